@@ -8,7 +8,7 @@ import yaml
 from pydantic import BeforeValidator, Field, model_validator
 
 from hydroid.errors import RunError, SettingsError
-from hydroid.files import is_file, write_atomic
+from hydroid.files import Plain, is_file, write_atomic
 from hydroid.findings import Finding
 from hydroid.settings.document import read_yaml
 from hydroid.settings.load import JointNumber, NotNegative, Settings, load
@@ -192,7 +192,7 @@ class FitSummary(Settings):
         """Name of the search's estimate, before any refinement."""
         return next(iter(self.estimates), "")
 
-    def plain(self) -> dict[str, Any]:
+    def plain(self) -> Plain:
         """Return mappings, lists, text and numbers, as YAML and JSON hold them."""
         return self.model_dump(mode="json", by_alias=True)
 
@@ -204,7 +204,7 @@ def write_estimate(folder: Path, summary: FitSummary) -> None:
     write_atomic(folder / NAME, text)
 
 
-def read_estimate(source: Path) -> tuple[Path, dict[str, Any], FitSummary | None]:
+def read_estimate(source: Path) -> tuple[Path, Plain, FitSummary | None]:
     """Read parameter values by name: of a folder, an `estimate.yaml`, or a YAML file of `K: 0.2` lines.
 
     Returned are the file, its values, unchecked where they are not an estimate's, and the estimate where

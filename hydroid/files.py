@@ -10,10 +10,11 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from itertools import count
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from hydroid.errors import RunError, SettingsError
 
+Plain = dict[str, Any]  # a mapping as YAML and JSON hold it
 PART = ".part"  # suffix of a file that is being written
 
 _log = logging.getLogger(__name__)

@@ -20,14 +20,13 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from hydroid.arrays import record
 from hydroid.errors import HydroidError, RunError
 from hydroid.estimate import finite
-from hydroid.files import write_atomic
+from hydroid.files import Plain, write_atomic
 from hydroid.fitting.fit import fit
 from hydroid.log import Log
 from hydroid.problem.problem import Problem
@@ -37,7 +36,7 @@ from hydroid.search.pareto import segment_best
 from hydroid.settings.fit import FitSettings, StudySettings, cell_settings
 from hydroid.settings.load import load
 
-Result = dict[str, Any]  # what `perform` returns, or {"failed": why}
+Result = Plain  # what `perform` returns, or {"failed": why}
 
 
 @record

@@ -6,10 +6,10 @@ masses: what a load, a slower engine or another day changes.
 """
 
 from collections.abc import Sequence
-from typing import Any
 
 from hydroid.advice.growth import Refit, refitted
 from hydroid.errors import SettingsError
+from hydroid.files import Plain
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
 from hydroid.problem.problem import Problem
@@ -51,7 +51,7 @@ def steps(
     logs: Sequence[Log],
     free: Sequence[str] = (),
     progress: Progress = no_progress,
-) -> list[dict[str, Any]]:
+) -> list[Plain]:
     """Return what freeing parameters one after another does, after the model as it is (""), as JSON has it.
 
     `free` are those to be freed; without any, those that pay. Errors are of the logs, and of parts left out.
@@ -60,7 +60,7 @@ def steps(
     pool = list(free) or [n for n, p in shared.items() if p.fixed is None or p.term is not None]
     problem, taken = Problem(adapted(model, pool), logs), list[str]()
     rms = float(problem.rms(problem.residuals(model.theta[None]))[0])
-    last, path = Refit(model.theta, rms, rms), list[dict[str, Any]]()
+    last, path = Refit(model.theta, rms, rms), list[Plain]()
     name = ""
     while True:
         path.append({"parameter": name} | last.degrees)

@@ -15,6 +15,7 @@ from hydroid.advice.growth import MIN_GAIN, Candidate, promising, refitted, scor
 from hydroid.arrays import Array
 from hydroid.errors import SettingsError
 from hydroid.estimate import finite
+from hydroid.files import Plain
 from hydroid.findings import Finding
 from hydroid.posterior.posterior import Posterior
 from hydroid.posterior.uncertainty import WEAK_ABOVE, Uncertainty
@@ -42,7 +43,7 @@ def advice(
     tests, weight = score_terms(problem, known, progress), known.linear.prior_weight
     best = promising(tests)
     without = refitted(problem, known.theta, weight)
-    rows: list[dict[str, Any]] = []
+    rows: list[Plain] = []
     for i, one in enumerate(best):
         row = {
             "name": one.term.name,
@@ -75,11 +76,11 @@ def advice(
     return content, (*said, *action_findings(content, problem.settings))
 
 
-def next_actions(problem: Problem, known: Uncertainty) -> list[dict[str, Any]]:
+def next_actions(problem: Problem, known: Uncertainty) -> list[Plain]:
     """Return the actions that would help most, the best first, as JSON has them (docs/json.md)."""
     now = forecast(known.posterior)
     wide, names = now.deviations, np.array(problem.parameters.names)[now.box.varied]
-    useful: list[tuple[int, float, dict[str, Any]]] = []
+    useful: list[tuple[int, float, Plain]] = []
     for kind, subject, rows in _forecasts(problem, known, now):
         narrow = now.add(rows).deviations
         before, after = (int(np.sum(each <= WEAK_ABOVE)) for each in (wide, narrow))
@@ -126,7 +127,7 @@ def _forecasts(problem: Problem, known: Uncertainty, now: Posterior) -> Iterator
         yield "experiment", f"{settings.design.duration_s:g}", best
 
 
-def proposed(one: Candidate, value: float) -> dict[str, dict[str, Any]]:
+def proposed(one: Candidate, value: float) -> dict[str, Plain]:
     """Return the entries of `parameters` that free a term, by name.
 
     Its bounds are a fifth and five times the value that was found, with the present value inside. Stage 2

@@ -6,7 +6,6 @@ cameras and lights of a fused body hang on the body that carries it; contacts ar
 
 import math
 from pathlib import Path
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -14,7 +13,7 @@ import yaml
 from numpy.typing import ArrayLike
 
 from hydroid.arm.locked import LockedArm
-from hydroid.files import write_atomic
+from hydroid.files import Plain, write_atomic
 from hydroid.mjcf import mjcf_text, quiet_mujoco
 
 _MECHANICAL_README = """\
@@ -131,7 +130,7 @@ def _draw_tendons(spec: mujoco.MjSpec) -> None:
 
 
 def write_fitted(
-    folder: Path, fitted: mujoco.MjSpec, timestep: float, joints: str, actuators: dict[str, Any] | None
+    folder: Path, fitted: mujoco.MjSpec, timestep: float, joints: str, actuators: Plain | None
 ) -> None:
     """Write the fitted arm to `model/`, beside `arm.xml`, and a README that says what it is good for.
 

@@ -18,6 +18,7 @@ import numpy as np
 from hydroid.arrays import Array
 from hydroid.cad.repair import compiled
 from hydroid.cad.source import Notes
+from hydroid.files import Plain
 from hydroid.settings.linkage import FourBar, Triangle, four_bar
 
 PARTS = {"rod", "piston", "cylinder", "cyl", "ram", "tube", "barrel"}
@@ -36,7 +37,7 @@ class _Pin:
         return self.bodies[self.bodies[0] == body]
 
 
-def take_cylinders(spec: mujoco.MjSpec, notes: Notes) -> dict[str, dict[str, Any]]:
+def take_cylinders(spec: mujoco.MjSpec, notes: Notes) -> dict[str, Plain]:
     """Hold the links of cylinders and return what an arm's file says of them, by the joint that they move.
 
     Pivots become sites of the links. A joint needs limits, or its cylinder might pass a dead centre.
@@ -51,7 +52,7 @@ def take_cylinders(spec: mujoco.MjSpec, notes: Notes) -> dict[str, dict[str, Any
     model = compiled(bare)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    pins, helpers, found = _pins(spec, data), set[str](), dict[str, dict[str, Any]]()
+    pins, helpers, found = _pins(spec, data), set[str](), dict[str, Plain]()
     for slide in [joint for joint in spec.joints if joint.type == mujoco.mjtJoint.mjJNT_SLIDE]:
         rod, tube = slide.parent.name, slide.parent.parent.name
         for foot in _at(pins, tube, rod):
@@ -116,7 +117,7 @@ def _at(pins: Sequence[_Pin], body: str, *without: str) -> list[_Pin]:
 
 def _linkage(
     pins: Sequence[_Pin], foot: _Pin, eye: _Pin, cylinder: tuple[str, str], data: mujoco.MjData
-) -> tuple[Any, dict[str, Any], tuple[str, ...]] | None:
+) -> tuple[Any, Plain, tuple[str, ...]] | None:
     """Return the joint that a cylinder moves, its settings, and links between them; None: it moves none.
 
     `foot` pins the tube to a link, `eye` the rod to another.
@@ -153,7 +154,7 @@ def _wrapped(angle: float) -> float:
     return (angle + math.pi) % (2 * math.pi) - math.pi
 
 
-def _four_bar(joint: Any, pins: Sequence[_Pin]) -> dict[str, Any] | None:
+def _four_bar(joint: Any, pins: Sequence[_Pin]) -> Plain | None:
     """Return the settings of a cylinder that turns a joint by a rocker and a coupler, as the file stands.
 
     The pins are those of the rocker on its link and on the coupler, of the coupler on the child, of tube and

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 import typer
 
 from hydroid.errors import HydroidError
+from hydroid.files import Plain
 from hydroid.progress import logging_to
 
 if TYPE_CHECKING:
@@ -49,7 +50,7 @@ class Printed:
     details: "Sequence[Table | str]" = field(default=(), kw_only=True)
     exit_status = 0
 
-    def plain(self) -> dict[str, Any]:
+    def plain(self) -> Plain:
         """Return what JSON holds."""
         return dict(self.content)
 
@@ -141,7 +142,7 @@ def show_error(error: Any) -> None:
         typer.echo(f"hydroid: {' '.join(text.split())}", err=True)
 
 
-def _print_json(content: dict[str, Any]) -> None:
+def _print_json(content: Plain) -> None:
     # the schema is the version of the keys (docs/json.md)
     typer.echo(json.dumps({"schema": 1} | content, ensure_ascii=False, allow_nan=False))
 

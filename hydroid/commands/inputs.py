@@ -16,7 +16,7 @@ import typer
 
 from hydroid.errors import SettingsError
 from hydroid.estimate import FitSummary, read_estimate
-from hydroid.files import find_config
+from hydroid.files import Plain, find_config
 from hydroid.identified_model import IdentifiedModel, load_identified
 from hydroid.progress import NOTE
 from hydroid.settings.fit import FitSettings
@@ -64,7 +64,7 @@ SHARED = """
     threads (N): Number of threads (0: one per core, or with --dask one per worker).
 """
 
-TERMINAL: dict[str, Any] = {
+TERMINAL: Plain = {
     "bool": bool,
     "int": int,
     "float": float,
@@ -81,7 +81,7 @@ COMMAND_LINES: dict[Callable[..., Any], tuple[str, str, list[inspect.Parameter]]
 """text, example and parameters on the command line of every command that is imported"""
 
 
-def setting_changes(given: SettingChanges, options: Mapping[str, Any] | None = None) -> dict[str, Any]:
+def setting_changes(given: SettingChanges, options: Mapping[str, Any] | None = None) -> Plain:
     """Return settings to replace by dotted key: those of `--set`, and the options that are not None.
 
     Raises:
@@ -139,7 +139,7 @@ def open_model(
     return model
 
 
-def open_values(fit: ModelSource) -> tuple[dict[str, Any], FitSummary | None]:
+def open_values(fit: ModelSource) -> tuple[Plain, FitSummary | None]:
     """Return the values of an estimate by name, and the fit's own account of them where there is one.
 
     Raises:
@@ -194,7 +194,7 @@ def _typed(parameter: inspect.Parameter, value: str, text: str) -> inspect.Param
     spelt = [f"--{parameter.name.replace('_', '-')}"]
     if parameter.name == "out":
         spelt.append("-o")
-    how: dict[str, Any] = {"metavar": value or None, "help": text}
+    how: Plain = {"metavar": value or None, "help": text}
     if limits := re.fullmatch(r"(\S+) (?:or more|to (\S+))", value):
         how |= {"metavar": None, "min": one(limits[1]), "max": limits[2] and one(limits[2])}
     if parameter.kind is parameter.POSITIONAL_OR_KEYWORD:

@@ -1,7 +1,7 @@
 """`hydroid suggest` and `hydroid design`: what the model lacks, and the next experiment."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from hydroid.commands.console import Result, written
 from hydroid.commands.inputs import (
@@ -17,7 +17,7 @@ from hydroid.commands.inputs import (
 )
 from hydroid.commands.logs import problem_of, read_logs
 from hydroid.commands.progress import Progress
-from hydroid.files import is_file
+from hydroid.files import Plain, is_file
 from hydroid.findings import Finding
 from hydroid.identified_model import CONFIG
 
@@ -106,7 +106,7 @@ def suggest(
     return Result(lines, content, findings)
 
 
-def _verdict(term: dict[str, Any]) -> str:
+def _verdict(term: Plain) -> str:
     return "free it" if "command" in term else "leave it" if "freed" in term else "others first"
 
 
@@ -159,7 +159,7 @@ def design(
         existing = read_logs(logs, settings, repair=repair)
         result = best_experiment(settings, model.theta, existing, seed, progress)
     stages = (result.known.deviations, result.random_deviations, result.after.deviations)
-    rows: list[dict[str, Any]] = [
+    rows: list[Plain] = [
         {"parameter": name, "estimate": model.values[name]}
         | {"before_percent": 100 * before, "random_percent": 100 * random, "designed_percent": 100 * after}
         | {"gain": random / after, "flag": flag_of(after).value}

@@ -23,6 +23,7 @@ from hydroid.commands.inputs import (
 from hydroid.commands.logs import read_logs
 from hydroid.commands.progress import FitProgress, Progress
 from hydroid.errors import SettingsError
+from hydroid.files import Plain
 from hydroid.parallel.cluster import open_workers
 from hydroid.quantity_table import MECHANICAL
 from hydroid.settings.fit import FitSettings
@@ -116,7 +117,7 @@ def _changes(
     seed: int | None,
     threads: int | None,
     refinement: bool | None,
-) -> dict[str, Any]:
+) -> Plain:
     """Return the settings that the options of both stages replace."""
     options = {"search.algorithm": algorithm, "search.seed": seed, "simulation.threads": threads}
     return setting_changes(given, options) | ({"refinement": None} if refinement is False else {})
@@ -145,9 +146,7 @@ def load_stage(
     return load_settings(config, {**changes, **starts, **changes})
 
 
-def with_mechanics(
-    mech: "ModelSource | None", config: ConfigSource, changes: Mapping[str, Any]
-) -> dict[str, Any]:
+def with_mechanics(mech: "ModelSource | None", config: ConfigSource, changes: Mapping[str, Any]) -> Plain:
     """Return changes of stage 2's settings `config` that hold the parameters of stage 1 at its estimate.
 
     Of a run folder or a result of stage 1, or a YAML file of values by name, the masses hold, and damping and
@@ -162,7 +161,7 @@ def with_mechanics(
             "is a fit of stage 2, but --mech takes one of stage 1", where=str(mech), hint=hint
         )
     settings = load_stage("hyd", config, changes)
-    held, missing = dict[str, Any](), list[str]()
+    held, missing = Plain(), list[str]()
     for name, p in settings.parameters.items():
         if p.quantity not in MECHANICAL or p.quantity == "gain":
             continue

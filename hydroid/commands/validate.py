@@ -16,6 +16,7 @@ from hydroid.commands.inputs import (
     open_model,
 )
 from hydroid.commands.logs import read_logs
+from hydroid.files import Plain
 from hydroid.identified_model import IdentifiedModel
 from hydroid.words import listed
 
@@ -66,7 +67,7 @@ def validate(
     from hydroid.run.record import fitted_by, keep_validation, run_of
 
     stated = {} if tolerance is None else {"tolerance_deg": tolerance}
-    results, verdicts = dict[str, Any](), dict[str, Any]()
+    results, verdicts = Plain(), Plain()
     for one, model, own in zip(given, models, read, strict=True):
         name = unique(model.name, results)
         fitted, baselines, hashes = fitted_by(model)

@@ -13,6 +13,7 @@ import numpy as np
 
 from hydroid.arrays import Array
 from hydroid.errors import LogError
+from hydroid.files import Plain
 from hydroid.log.clues import column_unit, direction, joint_of, kind_of, likely_range, number_in
 from hydroid.log.table import Signal, Table
 from hydroid.units import UNITS, likely_time_unit
@@ -30,7 +31,7 @@ class ColumnGuess(NamedTuple):
         unused: the other columns.
     """
 
-    log: dict[str, Any]
+    log: Plain
     reasons: tuple[str, ...]
     unused: tuple[str, ...]
 
@@ -72,9 +73,9 @@ def guess_columns(
     )
     unitless = [c.values for joint, (c,) in angles.items() if joint not in slides and not c.unit]
     default = "rad" if max((np.nanmax(np.abs(x)) for x in unitless), default=np.inf) <= 6.3 else "deg"
-    entries = dict[int, dict[str, Any]]()
+    entries = dict[int, Plain]()
     for joint in sorted({*angles, *commands}):
-        entry: dict[str, Any] = {"command": None, "angle": None}
+        entry: Plain = {"command": None, "angle": None}
         entries[joint], of = entry, joints[joint - 1]
         if pair := commands.get(joint):
             entry["command"], said = _command(table, pair)
@@ -159,11 +160,11 @@ def _by_joint(
     return given
 
 
-def _command(table: Table, columns: Sequence[_Column]) -> tuple[dict[str, Any], str]:
+def _command(table: Table, columns: Sequence[_Column]) -> tuple[Plain, str]:
     """Return the settings of a command, and its name with what its numbers seem to be."""
     names = [column.name for column in columns]
     likely = likely_range(*np.nan_to_num(table.read([Signal(name, "command") for name in names]).values.T))
-    entry: dict[str, Any] = {"column": names[0] if len(names) == 1 else names}
+    entry: Plain = {"column": names[0] if len(names) == 1 else names}
     if likely is None or "%" in (columns[0].unit, likely.name):
         return entry, f"{' and '.join(names)}: command in %"
     entry |= {"scale": likely.scale} | ({"offset": likely.offset} if likely.offset else {})

@@ -1,7 +1,7 @@
 """The arm's files of a project: those of an imported arm, or a template to be filled in."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -9,6 +9,7 @@ import yaml
 
 from hydroid.arm.model import load_model
 from hydroid.cad.importer import SCENE, ImportedArm
+from hydroid.files import Plain
 from hydroid.hydraulics.valve import DENSITY
 from hydroid.settings.arm import Arm
 from hydroid.settings.cylinder import LinearActuator
@@ -135,18 +136,18 @@ def arm_text(imported: ImportedArm, arm: Arm | None, sizes: Sequence[JointSize],
     `arm` is what an earlier text of it says; None: this is that text, and cylinders have a size that nothing
     uses. `title` says where the arm came from.
     """
-    actuators = dict[str, dict[str, Any]]()
+    actuators = dict[str, Plain]()
     if arm is None:
         areas = {"area_a": 1000, "area_b": 600, "max_opening": 1}
         actuators = {name: own | areas for name, own in imported.cylinders.items()}
     for joint, size in zip(arm.joints if arm else (), sizes, strict=True):
         own = imported.cylinders.get(joint.name, {"kind": "linear"} if joint.slides else None)
         area = size.area or size.displacement
-        oil: dict[str, Any] = {"kind": "rotary", "displacement": rounded(size.displacement)}
+        oil: Plain = {"kind": "rotary", "displacement": rounded(size.displacement)}
         if own is not None:  # the rod leaves about 65 % of the area
             oil = own | {"area_a": rounded(area), "area_b": rounded(0.65 * area)}
         actuators[joint.name] = oil | {"max_opening": rounded(size.opening)}
-    flow: dict[str, Any] = {"default_flow_style": True, "sort_keys": False, "width": 1e9}
+    flow: Plain = {"default_flow_style": True, "sort_keys": False, "width": 1e9}
     lines = [f"  {name}: {yaml.safe_dump(own, **flow).strip()}" for name, own in actuators.items()]
     notes = "".join(f"# - {note}\n" for note in imported.notes)
     return ARM_FILE.format(title=title, notes=notes, lift=LIFT, actuators="\n".join(lines) or "  {}")

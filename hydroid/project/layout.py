@@ -3,11 +3,11 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from hydroid.errors import LogError, SettingsError
+from hydroid.files import Plain
 from hydroid.log import JointMotion, Table, check_log, guess_columns, motion_of
 from hydroid.log.read import angle_margin
 from hydroid.settings.arm import Arm, Joint
@@ -33,7 +33,7 @@ class Layout:
         followed: whether a joint without a command moves.
     """
 
-    section: dict[str, Any]
+    section: Plain
     outputs: tuple[int, ...]
     reasons: tuple[str, ...]
     unused: tuple[str, ...]
@@ -101,7 +101,7 @@ def _remarks(motion: JointMotion, joint: Joint, wrong: bool) -> Iterator[str]:
         yield f"{joint.name} does not move below about {motion.dead_band:g} % of command: a dead band"
 
 
-def turned(command: dict[str, Any]) -> dict[str, Any]:
+def turned(command: Plain) -> Plain:
     """Return the settings of a command of the other sign."""
     if isinstance(command["column"], list):
         return command | {"column": command["column"][::-1]}

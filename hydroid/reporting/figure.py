@@ -16,6 +16,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from hydroid.arm.model import load_model
 from hydroid.arrays import Array
+from hydroid.files import Plain
 from hydroid.reporting.chart import SERIES, Chart, Mark, Panel
 from hydroid.reporting.outlines import Shape, body_poses, placed, shapes, sight
 from hydroid.settings.arm import Arm
@@ -32,7 +33,7 @@ SHADES = {
     "yellow": "#E69F00",
     "sky": "#56B4E9",
 }
-_STYLE: dict[str, Any] = {
+_STYLE: Plain = {
     "font.family": ["DejaVu Sans"],  # comes with matplotlib: the same glyphs on every machine
     "axes.titlesize": 10.0,
     "axes.titlelocation": "left",
@@ -103,7 +104,7 @@ def _panel(axes: Axes, panel: Panel) -> None:
 
 def _draw(axes: Axes, mark: Mark) -> None:
     x, y, end = mark.x, mark.y, mark.end
-    look: dict[str, Any] = {"color": SHADES[mark.color], "alpha": mark.alpha, "label": mark.label or None}
+    look: Plain = {"color": SHADES[mark.color], "alpha": mark.alpha, "label": mark.label or None}
     match mark.kind:
         case "line":
             axes.plot(x, y, lw=mark.width, **look)

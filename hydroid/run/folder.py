@@ -17,7 +17,7 @@ from hydroid.arm.model import load_model
 from hydroid.arrays import Array
 from hydroid.errors import RunError, Stopped
 from hydroid.estimate import NAME, FitSummary, write_estimate
-from hydroid.files import is_file, remove_parts, write_atomic
+from hydroid.files import Plain, is_file, remove_parts, write_atomic
 from hydroid.identified_model import ARM, CONFIG, MODEL, IdentifiedModel, portable, write_settings
 from hydroid.log import Log
 from hydroid.plant import Plant
@@ -31,7 +31,7 @@ DESCRIPTION = "run.json"
 """name of the file that describes the run: versions, seed, hashes of its logs and files, status, seconds"""
 
 
-def identity(settings: FitSettings, logs: Sequence[Log]) -> dict[str, Any]:
+def identity(settings: FitSettings, logs: Sequence[Log]) -> Plain:
     """Return versions, the settings that decide, and hashes of the logs and of the arm's model."""
     versions = {name: version(name) for name in ("hydroid", "mujoco", "numpy")}
     return versions | {
@@ -43,7 +43,7 @@ def identity(settings: FitSettings, logs: Sequence[Log]) -> dict[str, Any]:
     }
 
 
-def deciding(settings: FitSettings) -> dict[str, Any]:
+def deciding(settings: FitSettings) -> Plain:
     """Return the settings that decide a result, and the arm's.
 
     Without threads and unused searches, and without where the arm's files are.
@@ -100,7 +100,7 @@ def _file_hash(*files: Path) -> str:
     return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
 
 
-def _flat(values: Any, prefix: str = "") -> dict[str, Any]:
+def _flat(values: Any, prefix: str = "") -> Plain:
     if not isinstance(values, dict):
         return {prefix: values}
     inner = (_flat(value, f"{prefix}.{key}".lstrip(".")) for key, value in values.items())
@@ -177,7 +177,7 @@ class RunFolder:
                 hint = "put it back as it was, or choose another folder"
                 raise RunError("has changed since the run began", where=self.path / name, hint=hint)
 
-    def identity(self) -> dict[str, Any]:
+    def identity(self) -> Plain:
         """Read the run's description; raises RunError: missing or damaged."""
         file = self.path / DESCRIPTION
         try:
@@ -226,5 +226,5 @@ class RunFolder:
         run = hashlib.sha256(json.dumps(fixed, sort_keys=True).encode()).hexdigest()
         return CheckpointFile(self.path / "checkpoint.npz", run)
 
-    def _describe(self, content: dict[str, Any]) -> None:
+    def _describe(self, content: Plain) -> None:
         write_atomic(self.path / DESCRIPTION, json.dumps(content, indent=2) + "\n")

@@ -16,6 +16,7 @@ from pydantic import (
 )
 
 from hydroid.errors import SettingsError
+from hydroid.files import Plain
 from hydroid.settings.document import Lines, read_document, read_yaml
 from hydroid.words import listed
 
@@ -89,7 +90,7 @@ def load(path: Path, kind: type[S], overrides: Mapping[str, Any] | None = None) 
 
 
 def validate(
-    values: dict[str, Any],
+    values: Plain,
     kind: type[S],
     source: str,
     lines: Lines | None = None,
@@ -131,7 +132,7 @@ def parse_override(text: str) -> tuple[str, Any]:
     return key.strip(), read_document(value, f"--set {text}")[0]
 
 
-def replace_setting(values: dict[str, Any], key: str, value: Any) -> None:
+def replace_setting(values: Plain, key: str, value: Any) -> None:
     """Set a value of nested mappings by its dotted key; numbers of joints may be keys.
     Raises SettingsError: what the key names has no settings below it.
     """

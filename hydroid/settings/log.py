@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, ValidationInfo
 
+from hydroid.files import Plain
 from hydroid.settings.load import JointNumber, Settings
 
 JOINT = "{joint}"
@@ -144,7 +145,7 @@ class LogSettings(Settings):
         own: Columns | None = getattr(self.joints.get(joint, JointColumns()), kind, None)
         if own is None or (common is None and not _given(own)):
             return None
-        given: dict[str, Any] = vars(DEFAULTS[kind]) | (_given(common) if common else {}) | _given(own)
+        given: Plain = vars(DEFAULTS[kind]) | (_given(common) if common else {}) | _given(own)
         names = tuple(self._prefix + name.replace(JOINT, str(joint)) for name in given["column"])
         return ColumnMap(names, given["unit"], given["scale"], given["offset"])
 
@@ -161,5 +162,5 @@ class LogSettings(Settings):
         return self.changed(nothing | {"joints": joints})
 
 
-def _given(columns: Columns) -> dict[str, Any]:
+def _given(columns: Columns) -> Plain:
     return {name: value for name, value in columns if value is not None}

@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from hydroid.files import Plain
 from hydroid.parameters import Parameter, Prior
 from hydroid.quantity_table import CHOICES, MECHANICAL, TARGETS
 from hydroid.settings.arm import Actuator, Arm
@@ -12,14 +13,14 @@ from hydroid.settings.linkage import RotaryActuator
 from hydroid.settings.problem import ParameterSettings
 
 
-def expanded(parameters: Mapping[str, Any], compared: Any, arm: Arm | None) -> dict[str, Any]:
+def expanded(parameters: Mapping[str, Any], compared: Any, arm: Arm | None) -> Plain:
     """Return the settings of parameters, as YAML gives them, with one entry for each joint or link of `each`.
 
     `compared` are the joints that `each: true` means; of masses it means all links. With one joint a
     mechanical parameter serves all joints, because those that are driven but not compared need it too.
     Raises ValueError: a parameter with `joints` or `link` and `each`.
     """
-    result: dict[str, Any] = {}
+    result: Plain = {}
     for name, entry in parameters.items():
         each = entry.get("each") if isinstance(entry, dict) else None
         if not each:

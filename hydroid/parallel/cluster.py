@@ -24,7 +24,6 @@ from typing import Any
 import yaml
 
 from hydroid.errors import RunError, SettingsError
-from hydroid.files import Plain
 from hydroid.parallel.workers import DaskWorkers
 
 CONNECT = 20.0  # seconds in which a scheduler must answer
@@ -85,9 +84,9 @@ def write_credentials(folder: Path) -> None:
 
     security: Any = Security.temporary()  # pyright: ignore[reportUnknownMemberType]
     configs = {role: security.get_tls_config_for_role(role) for role in ("scheduler", "worker", "client")}
-    tls: Plain = {role: {key: c[key] for key in ("cert", "key")} for role, c in configs.items()}
+    tls: dict[str, Any] = {role: {key: c[key] for key in ("cert", "key")} for role, c in configs.items()}
     tls["ca-file"] = configs["client"]["ca_file"]
-    closed: Plain = {name: {"http": {"routes": []}} for name in ("scheduler", "worker")}
+    closed: dict[str, Any] = {name: {"http": {"routes": []}} for name in ("scheduler", "worker")}
     comm = {"default-scheme": "tls", "require-encryption": True, "tls": tls}
     folder.mkdir(mode=0o700)
     (folder / "distributed.yaml").write_text(yaml.safe_dump({"distributed": {"comm": comm} | closed}))

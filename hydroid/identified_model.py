@@ -26,8 +26,8 @@ class IdentifiedModel:
         theta: the parameters in the order and units of the settings, shape (P,).
         source: where the estimate came from, for messages.
         summary: the fit's own account of the estimate, where a fit made it.
-        nominal: names of parameters without a value. The settings and the arm's file give their effect; they
-            are not among the settings' parameters.
+        nominal: parameters without a value, whose effect the settings and the arm's file give; they are not
+            among the settings' parameters.
     """
 
     settings: FitSettings

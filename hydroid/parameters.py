@@ -17,10 +17,8 @@ from hydroid.errors import SettingsError
 class Prior:
     """What is known of one parameter besides the logs: Gaussian, or log-normal where `log`.
 
-    Attributes:
-        nominal: most likely value; of a log-normal prior its median.
-        sd: standard deviation in the unit; of a log-normal prior that of the logarithm.
-        log: whether the logarithm is Gaussian.
+    `nominal` is the most likely value, of a log-normal prior its median; `sd` the standard deviation in the
+    unit, or that of the logarithm.
     """
 
     nominal: float

@@ -147,11 +147,9 @@ SHORT = RefinementSettings(iterations=30, gain_tolerance=1e-3)  # of the refinem
 
 @dataclass(frozen=True)
 class Candidate:
-    """A change of the settings that frees one more parameter.
+    """A change of the settings that frees one more parameter, to be refined from `start`, in its unit.
 
     Attributes:
-        term: the change.
-        start: value to refine it from, in its unit.
         score: how clearly the residual shows its effect, in standard deviations.
         chance: of such a score if the model lacks nothing.
         gain: part of the rms error that freeing it saves, by the linear approximation.

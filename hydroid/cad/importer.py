@@ -42,11 +42,9 @@ SCENE = """
 
 @record
 class ImportedArm:
-    """A serial arm out of a robot's file.
+    """A serial arm out of a robot's file: its model's name and MJCF.
 
     Attributes:
-        name: of the robot.
-        mjcf: its model, with meshes in the folder MESHES.
         meshes: binary STL files by their path from the model.
         cylinders: settings of the cylinders that the file models, but for areas, by joint.
         notes: what was assumed, left out or mended, a line each.

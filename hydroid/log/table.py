@@ -49,10 +49,9 @@ class Signal:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Table:
-    """Named columns of one file.
+    """Named columns of one file, the source.
 
     Attributes:
-        source: the file.
         names: of the columns, in order; "" for one without.
         columns: their cells by name, shape (R,): numbers, times or text.
         header: line of the names [1-based]; None where the format stores them.
@@ -90,11 +89,9 @@ class Table:
 
 @record
 class Recording:
-    """The used columns of one file, R rows of C signals.
+    """The used columns of one file, a table: R rows of C signals, the first of which is the time.
 
     Attributes:
-        table: the file.
-        signals: of its columns; the first is the time.
         values: in the signals' units, shape (R, C), NaN where the file holds no number.
         rows: of the table [0-based], shape (R,).
     """

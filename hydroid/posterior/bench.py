@@ -22,14 +22,9 @@ from hydroid.simulation.scenario import Scenario
 
 @record
 class Bench:
-    """A joint whose quantities are wanted.
+    """A joint, numbered from 1, whose quantities are wanted.
 
-    Attributes:
-        settings: of the fit.
-        joint: its number, from 1.
-        angle: at which it is tested [rad].
-        period: between samples [s].
-        scenario: the joint alone.
+    `angle`: at which it is tested [rad]; `period` between samples [s]; `scenario`: the joint alone.
     """
 
     settings: FitSettings

@@ -160,7 +160,7 @@ def regular(rows: Array) -> Array:
 def stored_posterior(model: IdentifiedModel) -> Posterior | None:
     """Return the posterior that a fit kept; None where there is none for these parameters.
 
-    Parameters that the settings no longer free, or whose values changed, are not the fit's.
+    Those that the settings no longer free, or whose values changed, are not the fit's.
     """
     summary, parameters = model.summary, model.settings.parameter_set()
     if summary is None or summary.covariance is None:

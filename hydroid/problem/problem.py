@@ -66,14 +66,11 @@ class Spread(Protocol):
 
 
 class Problem:
-    """Logs, the model that should reproduce them, and the measure of the difference.
+    """Logs, each with its own start pose, the model that should reproduce them, and the measure of the
+    difference.
 
-    Args:
-        settings: the fit's settings.
-        logs: one or more records, each with its own start pose.
-        spread: where candidates are simulated; None: in this process. A worker has `simulation.threads`
-            threads, one where that is 0.
-        spec: the arm's model, if it is not the one that the settings name; then without `spread`.
+    Candidates are simulated by `spread`, where a worker has `simulation.threads` threads, one where that is
+    0; None: in this process. `spec` is the arm's model, if not that of the settings; then without `spread`.
 
     Attributes:
         channels: the compared signals, in the order of a row of residuals.

@@ -27,8 +27,7 @@ class Layout:
     Attributes:
         section: the `log` section of a fit's settings.
         outputs: joints with a command and an angle, numbered from 1.
-        reasons: a line for each column, and for what was found in the numbers.
-        unused: names of the other columns.
+        reasons: a line for each column that is not `unused`, and for what was found in the numbers.
         motions: how the measured joints move, by number.
         followed: whether a joint without a command moves.
     """

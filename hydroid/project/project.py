@@ -51,15 +51,10 @@ Then, from the folder in which you ran `hydroid init`:
 
 @dataclass(frozen=True)
 class Project:
-    """A project that was written.
+    """A project that was written: its folder, and the names of its files and folders there.
 
-    Attributes:
-        folder: where.
-        files: names of its files and folders there.
-        notes: what the import of the arm assumed, left out or mended.
-        columns: what each column of the log is taken for, and why.
-        unused: names of the log's other columns.
-        commands: what to run next, in this order.
+    `notes` say what the import of the arm assumed, left out or mended; `columns` what each column of the log
+    is taken for, and why; `unused` names the others; `commands` are to be run next, in this order.
     """
 
     folder: Path

@@ -64,15 +64,9 @@ class Mark:
 
 @record
 class Panel:
-    """A pair of axes.
+    """A pair of axes, with marks in the order in which they are drawn, and its height in the page [px].
 
-    Attributes:
-        x, y: labels of the axes.
-        marks: in the order in which they are drawn.
-        title: above the panel.
-        height: in the page [px].
-        y_limits: of the axis; None: around all that is drawn.
-        log_y: whether the y axis is logarithmic.
+    `x`, `y` label the axes; `y_limits` None: around all that is drawn.
     """
 
     x: str
@@ -86,13 +80,10 @@ class Panel:
 
 @record
 class Chart:
-    """Panels that belong together, with one legend.
+    """Panels that belong together, with one legend, row by row in `columns` on a wide screen and in files.
 
-    Attributes:
-        panels: row by row.
-        columns: on a wide screen and in files.
-        linked: whether all panels share their x axis: zooming one zooms all.
-        bins: parts of a curve of which the lowest and the highest sample are drawn.
+    Where `linked`, all share their x axis. Of a curve the lowest and the highest sample of `bins` parts is
+    drawn.
     """
 
     panels: tuple[Panel, ...]

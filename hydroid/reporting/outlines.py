@@ -110,10 +110,9 @@ _CAPTION = (
 
 @record
 class MovingArm:
-    """An arm and how it moves, in units of the picture.
+    """An arm and how it moves, in units of the picture of a size.
 
     Attributes:
-        size: width and height of the picture.
         shapes: in the order in which they are drawn, each with the number of its rigid part as its body.
         time: of the moments [s], shape (F,).
         poses: `measured` and `simulated`: how each part lies in the picture, rows of the 2 × 3 turn and of

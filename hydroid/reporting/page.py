@@ -29,12 +29,7 @@ class Given(float):
 class Table:
     """A table; each row has one cell per column of the header.
 
-    Attributes:
-        title: above the table.
-        header: names of the columns.
-        rows: the cells.
-        note: below the table.
-        optional: columns that a narrow terminal leaves out, the least important first.
+    The note stands below it. A narrow terminal leaves out `optional` columns, the least important first.
     """
 
     title: str
@@ -65,8 +60,8 @@ class Table:
     def show(self) -> None:
         """Print the table within the width of the terminal or of COLUMNS; elsewhere lines have any length.
 
-        Columns of text wrap at words. Where that does not suffice, `optional` columns are left out and named
-        below the table.
+        Columns of text wrap at words. Where that does not suffice, `optional` columns are named below it
+        instead.
         """
         from rich.console import Console
 
@@ -182,16 +177,11 @@ class Section:
 
 @dataclass(frozen=True)
 class Page:
-    """A report.
+    """A report: the answer in a sentence, `lead`, and its sections; `name` is that of its file, without
+    ending.
 
-    Attributes:
-        name: of the page's file, without ending.
-        title: of the page.
-        lead: the answer in a sentence.
-        sections: in order.
-        warnings: what a reader must know before using the answer; stand behind the first section.
-        versions: of the software, printed at the foot.
-        data: further files by name, such as CSV for scripts.
+    `warnings` must be read before using the answer, and stand behind the first section; `versions` of the
+    software stand at the foot; `data` are further files by name, such as CSV for scripts.
     """
 
     name: str

@@ -69,19 +69,12 @@ _log = logging.getLogger(__name__)
 
 
 class CheckpointFile(UserDict[str, Arrays]):
-    """Checkpoints by name; every change is written to one file.
+    """Checkpoints by name; every change is written to one file, which is made with the first of a run's id.
 
     The file before it is kept as `checkpoint.previous.npz`. Where the newest one is damaged, it is put aside
     as `checkpoint.damaged.npz` with a warning, and the one before it is taken: what the run did since is done
-    again, to the same bits.
-
-    Args:
-        file: is made with the first checkpoint.
-        run: id of the run.
-
-    Raises:
-        RunError: none is whole, or it is that of another run; on a change, it cannot be written, and both
-            files are as they were.
+    again, to the same bits. Raises RunError: none is whole, or it is that of another run; on a change, it
+    cannot be written, and both files are as they were.
     """
 
     def __init__(self, file: Path, run: str) -> None:

@@ -51,10 +51,9 @@ class Effort:
 
 @record
 class FitResult:
-    """The arrays of a fit.
+    """The arrays of a fit: what its estimates make of its logs, and how they came to be.
 
     Attributes:
-        fitted: what its estimates make of its logs.
         history: of the search, shape (G, len(HISTORY)).
         front: non-dominated candidates, (n, P), with objectives by segment and overall, (n, S + 1).
         segments: objectives of each estimate by segment, shape (S,).
@@ -72,14 +71,12 @@ class FitResult:
 
 @record
 class Record:
-    """A finished run.
+    """A finished run: its folder, as a command takes it.
 
     Attributes:
-        folder: where it is, as a command takes it.
         identity: versions, and hashes of its logs by source.
         settings: after a joint refinement with every parameter free that was refined.
         summary: the final estimate, and the others.
-        result: arrays.
         validations: predictions of unseen logs by name.
     """
 

@@ -114,15 +114,13 @@ class Scenario:
     what the others do.
 
     Attributes:
-        settings: what the other joints do, steps, threads.
         arm: the arm reduced to its V moving joints, springs slack in the start pose.
         active: shape (J,).
         outputs: columns of the outputs among the moving joints, shape (K,).
         command: held during each step [%], shape (steps, V).
         period: between samples [s].
         prescribed: the joints that follow the log.
-        pressure: in which the moving joints' chambers rest at the start [Pa], shape (V, 2), NaN where the log
-            has none.
+        pressure: in which the moving joints' chambers rest at the start [Pa], (V, 2), NaN where not measured.
     """
 
     def __init__(

@@ -19,7 +19,6 @@ class Motion:
     """A machine under the commands of logs.
 
     Attributes:
-        machine: what moves.
         time: [s], shape (T,).
         simulated: angles of all joints of the machine [rad], shape (T, nq).
         measured: the same as logged; None where the logs hold no motion.

@@ -59,7 +59,7 @@ def steps(
     shared = {n: p for n, p in model.settings.parameters.items() if p.joints is None and p.can_be_free}
     pool = list(free) or [n for n, p in shared.items() if p.fixed is None or p.term is not None]
     problem, taken = Problem(adapted(model, pool), logs), list[str]()
-    rms = float(problem.rms(problem.residuals(model.theta[None]))[0])
+    rms = float(problem.rms(problem.output_errors(model.theta[None]))[0])
     last, path = Refit(model.theta, rms, rms), list[Plain]()
     name = ""
     while True:

@@ -228,7 +228,7 @@ def refitted(problem: Problem, theta: Array, weight: float | None = None) -> Ref
     for part in np.unique(number[:size]):
         out = number == part
         unseen[out[:size]] = rows(parameters.from_unit(fitted(whole.point, ~out).point)[None])[0, out]
-    rms = problem.rms(np.stack([whole.residual[:size], unseen])).tolist()
+    rms = problem.rms(problem.unfiltered(np.stack([whole.residual[:size], unseen]))).tolist()
     return Refit(parameters.from_unit(whole.point), *rms)
 
 

@@ -17,6 +17,7 @@ from hydroid.errors import SettingsError
 from hydroid.estimate import finite
 from hydroid.files import Plain
 from hydroid.findings import Finding
+from hydroid.posterior.noise import error_level
 from hydroid.posterior.posterior import Posterior
 from hydroid.posterior.uncertainty import WEAK_ABOVE, Uncertainty
 from hydroid.problem.problem import Problem
@@ -109,7 +110,7 @@ def _forecasts(problem: Problem, known: Uncertainty, now: Posterior) -> Iterator
             kind = "weigh" if quantity == "mass" else "state"
             yield kind, name, row[None] / STATED_SD[kind]
     level, time = max(
-        (noise.level / channel.weight, noise.correlation_time * problem.logs[channel.log].period)
+        (error_level(channel, noise), noise.correlation_time * problem.logs[channel.log].period)
         for channel, noise in zip(problem.channels, known.noise, strict=True)
         if channel.quantity == "angle"
     )

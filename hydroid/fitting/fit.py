@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from hydroid.advice.growth import refitted
+from hydroid.advice.growth import MIN_GAIN, refitted
 from hydroid.fitting.checkpoints import Checkpoints
 from hydroid.fitting.refinement import refine
 from hydroid.fitting.search import Searched, search
@@ -24,11 +24,9 @@ from hydroid.search.pareto import average, best, non_dominated, utopia
 
 _log = logging.getLogger(__name__)
 
-NEARER = 0.95
-"""part of the rms error that is left at most by what is kept: the dynamic model, and terms also on parts of
-the logs left out"""
-TOO_FAR = 5.0
-"""times the rms error of the last estimate from which the dynamic model is not refined"""
+TOO_FAR = 20.0
+"""times the rms error of the last estimate from which the dynamic model is not refined: lags that stand for oil
+in a quasi-static model are too much beside it, and it errs by several times as much at first"""
 
 
 @dataclass(frozen=True)
@@ -130,15 +128,15 @@ def fit(problem: Problem, watch: Watcher | None = None, checkpoints: Checkpoints
         own = problem.varied(settings.of_estimate(name))
         theta = own.parameters.started(last.parameters.mapping(start.theta))
         other_model = if_nearer and own.settings.quasi_static != last.settings.quasi_static
-        if other_model and not own.rms(own.residuals(theta[None]))[0] < TOO_FAR * start.rms:
+        if other_model and not own.rms(own.output_errors(theta[None]))[0] < TOO_FAR * start.rms:
             return
         result = refine(own, theta, settings.refinement, watch.refining, checkpoints, name)
         estimates.update(_estimates(own, {name: own.parameters.from_unit(result.point)}))
         refinements[name], new = result, estimates[name]
-        nearer = new.rms < NEARER * start.rms
+        nearer = new.rms < (1 - MIN_GAIN) * start.rms
         if nearer and own.settings.terms != last.settings.terms:
             with_it, without = refitted(own, new.theta), refitted(last, start.theta)
-            nearer = with_it.left_out < NEARER * without.left_out
+            nearer = with_it.left_out < (1 - MIN_GAIN) * without.left_out
         if nearer or not if_nearer:
             final, last, start = name, own, new
 
@@ -194,7 +192,7 @@ def _estimates(problem: Problem, candidates: dict[str, Array]) -> dict[str, Esti
     """Simulate candidates by name, each of shape (P,), and measure them; those that diverged come last."""
     theta = np.array(list(candidates.values()))
     responses = problem.responses(theta)
-    errors = np.concatenate([channel.residual(responses) for channel in problem.channels], axis=1)
+    errors = np.concatenate([channel.error(responses) for channel in problem.channels], axis=1)
     objective = problem.settings.objective
     segments = segment_objectives(errors, problem.measured, problem.bounds, objective)
     overall, rms = overall_objective(errors, problem.measured, objective), problem.rms(errors)

@@ -80,7 +80,8 @@ def refine(
                 now = after
                 keep(now.arrays)
             now = step(now, residuals, settings)
-            progress(name, now.evaluations, problem.rms(now.residual[None, : problem.measured.size])[0])
+            errors = problem.unfiltered(now.residual[None, : problem.measured.size])
+            progress(name, now.evaluations, problem.rms(errors)[0])
         keep(now.arrays)
     _log.info("refinement of %d parameters: %s", now.point.size, now)
     return now

@@ -11,6 +11,7 @@ from hydroid.fitting.fit import Fit
 from hydroid.parameters import Array, ParameterSet
 from hydroid.posterior.by_log import FEW, ByLog, by_log
 from hydroid.posterior.identifiability import Identifiability
+from hydroid.posterior.noise import error_level
 from hydroid.posterior.uncertainty import Flag, Source, Uncertainty
 from hydroid.problem.problem import Problem
 
@@ -75,7 +76,7 @@ def account(problem: Problem, known: Uncertainty, directions: Identifiability | 
     squares = defaultdict[str, list[float]](list)
     for channel, noise in zip(problem.channels, known.noise, strict=True):
         if channel.quantity == "angle":
-            squares[f"q{channel.joint}"].append((noise.level / channel.weight) ** 2)
+            squares[f"q{channel.joint}"].append(error_level(channel, noise) ** 2)
     findings = [*_parameter_findings(parameters, estimate), *log_findings(logs)]
     findings += _direction_findings(directions) if directions else []
     return FitSummary(

@@ -17,6 +17,7 @@ from hydroid.arrays import Array, record
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
 from hydroid.posterior.linear import start_deviations
+from hydroid.posterior.noise import error_level
 from hydroid.posterior.posterior import COVERAGE, NORMAL, STEP, Posterior, stored_posterior
 from hydroid.posterior.uncertainty import Uncertainty
 from hydroid.problem.free_start import start_slopes
@@ -61,9 +62,10 @@ def fitted_bands(problem: Problem, known: Uncertainty, responses: Sequence[Array
     bands: list[dict[int, Band]] = [{} for _ in problem.logs]
     for channel, noise in zip(problem.channels, known.noise, strict=True):
         if channel.quantity == "angle":
-            sd = known.posterior.sd(known.linear.slopes[:, channel.rows]) / channel.weight
+            slopes = channel.unfiltered(known.linear.slopes[:, channel.rows])
+            sd = known.posterior.sd(slopes) / channel.weight
             error = channel.measured - responses[channel.log][:, channel.column]
-            band = _band(known.posterior, noise.level / channel.weight, sd**2, error)
+            band = _band(known.posterior, error_level(channel, noise), sd**2, error)
             bands[channel.log][channel.joint] = band
     return bands
 
@@ -140,5 +142,5 @@ def start_effects(problem: Problem, theta: Array, levels: dict[int, float]) -> d
     rows = np.zeros((0, len(problem.measured)))
     for each in start_slopes(problem, theta):
         rows = start_deviations(problem.logs[0], each.joints, levels)[:, None] * each.slopes
-    angles = (channel for channel in problem.channels if channel.quantity == "angle")
-    return {channel.joint: rows[:, channel.rows] / channel.weight for channel in angles}
+    angles = (c for c in problem.channels if c.quantity == "angle")
+    return {c.joint: c.unfiltered(rows[:, c.rows]) / c.weight for c in angles}

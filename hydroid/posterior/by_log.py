@@ -77,7 +77,7 @@ def by_log(problem: Problem, uncertainty: Uncertainty) -> ByLog:
     left_out = defaultdict[str, list[float]](list)
     for channel in problem.channels:
         if channel.quantity == "angle":
-            error = np.sqrt(np.mean((row[channel.rows] / channel.weight) ** 2))
+            error = np.sqrt(np.mean((channel.unfiltered(row[channel.rows]) / channel.weight) ** 2))
             left_out[f"q{channel.joint}"].append(float(np.degrees(error)))
 
     rows, pooled = linear.changes, scatters.sum(axis=0)  # of the p parameters that vary

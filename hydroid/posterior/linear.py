@@ -15,7 +15,7 @@ import numpy as np
 
 from hydroid.log import Log
 from hydroid.parameters import Array, ParameterSet
-from hydroid.posterior.noise import Noise, prior_weight, problem_noise
+from hydroid.posterior.noise import Noise, error_level, prior_weight, problem_noise
 from hydroid.posterior.posterior import WEAK_PRIOR, Posterior, regular
 from hydroid.problem.channels import Channel
 from hydroid.problem.free_start import start_slopes
@@ -50,12 +50,6 @@ class Linear:
     prior_slopes: Array
     prior_weight: float
     diverging: Mask
-
-    @property
-    def sensitivity(self) -> Array:
-        """Rms change of the residual [rad] per 1 % of each parameter, shape (P,); NaN where unknown."""
-        rms = 0.01 * np.sqrt(np.mean(self.slopes**2, axis=1))
-        return self.spread(np.where(self.diverging, np.nan, rms))
 
     @cached_property
     def white(self) -> Posterior:
@@ -202,7 +196,7 @@ def _opened(problem: Problem, values: tuple[float, ...]) -> Problem:
     opened, noise, weight = list[OpenStart](), problem_noise(problem, row), prior_weight(problem, row)
     for each in slopes:
         own = [(c, n) for c, n in zip(problem.channels, noise, strict=True) if c.log == each.log]
-        levels = {c.joint: n.level / c.weight for c, n in own if c.quantity == "angle"}
+        levels = {c.joint: error_level(c, n) for c, n in own if c.quantity == "angle"}
         deviations = start_deviations(problem.logs[each.log], each.joints, levels)
         opened.append(each.opened(deviations / weight))
     return problem.with_open_starts(opened)

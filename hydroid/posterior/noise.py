@@ -95,12 +95,14 @@ def problem_noise(problem: Problem, residual: Array) -> list[Noise]:
 def prior_weight(problem: Problem, residual: Array) -> float:
     """Return the weight [rad] of a prior's score of one standard deviation beside a row of residuals, (R,).
 
-    Autocorrelated residuals hold less information than their number says. The weight is therefore the noise's
-    level times the root of the number of samples per effective sample.
+    Autocorrelated residuals hold less information than their number T says: as much as
+    `effective_sample_size` = T' independent ones on what acts as slowly as their mean, and as much as T on
+    what acts as fast as they change. Parameters act in between. The weight is the noise's level times the
+    root of the number of samples per effective one, of which there are √(T T').
     """
     noise = problem_noise(problem, residual)
-    square = sum(n.samples * n.level**2 for n in noise)
-    return np.sqrt(square / sum(n.effective_sample_size for n in noise))
+    square, samples = sum(n.samples * n.level**2 for n in noise), sum(n.samples for n in noise)
+    return np.sqrt(square / np.sqrt(samples * sum(n.effective_sample_size for n in noise)))
 
 
 def channel_noise(channel: Channel, residual: Array, objective: ObjectiveSettings) -> Noise:
@@ -108,8 +110,7 @@ def channel_noise(channel: Channel, residual: Array, objective: ObjectiveSetting
 
     Simulated data without noise leave a residual below MIN_LEVEL. White noise then fills the difference.
     """
-    given, samples = objective.noise_deg, len(residual)
-    given = given.get(channel.joint) if isinstance(given, dict) else given
+    given, samples = objective.noise_of(channel.joint), len(residual)
     if given is not None and channel.quantity == "angle":
         return Noise(samples, np.deg2rad(given) * channel.weight, np.empty(0), "settings")
     lacking = samples * (MIN_LEVEL[channel.quantity] * channel.weight) ** 2 - residual @ residual
@@ -117,7 +118,14 @@ def channel_noise(channel: Channel, residual: Array, objective: ObjectiveSetting
         return fit_noise(residual)
     impulse = np.zeros(samples)  # its products are those expected of white noise
     impulse[samples // 2] = np.sqrt(lacking)
-    return replace(fit_noise(np.vstack([residual, impulse])), source="smallest")
+    return replace(fit_noise(np.vstack([residual, channel.filtered(impulse)])), source="smallest")
+
+
+def error_level(channel: Channel, noise: Noise) -> float:
+    """Standard deviation of the output error whose residual has a noise, unweighted [rad, Pa]."""
+    size = _transform_size(noise.samples)
+    power = noise.power[: 1 + size // 2] / channel.gain(size) ** 2
+    return np.sqrt(np.fft.irfft(power, size)[0]) / channel.weight
 
 
 def transformed(rows: Array) -> Array:

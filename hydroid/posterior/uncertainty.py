@@ -118,8 +118,8 @@ class Uncertainty:
             a bound.
         noise: of each channel.
         scatters: covariance of the effects by each channel's noise, shape (C, p, p).
-        sensitivity: rms change of the residual [rad] per 1 % of each parameter, shape (P,); NaN where fixed
-            or where simulations diverge.
+        sensitivity: rms change of the output error [rad] per 1 % of each parameter, shape (P,); NaN where
+            fixed or where simulations diverge.
         posterior: what is known of the parameters that vary.
         relative: relative standard deviation of each parameter, shape (P,); inf where it is not
             identifiable, NaN where it is fixed or held.
@@ -161,6 +161,8 @@ def uncertainty_from(problem: Problem, whole: Linear, noise: Sequence[Noise] = (
     Without `noise` of each channel it is that which the residual shows.
     """
     free, room, white = whole.box.varied, whole.box.room, whole.white.deviations
+    rms = 0.01 * np.sqrt(np.mean(problem.unfiltered(whole.slopes) ** 2, axis=1))
+    sensitivity = whole.spread(np.where(whole.diverging, np.nan, rms))
     edge = held_by_bound(room, white)
     held = edge & (white <= UNIDENTIFIABLE_ABOVE)
     linear = whole.of(~held | held.all())
@@ -178,7 +180,7 @@ def uncertainty_from(problem: Problem, whole: Linear, noise: Sequence[Noise] = (
     known = np.where(np.isnan(relative), whole.spread(white), relative)
     prior = whole.spread(white_posterior(whole.box, whole.prior_slopes).deviations)
     shares = np.where(free, np.clip(1 - (known / prior) ** 2, 0.0, 1.0), 1.0)
-    shares[whole.sensitivity == 0] = 0.0  # not the rounding of their factorisation
+    shares[sensitivity == 0] = 0.0  # not the rounding of their factorisation
     # where the noise is not well known the intervals are wider, and the flags are set accordingly;
     # a stated prior limits a parameter to half of what the weak one leaves, or less
     widened = known * np.where(np.isnan(widths), NORMAL, widths) / NORMAL
@@ -186,12 +188,11 @@ def uncertainty_from(problem: Problem, whole: Linear, noise: Sequence[Noise] = (
     relative[unknown] = np.inf
     status = [ParameterStatus(Flag.FIXED)] * len(free)
     for i, at_edge, (down, up) in zip(np.flatnonzero(free).tolist(), edge, room.T, strict=True):
-        flag = Flag.NO_EFFECT if whole.sensitivity[i] == 0 else flag_of(float(widened[i]), shares[i])
+        flag = Flag.NO_EFFECT if sensitivity[i] == 0 else flag_of(float(widened[i]), shares[i])
         side = ("lower" if down <= up else "upper") if at_edge else None
         status[i] = ParameterStatus(flag, side, float(shares[i]), not unknown[i])
     between = ends(problem.parameters, linear.box, widths * relative)
-    sensitivity, each = whole.sensitivity, tuple(status)
-    return Uncertainty(linear, noise, scatters, sensitivity, posterior, relative, between, each)
+    return Uncertainty(linear, noise, scatters, sensitivity, posterior, relative, between, tuple(status))
 
 
 def ends(parameters: ParameterSet, box: Box, half: Array) -> Array:

@@ -52,7 +52,7 @@ def start_slopes(problem: Problem, theta: Array) -> list[StartSlopes]:
     One simulation for each. A start angle from which the simulation diverges has no effect.
     """
     spec = load_model(problem.settings.arm)
-    base, slopes = problem.output_errors(theta[None])[0], list[StartSlopes]()
+    base, slopes = problem.filtered(problem.output_errors(theta[None]))[0], list[StartSlopes]()
     for i, log in enumerate(problem.logs):
         joints, pressures = problem.started(log), compared_pressures(log, problem.settings)
         channels = [channel for channel in problem.channels if channel.log == i]
@@ -63,7 +63,7 @@ def start_slopes(problem: Problem, theta: Array) -> list[StartSlopes]:
             start = log.moved(joint, STEP)
             simulation = make_simulation(spec, start, problem.outputs, problem.settings, pressures)
             response = {i: simulation.simulate(candidates)}
-            moved.append(np.concatenate([channel.residual(response)[0] for channel in channels]))
+            moved.append(np.concatenate([c.filtered(c.error(response))[0] for c in channels]))
         if moved:
             slope = (np.array(moved) - base[rows]) / STEP
             slope[~np.isfinite(slope).all(axis=1)] = 0.0

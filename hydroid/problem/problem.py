@@ -102,7 +102,8 @@ class Problem:
             make_simulation(spec, log, outputs, settings, joints)
             for log, joints in zip(logs, pressures, strict=True)
         ]
-        self.channels = make_channels(logs, outputs, pressures, settings.objective)
+        drifting = settings.stage == "hyd"
+        self.channels = make_channels(logs, outputs, pressures, settings.objective, drifting=drifting)
         self.measured = np.concatenate([c.weight * c.measured for c in self.channels])
         self.bounds: Ints = np.concatenate([self._segments(c) for c in self.channels])
 
@@ -167,31 +168,41 @@ class Problem:
         return values
 
     def residuals(self, theta: Array) -> Array:
-        """Weighted output errors of (17) [rad], shape (n, R): channel after channel; NaN where diverged.
+        """What least squares minimises [rad], shape (n, R): channel after channel; NaN where diverged.
 
-        What open start angles can explain is taken out (`with_open_starts`).
+        They are output errors through the prefilter. What open start angles can explain is taken out
+        (`with_open_starts`).
         """
         if self._spread is None:
             rows = self.output_errors(theta)
         else:
             rows = self._spread(self._on_worker, "output_errors", theta, len(self.measured))
+        rows = self.filtered(rows)
         for close in self.open_starts:
             close(rows)
         return rows
 
     def output_errors(self, theta: Array) -> Array:
-        """The residuals of theta, shape (n, P), simulated in this process."""
+        """Weighted output errors of (17) [rad] of theta, shape (n, P), simulated in this process: (n, R)."""
         responses = self.responses(theta)
-        return np.concatenate([channel.residual(responses) for channel in self.channels], axis=1)
+        return np.concatenate([channel.error(responses) for channel in self.channels], axis=1)
+
+    def filtered(self, errors: Array) -> Array:
+        """Return residuals from output errors, shape (n, R)."""
+        return np.concatenate([c.filtered(errors[:, c.rows]) for c in self.channels], axis=1)
 
     def responses(self, theta: Array) -> list[Response]:
         """Simulate theta, shape (n, P); return one response of n candidates per log."""
         pairs = zip(self._simulations, self.logs, strict=True)
         return [one.simulate(self.bindings.candidates(theta, log.source)) for one, log in pairs]
 
-    def rms(self, residuals: Array) -> Array:
-        """Rms error of the angles, unweighted [rad], shape (n,), from rows of residuals, shape (n, R)."""
-        angles = [residuals[:, c.rows] / c.weight for c in self.channels if c.quantity == "angle"]
+    def unfiltered(self, residuals: Array) -> Array:
+        """Return output errors from residuals, shape (n, R)."""
+        return np.concatenate([c.unfiltered(residuals[:, c.rows]) for c in self.channels], axis=1)
+
+    def rms(self, errors: Array) -> Array:
+        """Rms error of the angles, unweighted [rad], shape (n,), from output errors, shape (n, R)."""
+        angles = [errors[:, c.rows] / c.weight for c in self.channels if c.quantity == "angle"]
         return np.sqrt(np.mean(np.concatenate(angles, axis=1) ** 2, axis=1))
 
     @cached_property

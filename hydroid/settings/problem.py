@@ -176,6 +176,10 @@ class ObjectiveSettings(Settings):
     """standard deviation of the white noise of measured angles, for all joints or by joint [deg]; null: it is
     estimated from the residuals, with its autocorrelation"""
 
+    def noise_of(self, joint: int) -> float | None:
+        """Return the stated noise of a joint's angle [deg]."""
+        return self.noise_deg.get(joint) if isinstance(self.noise_deg, dict) else self.noise_deg
+
 
 class SimulationSettings(Settings):
     """How logs are simulated."""

@@ -41,6 +41,9 @@ class Linear:
         )
         self.weight = np.repeat(weights, np.diff(edges))
 
+    def unfiltered(self, residuals):
+        return residuals
+
     def residuals(self, theta):
         self.simulated += len(theta)
         return self.weight * (self.measured - theta / self.unit @ self.columns)

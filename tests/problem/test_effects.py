@@ -38,7 +38,7 @@ def test_effects_of_two_groups_are_recovered(tmp_path):
     theta = problem.parameters.from_unit(refine(problem, start, RefinementSettings(iterations=20)).point)
     values = problem.parameters.mapping(theta)
     assert {name: values[name] for name in DAY} == pytest.approx(DAY, abs=0.1)
-    assert np.degrees(problem.rms(problem.residuals(theta[None])))[0] == pytest.approx(0.02, rel=0.1)
+    assert np.degrees(problem.rms(problem.output_errors(theta[None])))[0] == pytest.approx(0.02, rel=0.1)
 
 
 @pytest.mark.parametrize("name", LOGS)

@@ -25,8 +25,8 @@ from hydroid.search.pareto import average, best, non_dominated, utopia
 _log = logging.getLogger(__name__)
 
 TOO_FAR = 20.0
-"""times the rms error of the last estimate from which the dynamic model is not refined: lags that stand for oil
-in a quasi-static model are too much beside it, and it errs by several times as much at first"""
+"""times the rms error of the last estimate from which the dynamic model is not refined: lags that stand for
+oil in a quasi-static model are too much beside it, and it errs by several times as much at first"""
 
 
 @dataclass(frozen=True)

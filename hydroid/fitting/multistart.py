@@ -140,6 +140,7 @@ class Multistart:
                 lambda what, n, rms, before=before: self._progress(what, before + n, rms),
                 self._checkpoints,
                 f"{name} part {number}",
+                cautious=True,  # far off, or alone, a joint errs by more than its noise
             )
             cost, theta = result.cost, part.parameters.from_unit(result.point)
             self._memo.elsewhere += result.evaluations

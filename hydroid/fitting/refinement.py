@@ -30,11 +30,13 @@ class _Refinement(Descent):
     Attributes:
         weight: residual that a prior's standard deviation counts [rad].
         anchor: where the noise, and the effect of open start angles, were estimated: shape (p,).
+        cautious: how the weight follows from the noise (`prior_weight`).
         noises: how often they were.
     """
 
     weight: float
     anchor: Array
+    cautious: bool
     noises: int = 1
 
 
@@ -45,6 +47,8 @@ def refine(
     progress: Callable[[str, int, float], None] = lambda *_: None,
     checkpoints: Checkpoints | None = None,
     name: str = "refined",
+    *,
+    cautious: bool = False,
 ) -> Descent:
     """Improve an estimate by bounded least squares.
 
@@ -60,6 +64,7 @@ def refine(
         progress: takes the name, the number of simulations and the rms error [rad] so far.
         checkpoints: where it continues from, and stores how far it is; a result is stored too.
         name: of this refinement among them.
+        cautious: whether priors count more, as beside a model that leaves something out (`prior_weight`).
 
     Raises:
         RunError: the checkpoint cannot be written.
@@ -70,7 +75,7 @@ def refine(
         if now.ended:
             return now
     else:
-        now = _estimated(problem, problem.parameters.to_unit(theta))
+        now = _estimated(problem, problem.parameters.to_unit(theta), cautious)
     residuals = _residuals(problem, now)
     with saving(checkpoints, name) as keep:
         while not now.ended:
@@ -87,14 +92,14 @@ def refine(
     return now
 
 
-def _estimated(problem: Problem, unit: Array, row: Array | None = None) -> _Refinement:
+def _estimated(problem: Problem, unit: Array, cautious: bool, row: Array | None = None) -> _Refinement:
     """Begin at a point of the unit box, (p,), with the noise there; `row`, (R,): its residuals, if known."""
     theta, weight = problem.parameters.from_unit(unit[None]), 0.0
     here = with_open_start(problem, theta[0]).residuals(theta)[0] if row is None else row
     if len(problem.priors) or problem.leaves_start_open:
-        weight = prior_weight(problem, here)
+        weight = prior_weight(problem, here, cautious=cautious)
     begun = start(unit, np.append(here, weight * problem.priors.scores(theta)))
-    return _Refinement(**vars(begun), weight=weight, anchor=unit)
+    return _Refinement(**vars(begun), weight=weight, anchor=unit, cautious=cautious)
 
 
 def _following(problem: Problem, now: _Refinement) -> _Refinement:
@@ -102,9 +107,9 @@ def _following(problem: Problem, now: _Refinement) -> _Refinement:
     row = now.residual[: problem.measured.size]
     if not now.weight or now.noises == MAX_NOISES:
         return now
-    if abs(prior_weight(problem, row) - now.weight) <= SETTLED * now.weight:
+    if abs(prior_weight(problem, row, cautious=now.cautious) - now.weight) <= SETTLED * now.weight:
         return now
-    here = _estimated(problem, now.point, None if problem.leaves_start_open else row)
+    here = _estimated(problem, now.point, now.cautious, None if problem.leaves_start_open else row)
     changed = {"residual": here.residual, "cost": here.cost, "weight": here.weight, "anchor": here.anchor}
     return replace(now, **changed, noises=now.noises + 1)
 

@@ -58,7 +58,7 @@ def test_a_lone_joint_feels_no_valve_but_its_own(problem):
 
 def test_a_lone_joint_moves_as_with_all_others(problem, truth):
     for joint in lone_joints(problem):
-        error = alone(problem, joint, truth).residuals(truth[None])
+        error = alone(problem, joint, truth).output_errors(truth[None])
         assert np.rad2deg(np.sqrt(np.mean(error**2))) < 0.1  # the logged motion passes a low-pass
 
 

@@ -11,6 +11,7 @@ from hydroid import fit, load_settings, read_logs
 from hydroid.arm.model import add_payload
 from hydroid.errors import SettingsError
 from hydroid.log import check_log, write_log
+from hydroid.posterior.noise import error_level, fit_noise
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 
@@ -51,6 +52,20 @@ def test_a_pressure_error_counts_its_weight(hydraulic):
     for channel in problem.channels[1:]:
         assert np.rad2deg(rows[channel.rows]) == pytest.approx(0.1 * 3.0)
     assert problem.rms(rows[None])[0] < 1e-12  # the error of angles alone
+
+
+def test_errors_of_driven_angles_pass_the_prefilter_and_can_be_had_back(hydraulic):
+    settings, log = hydraulic
+    angle, pressure, _ = Problem(settings, [log]).channels
+    errors = np.random.default_rng(0).normal(size=(2, 6000))
+    np.testing.assert_allclose(angle.unfiltered(angle.filtered(errors)), errors, rtol=0, atol=1e-12)
+    assert np.array_equal(pressure.filtered(errors), errors)
+    assert angle.filtered(np.ones(6000))[-1] == pytest.approx(1.0)  # after a minute
+    assert np.abs(angle.filtered(np.resize([1.0, -1.0], 6000))[-1]) == pytest.approx(2.0)
+    level = error_level(angle, fit_noise(angle.filtered(errors[0])))
+    assert level == pytest.approx(np.std(errors[0]), rel=0.02)
+    stated = settings.changed({"objective.noise_deg": 0.1})
+    assert np.array_equal(Problem(stated, [log]).channels[0].filtered(errors), errors)  # white
 
 
 def test_pressures_do_not_change_the_angles(hydraulic):

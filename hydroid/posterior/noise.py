@@ -98,8 +98,8 @@ def prior_weight(problem: Problem, residual: Array, *, cautious: bool = False) -
     Autocorrelated residuals hold less information than their number T says: as much as
     `effective_sample_size` = T' independent ones on what acts as slowly as their mean, and as much as T on
     what acts as fast as they change. Parameters act in between. The weight is the noise's level times the
-    root of the number of samples per effective one, of which there are √(T T'). A `cautious` fit counts T', so
-    that priors hold what an error of the model, not the noise, would move.
+    root of the number of samples per effective one, of which there are √(T T'). A `cautious` fit counts T':
+    its priors hold what an error of the model, not the noise, would move.
     """
     noise = problem_noise(problem, residual)
     square, samples = sum(n.samples * n.level**2 for n in noise), sum(n.samples for n in noise)

@@ -22,7 +22,6 @@ its effective samples; less the one that a took.
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -41,7 +40,7 @@ from hydroid.search.least_squares import least_squares
 from hydroid.settings.search import RefinementSettings
 
 
-@dataclass(frozen=True)
+@record
 class Score:
     """Statistic of one change of the model.
 
@@ -145,7 +144,7 @@ MIN_RESIDUAL = np.deg2rad(0.05)  # what the rms residual counts at least [rad]
 SHORT = RefinementSettings(iterations=30, gain_tolerance=1e-3)  # of the refinements from an estimate
 
 
-@dataclass(frozen=True)
+@record
 class Candidate:
     """A change of the settings that frees one more parameter, to be refined from `start`, in its unit.
 

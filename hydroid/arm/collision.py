@@ -6,7 +6,6 @@ one that the model excludes; `hydroid init` excludes bodies that touch in the po
 """
 
 from collections.abc import Generator
-from dataclasses import dataclass
 
 import mujoco
 import numpy as np
@@ -17,7 +16,7 @@ from hydroid.errors import ModelError
 FARTHEST = 100.0  # distance beyond which MuJoCo need not look [m]
 
 
-@dataclass(frozen=True)
+@record
 class Meeting:
     """Two bodies inside each other, from one sample to another."""
 

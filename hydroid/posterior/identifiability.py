@@ -1,6 +1,6 @@
 """Which directions an estimate leaves open, and intervals without the linear approximation."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.stats import chi2
@@ -20,7 +20,7 @@ THRESHOLD = float(chi2.ppf(COVERAGE, 1))  # deviance beyond which a value lies o
 STEPS = 6  # points on each side before the steps grow: they reach three standard deviations, or the bound
 
 
-@dataclass(frozen=True)
+@record
 class Profile:
     """What a profile of a parameter shows.
 

@@ -24,7 +24,6 @@ free.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from enum import StrEnum
 from typing import Literal
 
@@ -73,7 +72,7 @@ class Source(StrEnum):
     PRIOR = "prior only"
 
 
-@dataclass(frozen=True)
+@record
 class ParameterStatus:
     """How well one parameter is known.
 

@@ -6,7 +6,6 @@ simulated by threads of this process, or on workers (`Spread`); no bit of a resu
 
 from collections.abc import Callable, Sequence
 from copy import copy
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Protocol
@@ -15,7 +14,7 @@ import mujoco
 import numpy as np
 
 from hydroid.arm.model import add_payload, load_model
-from hydroid.arrays import Array, Ints
+from hydroid.arrays import Array, Ints, record
 from hydroid.errors import SettingsError
 from hydroid.log import Log
 from hydroid.problem.bindings import Bindings
@@ -37,7 +36,7 @@ OpenStart = Callable[[Array], None]
 """takes what one log's open start angles can explain out of residuals, shape (n, R)"""
 
 
-@dataclass(frozen=True)
+@record
 class Evaluation:
     """Objectives of n candidates [rad or relative]: by segment, and overall last, shape (n, S + 1).
 

@@ -12,7 +12,6 @@ import math
 import os
 import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -39,7 +38,7 @@ RESULT, VALIDATIONS = "result.npz", "validations"
 T = TypeVar("T")
 
 
-@dataclass(frozen=True)
+@record
 class Effort:
     """What one refinement took: its iterations and simulations, and why it ended."""
 

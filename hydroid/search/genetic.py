@@ -10,7 +10,6 @@ again from its seed, with the objectives that are known (`fitting.checkpoints`).
         population = algorithm.tell(population, offspring)
 """
 
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -56,7 +55,7 @@ class Population:
         return Population(chromosomes, np.concatenate([self.objectives, other.objectives]))
 
 
-@dataclass(frozen=True)
+@record
 class GeneticAlgorithm:
     """What both algorithms share: coding and reproduction.
 

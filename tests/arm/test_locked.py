@@ -124,20 +124,22 @@ def test_a_batch_follows_principal_axes_that_change_places(tmp_path):
 
 @pytest.mark.parametrize("moving", [["lift"], ["tilt"]])
 def test_the_export_stands_where_the_whole_arm_does(tmp_path, moving):
-    """Also bodies in frames, turned by angles; only drawings are left of tendons."""
+    """Also bodies in frames, turned by angles; only drawings are left of tendons, and no limits of motors."""
     bar = BOOM[BOOM.index('<body name="bar"') : BOOM.index("</body>\n      </body>")] + "</body>"
     turned = bar.replace('name="bar" pos="6 0 0"', 'name="bar" pos="1 0 0" euler="0 20 0"')
     frame = f'<frame pos="5 0 1" euler="30 0 0"><site name="eye"/>{turned}</frame>'
     fixed = '<tendon><fixed><joint joint="tilt" coef="1"/></fixed></tendon></mujoco>'
     arm = write_arm(tmp_path, BOOM.replace(bar, frame).replace("</mujoco>", fixed))
     spec, pose = load_model(arm), np.array([0.3, -0.4])
+    for joint in spec.joints:
+        joint.actfrclimited, joint.actfrcrange = mujoco.mjtLimited.mjLIMITED_TRUE, [-1, 1]
     locked, whole = locked_arm(spec, arm, moving, pose), spec.compile()
     model = locked_spec(spec, locked, locked.model).compile()
     here, there = mujoco.MjData(model), mujoco.MjData(whole)
     here.qpos[:], there.qpos[:] = locked.pose, pose
     mujoco.mj_forward(model, here)
     mujoco.mj_forward(whole, there)
-    assert (model.njnt, model.ntendon) == (1, 0)
+    assert (model.njnt, model.ntendon, model.jnt_actfrclimited[0]) == (1, 0, 0)
     np.testing.assert_allclose(
         *(d.geom_xpos[np.argsort(d.geom_xpos[:, 0])] for d in (here, there)), atol=1e-9
     )

@@ -116,10 +116,8 @@ def run_study(
 ) -> tuple[Row, ...]:
     """Perform the runs of a study that `folder` does not have yet; return the measures of all, by seed.
 
-    Raises:
-        SettingsError: a key or value of the file that is not allowed, with file and line.
-        LogError: a log cannot be used.
-        RunError: the folder cannot be written, or a process died.
+    Raises SettingsError: a key or value of the file that is not allowed, with file and line; LogError: a log
+    cannot be used; RunError: the folder cannot be written, or a process died.
     """
     study = load(path, StudySettings)
     cells = cell_settings(study, path)

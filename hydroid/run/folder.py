@@ -125,9 +125,8 @@ class RunFolder:
     def owned(self) -> Generator[None]:
         """Hold the folder against other processes, and write the `hydroid` logger's lines to `run.log`.
 
-        Raises:
-            RunError: another process holds it, it holds other files, or it cannot be written.
-            Stopped: the run was interrupted; says what is kept.
+        Raises RunError: another process holds it, it holds other files, or it cannot be written; Stopped: the
+        run was interrupted; says what is kept.
         """
         # it is the run's if it is empty, or holds a run's description or at least its lock
         other = self.path.exists() and not (self.exists or (self.path / LOCK).exists())
@@ -149,9 +148,8 @@ class RunFolder:
     def begin(self, settings: FitSettings, logs: Sequence[Log]) -> CheckpointFile:
         """Describe a new run, or check that the run here is the same; return its checkpoints.
 
-        Raises:
-            RunError: the run here had other settings, another arm, another log or another version, one of its
-                files was changed, no checkpoint is whole, or the folder cannot be written.
+        Raises RunError: the run here had other settings, another arm, another log or another version, one of
+        its files was changed, no checkpoint is whole, or the folder cannot be written.
         """
         own = identity(settings, logs)
         if not self.exists:

@@ -35,9 +35,7 @@ class Motion:
 def simulated_motion(model: IdentifiedModel, logs: Mapping[str, Log]) -> Motion:
     """Simulate the commands of logs, by the name of the arm that they move (`Machine.sides`).
 
-    Raises:
-        SettingsError: a log commands nothing.
-        RunError: the simulation diverged.
+    Raises SettingsError: a log commands nothing; RunError: the simulation diverged.
     """
     arm, first = model.settings.arm, next(iter(logs.values()))
     machine = load_machine(arm, pair=ALONE not in logs)

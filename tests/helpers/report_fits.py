@@ -60,7 +60,9 @@ def make_problem(
     problem.outputs = [joint - 1 for joint in outputs]
     channels = [log.angle[:, k] for log in logs for k in problem.outputs]
     problem.measured = np.concatenate(channels)
-    problem.channels = make_channels(logs, problem.outputs, [[]] * len(logs), problem.settings.objective)
+    problem.channels = make_channels(
+        logs, problem.outputs, [[]] * len(logs), problem.settings.objective, drifting=False
+    )
     problem.priors = Priors({}, problem.parameters)
     starts = np.cumsum([0, *map(len, channels)])
     problem.bounds = np.array(

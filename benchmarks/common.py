@@ -1,18 +1,21 @@
 """What the benchmarks share: options, tables, a clock, simulated logs of known truth, refits."""
 
 import argparse
+import sys
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+sys.path.append(str(Path(__file__).parents[1] / "tests" / "helpers"))
+
+from made_logs import at_rest, simulate_log
+
 from hydroid.estimate import read_estimate
 from hydroid.fitting.refinement import refine
 from hydroid.log import Log
-from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 from hydroid.search.descent import Descent
 from hydroid.settings.fit import FitSettings
@@ -78,10 +81,6 @@ def pseudo_random_log(
     samples = round(duration / period)
     command = np.zeros((samples, len(pose)))
 
-    def upto(end: int) -> Log:
-        angle = np.tile(pose, (end, 1))
-        return Log("pseudo-random", np.arange(end, dtype=float) * period, command[:end], angle, period)
-
     for joint in joints:
         start = 0
         while start < samples:
@@ -89,10 +88,10 @@ def pseudo_random_log(
             level = rng.uniform(-100.0, 100.0)
             for factor in (1.0, -1.0, 0.5, -0.5, 0.25, -0.25, 0.0):
                 command[start : start + dwell, joint - 1] = round(factor * level, 1)
-                if allowed(upto(min(start + dwell, samples))):
+                if allowed(at_rest(pose, command[: min(start + dwell, samples)], period, "pseudo-random")):
                     break
             start += dwell
-    return upto(samples)
+    return at_rest(pose, command, period, "pseudo-random")
 
 
 def true_log(
@@ -110,25 +109,12 @@ def true_log(
     low, high = settings.arm.lower + 0.05, settings.arm.upper - 0.05
 
     def off_the_stops(log: Log) -> bool:
-        angle = simulate_log(settings, log, truth, "truth").angle
+        angle = simulate_log(settings, log, truth).angle
         return bool(np.all((angle > low) & (angle < high)))
 
     pose, period = settings.arm.pose("study") if pose is None else pose, settings.log.period_s
     drive = pseudo_random_log(pose, list(joints), seconds, period, seed, off_the_stops)
-    return simulate_log(settings, drive, truth, "truth")
-
-
-def noisy(
-    log: Log, rng: np.random.Generator, deg: float = 0.1, phi: float = 0.0, *, start: bool = False
-) -> Log:
-    """Add stationary noise to every angle, white or AR(1); the first sample has none unless `start`."""
-    noise = rng.normal(0.0, np.deg2rad(deg), log.angle.shape)
-    if phi:
-        for i in range(1, len(noise)):
-            noise[i] = phi * noise[i - 1] + np.sqrt(1 - phi**2) * noise[i]
-    if not start:
-        noise[0] = 0.0
-    return replace(log, angle=log.angle + noise)
+    return simulate_log(settings, drive, truth)
 
 
 def near(problem: Problem, truth: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -142,8 +128,3 @@ def refined(
     """Refine an estimate, by default as the settings say; return where it ended, shape (P,), and how."""
     result = refine(problem, start, how or problem.settings.refinement or RefinementSettings())
     return problem.parameters.from_unit(result.point), result
-
-
-def named(names: Sequence[str], chosen: np.ndarray) -> list[str]:
-    """Return the names that are chosen, shape (P,)."""
-    return [name for name, yes in zip(names, chosen, strict=True) if yes]

@@ -30,7 +30,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from common import EXAMPLES, Clock, named, near, noisy, options, refined, row, table, true_log
+from common import EXAMPLES, Clock, near, options, refined, row, table, true_log
+from made_logs import at_rest, noisy, simulate_log, step_log
 
 import hydroid
 from hydroid import load_settings
@@ -41,7 +42,7 @@ from hydroid.posterior.band import prediction_bands
 from hydroid.posterior.bench import make_bench
 from hydroid.posterior.quantities import joint_measure
 from hydroid.posterior.uncertainty import Uncertainty, uncertainty
-from hydroid.prediction import predict, simulate_log
+from hydroid.prediction import predict
 from hydroid.problem.problem import Problem
 from hydroid.settings.fit import FitSettings
 
@@ -87,7 +88,7 @@ def report(title: str, names: Sequence[str], truth: np.ndarray, said: Iterator[S
     table(
         "of | true | determined | covered | predicted / spread",
         "{} | {:.4g} | {:.0f} % | {:.1f} % | {:.2f}",
-        named(names, shown),
+        np.array(names)[shown],
         *(column[shown] for column in columns[:2]),
         *columns[2:],
     )
@@ -105,12 +106,12 @@ def intervals(given: Any, *, start: bool = False) -> None:
     how = {"free_start": start, "refinement.gain_tolerance": 1e-6}
     settings = mech([2, 3], "K", "D", "S", "M2", "M6", **how)
     clean, free = true_log(settings, MECH, [2, 3], given.seconds), settings.parameter_set().free
-    names, truth = named([*MECH], free), np.array([*MECH.values()])[free]
+    names, truth = (np.array([*part])[free] for part in (MECH, MECH.values()))
     for time in given.correlation_times:
         phi = float(np.exp(-clean.period / time)) if time else 0.0
 
         def logs(rng: Any, phi: float = phi) -> list[Log]:
-            return [noisy(clean, rng, phi=phi, start=start)]
+            return [noisy(clean, seed=rng, phi=phi, exact_start=not start)]
 
         known = fits(settings, MECH, logs, given.fits, int(1000 * phi))
         title = f"noise of {time:g} s, logs of {given.seconds:g} s{', the start with noise' * start}"
@@ -136,7 +137,7 @@ def quantities(given: Any) -> None:
         return np.stack([value for _, value in measure(candidates(theta))], axis=1)
 
     def said() -> Iterator[Said]:
-        for _, known in fits(settings, HYD, lambda rng: [noisy(clean, rng)], given.fits):
+        for _, known in fits(settings, HYD, lambda rng: [noisy(clean, seed=rng)], given.fits):
             found = known.posterior.propagate(values, positive)
             yield found.value, found.sd, found.interval
 
@@ -163,14 +164,14 @@ def own_arm(given: Any) -> None:
 
         def new_log(seed: int) -> Log:
             command = example.commands(len(unseen.arm.joints), seed)
-            angle = np.tile(0.5 * (unseen.arm.lower + unseen.arm.upper), (len(command), 1))
-            drive = Log("log", example.PERIOD * np.arange(len(command)), command, angle, example.PERIOD)
+            angle = 0.5 * (unseen.arm.lower + unseen.arm.upper)
+            drive = at_rest(angle, command, example.PERIOD, "log")
             noise = example.NOISE_DEG
             return hydroid.simulate(drive, fit=machine, out=None, noise_deg=noise, seed=seed).log
 
         known = fits(settings, truth, lambda rng: [new_log(next(seeds)), new_log(next(seeds))], given.fits)
         true = settings.parameter_set().vector(truth, "truth")
-        names = named(settings.parameter_set().names, true > 0)
+        names = np.array(settings.parameter_set().names)[true > 0]
         report("own arm", names, true[true > 0], parameters(known, true > 0))
 
 
@@ -179,10 +180,8 @@ def bands(given: Any) -> None:
     settings = mech([2], "K", "D", "S", free_start=True)
 
     def steps(values: dict[str, float], rng: np.random.Generator) -> Log:
-        pose, command = settings.arm.pose("study"), np.zeros((500, 7))
-        command[:, 1] = np.repeat(rng.uniform(-60.0, 60.0, 5), 100)
-        drive = Log("steps.csv", np.arange(500.0) * 0.01, command, np.tile(pose, (500, 1)), 0.01)
-        return noisy(simulate_log(settings, drive, values, "truth"), rng, start=True)
+        drive = step_log(settings.arm.pose("study"), rng.uniform(-60.0, 60.0, 5))
+        return noisy(simulate_log(settings, drive, values), seed=rng, exact_start=False)
 
     table("the other log | inside the band, median (range) | the model is blamed")
     for percent in (0, 5, 20, 50):
@@ -212,10 +211,8 @@ def left_out(given: Any) -> None:
         settings, logs = load_settings(f"fit-{stage}", changes), list[Log]()
         for name, first in pieces:
             (log,) = hydroid.read_logs([EXAMPLES / "logs" / f"rig_{name}.csv"], settings)
-            part = slice(first, first + round(given.seconds / log.period))
-            cut = {"command": log.command[part], "angle": log.angle[part]}
-            time = log.time[: part.stop - first]
-            logs.append(replace(log, source=f"{name} from {first}.csv", time=time, **cut))
+            part = log.part(first, first + round(given.seconds / log.period))
+            logs.append(replace(part, source=f"{name} from {first}.csv", rest=None))
         model = hydroid.fit(settings, logs).model
         print(f"\nstage {stage}")
         table("left out | expected [deg] | actual [deg] | actual / expected | inside the band")

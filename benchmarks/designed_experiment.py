@@ -10,7 +10,7 @@ the joints, six masses), the total of the masses known to 42.5 ± 0.5 kg. The tr
 and random experiments know only an estimate that is off by up to a quarter in every parameter. A random
 experiment is one draw: a start pose uniform within the joints' ranges (a quarter: a named one), all six
 joints with random levels in ±100 % and dwells of 1 to 5 s, levels turned round or reduced where the joint's
-range or speed would be left, as the designer's own candidates are.
+range or speed would be left: the first of those that the designer begins with.
 
 Precision is that of the truth, without any prior but the total mass. Predicted: Cramer-Rao bound. Simulated:
 standard deviation over refits of noisy logs of the designed experiment, and of the random one whose weakest
@@ -20,14 +20,13 @@ parameter is predicted the median. One seed throughout; no experiment is chosen 
 from typing import Any
 
 import numpy as np
-from common import ARTICLE_TRUTH, Clock, noisy, options, refined, table
+from common import ARTICLE_TRUTH, Clock, options, refined, table
+from made_logs import noisy, simulate_log
 
 from hydroid import load_settings
 from hydroid.advice.design import ExperimentSimulator, design
-from hydroid.advice.experiment import RandomExperiments
 from hydroid.log import Log
 from hydroid.posterior.linear import estimate_box, prior_slopes, white_posterior
-from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.search import RefinementSettings
@@ -53,21 +52,11 @@ def make_settings(given: Any) -> FitSettings:
     return load_settings("article-mech", changes)
 
 
-def random_experiments(settings: FitSettings, simulator: ExperimentSimulator, count: int, seed: int) -> list:
-    """Single draws that drive all joints and keep the limits at the estimate."""
-    experiments, kept = RandomExperiments(settings, np.random.default_rng(seed + 1)), []
-    while len(kept) < count:
-        experiment = experiments.draw()
-        if len(experiment.inputs) == len(settings.outputs):
-            kept += (simulator.within_limits(experiment) or [])[:1]
-    return kept
-
-
 def refitted(settings: FitSettings, log: Log, count: int) -> np.ndarray:
     """Relative spread of refits to noisy logs, shape (P,); the start pose is known from standstill."""
     rng, estimates = np.random.default_rng(SEED + 2), []
     for _ in range(count):
-        measured = noisy(log, rng, NOISE_DEG)
+        measured = noisy(log, NOISE_DEG, rng)
         total = settings.priors["total mass"].model_copy(update={"value": rng.normal(TOTAL, TOTAL_SD)})
         problem = Problem(settings.model_copy(update={"priors": {"total mass": total}}), [measured])
         start = TRUTH * np.exp(rng.uniform(-0.05, 0.05, len(TRUTH)))
@@ -87,13 +76,14 @@ def study(given: Any) -> None:
     best = design(settings, estimate, [], given.seed, lambda what, done, of: None)
     print(f"designed in {clock} from {settings.design.effort} experiments", flush=True)
     problem = Problem(settings, [best.log])
-    boxes = [estimate_box(problem.parameters, theta) for theta in (estimate, TRUTH)]
-    guessed, there = (white_posterior(box, prior_slopes(problem.priors, box)) for box in boxes)
-    randoms = random_experiments(settings, ExperimentSimulator(settings, guessed), given.random, given.seed)
+    box = estimate_box(problem.parameters, TRUTH)
+    there = white_posterior(box, prior_slopes(problem.priors, box))
     at_truth = ExperimentSimulator(settings, there)
+    randoms = [one.experiment for one in best.random if len(one.experiment.inputs) == len(settings.outputs)]
+    randoms = randoms[: given.random]
 
     def response(experiment) -> Log:
-        return simulate_log(settings, experiment.log(settings), ARTICLE_TRUTH, "truth")
+        return simulate_log(settings, experiment.log(settings), ARTICLE_TRUTH)
 
     def predicted(experiment) -> np.ndarray:
         information = at_truth.information(experiment, response(experiment).angle)

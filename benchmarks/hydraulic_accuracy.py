@@ -6,13 +6,8 @@ One joint against Radau (rtol 1e-8) of the full coupled equations: feasible para
 2.5 times the article's values, 30 s of pseudo-random pulses, several sub-steps and MuJoCo steps.
 """
 
-import sys
-
 import numpy as np
-from common import ROOT, Clock, options, table
-
-sys.path.insert(0, str(ROOT / "tests" / "helpers"))
-
+from common import Clock, options, table
 from hydraulic_reference import draw, parameters, pulses, reference, simulate
 
 from hydroid.settings.hydraulics import HydraulicSettings

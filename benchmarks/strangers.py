@@ -13,7 +13,6 @@ travel. A joint that is not good must be named by the verdict.
 """
 
 import shutil
-import sys
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -23,11 +22,10 @@ from common import Clock, options, row, table
 from numba import njit
 from numpy.random import Generator
 from numpy.typing import NDArray
+from robots import LIMIT, body, joint
+from worlds import NOISE_DEG, NOISE_M, WORLDS, write_log
 
 import hydroid
-
-sys.path.append(str(Path(__file__).parents[1] / "tests" / "helpers"))
-import worlds
 
 Array = NDArray[np.float64]
 STEP = 0.002
@@ -216,28 +214,17 @@ def write_machine(folder: Path, m: Machine, rng: Generator) -> list[Path]:
     return logs
 
 
-LINK = """<link name="{name}_link">
-<inertial><origin xyz="{middle:.4f} 0 0"/><mass value="{mass:.3f}"/>
-<inertia ixx="{ixx:.5g}" iyy="{iyy:.5g}" izz="{iyy:.5g}" ixy="0" ixz="0" iyz="0"/></inertial>
-<visual><origin xyz="{middle:.4f} 0 0"/><geometry><box size="{long:.4f} {wide:.4f} {wide:.4f}"/></geometry>
-</visual></link>
-<joint name="{name}" type="revolute"><parent link="{parent}"/><child link="{name}_link"/>
-<origin xyz="{x:.4f} 0 {z:.4f}"/><axis xyz="{axis}"/>
-<limit lower="{lower:.5f}" upper="{upper:.5f}" effort="1e6" velocity="2"/></joint>
-"""
-
-
-def urdf(m: Machine) -> str:
-    """The machine as its maker's CAD exports it: boxes of the right masses."""
+def urdf(m: Machine, turned: int | None = None) -> str:
+    """The machine as its maker's CAD exports it; the axis of joint `turned` (from 0) is turned round."""
     text, parent, x = '<robot name="stranger"><link name="base"/>', "base", 0.0
     for j, name in enumerate(m.names):
-        wide, vertical, mass = 0.15 * m.length[j], m.vertical[j], m.mass[j]
+        wide, vertical = 0.15 * m.length[j], m.vertical[j]
         long, reach = (wide, 0.0) if vertical else (m.length[j], m.length[j])
-        place = {"parent": parent, "x": x, "z": 0.0, "axis": "0 0 1" if vertical else "0 -1 0"}
-        shape = {"middle": reach / 2, "mass": mass, "long": long, "wide": wide}
-        inertia = {"ixx": mass / 12 * 2 * wide**2, "iyy": mass / 12 * (long**2 + wide**2)}
-        ends = dict(zip(("lower", "upper"), m.ends[j], strict=True))
-        text += LINK.format(name=name, **place, **shape, **inertia, **ends)
+        middle, shape = f"{reach / 2} 0 0", f'<box size="{long} {wide} {wide}"/>'
+        text += body(f"{name}_link", (long, wide, wide), m.mass[j], shape, centre=middle, seen=middle)
+        axis = "0 0 1" if vertical else "0 1 0" if j == turned else "0 -1 0"
+        place = {"at": f"{x} 0 0", "axis": axis, "limit": LIMIT.format(*m.ends[j])}
+        text += joint(name, parent, f"{name}_link", **place)
         parent, x = f"{name}_link", reach
     return f"{text}</robot>\n"
 
@@ -264,10 +251,10 @@ def stranger(seed: int, number: int, folder: Path) -> tuple[str, Path, list[Path
 
 def world(number: int, folder: Path) -> tuple[str, Path, list[Path], Array]:
     """Make one of the twelve arms as the world has them; errors are good up to twice the noise."""
-    name, one = [*worlds.WORLDS.items()][number]
+    name, one = [*WORLDS.items()][number]
     folder.mkdir(parents=True)
-    logs = [worlds.write_log(one, folder / f"log_{k}.csv", 60.0, k) for k in (1, 2)]
-    noise = [np.degrees(worlds.NOISE_M) if j == "telescope" else worlds.NOISE_DEG for j in one.joints]
+    logs = [write_log(one, folder / f"log_{k}.csv", 60.0, k) for k in (1, 2)]
+    noise = [np.degrees(NOISE_M) if j == "telescope" else NOISE_DEG for j in one.joints]
     return name, one.write(one, folder), logs, 2 * np.array(noise)
 
 

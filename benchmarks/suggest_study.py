@@ -13,14 +13,14 @@ both, lowers the error on the halves left out. It is first where nothing ranks b
 from dataclasses import replace
 
 import numpy as np
-from common import near, options, pseudo_random_log, refined, row, table
+from common import near, options, refined, row, table, true_log
+from made_logs import at_rest, simulate_log
 
 from hydroid import load_settings
 from hydroid.advice.suggestions import advice
 from hydroid.arm.model import load_model
 from hydroid.log import Log
 from hydroid.posterior.uncertainty import uncertainty
-from hydroid.prediction import simulate_log
 from hydroid.problem.bindings import Bindings
 from hydroid.problem.problem import Problem, make_simulation
 from hydroid.settings.fit import FitSettings
@@ -55,16 +55,11 @@ def make_log(term: str, seconds: float, seed: int) -> Log:
     pose = truth.arm.pose("study").copy()
     pose[1:3] = np.radians([rng.uniform(0, 40), rng.uniform(-100, -40)])
 
-    def off_the_stops(log: Log) -> bool:
-        angle = simulate_log(truth, log, TRUTH, "truth").angle[:, 1]
-        return bool(angle.min() > np.deg2rad(-25) and angle.max() < np.deg2rad(85))
-
-    log = pseudo_random_log(pose, [2], duration=seconds, seed=seed, allowed=off_the_stops)
-    log.command[rest:] = log.command[:-rest].copy()
-    log.command[:rest] = 0.0
+    drive = true_log(truth, TRUTH, [2], seconds, seed, pose).command
+    log = at_rest(pose, np.concatenate([np.zeros_like(drive[:rest]), drive[:-rest]]))
     if term == "flow_limit":
         truth = make_settings(term, TERMS[term] * largest_flow(truth, log))
-    angle = simulate_log(truth, log, TRUTH, "truth").angle.copy()
+    angle = simulate_log(truth, log, TRUTH).angle.copy()
     angle[:, 1] += rng.normal(0.0, np.deg2rad(0.1), len(angle))
     return replace(log, angle=angle)
 

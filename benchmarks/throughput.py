@@ -14,13 +14,13 @@ from functools import partial
 import mujoco
 import numpy as np
 from common import ARTICLE_TRUTH, pseudo_random_log, row, table
+from made_logs import simulate_log
 from mujoco.batch import Batch
 
 from hydroid import load_settings
 from hydroid.arm.locked import lock
 from hydroid.arm.model import load_model
 from hydroid.plant import load_plant
-from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 
 CANDIDATES, REPEATS = 70, 9
@@ -32,7 +32,7 @@ def make_problem(config: str, joints: list[int], other_joints: str) -> Problem:
     settings = load_settings(config, {"simulation.other_joints": other_joints})
     log = pseudo_random_log(settings.arm.pose("study"), joints, duration=75.01)
     if config == "article-mech":
-        log = simulate_log(settings, log, ARTICLE_TRUTH, "truth")
+        log = simulate_log(settings, log, ARTICLE_TRUTH)
     return Problem(settings, [log])
 
 
@@ -64,25 +64,22 @@ def bare_rollout(problem: Problem) -> Callable[[], object]:
     torque = batch.bind("qfrc_bias")[:, None] + gained
     out = {"qpos": np.empty((CANDIDATES, steps, len(moving)))}
 
-    def roll() -> float:
+    def roll() -> None:
         batch.reset()
         batch.bind("qpos")[:] = log.angle[0, moving]
-        started = time.perf_counter()
         batch.rollout(steps, torque, mujoco.mjtState.mjSTATE_QFRC_APPLIED.value, out=out)
-        return time.perf_counter() - started
 
     return roll
 
 
 def in_turn(calls: dict[str, Callable[[], object]]) -> dict[str, np.ndarray]:
-    """Seconds of each call in every round, shape (REPEATS,); a call may time itself."""
+    """Seconds of each call in every round, shape (REPEATS,)."""
     rounds = dict[str, list[float]]()
     for _ in range(1 + REPEATS):  # the first one compiles and warms up
         for name, call in calls.items():
             started = time.perf_counter()
-            result = call()
-            took = result if isinstance(result, float) else time.perf_counter() - started
-            rounds.setdefault(name, []).append(took)
+            call()
+            rounds.setdefault(name, []).append(time.perf_counter() - started)
     return {name: np.array(times[1:]) for name, times in rounds.items()}
 
 

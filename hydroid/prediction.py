@@ -1,19 +1,17 @@
 """What a model predicts for a log: commands in; angles, pressures and flows out."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from hydroid.arm.model import load_model
 from hydroid.arrays import Array
 from hydroid.errors import RunError
-from hydroid.identified_model import IdentifiedModel, identified
+from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
 from hydroid.problem.bindings import Bindings
 from hydroid.problem.problem import make_simulation
-from hydroid.settings.fit import FitSettings
 from hydroid.simulation import Response
 
 
@@ -48,13 +46,6 @@ def predict_log(model: IdentifiedModel, log: Log) -> Log:
         pressure = np.zeros((*angle.shape, 2))  # the pressures of an idle cylinder are not simulated
         pressure[:, measured] = response.pressure[0]
     return replace(log, angle=angle, pressure=pressure)
-
-
-def simulate_log(settings: FitSettings, log: Log, values: Mapping[str, Any], source: str) -> Log:
-    """Return `predict_log` for parameters by name; `source` is where they came from, for messages.
-    Raises SettingsError: a parameter is missing or unknown; RunError: the simulation diverged.
-    """
-    return predict_log(identified(settings, values, source), log)
 
 
 def _respond(

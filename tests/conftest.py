@@ -6,21 +6,29 @@ from hydroid.viewer import choose_platform
 
 choose_platform()
 
-from dataclasses import replace
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
 from hypothesis import settings
+from made_logs import step_log
 
 from hydroid.arm.model import load_model
 from hydroid.hydraulics.records import nominal_joints
 from hydroid.log import Log
 from hydroid.settings.arm import Arm, load_arm
 from hydroid.settings.hydraulics import HydraulicSettings
-from hydroid.simulation import Candidates
+from hydroid.settings.problem import SimulationSettings
+from hydroid.simulation import Candidates, Simulation
+from hydroid.simulation.scenario import Scenario
 
 TRUTH = {"K": 0.2, "D": 231.8, "S": 53.4, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
 """the article's values of stage 1"""
+COILS = {"F1": 8.0, "F2": 0.7, "x1": 0.8, "x2": 12.0}
+HYDRAULIC = {"A_A": 1000.0, "A_B": 750.0, "I_max": 0.9, "I_min": 0.3, "A": 1.4, "C": 1.2} | COILS
+"""and of stage 2"""
+SMALL = {"search.algorithm": "ga", "search.ga": {"population": 6, "generations": 2}}
+"""settings of a search of a second"""
 
 # an example's time says nothing on a machine that is busy with something else
 settings.register_profile("hydroid", deadline=None)
@@ -43,22 +51,6 @@ def study_log(arm: Arm) -> Log:
     return step_log(arm.pose("study"), [60.0, -80.0, 30.0, 0.0, -40.0])
 
 
-def step_log(pose: np.ndarray, levels: list[float], dwell: float = 1.0, joint: int = 2) -> Log:
-    period = 0.01
-    command = np.zeros((round(len(levels) * dwell / period), len(pose)))
-    command[:, joint - 1] = np.repeat(levels, round(dwell / period))
-    time = np.arange(len(command), dtype=float) * period
-    return Log("steps", time, command, np.tile(pose, (len(time), 1)), period)
-
-
-def noisy(log: Log, level_deg: float, seed: int = 0, exact_start: bool = True) -> Log:
-    """The log with white noise on all angles, but for its first sample."""
-    noise = np.random.default_rng(seed).normal(0.0, np.deg2rad(level_deg), log.angle.shape)
-    if exact_start:
-        noise[0] = 0.0
-    return replace(log, angle=log.angle + noise)
-
-
 def candidates(arm: Arm, n: int, seed: int = 0, hydraulics: HydraulicSettings | None = None) -> Candidates:
     """Random candidates around the article's true values; every joint shares gain, damping and stiffness."""
     rng = np.random.default_rng(seed)
@@ -75,6 +67,14 @@ def scattered(arm: Arm, n: int, **hydraulics: float) -> Candidates:
     for name in ("area_a", "area_b", "current_max", "onset_a", "onset_b", "force_1"):
         everyone.joints[name] *= rng.uniform(0.7, 1.4, (n, 1))
     return everyone
+
+
+def simulation(
+    spec, arm: Arm, log: Log, outputs: Sequence[int] = (1,), kind: str = "mech", **settings
+) -> Simulation:
+    """Of some joints, from 0, in the stage `kind`."""
+    scenario = Scenario(spec, arm, log, list(outputs), SimulationSettings(**settings))
+    return Simulation(scenario, arm, HydraulicSettings().substeps if kind == "hyd" else None)
 
 
 def replaced(candidates: Candidates, **joints: np.ndarray | float) -> Candidates:

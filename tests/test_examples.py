@@ -1,7 +1,11 @@
-"""The examples run as they stand, and the benchmarks can be imported."""
+"""The examples run as they stand, and are what they say; the benchmarks can be imported."""
 
+import glob
 import json
 import re
+import runpy
+import shlex
+import shutil
 import subprocess
 import sys
 import warnings
@@ -10,6 +14,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
+
+import hydroid
+from hydroid.commands.app import app
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
@@ -57,6 +65,70 @@ def test_the_notebook_goes_from_a_log_to_the_arm(monkeypatch: pytest.MonkeyPatch
     assert names["fit"].summary.rms_deg < 0.5
     assert "shoulder" in names["fit"]._repr_html_()
     assert np.degrees(names["shoulder"]) == pytest.approx(20, abs=1)
+
+
+SHORT = ["--set", "search.multistart={starts: 1, horizons: [], iterations: 1}", "--no-refinement"]
+"""for a fit: as the README has it, but for a step only"""
+
+
+@pytest.fixture
+def copied(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of both examples, as the working folder."""
+    for name in ("boom", "urdf"):
+        shutil.copytree(EXAMPLES / name, tmp_path / "examples" / name, ignore=shutil.ignore_patterns("mine"))
+    monkeypatch.chdir(tmp_path)
+    return tmp_path / "examples"
+
+
+def commands(readme: Path) -> list[list[str]]:
+    """The hydroid commands of a README, with its patterns expanded."""
+    (block,) = re.findall(r"```sh\n(.*?)```", readme.read_text(encoding="utf-8"), re.DOTALL)
+    found: list[list[str]] = []
+    for line in block.splitlines():
+        if line.startswith("hydroid "):
+            words = shlex.split(line)[1:]
+            found.append([f for word in words for f in (sorted(glob.glob(word)) if "*" in word else [word])])
+    return found
+
+
+@pytest.mark.parametrize(("name", "count"), [("boom", 3), ("urdf", 4)])
+def test_the_readmes_commands_run(name: str, count: int, copied: Path, monkeypatch: pytest.MonkeyPatch):
+    if name == "urdf":
+        monkeypatch.chdir(copied / "urdf")
+    run = commands(copied / name / "README.md")
+    assert len(run) == count
+    for words in run:
+        done = CliRunner().invoke(app, [*words, *(SHORT if words[0].startswith("fit-") else [])])
+        assert done.exit_code == 0, (words, done.output[-2000:], done.exception)
+
+
+def test_the_urdf_and_its_meshes_are_what_the_script_makes():
+    script = runpy.run_path(str(EXAMPLES / "urdf" / "make_example.py"))
+    assert (EXAMPLES / "urdf" / "robot.urdf").read_text(encoding="utf-8") == script["urdf"]()
+    for name in script["SIZES"]:
+        assert (EXAMPLES / "urdf" / "meshes" / f"{name}.stl").read_bytes() == script["mesh"](name)
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("boom", "**Virtual.**"),
+        ("urdf", "**No machine.**"),
+        ("excavator", "EfficientTrack"),
+        ("excavator", "geometry is ours"),
+    ],
+)
+def test_what_is_made_up_is_called_so(name: str, words: str):
+    assert words in " ".join((EXAMPLES / name / "README.md").read_text(encoding="utf-8").split())
+
+
+def test_all_logs_of_the_excavator_are_read_without_repair_and_its_boom_rises_as_its_rod_runs_out(caplog):
+    files = sorted((EXAMPLES / "excavator").glob("*_*.csv"))
+    assert len(files) == 18
+    logs = hydroid.read_logs(files, hydroid.load_settings(EXAMPLES / "excavator" / "fit.yaml"))
+    assert all(log.driven.all() and log.measured.all() for log in logs)
+    assert {log.period for log in logs} == {0.05}
+    assert "moves against" not in caplog.text
 
 
 def test_every_benchmark_can_be_imported():

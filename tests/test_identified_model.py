@@ -9,11 +9,10 @@ from conftest import TRUTH
 
 import hydroid
 from hydroid.errors import RunError, SettingsError
-from hydroid.estimate import FitSummary, NamedEstimate, ParameterEstimate, write_estimate
+from hydroid.estimate import FitSummary, ParameterEstimate, write_estimate
 from hydroid.identified_model import load_identified, write_settings
 from hydroid.problem.bindings import Bindings
 from hydroid.settings.arm import Arm
-from hydroid.settings.load import load
 
 
 def nominal(source: Path | None = None, **overrides: object):
@@ -79,23 +78,6 @@ def test_a_joint_refinement_frees_what_was_fixed(tmp_path: Path, final: str, fre
         assert parameters.free[parameters.names.index("M3")] == free
         assert model.values["M3"] == 22.5
         assert model.name == "run"
-
-
-def test_an_estimate_comes_back_as_it_was_written(tmp_path: Path):
-    parameter = ParameterEstimate(
-        value=0.1 + 0.2, unit="N·m/%", sd=None, interval=(1e-7, None), flag="no effect", at_bound="lower"
-    )
-    summary = FitSummary(
-        stage="mech",
-        estimate={"K": parameter},
-        final="best",
-        converged=False,
-        rms_deg=1 / 3,
-        estimates={"best": NamedEstimate(values={"K": 0.1 + 0.2}, rms_deg=None)},
-    )
-    write_estimate(tmp_path, summary)
-    assert load(tmp_path / "estimate.yaml", FitSummary) == summary
-    assert summary.plain()["schema"] == 1
 
 
 def test_no_public_name_is_a_module_too():

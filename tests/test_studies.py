@@ -5,19 +5,50 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import psutil
 import pytest
-from small_studies import content, run, written
+import yaml
+from conftest import SMALL
+from log_files import head
 
 from hydroid import read_logs, studies
 from hydroid.errors import HydroidError, RunError
+from hydroid.progress import no_progress
 from hydroid.settings.fit import StudySettings, cell_settings
 from hydroid.settings.load import load
-from hydroid.studies import make_tasks
+from hydroid.studies import Row, make_tasks, run_study
+
+
+def content(**changes: Any) -> dict[str, Any]:
+    """A study's file as plain values."""
+    study: dict[str, Any] = {
+        "title": "Two norms",
+        "base": "article-mech",
+        "set": SMALL | {"refinement": None},
+        "logs": ["short.csv"],
+        "axes": {"norm": {"largest": {"objective.norm": "inf"}, "mean": {"objective.norm": 1}}},
+        "seeds": 2,
+    }
+    return study | changes
+
+
+def written(folder: Path, **changes: Any) -> Path:
+    """The file and its log, in a folder."""
+    head(folder / "short.csv", 301)
+    file = folder / "small.yaml"
+    file.write_text(yaml.safe_dump(content(**changes), sort_keys=False))
+    return file
+
+
+def run(file: Path, out: Path) -> tuple[Row, ...]:
+    """Run a study in this process."""
+    with ThreadPoolExecutor(1) as executor:
+        return run_study(file, out, read_logs, executor, no_progress)
 
 
 def stored(folder: Path) -> dict[str, dict[str, Any]]:

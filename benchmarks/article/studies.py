@@ -11,13 +11,13 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from common import pseudo_random_log
+from made_logs import simulate_log
 from measures import Directions, course, output_errors
 from pydantic import Field
 
 from hydroid import read_logs
 from hydroid.errors import RunError
 from hydroid.log import Log
-from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 from hydroid.settings.fit import Changes, FitSettings, StudySettings, cell_settings
 from hydroid.settings.load import Settings, load
@@ -193,7 +193,7 @@ class Plan:
 
         def inside(log: Log) -> bool:
             try:
-                angle = np.degrees(simulate_log(settings, log, truth, "truth").angle[:, joints[0] - 1])
+                angle = np.degrees(simulate_log(settings, log, truth).angle[:, joints[0] - 1])
             except RunError:
                 return False
             return bool(low < angle.min() and angle.max() < high)
@@ -201,7 +201,7 @@ class Plan:
         pose, joints = settings.arm.pose("study"), [*settings.outputs]
         allowed = inside if self.study.range_deg else lambda log: True
         commands = pseudo_random_log(pose, joints, self.longest, seed=seed, allowed=allowed)
-        return simulate_log(settings, commands, truth, "truth")
+        return simulate_log(settings, commands, truth)
 
 
 def read_runs(file: Path) -> Runs:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from conftest import TRUTH
+from made_logs import simulate_log
 
 from hydroid import load_settings
 from hydroid.advice.design import Design, design, forecast, measured, sensor_noise, weakest
@@ -10,7 +11,6 @@ from hydroid.advice.experiment import violation
 from hydroid.arm.model import load_machine
 from hydroid.errors import SettingsError
 from hydroid.posterior.uncertainty import uncertainty
-from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.search import DesignSettings
@@ -34,7 +34,7 @@ def designed() -> tuple[FitSettings, Design]:
 
 def keeps_limits(settings: FitSettings, result: Design) -> bool:
     """Whether `simulate` gives the predicted motion, within the limits, after a rest, and without jumps."""
-    run, limits = simulate_log(settings, result.log, TRUTH, "truth"), settings.design
+    run, limits = simulate_log(settings, result.log, TRUTH), settings.design
     rest = round(limits.rest_s / settings.log.period_s)
     assert not run.command[:rest].any()
     assert limits.slew_pct_s is not None
@@ -100,7 +100,7 @@ def test_the_best_is_no_worse_than_any_random_one_and_repeats(designed: tuple[Fi
 def test_the_forecast_is_what_a_fit_to_the_same_log_knows(designed: tuple[FitSettings, Design]):
     """The search's one-sided differences against the uncertainty of a fit; two logs have twice as much."""
     settings, result = designed
-    log = simulate_log(settings, result.log, TRUTH, "truth")
+    log = simulate_log(settings, result.log, TRUTH)
     how = settings.objective.model_copy(update={"noise_deg": settings.design.noise_deg})
     given = settings.model_copy(update={"objective": how})
     fitted = forecast(uncertainty(Problem(given, [log]), THETA).posterior)

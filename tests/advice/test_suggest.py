@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import step_log
+from made_logs import simulate_log, step_log
 
 from hydroid import load_settings
 from hydroid.advice.growth import promising, refitted, score_terms
@@ -14,7 +14,6 @@ from hydroid.log import Log
 from hydroid.posterior.linear import with_open_start
 from hydroid.posterior.posterior import regular
 from hydroid.posterior.uncertainty import Uncertainty, uncertainty
-from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 from hydroid.quantity_table import QUANTITIES, ROWS, TARGETS
 from hydroid.settings.fit import FitSettings
@@ -36,7 +35,7 @@ def make_settings(**hydraulics: float) -> FitSettings:
 
 
 def make_log(settings: FitSettings, noise_deg: float = 0.1) -> Log:
-    log = simulate_log(settings, step_log(settings.arm.pose("study"), LEVELS, joint=2), TRUTH, "truth")
+    log = simulate_log(settings, step_log(settings.arm.pose("study"), LEVELS, joint=2), TRUTH)
     noise = np.random.default_rng(1).normal(0.0, np.radians(noise_deg), log.angle.shape)
     noise[:, np.arange(log.joints) != 1] = 0.0
     return replace(log, angle=log.angle + noise)
@@ -71,12 +70,10 @@ def test_terms_are_what_is_not_free(late: tuple[Problem, Uncertainty]):
         problem
     )
     assert not {"damping", "area_a", "area", "pump_flow"} & names(problem)
-    free = {"late": ParameterSettings(quantity="delay_a", joints=(2,), bounds=(0, 1))}
-    freed = names(problem.varied(problem.settings.with_parameters(free)), np.append(known.theta, 0.0))
-    assert freed & {"delay", "delay_a", "delay_b", "late_b"} == {"delay_b"}
-    free = {"late": ParameterSettings(quantity="delay", joints=(2,), bounds=(0, 1))}
-    freed = names(problem.varied(problem.settings.with_parameters(free)), np.append(known.theta, 0.0))
-    assert freed & {"delay", "delay_a", "delay_b", "late_b"} == {"late_b"}
+    for quantity, left in (("delay_a", "delay_b"), ("delay", "late_b")):
+        free = {"late": ParameterSettings(quantity=quantity, joints=(2,), bounds=(0, 1))}
+        freed = names(problem.varied(problem.settings.with_parameters(free)), np.append(known.theta, 0.0))
+        assert freed & {"delay", "delay_a", "delay_b", "late_b"} == {left}
     (log,) = problem.logs
     gauged = replace(log, pressure=np.zeros((*log.angle.shape, 2)))
     assert "start_pressure" in names(problem)

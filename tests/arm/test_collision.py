@@ -3,21 +3,14 @@
 import mujoco
 import numpy as np
 import pytest
+from arms import MODELS
 
 from hydroid.arm.collision import CollisionChecker
 from hydroid.arm.model import Machine, load_machine
 from hydroid.errors import ModelError
 from hydroid.settings.arm import Arm
 
-SWINGS = """
-<mujoco>
-  <worldbody>
-    <geom name="floor" type="plane" size="5 5 1"/>
-    <body name="first" pos="0 0 2"><joint axis="0 -1 0"/><geom size="0.1" pos="1 0 0" mass="1"/></body>
-    <body name="second" pos="3 0 2"><joint axis="0 -1 0"/><geom size="0.1" pos="-1 0 0" mass="1"/></body>
-  </worldbody>
-</mujoco>
-"""
+SWINGS = (MODELS / "swings.xml").read_text()
 """two balls on sticks of 1 m, whose hinges are 3 m apart and 2 m above the floor"""
 
 

@@ -71,13 +71,6 @@ def test_motors_are_joint_torques_and_nothing_else_pushes():
     assert MODEL.opt.timestep == 0.01
 
 
-@pytest.mark.parametrize("pose", ARM.poses)
-def test_no_pose_starts_in_contact_but_an_arm_in_the_floor_is_felt(pose):
-    assert posed(ARM.pose(pose)).ncon == 0
-    data = posed([0, np.radians(-30), np.radians(-50), 0, 0, 0, 0])
-    assert MODEL.geom("floor").id in data.contact.geom
-
-
 def test_each_arm_of_a_pair_is_the_one_that_stands_alone():
     """Its gravity and inertia, on both sides."""
     machine = load_machine(ARM, pair=True)

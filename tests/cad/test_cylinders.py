@@ -3,6 +3,7 @@
 import mujoco
 import numpy as np
 import pytest
+from arms import MODELS
 from scipy.optimize import least_squares
 
 from hydroid.cad.importer import import_arm
@@ -16,45 +17,14 @@ GROUND, PIN, CHILD = np.array([1.6, 0.15]), np.array([1.75, 0.5]), np.array([2.1
 TAIL, BUCKET = np.array([0.3, 0.45]), np.array([2.0, 0.0])
 """of the bucket's cylinder on the stick; the bucket's joint"""
 
-EXCAVATOR = """
-<mujoco model="loops"><compiler angle="radian"/><extension><plugin plugin="some.soil"/></extension>
-  <asset><texture name="mud" type="2d" file="none.png"/><material name="mud" texture="mud"/></asset>
-  <worldbody><body name="track"><freejoint/><geom type="box" size="1 1 .2" mass="2000"/>
-    <body name="house" pos="0 0 1"><joint name="swing" axis="0 0 1" range="-3 3"/>
-      <geom type="box" size="1 1 .5" material="mud" mass="4000"/>
-      <body name="boom_tube" pos="0.5 0 -0.3" euler="0 {boom} 0"><joint name="tube1" axis="0 1 0"/>
-        <geom type="capsule" fromto="0 0 0 .5 0 0" size=".05" mass="60"/>
-        <body name="boom_rod" pos=".3 0 0"><joint name="rod1" type="slide" axis="1 0 0" range="-.2 .3"/>
-          <geom type="capsule" fromto="0 0 0 .6 0 0" size=".03" mass="20"/></body></body>
-      <body name="boom"><joint name="boom" axis="0 -1 0" range="-.3 .5"/>
-        <geom type="capsule" fromto="0 0 0 3 0 0" size=".2" mass="800"/>
-        <body name="stick" pos="3 0 0"><joint name="stick" axis="0 -1 0" range="-2 0.5"/>
-          <geom type="capsule" fromto="0 0 0 2 0 0" size=".15" mass="400"/>
-          <body name="bucket_tube" pos=".3 0 .45" euler="0 {bucket} 0"><joint name="tube2" axis="0 1 0"/>
-            <geom type="capsule" fromto="0 0 0 .5 0 0" size=".05" mass="30"/>
-            <body name="bucket_rod"><joint name="rod2" type="slide" axis="1 0 0" range="-.2 .2"/>
-              <geom type="capsule" fromto=".5 0 0 1 0 0" size=".03" mass="10"/></body></body>
-          <body name="rocker" pos="1.6 0 .15"><joint name="rocker" axis="0 -1 0"/>
-            <geom type="capsule" fromto="0 0 0 .15 0 .35" size=".03" mass="10"/></body>
-          <body name="bucket" pos="2 0 0"><joint name="bucket" axis="0 -1 0" range="-.4 .4"/>
-            <geom type="box" size=".3 .4 .3" pos="0.3 0 -.3" mass="300"/>
-            <body name="coupler" pos=".12 0 .3"><joint name="coupler" axis="0 -1 0"/>
-              <geom type="capsule" fromto="0 0 0 -.37 0 .2" size=".03" mass="10"/></body></body>
-        </body></body></body></body></worldbody>
-  <equality><connect body1="boom_rod" body2="boom" anchor="{eye} 0 0"/>
-    <connect body1="bucket_rod" body2="rocker" anchor="{rod} 0 0"/>
-    <connect body1="coupler" body2="rocker" anchor="-.37 0 .2"/></equality>
-  <sensor><jointpos joint="rod1"/></sensor>
-  <actuator><velocity joint="rod1"/></actuator>
-</mujoco>"""
-
 
 def written(folder):
     """The file: rods point from their feet to their eyes, pinned to rocker and coupler in one point."""
     way, rod = EYE - FOOT, PIN - TAIL
     path = folder / "loops.xml"
     angles = {"boom": -np.arctan2(way[1], way[0]), "bucket": -np.arctan2(rod[1], rod[0])}
-    path.write_text(EXCAVATOR.format(**angles, eye=np.hypot(*way) - 0.3, rod=np.hypot(*rod)))
+    text = (MODELS / "loops.xml").read_text()
+    path.write_text(text.format(**angles, eye=np.hypot(*way) - 0.3, rod=np.hypot(*rod)))
     return path
 
 

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 import robots
 import trimesh
+from arms import MODELS
 from robots import LIMIT, joint, link, write_robot
 
 from hydroid.cad.importer import import_arm
@@ -247,33 +248,10 @@ def test_the_branch_that_the_log_names_or_that_is_asked_for_is_taken(tmp_path):
         import_arm(path, tip="bom")
 
 
-MJCF = """
-<mujoco model="my arm">
-  <compiler angle="degree" meshdir="meshes"/>
-  <asset><mesh name="b" file="boom.stl"/></asset>
-  <worldbody>
-    <geom type="plane" size="5 5 1"/>
-    <body name="base" pos="0 0 1"><geom type="box" size="0.5 0.5 0.5"/>
-      <body name="boom" pos="0.5 0 0.5" euler="0 0 90">
-        <joint name="lift" axis="0 -1 0" pos="0 0 0.1" range="-30 60" limited="true"/>
-        <frame pos="0 0 0.1" euler="0 0 0"><geom type="mesh" mesh="b" density="500"/></frame>
-        <body name="stick" pos="2 0 0.1"><inertial pos="0.7 0 0" mass="50" diaginertia="1 9 9"/>
-          <joint name="tilt" axis="0 -1 0" range="-90 0" limited="true"/>
-          <geom type="capsule" fromto="0 0 0 1.5 0 0" size="0.1"/>
-          <body name="slide"><joint type="slide" axis="1 0 0"/><geom size="0.1" mass="5"/></body>
-        </body>
-      </body>
-    </body>
-  </worldbody>
-  <actuator><motor joint="lift"/></actuator>
-</mujoco>
-"""
-
-
 def test_an_mjcf_is_read_too(tmp_path):
     write_robot(tmp_path)
     path = tmp_path / "digger" / "arm.xml"
-    path.write_text(MJCF)
+    path.write_text((MODELS / "arm.xml").read_text())
     arm = import_arm(path)
     assert arm.name == "my_arm"
     said(arm, "slide_joint: without limits: moving without stops")

@@ -4,38 +4,28 @@ from pathlib import Path
 
 import pytest
 from command_line import Ended, Run, run
+from conftest import SMALL
+from log_files import head
 
 import hydroid
 from hydroid.reporting import page_file
-
-LOG = Path(__file__).parents[2] / "examples" / "logs" / "rig_shoulder_1.csv"
 
 
 @pytest.fixture(scope="session")
 def short(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Ten seconds of a virtual rig's log."""
-    path = tmp_path_factory.mktemp("log") / "short.csv"
-    path.write_text("\n".join(LOG.read_text().splitlines()[:1001]) + "\n")
-    return path
-
-
-SMALL: dict[str, object] = {
-    "search.algorithm": "ga",
-    "search.ga": {"population": 6, "generations": 2},
-    "refinement.iterations": 1,
-    "design": {"effort": 3, "poses": "any"},
-}
+    return head(tmp_path_factory.mktemp("log") / "short.csv", 1000)
 
 
 @pytest.fixture(scope="session")
 def array(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[int, hydroid.FitResult]]:
     """Four seconds of the log, a.csv; beside it three small runs of it, seed-1 to seed-3; their results."""
     folder = tmp_path_factory.mktemp("array")
-    (folder / "a.csv").write_text("\n".join(LOG.read_text().splitlines()[:401]) + "\n")
+    log = head(folder / "a.csv", 400)
+    small = SMALL | {"refinement.iterations": 1, "design": {"effort": 3, "poses": "any"}}
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(page_file, "write_page", lambda *_: [])  # figures take longest
-        log = folder / "a.csv"
-        runs = {n: hydroid.fit_mech(log, seed=n, set=SMALL, out=folder / f"seed-{n}") for n in (1, 2, 3)}
+        runs = {n: hydroid.fit_mech(log, seed=n, set=small, out=folder / f"seed-{n}") for n in (1, 2, 3)}
     return folder, runs
 
 

@@ -4,7 +4,6 @@ import json
 from pathlib import Path
 
 import pytest
-from command_line import Run
 
 ROOT = Path(__file__).parents[2]
 LOG = ROOT / "examples" / "logs" / "rig_shoulder_1.csv"
@@ -60,9 +59,7 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("command", "kind", "says"), WRONG, ids=[command for command, *_ in WRONG])
-def test_what_the_user_can_correct_is_one_line_and_exit_2(
-    hydroid_cli: Run, tmp_path: Path, command: str, kind: str, says: str
-):
+def test_what_the_user_can_correct_is_one_line_and_exit_2(hydroid_cli, tmp_path, command, kind, says):
     for name, text in FILES.items():
         (tmp_path / name).write_text(text)
     words = command.format(log=LOG, root=ROOT).split()

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import yaml
 from command_line import Run
+from conftest import SMALL
 
 import hydroid
 from hydroid.commands.stages import with_mechanics
@@ -63,8 +64,7 @@ def test_python_does_what_the_terminal_does_and_shows_it(short: Path, hydroid_cl
     assert "median" not in printed
     assert len(printed.splitlines()) <= 20
     assert "shoulder  ✗ does not fit" in printed
-    small = {"search.ga.population": 6, "search.ga.generations": 2}
-    fitted = hydroid.fit_mech(short, algorithm="ga", seed=5, refinement=False, set=small, out="python")
+    fitted = hydroid.fit_mech(short, seed=5, refinement=False, set=SMALL, out="python")
     own = Path("runs/fit-mech/estimate.yaml").read_bytes()
     assert Path("python/estimate.yaml").read_bytes() == own
     assert len(repr(fitted)) < 200
@@ -72,9 +72,8 @@ def test_python_does_what_the_terminal_does_and_shows_it(short: Path, hydroid_cl
 
 
 def test_a_fit_in_memory_steps_predicts_validates_reports_and_tables_itself(short: Path, tmp_path: Path):
-    small = {"search.ga.population": 6, "search.ga.generations": 2}
     before = sorted(tmp_path.iterdir())
-    fitted = hydroid.fit_mech(short, algorithm="ga", refinement=False, set=small)
+    fitted = hydroid.fit_mech(short, refinement=False, set=SMALL)
     assert fitted.to_frame()["value"].to_dict() == fitted.summary.values
     predicted = fitted.predict(short)
     assert np.array_equal(predicted.response, fitted.predictions[0].response)
@@ -135,9 +134,8 @@ def test_the_second_stage_walks_through(short: Path, hydroid_cli: Run, tmp_path:
     rms = [found["estimates"][name]["rms_deg"] for name in ("best", "refined", "joint")]
     assert rms == sorted(rms, reverse=True)
     hydroid_cli("simulate", short, "--fit", "run/estimate.yaml", "--out", "s.csv")
-    (row,) = json.loads(hydroid_cli("validate", "s.csv", "--fit", "run", "--json", "--out", "v").out)[
-        "results"
-    ]
+    judged = json.loads(hydroid_cli("validate", "s.csv", "--fit", "run", "--json", "--out", "v").out)
+    (row,) = judged["results"]
     assert row["max_deg"] < 1e-6
 
 

@@ -71,14 +71,8 @@ def test_the_exit_status_says_whether_bodies_meet(arm: Arm, hydroid_cli: Run):
     """The azimuth turns 45 deg to the other arm and back; the arm is stretched."""
     time, (_, shoulder, *_) = 0.01 * np.arange(401), np.degrees(arm.pose("home"))
     swing = 45 * np.sin(np.pi * time / 4) ** 2
-    np.savetxt(
-        "a.csv",
-        np.column_stack([time, swing, np.full(401, shoulder)]),
-        "%.9g",
-        ",",
-        header="time_s,q1_deg,q2_deg",
-        comments="",
-    )
+    rows = np.column_stack([time, swing, np.full(401, shoulder)])
+    np.savetxt("a.csv", rows, "%.9g", ",", header="time_s,q1_deg,q2_deg", comments="")
     assert json.loads(hydroid_cli("view", "a.csv", "--collisions", "--json").out)["free"] is True
     beside = ("view", "a.csv", "--collisions", "--arm", "right")
     assert " mm deep" in hydroid_cli(*beside, code=1).out

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from conftest import TRUTH, step_log
+from conftest import TRUTH
+from made_logs import simulate_log, step_log
 
 from hydroid import load_settings
 from hydroid.errors import HydroidError
@@ -10,7 +11,6 @@ from hydroid.findings import Finding
 from hydroid.fitting.checkpoints import Memo
 from hydroid.fitting.fit import fit
 from hydroid.fitting.summary import fit_findings
-from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 
 STEPS = 2**16 - 1
@@ -38,7 +38,7 @@ def make(kind=Fragile, **changes) -> Problem:
     small = {f"search.{algorithm}": {"population": 10, "generations": 5} for algorithm in ("ga", "nsga2")}
     small |= {"objective.segments": 3}
     settings = load_settings("article-mech", small | changes)
-    log = simulate_log(settings, step_log(settings.arm.pose("study"), [60.0, -80.0, 30.0]), TRUTH, "truth")
+    log = simulate_log(settings, step_log(settings.arm.pose("study"), [60.0, -80.0, 30.0]), TRUTH)
     return kind(settings, [log])
 
 

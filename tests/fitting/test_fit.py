@@ -11,7 +11,6 @@ from hydroid.fitting.checkpoints import Memo
 from hydroid.fitting.fit import fit
 from hydroid.fitting.search import search
 from hydroid.fitting.validation import error_indices
-from hydroid.problem.bindings import Bindings
 from hydroid.problem.problem import Problem
 from hydroid.run.folder import RunFolder
 
@@ -131,24 +130,6 @@ def test_a_search_that_does_not_repeat_itself_is_found_out(tmp_path):
 def test_parameters_that_do_not_fit_the_arm_are_refused(change, says, study_log):
     with pytest.raises(SettingsError, match=says):
         Problem(load_settings("article-mech", change), [study_log])
-
-
-def test_a_fixed_parameter_stays_and_the_others_move(tmp_path):
-    result = Study(tmp_path, **{"parameters.M3.fixed": 22.5}).fit()
-    assert all(estimate.theta[5] == 22.5 for estimate in result.estimates.values())
-    assert result.best.rms < result.searched.rms
-
-
-def test_shared_and_own_parameters_of_joints():
-    own = {
-        "parameters.K.joints": [2],
-        "parameters.K3": {"quantity": "gain", "joints": [3], "bounds": [0.1, 1.0]},
-    }
-    settings = load_settings("article-mech", own)
-    stage = Bindings(settings)
-    values = stage.candidates(stage.parameters.vector(TRUTH | {"K3": 0.7}, "here")[None])
-    np.testing.assert_array_equal(values.joints.gain[0], [0, 0.2, 0.7, 0, 0, 0, 0])
-    assert values.mass[0].sum() == pytest.approx(45.0)
 
 
 def test_error_indices_against_their_definitions():

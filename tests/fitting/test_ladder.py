@@ -1,13 +1,11 @@
 """A fit climbs: it keeps the dynamic model, and a term, where the logs ask for them, and nowhere else."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
+from made_logs import noisy, simulate_log
 from recovery import duties, settings_of
 
 from hydroid.fitting.fit import fit
-from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 from hydroid.settings.search import MultistartSettings, RefinementSettings
 
@@ -37,8 +35,7 @@ def test_a_fit_keeps_what_the_logs_ask_for(name):
     ladder = settings.model_copy(update=changes)
     machine = ladder.of_estimate(name)
     log = duties(machine.arm.pose("study"), {2: SHOULDER, 3: ELBOW})
-    exact = simulate_log(machine, log, {n: TRUTH[n] for n in CONFIG if n in machine.parameters}, "truth")
-    noise = np.radians(0.02) * np.random.default_rng(1).standard_normal(exact.angle.shape)
-    found = fit(Problem(ladder, [replace(exact, angle=exact.angle + noise)]))
+    exact = simulate_log(machine, log, {n: TRUTH[n] for n in CONFIG if n in machine.parameters})
+    found = fit(Problem(ladder, [noisy(exact, 0.02, 1, exact_start=False)]))
     assert found.final == name
     assert np.degrees(found.best.rms) == pytest.approx(0.02, rel=0.1)

@@ -35,12 +35,8 @@ def exact() -> Problem:
     return make()
 
 
-def unit(problem: Problem, n: int) -> np.ndarray:
-    return np.random.default_rng(1).random((n, len(problem.parameters.names)))
-
-
 def test_a_part_of_a_problem_is_the_same_problem_for_a_shorter_time(exact):
-    theta = exact.theta(unit(exact, 1))
+    theta = exact.theta(np.random.default_rng(1).random((1, len(exact.parameters.names))))
     part = exact.varied(exact.settings.changed({"objective.segments": 1}), [exact.logs[0].first(1.0)])
     whole = exact.residuals(theta).reshape(2, -1)
     np.testing.assert_array_equal(part.residuals(theta).reshape(2, -1), whole[:, :151])
@@ -54,17 +50,6 @@ def test_a_horizon_in_which_nothing_moves_is_left_out():
     stored: dict[str, dict] = {}
     search(Problem(problem.settings, [late]), lambda row: None, lambda *_: None, stored)
     assert set(stored) == {"search", "start 1 part 1", "start 1 part 2"}  # two seconds, and all
-
-
-def test_starts_fill_positive_bounds_evenly_by_decades():
-    problem = make(factor=100.0, **{"parameters.S2.bounds": [0.0, 500.0]})
-    drawn, names = problem.theta(unit(problem, 2000)), problem.parameters.names
-    low, high = problem.parameters.lower, problem.parameters.upper
-    assert ((drawn >= low) & (drawn <= high)).all()
-    wide, plain = names.index("K2"), names.index("S2")
-    # a uniform distribution's mean is known to 0.29 / sqrt(2000)
-    assert np.mean(np.log10(drawn[:, wide] / low[wide]) / 4) == pytest.approx(0.5, abs=0.03)
-    assert np.mean(drawn[:, plain] / 500) == pytest.approx(0.5, abs=0.03)
 
 
 def test_all_starts_end_at_one_optimum_which_is_the_truth_without_noise(exact):

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from conftest import TRUTH, noisy, step_log
+from conftest import TRUTH
+from made_logs import noisy, simulate_log, step_log
 
 from hydroid import load_settings
 from hydroid.fitting.refinement import refine
-from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 from hydroid.run.archive import CheckpointFile
 from hydroid.search.descent import Descent
@@ -29,7 +29,7 @@ class Counted(Problem):
 def problem(request, arm):
     priors = {} if request.param == "no prior" else {"link 3": {"of": "M3", "value": 22.0, "sd": 0.5}}
     settings = load_settings("article-mech", {"priors": priors})
-    log = simulate_log(settings, step_log(arm.pose("study"), [60.0, -80.0]), TRUTH, "truth")
+    log = simulate_log(settings, step_log(arm.pose("study"), [60.0, -80.0]), TRUTH)
     return Counted(settings, [noisy(log, 0.06, exact_start=False)])
 
 

@@ -19,6 +19,7 @@ import numpy as np
 import trimesh
 import typer
 import yaml
+from arms import MODELS
 
 from hydroid.commands.app import app
 from hydroid.errors import HydroidError
@@ -63,9 +64,8 @@ def edit(rng: Random, data: bytes) -> bytes:
             return data[:at] + rng.choice((b"", data[at + rng.choice((1, 2, 9, 100)) :]))
         case "word" if words:
             word = rng.choice(words)
-            if (
-                re.fullmatch(rb"-?\d{1,12}\.?\d*", word[0]) and rng.random() < 0.7
-            ):  # a number differs a little
+            number = re.fullmatch(rb"-?\d{1,12}\.?\d*", word[0])
+            if number and rng.random() < 0.7:  # it differs a little
                 value = float(word[0]) * rng.choice((-1, 0.1, 0.5, 1.01, 2, 1e3)) + rng.choice((0, 0, 1))
                 token = f"{value:.6g}".encode()
             return data[: word.start()] + token + data[word.end() :]
@@ -185,19 +185,8 @@ def _cells(data: bytes) -> tuple[list[str], np.ndarray]:
 @cache
 def configs() -> tuple[bytes, ...]:
     """Shipped settings, and one that uses what they leave out."""
-    shown = {
-        "parameters": {
-            "K": {"quantity": "gain", "bounds": [0.1, 1]},
-            "D": {"quantity": "damping", "fixed": 200},
-        },
-        "log": {"joints": {4: {"command": {"scale": 0.5}}, 7: None}, "delay_s": 0.1},
-        "priors": {"gain": {"of": {"K": 1}, "value": 0.4, "sd": 0.1}},
-        "objective": {"norm": 2, "weights": {2: 3.0}, "segments": 3},
-        "search": {"algorithm": "ga", "seed": 7},
-        "refinement": None,
-    }
     shipped = [(ROOT / "configs" / f"{name}.yaml").read_bytes() for name in ("fit-mech", "fit-hyd")]
-    return (*shipped, yaml.safe_dump(shown, sort_keys=False).encode())
+    return (*shipped, (MODELS / "settings.yaml").read_bytes())
 
 
 def overrides() -> tuple[bytes, ...]:
@@ -208,23 +197,6 @@ def overrides() -> tuple[bytes, ...]:
 
 
 @cache
-def arms() -> tuple[bytes, ...]:
-    """The YAML of the arm of two boxes."""
-    cylinder = {"kind": "linear", "stroke": 250, "area_a": 800, "area_b": 600, "max_opening": 0.35}
-    ends = {"parent": [-0.25, 0, 0.1], "child": [0.05, 0, 0.2]}
-    rotary = {"kind": "rotary", "displacement": 10, "max_opening": 0.2}
-    arm = {"model": "arm.xml", "actuators": {"s": cylinder | {"pivots": ends}, "e": rotary}}
-    return (yaml.safe_dump(arm, sort_keys=False).encode(),)
-
-
-TWO = """<mujoco model="two"><asset><mesh name="rod" file="rod.stl" inertia="exact"/></asset><worldbody>
-<body name="upper" pos="0 0 0.1"><joint name="s" axis="0 -1 0" range="-50 50"/>
-<geom type="mesh" mesh="rod" mass="2"/><body name="fore" pos="0 0 0.1">
-<joint name="e" axis="0 -1 0" range="-50 50"/><geom type="mesh" mesh="rod" mass="2"/>
-</body></body></worldbody></mujoco>"""
-
-
-@cache
 def rod() -> bytes:
     """The mesh of the arm of two boxes."""
     content = trimesh.creation.box((0.5, 0.06, 0.04)).export(file_type="stl")
@@ -232,9 +204,14 @@ def rod() -> bytes:
     return content
 
 
+def two(kind: str) -> bytes:
+    """A file of the arm of two boxes."""
+    return (MODELS / f"two.{kind}").read_bytes()
+
+
 def start(room: Path, data: bytes) -> Sequence[str]:
     """Return the command that starts a project with the room's arm."""
-    for name, content in {"rod.stl": rod(), "arm.yaml": arms()[0], "arm.xml": TWO.encode()}.items():
+    for name, content in {"rod.stl": rod(), "arm.yaml": two("yaml"), "arm.xml": two("xml")}.items():
         if not (room / "arm" / name).exists():
             (room / "arm" / name).write_bytes(content)
     shutil.rmtree(room / "mine", ignore_errors=True)
@@ -307,7 +284,7 @@ KINDS = {
         Kind(
             "set", overrides, "set", lambda room, data: check(room, "--set", data.decode("utf-8", "replace"))
         ),
-        Kind("arm", arms, "arm/arm.yaml", start),
+        Kind("arm", lambda: (two("yaml"),), "arm/arm.yaml", start),
         Kind("mesh", lambda: (rod(),), "arm/rod.stl", start),
         Kind(
             "values", lambda: ((ROOT / "examples/article/truth.yaml").read_bytes(),), "values.yaml", simulate

@@ -102,16 +102,7 @@ def wheel(inertia: float) -> mujoco.MjModel:
     )
 
 
-def simulate(
-    p: Records,
-    command: np.ndarray,
-    settings: HydraulicSettings,
-    steps: int = 1,
-    observe: list | None = None,
-    start: float = START,
-    model: mujoco.MjModel | None = None,
-    velocity: float = 0.0,
-) -> np.ndarray:
+def simulate(p, command, settings, steps=1, observe=None, start=START, model=None, velocity=0.0):
     """Angles [rad], (n, T + 1), of one joint under commands (T,), with `steps` MuJoCo steps a sample.
 
     It is the pendulum on its cylinder, or another. `observe` receives an Observation, shapes (n, 1), and the
@@ -178,15 +169,9 @@ def reference(p: Records, command: np.ndarray, rtol: float = 1e-7) -> tuple[np.n
             va, vb = volumes(x)
             pa, pb = pressures(z, x)
             spool = xa - xb
-            share = min(
-                max(abs(spool) - v["overlap_a" if spool > 0 else "overlap_b"], 0)
-                / v["slot_width_a" if spool > 0 else "slot_width_b"],
-                1,
-            )
-            area = (
-                v["opening_a" if spool > 0 else "opening_b"]
-                * share ** v["opening_exponent_a" if spool > 0 else "opening_exponent_b"]
-            )
+            side = "a" if spool > 0 else "b"
+            share = min(max(abs(spool) - v[f"overlap_{side}"], 0) / v[f"slot_width_{side}"], 1)
+            area = v[f"opening_{side}"] * share ** v[f"opening_exponent_{side}"]
             ahead, back = (area, 0.0) if spool > 0 else (0.0, area)
             in_a, in_b = (max(flow(v["leakage"] + a, ps - p), backflow) for a, p in ((ahead, pa), (back, pb)))
             fill_a, fill_b = (v["anticavitation"] if p < pt else 0.0 for p in (pa, pb))
@@ -222,9 +207,8 @@ def reference(p: Records, command: np.ndarray, rtol: float = 1e-7) -> tuple[np.n
     at_rest = np.roots([1, 2 * gap, gap**2, -coil * v["current_min"] ** 2 / v["plunger_stiffness"]])
     rest = float(max(at_rest[abs(at_rest.imag) < 1e-9].real))
     va, vb = volumes(x0)
-    z = np.array(
-        [rest, 0, rest, 0, pa / beta + log(va), pb / beta + log(vb), START, 0.0, v["supply_pressure"] / beta]
-    )
+    oil = [pa / beta + log(va), pb / beta + log(vb)]
+    z = np.array([rest, 0, rest, 0, *oil, START, 0.0, v["supply_pressure"] / beta])
     atol = np.array([1e-11, 1e-9, 1e-11, 1e-9, 1e-11, 1e-11, 1e-10, 1e-9, 1e-11])
     states = np.empty((len(command) + 1, 9))
     states[0] = z
@@ -233,14 +217,8 @@ def reference(p: Records, command: np.ndarray, rtol: float = 1e-7) -> tuple[np.n
         u = float(command[first])
         ia = current(v["onset_a"] + u * (10.0 - v["onset_a"]) / 100 if u > 0 else 0.0)
         ib = current(v["onset_b"] - u * (10.0 - v["onset_b"]) / 100 if u < 0 else 0.0)
-        solver = Radau(
-            slope(coil * ia**2, coil * ib**2),
-            0.0,
-            states[first],
-            (last - first) * PERIOD,
-            rtol=rtol,
-            atol=atol,
-        )
+        motion, end = slope(coil * ia**2, coil * ib**2), (last - first) * PERIOD
+        solver = Radau(motion, 0.0, states[first], end, rtol=rtol, atol=atol)
         wanted = 1
         while solver.status == "running":
             solver.step()

@@ -1,6 +1,7 @@
 """Problems whose residuals are linear in their parameters: other libraries say what is right."""
 
 import numpy as np
+from scipy.signal import lfilter
 
 from hydroid.parameters import Parameter, ParameterSet
 from hydroid.problem.channels import Channel
@@ -57,11 +58,10 @@ def slow(count, samples=1000, seed=0):
 
 
 def ar1(rng, samples, phi, level):
-    out = np.empty(samples)
-    out[0] = rng.normal(0, level)
-    for i, e in enumerate(rng.normal(0, level * np.sqrt(1 - phi**2), samples - 1), start=1):
-        out[i] = phi * out[i - 1] + e
-    return out
+    """A stationary first-order process."""
+    steps = rng.normal(0, level * np.sqrt(1 - phi**2), samples)
+    steps[0] = rng.normal(0, level)
+    return lfilter([1.0], [1.0, -phi], steps)
 
 
 def least_squares(columns, measured):

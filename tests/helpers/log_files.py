@@ -35,6 +35,13 @@ def save(path: Path, rows: list[list[str]], separator: str = ",") -> Path:
     return path
 
 
+def head(path: Path, samples: int) -> Path:
+    """Write the first samples of a virtual rig's log to a file."""
+    rows = (RIG / "rig_shoulder_1.csv").read_text().splitlines()
+    path.write_text("\n".join(rows[: samples + 1]) + "\n")
+    return path
+
+
 def read(
     path: Path, settings: LogSettings = SETTINGS, ranges: np.ndarray = RANGES, **options: Any
 ) -> tuple[Log, list[LogFinding]]:

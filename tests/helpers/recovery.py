@@ -1,16 +1,15 @@
 """Stage 2 with known mechanics, logs that are commands alone, and fits that recover what made a log."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
+from made_logs import at_rest, noisy, simulate_log
 
 import hydroid
+from hydroid.fitting.refinement import refine
 from hydroid.log import Log
 from hydroid.posterior.uncertainty import Uncertainty, uncertainty
-from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
-from hydroid.search.least_squares import least_squares
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.search import RefinementSettings
 
@@ -25,8 +24,7 @@ def duties(pose: np.ndarray, levels: Mapping[int, Sequence[float]], dwell: float
     for joint, values in levels.items():
         held = np.repeat(values, round(dwell / period))
         command[: len(held), joint - 1] = held
-    time = np.arange(length) * period
-    return Log("duties", time, command, np.tile(pose, (length, 1)), period)
+    return at_rest(pose, command)
 
 
 def settings_of(parameters: Mapping[str, Mapping[str, object]], **hydraulics: float | None) -> FitSettings:
@@ -45,22 +43,10 @@ def recover(
 ) -> Uncertainty:
     """Fit logs that the settings simulate with `truth`, noise added, from another start."""
     rng = np.random.default_rng(0)
-    measured = [simulate_log(settings, log, truth, "truth") for log in logs]
-    noisy = [
-        replace(log, angle=log.angle + rng.normal(0, np.radians(NOISE_DEG), log.angle.shape))
-        for log in measured
-    ]
     # the start pose is known here; its noise is another test's subject
-    for log, exact in zip(noisy, measured, strict=True):
-        log.angle[0] = exact.angle[0]
-    problem = Problem(settings, noisy)
-    begin = problem.parameters.vector(start, "start")
-
-    def residuals(unit: np.ndarray) -> np.ndarray:
-        return problem.residuals(problem.parameters.from_unit(unit))
-
-    ended = least_squares(problem.parameters.to_unit(begin[None])[0], residuals, RefinementSettings())
-    return uncertainty(problem, problem.parameters.from_unit(ended.point[None])[0])
+    problem = Problem(settings, [noisy(simulate_log(settings, log, truth), NOISE_DEG, rng) for log in logs])
+    ended = refine(problem, problem.parameters.vector(start, "start"), RefinementSettings())
+    return uncertainty(problem, problem.parameters.from_unit(ended.point))
 
 
 def assert_recovered(found: Uncertainty, settings: FitSettings, truth: Mapping[str, float]) -> None:

@@ -17,14 +17,14 @@ from hydroid.posterior.linear import Linear, estimate_box
 from hydroid.posterior.noise import problem_noise
 from hydroid.posterior.quantities import Quantities
 from hydroid.posterior.uncertainty import Uncertainty, uncertainty_from
-from hydroid.problem.channels import make_channels, overall_objective, segment_objectives
-from hydroid.problem.priors import Priors
+from hydroid.problem.channels import overall_objective, segment_objectives
 from hydroid.problem.problem import Evaluation, Problem
 from hydroid.run.record import Record, fit_result
 from hydroid.search.descent import Descent, Ending
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.problem import ParameterSettings
 
+WHAT = {"K": "gain", "D": "damping"}
 MODEL = {"K": (0.05, 0.5), "D": (50.0, 500.0), "M1": (1.0, 10.0), "M2": (1.5, 12.75)}
 
 
@@ -37,42 +37,21 @@ def make_problem(
     samples: int = 120,
     **objective: Any,
 ) -> Problem:
-    """A problem with everything a report looks at, and no model behind it."""
-    problem = object.__new__(Problem)
+    """A problem of noise and waves that no model explains; nothing of it is simulated."""
+    fixed, own = fixed or {}, dict[str, ParameterSettings]()
+    for name, ends in parameters.items():
+        what = {"quantity": "mass", "link": f"link{name[1]}"} if name[0] == "M" else {"quantity": WHAT[name]}
+        bounds = ends if ends[0] < ends[1] else None
+        own[name] = ParameterSettings(bounds=bounds, fixed=fixed.get(name), **what)
     how = {"segments": segments} | objective
-    fixed = fixed or {}
-    own = {
-        name: ParameterSettings(
-            quantity="gain", bounds=ends if ends[0] < ends[1] else None, fixed=fixed.get(name)
-        )
-        for name, ends in parameters.items()
-    }
-    problem.settings = FitSettings(parameters=own, outputs=list(outputs), objective=how, scale="linear")
-    problem.parameters = problem.settings.parameter_set()
-    rng = np.random.default_rng(3)
-    logs = []
+    settings = FitSettings(parameters=own, outputs=list(outputs), objective=how, scale="linear")
+    rng, logs = np.random.default_rng(3), list[Log]()
     for number, source in enumerate(sources):
         time = np.arange(samples + 10 * number) * 0.01
         command = np.repeat(rng.uniform(-90, 90, (len(time) // 10 + 1, 7)), 10, axis=0)[: len(time)]
         angle = np.cumsum(command, axis=0) * 1e-4 + 0.3 + 0.05 * np.sin(20 * time)[:, None]
         logs.append(Log(source, time, command, angle, 0.01))
-    problem.logs = tuple(logs)
-    problem.outputs = [joint - 1 for joint in outputs]
-    channels = [log.angle[:, k] for log in logs for k in problem.outputs]
-    problem.measured = np.concatenate(channels)
-    problem.channels = make_channels(
-        logs, problem.outputs, [[]] * len(logs), problem.settings.objective, drifting=False
-    )
-    problem.priors = Priors({}, problem.parameters)
-    starts = np.cumsum([0, *map(len, channels)])
-    problem.bounds = np.array(
-        [
-            (start + len(c) * s // segments, start + len(c) * (s + 1) // segments)
-            for c, start in zip(channels, starts[:-1], strict=True)
-            for s in range(segments)
-        ]
-    )
-    return problem
+    return Problem(settings, logs)
 
 
 def make_fit(

@@ -1,15 +1,12 @@
-"""A small URDF arm with STL boxes, as CAD exports one: swing, boom and stick."""
+"""URDFs of boxes, as CAD exports them; and a small one with STL meshes: swing, boom and stick."""
 
 from pathlib import Path
 
 import trimesh
 
-LINK = """
-  <link name="{name}">
+INERTIAL = """
     <inertial><origin xyz="{centre}"/><mass value="{mass}"/>
-      <inertia ixx="{ixx}" iyy="{iyy}" izz="{izz}" ixy="0" ixz="0" iyz="0"/></inertial>
-    <visual><geometry><mesh filename="{mesh}"/></geometry></visual>
-  </link>"""
+      <inertia ixx="{ixx}" iyy="{iyy}" izz="{izz}" ixy="0" ixz="0" iyz="0"/></inertial>"""
 JOINT = """
   <joint name="{name}" type="{kind}">
     <parent link="{parent}"/><child link="{child}"/><origin xyz="{at}" rpy="{turn}"/><axis xyz="{axis}"/>
@@ -22,20 +19,22 @@ SIZES = {"house": (1.0, 0.8, 0.6), "boom": (2.0, 0.2, 0.3), "stick": (1.5, 0.15,
 MASSES = {"house": 800.0, "boom": 200.0, "stick": 90.0}
 
 
+def body(
+    name: str, size: tuple[float, float, float], mass: float | None, shape: str, **changes: object
+) -> str:
+    """A link whose box of a size [m] and mass [kg] begins at its joint; without a mass: no inertia."""
+    m, (x, y, z) = mass or 0.0, (length**2 / 12 for length in size)
+    values = {"mass": m, "centre": f"{size[0] / 2} 0 0", "seen": "0 0 0"}
+    values |= {"ixx": m * (y + z), "iyy": m * (x + z), "izz": m * (x + y)} | changes
+    inertial = "" if mass is None else INERTIAL.format_map(values)
+    visual = f'<visual><origin xyz="{values["seen"]}"/><geometry>{shape}</geometry></visual>'
+    return f'\n  <link name="{name}">{inertial}\n    {visual}\n  </link>'
+
+
 def link(name: str, mass: float | None = None, mesh: str = "", **changes: object) -> str:
-    """A link whose box begins at its joint."""
-    length, width, height = SIZES[name]
-    m = MASSES[name] if mass is None else mass
-    values = {
-        "name": name,
-        "mass": m,
-        "centre": f"{length / 2} 0 0",
-        "mesh": mesh or f"package://digger/meshes/{name}.stl",
-        "ixx": m * (width**2 + height**2) / 12,
-        "iyy": m * (length**2 + height**2) / 12,
-        "izz": m * (length**2 + width**2) / 12,
-    }
-    return LINK.format_map(values | changes)
+    """A link of the small arm."""
+    shape = f'<mesh filename="{mesh or f"package://digger/meshes/{name}.stl"}"/>'
+    return body(name, SIZES[name], MASSES[name] if mass is None else mass, shape, **changes)
 
 
 def joint(name: str, parent: str, child: str, **changes: str) -> str:

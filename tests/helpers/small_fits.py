@@ -4,30 +4,25 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-from conftest import TRUTH, noisy, step_log
+from conftest import TRUTH
+from made_logs import at_rest, noisy, simulate_log, step_log
 
 from hydroid import load_settings, read_logs
 from hydroid.fitting.fit import Fit, fit
 from hydroid.fitting.summary import summarise
 from hydroid.log import Log, write_log
-from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 from hydroid.run.folder import RunFolder
 from hydroid.settings.fit import FitSettings
 
 
-def steps_of(
-    settings: FitSettings,
-    truth: Mapping[str, float],
-    levels: Mapping[int, list[float]],
-    noise_deg: float = 0.0,
-) -> Log:
+def steps_of(settings: FitSettings, truth: Mapping, levels: Mapping, noise_deg: float = 0.0) -> Log:
     """Steps [%] of some joints that fill four seconds after half a second at rest; an exact first sample."""
     command = np.zeros((450, 7))
     for joint, duties in levels.items():
         command[50:, joint - 1] = np.repeat(duties, 400 // len(duties))
-    log = Log("steps", np.arange(450) * 0.01, command, np.tile(settings.arm.pose("study"), (450, 1)), 0.01)
-    return noisy(simulate_log(settings, log, truth, "truth"), noise_deg)
+    log = at_rest(settings.arm.pose("study"), command, source="steps")
+    return noisy(simulate_log(settings, log, truth), noise_deg)
 
 
 class Watcher:
@@ -54,7 +49,7 @@ class Study:
         small = {f"search.{a}": {"population": n, "generations": 6} for a, n in sizes.items()}
         self.settings = load_settings("article-mech", small | {"objective.segments": 3} | changes)
         log = step_log(self.settings.arm.pose("study"), [60.0, -80.0, 30.0, 0.0, -40.0])
-        self.log = simulate_log(self.settings, log, TRUTH, "truth")
+        self.log = simulate_log(self.settings, log, TRUTH)
         self.path = folder / "log.csv"
         write_log(self.path, self.log, self.settings.log)
         self.problem = Problem(self.settings, [self.log])

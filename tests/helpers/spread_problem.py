@@ -3,7 +3,7 @@
 from typing import Any
 
 import numpy as np
-from conftest import step_log
+from made_logs import step_log
 
 from hydroid import load_settings
 from hydroid.log import Log

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
+from arms import MODELS
+from robots import LIMIT, body, joint
 
 Joint = tuple[str, str, str, str, tuple[float, float, float], str]
 """joint, parent, child, kind, place on the parent [m], and limits"""
@@ -55,16 +57,12 @@ def urdf(world: World, folder: Path) -> Path:
     text = '<link name="base"/>'
     for name, parent, child, kind, at, limits in world.parts:
         length = SIZES.get(child, 0.6)
-        mass = "" if world.density is None else inertial(length, world.density * length**3 / 25)
+        mass = None if world.density is None else world.density * length**3 / 25
         shape = world.shape.format(length, length / 5, child)
-        seen = f'<visual><origin xyz="{length / 2} 0 0"/><geometry>{shape}</geometry></visual>'
-        text += f'<link name="{child}">{mass}{seen if shape else ""}</link>'
-        low, high = limits.split() if limits else (0, 0)
-        limit = f'<limit lower="{low}" upper="{high}" effort="1" velocity="1"/>' if limits else ""
-        text += (
-            f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
-            f'<origin xyz="{at[0]} {at[1]} {at[2]}"/><axis xyz="{AXES.get(child, "0 -1 0")}"/>{limit}</joint>'
-        )
+        text += body(child, (length, length / 5, length / 5), mass, shape, seen=f"{length / 2} 0 0")
+        how = {"kind": kind, "at": " ".join(map(str, at)), "axis": AXES.get(child, "0 -1 0")}
+        limit = LIMIT.format(*limits.split()) if limits else ""
+        text += joint(name, parent, child, limit=limit, **how)
         solid = trimesh.creation.box((1e3 * length, 200 * length, 200 * length))
         if "mm_" in world.shape:
             (folder / f"mm_{child}.stl").write_bytes(solid.export(file_type="stl"))
@@ -73,38 +71,11 @@ def urdf(world: World, folder: Path) -> Path:
     return path
 
 
-def inertial(length: float, mass: float) -> str:
-    """The inertial of a box that begins at its joint."""
-    along, across = mass * 2 * (length / 5) ** 2 / 12, mass * (length**2 + (length / 5) ** 2) / 12
-    return (
-        f'<inertial><origin xyz="{length / 2} 0 0"/><mass value="{mass}"/><inertia ixx="{along}" '
-        f'iyy="{across}" izz="{across}" ixy="0" ixz="0" iyz="0"/></inertial>'
-    )
-
-
 def mjcf(world: World, folder: Path) -> Path:
-    """Write an MJCF with an include, a missing texture, a plugin and a sensor."""
-    body = ""
-    for name, _, child, kind, at, limits in reversed(world.parts):
-        length, slides = SIZES[child], kind == "prismatic"
-        body = (
-            f'<body name="{child}" pos="{at[0]} {at[1]} {at[2]}"><joint name="{name}" range="{limits}" '
-            f'type="{"slide" if slides else "hinge"}" axis="{AXES.get(child, "0 -1 0")}"/><geom type="box" '
-            f'size="{length / 2} {length / 10} {length / 10}" pos="{length / 2} 0 0" material="paint" '
-            f'mass="{1200 * length**3 / 25}"/>{body}</body>'
-        )
-    (folder / "looks.xml").write_text(
-        '<mujoco><asset><texture name="mud" type="2d" file="none.png"/>'
-        '<material name="paint" texture="mud"/></asset></mujoco>'
-    )
-    path = folder / "machine.xml"
-    path.write_text(
-        '<mujoco model="machine"><compiler angle="radian" autolimits="true"/><include file="looks.xml"/>'
-        '<extension><plugin plugin="some.soil"/></extension><worldbody><body name="track"><freejoint/>'
-        f'<geom type="box" size="1 1 .3" mass="3000"/>{body}</body></worldbody>'
-        '<sensor><jointpos joint="boom"/></sensor></mujoco>'
-    )
-    return path
+    """Copy an MJCF of the crane with an include, a missing texture, a plugin and a sensor."""
+    for name in ("looks.xml", "machine.xml"):
+        (folder / name).write_bytes((MODELS / name).read_bytes())
+    return folder / "machine.xml"
 
 
 def _legs() -> tuple[Joint, ...]:
@@ -187,17 +158,12 @@ def write_log(world: World, path: Path, seconds: float = 30.0, number: int = 0) 
     both = len(joints), 2
     dead, exponent = machine.uniform(5, 35, both), machine.uniform(1, 2.2, both)
     full = (high - low)[:, None] / machine.uniform(5, 12, both)
-    late, lag = (
-        np.round(machine.uniform(0.05, 0.3, both[0]) / step).astype(int),
-        machine.uniform(0.03, 0.2, both[0]),
-    )
+    late = np.round(machine.uniform(0.05, 0.3, both[0]) / step).astype(int)
+    lag = machine.uniform(0.03, 0.2, both[0])
     steps, each = round(seconds / step), np.arange(both[0])
     command, place = np.zeros((steps, both[0])), np.empty((steps, both[0]))
-    now, opening, until = (
-        low + (high - low) * drive.uniform(0.3, 0.7, both[0]),
-        np.zeros(both[0]),
-        np.ones(both[0]),
-    )
+    now = low + (high - low) * drive.uniform(0.3, 0.7, both[0])
+    opening, until = np.zeros(both[0]), np.ones(both[0])
     for k in range(steps):
         command[k] = command[k - 1]
         for j in np.flatnonzero(until <= k * step) if k % every == 0 else ():  # a sample shows each change

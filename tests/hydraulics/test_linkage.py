@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hydraulic_reference import changed, simulate, wheel
 
-from hydroid.hydraulics.records import Records, coefficients, nominal_joints
+from hydroid.hydraulics.records import Records, nominal_joints
 from hydroid.settings.arm import Arm
 from hydroid.settings.cylinder import make_cylinder
 from hydroid.settings.hydraulics import HydraulicSettings
@@ -52,12 +52,6 @@ def test_a_cylinder_that_extends_to_negative_angles_mirrors_the_motion(arm: Arm)
     assert np.ptp(here) > 0.2
     assert here[30] > here[0]
     np.testing.assert_allclose(there, -here, atol=1e-12)
-
-
-def test_pivots_of_parameters_take_the_place_of_the_arms(arm: Arm):
-    moved = coefficients(shoulder(arm, pivot_distance_2=[[0.08], [0.1]]))
-    assert moved[0, 0] == coefficients(shoulder(arm))[0, 0]
-    assert moved.shortest[1, 0] < moved.shortest[0, 0]
 
 
 BARS = {"ground": 0.35, "rocker": 0.45, "coupler": 0.4, "child": 0.35, "phase_deg": 69.0, "side": "right"}

@@ -1,10 +1,9 @@
 """A telescope: a joint that slides, with its cylinder along it."""
 
-from pathlib import Path
-
 import mujoco
 import numpy as np
 import pytest
+from arms import MODELS
 from recovery import assert_recovered, duties, recover
 
 import hydroid
@@ -16,17 +15,6 @@ from hydroid.log import Log
 from hydroid.reporting.predictions import validation_page
 from hydroid.settings.fit import FitSettings
 
-CRANE = """<mujoco model="crane"><worldbody><body name="boom" pos="0 0 2">
-  <joint name="boom" axis="0 -1 0" range="-20 70"/><geom type="box" size="2 .15 .2" pos="2 0 0" mass="600"/>
-  <body name="telescope" pos="1 0 0"><joint name="telescope" type="slide" axis="1 0 0" range="0 1.8"/>
-    <geom type="box" size="1.7 .1 .12" pos="1.7 0 0" mass="250"/></body></body></worldbody>
-  <keyframe><key name="up" qpos="0.9 0.4"/></keyframe></mujoco>"""
-ARM = """model: crane.xml
-actuators:
-  boom: {kind: linear, pivots: {parent: [0.3, 0, 1.4], child: [1.2, 0, 1.9]}, area_a: 7854, area_b: 4000,
-         max_opening: 8}
-  telescope: {kind: linear, area_a: 3000, area_b: 1800, max_opening: 6}
-"""
 TRUTH = {"area_A": 3400.0, "area_B": 1650.0, "delay": 0.12, "M_telescope": 310.0}
 PARAMETERS = {
     "area_A": {"quantity": "area_a", "joints": ["telescope"], "bounds": [1500, 6000], "start": 3100},
@@ -38,11 +26,8 @@ PARAMETERS = {
 
 
 @pytest.fixture(scope="module")
-def settings(tmp_path_factory: pytest.TempPathFactory) -> FitSettings:
-    folder: Path = tmp_path_factory.mktemp("crane")
-    (folder / "crane.xml").write_text(CRANE)
-    (folder / "arm.yaml").write_text(ARM)
-    changes = {"arm": str(folder / "arm.yaml"), "outputs": [2], "parameters": PARAMETERS}
+def settings() -> FitSettings:
+    changes = {"arm": str(MODELS / "crane.yaml"), "outputs": [2], "parameters": PARAMETERS}
     changes |= {"start_pose": "up", "simulation.threads": 1, "hydraulics.supply_pressure": 150}
     return hydroid.load_settings("fit-hyd", changes)
 

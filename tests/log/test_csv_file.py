@@ -131,9 +131,7 @@ def test_the_table_is_found_in_any_layout(layout: str, separator: str, tmp_path:
 
 
 @pytest.mark.parametrize(("line", "cell", "text"), [(1, 0, "x"), (1, 3, "?"), (2, 2, ""), (40, 1, "3 V")])
-def test_a_faulty_cell_below_comments_and_a_preamble_has_its_place(
-    line: int, cell: int, text: str, tmp_path: Path
-) -> None:
+def test_a_faulty_cell_below_comments_and_a_preamble_has_its_place(line, cell, text, tmp_path) -> None:
     table = rows(["# one"], [], ["Rate", "100"], below=[["s", "%", "%", "deg", "deg"]])
     table[4 + line][cell] = text
     (fault,) = faults(save(tmp_path / "log.csv", table))

@@ -137,9 +137,7 @@ def test_a_bad_file_is_refused_in_one_line(kind: str, tmp_path: Path) -> None:
         (empty_bag, "rosbags", "ros"),
     ],
 )
-def test_a_missing_package_names_its_extra(
-    write, package: str, extra: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_missing_package_names_its_extra(write, package, extra, tmp_path, monkeypatch) -> None:
     path = write(tmp_path / "log.bag")
     for name in [name for name in sys.modules if name.partition(".")[0] == package]:
         monkeypatch.setitem(sys.modules, name, None)

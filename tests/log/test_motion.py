@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import noisy, step_log
+from made_logs import noisy, step_log
 
 from hydroid.log import JointMotion, Log
 

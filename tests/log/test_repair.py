@@ -1,7 +1,6 @@
 from pathlib import Path
 
 import numpy as np
-import pytest
 from hypothesis import given, settings, strategies as st
 from log_files import cells, faults, lines, place, read, save
 
@@ -10,9 +9,7 @@ holes = st.lists(st.tuples(st.integers(2, 75), st.integers(1, 3)), max_size=4)
 
 @settings(max_examples=60, deadline=None)
 @given(holes, st.lists(st.tuples(st.integers(1, 78), st.integers(1, 4)), max_size=6))
-def test_repair_restores_length_and_leaves_the_rest_alone(
-    tmp_path_factory: pytest.TempPathFactory, dropped: list[tuple[int, int]], blanked: list[tuple[int, int]]
-) -> None:
+def test_repair_restores_length_and_leaves_the_rest_alone(tmp_path_factory, dropped, blanked) -> None:
     values = cells()
     folder = tmp_path_factory.getbasetemp()
     whole, _ = read(save(folder / "whole.csv", lines(values)))

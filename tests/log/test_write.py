@@ -42,9 +42,7 @@ layouts = st.fixed_dictionaries(
 
 @settings(max_examples=80, deadline=None)
 @given(logs, layouts, st.integers(-20, 20))
-def test_what_is_written_reads_back(
-    tmp_path_factory: pytest.TempPathFactory, log: Log, layout: dict, delay: int
-) -> None:
+def test_what_is_written_reads_back(tmp_path_factory, log: Log, layout: dict, delay: int) -> None:
     path = tmp_path_factory.getbasetemp() / "written.csv"
     mapping = LogSettings.model_validate({**layout, "period_s": log.period, "delay_s": delay * log.period})
     if delay > 0:

@@ -7,13 +7,14 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
 import psutil
 import pytest
 import yaml
+from log_files import head
 from spread_problem import arguments, assert_same, random_candidates
 from worker_targets import DEADLY, Deadly, Rows
 
@@ -26,8 +27,6 @@ from hydroid.problem.problem import Problem
 dask = pytest.importorskip("dask")
 distributed = pytest.importorskip("distributed")
 pytestmark = pytest.mark.slow
-TESTS = Path(__file__).parents[1]
-LOG = TESTS.parent / "examples" / "logs" / "rig_shoulder_1.csv"
 NINE = np.arange(18.0).reshape(9, 2)
 IMPATIENT = {"distributed.deploy.lost-worker-timeout": "100ms"}
 """as if every worker took too long to start again: hydroid must not let Dask give it up"""
@@ -126,14 +125,16 @@ class Site:
         for number in reversed(range(len(self.processes))):
             self.kill(number)
 
-    @property
-    def credentials(self) -> dict[str, str]:
-        """What DASK_CONFIG would bring into this process."""
+    @contextmanager
+    def opened(self) -> Iterator[DaskWorkers]:
+        """The workers as of a process whose DASK_CONFIG names the credentials."""
         tls = yaml.safe_load((self.config / "distributed.yaml").read_text())["distributed"]["comm"]["tls"]
         roles = {f"{role}.{key}": text for role in ("scheduler", "client") for key, text in tls[role].items()}
-        return {
-            f"distributed.comm.tls.{key}": text for key, text in (roles | {"ca-file": tls["ca-file"]}).items()
-        }
+        texts = (roles | {"ca-file": tls["ca-file"]}).items()
+        credentials = {f"distributed.comm.tls.{key}": text for key, text in texts}
+        with dask.config.set(credentials), open_workers(str(self.file)) as workers:
+            assert workers is not None
+            yield workers
 
 
 @pytest.fixture
@@ -146,11 +147,7 @@ def site(tmp_path: Path) -> Iterator[Site]:
 def test_one_two_and_four_workers_and_one_killed_change_no_bit(site: Site, tmp_path: Path):
     plain = Problem(*arguments())
     theta = random_candidates(plain, 9)
-    with (
-        dask.config.set(site.credentials),
-        open_workers(str(site.file)) as workers,
-    ):
-        assert workers is not None
+    with site.opened() as workers:
         spread = Problem(*arguments(), workers)
         for count in (1, 2, 4):
             while len(site.processes) <= count:
@@ -166,12 +163,7 @@ def test_one_two_and_four_workers_and_one_killed_change_no_bit(site: Site, tmp_p
 
 def test_a_lost_scheduler_is_one_error(site: Site):
     site.worker()
-    with (
-        dask.config.set(site.credentials),
-        dask.config.set({"distributed.comm.timeouts.connect": "1s"}),
-        open_workers(str(site.file)) as workers,
-    ):
-        assert workers is not None
+    with dask.config.set({"distributed.comm.timeouts.connect": "1s"}), site.opened() as workers:
         rows = Rows()
         np.testing.assert_array_equal(workers(rows, "squares", NINE, 2), NINE**2)
         site.kill(0)
@@ -189,9 +181,7 @@ QUICK = ["--algorithm", "ga", "--set", "search.ga.population=6", "--set", "refin
 @pytest.fixture(scope="module")
 def short(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Three seconds of a virtual rig's log."""
-    path = tmp_path_factory.mktemp("log") / "short.csv"
-    path.write_text("\n".join(LOG.read_text().splitlines()[:301]) + "\n")
-    return path
+    return head(tmp_path_factory.mktemp("log") / "short.csv", 300)
 
 
 @pytest.mark.parametrize("end", ["SIGTERM", "SIGINT to the group", "SIGKILL"])

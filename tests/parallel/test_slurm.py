@@ -14,6 +14,7 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from log_files import head
 
 pytestmark = [
     pytest.mark.slow,
@@ -22,9 +23,7 @@ pytestmark = [
         reason="no Slurm here: .ci/slurm .venv/bin/pytest tests/parallel/test_slurm.py",
     ),
 ]
-ROOT = Path(__file__).parents[2]
-EXAMPLES = ROOT / "examples" / "cluster"
-LOG = ROOT / "examples" / "logs" / "rig_shoulder_1.csv"
+EXAMPLES = Path(__file__).parents[2] / "examples" / "cluster"
 QUICK = ["--algorithm=ga", "--set=search.ga.population=6", "--set=refinement.iterations=2", "--quiet"]
 OFTEN = f"""#!{sys.executable}
 from hydroid.commands.app import main
@@ -38,7 +37,7 @@ ENDED = ("COMPLETED", "FAILED", "TIMEOUT", "CANCELLED", "NODE_FAIL", "OUT_OF_MEM
 @pytest.fixture
 def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder with four seconds of a virtual rig's log; hydroid and dask are found as in an active .venv."""
-    (tmp_path / "log.csv").write_text("\n".join(LOG.read_text().splitlines()[:401]) + "\n")
+    head(tmp_path / "log.csv", 400)
     monkeypatch.setenv("PATH", str(Path(sys.executable).parent), prepend=os.pathsep)
     monkeypatch.chdir(tmp_path)
     return tmp_path

@@ -109,9 +109,7 @@ SILENT = (RunError, "no Dask scheduler answers")
         *((a, SILENT) for a in ("tcp://127.0.0.1:1", "localhost:1", "tcp://[::1]:1")),
     ],
 )
-def test_an_address_that_is_none_or_that_others_reach_is_refused(
-    address: str, refusal: tuple[type[Exception], str], tmp_path: Path, monkeypatch
-):
+def test_an_address_that_is_none_or_that_others_reach_is_refused(address, refusal, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(cluster, "CONNECT", 0.5)
     Path("file.json").write_text('{"address": "tcp://10.0.0.1:8786"}')

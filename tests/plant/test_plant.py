@@ -6,6 +6,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from made_logs import at_rest
 
 from hydroid import fit, load_settings, read_logs
 from hydroid.arm.model import load_machine, load_model
@@ -43,8 +44,7 @@ def log_of(settings: FitSettings, joints: list[int], seconds: float = 4.0) -> Lo
     for joint in joints:
         levels = np.repeat(rng.uniform(-80, 80, 1 + len(time) // 60), 60)[: len(time)]
         command[:, joint - 1] = levels + rng.normal(0, 2, len(time))
-    pose = settings.arm.pose(settings.start_pose)
-    return Log("steps", time, command, np.tile(pose, (len(time), 1)), period)
+    return at_rest(settings.arm.pose(settings.start_pose), command, period)
 
 
 def response(fitted: IdentifiedModel, log: Log, joints: list[int]) -> Response:
@@ -105,13 +105,19 @@ def test_a_slower_control_period_holds_the_command(stage):
     assert slow.time == pytest.approx(fast.time) == pytest.approx(2.0)
 
 
+def exported(plant: Plant, folder: Path) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    """What plain MuJoCo reads of a saved plant, where it starts."""
+    plant.save(folder)
+    arm = mujoco.MjModel.from_xml_path(str(folder / "model" / "fitted.xml"))
+    data = mujoco.MjData(arm)
+    mujoco.mj_resetDataKeyframe(arm, data, arm.key("start").id)
+    return arm, data
+
+
 def test_an_external_force_acts_as_in_plain_mujoco(tmp_path):
     fitted = model()
     plant = Plant(fitted)
-    plant.save(tmp_path)
-    arm = mujoco.MjModel.from_xml_path(str(tmp_path / "model" / "fitted.xml"))
-    data = mujoco.MjData(arm)
-    mujoco.mj_resetDataKeyframe(arm, data, 0)
+    arm, data = exported(plant, tmp_path)
     plant.data.xfrc_applied[-1, 2] = data.xfrc_applied[-1, 2] = -100.0  # [N]
     for _ in range(200):
         plant.step(np.zeros(7))
@@ -163,10 +169,7 @@ def test_plain_mujoco_steps_the_exported_mjcf_to_the_fits_response(joints, tmp_p
     expected = response(fitted, log, joints).angle[0]
     plant = Plant(fitted, joints=joints)
     plant.reset(log.start)
-    plant.save(tmp_path)
-    arm = mujoco.MjModel.from_xml_path(str(tmp_path / "model" / "fitted.xml"))
-    data = mujoco.MjData(arm)
-    mujoco.mj_resetDataKeyframe(arm, data, arm.key("start").id)
+    arm, data = exported(plant, tmp_path)
     angle = [data.qpos.copy()]
     for command in log.command[:-1]:
         data.ctrl[:] = command[[j - 1 for j in joints]]

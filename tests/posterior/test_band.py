@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import TRUTH as ARTICLE, noisy, step_log
+from conftest import TRUTH as ARTICLE
+from made_logs import noisy, simulate_log, step_log
 
 import hydroid
 from hydroid.fitting.refinement import refine
@@ -13,7 +14,7 @@ from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
 from hydroid.posterior.band import prediction_bands, start_effects
 from hydroid.posterior.uncertainty import uncertainty
-from hydroid.prediction import predict, simulate_log
+from hydroid.prediction import predict
 from hydroid.problem.problem import Problem
 from hydroid.settings.search import RefinementSettings
 
@@ -30,7 +31,7 @@ CHANGES = {
 def driven(settings, levels, seed: int, values=TRUTH) -> Log:
     """A log of steps of the shoulder with white noise of 0.1 deg, but for its first sample."""
     drive = replace(step_log(settings.arm.pose("study"), levels), source=f"steps{seed}.csv")
-    return noisy(simulate_log(settings, drive, values, "test"), 0.1, seed)
+    return noisy(simulate_log(settings, drive, values), 0.1, seed)
 
 
 @pytest.fixture(scope="module")

@@ -2,16 +2,14 @@
 
 import numpy as np
 import pytest
-from conftest import TRUTH as MECH, noisy, step_log
+from conftest import COILS, HYDRAULIC, TRUTH as MECH
+from made_logs import noisy, simulate_log, step_log
 
 from hydroid import load_settings
 from hydroid.posterior.identifiability import Identifiability, identifiability
 from hydroid.posterior.uncertainty import WEAK_ABOVE, Flag, Source, Uncertainty, uncertainty
-from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 
-HYD = {"A_A": 1e3, "A_B": 750.0, "I_max": 0.9, "I_min": 0.3, "A": 1.4, "C": 1.2}
-COIL = {"F1": 8.0, "F2": 0.7, "x1": 0.8, "x2": 12.0}
 QUIET = {"objective.noise_deg": 0.01}  # so that ten seconds determine what is not exactly open
 OPEN = {f"parameters.{name}.fixed": None for name in ("F1", "x1", "x2")}
 LEVELS = [60.0, -80.0, 30.0, 0.0, -40.0, 70.0, -60.0, 20.0]
@@ -21,7 +19,7 @@ def look(config: str, truth: dict[str, float], **changes) -> tuple[Problem, Unce
     """The article's protocol, ten seconds of it: joint 2 driven and measured with 0.1 deg of noise."""
     settings = load_settings(config, changes)
     levels = LEVELS if config == "article-mech" else [0.4 * level for level in LEVELS]
-    log = simulate_log(settings, step_log(settings.arm.pose("study"), levels, 1.25), truth, "truth")
+    log = simulate_log(settings, step_log(settings.arm.pose("study"), levels, 1.25), truth)
     problem = Problem(settings, [noisy(log, 0.1)])
     told = uncertainty(problem, problem.parameters.vector(truth, "truth"))
     return problem, told, identifiability(problem, told)
@@ -77,15 +75,15 @@ def test_pins_close_directions_one_by_one(mech):
 @pytest.mark.parametrize(
     ("pins", "open_", "directions"),
     [
-        (OPEN, {"I_max", "I_min", *COIL}, 3),
+        (OPEN, {"I_max", "I_min", *COILS}, 3),
         ({"parameters.F1.fixed": None}, {"I_max", "I_min", "F1", "F2"}, 1),
         ({}, set(), 0),
-        (OPEN | {"parameters.I_max.fixed": 0.9}, {*COIL}, 2),
-        (OPEN | {"priors": {"rated": {"of": "I_max", "value": 0.9, "sd": 0.009}}}, {*COIL}, 2),
+        (OPEN | {"parameters.I_max.fixed": 0.9}, {*COILS}, 2),
+        (OPEN | {"priors": {"rated": {"of": "I_max", "value": 0.9, "sd": 0.009}}}, {*COILS}, 2),
     ],
 )
 def test_pins_close_the_null_directions_of_the_solenoids(pins, open_, directions):
-    problem, told, found = look("article-hyd", HYD | COIL, **QUIET, **pins)
+    problem, told, found = look("article-hyd", HYDRAULIC, **QUIET, **pins)
     known = zip(problem.parameters.names, told.status, strict=True)
     assert {n for n, s in known if s.flag is Flag.UNIDENTIFIABLE and s.source is not Source.PRIOR} == open_
     assert np.sum(np.linalg.svd(told.posterior.root)[1] < 1) == directions

@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import noisy, step_log
+from conftest import HYDRAULIC, SMALL
+from made_logs import noisy, simulate_log, step_log
 
 import hydroid
 from hydroid import load_settings
@@ -13,31 +14,29 @@ from hydroid.commands.fit import FitResult
 from hydroid.errors import RunError
 from hydroid.estimate import FitSummary
 from hydroid.posterior.posterior import stored_posterior
-from hydroid.prediction import simulate_log
 from hydroid.settings.load import load
 
-TRUTH = {"A_A": 1000, "A_B": 750, "F2": 0.7, "x2": 12.0}
-FIXED = {"I_max": 0.9, "I_min": 0.3, "A": 1.4, "C": 1.2}
-SMALL = {
-    **{f"parameters.{name}.fixed": value for name, value in FIXED.items()},
-    "search.algorithm": "ga",
-    "search.ga": {"population": 6, "generations": 2},
-}
+HELD = ("I_max", "I_min", "A", "C")
 
 
 @pytest.fixture(scope="module")
 def fitted(tmp_path_factory: pytest.TempPathFactory) -> FitResult:
     """A small fit of stage 2 to six simulated seconds with noise."""
-    settings = load_settings("article-hyd", SMALL)
+    held = {f"parameters.{name}.fixed": HYDRAULIC[name] for name in HELD}
+    settings = load_settings("article-hyd", SMALL | held)
+    truth = {name: HYDRAULIC[name] for name in settings.parameters if name in HYDRAULIC}
     steps = step_log(settings.arm.pose("study"), [0.0, 60.0, -40.0, 90.0, -80.0, 30.0])
-    log = noisy(simulate_log(settings, steps, TRUTH | FIXED, "truth"), 0.05, exact_start=False)
+    log = noisy(simulate_log(settings, steps, truth), 0.05, exact_start=False)
     return hydroid.fit(settings, log, tmp_path_factory.mktemp("fit") / "run")
 
 
 def test_the_summary_holds_quantities_curves_and_covariance_as_the_file_does(fitted):
     summary = fitted.summary
     assert load(fitted.folder / "estimate.yaml", FitSummary) == summary
+    assert summary.plain()["schema"] == 1
     json.dumps(summary.plain(), allow_nan=False)
+    # all masses are fixed: what no free parameter changes is not stated
+    assert not any("gravity" in name for name in summary.quantities)
     ratio = summary.quantities["shoulder_area_ratio"]
     values = summary.values
     assert ratio.value == pytest.approx(values["A_A"] / values["A_B"])
@@ -46,10 +45,6 @@ def test_the_summary_holds_quantities_curves_and_covariance_as_the_file_does(fit
     assert len(speed.at) == len(speed.value) == len(speed.interval)
     at_50 = dict(zip(speed.at, speed.value, strict=True))[50.0]
     assert summary.quantities["shoulder_speed_50_positive"].value == pytest.approx(at_50)
-
-
-def test_what_no_free_parameter_changes_is_not_stated(fitted):
-    assert not any("gravity" in name for name in fitted.summary.quantities)  # all masses are fixed
 
 
 def test_the_kept_precision_gives_the_intervals_of_the_fit(fitted):

@@ -3,7 +3,8 @@
 import mujoco
 import numpy as np
 import pytest
-from conftest import TRUTH, replaced, step_log
+from conftest import HYDRAULIC, TRUTH, replaced
+from made_logs import step_log
 
 from hydroid import load_settings
 from hydroid.hydraulics.solenoid import coil_current, resting_stroke, side_voltage
@@ -14,7 +15,7 @@ from hydroid.posterior.quantities import actuator, joint_measure
 from hydroid.problem.bindings import Bindings
 from hydroid.simulation import Candidates
 
-TRUE = {"A_A": 1000, "A_B": 750, "I_max": 0.9, "I_min": 0.3, "A": 1.4, "C": 1.2, "F2": 0.7, "x2": 12}
+TRUE = {name: value for name, value in HYDRAULIC.items() if name not in ("F1", "x1")}
 
 
 def model(stage: str = "hyd", **changes: object) -> IdentifiedModel:

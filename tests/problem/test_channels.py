@@ -5,21 +5,18 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
-from conftest import TRUTH, step_log
+from conftest import HYDRAULIC, TRUTH
+from made_logs import simulate_log, step_log
 
 from hydroid import fit, load_settings, read_logs
 from hydroid.arm.model import add_payload
 from hydroid.errors import SettingsError
 from hydroid.log import check_log, write_log
 from hydroid.posterior.noise import error_level, fit_noise
-from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 
 MECHANICAL = {name: value for name, value in TRUTH.items() if name != "K"}
-HYDRAULIC = MECHANICAL | {
-    "A_A": 1000.0, "A_B": 750.0, "I_max": 0.9, "I_min": 0.3, "A": 1.4, "C": 1.2,
-    "F1": 8.0, "F2": 0.7, "x1": 0.8, "x2": 12.0,
-}  # fmt: skip
+TRUTH_2 = MECHANICAL | HYDRAULIC
 FIXED = {f"parameters.{name}.fixed": value for name, value in MECHANICAL.items()}
 FIXED |= {f"parameters.{name}.fixed": None for name in ("F1", "x1", "x2")}
 PRESSURE = {"log.pressure": {"column": ["pA{joint}", "pB{joint}"], "unit": "MPa"}}
@@ -30,14 +27,14 @@ def hydraulic():
     changes = FIXED | PRESSURE | {"objective.pressure_weight": 0.1, "objective.segments": 3}
     settings = load_settings("article-hyd", changes)
     log = step_log(settings.arm.pose("rig"), [50.0, -60.0, 40.0])
-    return settings, simulate_log(settings, log, HYDRAULIC, "truth")
+    return settings, simulate_log(settings, log, TRUTH_2)
 
 
 def test_the_truth_leaves_no_residual_in_any_channel(hydraulic):
     settings, log = hydraulic
     problem = Problem(settings, [log])
     assert [c.quantity for c in problem.channels] == ["angle", "pressure_a", "pressure_b"]
-    truth = problem.parameters.vector(HYDRAULIC, "truth")
+    truth = problem.parameters.vector(TRUTH_2, "truth")
     rows = problem.residuals(truth[None])
     assert rows.shape == (1, 3 * len(log.time))
     assert np.abs(rows).max() < 1e-12
@@ -48,7 +45,7 @@ def test_a_pressure_error_counts_its_weight(hydraulic):
     settings, log = hydraulic
     off = replace(log, pressure=log.pressure + 3e5)
     problem = Problem(settings, [off])
-    rows = problem.residuals(problem.parameters.vector(HYDRAULIC, "truth")[None])[0]
+    rows = problem.residuals(problem.parameters.vector(TRUTH_2, "truth")[None])[0]
     for channel in problem.channels[1:]:
         assert np.rad2deg(rows[channel.rows]) == pytest.approx(0.1 * 3.0)
     assert problem.rms(rows[None])[0] < 1e-12  # the error of angles alone
@@ -120,15 +117,15 @@ def test_a_payload_pulls_on_the_shoulder_with_its_weight_times_its_lever(arm, sp
 def test_a_payload_slows_the_arm_of_its_log_alone():
     settings, log, truth = mechanical(payloads={"steps": 5.0})
     other = replace(log, source="elsewhere/other.csv")
-    loaded, empty = (simulate_log(settings, x, truth, "t").angle[50, 1] for x in (log, other))
+    loaded, empty = (simulate_log(settings, x, truth).angle[50, 1] for x in (log, other))
     assert abs(loaded - log.angle[0, 1]) < abs(empty - log.angle[0, 1])
     with pytest.raises(SettingsError, match="no place for a payload"):
-        simulate_log(settings.changed({"arm.payload": None}), log, truth, "t")
+        simulate_log(settings.changed({"arm.payload": None}), log, truth)
 
 
 def test_a_payload_of_no_log_is_refused(tmp_path):
     settings, log, truth = mechanical(payloads={"heavy.csv": 5.0})
-    write_log(tmp_path / "light.csv", simulate_log(settings, log, truth, "t"), settings.log)
+    write_log(tmp_path / "light.csv", simulate_log(settings, log, truth), settings.log)
     with pytest.raises(SettingsError, match="none of the logs"):
         fit(settings, read_logs([tmp_path / "light.csv"], settings), tmp_path / "out")
     assert not (tmp_path / "out").exists()

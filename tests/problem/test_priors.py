@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from conftest import TRUTH, noisy, step_log
+from conftest import TRUTH
+from made_logs import noisy, simulate_log, step_log
 
 from hydroid import load_settings
 from hydroid.errors import SettingsError
 from hydroid.fitting.refinement import refine
 from hydroid.parameters import Parameter, ParameterSet
-from hydroid.prediction import simulate_log
 from hydroid.problem.priors import REACH, Priors
 from hydroid.problem.problem import Problem
 from hydroid.settings.problem import PriorSettings
@@ -95,7 +95,7 @@ def test_a_refinement_weighs_priors_against_the_logs():
     known = {"total": {"of": ["M1", "M2", "M3", "M4", "M5", "M6"], "value": 30.0, "sd": 0.3}}
     settings = load_settings("article-mech", {"priors": known, "objective.segments": 2})
     log = step_log(settings.arm.pose("study"), [60.0, -80.0, 30.0, 0.0])
-    problem = Problem(settings, [noisy(simulate_log(settings, log, TRUTH, "truth"), 0.1)])
+    problem = Problem(settings, [noisy(simulate_log(settings, log, TRUTH), 0.1)])
     truth = problem.parameters.vector(TRUTH, "truth")
     result = refine(problem, 0.9 * truth, RefinementSettings(iterations=30), lambda *_: None)
     theta = problem.parameters.from_unit(result.point[None])

@@ -2,8 +2,8 @@
 
 import json
 import re
+import runpy
 import shutil
-from collections.abc import Callable
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -17,48 +17,13 @@ from typer.testing import CliRunner
 import hydroid
 from hydroid.commands.app import app
 from hydroid.errors import LogError, ModelError, SettingsError
-from hydroid.identified_model import identified
-from hydroid.log import Log
 from hydroid.project import Project
 from hydroid.settings.arm import load_arm
 from hydroid.settings.fit import FitSettings
 
-FACTORS = {"open_A": 1.3, "open_B": 0.8, "dead_A": 1.6, "dead_B": 2.2, "lag": 2.0, "size": 1.2, "D": 0.7}
-"""by which the machine's parameters differ from the nominal ones, by the beginning of their names"""
-
-
-def moves(joints: int, seconds: float, period: float, seed: int) -> np.ndarray:
-    """Steps of commands [%] between rests, shape (T, joints)."""
-    rng, samples = np.random.default_rng(seed), round(seconds / period) + 1
-    command = np.zeros((samples, joints))
-    for joint in range(joints):
-        at, sign = round(rng.uniform(1.0, 2.0) / period), 1.0 - 2.0 * (joint % 2)
-        while at < samples:
-            length = round(rng.uniform(0.4, 0.9) / period)
-            command[at : at + length, joint] = sign * rng.uniform(25, 95)
-            at, sign = at + length + round(rng.uniform(0.3, 1.0) / period), -sign
-    return command
-
-
-def write_log(
-    project: Path, path: Path, seed: int = 0, seconds: float = 20.0, noise_deg: float = 0.05
-) -> None:
-    """Simulate the arm of a project's stage 2 at other values, and write commands in V and angles in rad."""
-    model = hydroid.start_values(hydroid.load_settings(project / "fit.yaml"))
-    values = {
-        name: value * next((f for start, f in FACTORS.items() if name.startswith(start)), 1.0)
-        for name, value in model.values.items()
-    }
-    truth = identified(model.settings, values, "the machine")
-    arm, period = model.settings.arm, 0.01
-    command = moves(len(arm.joints), seconds, period, seed)
-    start = np.clip(0.0, arm.lower + 0.4, arm.upper - 0.4)
-    angle = np.tile(start, (len(command), 1))
-    log = Log("commands", period * np.arange(len(command)), command, angle, period)
-    seen = hydroid.simulate(log, fit=truth, out=None, noise_deg=noise_deg, seed=seed).log.angle
-    names = ["t_ms", *(f"valve_{n}_V" for n in arm.joint_names), *(f"enc_{n}_rad" for n in arm.joint_names)]
-    rows = np.column_stack([1e3 * log.time, command / 10, seen])
-    np.savetxt(path, rows, fmt="%.6g", delimiter=";", header=";".join(names), comments="")
+URDF = Path(__file__).parents[2] / "examples" / "urdf"
+EXAMPLE = runpy.run_path(str(URDF / "make_example.py"))
+"""how it simulates a machine like a project's, its boom's valve wired the other way round"""
 
 
 def init(folder: Path, arm: Path | None = None, logs: list[Path] | None = None, **more: Any) -> Project:
@@ -72,7 +37,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     robot = write_robot(folder)
     init(folder / "machine", robot)
     for seed in range(3):
-        write_log(folder / "machine", folder / f"move_{seed}.csv", seed, seconds=8.0)
+        EXAMPLE["write_log"](folder / "machine", folder / f"move_{seed}.csv", seed)
     init(folder / "mine", robot, sorted(folder.glob("move_*.csv")))
     return folder
 
@@ -80,12 +45,12 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_columns_units_and_scales_are_those_of_the_log(place: Path):
     settings = hydroid.load_settings(place / "mine" / "fit.yaml")
     assert settings.outputs == (1, 2, 3)
-    assert settings.log.columns("command", 2).column == ("valve_boom_joint_V",)
-    assert settings.log.columns("command", 2).scale == 10
+    assert settings.log.columns("command", 2).column == ("boom valve [V]",)
+    assert settings.log.columns("command", 2).scale == -10
     assert settings.log.columns("angle", 3).unit == "rad"
     assert settings.log.time.unit == "ms"
     page = (place / "mine" / "fit.yaml").read_text()
-    assert "# - valve_boom_joint_V: command in ±10 V of boom_joint, by its unit" in page
+    assert "# - boom valve [V]: command in ±10 V of boom_joint, by its unit" in page
 
 
 def test_a_fit_starts_near_the_log(place: Path):
@@ -99,12 +64,12 @@ def test_a_fit_starts_near_the_log(place: Path):
 
 
 @pytest.mark.slow
-def test_from_cad_and_log_to_a_validated_fit(place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_from_cad_and_log_to_a_validated_fit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """Every command of the next steps, as they stand; the last log was not fitted."""
-    monkeypatch.chdir(place)
-    shutil.rmtree("mine")
-    command = ["init", "mine", "--arm", "digger/urdf/digger.urdf", "--json"]
-    for name in sorted(Path().glob("move_*.csv")):
+    shutil.copytree(URDF, tmp_path / "urdf")
+    monkeypatch.chdir(tmp_path / "urdf")
+    command = ["init", "new", "--arm", "robot.urdf", "--json"]
+    for name in sorted(Path().glob("log_*.csv")):
         command += ["--log", str(name)]
     done = CliRunner().invoke(app, command)
     steps = json.loads(done.stdout)["commands"]
@@ -182,8 +147,8 @@ def test_without_cad_there_is_a_template_that_runs(tmp_path: Path):
     assert [joint.actuator.kind for joint in arm.joints] == ["linear", "linear"]
     assert arm.joints[0].actuator.sense == 1
     assert arm.joints[1].actuator.sense == -1  # its cylinder pushes the stick down
-    write_log(tmp_path / "mine", tmp_path / "a.csv", seconds=3.0)
     settings = hydroid.load_settings(tmp_path / "mine" / "fit.yaml")
+    hydroid.load_plant(tmp_path / "mine" / "fit.yaml").step(np.array([50.0, -50.0]))
     assert {"area_A_boom", "area_B_boom", "open_A_boom"} <= set(settings.parameters)
 
 
@@ -202,28 +167,26 @@ ROWS = count(-99)
     ("column", "change", "note", "scale"),
     [
         (
-            2,
+            3,
             lambda u: -u,
-            r"boom_joint moves against its command \(on \d+% of its way\): the command's sign",
+            r"stick_joint moves against its command \(on \d+% of its way\): the command's sign",
             -10,
         ),
         (5, lambda q: q + 2, r"boom_joint: angles .*allows -28\.6479 to 68\.7549: give them an offset", 10),
-        (5, lambda q: q if next(ROWS) else np.nan, r".*line 101, column enc.*is not a number", 10),
+        (5, lambda q: q if next(ROWS) else np.nan, r".*line 101, column boom angle.*is not a number", 10),
     ],
 )
-def test_what_the_numbers_of_a_log_tell_is_said(
-    place: Path, tmp_path: Path, column: int, change: Callable[[float], float], note: str, scale: int
-):
-    header, *rows = [line.split(";") for line in (place / "move_0.csv").read_text().splitlines()]
+def test_what_the_numbers_of_a_log_tell_is_said(place, tmp_path, column, change, note, scale):
+    header, *rows = [line.split(",") for line in (place / "move_0.csv").read_text().splitlines()]
     for row in rows:
         row[column] = f"{change(float(row[column])):.6g}"
-    made, settings = project(place, tmp_path, "\n".join(";".join(row) for row in (header, *rows)))
+    made, settings = project(place, tmp_path, "\n".join(",".join(row) for row in (header, *rows)))
     assert len([line for line in made.columns if re.match(note, line)]) == 1
-    assert [settings.log.columns("command", j).scale for j in (1, 2, 3)] == [10, scale, 10]
+    assert [settings.log.columns("command", j).scale for j in (1, 2, 3)] == [10, -10, scale]
 
 
 def test_a_joint_that_moves_without_a_command_follows_the_log(place: Path, tmp_path: Path):
-    text = (place / "move_0.csv").read_text().replace("valve_stick_joint_V", "torque")
+    text = (place / "move_0.csv").read_text().replace("stick valve [V]", "torque")
     made, settings = project(place, tmp_path, text)
     assert made.unused == ("torque",)
     assert settings.outputs == (1, 2)
@@ -244,14 +207,14 @@ def test_the_command_prints_what_it_assumed_and_what_is_next(place: Path, tmp_pa
 def test_a_log_may_count_joints_in_its_own_order(place: Path, tmp_path: Path):
     """The log's joint 1 is the arm's boom; an arm's file that one has is used as it is."""
     lines = (place / "move_0.csv").read_text().splitlines()
-    order = ["boom_joint", "stick_joint", "swing_joint"]
-    columns = lines[0].split(";")
-    wanted = [f"valve_{name}_V" for name in order] + [f"enc_{name}_rad" for name in order]
+    order = ["boom", "stick", "swing"]
+    columns = lines[0].split(",")
+    wanted = [f"{name} {what}" for what in ("valve [V]", "angle [rad]") for name in order]
     at = [0, *(columns.index(name) for name in wanted)]
-    rows = [";".join(line.split(";")[k] for k in at) for line in lines[1:]]
-    (tmp_path / "log.csv").write_text("\n".join(["t_ms;u1_V;u2_V;u3_V;q1_rad;q2_rad;q3_rad", *rows]))
+    rows = [",".join(line.split(",")[k] for k in at) for line in lines[1:]]
+    (tmp_path / "log.csv").write_text("\n".join(["t_ms,u1_V,u2_V,u3_V,q1_rad,q2_rad,q3_rad", *rows]))
     arm = place / "mine" / "arm.yaml"
-    made = init(tmp_path / "second", arm, [tmp_path / "log.csv"], joints=order)
+    made = init(tmp_path / "second", arm, [tmp_path / "log.csv"], joints=[f"{name}_joint" for name in order])
     assert made.files == ("arm.png", "fit.yaml", "next-steps.md")
     settings = hydroid.load_settings(tmp_path / "second" / "fit.yaml")
     assert settings.arm == load_arm(arm)

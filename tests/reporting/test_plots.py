@@ -54,7 +54,7 @@ def labelled(panel: Panel, start: str = "") -> dict[str, Mark]:
 TWO = {"K": (0.05, 0.5), "D": (80.0, 80.0)}
 SHAPES = {
     "one segment, one parameter, simple GA": (
-        {"segments": 1, "parameters": {"K": (0.05, 0.5)}},
+        {"segments": 1, "parameters": TWO, "fixed": {"D": 80.0}},
         {"names": ("best", "refined")},
     ),
     "several logs and outputs": ({"sources": ("a.csv", "b.csv"), "outputs": (1, 2)}, {"names": ("best",)}),

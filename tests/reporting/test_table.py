@@ -39,9 +39,7 @@ def test_a_shown_number_is_right_to_four_digits(value: float):
     assert abs(Decimal(number(value)) - Decimal(value)) <= abs(Decimal(value)) * Decimal("5.01e-4")
 
 
-def test_without_a_terminal_no_line_is_cut(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-):
+def test_without_a_terminal_no_line_is_cut(capsys, monkeypatch):
     monkeypatch.delenv("COLUMNS", raising=False)
     words = tuple(f"[deg] word{i}" * 3 for i in range(12))
     Table("wide", words, (words,)).show()
@@ -50,9 +48,7 @@ def test_without_a_terminal_no_line_is_cut(
 
 
 @pytest.mark.parametrize("width", [60, 100, 200])
-def test_a_table_fits_the_terminal_and_names_the_columns_left_out(
-    width: int, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-):
+def test_a_table_fits_the_terminal_and_names_the_columns_left_out(width: int, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", str(width))
     names = tuple(f"value {i}" for i in range(14))
     values = tuple(0.001234 * 1.7**i for i in range(14))

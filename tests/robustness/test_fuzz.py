@@ -19,9 +19,7 @@ HEADER = logs()[0].split(b"\n", 1)[0]
 
 
 @pytest.mark.parametrize("name", COUNTS)
-def test_damaged_files_are_read_rightly_or_refused_in_one_line(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_damaged_files_are_read_rightly_or_refused_in_one_line(name: str, tmp_path, monkeypatch) -> None:
     files, work = tmp_path / "files", tmp_path / "work"
     files.mkdir()
     work.mkdir()

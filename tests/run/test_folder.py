@@ -9,13 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import step_log
+from made_logs import simulate_log, step_log
 from small_fits import TRUTH, Watcher
 
 from hydroid import fit, load_settings, read_logs
 from hydroid.errors import RunError
 from hydroid.log import write_log
-from hydroid.prediction import simulate_log
 from hydroid.reporting import page_file
 from hydroid.run.folder import RunFolder
 from hydroid.run.process import locked
@@ -37,7 +36,7 @@ def path(tmp_path_factory) -> Path:
     """The log of a small fit."""
     log = step_log(SETTINGS.arm.pose("study"), [60.0, -80.0])
     path = tmp_path_factory.mktemp("log") / "log.csv"
-    write_log(path, simulate_log(SETTINGS, log, TRUTH, "truth"), SETTINGS.log)
+    write_log(path, simulate_log(SETTINGS, log, TRUTH), SETTINGS.log)
     return path
 
 

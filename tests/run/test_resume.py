@@ -11,8 +11,8 @@ import time
 from pathlib import Path
 
 import pytest
+from log_files import head
 
-LOG = Path(__file__).parents[2] / "examples" / "logs" / "rig_shoulder_1.csv"
 SHORT = ["--quiet", "--set", "search.ga.population=10", "--algorithm", "ga"]
 OWN = {".lock", "run.log", "checkpoint.previous.npz"}
 """files of a run that tell of its course"""
@@ -20,9 +20,8 @@ OWN = {".lock", "run.log", "checkpoint.previous.npz"}
 
 def start(cwd: Path, *options: object, out: str) -> "subprocess.Popen[str]":
     """Begin or resume a run of six seconds of a virtual rig's log; checkpoints after every generation."""
-    log = cwd / "log.csv"
-    if not log.exists():
-        log.write_text("\n".join(LOG.read_text().splitlines()[:601]) + "\n")
+    if not (cwd / "log.csv").exists():
+        head(cwd / "log.csv", 600)
     code = "import hydroid.commands.app as a, hydroid.fitting.checkpoints as s; s.SAVE_EVERY = 0; a.main()"
     command = ["fit-mech", "log.csv", *map(str, options), "--out", out, "--resume"]
     command = [sys.executable, "-c", code, *command]

@@ -4,11 +4,35 @@ from pymoo.algorithms.moo.nsga2 import NSGA2
 from pymoo.indicators.hv import HV
 from pymoo.optimize import minimize
 from pymoo.problems import get_problem
-from search_runs import advance, evaluate, same
 
 from hydroid.search.genetic import Nsga2, Population, SimpleGa, crowded_order, tournament
 from hydroid.search.pareto import feasible
 from hydroid.settings.search import GeneticSettings
+
+
+def evaluate(algorithm, chromosomes, function):
+    """Evaluated chromosomes that no one may write into."""
+    objectives = np.asarray(function(algorithm.decode(chromosomes)), dtype=float)
+    for array in (chromosomes, objectives):
+        array.flags.writeable = False
+    return Population(chromosomes, objectives)
+
+
+def advance(algorithm, function, population, rng, generations):
+    if population is None:
+        population = algorithm.tell(None, evaluate(algorithm, algorithm.ask(None, rng), function))
+    for _ in range(generations):
+        offspring = evaluate(algorithm, algorithm.ask(population, rng), function)
+        population = algorithm.tell(population, offspring)
+    return population
+
+
+def same(a, b):
+    return (
+        a.chromosomes.dtype == b.chromosomes.dtype
+        and np.array_equal(a.chromosomes, b.chromosomes)
+        and np.array_equal(a.objectives, b.objectives)
+    )
 
 
 def two_goals(points):

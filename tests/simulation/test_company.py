@@ -1,39 +1,30 @@
 """A population: no neighbour, no thread and no candidate that fails changes a bit of another."""
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import replaced, scattered
+from conftest import replaced, scattered, simulation
 
-from hydroid.settings.hydraulics import HydraulicSettings
-from hydroid.settings.problem import SimulationSettings
-from hydroid.simulation import Simulation
-from hydroid.simulation.scenario import Scenario
-
-KINDS = {"mech": None, "hyd": HydraulicSettings().substeps}
-each_kind = pytest.mark.parametrize("kind", KINDS)
+each_kind = pytest.mark.parametrize("kind", ["mech", "hyd"])
 
 
 @pytest.fixture
-def simulation(spec, arm, study_log):
-    def make(kind: str, **settings) -> Simulation:
-        scenario = Scenario(spec, arm, study_log, [1], SimulationSettings(**settings))
-        return Simulation(scenario, arm, KINDS[kind])
-
-    return make
+def make(spec, arm, study_log):
+    return partial(simulation, spec, arm, study_log)
 
 
 @each_kind
 @pytest.mark.parametrize("other", ["locked", "passive", "measured"])
-def test_threads_and_neighbours_change_no_bit(arm, simulation, kind, other):
+def test_threads_and_neighbours_change_no_bit(arm, make, kind, other):
     everyone = scattered(arm, 7)
-    together = simulation(kind, other_joints=other, threads=1).simulate(everyone).angle
+    together = make(kind=kind, other_joints=other, threads=1).simulate(everyone).angle
     assert np.ptp(together, axis=1).min() > np.deg2rad(0.2)
     for threads in (2, 5):
-        again = simulation(kind, other_joints=other, threads=threads).simulate(everyone).angle
+        again = make(kind=kind, other_joints=other, threads=threads).simulate(everyone).angle
         np.testing.assert_array_equal(again, together)
-    alone = simulation(kind, other_joints=other)
+    alone = make(kind=kind, other_joints=other)
     # large after small and small after large: the buffers of one call leave nothing to the next
     for rows in (slice(3, 5), slice(0, 7), slice(6, 7)):
         np.testing.assert_array_equal(alone.simulate(everyone[rows]).angle, together[rows])
@@ -48,11 +39,11 @@ def test_threads_and_neighbours_change_no_bit(arm, simulation, kind, other):
     ],
 )
 def test_a_set_that_cannot_be_simulated_is_marked_and_harms_nobody(
-    arm, simulation, kind, other, spoiled, capfd, tmp_path, monkeypatch
+    arm, make, kind, other, spoiled, capfd, tmp_path, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
     everyone = scattered(arm, 4)
-    run = simulation(kind, other_joints=other).simulate
+    run = make(kind=kind, other_joints=other).simulate
     healthy = run(everyone).angle
     columns = {name: everyone.joints[name].copy() for name in spoiled}
     for name, column in columns.items():

@@ -4,9 +4,9 @@ import mujoco
 import numpy as np
 import pytest
 from conftest import candidates
+from made_logs import at_rest
 
 from hydroid.hydraulics.valve import DENSITY
-from hydroid.log import Log
 from hydroid.settings.problem import SimulationSettings
 from hydroid.simulation import Simulation
 from hydroid.simulation.scenario import Scenario
@@ -17,16 +17,14 @@ PUMP = {"pump_flow": 6e-5, "pump_droop": 60e5}
 
 
 @pytest.fixture
-def simulated(spec, arm, study_log):
+def simulated(spec, arm):
     """Simulate constant commands [%] of some joints, 0-based; angles [rad] and what the actuators did."""
 
     def run(commands, seconds=2.0, model="quasi-static", period=0.01, **values):
-        log_time = np.arange(0.0, seconds + 0.5 * period, period)
-        command = np.zeros((len(log_time), len(arm.joints)))
+        command = np.zeros((round(seconds / period) + 1, len(arm.joints)))
         for joint, value in commands.items():
             command[:, joint] = value
-        angle = np.tile(study_log.angle[0], (len(log_time), 1))
-        log = Log("constant", log_time, command, angle, period)
+        log = at_rest(arm.pose("study"), command, period)
         one = candidates(arm, 1)
         one.mass[:], one.joints.stiffness[:] = arm.masses, 0.0
         for name, value in values.items():

@@ -8,21 +8,12 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
-from conftest import candidates, replaced, scattered, step_log
+from conftest import candidates, replaced, scattered, simulation
+from made_logs import step_log
 from scipy.integrate import solve_ivp
 
-from hydroid.settings.hydraulics import HydraulicSettings
-from hydroid.settings.problem import SimulationSettings
-from hydroid.simulation import Candidates, Simulation
-from hydroid.simulation.scenario import Scenario
+from hydroid.simulation import Candidates
 from hydroid.simulation.simulation import reading
-
-SHOULDER = [1]
-
-
-def simulation(spec, arm, log, outputs=SHOULDER, kind="mech", **settings) -> Simulation:
-    scenario = Scenario(spec, arm, log, list(outputs), SimulationSettings(**settings))
-    return Simulation(scenario, arm, HydraulicSettings().substeps if kind == "hyd" else None)
 
 
 @pytest.mark.parametrize(
@@ -206,11 +197,8 @@ def test_compiling_is_announced_only_where_the_cache_is_empty(tmp_path):
     """The message follows numba's cache, not the time that reading it takes."""
     program = "from hydroid.simulation.rollout import compile_rollout; compile_rollout()"
     environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
-    said = [
-        subprocess.run(
-            [sys.executable, "-c", program], env=environment, capture_output=True, text=True
-        ).stderr
-        for _ in range(2)
-    ]
+    command = [sys.executable, "-c", program]
+    runs = [subprocess.run(command, env=environment, capture_output=True, text=True) for _ in range(2)]
+    said = [run.stderr for run in runs]
     assert said[0].count("compiling the simulation") == 1
     assert said[1] == ""

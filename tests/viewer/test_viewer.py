@@ -8,7 +8,7 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
-from conftest import step_log
+from made_logs import step_log
 from PIL import Image
 
 from hydroid.errors import RunError, SettingsError

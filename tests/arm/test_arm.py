@@ -80,11 +80,9 @@ def test_a_cylinder_between_two_points_of_the_assembled_arm(tmp_path, above):
     for angle in (-0.9, 0.0, 0.7):
         data.qpos[:] = 0.3, angle
         mujoco.mj_forward(model, data)
-        places = [
-            data.body(b).xpos + data.body(b).xmat.reshape(3, 3) @ p
-            for b, p in (("boom", here), ("bar", there))
-        ]
-        assert np.linalg.norm(places[1] - places[0]) == pytest.approx(cylinder.length(angle), abs=1e-9)
+        pairs = ((data.body("boom"), here), (data.body("bar"), there))
+        first, second = (body.xpos + body.xmat.reshape(3, 3) @ point for body, point in pairs)
+        assert np.linalg.norm(second - first) == pytest.approx(cylinder.length(angle), abs=1e-9)
     assert (cylinder.length(0.1) > cylinder.length(0.0)) == (cylinder.sense > 0) == (above < 0)
     assert cylinder.stroke == pytest.approx(1e3 * np.ptp(cylinder.length(np.radians([-60, 60]))), abs=1e-3)
     before = {"parent": ('<body name="hook"', here), "child": ('<joint name="tilt"', there)}

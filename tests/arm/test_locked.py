@@ -129,8 +129,7 @@ def test_the_export_stands_where_the_whole_arm_does(tmp_path, moving):
     mujoco.mj_forward(model, here)
     mujoco.mj_forward(whole, there)
     assert (model.njnt, model.ntendon, model.jnt_actfrclimited[0]) == (1, 0, 0)
-    np.testing.assert_allclose(
-        *(d.geom_xpos[np.argsort(d.geom_xpos[:, 0])] for d in (here, there)), atol=1e-9
-    )
+    places = (d.geom_xpos[np.argsort(d.geom_xpos[:, 0])] for d in (here, there))
+    np.testing.assert_allclose(*places, atol=1e-9)
     np.testing.assert_allclose(here.site_xpos, there.site_xpos, atol=1e-9)
     np.testing.assert_allclose(here.qfrc_bias, there.qfrc_bias[locked.columns], atol=1e-6)

@@ -239,9 +239,8 @@ def test_a_mesh_that_cannot_be_read_is_said(tmp_path):
 def test_the_branch_that_the_log_names_or_that_is_asked_for_is_taken(tmp_path):
     path = write_robot(tmp_path, more=FORK)
     arm = import_arm(path, columns=["t", "u_stick_V", "phi stick"])
-    said(
-        arm, "the arm is swing_joint - boom_joint - stick_joint (the log names most of its joints); held at 0"
-    )
+    taken = "swing_joint - boom_joint - stick_joint (the log names most of its joints)"
+    said(arm, f"the arm is {taken}; held at 0")
     assert joints(compiled(arm)[0]) == ["swing_joint", "boom_joint", "stick_joint"]
     assert compiled(import_arm(path, tip="boom"))[0].njnt == 2
     with pytest.raises(ModelError, match=r"no joint moves a link 'bom'; tips: stick, chisel"):

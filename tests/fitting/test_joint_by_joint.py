@@ -12,8 +12,6 @@ from hydroid.fitting.multistart import alone, lone_joints
 from hydroid.problem.problem import Problem
 
 TRUTH = {"open_2": 0.35, "open_3": 0.5, "overlap_2": 0.4, "overlap_3": 0.3, "M3": 20.0, "D": 100.0}
-
-
 LEVELS = {2: [60.0, -80.0, 70.0, 0.0], 3: [-70.0, 80.0, 0.0, -60.0, 90.0]}
 
 

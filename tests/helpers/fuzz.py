@@ -161,9 +161,8 @@ def check_log(path: Path, data: bytes) -> None:
 
 def _cells(data: bytes) -> tuple[list[str], np.ndarray]:
     wide = data[:2] in (b"\xff\xfe", b"\xfe\xff")
-    encoding = (
-        "utf-16-be" if data[:200:2].count(0) > 90 else "utf-16-le" if data[1:200:2].count(0) > 90 else ""
-    )
+    even, odd = data[:200:2].count(0), data[1:200:2].count(0)
+    encoding = "utf-16-be" if even > 90 else "utf-16-le" if odd > 90 else ""
     try:
         text = data.decode("utf-16" if wide else encoding or "utf-8-sig")
     except UnicodeDecodeError:

@@ -53,8 +53,7 @@ class Linear:
 def slow(count, samples=1000, seed=0):
     """Slow signals as regressors, like an arm's responses."""
     rng = np.random.default_rng(seed)
-    walk = np.cumsum(rng.normal(size=(count, samples)), axis=1) / np.sqrt(samples)
-    return walk
+    return np.cumsum(rng.normal(size=(count, samples)), axis=1) / np.sqrt(samples)
 
 
 def ar1(rng, samples, phi, level):

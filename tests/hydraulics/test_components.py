@@ -5,11 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hydroid.hydraulics.cylinder import (
-    holding_pressures,
-    stop_damping,
-    triangle,
-)
+from hydroid.hydraulics.cylinder import holding_pressures, stop_damping, triangle
 from hydroid.hydraulics.records import coefficients, has_force_curve, nominal_joints
 from hydroid.hydraulics.solenoid import (
     coil_force,

@@ -13,8 +13,6 @@ ROTARY = 4
 """the roll: a rotary actuator turns it"""
 STOPPED = np.radians([0, -30, -60, 0, 0, 0, 20])
 """the shoulder at the lower end of its range"""
-
-
 NOTHING: Mapping[str, float] = MappingProxyType({})
 
 

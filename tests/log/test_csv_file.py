@@ -19,8 +19,6 @@ def with_degree_sign(data: str) -> str:
 
 
 DIALECTS: dict[str, Callable[[], bytes]] = {
-    "semicolon": lambda: text(";").encode(),
-    "tab": lambda: text("\t").encode(),
     "decimal comma": lambda: text(";", ",").encode(),
     "decimal comma, tab": lambda: text("\t", ",").encode(),
     "byte order mark": lambda: text().encode("utf-8-sig"),

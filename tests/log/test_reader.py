@@ -191,10 +191,8 @@ def test_a_faster_log_gives_the_means_of_its_commands(tmp_path: Path) -> None:
     for delay in (0.0, 0.03):
         exact, _ = read(path, LogSettings(delay_s=delay))
         coarse, _ = read(path, LogSettings(period_s=0.05, delay_s=delay))
-        travel = np.cumsum(exact.command * 0.01, axis=0)
-        np.testing.assert_allclose(
-            np.cumsum(coarse.command * 0.05, axis=0)[:-1], travel[4::5][:79], atol=1e-9
-        )
+        travel, found = (np.cumsum(x.command * x.period, axis=0) for x in (exact, coarse))
+        np.testing.assert_allclose(found[:-1], travel[4::5][:79], atol=1e-9)
         np.testing.assert_array_equal(coarse.command[0, 0], 0)
 
 

@@ -22,8 +22,6 @@ from hydroid.simulation import Response
 RIG = Path(__file__).parents[2] / "examples" / "logs" / "rig_shoulder_1.csv"
 MECHANICAL = {"K": 0.21, "D": 250.0, "S": 40.0}
 MECHANICAL |= {f"M{k + 1}": mass for k, mass in enumerate([4.0, 6.0, 20.0, 2.0, 3.0, 5.0])}
-
-
 HYDRAULIC = {"A_A": 900, "A_B": 800, "I_max": 0.85, "I_min": 0.3, "A": 1.4, "C": 1.1, "F1": 8.0, "F2": 0.7}
 HYDRAULIC |= {"x1": 0.8, "x2": 12.0, "open_A": 0.4, "open_B": 0.4, "delay": 0.0, "friction": 100.0}
 

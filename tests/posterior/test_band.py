@@ -71,9 +71,8 @@ def test_a_band_includes_what_the_noise_of_the_start_does(fitted):
 
 def test_leaving_out_each_log_predicts_it(fitted):
     settings, model = fitted
-    logs = [
-        driven(settings, levels, i) for i, levels in enumerate(([60, -80, 30], [-30, 50, 20], [40, -60, 50]))
-    ]
+    drives = [60, -80, 30], [-30, 50, 20], [40, -60, 50]
+    logs = [driven(settings, levels, seed) for seed, levels in enumerate(drives)]
     for i, log in enumerate(logs):
         problem = Problem(settings, [*logs[:i], *logs[i + 1 :]])
         theta = problem.parameters.from_unit(refine(problem, model.theta, RefinementSettings()).point)

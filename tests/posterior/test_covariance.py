@@ -79,9 +79,8 @@ def test_a_prior_is_one_more_measurement():
     prior = np.array([[1.0, 0.0, 1.0]]) / 0.05
     information = columns @ columns.T / (0.1 * DEG) ** 2 + prior.T @ prior
     # the residual's level, which weighs the prior, is the noise to about 2 %
-    np.testing.assert_allclose(
-        found.standard_deviation, np.sqrt(np.diag(np.linalg.inv(information))), rtol=1e-3
-    )
+    expected = np.sqrt(np.diag(np.linalg.inv(information)))
+    np.testing.assert_allclose(found.standard_deviation, expected, rtol=1e-3)
     assert flags(found) == [Flag.IDENTIFIABLE] * 3
     assert flags(uncertainty(Linear(columns, measured, theta), theta))[0] is Flag.UNIDENTIFIABLE
 
@@ -155,9 +154,8 @@ def test_noise_is_taken_from_settings_residual_or_floor():
     assert channel_noise(channel, slow_residual, how).correlation_time > 5
     given = channel_noise(channel, residual, how.model_copy(update={"noise_deg": {2: 0.7}}))
     assert (given.source, given.level) == ("settings", pytest.approx(0.7 * DEG))
-    weighted = channel_noise(
-        replace(channel, weight=3.0), residual, how.model_copy(update={"noise_deg": 0.7})
-    )
+    stated = how.model_copy(update={"noise_deg": 0.7})
+    weighted = channel_noise(replace(channel, weight=3.0), residual, stated)
     assert weighted.level == pytest.approx(2.1 * DEG)
 
 

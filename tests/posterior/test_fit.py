@@ -52,9 +52,8 @@ def test_the_kept_precision_gives_the_intervals_of_the_fit(fitted):
     kept = stored_posterior(model)
     i, j = (model.settings.parameter_set().names.index(name) for name in ("A_A", "A_B"))
     found = kept.propagate(lambda theta: theta[:, [i]] / theta[:, [j]], positive=True)
-    np.testing.assert_allclose(
-        found.interval[0], fitted.summary.quantities["shoulder_area_ratio"].interval, rtol=1e-5
-    )
+    stated = fitted.summary.quantities["shoulder_area_ratio"].interval
+    np.testing.assert_allclose(found.interval[0], stated, rtol=1e-5)
 
 
 def test_other_values_or_free_parameters_are_not_the_fits(fitted):

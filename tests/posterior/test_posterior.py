@@ -29,9 +29,8 @@ def test_the_interval_of_a_linear_quantity_is_the_textbooks():
     slopes = weights * THETA[:, None]
     sd = np.sqrt(np.diag(slopes.T @ COVARIANCE @ slopes))
     np.testing.assert_allclose(found.sd, sd, rtol=1e-3)
-    np.testing.assert_allclose(
-        found.interval, np.stack([found.value - Z * found.sd, found.value + Z * found.sd], 1)
-    )
+    ends = np.stack([found.value - Z * found.sd, found.value + Z * found.sd], 1)
+    np.testing.assert_allclose(found.interval, ends)
 
 
 def test_a_ratio_has_a_multiplicative_interval_that_its_inverse_shares():

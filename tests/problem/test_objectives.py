@@ -51,9 +51,8 @@ def test_only_a_row_that_is_not_finite_is_infinite(p, bad):
 def test_a_relative_objective_has_no_unit(p):
     measured, how = np.sin(np.arange(1001) / 50), ObjectiveSettings(norm=p, relative=True)
     value = overall_objective(ERROR, measured, how)
-    np.testing.assert_allclose(
-        value, overall_objective(np.rad2deg(ERROR), np.rad2deg(measured), how), rtol=1e-13
-    )
+    other = overall_objective(np.rad2deg(ERROR), np.rad2deg(measured), how)
+    np.testing.assert_allclose(value, other, rtol=1e-13)
     assert (overall_objective(ERROR, measured, ObjectiveSettings(norm=p)) == norm(ERROR, p)).all()
     assert overall_objective(measured[None, :], measured, how)[0] == 1.0  # a model that never moves
     with pytest.raises(SettingsError, match=r"objective\.relative"):

@@ -26,8 +26,6 @@ SMALL = {
     "refinement": None,
     "objective.segments": 2,
 }
-
-
 SETTINGS = load_settings("article-mech", SMALL)
 
 

@@ -58,10 +58,8 @@ def test_a_curved_problem_over_six_decades_is_solved_too(seed):
 def test_the_unit_of_the_residual_does_not_matter(unit):
     residuals, _ = linear(10.0 ** -np.arange(0, 6), np.full(6, 0.4))
     start = np.linspace(0.3, 0.6, 6)
-    here, there = (
-        least_squares(start, residuals, SETTINGS),
-        least_squares(start, lambda x: unit * residuals(x), SETTINGS),
-    )
+    here = least_squares(start, residuals, SETTINGS)
+    there = least_squares(start, lambda x: unit * residuals(x), SETTINGS)
     assert (here.point == there.point).all()
     assert there.cost == unit**2 * here.cost
     assert (here.evaluations, here.ending) == (there.evaluations, there.ending)
@@ -93,9 +91,8 @@ def test_never_worse_than_the_start_and_always_inside(seed, failing):
 
     def residuals(x):
         rows = np.sin(3 * (x - truth)) @ mix + 0.01 * np.sin(40 * x.sum(axis=1, keepdims=True))
-        rows[np.cos(12 * x).sum(axis=1) > 3 - 2 * failing] = (
-            np.nan
-        )  # scattered regions that cannot be simulated
+        # scattered regions that cannot be simulated
+        rows[np.cos(12 * x).sum(axis=1) > 3 - 2 * failing] = np.nan
         return rows
 
     start = rng.random(3)
@@ -139,9 +136,8 @@ def test_a_state_that_was_stored_goes_on_to_the_same_bits():
         again = Descent.from_arrays(arrays)
         while not again.ended:
             again = step(again, residuals, SETTINGS)
-        assert all(
-            (a == b).all() for a, b in zip(again.arrays().values(), state.arrays().values(), strict=True)
-        )
+        pairs = zip(again.arrays().values(), state.arrays().values(), strict=True)
+        assert all((a == b).all() for a, b in pairs)
 
 
 @settings(deadline=None)

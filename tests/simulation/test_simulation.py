@@ -39,10 +39,8 @@ def test_passive_arm_equals_a_plain_mujoco_loop(spec, arm, study_log):
         body.mass = mass
     own.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT.value
     model = own.compile()
-    model.dof_damping[:], model.jnt_stiffness[:] = (
-        parameters.joints.damping[0],
-        parameters.joints.stiffness[0],
-    )
+    model.dof_damping[:] = parameters.joints.damping[0]
+    model.jnt_stiffness[:] = parameters.joints.stiffness[0]
     pose = study_log.angle[0]
     model.qpos_spring[:] = pose
     data = mujoco.MjData(model)

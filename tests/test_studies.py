@@ -156,9 +156,8 @@ def test_axes_multiply_and_lists_name_their_cells(tmp_path: Path):
     axes = {"search.ga.crossover_rate": [0.4, 0.8], "norm": content()["axes"]["norm"]}
     file = written(tmp_path, axes=axes)
     cells = cell_settings(load(file, StudySettings), file)
-    assert list(cells) == [
-        f"search.ga.crossover_rate {r}, {n}" for r in (0.4, 0.8) for n in ("largest", "mean")
-    ]
+    names = [f"search.ga.crossover_rate {r}, {n}" for r in (0.4, 0.8) for n in ("largest", "mean")]
+    assert list(cells) == names
     assert [s.search.ga.crossover_rate for s in cells.values()] == [0.4, 0.4, 0.8, 0.8]
 
 

@@ -129,9 +129,8 @@ def test_defaults_classes_and_frames_are_read_as_mujoco_reads_them(tmp_path):
 
 
 def test_a_payload_hangs_on_its_site(tmp_path):
-    model = BOOM.replace("</worldbody>", "</worldbody>").replace(
-        '<body name="bar"', '<frame pos="1 0 0"><site name="grip" pos="0 0 2"/></frame><body name="bar"'
-    )
+    frame = '<frame pos="1 0 0"><site name="grip" pos="0 0 2"/></frame>'
+    model = BOOM.replace('<body name="bar"', f'{frame}<body name="bar"')
     arm = write_arm(tmp_path, model, payload="grip")
     loaded = add_payload(load_model(arm), arm, 70.0).compile()
     assert loaded.body("payload").mass[0] == 70.0

@@ -151,12 +151,8 @@ def test_stage_two_holds_masses_and_says_which_stage_1_moved_without_knowing_it(
     """The arm's file has 5.1 and 22.5 kg: M2 was moved, M3 stayed, and the logs know M4."""
     flags = {"M2": "weakly identifiable", "M3": "not identifiable", "M4": "identifiable"}
     values = VALUES | {"M2": 8.0, "M3": 22.6, "M4": 3.0}
-    known = {
-        n: ParameterEstimate(
-            value=v, unit="?", flag=flags.get(n, "fixed" if n[0] == "M" else "not identifiable")
-        )
-        for n, v in values.items()
-    }
+    flags = {n: "fixed" if n[0] == "M" else "not identifiable" for n in values} | flags
+    known = {n: ParameterEstimate(value=v, unit="?", flag=flags[n]) for n, v in values.items()}
     write_estimate(tmp_path, FitSummary(stage="mech", estimate=known))
     with caplog.at_level(logging.WARNING, "hydroid"):
         changes = with_mechanics(tmp_path, "fit-hyd", {"log.delay_s": 0.2})

@@ -60,9 +60,8 @@ def test_all_starts_end_at_one_optimum_which_is_the_truth_without_noise(exact):
 
 
 def test_a_resumed_search_ends_bit_for_bit_and_gains_no_more_on_noise_than_its_parameters_can():
-    problem = make(
-        noise_deg=0.02, **{"search.multistart": {"starts": 2, "iterations": 4, "horizons": [0.25, 2.0]}}
-    )
+    how = {"starts": 2, "iterations": 4, "horizons": [0.25, 2.0]}
+    problem = make(noise_deg=0.02, **{"search.multistart": how})
     watcher, stopped, last, stored = Watcher(), Watcher(stop_at=1, simulations=60), Watcher(), {}
     whole = search(problem, watcher.generation, watcher.refining, {})
     assert [row[0] for row in watcher.rows] == [1, 2]

@@ -27,9 +27,8 @@ class Off:
     joint: int = 2
 
     def errors(self, logs) -> np.ndarray:
-        return np.concatenate(
-            [np.full(len(log.time), np.radians(self.seen if log is LOG else self.unseen)) for log in logs]
-        )
+        pairs = ((log, self.seen if log is LOG else self.unseen) for log in logs)
+        return np.concatenate([np.full(len(log.time), np.radians(error)) for log, error in pairs])
 
 
 def predicted(error: float, log: Log) -> Prediction:

@@ -26,7 +26,7 @@ from hydroid.errors import HydroidError
 from hydroid.log import open_table
 
 ROOT = Path(__file__).parents[2]
-LOGS = ROOT / "examples" / "logs"
+LOGS, TRUTH = ROOT / "examples" / "logs", ROOT / "examples" / "article" / "truth.yaml"
 TINY = ("--algorithm=ga", "--set=search.ga={population: 4, generations: 1}", "--no-refinement", "--quiet")
 NUMBERS = (
     """0 -0 1e308 -1e308 1e999 1e-320 nan inf -inf .nan .inf 1e3 0x1F 010 1_0 1,5 1:30 2024-01-01 1.5.2"""
@@ -227,7 +227,7 @@ def simulate(room: Path, data: bytes) -> Sequence[str]:
     """Return the command that simulates with the room's values and model, where it has them."""
     (room / "log.csv").write_bytes(logs()[0])
     values = room / "values.yaml"
-    given = values if values.exists() else ROOT / "examples" / "article" / "truth.yaml"
+    given = values if values.exists() else TRUTH
     arm = yaml.safe_load((ROOT / "configs" / "hydrolek.yaml").read_text())
     model = room / "model.xml" if (room / "model.xml").exists() else ROOT / "models" / "hydrolek.xml"
     arm |= {"model": str(model), "pair": None}
@@ -280,14 +280,10 @@ KINDS = {
     for kind in (
         Kind("log", logs, "log.csv", lambda room, _: ("check", str(room / "log.csv")), check_log),
         Kind("config", configs, "c.yaml", lambda room, _: check(room, "--config", str(room / "c.yaml"))),
-        Kind(
-            "set", overrides, "set", lambda room, data: check(room, "--set", data.decode("utf-8", "replace"))
-        ),
+        Kind("set", overrides, "set", lambda room, data: check(room, "--set", data.decode(errors="replace"))),
         Kind("arm", lambda: (two("yaml"),), "arm/arm.yaml", start),
         Kind("mesh", lambda: (rod(),), "arm/rod.stl", start),
-        Kind(
-            "values", lambda: ((ROOT / "examples/article/truth.yaml").read_bytes(),), "values.yaml", simulate
-        ),
+        Kind("values", lambda: (TRUTH.read_bytes(),), "values.yaml", simulate),
         Kind("model", models, "model.xml", simulate),
     )
 }

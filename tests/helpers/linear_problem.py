@@ -30,9 +30,8 @@ class Linear:
         )
         self.unit = unit
         one = ParameterSettings(quantity="gain", bounds=(0.1, 1.0))
-        self.settings = FitSettings(
-            parameters=dict.fromkeys(names, one), objective={"segments": 1} | objective
-        )
+        how = {"segments": 1} | objective
+        self.settings = FitSettings(parameters=dict.fromkeys(names, one), objective=how)
         statements = {k: PriorSettings(**v) for k, v in (known or {}).items()}
         self.priors = Priors(statements, self.parameters)
         edges = np.linspace(0, len(measured), len(weights) + 1).astype(int)

@@ -51,9 +51,8 @@ def recover(
 
 def assert_recovered(found: Uncertainty, settings: FitSettings, truth: Mapping[str, float]) -> None:
     """The truth lies within three standard deviations of each estimate, and these are below a third of it."""
-    for name, estimate, deviation in zip(
-        settings.parameters, found.theta, found.standard_deviation, strict=True
-    ):
+    known = zip(settings.parameters, found.theta, found.standard_deviation, strict=True)
+    for name, estimate, deviation in known:
         if settings.parameters[name].fixed is None:
             what = f"{name}: {estimate:.5g} ± {deviation:.2g}, truth {truth[name]:.5g}"
             assert abs(estimate - truth[name]) < 3 * deviation, what

@@ -16,6 +16,7 @@ from hydroid.settings.hydraulics import HydraulicSettings
 STOPPED = np.radians([0, -30, -60, 0, 0, 0, 20])
 """the shoulder at the lower end of its range"""
 TIGHT = HydraulicSettings(leakage=0.0, substeps=10)
+TRAPPED = {"trapped": {"quantity": "trapped_pressure", "joints": [2], "bounds": [0.0, 150.0]}}
 
 
 @pytest.mark.parametrize("trapped", [0.0, 5.0, 30.0])
@@ -59,8 +60,7 @@ def test_more_than_the_load_presses_against_a_stop_above():
 
 
 def test_a_log_says_in_which_pressures_it_rested():
-    trapped = {"quantity": "trapped_pressure", "joints": [2], "bounds": [0.0, 150.0]}
-    settings = settings_of({"trapped": trapped}, start_pressure=None)
+    settings = settings_of(TRAPPED, start_pressure=None)
     log = duties(STOPPED, {2: [0, 50]})
     pressure = np.full((len(log.time), 7, 2), np.nan)
     pressure[:, 1] = 12e5, 3e5
@@ -73,9 +73,7 @@ def test_a_log_says_in_which_pressures_it_rested():
 
 
 def test_a_joint_away_from_its_stops_is_held_by_its_oil():
-    settings = settings_of(
-        {"trapped": {"quantity": "trapped_pressure", "joints": [2], "bounds": [0.0, 150.0]}}
-    )
+    settings = settings_of(TRAPPED)
     log, bindings = duties(settings.arm.pose("study"), {2: [50, -50]}), Bindings(settings)
     simulation = make_simulation(load_model(settings.arm), log, [1], settings)
     angle = simulation.simulate(bindings.candidates(np.array([[231.8, 53.4, p] for p in (0.0, 40.0)]))).angle

@@ -30,9 +30,8 @@ def test_the_same_bits_as_the_csv(kind: str, tmp_path: Path) -> None:
 
 
 def settings(time: str, command: str, angle: str) -> LogSettings:
-    return LogSettings.model_validate(
-        {"time": {"column": time}, "command": {"column": command}, "angle": {"column": angle}}
-    )
+    names = {"time": time, "command": command, "angle": angle}
+    return LogSettings.model_validate({what: {"column": name} for what, name in names.items()})
 
 
 MATRIX = settings("t", "u[{joint}]", "q[{joint}]")
@@ -76,9 +75,8 @@ def test_elements_of_cells_count_from_one(tmp_path: Path) -> None:
 def test_timestamps_in_parquet(tmp_path: Path) -> None:
     import pyarrow
 
-    stamps = pyarrow.array(
-        (1e9 * T).round().astype(np.int64) + 1_700_000_000 * 10**9, pyarrow.timestamp("ns", "UTC")
-    )
+    nanoseconds = (1e9 * T).round().astype(np.int64) + 1_700_000_000 * 10**9
+    stamps = pyarrow.array(nanoseconds, pyarrow.timestamp("ns", "UTC"))
     log, _ = read(write_parquet(tmp_path / "log.parquet", {**COLUMNS, "time_s": stamps}))
     same(log, tmp_path)
 

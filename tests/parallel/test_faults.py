@@ -106,11 +106,8 @@ class Site:
         command = [sys.executable, "-m", "dask", *map(str, arguments), "--no-dashboard"]
         environment = os.environ | {"DASK_CONFIG": str(self.config), "PYTHONPATH": os.pathsep.join(sys.path)}
         with (self.folder / "log.txt").open("ab") as log:
-            self.processes.append(
-                subprocess.Popen(
-                    command, cwd=self.folder, env=environment, stdout=log, stderr=log, start_new_session=True
-                )
-            )
+            how = {"cwd": self.folder, "env": environment, "stdout": log, "stderr": log}
+            self.processes.append(subprocess.Popen(command, start_new_session=True, **how))
 
     def worker(self) -> None:
         file = ("--scheduler-file", self.file)

@@ -57,9 +57,8 @@ def test_pins_close_directions_one_by_one(mech):
     inside = told.interval[:3] / np.array([0.2, 231.8, 53.4])[:, None]
     assert (np.abs(inside - 1) < WEAK_ABOVE * 2.1).all()
     # a plausible value of each mass instead, to 5 %: K, D, S are known about as well as the masses
-    priors = {
-        name: {"of": name, "value": MECH[name], "sd": 0.05 * MECH[name]} for name in MECH if name[0] == "M"
-    }
+    masses = {name: value for name, value in MECH.items() if name[0] == "M"}
+    priors = {name: {"of": name, "value": value, "sd": 0.05 * value} for name, value in masses.items()}
     problem, told, found = look("article-mech", MECH, priors=priors)
     assert found.rank == 9 > free.rank
     sources = {n: s.source for n, s in zip(problem.parameters.names, told.status, strict=True)}

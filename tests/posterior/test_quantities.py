@@ -123,9 +123,8 @@ def test_stage_1s_quantities_are_its_ratios():
     found = measured(bench, estimate)
     gain = np.degrees(0.2 / 231.8)
     assert found["joint2_gain"] == [pytest.approx(gain)]
-    np.testing.assert_allclose(
-        found["joint2_speed"], gain * np.array([-100, -75, -50, -25, -10, 10, 25, 50, 75, 100])
-    )
+    commands = np.array([-100, -75, -50, -25, -10, 10, 25, 50, 75, 100])
+    np.testing.assert_allclose(found["joint2_speed"], gain * commands)
     scaled = replaced(estimate, gain=3 * estimate.joints.gain, damping=3 * estimate.joints.damping)
     assert measured(bench, scaled)["joint2_gain"] == [pytest.approx(gain)]
 

@@ -88,9 +88,8 @@ def test_the_seed_alone_decides_every_bit(kind, coding):
     def function(points):
         return with_failures(points)[:, -1 if search.single else 0 :]
 
-    one, again, other = (
-        advance(search, function, None, np.random.default_rng(seed), 12) for seed in (7, 7, 8)
-    )
+    generators = (np.random.default_rng(seed) for seed in (7, 7, 8))
+    one, again, other = (advance(search, function, None, rng, 12) for rng in generators)
     assert same(one, again)
     assert len(one) == 13
     assert not same(one, other)

@@ -53,9 +53,8 @@ def test_the_dynamic_model_converges_to_it_as_oil_stiffens_and_motion_slows(simu
         each = {"opening_a": 3e-7 / slower, "opening_b": 3e-7 / slower, "leakage": 1e-14, "damping": 0.0}
         each |= pump | {"pump_flow": pump["pump_flow"] / slower} if pump else {}
         each |= {"bulk_modulus": 8e8 * stiffer, "line_volume": 1e-6}
-        quasi, full = (
-            simulated(commands, 1.0 * slower, model, **each)[0] for model in ("quasi-static", "dynamic")
-        )
+        models = "quasi-static", "dynamic"
+        quasi, full = (simulated(commands, 1.0 * slower, model, **each)[0] for model in models)
         return np.abs(quasi - full).max() / np.ptp(full, axis=0).max()
 
     near, far = apart(4.0, 20.0), apart(1.0, 1.0)

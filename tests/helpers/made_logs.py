@@ -31,7 +31,7 @@ def simulate_log(settings: FitSettings, log: Log, truth: Mapping[str, float]) ->
 
 
 def noisy(log: Log, level_deg=0.1, seed: Any = 0, *, phi=0.0, exact_start=True) -> Log:
-    """The log with noise on all angles, white or AR(1), but for its first sample; by a seed or generator."""
+    """The log with noise on all angles, white or AR(1), but for its first sample; by seed or generator."""
     noise = np.random.default_rng(seed).normal(0.0, np.deg2rad(level_deg), log.angle.shape)
     if phi:
         for i in range(1, len(noise)):

@@ -73,7 +73,7 @@ def fits(
         yield problem, uncertainty(problem, refined(problem, start)[0])
 
 
-def report(title: str, names: Sequence[str], truth: np.ndarray, said: Iterator[Said]) -> None:
+def report(title: str, names: Sequence[str] | np.ndarray, truth: np.ndarray, said: Iterator[Said]) -> None:
     """Print how often intervals hold the truth, shape (m,), where there are any."""
     clock = Clock()
     values, sds, intervals = (np.array(each) for each in zip(*said, strict=True))

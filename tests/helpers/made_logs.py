@@ -1,10 +1,11 @@
 """Logs of which the truth is known, for tests and benchmarks: commands, what a model makes of them, noise."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hydroid.identified_model import identified
 from hydroid.log import Log
@@ -18,10 +19,11 @@ def at_rest(pose: np.ndarray, command: np.ndarray, period: float = 0.01, source:
     return Log(source, time, command, np.tile(pose, (len(time), 1)), period)
 
 
-def step_log(pose: np.ndarray, levels: Sequence[float], dwell: float = 1.0, joint: int = 2) -> Log:
+def step_log(pose: np.ndarray, levels: ArrayLike, dwell: float = 1.0, joint: int = 2) -> Log:
     """Commands [%] of one joint (from 1), each held for `dwell` [s]."""
-    command = np.zeros((round(len(levels) * dwell / 0.01), len(pose)))
-    command[:, joint - 1] = np.repeat(levels, round(dwell / 0.01))
+    held = np.repeat(levels, round(dwell / 0.01))
+    command = np.zeros((len(held), len(pose)))
+    command[:, joint - 1] = held
     return at_rest(pose, command, source="steps")
 
 

@@ -6,7 +6,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -123,7 +123,7 @@ class Site:
             self.kill(number)
 
     @contextmanager
-    def opened(self) -> Iterator[DaskWorkers]:
+    def opened(self) -> Generator[DaskWorkers]:
         """The workers as of a process whose DASK_CONFIG names the credentials."""
         tls = yaml.safe_load((self.config / "distributed.yaml").read_text())["distributed"]["comm"]["tls"]
         roles = {f"{role}.{key}": text for role in ("scheduler", "client") for key, text in tls[role].items()}

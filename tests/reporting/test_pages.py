@@ -17,7 +17,7 @@ from hydroid.estimate import JointVerdict
 from hydroid.fitting.search import HISTORY
 from hydroid.fitting.verdict import judge
 from hydroid.reporting.page import Page, Section, Table
-from hydroid.reporting.page_file import write_figures, write_page
+from hydroid.reporting.page_file import html, write_figures, write_page
 from hydroid.reporting.predictions import fit_page, validation_page
 from hydroid.reporting.verdict_table import horizon_section, next_step, ordered, verdict_table, worst
 
@@ -157,6 +157,16 @@ def test_the_worst_joint_is_that_which_errs_most_for_its_tolerance():
     diverged = boom.changed({"unseen_deg": None, "fitted_deg": 0.1})
     assert worst([swing, diverged]) == "Worst joint: boom, whose simulation diverges."
     assert worst([swing, diverged.changed({"verdict": "not tested"})]).startswith("Worst joint: swing")
+
+
+def test_a_fit_that_fails_says_so_in_every_place():
+    problem = make_problem()
+    log, fit = replace(problem.logs[0], source="b.csv"), make_fit(problem)
+    page = fit_page(make_record(problem, fit, {"b.csv": make_prediction(log, error=1.0)}))
+    text = Reader(html(page)).text
+    assert "✗ predicts no better than standing still" in text
+    assert "✓" not in text
+    assert page.lead == "shoulder: predicts no better than standing still."
 
 
 def test_a_validation_of_several_fits_shows_the_best_first_in_shared_charts():

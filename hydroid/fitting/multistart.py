@@ -134,13 +134,12 @@ class Multistart:
         for number, part in enumerate(self._parts(problem), 1):
             before = self._memo.simulated
             result = refine(
-                part,
+                part.from_afar(),
                 theta,
                 self._descent,
                 lambda what, n, rms, before=before: self._progress(what, before + n, rms),
                 self._checkpoints,
                 f"{name} part {number}",
-                cautious=True,  # far off, or alone, a joint errs by more than its noise
             )
             cost, theta = result.cost, part.parameters.from_unit(result.point)
             self._memo.elsewhere += result.evaluations

@@ -20,6 +20,9 @@ SETTLED = 1e-3
 MAX_NOISES = 8
 """times at most that the noise is estimated: its model may jump to and fro between two orders"""
 
+ROUGH = 1e-3
+"""gain below which least squares without the prefilter ends"""
+
 _log = logging.getLogger(__name__)
 
 
@@ -30,13 +33,11 @@ class _Refinement(Descent):
     Attributes:
         weight: residual that a prior's standard deviation counts [rad].
         anchor: where the noise, and the effect of open start angles, were estimated: shape (p,).
-        cautious: how the weight follows from the noise (`prior_weight`).
         noises: how often they were.
     """
 
     weight: float
     anchor: Array
-    cautious: bool
     noises: int = 1
 
 
@@ -47,8 +48,6 @@ def refine(
     progress: Callable[[str, int, float], None] = lambda *_: None,
     checkpoints: Checkpoints | None = None,
     name: str = "refined",
-    *,
-    cautious: bool = False,
 ) -> Descent:
     """Improve an estimate by bounded least squares.
 
@@ -57,6 +56,9 @@ def refine(
     again where a Jacobian is taken, until they settle. Between two Jacobians nothing is stored: a resumed
     refinement repeats the steps since the last one.
 
+    Fast errors have more optima than slow ones: where there is a prefilter, least squares goes first to the
+    optimum without it.
+
     Args:
         problem: the problem.
         theta: where to start, shape (P,).
@@ -64,18 +66,23 @@ def refine(
         progress: takes the name, the number of simulations and the rms error [rad] so far.
         checkpoints: where it continues from, and stores how far it is; a result is stored too.
         name: of this refinement among them.
-        cautious: whether priors count more, as beside a model that leaves something out (`prior_weight`).
 
     Raises:
         RunError: the checkpoint cannot be written.
     """
     checkpoints = {} if checkpoints is None else checkpoints
+    simulated = 0
+    if problem.is_filtered:
+        rough = settings.changed({"gain_tolerance": max(settings.gain_tolerance, ROUGH)})
+        first = refine(problem.from_afar(), theta, rough, progress, checkpoints, f"{name} from afar")
+        theta, simulated = problem.parameters.from_unit(first.point), first.evaluations
     if name in checkpoints:
         now = _Refinement.from_arrays(checkpoints[name])
         if now.ended:
             return now
     else:
-        now = _estimated(problem, problem.parameters.to_unit(theta), cautious)
+        now = _estimated(problem, problem.parameters.to_unit(theta))
+        now = replace(now, evaluations=now.evaluations + simulated)
     residuals = _residuals(problem, now)
     with saving(checkpoints, name) as keep:
         while not now.ended:
@@ -92,14 +99,14 @@ def refine(
     return now
 
 
-def _estimated(problem: Problem, unit: Array, cautious: bool, row: Array | None = None) -> _Refinement:
+def _estimated(problem: Problem, unit: Array, row: Array | None = None) -> _Refinement:
     """Begin at a point of the unit box, (p,), with the noise there; `row`, (R,): its residuals, if known."""
     theta, weight = problem.parameters.from_unit(unit[None]), 0.0
     here = with_open_start(problem, theta[0]).residuals(theta)[0] if row is None else row
     if len(problem.priors) or problem.leaves_start_open:
-        weight = prior_weight(problem, here, cautious=cautious)
+        weight = prior_weight(problem, here)
     begun = start(unit, np.append(here, weight * problem.priors.scores(theta)))
-    return _Refinement(**vars(begun), weight=weight, anchor=unit, cautious=cautious)
+    return _Refinement(**vars(begun), weight=weight, anchor=unit)
 
 
 def _following(problem: Problem, now: _Refinement) -> _Refinement:
@@ -107,9 +114,9 @@ def _following(problem: Problem, now: _Refinement) -> _Refinement:
     row = now.residual[: problem.measured.size]
     if not now.weight or now.noises == MAX_NOISES:
         return now
-    if abs(prior_weight(problem, row, cautious=now.cautious) - now.weight) <= SETTLED * now.weight:
+    if abs(prior_weight(problem, row) - now.weight) <= SETTLED * now.weight:
         return now
-    here = _estimated(problem, now.point, now.cautious, None if problem.leaves_start_open else row)
+    here = _estimated(problem, now.point, None if problem.leaves_start_open else row)
     changed = {"residual": here.residual, "cost": here.cost, "weight": here.weight, "anchor": here.anchor}
     return replace(now, **changed, noises=now.noises + 1)
 

@@ -92,19 +92,19 @@ def problem_noise(problem: Problem, residual: Array) -> list[Noise]:
     return [channel_noise(c, residual[c.rows], problem.settings.objective) for c in problem.channels]
 
 
-def prior_weight(problem: Problem, residual: Array, *, cautious: bool = False) -> float:
+def prior_weight(problem: Problem, residual: Array) -> float:
     """Return the weight [rad] of a prior's score of one standard deviation beside a row of residuals, (R,).
 
     Autocorrelated residuals hold less information than their number T says: as much as
     `effective_sample_size` = T' independent ones on what acts as slowly as their mean, and as much as T on
     what acts as fast as they change. Parameters act in between. The weight is the noise's level times the
-    root of the number of samples per effective one, of which there are √(T T'). A `cautious` fit counts T':
-    its priors hold what an error of the model, not the noise, would move.
+    root of the number of samples per effective one, of which there are √(T T'). From afar they are T':
+    priors hold what an error of the model, not the noise, would move.
     """
     noise = problem_noise(problem, residual)
     square, samples = sum(n.samples * n.level**2 for n in noise), sum(n.samples for n in noise)
     effective = sum(n.effective_sample_size for n in noise)
-    return np.sqrt(square / (effective if cautious else np.sqrt(samples * effective)))
+    return np.sqrt(square / (effective if problem.afar else np.sqrt(samples * effective)))
 
 
 def channel_noise(channel: Channel, residual: Array, objective: ObjectiveSettings) -> Noise:

@@ -38,6 +38,7 @@ Quantity = Literal["angle", "pressure_a", "pressure_b"]
 SIDES: tuple[Quantity, Quantity] = ("pressure_a", "pressure_b")
 STAYING, FAST_GAIN = 3.0, 2.0
 """T of the prefilter [s], and its gain of fast errors (ours: of 1, 2 and 4; docs/measured.md)"""
+UNFILTERED: Array = np.array([[1.0, 0.0], [1.0, 0.0]])
 
 
 @record
@@ -61,7 +62,7 @@ class Channel:
     measured: Array
     weight: float
     rows: slice
-    prefilter: Array = field(default_factory=lambda: np.eye(2)[[0, 0]])
+    prefilter: Array = field(default_factory=lambda: UNFILTERED)
 
     def error(self, responses: Sequence[Response] | Mapping[int, Response]) -> Array:
         """Return the weighted output error y - y_hat of (17) [rad], shape (n, T)."""

@@ -6,6 +6,7 @@ simulated by threads of this process, or on workers (`Spread`); no bit of a resu
 
 from collections.abc import Callable, Sequence
 from copy import copy
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Protocol
@@ -19,6 +20,7 @@ from hydroid.errors import SettingsError
 from hydroid.log import Log
 from hydroid.problem.bindings import Bindings
 from hydroid.problem.channels import (
+    UNFILTERED,
     Channel,
     make_channels,
     overall_objective,
@@ -76,7 +78,10 @@ class Problem:
         measured: all channels in a row, times their weights, shape (R,).
         open_starts: what open start angles can explain, taken out of the residuals (`with_open_starts`).
         bounds: [first, end) of each objective's samples in it, shape (S, 2).
+        afar: whether it is as least squares far from an optimum sees it (`from_afar`).
     """
+
+    afar = False
 
     def __init__(
         self,
@@ -122,6 +127,17 @@ class Problem:
     def leaves_start_open(self) -> bool:
         """Whether the start angle of any log is open."""
         return self.settings.free_start and any(self.started(log) for log in self.logs)
+
+    @property
+    def is_filtered(self) -> bool:
+        """Whether any channel has a prefilter."""
+        return any(c.prefilter is not UNFILTERED for c in self.channels)
+
+    def from_afar(self) -> "Problem":
+        """Return it without prefilter, and with priors that count more (`prior_weight`)."""
+        rough = copy(self)
+        rough.channels, rough.afar = tuple(replace(c, prefilter=UNFILTERED) for c in self.channels), True
+        return rough
 
     def with_open_starts(self, open_starts: Sequence[OpenStart]) -> "Problem":
         """Return the problem whose residuals hold for any start angle that its logs leave open."""

@@ -20,7 +20,7 @@ class Linear:
         self, columns, measured, theta, *, fixed=(), known=None, unit=1.0, weights=(1.0,), **objective
     ):
         self.columns, self.measured, self.simulated = columns, measured, 0
-        self.leaves_start_open = False
+        self.leaves_start_open = self.afar = False
         names = "abcdefgh"[: len(theta)]
         self.parameters = ParameterSet(
             tuple(

@@ -20,7 +20,7 @@ SETTLED = 1e-3
 MAX_NOISES = 8
 """times at most that the noise is estimated: its model may jump to and fro between two orders"""
 
-ROUGH = 1e-3
+ROUGH = 0.1
 """gain below which least squares without the prefilter ends"""
 
 _log = logging.getLogger(__name__)
@@ -56,8 +56,8 @@ def refine(
     again where a Jacobian is taken, until they settle. Between two Jacobians nothing is stored: a resumed
     refinement repeats the steps since the last one.
 
-    Fast errors have more optima than slow ones: where there is a prefilter, least squares goes first to the
-    optimum without it.
+    Fast errors have more optima than slow ones: where there is a prefilter, least squares goes most of the
+    way without it.
 
     Args:
         problem: the problem.
@@ -74,7 +74,9 @@ def refine(
     simulated = 0
     if problem.is_filtered:
         rough = settings.changed({"gain_tolerance": max(settings.gain_tolerance, ROUGH)})
-        first = refine(problem.from_afar(), theta, rough, progress, checkpoints, f"{name} from afar")
+        first = refine(
+            problem.from_afar(filtered=False), theta, rough, progress, checkpoints, f"{name} from afar"
+        )
         theta, simulated = problem.parameters.from_unit(first.point), first.evaluations
     if name in checkpoints:
         now = _Refinement.from_arrays(checkpoints[name])

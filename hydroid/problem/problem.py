@@ -133,10 +133,12 @@ class Problem:
         """Whether any channel has a prefilter."""
         return any(c.prefilter is not UNFILTERED for c in self.channels)
 
-    def from_afar(self) -> "Problem":
-        """Return it without prefilter, and with priors that count more (`prior_weight`)."""
+    def from_afar(self, *, filtered: bool = True) -> "Problem":
+        """Return it with priors that count more (`prior_weight`), with or without its prefilter."""
         rough = copy(self)
-        rough.channels, rough.afar = tuple(replace(c, prefilter=UNFILTERED) for c in self.channels), True
+        rough.afar = True
+        if not filtered:
+            rough.channels = tuple(replace(c, prefilter=UNFILTERED) for c in self.channels)
         return rough
 
     def with_open_starts(self, open_starts: Sequence[OpenStart]) -> "Problem":

@@ -136,9 +136,8 @@ class Problem:
     def from_afar(self, *, filtered: bool = True) -> "Problem":
         """Return it with priors that count more (`prior_weight`), with or without its prefilter."""
         rough = copy(self)
-        rough.afar = True
-        if not filtered:
-            rough.channels = tuple(replace(c, prefilter=UNFILTERED) for c in self.channels)
+        plain = tuple(replace(c, prefilter=UNFILTERED) for c in self.channels)
+        rough.afar, rough.channels = True, self.channels if filtered else plain
         return rough
 
     def with_open_starts(self, open_starts: Sequence[OpenStart]) -> "Problem":
@@ -185,10 +184,9 @@ class Problem:
         return values
 
     def residuals(self, theta: Array) -> Array:
-        """What least squares minimises [rad], shape (n, R): channel after channel; NaN where diverged.
+        """Output errors through the prefilter [rad], shape (n, R): channel after channel; NaN where diverged.
 
-        They are output errors through the prefilter. What open start angles can explain is taken out
-        (`with_open_starts`).
+        What open start angles can explain is taken out (`with_open_starts`).
         """
         if self._spread is None:
             rows = self.output_errors(theta)

@@ -76,10 +76,14 @@ class Channel:
 
     def filtered(self, errors: Array) -> Array:
         """Return residuals, shape (n, T), from weighted output errors."""
+        if self.prefilter is UNFILTERED:
+            return errors
         return np.asarray(lfilter(self.prefilter[0], self.prefilter[1], errors))
 
     def unfiltered(self, residuals: Array) -> Array:
         """Return the weighted output errors that residuals, shape (n, T), come from."""
+        if self.prefilter is UNFILTERED:
+            return residuals
         return np.asarray(lfilter(self.prefilter[1], self.prefilter[0], residuals))
 
     def gain(self, size: int) -> Array:

@@ -16,8 +16,8 @@ from hydroid.simulation import Response
 
 
 def predict(model: IdentifiedModel, log: Log, joints: Sequence[int]) -> Array:
-    """Return the angles [rad] of some joints, numbered from 1, for a log's commands, shape (T, K).
-    Raises RunError: the simulation diverged.
+    """Return the angles [rad] of some joints, numbered from 1, for a log's commands, shape (T, K); NaN if the
+    simulation diverged.
     """
     return _respond(model, log, joints).angle[0]
 
@@ -40,6 +40,8 @@ def predict_log(model: IdentifiedModel, log: Log) -> Log:
         columns = settings.log.columns
         measured = [j for j in range(log.joints) if log.driven[j] and columns("pressure", j + 1)]
     response = _respond(model, log, moving, measured)
+    if not response.feasible[0]:
+        raise RunError("the simulation diverged with these parameters", where=model.source)
     angle[:, [j - 1 for j in moving]] = response.angle[0]
     pressure = None
     if response.pressure is not None:
@@ -55,7 +57,4 @@ def _respond(
     settings, bindings = model.settings, Bindings(model.settings)
     spec, outputs = load_model(settings.arm), [j - 1 for j in joints]
     simulation = make_simulation(spec, log, outputs, settings, pressures)
-    response = simulation.simulate(bindings.candidates(model.theta[None], log.source))
-    if not response.feasible[0]:
-        raise RunError("the simulation diverged with these parameters", where=model.source)
-    return response
+    return simulation.simulate(bindings.candidates(model.theta[None], log.source))

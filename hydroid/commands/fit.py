@@ -56,10 +56,10 @@ class FitResult(Printed):
         return Plant(self.model, **how)
 
     def predict(self, log: "LogSource") -> "Prediction":
-        """Predict a log from its commands and its first angles.
+        """Predict a log from its commands and its first angles; NaN if the simulation diverges.
 
         Raises:
-            LogError: the log cannot be used. RunError: the simulation diverged.
+            LogError: the log cannot be used.
         """
         from hydroid.fitting.validation import predicted
 

@@ -53,7 +53,7 @@ def validate(
 
     Raises:
         LogError: a log cannot be used.
-        RunError: a simulation diverged, or the folder cannot be written.
+        RunError: the folder cannot be written.
     """
     given: list[ModelSource] = as_list(fit)
     models = [open_model(one, None, set) for one in given]

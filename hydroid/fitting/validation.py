@@ -1,5 +1,6 @@
 """How well a model predicts a log: its response with a band, and the article's error indices (table 9)."""
 
+import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -8,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from hydroid.errors import RunError
 from hydroid.estimate import finite
 from hydroid.fitting.fit import Fit
 from hydroid.identified_model import IdentifiedModel
@@ -17,6 +17,8 @@ from hydroid.parameters import Array
 from hydroid.posterior.band import Band, fitted_bands, prediction_bands
 from hydroid.prediction import predict
 from hydroid.problem.problem import Problem
+
+_log = logging.getLogger(__name__)
 
 HORIZONS = (0.5, 1.0, 2.0, 5.0, 10.0)
 """over which a predicted change of an angle is compared [s]"""
@@ -91,20 +93,16 @@ def error_indices(measured: Array, error: Array) -> ErrorIndices:
 
 
 def predicted(model: IdentifiedModel, log: Log, unseen: bool | None) -> Prediction:
-    """Return a model's prediction of a log.
-
-    Raises:
-        RunError: the simulation diverged.
-    """
+    """Return a model's prediction of a log: NaN, with a warning, where the simulation diverges."""
     joints = tuple(model.settings.outputs)
-    response = predict(model, log, joints)
-    bands = prediction_bands(model, log, response)
+    response, bands = predict(model, log, joints), dict[int, Band]()
+    if np.isfinite(response).all():
+        bands = prediction_bands(model, log, response)
+    else:
+        _log.warning("warning: %s predicts no joint in %s: its simulation diverged", model.name, log.source)
 
     def errors(part: Log) -> Array:
-        try:
-            return part.angle[:, [j - 1 for j in joints]] - predict(model, part, joints)
-        except RunError:
-            return np.full((len(part.time), len(joints)), np.inf)
+        return part.angle[:, [j - 1 for j in joints]] - predict(model, part, joints)
 
     ahead = np.empty((0, len(HORIZONS), 0)) if unseen is False else errors_ahead(log, errors)
     return Prediction(model.name, log, joints, response, bands, unseen, ahead)
@@ -128,8 +126,7 @@ def errors_ahead(log: Log, errors: Callable[[Log], Array]) -> Array:
     for first in range(0, len(log.time) - int(steps[0]), before):
         error = errors(log.part(first, first + int(steps[-1]) + 1))
         row, there = np.full((len(steps), *error.shape[1:]), np.nan), steps < len(error)
-        with np.errstate(invalid="ignore"):  # it may have diverged
-            row[there] = error[steps[there]] - error[before]
+        row[there] = np.nan_to_num(error[steps[there]] - error[before], nan=np.inf)  # NaN: it diverged
         rows.append(row)
     return np.array(rows)
 

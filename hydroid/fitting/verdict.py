@@ -112,7 +112,7 @@ def _word(
         return "not tested"
     if unseen <= tolerance and (stated or not as_good):
         return "predicts"
-    if as_good:
+    if as_good and (fitted is None or np.isfinite(unseen)):
         return f"predicts no better than {as_good[0]}"
     if fitted is not None and not unseen <= WORSE * fitted:
         return "fits but does not predict"

@@ -70,6 +70,7 @@ def prediction_sections(predictions: Sequence[Prediction], arm: Arm, fits: Verdi
             row = f"{names[log]} {_KINDS[first.unseen]}".strip()
             plot = Plot(f"response_{len(tabs) + 1}", title, drawing, zoom=True)
             size = f"{1e3 * np.radians(error):.2g} mm" if slides else f"{error:.2g}°"
+            size = size if np.isfinite(error) else "diverged"
             tabs.append(Tab(size, plot, row, arm.joint_names[joint - 1], state))
     rows = [
         row | {"fit": short_name(one.fit), "log": names[one.log.source], "kind": _KINDS[one.unseen]}

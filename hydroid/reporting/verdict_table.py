@@ -31,11 +31,12 @@ def verdict_table(fits: Verdicts) -> Table:
         for one in verdicts:
             errors = {"fitted": one.fitted_deg, "unseen": one.unseen_deg} | one.baselines_deg
             row = {name: _shown(error, one.slides) for name, error in errors.items()}
+            row["unseen"] = row["unseen"] or ("diverged" if _tested(one) else None)
             verdict = f"{_SIGNS.get(one.verdict, '✗')} {one.verdict}"
             rows.append(row | {"fit": short_name(fit), "joint": one.name, "verdict": verdict})
     if len(fits) == 1:
         del columns["fit"]
-    unseen = any(one.unseen_deg is not None for verdicts in fits.values() for one in verdicts)
+    unseen = any(_tested(one) for verdicts in fits.values() for one in verdicts)
     note = _NOTE.format(logs="unseen" if unseen else "fitted")
     return Table.of("Verdict", columns, rows, note, NAMES[:2])
 
@@ -74,10 +75,14 @@ def ordered(fits: Verdicts) -> Verdicts:
     return {name: fits[name] for name in sorted(fits, key=lambda name: sum(map(_size, fits[name])))}
 
 
+def _tested(one: JointVerdict) -> bool:
+    """Return whether unseen logs test the joint: if their error is unknown, it diverged."""
+    return one.unseen_deg is not None or one.verdict not in ("not tested", "does not fit")
+
+
 def _error(one: JointVerdict) -> float:
     """Return the error on the unseen logs, or of a joint that they do not test on the fitted ones [deg]."""
-    untested = one.unseen_deg is None and one.verdict in ("not tested", "does not fit")
-    error = one.fitted_deg if untested else one.unseen_deg
+    error = one.unseen_deg if _tested(one) else one.fitted_deg
     return np.inf if error is None else error  # it diverged
 
 

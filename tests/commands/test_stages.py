@@ -2,6 +2,8 @@
 
 import json
 import logging
+import shutil
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +16,10 @@ import hydroid
 from hydroid.commands.stages import with_mechanics
 from hydroid.estimate import FitSummary, ParameterEstimate, write_estimate
 from hydroid.findings import Finding
+from hydroid.fitting import validation
+from hydroid.identified_model import IdentifiedModel
+from hydroid.log import Log
+from hydroid.prediction import predict
 
 ROOT = Path(__file__).parents[2]
 QUICK = ["--set=search.ga.population=6", "--set=search.ga.generations=2", "--set=refinement.iterations=1"]
@@ -56,6 +62,39 @@ def test_fit_validate_and_simulate_walk_through(short: Path, hydroid_cli: Run, t
     assert done["verdict"][0]["verdict"] == "predicts"
     assert (run / "validations" / "sim.csv" / "result.npz").exists()  # and the fit's own report shows it
     assert sorted(p.name for p in tmp_path.iterdir()) == ["run", "sim.csv", "val", "val2"]
+
+
+def test_a_log_that_diverges_is_named_and_judged_with_the_others(
+    short: Path, array, hydroid_cli: Run, monkeypatch: pytest.MonkeyPatch
+):
+    shutil.copytree(array[0] / "seed-1", "run")
+    for name in ("good.csv", "lost.csv"):
+        shutil.copy(short, name)
+
+    def lost(model: IdentifiedModel, log: Log, joints: Sequence[int]) -> np.ndarray:
+        return predict(model, log, joints) * (np.nan if log.source == "lost.csv" else 1)
+
+    monkeypatch.setattr(validation, "predict", lost)
+    done = hydroid_cli("validate", "good.csv", "lost.csv", "--fit=run", "--out=val", "--json")
+    assert done.err == "hydroid: warning: run predicts no joint in lost.csv: its simulation diverged\n"
+    found = json.loads(done.out)
+    (verdict,) = found["verdict"]
+    assert verdict["unseen_deg"] is None
+    assert verdict["verdict"] in ("does not fit", "fits but does not predict")
+    assert verdict["horizons_deg"]["the fit"][0] is None
+    errors = {row["log"]: row["rms_deg"] for row in found["results"]}
+    assert errors["good.csv"] > 0
+    assert errors["lost.csv"] is None
+    for page in ("val/validation.html", "run/report.html"):
+        text = Path(page).read_text("utf-8")
+        assert f"✗ {verdict['verdict']}" in text
+        assert "diverged" in text
+
+
+def test_values_that_diverge_are_judged(short: Path, hydroid_cli: Run):
+    Path("values.yaml").write_text(yaml.safe_dump(VALUES | {"K": 1e9}))
+    printed = hydroid_cli("validate", short, "--fit", "values.yaml", "--set=simulation.other_joints=passive")
+    assert "✗ predicts no better than standing still          diverged" in printed.out
 
 
 def test_python_does_what_the_terminal_does_and_shows_it(short: Path, hydroid_cli: Run):

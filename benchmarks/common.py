@@ -31,9 +31,8 @@ def options(text: str | None, **defaults: Any) -> Any:
     parser = argparse.ArgumentParser(description=text, formatter_class=argparse.RawDescriptionHelpFormatter)
     for name, default in defaults.items():
         first, nargs = (default[0], "*") if isinstance(default, list) else (default, None)
-        how: dict[str, Any] = {"type": type(first), "default": default, "nargs": nargs}
-        if nargs and isinstance(first, str):
-            how["choices"] = default
+        names = default if nargs and isinstance(first, str) else None
+        how: dict[str, Any] = {"type": type(first), "default": default, "nargs": nargs, "choices": names}
         how = {"action": "store_true"} if default is False else how
         parser.add_argument(f"--{name.replace('_', '-')}", **how)
     return parser.parse_args()
@@ -47,7 +46,6 @@ def table(header: str, line: str = "", *columns: Iterable[Any]) -> None:
 
 
 def row(*cells: Any) -> None:
-    """Print one row of a table."""
     print(f"| {' | '.join(map(str, cells))} |", flush=True)
 
 
@@ -70,9 +68,7 @@ def pseudo_random_log(
     seed: int = 0,
     allowed: Callable[[Log], bool] = lambda log: True,
 ) -> Log:
-    """Make a log of commands without motion: `joints` (1-based) driven, every joint at `pose` [rad].
-
-    Levels and dwells are random, as in the article's figure 17.
+    """Make a log of random levels and dwells of joints (from 1), as in figure 17, every joint at rest.
 
     A level after which `allowed` is false of the log so far is turned round or reduced, as by an operator who
     keeps the arm off its stops.
@@ -80,7 +76,6 @@ def pseudo_random_log(
     rng = np.random.default_rng(seed)
     samples = round(duration / period)
     command = np.zeros((samples, len(pose)))
-
     for joint in joints:
         start = 0
         while start < samples:
@@ -102,10 +97,7 @@ def true_log(
     seed: int = 3,
     pose: np.ndarray | None = None,
 ) -> Log:
-    """Return the response to pseudo-random commands of some joints that keeps off the stops.
-
-    It starts in a pose [rad], shape (J,), by default the one named study.
-    """
+    """Return the response to pseudo-random commands, kept off the stops; by default from the study pose."""
     low, high = settings.arm.lower + 0.05, settings.arm.upper - 0.05
 
     def off_the_stops(log: Log) -> bool:

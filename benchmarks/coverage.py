@@ -3,18 +3,13 @@
     python benchmarks/coverage.py [--parts intervals start quantities own_arm bands left_out] [--fits 20]
                                   [--seconds 20] [--correlation-times 0 0.15 1 4]
 
-intervals: shoulder and elbow are driven and measured, the other joints locked; K, D, S (shared by both), M2
-and M6 are free, the other masses held as if weighed: from these angles all five are determined. The noise
-of 0.1 deg is white, or a first-order autoregression of a correlation time; each fit estimates it from its
-residual.
+intervals: shoulder and elbow are driven and measured, the others locked; K, D, S, M2 and M6 are free. The
+noise of 0.1 deg is white, or a first-order autoregression, which each fit estimates from its residual.
 start: the same, with noise on the first sample too, and the start left open.
-quantities: stage 2 of the shoulder with the article's ten parameters free, of which three directions are
-exactly unidentifiable. Do the intervals of the quantities hold their values at the true parameters?
-own_arm: the machine of examples/urdf, in the settings that `hydroid init` makes: three joints, 27
-parameters that trade, oil that cavitates, two new logs a fit. Its delays are 0, where the bound is: they
-have no interval.
-bands: stage 1 of the shoulder, fitted to steps, predicts another log, simulated at the same values or with
-a stiffer spring. How many of its samples are inside the band, and is the model blamed?
+quantities: stage 2 of the shoulder, the article's ten parameters free. Three directions are unidentifiable.
+own_arm: the machine of examples/urdf, in the settings that `hydroid init` makes, two new logs a fit. Its
+delays are 0, where the bound is: they have no interval.
+bands: stage 1 of the shoulder, fitted to steps, predicts another log, of the same values or a stiffer spring.
 left_out: five logs of the virtual rig, each predicted by a fit to the others. Expected and actual error.
 
 Refinements start at the truth times random factors within 5 %: this is a study of the intervals, not of the
@@ -30,7 +25,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from common import EXAMPLES, Clock, near, options, refined, row, table, true_log
+from common import ARTICLE_TRUTH, EXAMPLES, Clock, near, options, refined, row, table, true_log
 from made_logs import at_rest, noisy, simulate_log, step_log
 
 import hydroid
@@ -38,7 +33,7 @@ from hydroid import load_settings
 from hydroid.fitting.summary import account
 from hydroid.identified_model import IdentifiedModel, identified
 from hydroid.log import Log
-from hydroid.posterior.band import prediction_bands
+from hydroid.posterior.band import Band, prediction_bands
 from hydroid.posterior.bench import make_bench
 from hydroid.posterior.quantities import joint_measure
 from hydroid.posterior.uncertainty import Uncertainty, uncertainty
@@ -48,14 +43,13 @@ from hydroid.settings.fit import FitSettings
 
 Said = tuple[np.ndarray, np.ndarray, np.ndarray]
 """values, standard deviations, and intervals, shape (m, 2)"""
-MECH = {"K": 1.0, "D": 60.0, "S": 100.0, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
+MECH = ARTICLE_TRUTH | {"K": 1.0, "D": 60.0, "S": 100.0}
 """masses as in the article; K, D, S are ours: with the article's the arm is too slow to feel its masses"""
 HYD = {"A_A": 1000.0, "A_B": 750.0, "I_max": 0.9, "I_min": 0.3, "A": 1.4, "C": 1.2}
 HYD |= {"F1": 8.0, "F2": 0.7, "x1": 0.8, "x2": 12.0}
 
 
 def mech(outputs: list[int], *free: str, **changes: object) -> FitSettings:
-    """Settings of stage 1 with few parameters free, and wide bounds."""
     how: dict[str, object] = {"outputs": outputs, "simulation.other_joints": "locked"} | changes
     how |= {f"parameters.{name}.bounds": [0.2 * MECH[name], 5 * MECH[name]] for name in ("K", "D", "S")}
     how |= {f"parameters.{name}.fixed": value for name, value in MECH.items() if name not in free}
@@ -83,15 +77,11 @@ def report(title: str, names: Sequence[str] | np.ndarray, truth: np.ndarray, sai
     hits = np.where(known, (low <= truth) & (truth <= high), np.nan)
     error, sd = np.sqrt(np.mean((values - truth) ** 2, axis=0)), np.where(known, sds, np.nan)
     shown = np.any(known, axis=0)
-    columns = [truth, 100 * np.mean(known, axis=0)]
-    columns += [100 * np.nanmean(hits[:, shown], axis=0), np.nanmean(sd[:, shown], axis=0) / error[shown]]
-    table(
-        "of | true | determined | covered | predicted / spread",
-        "{} | {:.4g} | {:.0f} % | {:.1f} % | {:.2f}",
-        np.array(names)[shown],
-        *(column[shown] for column in columns[:2]),
-        *columns[2:],
-    )
+    hits, sd, error = hits[:, shown], sd[:, shown], error[shown]
+    columns = [np.array(names)[shown], truth[shown], 100 * np.mean(known, axis=0)[shown]]
+    columns += [100 * np.nanmean(hits, axis=0), np.nanmean(sd, axis=0) / error]
+    header = "of | true | determined | covered | predicted / spread"
+    table(header, "{} | {:.4g} | {:.0f} % | {:.1f} % | {:.2f}", *columns)
     row("all", "", "", f"{100 * np.nanmean(hits):.1f} %", "")
 
 
@@ -102,7 +92,6 @@ def parameters(known: Iterator[tuple[Problem, Uncertainty]], chosen: np.ndarray)
 
 
 def intervals(given: Any, *, start: bool = False) -> None:
-    """Do intervals hold where the noise is white, and where it is slow?"""
     how = {"free_start": start, "refinement.gain_tolerance": 1e-6}
     settings = mech([2, 3], "K", "D", "S", "M2", "M6", **how)
     clean, free = true_log(settings, MECH, [2, 3], given.seconds), settings.parameter_set().free
@@ -119,7 +108,6 @@ def intervals(given: Any, *, start: bool = False) -> None:
 
 
 def quantities(given: Any) -> None:
-    """Do intervals of quantities hold where no parameter is known?"""
     changes = {f"parameters.{name}.fixed": None for name in ("F1", "x1", "x2")}
     # the overlaps make a dead band; the article's model has none
     changes |= {"hydraulics.overlap_a": 0.4, "hydraulics.overlap_b": 0.3, "refinement.gain_tolerance": 1e-6}
@@ -145,7 +133,6 @@ def quantities(given: Any) -> None:
 
 
 def own_arm(given: Any) -> None:
-    """Do the intervals of a first fit of one's own arm hold?"""
     folder = EXAMPLES / "urdf"
     sys.path.insert(0, str(folder))
     example: Any = importlib.import_module("make_example")
@@ -175,8 +162,13 @@ def own_arm(given: Any) -> None:
         report("own arm", names, true[true > 0], parameters(known, true > 0))
 
 
+def predicted(problem: Problem, theta: np.ndarray, log: Log) -> Band:
+    """Return the shoulder's band in another log."""
+    model = IdentifiedModel(problem.settings, theta, "fit", account(problem, uncertainty(problem, theta)))
+    return prediction_bands(model, log, predict(model, log, problem.settings.outputs))[2]
+
+
 def bands(given: Any) -> None:
-    """Are samples of an unseen log inside the prediction band, and is the model blamed where it is wrong?"""
     settings = mech([2], "K", "D", "S", free_start=True)
 
     def steps(values: dict[str, float], rng: np.random.Generator) -> Log:
@@ -190,19 +182,21 @@ def bands(given: Any) -> None:
             rng = np.random.default_rng(seed)
             problem = Problem(settings, [steps(MECH, rng)])
             theta, _ = refined(problem, problem.parameters.vector(MECH, "truth"))
-            model = IdentifiedModel(settings, theta, "fit", account(problem, uncertainty(problem, theta)))
-            log = steps(wrong, rng)
-            found.append(prediction_bands(model, log, predict(model, log, settings.outputs))[2])
+            found.append(predicted(problem, theta, steps(wrong, rng)))
         low, middle, high = np.quantile([100 * band.inside for band in found], [0.0, 0.5, 1.0])
         blamed = sum(band.model_limits for band in found)
         row(f"S {percent} % wrong", f"{middle:.0f} % ({low:.0f} to {high:.0f})", f"{blamed} of {given.fits}")
 
 
 def left_out(given: Any) -> None:
-    """Does a fit know how well it predicts a log that it has not seen?"""
     # logs, and the samples at which they rest where a piece begins
-    pieces = [("shoulder_1", 0), ("shoulder_1", 2200), ("shoulder_2", 0), ("shoulder_2", 3300)]
-    pieces.append(("all_joints_1", 0))
+    pieces = (
+        ("shoulder_1", 0),
+        ("shoulder_1", 2200),
+        ("shoulder_2", 0),
+        ("shoulder_2", 3300),
+        ("all_joints_1", 0),
+    )
     masses = load_settings("fit-hyd").arm.masses
     changes: dict[str, object] = {"simulation.other_joints": "measured", "search.nsga2.generations": 3}
     changes |= {f"log.joints.{joint}.command": None for joint in (1, 3, 4, 5, 6, 7)}
@@ -218,9 +212,7 @@ def left_out(given: Any) -> None:
         table("left out | expected [deg] | actual [deg] | actual / expected | inside the band")
         for i, log in enumerate(logs):
             problem = Problem(model.settings, [*logs[:i], *logs[i + 1 :]])
-            theta, _ = refined(problem, model.theta)
-            fold = IdentifiedModel(settings, theta, "fold", account(problem, uncertainty(problem, theta)))
-            band = prediction_bands(fold, log, predict(fold, log, settings.outputs))[2]
+            band = predicted(problem, refined(problem, model.theta)[0], log)
             errors = f"{np.degrees(band.expected):.3f} | {np.degrees(band.error):.3f}"
             ratio = f"{band.error / band.expected:.1f}"
             row(Path(log.source).stem, errors, ratio, f"{100 * band.inside:.0f} %")

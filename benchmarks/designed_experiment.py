@@ -7,14 +7,11 @@
 
 Stage 1, joints 1 to 6 driven and measured with 0.1 deg of white noise, nine parameters (K, D, S shared by
 the joints, six masses), the total of the masses known to 42.5 ± 0.5 kg. The truth is the article's; designer
-and random experiments know only an estimate that is off by up to a quarter in every parameter. A random
-experiment is one draw: a start pose uniform within the joints' ranges (a quarter: a named one), all six
-joints with random levels in ±100 % and dwells of 1 to 5 s, levels turned round or reduced where the joint's
-range or speed would be left: the first of those that the designer begins with.
+and random experiments know only an estimate that is off by up to a quarter in every parameter. The random
+ones are the first that drive all six joints of those that the designer begins with.
 
-Precision is that of the truth, without any prior but the total mass. Predicted: Cramer-Rao bound. Simulated:
-standard deviation over refits of noisy logs of the designed experiment, and of the random one whose weakest
-parameter is predicted the median. One seed throughout; no experiment is chosen by what follows.
+Precision is that at the truth, with the total mass as the only prior. Predicted: Cramer-Rao bound. Refitted:
+spread over noisy logs of the designed experiment, and of the random one with the median weakest parameter.
 """
 
 from typing import Any
@@ -70,7 +67,6 @@ def weakest(sds: Any) -> np.ndarray:
 
 
 def study(given: Any) -> None:
-    """Design, draw, refit, and print the table."""
     settings, clock = make_settings(given), Clock()
     estimate = TRUTH * np.exp(np.random.default_rng(SEED).uniform(np.log(0.8), np.log(1.25), len(TRUTH)))
     best = design(settings, estimate, [], given.seed, lambda what, done, of: None)
@@ -95,15 +91,14 @@ def study(given: Any) -> None:
     pair = randoms[middle], designed
     at_random, as_designed = (weakest(refitted(settings, response(e), given.fits)) for e in pair)
     typical, best_sd = np.median(drawn, axis=0), weakest(predicted(designed))
-    columns = (typical, drawn[middle], at_random, best_sd, as_designed)
+    columns = (100 * sd for sd in (typical, drawn[middle], at_random, best_sd, as_designed))
     print(f"standard deviations [%], {given.duration:g} s, {NOISE_DEG} deg of noise")
     print(f"weakest parameter of the best random one: {100 * drawn[:, -1].min():.3g}")
     table(
         "parameter | random, median of predicted | median random one, predicted | refitted "
         "| designed, predicted | refitted | ratio predicted | ratio refitted",
         "{} | {:.3g} | {:.3g} | {:.3g} | {:.3g} | {:.3g} | {:.1f} | {:.1f}",
-        *([*ARTICLE_TRUTH, "weakest"], *(100 * sd for sd in columns)),
-        *(typical / best_sd, at_random / as_designed),
+        *([*ARTICLE_TRUTH, "weakest"], *columns, typical / best_sd, at_random / as_designed),
     )
 
 

@@ -21,7 +21,6 @@ JOINTS = {2: "boom", 3: "arm", 4: "bucket", 1: "swing"}
 
 
 def starts(seed: int) -> dict[str, object]:
-    """Return settings that move the start values; none for seed 1."""
     rng, moved = np.random.default_rng(seed), dict[str, object]()
     for p in hydroid.load_settings(FOLDER / "fit.yaml").parameter_set().parameters:
         if seed > 1 and p.fixed is None and p.start is not None and p.prior is not None:

@@ -23,8 +23,7 @@ def accuracy(sets: int) -> None:
     pairs = [reference(candidates[i : i + 1], command, 1e-8) for i in range(sets)]  # pyright: ignore[reportArgumentType]
     exact, pressure = zip(*pairs, strict=True)
     angle, bar, errors = np.degrees(exact), 1e-5 * np.array(pressure), []
-    low, high = angle.min(), angle.max()
-    print(f"{sets} sets, 30 s, joint from {low:.0f} to {high:.0f} deg; Radau took {clock}")
+    print(f"{sets} sets, 30 s, joint from {angle.min():.0f} to {angle.max():.0f} deg; Radau took {clock}")
     for steps, substeps in STEPS:
         seen: list = []
         out = simulate(candidates, command, HydraulicSettings(substeps=substeps), steps, seen)

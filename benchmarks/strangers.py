@@ -3,13 +3,10 @@
     python benchmarks/strangers.py [--machines 40] [--first 0] [--seed 1]
     python benchmarks/strangers.py --worlds --machines 12    # the arms of tests/helpers/worlds.py
 
-Every machine is random: three to six joints, 0.2 to 20 t, rotary actuators and cylinders, dead bands to 60 %,
-exponents of 0.7 to 3, delays to 0.4 s, lags, asymmetries, friction; half of them share a pump that droops, a
-third of those draws differently in each direction; half have oil and inertia that the logs show. Their
-equations and their integrator are those of this file: nothing of hydroid simulates them. Each is recorded
-three times as with sticks, with 0.02 to 0.2 deg of noise at 10 to 100 Hz with jitter; two logs are fitted,
-and the third is predicted. Good is an rms error on every joint of at most twice the noise plus 2 % of its
-travel. A joint that is not good must be named by the verdict.
+Every machine is random (`Machine`). Its equations and integrator are those of this file: nothing of hydroid
+simulates it. It is recorded three times as with sticks, with jitter; two logs are fitted, and the third is
+predicted. Good is an rms error on every joint of at most twice the noise plus 2 % of its travel. A joint that
+is not good must be named by the verdict.
 """
 
 import shutil
@@ -64,8 +61,7 @@ class Machine:
         self.draw = np.tile(rng.uniform(0.2, 0.6, (joints, 1)), (1, 2))
         if rng.random() < 1 / 3:
             self.draw *= rng.uniform(0.3, 1.0, (joints, 2))
-        own = np.zeros(joints)
-        gravity_torque(self.ends.mean(axis=1), self.vertical, self.length, self.mass, own)
+        own = gravity_torque(self.ends.mean(axis=1), self.vertical, self.length, self.mass)
         reach = np.maximum(np.abs(own), 0.3 * GRAVITY * self.mass * self.length)
         self.delay = np.full(joints, rng.uniform(0, 0.4)) * rng.uniform(0.8, 1.0, joints)
         self.lag = rng.uniform(0.02, 0.25, joints)
@@ -87,15 +83,14 @@ class Machine:
         single = (self.length, self.mass, self.lag, self.early, self.load, self.friction, self.lever)
         numbers = np.array([*single, self.stiff, self.ratio, *sided], float)
         late = np.round(self.delay / STEP).astype(np.int64)
-        command = np.ascontiguousarray(command)
-        return integrate(command, start, late, self.vertical, numbers, self.droop)
+        return integrate(np.ascontiguousarray(command), start, late, self.vertical, numbers, self.droop)
 
 
 @njit(cache=True)
-def gravity_torque(angle: Array, vertical: Any, length: Array, mass: Array, torque: Array) -> None:
-    """Write the torque that holds each joint [N·m], (J,): a planar chain, each link's mass in its middle."""
+def gravity_torque(angle: Array, vertical: Any, length: Array, mass: Array) -> Array:
+    """Torque that holds each joint [N·m], (J,): a planar chain, each link's mass in its middle."""
     pitch, carried, moment = 0.0, 0.0, 0.0
-    along = np.zeros(len(angle))
+    along, torque = np.zeros(len(angle)), np.zeros(len(angle))
     for j in range(len(angle)):
         pitch += 0.0 if vertical[j] else angle[j]
         along[j] = 0.0 if vertical[j] else length[j] * np.cos(pitch)
@@ -103,6 +98,7 @@ def gravity_torque(angle: Array, vertical: Any, length: Array, mass: Array, torq
         moment += along[j] * (0.5 * mass[j] + carried)
         carried += mass[j]
         torque[j] = 0.0 if vertical[j] else GRAVITY * moment
+    return torque
 
 
 @njit(cache=True)
@@ -128,10 +124,10 @@ def integrate(command: Array, start: Array, late: Any, vertical: Any, numbers: A
     full, dead, exponent, draw = numbers[11:13], numbers[13:15], numbers[15:17], numbers[17:19]
     angle, found = start.copy(), np.empty((steps, joints))
     held, speed, force = np.zeros(joints), np.zeros(joints), np.zeros(joints)
-    part, turn, lift, torque = np.zeros(joints), np.zeros(joints), np.zeros(joints), np.zeros(joints)
+    part, turn, lift = np.zeros(joints), np.zeros(joints), np.zeros(joints)
     for k in range(steps):
         found[k] = angle
-        gravity_torque(angle, vertical, length, mass, torque)
+        torque = gravity_torque(angle, vertical, length, mass)
         for j in range(joints):
             u = command[k - late[j], j] if k >= late[j] else 0.0
             target = u if early[j] else opening(u, dead[:, j], exponent[:, j])
@@ -147,10 +143,7 @@ def integrate(command: Array, start: Array, late: Any, vertical: Any, numbers: A
                 rate, taken = speeds(supply, part, lift, friction, turn), 0.0
                 for j in range(joints):
                     taken += rate[j] / turn[j] * draw[0 if part[j] >= 0 else 1, j]
-                if 1.0 - droop * taken > supply:
-                    low = supply
-                else:
-                    high = supply
+                low, high = (supply, high) if 1.0 - droop * taken > supply else (low, supply)
         rate = speeds(supply, part, lift, friction, turn)
         for j in range(joints):
             wanted = np.sign(part[j]) * full[0 if part[j] >= 0 else 1, j] * rate[j]
@@ -176,7 +169,7 @@ def stick(rng: Generator, m: Machine, seconds: float) -> tuple[Array, Array]:
         for _ in range(12):
             trial = command.copy()
             for j in range(m.joints):
-                k = first + (round(1.0 / STEP) if first == 0 else 0)
+                k = first or round(1.0 / STEP)
                 while k < last:
                     hold = round(rng.uniform(0.5, 3.0) / STEP)
                     level = rng.choice([-1, 1]) * rng.uniform(0.3, 1.0) * 100 if rng.random() < 0.6 else 0.0
@@ -185,13 +178,12 @@ def stick(rng: Generator, m: Machine, seconds: float) -> tuple[Array, Array]:
                     part = np.minimum(np.arange(1, end - k + 1) / max(ramp, 1), 1.0)
                     trial[k:end, j] = trial[k - 1, j] + (level - trial[k - 1, j]) * part
                     k = end
-            moved = m.simulate(trial[:last], start)
-            bad = np.any((moved < lower + margin) | (moved > upper - margin), axis=0)
+            for again in (True, False):
+                moved = m.simulate(trial[:last], start)
+                bad = np.any((moved < lower + margin) | (moved > upper - margin), axis=0)
+                if again and bad.any():
+                    trial[first:last, bad] *= rng.uniform(-1.0, 0.6)
             if not bad.any():
-                break
-            trial[first:last, bad] *= rng.uniform(-1.0, 0.6)
-            moved = m.simulate(trial[:last], start)
-            if not np.any((moved < lower + margin) | (moved > upper - margin)):
                 break
         command, angle[:last] = trial, moved
     return command, angle
@@ -223,8 +215,8 @@ def urdf(m: Machine, turned: int | None = None) -> str:
         middle, shape = f"{reach / 2} 0 0", f'<box size="{long} {wide} {wide}"/>'
         text += body(f"{name}_link", (long, wide, wide), m.mass[j], shape, centre=middle, seen=middle)
         axis = "0 0 1" if vertical else "0 1 0" if j == turned else "0 -1 0"
-        place = {"at": f"{x} 0 0", "axis": axis, "limit": LIMIT.format(*m.ends[j])}
-        text += joint(name, parent, f"{name}_link", **place)
+        limit = LIMIT.format(*m.ends[j])
+        text += joint(name, parent, f"{name}_link", at=f"{x} 0 0", axis=axis, limit=limit)
         parent, x = f"{name}_link", reach
     return f"{text}</robot>\n"
 

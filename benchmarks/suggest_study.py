@@ -2,12 +2,10 @@
 
     python benchmarks/suggest_study.py [--logs 20] [--seconds 15] [--only delay none]
 
-Stage 2 of the shoulder: areas and openings of both sides, the damping and the third link's mass are free,
-with the priors of configs/fit-hyd.yaml, and all else is held at the truth. Each log is simulated with one
-term present (or none), with commands and a start pose of its own, a second of rest, and 0.1 deg of white
-noise. The model without the term is fitted to it, from within 5 % of the truth: this is a study of the
-test, not of the search. The sizes of the terms are ours. A term is named where freeing it, on one side or
-both, lowers the error on the halves left out. It is first where nothing ranks before it.
+Stage 2 of the shoulder: the parameters in `TRUTH` are free, as in configs/fit-hyd.yaml, and all else is held
+at the truth. Each log has one term (or none), its own commands and start pose, a second of rest, and 0.1 deg
+of white noise. The model without the term is fitted to it, from within 5 % of the truth. A term is named
+where freeing it, on one side or both, lowers the error on the halves left out.
 """
 
 from dataclasses import replace
@@ -24,17 +22,8 @@ from hydroid.posterior.uncertainty import uncertainty
 from hydroid.problem.bindings import Bindings
 from hydroid.problem.problem import Problem, make_simulation
 from hydroid.settings.fit import FitSettings
-from hydroid.settings.problem import ParameterSettings as Free
 
 TRUTH = {"A_A": 1000.0, "A_B": 750.0, "open_A": 0.4, "open_B": 0.4, "D": 150.0, "M3": 22.5}
-PARAMETERS = {
-    "A_A": Free(quantity="area_a", joints=(2,), within=1.5, nominal=1000.0),
-    "A_B": Free(quantity="area_b", joints=(2,), within=1.5, nominal=750.0),
-    "open_A": Free(quantity="opening_a", joints=(2,), within=2.0, nominal=0.4),
-    "open_B": Free(quantity="opening_b", joints=(2,), within=2.0, nominal=0.4),
-    "D": Free(quantity="damping", joints=(2,), bounds=(1.0, 5000.0), start=100.0),
-    "M3": Free(quantity="mass", link="link3", within=2.0),
-}
 TERMS = {"delay": 0.03, "overlap": 0.05, "opening_exponent": 1.1, "dry_friction": 1500.0, "flow_limit": 0.8,
          "leakage": 0.02, "none": 0.0}  # fmt: skip
 """what is present in the truth, in its unit; the flow limit is a part of the flow that the log without it
@@ -43,13 +32,12 @@ exceeds for 1 % of the time"""
 
 def make_settings(term: str = "none", value: float = 0.0) -> FitSettings:
     """The model without any term, or the truth with one."""
-    changes: dict[str, object] = {"joint_refinement": False, "refinement.gain_tolerance": 1e-6}
-    changes |= {} if term == "none" else {f"hydraulics.{term}": value}
-    return load_settings("fit-hyd", changes).model_copy(update={"parameters": PARAMETERS})
+    changes: dict[str, object] = {"refinement.gain_tolerance": 1e-6, "parameters.D.joints": [2]}
+    settings = load_settings("fit-hyd", changes | ({} if term == "none" else {f"hydraulics.{term}": value}))
+    return settings.changed({"parameters": {name: settings.parameters[name] for name in TRUTH}})
 
 
 def make_log(term: str, seconds: float, seed: int) -> Log:
-    """A log of its own: start pose, commands and noise."""
     rng, rest = np.random.default_rng([seed, 17]), 100
     truth = make_settings() if term == "flow_limit" else make_settings(term, TERMS[term])
     pose = truth.arm.pose("study").copy()

@@ -37,7 +37,6 @@ def make_problem(config: str, joints: list[int], other_joints: str) -> Problem:
 
 
 def population(problem: Problem) -> np.ndarray:
-    """Random candidates, shape (n, P)."""
     unit = np.random.default_rng(0).random((CANDIDATES, int(problem.parameters.free.sum())))
     return problem.parameters.from_unit(unit)
 
@@ -56,12 +55,11 @@ def bare_rollout(problem: Problem) -> Callable[[], object]:
     batch.expand("dof_damping")[:] = candidates.joints.damping[:, moving]
     batch.expand("jnt_stiffness")[:] = candidates.joints.stiffness[:, moving]
     batch.set_const()
-    steps = len(log.time) - 1
     batch.reset()
     batch.bind("qpos")[:] = log.angle[0, moving]
     batch.forward()
     gained = candidates.joints.gain[:, None, moving] * log.command[:-1, moving]
-    torque = batch.bind("qfrc_bias")[:, None] + gained
+    torque, steps = batch.bind("qfrc_bias")[:, None] + gained, len(log.time) - 1
     out = {"qpos": np.empty((CANDIDATES, steps, len(moving)))}
 
     def roll() -> None:
@@ -98,12 +96,9 @@ def plant_steps(joints: list[int], steps: int = 2000) -> tuple[float, float]:
 
 if __name__ == "__main__":
     problems = {name: make_problem("article-mech", [2], name) for name in ("passive", "locked")}
-    problems |= {
-        f"hydraulics of {len(some)}": make_problem("article-hyd", some, "passive") for some in ([2], ALL)
-    }
-    calls = {name: partial(p.evaluate, population(p)) for name, p in problems.items()}
-    bare = {f"{name}, bare": bare_rollout(problems[name]) for name in ("passive", "locked")}
-    took = in_turn(calls | bare)
+    calls = {f"{name}, bare": bare_rollout(problem) for name, problem in problems.items()}
+    problems |= {f"hydraulics of {len(j)}": make_problem("article-hyd", j, "passive") for j in ([2], ALL)}
+    took = in_turn({name: partial(p.evaluate, population(p)) for name, p in problems.items()} | calls)
     table("joints besides the shoulder | evaluation [s] | Batch.rollout alone [s] | ratio | evaluations/s")
     for name in ("passive", "locked"):
         middle, alone = np.median(took[name]), took[f"{name}, bare"]

@@ -6,6 +6,7 @@ smallest of m p-values has the level 0.05 / m, the next 0.05 / (m - 1), and so o
 not reject; all others have its level.
 """
 
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -25,8 +26,6 @@ POWER, MOST = 0.8, 200
 
 
 class Outcome(StrEnum):
-    """What the runs say of a claim."""
-
     HOLDS = "holds"
     OPPOSITE = "opposite"
     EXCLUDED = "excluded"
@@ -53,10 +52,10 @@ class Verdict:
 def verdicts(claims: Sequence[Claim], runs: Runs, tables: Sequence[Table]) -> list[Verdict]:
     """Return the verdict on every claim of a study, in their order."""
     made: dict[str, Verdict] = {}
-    families = {(claim.item, claim.equal, claim.ours) for claim in claims}
-    for family in families:
-        mine = [claim for claim in claims if (claim.item, claim.equal, claim.ours) == family]
-        together = [(claim, log_ratios(claim, runs)) for claim in mine]
+    families: dict[object, list[tuple[Claim, Array]]] = defaultdict(list)
+    for claim in claims:
+        families[claim.item, claim.equal, claim.ours].append((claim, log_ratios(claim, runs)))
+    for together in families.values():
         together.sort(key=lambda each: chance(each[1] - np.log(each[0].below)))
         level, stopped = 0.05, False
         for rank, (claim, logs) in enumerate(together):
@@ -82,7 +81,6 @@ def verdict(claim: Claim, logs: Array, level: float, printed: float | None) -> V
 
 
 def judge(claim: Claim, low: float, high: float, expected: float | None) -> Outcome:
-    """Return the outcome of an interval of the ratio."""
     bottom, top = (1 / NEAR, NEAR) if claim.equal else (0.0, claim.below)
     if bottom <= low and high < top:
         return Outcome.HOLDS

@@ -17,7 +17,6 @@ COLORS = [f"C{i}" for i in range(10)]
 
 
 def draw(plan: Plan, runs: Runs, figure: Figure, file: Path) -> None:
-    """Draw one figure of a study as SVG, on the first seed's record."""
     kinds = {"convergence": _convergence, "sensitivity": _sensitivity, "surface": _surface}
     with mpl.rc_context({"font.size": 9, "svg.hashsalt": "hydroid", "axes.spines.top": False}):
         size = (7.0, 4.8 if figure.kind in ("surface", "sensitivity") else 3.6)
@@ -35,7 +34,6 @@ def _lines(axes: Any, problem: Problem, curves: Array, window: slice = slice(Non
 
 
 def _data(axes: Any, problem: Problem, window: slice = slice(None)) -> None:
-    """Draw the data."""
     angle = np.degrees(problem.logs[0].angle[:, problem.outputs])
     _lines(axes, problem, angle.T, window, color="black", linestyle="--", label="data")
 
@@ -64,10 +62,8 @@ def _responses(drawing: Drawing, plan: Plan, runs: Runs, figure: Figure) -> None
     """The angle, and responses of a run of each cell: the one of median error among those of one record."""
     axes, with_bests = drawing.subplots(), figure.kind == "segment bests"
     axes.set(xlabel="time [s]", ylabel="angle [deg]")
-    shown = [
-        r for r in runs if r["cell"] in figure.cells and ("segment bests" if with_bests else "rms error") in r
-    ]
-    if not shown:
+    column = "segment bests" if with_bests else "rms error"
+    if not (shown := [run for run in runs if run["cell"] in figure.cells and column in run]):
         return
     seed = min(run["seed"] for run in shown)
     for number, cell in enumerate(figure.cells):
@@ -87,9 +83,7 @@ def _responses(drawing: Drawing, plan: Plan, runs: Runs, figure: Figure) -> None
 def _sensitivity(drawing: Drawing, plan: Plan, runs: Runs, figure: Figure) -> None:
     """The output for 20 values of each of some parameters over their bounds, dark to light."""
     problem, truth = plan.problem(1), plan.directions(1).truth
-    window = (
-        slice(*np.searchsorted(problem.logs[0].time, figure.window_s)) if figure.window_s else slice(None)
-    )
+    window = slice(*np.searchsorted(problem.logs[0].time, figure.window_s or (-np.inf, np.inf)))
     panels = drawing.subplots(-(-len(figure.parameters) // 2), 2, sharex=True, squeeze=False)
     for axes, name in zip(panels.ravel(), figure.parameters, strict=False):
         column = problem.parameters.names.index(name)
@@ -112,8 +106,7 @@ def _surface(drawing: Drawing, plan: Plan, runs: Runs, figure: Figure) -> None:
     points = np.tile(problem.parameters.vector(plan.truth(1), "truth"), (count**2, 1))
     points[:, at] = np.stack([first, second], axis=-1).reshape(-1, 2)
     error = np.degrees(problem.evaluate(points).overall.reshape(count, count))
-    axes = drawing.add_subplot(projection="3d")
-    shown = np.where(np.isfinite(error), error, np.nan)
+    axes, shown = drawing.add_subplot(projection="3d"), np.where(np.isfinite(error), error, np.nan)
     minima = int((shown == minimum_filter(error, 3, mode="nearest")).sum())
     axes.set_title(f"{minima} minima on {count} x {count} points", fontsize=9)
     axes.plot_surface(first, second, shown, cmap="viridis_r", rstride=1, cstride=1)

@@ -39,7 +39,6 @@ class Directions:
         self.axes = determined(self.slopes)
 
     def measures(self, values: Mapping[str, float]) -> dict[str, float]:
-        """Return the errors of an estimate."""
         estimate, free = self.parameters.vector(values, "a run"), self.parameters.free
         change = ((estimate - self.truth) / self.truth)[free]
         names = np.array(self.parameters.names)[free]
@@ -47,9 +46,8 @@ class Directions:
         result = {f"error {n}": abs(float(c)) for n, c in zip(names, change, strict=True)}  # tables 1 and 6
         result["parameter error"] = float(np.abs(change).sum())
         result["identifiable error"] = float(np.abs(self.axes.T @ (self.axes @ change)).sum())
-        if free[masses].any():
-            result["mass error"] = abs(float(np.sum((estimate - self.truth)[masses])))
-        return result
+        total = {"mass error": abs(float(np.sum((estimate - self.truth)[masses])))}
+        return result | (total if free[masses].any() else {})
 
     def sensitivities(self, segments: NDArray[np.int64]) -> dict[str, float]:
         """Return how strongly the output depends on each parameter, in all and by segment, (S, 2)."""

@@ -8,108 +8,73 @@ docs/reproduction/ has one CSV of all runs for each study, and the figures; page
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from statistics import median
+from typing import Any
 
 import numpy as np
 from claims import MOST, POWER, Outcome, Verdict, log_ratios, verdict, verdicts
-from studies import (
-    BLIND,
-    CENTRE,
-    FOLDER,
-    RECORDS,
-    ArticleStudy,
-    Claim,
-    Figure,
-    Runs,
-    Table,
-    load_studies,
-    of_cell,
-    read_runs,
-)
+from studies import BLIND, CENTRE, RECORDS, Claim, Figure, Runs, Table, load_studies, of_cell, read_runs
 
-DOCS = FOLDER.parents[1] / "docs"
+DOCS = Path(__file__).parents[2] / "docs"
 QUICK = "> **The short form: one seed, short data, few generations. It shows that the studies run.**\n\n"
 FEW = 5
 """runs below which a median of some of a cell's runs, or a curve, says little"""
-SEARCHES = {"simple": "simple GA", "multi": "multi-objective", "least": "multi-start"}
-"""what the head calls a cell"""
-KNOWN = Claim(
-    says="", item="", lower=SEARCHES["multi"], than=SEARCHES["simple"], column="identifiable error", ours=True
-)
+KNOWN = Claim(says="", item="", lower="multi-objective", than="simple GA", column="identifiable error")
 """what the head says of the wide box besides the article's claim"""
 
 
 def page(results: Path, *, quick: bool = False) -> str:
-    """Return the page of the results in a folder."""
-    studies = load_studies()
+    studies, text = load_studies(), Path(__file__).with_name("page.md").read_text(encoding="utf-8")
     runs = {name: read_runs(results / f"{name}_runs.csv") for name in studies}
     made = {name: verdicts(study.claims, runs[name], study.tables) for name, study in studies.items()}
-    every = [v for each in made.values() for v in each]
-    parts = [""]
+    numbers = head(runs, made, {name: study.same_record for name, study in studies.items()})
+    numbers["studies"] = ""
     for name, study in studies.items():
-        link = f"[Settings](../benchmarks/article/{name}.yaml)"
-        parts.append(f"\n## {study.title}\n\n{study.about.strip()} {link}.\n")
-        cells = [*study.changes()]
-        parts += [study_table(shown, runs[name], cells) for shown in study.tables]
-        parts += [shown_figure(figure, runs[name]) for figure in study.figures]
-    text = (
-        (FOLDER / "page.md")
-        .read_text(encoding="utf-8")
-        .format(
-            theirs=claims_table(v for v in every if not v.claim.ours),
-            ours=claims_table(v for v in every if v.claim.ours),
-            studies="".join(parts),
-            enough=percent(POWER),
-            **head(runs, made, studies),
-        )
-    )
-    return QUICK + text if quick else text
+        link, cells = f"[Settings](../benchmarks/article/{name}.yaml)", [*study.changes()]
+        numbers["studies"] += f"\n## {study.title}\n\n{study.about.strip()} {link}.\n"
+        numbers["studies"] += "".join(study_table(shown, runs[name], cells) for shown in study.tables)
+        numbers["studies"] += "".join(shown_figure(figure, runs[name]) for figure in study.figures)
+    for word, ours in (("theirs", False), ("ours", True)):
+        numbers[word] = claims_table(v for each in made.values() for v in each if v.claim.ours is ours)
+    return QUICK * quick + text.format(enough=percent(POWER), **numbers)
+
+
+class Medians:
+    """What page.md says of a study: the median of a measure over a cell's runs, by `cell / measure`."""
+
+    def __init__(self, runs: Runs) -> None:
+        self.runs = runs
+
+    def __getitem__(self, place: str) -> str:
+        cell, _, column = place.partition(" / ")
+        middle = median(of_cell(self.runs, cell, column).values() or [np.nan])
+        return f"{middle:,.0f}" if column == "simulations" else number(middle)
 
 
 def head(
-    runs: Mapping[str, Runs],
-    made: Mapping[str, Sequence[Verdict]],
-    studies: Mapping[str, ArticleStudy],
-) -> dict[str, object]:
-    """Return the numbers that the words need."""
-
-    def middle(study: str, cell: str, column: str) -> float:
-        return median(of_cell(runs[study], cell, column).values() or [np.nan])
-
+    runs: Mapping[str, Runs], made: Mapping[str, Sequence[Verdict]], shared: Mapping[str, int]
+) -> dict[str, Any]:
+    """Return what page.md needs besides; `shared`: seeds up to this one share a record, by study."""
     says = "ulti-objective GA: lower parameter error than simple GA"
     narrow, wide = (next(v for v in made[n] if says in v.claim.says) for n in ("mechanical", "wide"))
-    both = [
-        of_cell(runs["mechanical"], cell, "parameter error")
-        for cell in (narrow.claim.lower, narrow.claim.than)
+    both = [of_cell(runs["mechanical"], cell, "parameter error") for cell in ("multi-objective", "simple GA")]
+    hydraulic = [
+        of_cell(runs["hydraulic"], cell, "simulations") for cell in ("multi-start", "multi-objective")
     ]
-    cost = {
-        f"cost_{stage}_{name}": middle(study, cell, "simulations")
-        for stage, study in (("1", "mechanical"), ("2", "hydraulic"))
-        for name, cell in SEARCHES.items()
-    }
-    seeds = [  # of the searches in stages 1 and 2, with whether the record is a seed's own
-        run["seed"] > studies[name].same_record
-        for name in ("mechanical", "hydraulic")
-        for run in runs[name]
-        if run["cell"] not in (BLIND, CENTRE, RECORDS)
-    ]
-    cells = SEARCHES | {"blind": BLIND, "centre": CENTRE}
+    least, multi = (median(each.values() or [np.nan]) for each in hydraulic)
+    searches = [(n, r) for n in ("mechanical", "hydraulic") for r in runs[n] if "generations" in r]
     return {
+        **{f"{name}_median": Medians(made) for name, made in runs.items()},
         "main": at_best(narrow),
         "wide": at_best(wide),
         "seeds": narrow.seeds,
-        "shared": sum(seed <= studies["mechanical"].same_record for seed in both[0] if seed in both[1]),
+        "shared": sum(seed <= shared["mechanical"] for seed in both[0] if seed in both[1]),
         "wide_seeds": wide.seeds,
         "wide_known": interval(verdict(KNOWN, log_ratios(KNOWN, runs["wide"]), 0.05, None)),
-        "own": sum(seeds),
-        "searches": len(seeds),
-        "rank": number(middle("mechanical", RECORDS, "directions of the record")),
+        "own": sum(run["seed"] > shared[name] for name, run in searches),  # with a record of their own
+        "searches": len(searches),
         "count": sum(not v.claim.ours for each in made.values() for v in each),
-        "tally": tally(made, number(middle("mechanical", CENTRE, "largest error"))),
-        **{f"wide_{n}": number(middle("wide", c, "identifiable error")) for n, c in SEARCHES.items()},
-        **{name: number(middle("mechanical", cell, "parameter error")) for name, cell in cells.items()},
-        **{f"output_{n}": number(middle("mechanical", c, "largest error")) for n, c in SEARCHES.items()},
-        **{name: f"{value:,.0f}" for name, value in cost.items()},
-        "dearer": percent(cost["cost_2_least"] / cost["cost_2_multi"] - 1),
+        "tally": tally(made, Medians(runs["mechanical"])[f"{CENTRE} / largest error"]),
+        "dearer": percent(least / multi - 1),
     }
 
 
@@ -117,7 +82,8 @@ def tally(made: Mapping[str, Sequence[Verdict]], centre: str) -> str:
     """Return how many of the article's claims have each outcome, and which."""
     every = [(name, v) for name, each in made.items() for v in each if not v.claim.ours]
     held = [(name, v.claim.item) for name, v in every if v.outcome is Outcome.HOLDS]
-    excluded = [(v, v.printed is not None) for _, v in every if v.outcome is Outcome.EXCLUDED]
+    excluded = [(v.claim.says, v.printed is not None) for _, v in every if v.outcome is Outcome.EXCLUDED]
+    printed, halved = ([says for says, there in excluded if there is which] for which in (True, False))
     log, slopes = sum(n == "rig" for n, _ in held), sum(item == "section 3.1" for _, item in held)
     near = sum(item == "figure 16" for _, item in held)
     of = {o: [v.claim.says for _, v in every if v.outcome is o] for o in Outcome}
@@ -126,12 +92,8 @@ def tally(made: Mapping[str, Sequence[Verdict]], centre: str) -> str:
         f"search; {near}, of figure 16, ask for an error within 5 % of the motion, and the box's centre "
         f"meets that without a search: {centre} deg)": of[Outcome.HOLDS],
         f"**in {len(of[Outcome.OPPOSITE])} the opposite holds**": of[Outcome.OPPOSITE],
-        f"**in {sum(p for _, p in excluded)} the effect that the article prints is excluded**": [
-            v.claim.says for v, printed in excluded if printed
-        ],
-        f"**in {sum(not p for _, p in excluded)} the article prints no effect, and a halving is excluded**": [
-            v.claim.says for v, printed in excluded if not printed
-        ],
+        f"**in {len(printed)} the effect that the article prints is excluded**": printed,
+        f"**in {len(halved)} the article prints no effect, and a halving is excluded**": halved,
     }
     lines = [f"- {what}: {'; '.join(says)}.\n" for what, says in lists.items() if says]
     undecided = f"- **{len(of[Outcome.UNDECIDED])} are undecided**: the seeds are too few so far.\n"
@@ -149,12 +111,10 @@ def at_best(made: Verdict) -> str:
 
 
 def percent(part: float) -> str:
-    """Return a part in per cent."""
     return f"{100 * part:.0f} %"
 
 
 def interval(made: Verdict) -> str:
-    """Return a ratio with its interval."""
     if not np.isfinite(made.interval[1]):
         return "too few runs"
     return f"{made.ratio:.2g} [{made.interval[0]:.2g}, {made.interval[1]:.2g}]"
@@ -162,8 +122,7 @@ def interval(made: Verdict) -> str:
 
 def claims_table(made: Iterable[Verdict]) -> str:
     """Return the table of verdicts; an item stands at its first claim."""
-    lines: list[tuple[str, ...]] = []
-    item = ""
+    lines, item = list[tuple[str, ...]](), ""
     for v in made:
         printed = "" if v.printed is None else f"{v.printed:.2g}"
         open_still = v.outcome is Outcome.UNDECIDED and 2 < v.seeds < v.enough
@@ -175,7 +134,6 @@ def claims_table(made: Iterable[Verdict]) -> str:
 
 
 def table(title: str, header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return a table in Markdown."""
     above = f"\n**{title}**\n\n" if title else "\n"
     text = "".join(f"| {' | '.join(row)} |\n" for row in (header, ["---"] * len(header), *rows))
     return above + text

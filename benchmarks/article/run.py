@@ -13,7 +13,7 @@ import argparse
 import os
 import time
 from collections.abc import Mapping
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from pathlib import Path
 
 import numpy as np
@@ -35,16 +35,13 @@ ATTEMPT = 6
 
 
 def main(chosen: list[str], minutes: float, at_once: int, *, quick: bool) -> None:
-    """Perform what is missing, and write results and page."""
     results = ROOT / ("runs/article-quick/results" if quick else "docs/reproduction")
     results.mkdir(parents=True, exist_ok=True)
     studies = {name: study for name, study in load_studies().items() if name in chosen or not chosen}
     plans = {name: Plan(name, study, quick=quick) for name, study in studies.items()}
-    runs = {name: read_runs(results / f"{name}_runs.csv") for name in plans}
-    for name, plan in plans.items():
-        runs[name] = with_what_needs_no_search(plan, runs[name])
-    with processes(at_once) as executor:
-        work(plans, runs, results, executor, at_once, 60 * minutes)
+    read = {name: read_runs(results / f"{name}_runs.csv") for name in plans}
+    runs = {name: with_what_needs_no_search(plan, read[name]) for name, plan in plans.items()}
+    work(plans, runs, results, at_once, 60 * minutes)
     for name, plan in plans.items():
         if runs[name]:
             write(results, name, runs[name])
@@ -56,35 +53,30 @@ def main(chosen: list[str], minutes: float, at_once: int, *, quick: bool) -> Non
 
 
 def work(
-    plans: Mapping[str, Plan],
-    runs: dict[str, Runs],
-    results: Path,
-    executor: Executor,
-    at_once: int,
-    seconds: float,
+    plans: Mapping[str, Plan], runs: dict[str, Runs], results: Path, at_once: int, seconds: float
 ) -> None:
     """Perform what is missing, the most telling first, until that many seconds have passed."""
     begun, pending = time.monotonic(), dict[Future[Result], Key]()
-    while True:
-        if time.monotonic() - begun < seconds:
-            todo = [key for key in telling(plans, runs) if key not in pending.values()]
-            for name, cell, seed in todo[: at_once - len(pending)]:
-                pending[executor.submit(perform, plans[name].task(cell, seed))] = (name, cell, seed)
-        if not pending:
-            return
-        for done in wait(pending, return_when=FIRST_COMPLETED).done:
-            name, cell, seed = pending.pop(done)
-            try:
-                result = done.result()
-            except HydroidError as error:
-                result = {"failed": str(error)}
-            runs[name].append(plans[name].row(cell, seed, result))
-            write(results, name, runs[name])
-            print(f"{time.monotonic() - begun:.0f} s: {name}, {cell}, seed {seed}", flush=True)
+    with processes(at_once) as executor:
+        while True:
+            if time.monotonic() - begun < seconds:
+                todo = [key for key in telling(plans, runs) if key not in pending.values()]
+                for name, cell, seed in todo[: at_once - len(pending)]:
+                    pending[executor.submit(perform, plans[name].task(cell, seed))] = (name, cell, seed)
+            if not pending:
+                return
+            for done in wait(pending, return_when=FIRST_COMPLETED).done:
+                name, cell, seed = pending.pop(done)
+                try:
+                    result = done.result()
+                except HydroidError as error:
+                    result = {"failed": str(error)}
+                runs[name].append(plans[name].row(cell, seed, result))
+                write(results, name, runs[name])
+                print(f"{time.monotonic() - begun:.0f} s: {name}, {cell}, seed {seed}", flush=True)
 
 
 def write(results: Path, name: str, runs: Runs) -> None:
-    """Write the runs of a study, by cell and seed."""
     first = ["cell", "seed", "failed", "history", "segment bests"]
     columns = [*first, *sorted({column for run in runs for column in run} - {*first})]
     ordered = sorted(runs, key=lambda run: (run["cell"], run["seed"]))
@@ -120,9 +112,8 @@ def with_what_needs_no_search(plan: Plan, runs: Runs) -> Runs:
         theta = parameters.mapping(parameters.from_unit(point[None])[0])
         if (cell, seed) not in known:
             rows.append({"cell": cell, "seed": seed} | {f"value {n}": float(v) for n, v in theta.items()})
-    for i, row in enumerate(rows):
-        if "value " + parameters.names[0] in row and "error over motion" not in row:
-            rows[i] = plan.judged(row)
+    value = f"value {parameters.names[0]}"
+    rows = [plan.judged(row) if value in row and "error over motion" not in row else row for row in rows]
     first = plan.study.same_record + 1  # every one has a truth of its own
     for seed in range(first, first + min(plan.study.records, len(seeds))):
         if (RECORDS, seed) not in known:

@@ -45,8 +45,6 @@ class Table(Settings):
 
 
 class Figure(Settings):
-    """A figure."""
-
     title: str
     kind: Literal["convergence", "responses", "segment bests", "sensitivity", "surface"]
     cells: tuple[str, ...] = ()
@@ -56,7 +54,6 @@ class Figure(Settings):
 
     @property
     def file(self) -> str:
-        """Name of the file: the article's item, as the title says."""
         return self.title.lower().partition(":")[0].replace(" ", "_") + ".svg"
 
 
@@ -102,7 +99,6 @@ class ArticleStudy(StudySettings):
 
 
 def load_studies() -> dict[str, ArticleStudy]:
-    """Return the studies by the name of their file, in the page's order."""
     names = ("mechanical", "wide", "elbow", "hydraulic", "surface", "rig")
     return {name: load(FOLDER / f"{name}.yaml", ArticleStudy) for name in names}
 
@@ -113,16 +109,15 @@ class Plan:
     def __init__(self, name: str, study: ArticleStudy, *, quick: bool = False) -> None:
         self.name, self.study, self.quick = name, study, quick
         self.longest = QUICK_SECONDS if quick else SECONDS
-        self._record, self._directions = cache(self._make_record), cache(self._make_directions)
+        self._record = cache(self._make_record)
+        self._directions = cache(lambda seed: Directions(self.problem(seed), self.truth(seed)))
 
     def settings(self, changes: Changes) -> dict[str, FitSettings]:
-        """Return the settings of a fit by cell, with some replaced."""
         quick = self.study.quick if self.quick else {}
         return cell_settings(self.study, FOLDER / self.name, quick | changes)
 
     @cached_property
     def cells(self) -> dict[str, FitSettings]:
-        """Settings of a fit, by cell."""
         return self.settings({})
 
     def seeds(self, cell: str) -> range:
@@ -131,13 +126,11 @@ class Plan:
         return range(1, 1 + min(self.study.seeds // (1 + half), 1 if self.quick else self.study.seeds))
 
     def truth(self, seed: int) -> dict[str, float]:
-        """Return the true parameters of a seed."""
         own = seed > self.study.same_record
         exponents = np.random.default_rng(seed).uniform(-1, 1, len(self.study.truth)) * own
         return {n: v * TRUTHS_FROM**e for (n, v), e in zip(self.study.truth.items(), exponents, strict=True)}
 
     def log(self, seed: int) -> Log:
-        """Return what the runs of a seed are fitted to."""
         return self._record(seed if self.study.truth and seed > self.study.same_record else 0)
 
     def directions(self, seed: int) -> Directions:
@@ -149,21 +142,18 @@ class Plan:
         return Problem(self.cells.get(cell, next(iter(self.cells.values()))), [self.log(seed)])
 
     def task(self, cell: str, seed: int) -> Task:
-        """Return one run."""
         changes = {"search.seed": seed, "simulation.threads": 1}  # the runs are what is shared out
         return Task(cell, seed, self.cells[cell].changed(changes), (self.log(seed),))
 
     def row(self, cell: str, seed: int, result: Result) -> dict[str, Any]:
         """Return a run with all its measures, as it is kept."""
-        row: dict[str, Any] = {"cell": cell, "seed": seed}
         if "failed" in result:
-            return row | {"failed": result["failed"]}
+            return {"cell": cell, "seed": seed, "failed": result["failed"]}
+        row: dict[str, Any] = {"cell": cell, "seed": seed}
         row |= {name: float(value) for name, value in result["measures"].items()} | course(result["history"])
         row |= {f"value {name}": float(value) for name, value in result["theta"].items()}
-        row["segment bests"] = ";".join(
-            " ".join(f"{value:.6g}" for value in best.values()) for best in result["segment_bests"]
-        )
-        return self.judged(row)
+        bests = (" ".join(f"{value:.6g}" for value in best.values()) for best in result["segment_bests"])
+        return self.judged(row | {"segment bests": ";".join(bests)})
 
     def judged(self, row: dict[str, Any]) -> dict[str, Any]:
         """Return a run with the measures of its estimate that it lacks."""
@@ -180,9 +170,6 @@ class Plan:
                 log = read_logs([FOLDER / file], settings)[0].first(self.longest)
                 found[name] = output_errors(Problem(settings, [log]), theta)["mean absolute error"]
         return found | row
-
-    def _make_directions(self, seed: int) -> Directions:
-        return Directions(self.problem(seed), self.truth(seed))
 
     def _make_record(self, seed: int) -> Log:
         """Read the log, or simulate the truth under pseudo-random commands, as in the article's figure 17."""

@@ -13,15 +13,15 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
+from hydroid.arrays import Array, Mask
 from hydroid.log import Log
-from hydroid.parameters import Array, ParameterSet
+from hydroid.parameters import ParameterSet
 from hydroid.posterior.noise import Noise, error_level, prior_weight, problem_noise
 from hydroid.posterior.posterior import WEAK_PRIOR, Posterior, regular
 from hydroid.problem.channels import Channel
 from hydroid.problem.free_start import start_slopes
 from hydroid.problem.priors import Priors
 from hydroid.problem.problem import OpenStart, Problem
-from hydroid.search import Mask
 from hydroid.search.axes import Box, Function, differentiate, single_axes
 
 NO_EFFECT_BELOW = 1e-6

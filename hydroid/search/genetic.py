@@ -56,23 +56,22 @@ class Population:
 
 
 @record
-class GeneticAlgorithm:
-    """What both algorithms share: coding and reproduction.
+class SimpleGa:
+    """Roulette, crossover, mutation; the best few survive, the children replace the rest.
 
     Attributes:
         settings: population, generations and rates.
         parameters: dimensions p of the unit box.
         start: point of the box that joins the first population, shape (p,).
         single: whether it minimises one objective, shape (n, 1), rather than several at once.
-        elite: best candidates that survive unchanged, and are not simulated again (of the simple GA; the
-            article gives none).
+        elite: best candidates that survive unchanged, and are not simulated again (the article gives none).
     """
 
     settings: GeneticSettings
     parameters: int
     start: Array | None = None
-    single: ClassVar[bool]
-    elite: ClassVar[int]
+    single: ClassVar[bool] = True
+    elite: ClassVar[int] = 1
 
     @property
     def coding(self) -> Coding:
@@ -96,21 +95,7 @@ class GeneticAlgorithm:
         return mutate(children, self.settings.mutation_rate, self.coding, rng)
 
     def select(self, objectives: Array, count: int, rng: Generator) -> Ints:
-        """Return parents, shape (count,), by the objectives of a population."""
-        raise NotImplementedError
-
-    def tell(self, population: Population | None, offspring: Population) -> Population:
-        """Return the next population, from the present one (none at the start) and its offspring."""
-        raise NotImplementedError
-
-
-class SimpleGa(GeneticAlgorithm):
-    """Roulette, crossover, mutation; the best few survive, the children replace the rest."""
-
-    single, elite = True, 1
-
-    def select(self, objectives: Array, count: int, rng: Generator) -> Ints:
-        """Return parents by the roulette wheel."""
+        """Return parents, shape (count,), by the roulette wheel of the objectives of a population."""
         return roulette(_objective(objectives), count, rng)
 
     def tell(self, population: Population | None, offspring: Population) -> Population:
@@ -121,7 +106,7 @@ class SimpleGa(GeneticAlgorithm):
         return population.take(best).join(offspring)
 
 
-class Nsga2(GeneticAlgorithm):
+class Nsga2(SimpleGa):
     """NSGA-II (Deb, Pratap, Agarwal, Meyarivan 2002) on the simple GA's operators.
 
     Non-dominated sorting, crowding, crowded tournament, and survival of the best of parents and children.

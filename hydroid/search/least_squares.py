@@ -25,7 +25,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from hydroid.search import Array
+from hydroid.arrays import Array
 from hydroid.search.axes import Function
 from hydroid.search.descent import (
     DAMPING,

@@ -19,19 +19,20 @@ search. "predicted / spread" is the mean standard deviation over the root of the
 import importlib
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import count
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from common import ARTICLE_TRUTH, EXAMPLES, Clock, near, options, refined, row, table, true_log
-from made_logs import at_rest, noisy, simulate_log, step_log
+from made_logs import noisy, simulate_log, step_log
 
 import hydroid
 from hydroid import load_settings
 from hydroid.fitting.summary import account
-from hydroid.identified_model import IdentifiedModel, identified
+from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
 from hydroid.posterior.band import Band, prediction_bands
 from hydroid.posterior.bench import make_bench
@@ -57,10 +58,10 @@ def mech(outputs: list[int], *free: str, **changes: object) -> FitSettings:
 
 
 def fits(
-    settings: FitSettings, truth: dict[str, float], logs: Callable[[Any], list[Log]], count: int, *key: int
+    settings: FitSettings, truth: Mapping[str, float], logs: Callable[[Any], list[Log]], most: int, *key: int
 ) -> Iterator[tuple[Problem, Uncertainty]]:
     """Yield what fits of new logs, made from a generator, know."""
-    for seed in range(count):
+    for seed in range(most):
         rng = np.random.default_rng([seed, *key])
         problem = Problem(settings, logs(rng))
         start = near(problem, problem.parameters.vector(truth, "truth"), rng)
@@ -137,27 +138,19 @@ def own_arm(given: Any) -> None:
     sys.path.insert(0, str(folder))
     example: Any = importlib.import_module("make_example")
 
-    def made(place: Path, name: str, logs: list[Path], **changes: object) -> FitSettings:
-        hydroid.init(place / name, arm=folder / "robot.urdf", log=logs)
-        return load_settings(place / name / "fit.yaml", changes)
-
     with tempfile.TemporaryDirectory() as place:
-        unseen = made(Path(place), "machine", [], **{"log.period_s": example.PERIOD})
-        settings = made(Path(place), "mine", [folder / f"log_{number}.csv" for number in (1, 2, 3)])
-        at = hydroid.start_values(unseen).values
-        factors = {n: next((f for s, f in example.TRUTH.items() if n.startswith(s)), 1.0) for n in at}
-        truth = {name: value * factors[name] for name, value in at.items()}
-        machine, seeds = identified(unseen, truth, "the machine"), iter(range(1000, 1000 + 2 * given.fits))
+        machine, mine = Path(place) / "machine", Path(place) / "mine"
+        hydroid.init(machine, arm=folder / "robot.urdf")
+        hydroid.init(
+            mine, arm=folder / "robot.urdf", log=[folder / f"log_{number}.csv" for number in (1, 2, 3)]
+        )
+        settings, truth, seeds = load_settings(mine / "fit.yaml"), example.machine(machine), count(1000)
 
-        def new_log(seed: int) -> Log:
-            command = example.commands(len(unseen.arm.joints), seed)
-            angle = 0.5 * (unseen.arm.lower + unseen.arm.upper)
-            drive = at_rest(angle, command, example.PERIOD, "log")
-            noise = example.NOISE_DEG
-            return hydroid.simulate(drive, fit=machine, out=None, noise_deg=noise, seed=seed).log
+        def logs(rng: Any) -> list[Log]:
+            return [example.recorded(truth, next(seeds)) for _ in range(2)]
 
-        known = fits(settings, truth, lambda rng: [new_log(next(seeds)), new_log(next(seeds))], given.fits)
-        true = settings.parameter_set().vector(truth, "truth")
+        known = fits(settings, truth.values, logs, given.fits)
+        true = settings.parameter_set().vector(truth.values, "truth")
         names = np.array(settings.parameter_set().names)[true > 0]
         report("own arm", names, true[true > 0], parameters(known, true > 0))
 

@@ -14,7 +14,7 @@ import numpy as np
 import trimesh
 
 import hydroid
-from hydroid.identified_model import identified
+from hydroid.identified_model import IdentifiedModel, identified
 from hydroid.log import Log
 
 SIZES = {"swing": (0.6, 0.5, 0.4), "boom": (1.8, 0.15, 0.25), "stick": (1.4, 0.12, 0.18)}
@@ -79,22 +79,33 @@ def commands(joints: int, seed: int) -> np.ndarray:
     return command
 
 
-def write_log(project: Path, path: Path, seed: int) -> None:
-    """Simulate the project's arm at other values, and write what a logger would: volts and radians."""
-    changes = {"log.period_s": PERIOD, "simulation.model": "dynamic"}  # a machine has oil and inertia
-    model = hydroid.start_values(hydroid.load_settings(project / "fit.yaml", changes))
+def machine(project: Path, **changes: object) -> IdentifiedModel:
+    """The project's arm at other values."""
+    model = hydroid.start_values(
+        hydroid.load_settings(project / "fit.yaml", {"log.period_s": PERIOD} | changes)
+    )
     factor = {n: next((f for s, f in TRUTH.items() if n.startswith(s)), 1.0) for n in model.values}
-    truth = identified(model.settings, {n: v * factor[n] for n, v in model.values.items()}, "the machine")
-    arm = model.settings.arm
+    return identified(model.settings, {n: v * factor[n] for n, v in model.values.items()}, "the machine")
+
+
+def recorded(truth: IdentifiedModel, seed: int) -> Log:
+    """Simulate commands to a machine."""
+    arm = truth.settings.arm
     command = commands(len(arm.joints), seed)
     angle = np.tile(0.5 * (arm.lower + arm.upper), (len(command), 1))
     log = Log("commands", np.arange(len(command), dtype=np.float64) * PERIOD, command, angle, PERIOD)
-    seen = hydroid.simulate(log, fit=truth, out=None, noise_deg=NOISE_DEG, seed=seed).log.angle
-    names = [name.removesuffix("_joint") for name in arm.joint_names]
+    return hydroid.simulate(log, fit=truth, out=None, noise_deg=NOISE_DEG, seed=seed).log
+
+
+def write_log(project: Path, path: Path, seed: int) -> None:
+    """Write what a logger of the machine would: volts and radians."""
+    truth = machine(project, **{"simulation.model": "dynamic"})  # a machine has oil and inertia
+    log = recorded(truth, seed)
+    names = [name.removesuffix("_joint") for name in truth.settings.arm.joint_names]
     what = ("valve [V]", "angle [rad]")
     header = ["Time [ms]", *(f"{name} {column}" for column in what for name in names)]
     # the boom's valve is wired the other way round
-    rows = np.column_stack([1e3 * log.time, command / 10 * [1, -1, 1], seen])
+    rows = np.column_stack([1e3 * log.time, log.command / 10 * [1, -1, 1], log.angle])
     np.savetxt(path, rows, fmt="%.6g", delimiter=",", header=",".join(header), comments="")
 
 

@@ -147,10 +147,8 @@ def _stated_fault(body: mujoco.MjsBody, urdf: bool) -> str:
     """Say why no rigid body has the mass or inertia that a file states, and take it out; empty: one has."""
     if not body.explicitinertial:
         return "no mass" if urdf else ""
-    xx, yy, zz, xy, xz, yz = body.fullinertia
-    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    if np.isnan(xx):
-        tensor = np.diag(np.array(body.inertia))
+    full = np.array(body.fullinertia)  # xx, yy, zz, xy, xz, yz
+    tensor = np.diag(body.inertia) if np.isnan(full[0]) else full[[0, 3, 4, 3, 1, 5, 4, 5, 2]].reshape(3, 3)
     fault = "no mass"
     if body.mass > MASSLESS and np.isfinite(body.mass):
         fault = "an inertia that is not finite"

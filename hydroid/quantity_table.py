@@ -169,6 +169,15 @@ _HYDRAULIC = (
     Quantity("transition_pressure", "bar", 0.2, "pressure drop below which flow is laminar"),
     Quantity("flow_limit", "L/min", None, "largest flow to one actuator", "null: no limit", (0.1, 1000.0)),
     Quantity(
+        "compensation",
+        "",
+        0.0,
+        "share of the load that a pressure compensator keeps from the valve",
+        "0: none, 1: a load does not slow the motion",
+        (0.0, 1.0),
+        (0.0, 1.0),
+    ),
+    Quantity(
         "draw",
         "",
         ONE,

@@ -17,6 +17,13 @@ five parts, which still ends at A_max.
 The article's edges open alike. A real spool's do not: `return_a` and `return_b` are the openings of A→T and
 B→T as multiples of those of P→B and P→A. So a load that is lowered can be held by the oil that leaves, while
 the other chamber fills from the tank through an anti-cavitation check valve.
+
+A pressure compensator before the pump edge leaves the edge a drop of MARGIN p_S, so that a load does not slow
+the motion while the supply can lift it. The drop is
+
+    Δp = p_S - p - κ max(p_S - p - MARGIN p_S, 0),
+
+with `compensation` κ: 0 without a compensator, as in the article, 1 with an ideal one.
 """
 
 # pyright: reportMissingParameterType=false
@@ -30,6 +37,7 @@ from hydroid.hydraulics.elementwise import compilable, select
 
 DENSITY = 860.0  # ρ of the oil [kg/m³]; ours
 
+MARGIN = 0.25  # part of the supply pressure that a compensator leaves the pump edge; ours
 NOTCHES = (0.04, 0.1, 0.25, 0.5)  # parts of the full opening where the notches of a valve's curve end; ours
 
 
@@ -74,7 +82,14 @@ def port_flow(pressure, supply, pump_area, tank_area, c) -> Any:
     Also returns -dQ/dp [m³/(s Pa)], which is never negative, the part of Q that comes from the pump, at
     `supply` pressure [Pa], and its rise with that pressure.
     """
-    into, into_slope = root(supply - pressure, c.transition_pressure)
+    drop, kept = supply - pressure, 1.0
+    fed = kept
+    if c.compensation > 0.0:
+        beyond = drop > MARGIN * supply
+        drop = drop - c.compensation * np.maximum(drop - MARGIN * supply, 0.0)
+        kept = select(beyond, 1.0 - c.compensation, 1.0)
+        fed = select(beyond, 1.0 - c.compensation * (1.0 - MARGIN), 1.0)
+    into, into_slope = root(drop, c.transition_pressure)
     out, out_slope = root(pressure - c.tank_pressure, c.transition_pressure)
     pumped = c.conductance * pump_area * into
     pumped_slope = c.conductance * pump_area * into_slope
@@ -83,4 +98,4 @@ def port_flow(pressure, supply, pump_area, tank_area, c) -> Any:
     pumped_slope = select(limited, 0.0, pumped_slope)
     filling = select(pressure < c.tank_pressure, c.anticavitation, 0.0)
     drained = c.conductance * (tank_area + filling)
-    return pumped - drained * out, pumped_slope + drained * out_slope, pumped, pumped_slope
+    return pumped - drained * out, kept * pumped_slope + drained * out_slope, pumped, fed * pumped_slope

@@ -14,6 +14,7 @@ from hydroid.settings.cylinder import LinearActuator
 
 LONGEST_STEP = 0.025  # of MuJoCo [s], in a log of fewer samples
 DEAD = 0.8  # part of the command below which a joint seems to stand that its dead band is
+DRAG = 0.02  # part of the torque at the pump's pressure that damping takes at full speed
 RESPONSE = 0.1  # of a valve and its oil without any delay [s]
 
 FIT = """\
@@ -59,7 +60,7 @@ refinement: {{iterations: 60, gain_tolerance: 1.0e-5}}
 """
 JOINT = """\
 {actuator}
-  D_{own}: {{quantity: damping, joints: [{name}], nominal: {damping}, within: 10}}    # {unit}
+  D_{own}: {{quantity: damping, joints: [{name}], fixed: {damping}}}    # {unit}
   delay_{own}: {{quantity: delay, joints: [{name}], bounds: [0, 1], start: {delay:.2f}}}    # s
   dead_A_{own}: {{quantity: dead_band_a, joints: [{name}], nominal: {dead}, sd: 15, bounds: [0, 75]}}    # %
   dead_B_{own}: {{quantity: dead_band_b, joints: [{name}], nominal: {dead}, sd: 15, bounds: [0, 75]}}
@@ -67,6 +68,7 @@ JOINT = """\
   open_B_{own}: {{quantity: opening_b, joints: [{name}], within: 4}}
   exponent_A_{own}: {{quantity: opening_exponent_a, joints: [{name}], within: 3}}
   exponent_B_{own}: {{quantity: opening_exponent_b, joints: [{name}], within: 3}}
+  compensation_{own}: {{quantity: compensation, joints: [{name}], bounds: [0, 1], start: 0.5}}
   lag_{own}: {{quantity: opening_lag, joints: [{name}], bounds: [0, 0.6], start: 0.05}}    # s
   pilot_{own}: {{quantity: pilot_lag, joints: [{name}], bounds: [0, 0.6], start: 0.03}}    # s
   draw_A_{own}: {{quantity: draw_a, joints: [{name}], nominal: {draw}, within: 5, term: pump}}    # from the
@@ -112,7 +114,7 @@ def fit_text(arm: Arm, layout: Layout | None, sizes: Sequence[JointSize], file: 
         lines.append(
             JOINT.format(
                 actuator=(CYLINDER if linear else STAND_IN).format(**words),
-                damping=short(0.1 * size.damping),
+                damping=short(DRAG * size.damping),
                 delay=min(max(motion.likely_lag - RESPONSE, 0.0), 0.9) if motion else 0.0,
                 # a stand-in's size is a guess, but the valves of one machine let like flows through
                 unit="N·s/m" if own.slides else "N·m·s/rad",

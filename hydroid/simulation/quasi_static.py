@@ -5,8 +5,9 @@ and A_out, k = C_q √(2/ρ), the load F (gravity, springs, dry friction against
 
     p_in = P − (v A_in/(k a_in))²,   p_out = p_T + (v A_out/(k a_out))²,   p_in A_in − p_out A_out = F + d v,
 
-which is a quadratic equation in v. Where the load overruns, p_in would fall below 0: the chamber then
-cavitates, and what leaves the other one governs. A load that the supply cannot lift is held. All actuators
+which is a quadratic equation in v. A compensator (`hydroid.hydraulics.valve`) makes it another one; the
+slower of both speeds holds. Where the load overruns, p_in would fall below 0: the chamber then cavitates,
+and what leaves the other one governs. A load that the supply cannot lift is held. All actuators
 share the pump's line, whose pressure P satisfies one equation, Σ Q_i(P) = Q_P(P) of
 `hydroid.hydraulics.pump`, with Q_i the flow into the chamber times its `draw`.
 
@@ -31,6 +32,7 @@ from hydroid.hydraulics.joint import command, move_spool, net_opening
 from hydroid.hydraulics.kernel import SOURCE, Plugin, make_pad
 from hydroid.hydraulics.pump import begin_line, come_up, delivery
 from hydroid.hydraulics.records import LINEAR
+from hydroid.hydraulics.valve import MARGIN
 from hydroid.simulation.rollout import mujoco_library, write_sample
 
 for _name in ("mj_kinematics", "mj_comPos", "mj_rne"):
@@ -59,17 +61,26 @@ def rod_speed(c, w, supply: float) -> Any:
     side, other, sign = (c.a, c.b, 1.0) if w.travel > 0.0 else (c.b, c.a, -1.0)
     area, load, drag = abs(w.travel), sign * w.push + w.thrust, w.drag
     pump_edge, tank_edge = c.conductance * area, c.conductance * area * other.return_
-    back = (other.area / tank_edge) ** 2 * other.area
+    back, into = (other.area / tank_edge) ** 2 * other.area, (side.area / pump_edge) ** 2 * side.area
     free = supply * side.area - c.tank_pressure * other.area - load
     if free <= 0.0:
         return 0.0, 0.0, 0.0
-    root = np.sqrt(drag * drag + 4.0 * free * ((side.area / pump_edge) ** 2 * side.area + back))
-    speed = 2.0 * free / (drag + root)
-    flow, rise = side.area * speed, side.area * side.area / root
-    if flow * flow > supply * pump_edge * pump_edge:  # cavitates
+    root = np.sqrt(drag * drag + 4.0 * free * (into + back))
+    speed, rise = 2.0 * free / (drag + root), side.area * side.area / root
+    drop = supply  # over the pump edge of an empty chamber
+    if c.compensation > 0.0:
+        left, fed = 1.0 - c.compensation, 1.0 - c.compensation * (1.0 - MARGIN)
+        drop = fed * supply
+        push = left * free + c.compensation * MARGIN * supply * side.area
+        root = np.sqrt(left * left * drag * drag + 4.0 * push * (into + left * back))
+        slower = 2.0 * push / (left * drag + root)
+        if slower < speed:
+            speed, rise = slower, fed * side.area * side.area / root
+    flow = side.area * speed
+    if (drag + back * speed) * speed + c.tank_pressure * other.area + load < 0.0:  # cavitates
         falling = -c.tank_pressure * other.area - load
         speed = 2.0 * falling / (drag + np.sqrt(drag * drag + 4.0 * falling * back))
-        flow = pump_edge * np.sqrt(supply)
+        flow = pump_edge * np.sqrt(drop)
         rise = 0.5 * flow / supply
         if flow > c.flow_limit:
             flow, rise = c.flow_limit, 0.0
@@ -118,7 +129,7 @@ def linkage(c, angle: float) -> Any:
 
 
 @compilable
-def store_oil(c, z, w, supply: float, speed: float, angle: float) -> None:
+def store_oil(c, z, w, speed: float, angle: float) -> None:
     """Store the oil and flows of a joint's chambers as `actuator.observe` reads them.
 
     A joint that stands has tank pressure in one chamber, and in the other what holds the load w.push [N].
@@ -127,11 +138,13 @@ def store_oil(c, z, w, supply: float, speed: float, angle: float) -> None:
     sign = 1.0 if w.travel > 0.0 else -1.0
     pressure_a, pressure_b = max(tank, (tank * b + w.push) / a), max(tank, (tank * a - w.push) / b)
     if speed != 0.0:
-        pressure_a, pressure_b = supply - (speed * a / edge) ** 2, supply - (speed * b / edge) ** 2
+        against = w.thrust + w.drag * speed
         if w.travel > 0.0:
             pressure_b = tank + (speed * b / (edge * c.b.return_)) ** 2
+            pressure_a = (pressure_b * b + against + w.push) / a
         else:
             pressure_a = tank + (speed * a / (edge * c.a.return_)) ** 2
+            pressure_b = (pressure_a * a + against - w.push) / b
     out = linkage(c, angle)[0]
     fill_a, fill_b = out * a / c.dead_volume, -out * b / c.dead_volume
     if c.kind == LINEAR:
@@ -213,5 +226,5 @@ def roll_quasi_static(arm, plugin: Plugin, state, course, record, source: int = 
             after = min(max(after, min(arm.limits[place, 0], z.angle)), max(arm.limits[place, 1], z.angle))
             arm.angle[place], z.velocity = after, (after - z.angle) / period
             if observed:
-                store_oil(c, z, w, supply, speed, after)
+                store_oil(c, z, w, speed, after)
         write_sample(arm, record, state, k)

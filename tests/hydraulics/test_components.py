@@ -16,7 +16,7 @@ from hydroid.hydraulics.solenoid import (
     resting_stroke,
     side_voltage,
 )
-from hydroid.hydraulics.valve import notched
+from hydroid.hydraulics.valve import notched, port_flow
 from hydroid.settings.arm import Arm
 from hydroid.settings.hydraulics import HydraulicSettings
 
@@ -90,6 +90,27 @@ def test_notches_bend_the_opening_between_its_ends():
     assert (slope > 0).all()
     middles = np.searchsorted(share, [0.02, 0.07, 0.2, 0.4])  # one in each part
     np.testing.assert_allclose(slope[middles] / slope[-1], [0.2, 3.0, 0.5, 2.0])
+
+
+@pytest.mark.parametrize("compensation", [0.0, 0.4, 1.0])
+@pytest.mark.parametrize("pressure", [20e5, 100e5, 130e5, 170e5])
+def test_the_flow_into_a_chamber_has_the_slopes_that_it_states(compensation: float, pressure: float):
+    c = SimpleNamespace(
+        transition_pressure=0.2e5, conductance=0.03, flow_limit=np.inf, backflow=-np.inf, tank_pressure=5e5,
+        anticavitation=0.0, compensation=compensation,
+    )  # fmt: skip
+
+    def flow(pressure: float, supply: float) -> np.ndarray:
+        return np.array(port_flow(pressure, supply, 2e-6, 1e-6, c))
+
+    _, fall, pumped, give = flow(pressure, 150e5)
+    steeper = (flow(pressure + 1e3, 150e5) - flow(pressure - 1e3, 150e5)) / 2e3
+    assert -steeper[0] == pytest.approx(fall, rel=1e-5)
+    assert (flow(pressure, 150e5 + 1e3) - flow(pressure, 150e5 - 1e3))[2] / 2e3 == pytest.approx(
+        give, rel=1e-5
+    )
+    if compensation == 1.0 and pressure < 0.75 * 150e5:
+        assert pumped == pytest.approx(0.03 * 2e-6 * np.sqrt(0.25 * 150e5), rel=1e-4)
 
 
 def test_linkages_are_those_of_the_arms_cylinders(arm: Arm):

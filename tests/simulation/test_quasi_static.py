@@ -28,7 +28,7 @@ def simulated(spec, arm):
         one = candidates(arm, 1)
         one.mass[:], one.joints.stiffness[:] = arm.masses, 0.0
         for name, value in values.items():
-            one.joints[name] = value
+            (one.mass if name == "mass" else one.joints[name])[:] = value
         settings = SimulationSettings(model=model)
         simulation = Simulation(Scenario(spec, arm, log, sorted(commands), settings), arm, 10)
         return simulation.simulate(one).angle[0], simulation.trace(one), one.joints[0]
@@ -47,11 +47,14 @@ def test_without_load_the_speed_is_opening_times_root_of_the_pressure(simulated)
 
 
 @pytest.mark.parametrize("commands", [{SHOULDER: 50}, {SHOULDER: -50}, {SHOULDER: 60, 2: -40}])
-@pytest.mark.parametrize("pump", [{}, PUMP, PUMP | {"draw_a": 0.3, "draw_b": 0.8}])
+@pytest.mark.parametrize(
+    "pump",
+    [{}, PUMP, PUMP | {"draw_a": 0.3, "draw_b": 0.8}, {"compensation": 1.0}, PUMP | {"compensation": 0.5}],
+)
 def test_the_dynamic_model_converges_to_it_as_oil_stiffens_and_motion_slows(simulated, commands, pump):
     def apart(slower, stiffer):
         each = {"opening_a": 3e-7 / slower, "opening_b": 3e-7 / slower, "leakage": 1e-14, "damping": 0.0}
-        each |= pump | {"pump_flow": pump["pump_flow"] / slower} if pump else {}
+        each |= pump | ({"pump_flow": pump["pump_flow"] / slower} if "pump_flow" in pump else {})
         each |= {"bulk_modulus": 8e8 * stiffer, "line_volume": 1e-6}
         models = "quasi-static", "dynamic"
         quasi, full = (simulated(commands, 1.0 * slower, model, **each)[0] for model in models)
@@ -60,6 +63,22 @@ def test_the_dynamic_model_converges_to_it_as_oil_stiffens_and_motion_slows(simu
     near, far = apart(4.0, 20.0), apart(1.0, 1.0)
     assert near < 0.01
     assert near < 0.5 * far
+
+
+@pytest.mark.parametrize("model", ["quasi-static", "dynamic"])
+@pytest.mark.parametrize("command", [50, -50])
+def test_a_load_does_not_slow_a_compensated_valve(simulated, arm, model, command):
+    stiff = {"bulk_modulus": 1.6e10, "leakage": 1e-14, "damping": 0.0, "opening_a": 1e-7, "opening_b": 1e-7}
+
+    def way(compensation, part):
+        angle = simulated(
+            {SHOULDER: command}, 2.0, model, **stiff, compensation=compensation, mass=part * arm.masses
+        )[0]
+        return float(angle[-1, 0] - angle[0, 0])
+
+    free, loaded = (way(1.0, part) for part in (0.4, 0.8))
+    assert loaded == pytest.approx(free, rel=2e-3)
+    assert abs(way(0.0, 0.8) / way(0.0, 0.4) - 1) > 0.02
 
 
 @pytest.mark.parametrize("draw", [1.0, 0.6])

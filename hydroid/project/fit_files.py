@@ -32,6 +32,8 @@ hydraulics:
   supply_pressure: 150             # bar    read it off the gauge
   onset_a: 0                       # V      no jump behind the dead band
   onset_b: 0
+  current_min: 0.8                 # A      a coil that moves its spool nearly in proportion to the command,
+  slot_width: 0.33                 # mm     which full command opens
   rotary_volume: {volume}             # cm³    of each chamber of a rotary actuator
   opening_exponent: 1.4            #        speed rises with this power of the command behind the dead band
   plunger_damping: 20              # N·s/m  a lag of 10 ms

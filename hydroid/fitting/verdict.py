@@ -2,7 +2,7 @@
 
 Errors are rms over the logs that drive the joint. The tolerance is `tolerance_deg` of the settings, or 2 % of
 the joint's travel in the unseen logs. A baseline is as good on these unless the fit's error is below 90 % of
-its. The first of these that is true is the verdict:
+its, or below a tenth of the tolerance. The first of these that is true is the verdict:
 
 1. does not fit: on the fitted logs the error is outside the tolerance, and a baseline is as good; where there
    are unseen logs, one must be as good there too;
@@ -30,6 +30,8 @@ SHARE = 0.02
 """of a joint's travel that its error may be where no tolerance is stated"""
 CLEARLY = 0.9
 """part of a baseline's error on unseen logs that a better fit stays below"""
+TINY = 0.1
+"""part of the tolerance below which an error does not count, whatever a baseline does"""
 WORSE = 2.0
 """times the error on fitted logs, beyond which a fit does not predict"""
 ANYWHERE = np.array([-np.inf, np.inf])
@@ -104,7 +106,8 @@ def _word(
 ) -> str:
     """Return the verdict from errors [deg] on the fitted and on the unseen logs, and the baselines' there."""
     (fitted, unseen), (there, here) = errors, rivals
-    as_good = [] if unseen is None else [name for name, e in here.items() if not unseen < CLEARLY * e]
+    small = TINY * tolerance
+    as_good = [n for n, e in here.items() if unseen is not None and not unseen < max(CLEARLY * e, small)]
     misfit = fitted is not None and not fitted <= tolerance and not fitted < min(there.values())
     if misfit and (unseen is None or as_good):
         return "does not fit"

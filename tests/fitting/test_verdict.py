@@ -55,6 +55,7 @@ ROWS = {
         {"nine": (1, 1.5)},
         "predicts no better than nine numbers",
     ),
+    "an error too small to count": ((0.1, 0.15), {"nine": (0.1, 0.1)}, "predicts"),
     "that is within what the user asked for": ((1, 1.9), {"nine": (1, 1.5), "tolerance": 2}, "predicts"),
     "better than anything, not good": ((2.5, 4.4), {}, "predicts roughly"),
     "as bad as the user allows": ((2.5, 4.5), {"tolerance": 5}, "predicts"),

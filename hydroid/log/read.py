@@ -144,20 +144,18 @@ def _match(
         shared = [str(other) for other in wanted if other.name == signal.name]
         if count == len(shared) == 1:
             continue
-        what, hint = f"one column cannot be {listed(shared)}", "correct log.joints in the config"
+        what, hint = f"column {signal.name!r} cannot be {listed(shared)}", "correct log.joints in the config"
         if count > 1:
-            what, hint = f"has {count} columns of this name", "rename all but one"
+            what, hint = f"has {count} columns {signal.name!r}", "rename all but one"
         elif count == 0:
             lacking = sorted((one for one in wanted if one in missing), key=lambda one: one.name not in close)
             guess = {name: f", did you mean {other!r}?" for name, other in close.items()}
             what = listed([f"{one.name!r} ({one}{guess.get(one.name, '')})" for one in lacking], 2)
-            what, places = f"the file lacks {what}", dict.fromkeys(f"log.{one.kind}" for one in lacking)
-            hint = (
-                f"it has {listed([*filter(None, table.names)], 4)}: name its columns in {listed([*places])} "
-                "(`hydroid convert` guesses them), null for a joint that it lacks"
-            )
+            what = f"lacks {what}; unused: {listed([*filter(None, free.values())] or ['no column'], 3)}"
+            places = listed([*dict.fromkeys(f"log.{one.kind}" for one in lacking)])
+            hint = f"name its columns in {places}, null for none (`hydroid convert` guesses them)"
         line = f", line {table.header}" if table.header else ""
-        raise LogError(what, where=f"{table.source}{line}, column {signal.name}", hint=hint)
+        raise LogError(what, where=f"{table.source}{line}", hint=hint)
     return wanted
 
 

@@ -91,7 +91,7 @@ def test_bad_bags_are_refused_in_one_line(tmp_path: Path) -> None:
     path, _ = write(tmp_path, "mcap")
     other = SETTINGS.model_copy(update={"joints": {}, "angle": None})
     other = LogSettings.model_validate({"command": {"column": "/valve.data[{joint}]"}, "angle": None})
-    assert "the file lacks '/valve.data[1]' (command of joint 1, did you mean" in errors(path, other)
+    assert "lacks '/valve.data[1]' (command of joint 1, did you mean" in errors(path, other)
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(path.read_bytes()[:200])
     assert "cannot be read as a bag" in errors(cut)

@@ -16,9 +16,11 @@ MASSLESS = 1e-6  # mass up to which a body counts as a frame without mass [kg]
 USUAL = 1200.0
 """mass of a link over the volume of its hull [kg/m³]: compact parts of machines have 500 to 3,000. A welded
 boom has less: 10 mm of steel around 0.4 m square make 770 of the box, and a bend half empties its hull"""
-LEAST, MOST = 200.0, 8000.0  # outside these no link can be: half of the lightest such booms, and solid steel
+LEAST, MOST = 100.0, 8000.0
+"""outside these no link can be: a box around a boom of 400 kg/m³ that points up at 45 deg, four times as
+large as the boom; and solid steel"""
 SLENDER = 0.015  # volume of a link without a shape, over the cube of its length: a box of 1 to 8
-SLIGHT = LEAST / 3
+SLIGHT = 67.0
 """the least density of this box: that of a boom of 1 to 20 with 400 kg/m³, 1 kg for a length of 1 m"""
 NO_TENSOR = [np.nan, 0, 0, 0, 0, 0]  # MuJoCo's word for a full inertia that is not given
 

@@ -204,6 +204,12 @@ def test_an_impossible_inertia_is_that_of_the_mesh(tmp_path, fault):
     np.testing.assert_allclose(model.body("boom").ipos, [1, 0, 0], atol=1e-9)
 
 
+@pytest.mark.parametrize(("stated", "taken"), [(22.0, 22.0), (10.0, 144.0)])
+def test_a_box_around_a_bent_boom_may_weigh_little(tmp_path, stated, taken):
+    arm = import_arm(write_robot(tmp_path, boom=link("boom", mass=stated)))
+    assert compiled(arm)[0].body("boom").mass[0] == pytest.approx(taken)
+
+
 def test_meshes_in_millimetres_are_scaled(tmp_path):
     arm = import_arm(write_robot(tmp_path, scale=1000.0))
     said(arm, "meshes up to 2000 m long: all are taken to be in mm")

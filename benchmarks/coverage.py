@@ -12,8 +12,8 @@ delays are 0, where the bound is: they have no interval.
 bands: stage 1 of the shoulder, fitted to steps, predicts another log, of the same values or a stiffer spring.
 left_out: five logs of the virtual rig, each predicted by a fit to the others. Expected and actual error.
 
-Refinements start at the truth times random factors within 5 %: this is a study of the intervals, not of the
-search. "predicted / spread" is the mean standard deviation over the root of the mean square error.
+Refinements start within 5 % of the truth: this is a study of the intervals, not of the search. "predicted /
+spread" is the mean standard deviation over the root of the mean square error.
 """
 
 import importlib

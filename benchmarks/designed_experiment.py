@@ -3,12 +3,9 @@
     python benchmarks/designed_experiment.py [--random 20] [--effort 220] [--fits 50] [--duration 30]
         [--without "rest slew clearance"] [--seed 1]
 
-`--without` switches limits off; with `--fits 0` nothing is refitted.
-
-Stage 1, joints 1 to 6 driven and measured with 0.1 deg of white noise, nine parameters (K, D, S shared by
-the joints, six masses), the total of the masses known to 42.5 ± 0.5 kg. The truth is the article's; designer
-and random experiments know only an estimate that is off by up to a quarter in every parameter. The random
-ones are the first that drive all six joints of those that the designer begins with.
+`--without` switches limits off; with `--fits 0` nothing is refitted. docs/measured.md says what is simulated;
+the truth is the article's. The random experiments are the first that drive all six joints of those that the
+designer begins with.
 
 Precision is that at the truth, with the total mass as the only prior. Predicted: Cramer-Rao bound. Refitted:
 spread over noisy logs of the designed experiment, and of the random one with the median weakest parameter.

@@ -2,11 +2,9 @@
 
     python benchmarks/article/run.py [--quick] [--minutes N] [--processes N] [STUDY ...]
 
-The results in docs/reproduction/ count as done: a CSV of all runs for each study, written after every run.
-Only what they lack is run, up to the seeds that the studies state: first the claims that the fewest runs
-would decide, if the effect is as large as the article's. No run begins after N minutes. In the end
-figures and docs/reproduction.md are made from what there is. The short form has one seed, 15 s of data
-and few generations, and writes to runs/article-quick alone.
+Only what docs/reproduction/ lacks is run, up to the seeds that the studies state: first the claims that the
+fewest runs would decide, if the effect is that of the article. No run begins after N minutes. In the end
+figures and docs/reproduction.md are made. The short form writes to runs/article-quick alone.
 """
 
 import argparse

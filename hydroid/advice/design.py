@@ -90,15 +90,9 @@ class ExperimentSimulator:
         self._box, self._axes = known.box, known.axes(1e-5).one_sided  # little curvature
 
     def trial(self, experiment: Experiment) -> Trial | None:
-        """Return the experiment, changed to keep the limits, with its information; None where it cannot."""
-        kept = self.within_limits(experiment)
-        gained = None if kept is None else self.information(kept[0], kept[1].angle)
-        return None if kept is None or gained is None else Trial(kept[0], gained, kept[1])
+        """Return the experiment, levels reversed or reduced until it keeps the limits, and its information.
 
-    def within_limits(self, experiment: Experiment) -> tuple[Experiment, Log] | None:
-        """Reverse or reduce levels until the experiment keeps the limits; return it and its predicted log.
-
-        None where it still breaks them, or its simulation diverges.
+        None where it still breaks them, or a simulation diverges.
         """
         for _ in range(60):
             (angle,) = self._simulate(experiment, self._box.at[None])
@@ -107,7 +101,8 @@ class ExperimentSimulator:
             first = violation(angle, self._period, self._settings.arm, self._design)
             first = first or self._too_near(angle)
             if first is None:
-                return experiment, replace(experiment.log(self._settings), angle=angle)
+                gained, log = self.information(experiment, angle), experiment.log(self._settings)
+                return None if gained is None else Trial(experiment, gained, replace(log, angle=angle))
             if first.sample == 0:
                 return None  # the start pose itself
             experiment = repaired(experiment, first)

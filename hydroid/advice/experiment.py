@@ -36,13 +36,14 @@ class Experiment:
     def log(self, settings: FitSettings) -> Log:
         """Return commands without motion: every angle stays in the start pose."""
         period, slew = settings.log.period_s, settings.design.slew_pct_s
-        samples = experiment_samples(settings)
+        samples, step = experiment_samples(settings), np.inf if slew is None else slew * period
         command = np.zeros((samples, len(self.pose)))
         for joint, signal in self.inputs.items():
             held = np.diff(np.append(signal.start, samples))
             command[signal.start[0] :, joint] = np.repeat(signal.level, held)
-            if slew is not None:
-                command[:, joint] = _limited(command[:, joint], slew * period)
+            wanted = command[:, joint].tolist()
+            slow = accumulate(wanted, lambda now, to: min(max(to, now - step), now + step), initial=0.0)
+            command[:, joint] = [*slow][1:]
         angle = np.tile(self.pose, (samples, 1))
         return Log("design", period * np.arange(samples, dtype=float), command, angle, period)
 
@@ -51,14 +52,6 @@ class Experiment:
         start, levels = self.inputs[joint].start, self.inputs[joint].level.copy()
         levels[place] = np.round(level, 1)
         return replace(self, inputs={**self.inputs, joint: Input(start, levels)})
-
-
-def _limited(command: Array, step: float) -> list[float]:
-    """A command [%], shape (T,), that follows another with at most `step` per sample, from 0."""
-    slow = accumulate(
-        command.tolist(), lambda now, wanted: min(max(wanted, now - step), now + step), initial=0.0
-    )
-    return [*slow][1:]
 
 
 def experiment_samples(settings: FitSettings) -> int:

@@ -64,9 +64,14 @@ class LockedArm:
         np.add.at(mass, at, weight)
         np.add.at(ipos, at, weight[..., None] * part.centre)
         ipos[:, 1:] /= mass[:, 1:, None]
-        unit = part.inertia + _steiner(part.centre - ipos[:, part.body])
+        away = part.centre - ipos[:, part.body]
+        square = np.sum(away * away, axis=-1)[..., None, None]
+        unit = part.inertia + (square * np.eye(3) - away[..., :, None] * away[..., None, :])
         np.add.at(tensor, at, weight[..., None, None] * unit)
-        inertia, iquat = _principal(tensor)
+        inertia, axes = np.linalg.eigh(tensor)
+        axes[..., 2] *= np.sign(np.linalg.det(axes))[..., None]  # right-handed
+        quat = np.roll(Rotation.from_matrix(axes.reshape(-1, 3, 3)).as_quat(), 1, axis=-1)
+        iquat = quat.reshape(*shapes, 4)
         return {"body_mass": mass, "body_ipos": ipos, "body_iquat": iquat, "body_inertia": inertia}
 
 
@@ -147,17 +152,3 @@ def _fused(
     idle = off.mjDSBL_ACTUATION | off.mjDSBL_SENSOR | off.mjDSBL_EQUALITY | off.mjDSBL_ISLAND
     model.opt.disableflags = full.opt.disableflags | off.mjDSBL_CONTACT | off.mjDSBL_AUTORESET | idle
     return model, np.array(parts, PART).view(np.recarray)
-
-
-def _steiner(away: Array) -> Array:
-    """Inertia of 1 kg at `away` [m], shape (..., 3), about the origin [m²], shape (..., 3, 3)."""
-    square = np.sum(away * away, axis=-1)[..., None, None]
-    return square * np.eye(3) - away[..., :, None] * away[..., None, :]
-
-
-def _principal(tensor: Array) -> tuple[Array, Array]:
-    """Principal moments (..., 3) and the quaternion (w, x, y, z) of their right-handed axes (..., 4)."""
-    moments, axes = np.linalg.eigh(tensor)
-    axes[..., 2] *= np.sign(np.linalg.det(axes))[..., None]
-    quat = Rotation.from_matrix(axes.reshape(-1, 3, 3)).as_quat()
-    return moments, np.roll(quat, 1, axis=-1).reshape(*tensor.shape[:-2], 4)

@@ -10,8 +10,6 @@ from hydroid.errors import ModelError
 from hydroid.log.clues import joint_of
 from hydroid.words import listed
 
-FREE = mujoco.mjtJoint.mjJNT_FREE
-
 
 def choose_chain(
     spec: mujoco.MjSpec, where: str, notes: Notes, columns: Sequence[str] = (), tip: str | None = None
@@ -60,7 +58,7 @@ def _hold(spec: mujoco.MjSpec, notes: Notes) -> None:
     """Delete the joints that hydroid does not move, or that follow others, and say so."""
     followers = {e.name1: e.name2 for e in spec.equalities if e.type == mujoco.mjtEq.mjEQ_JOINT}
     for joint in list(spec.joints):
-        if joint.type == FREE:
+        if joint.type == mujoco.mjtJoint.mjJNT_FREE:
             notes.add("free to float in the file: fixed to the world", joint.parent.name)
         elif joint.name in followers:
             notes.add("following another joint, which hydroid does not model: held at 0", joint.name)

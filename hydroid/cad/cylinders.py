@@ -141,13 +141,12 @@ def _joint(pins: Sequence[_Pin], first: str, second: str) -> Any:
     return next(between, None)
 
 
-def _polar(joint: Any, point: Array) -> tuple[float, float]:
-    """Return distance [m] and direction [rad] of a point from a joint's axis, in a plane across it."""
+def _planar(joint: Any, point: Array) -> complex:
+    """Return where a point lies from a joint's axis, in a plane across it [m]."""
     axis, away = joint.xaxis, point - joint.xanchor
     x = np.cross([0.0, 1.0, 0.0] if abs(axis[1]) < 0.9 else [1.0, 0.0, 0.0], axis)
     x /= np.linalg.norm(x)
-    across, along = away @ np.cross(axis, x), away @ x
-    return math.hypot(across, along), math.atan2(across, along)
+    return complex(away @ x, away @ np.cross(axis, x))
 
 
 def _wrapped(angle: float) -> float:
@@ -160,8 +159,7 @@ def _four_bar(joint: Any, pins: Sequence[_Pin]) -> Plain | None:
     The pins are those of the rocker on its link and on the coupler, of the coupler on the child, of tube and
     rod.
     """
-    plane = [distance * np.exp(1j * angle) for distance, angle in (_polar(joint, pin.at) for pin in pins)]
-    ground, pin, child, foot, eye = plane
+    ground, pin, child, foot, eye = (_planar(joint, one.at) for one in pins)
     turn = abs(ground) / ground  # the rocker's pivot lies at (ground, 0)
     side = "left" if ((pin - ground) * np.conj(child - ground)).imag > 0 else "right"
     bars = FourBar(

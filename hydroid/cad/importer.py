@@ -92,11 +92,13 @@ def import_arm(
 
 
 def _clear(spec: mujoco.MjSpec, path: Path) -> None:
-    """Delete what is no part of the arm's bodies, and give these plain names."""
-    for section in (spec.keys, spec.excludes, spec.pairs):
-        for part in list(section):
-            spec.delete(part)
-    _clear_scene(spec)
+    """Delete what is no part of the arm's bodies or would stand beside the scene, and give plain names."""
+    plane, sky = mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtTexture.mjTEXTURE_SKYBOX
+    floors = [geom for geom in spec.geoms if geom.type == plane]
+    looks = [*spec.textures, *spec.materials]
+    named = [look for look in looks if look.name in ("floor", "sky") or getattr(look, "type", None) == sky]
+    for part in (*spec.keys, *spec.excludes, *spec.pairs, *spec.lights, *spec.cameras, *floors, *named):
+        spec.delete(part)
     spec.modelname = word(path.stem if spec.modelname in ("", "MuJoCo Model") else spec.modelname)
     renamed, taken = dict[str, str](), {"world"}
     for number, body in enumerate(spec.bodies[1:], start=1):
@@ -110,16 +112,6 @@ def _clear(spec: mujoco.MjSpec, path: Path) -> None:
         names = joints if one.type == mujoco.mjtEq.mjEQ_JOINT else renamed
         if one.objtype != mujoco.mjtObj.mjOBJ_SITE:
             one.name1, one.name2 = (names.get(name, name) for name in (one.name1, one.name2))
-
-
-def _clear_scene(spec: mujoco.MjSpec) -> None:
-    """Delete what would stand beside the scene: lights, cameras, floors and the sky."""
-    plane, sky = mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtTexture.mjTEXTURE_SKYBOX
-    floors = [geom for geom in spec.geoms if geom.type == plane]
-    looks = [*spec.textures, *spec.materials]
-    named = [look for look in looks if look.name in ("floor", "sky") or getattr(look, "type", None) == sky]
-    for part in (*spec.lights, *spec.cameras, *floors, *named):
-        spec.delete(part)
 
 
 def _in_scene(spec: mujoco.MjSpec, meshes: dict[str, bytes]) -> str:

@@ -52,7 +52,8 @@ def repair_inertias(spec: mujoco.MjSpec, urdf: bool, notes: Notes) -> None:
         if mass and shaped and not fault and _gyration(tensor, mass) > 2 * _gyration(hull.tensor, hull.mass):
             fault = "an inertia of a far larger body"
         if mass and fault:
-            tensor, what = ball(mass), "a steel ball of its mass is taken"
+            radius = (mass / 7850.0 / (4 / 3 * np.pi)) ** (1 / 3)
+            tensor, what = 0.4 * mass * radius**2 * np.eye(3), "a steel ball of its mass is taken"
             if shaped:
                 centre, tensor = hull.centre, mass / hull.mass * hull.tensor
                 what = "that of its hull is taken"
@@ -137,12 +138,6 @@ def set_inertia(body: mujoco.MjsBody, mass: float, centre: Array, tensor: Array)
     body.iquat, body.ialt.type = [1.0, 0.0, 0.0, 0.0], mujoco.mjtOrientation.mjORIENTATION_QUAT
     body.inertia = [0.0] * 3
     body.fullinertia = [*tensor.diagonal(), tensor[0, 1], tensor[0, 2], tensor[1, 2]] if mass else NO_TENSOR
-
-
-def ball(mass: float) -> Array:
-    """Return the inertia of a steel ball about its centre [kg·m²], shape (3, 3)."""
-    radius = (mass / 7850.0 / (4 / 3 * np.pi)) ** (1 / 3)
-    return 0.4 * mass * radius**2 * np.eye(3)
 
 
 def _stated_fault(body: mujoco.MjsBody, urdf: bool) -> str:

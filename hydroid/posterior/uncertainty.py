@@ -51,8 +51,6 @@ from hydroid.search.axes import Box, held_by_bound
 
 WEAK_ABOVE = 0.3  # relative standard deviation above which a parameter or direction is weakly identifiable
 
-Side = Literal["lower", "upper"]
-
 
 class Flag(StrEnum):
     """How well the logs determine a parameter, whatever a prior adds."""
@@ -84,7 +82,7 @@ class ParameterStatus:
     """
 
     flag: Flag
-    at_bound: Side | None = None
+    at_bound: Literal["lower", "upper"] | None = None
     share: float = 1.0
     known: bool = True
 

@@ -158,8 +158,6 @@ class FitSettings(Settings):
 
 Changes = dict[str, Any]  # settings to replace, by dotted key, as `--set` has them
 
-Axis = Annotated[dict[str, Changes] | tuple[Any, ...], Field(min_length=1)]
-
 
 class StudySettings(Settings):
     """A study."""
@@ -172,7 +170,7 @@ class StudySettings(Settings):
     """settings to replace in every cell, by dotted key"""
     logs: Annotated[tuple[str, ...], Field(min_length=1)]
     """fitted logs, relative to the study's file"""
-    axes: dict[str, Axis] = {}
+    axes: dict[str, Annotated[dict[str, Changes] | tuple[Any, ...], Field(min_length=1)]] = {}
     """what varies: a dotted key with a list of values, or a name with cells: {label: {key: value, ...}}"""
     seeds: Annotated[int, Field(ge=0, le=10_000)] = 10
     """number of seeds, from 1"""

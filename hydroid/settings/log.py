@@ -9,7 +9,7 @@ log:
 """
 
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, ValidationInfo
 
@@ -18,10 +18,6 @@ from hydroid.settings.load import JointNumber, Settings
 
 JOINT = "{joint}"
 Kind = Literal["command", "angle", "pressure"]
-
-
-def _as_names(value: Any) -> Any:
-    return (value,) if isinstance(value, str) else value
 
 
 def _nonzero(value: float | None) -> float | None:
@@ -46,7 +42,9 @@ class TimeColumn(Settings):
 class Columns(Settings):
     """Columns of one quantity: value = scale · cell + offset. Null: as for all joints, or the default."""
 
-    column: Annotated[tuple[Name, ...] | None, BeforeValidator(_as_names)] = None
+    column: Annotated[
+        tuple[Name, ...] | None, BeforeValidator(lambda given: (given,) if isinstance(given, str) else given)
+    ] = None
     """name in the header, with {joint} for the joint's number; or two names: the positive and the negative
     direction of a command, whose values lie in [0, 100] % and are subtracted; chamber A, which pushes to
     positive angles, and chamber B of a pressure. Default: u{joint}_pct, q{joint}_deg, [pA{joint}_bar,

@@ -156,13 +156,10 @@ def _name_infinity(value: Any) -> Any:
     return "inf" if isinstance(value, float) and value == math.inf else value
 
 
-Order = Annotated[Literal[1, 2, "inf"], BeforeValidator(_name_infinity)]
-
-
 class ObjectiveSettings(Settings):
     """Norm of the output error, equations (18) and (19), and the segments of equation (21)."""
 
-    norm: Order = "inf"
+    norm: Annotated[Literal[1, 2, "inf"], BeforeValidator(_name_infinity)] = "inf"
     """p of the norm: 1, 2 or inf (the article's choice, table 5)"""
     relative: bool = False
     """divide by the norm of the measured output of the same segment, equation (19)"""

@@ -14,6 +14,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from hydroid.arrays import Array, Mask
+from hydroid.errors import SettingsError
 from hydroid.log import Log
 from hydroid.parameters import ParameterSet
 from hydroid.posterior.noise import Noise, error_level, prior_weight, problem_noise
@@ -140,9 +141,14 @@ def estimate_box(parameters: ParameterSet, theta: Array) -> Box:
     """Return theta, (P,), between its bounds, with the scale of relative changes; the free ones vary.
 
     A relative change of 1 is the value; on a linear scale at least a hundredth of the bounds' width.
+    Raises SettingsError: a free parameter on a log scale is 0.
     """
     least = np.where(parameters.log, 0.0, 0.01 * (parameters.upper - parameters.lower))
     scale = np.maximum(np.abs(theta), least)
+    for name in np.array(parameters.names)[parameters.free & (scale == 0)]:
+        raise SettingsError(
+            f"parameter {name} is 0", hint="it is on a log scale: state a value above 0, or fix it"
+        )
     return Box(theta, parameters.lower, parameters.upper, scale, parameters.free)
 
 

@@ -32,7 +32,7 @@ def parameter_section(settings: FitSettings, summary: FitSummary) -> Section:
 
 
 def parameter_table(settings: FitSettings, summary: FitSummary, profiles: Intervals | None = None) -> Table:
-    """Return one row per parameter: bounds, estimate, intervals, share of the data, effect, flag.
+    """Return one row per parameter: bounds, estimate, intervals, share of the data, flag.
 
     `profiles` are further intervals by parameter.
     """
@@ -54,18 +54,17 @@ def parameter_table(settings: FitSettings, summary: FitSummary, profiles: Interv
                 for end, v in zip(("from", "to"), pair, strict=True)
             },
             "data [%]": None if one.data_share is None else 100 * one.data_share,
-            "effect [deg]": one.effect_deg,
             "flag": status(one),
         }
 
     by_log = ("by log from", "by log to") if summary.left_out_deg else ()
     columns = ["name", "what", "unit", "lower", "upper", "value", "from", "to", *by_log]
-    columns += [*(("profile from", "profile to") if profiles else ()), "data [%]", "effect [deg]", "flag"]
+    columns += [*(("profile from", "profile to") if profiles else ()), "data [%]", "flag"]
     note = (
-        "from, to: 95 % interval; empty: no limit. data: share of the information from the logs. effect: rms "
-        "change of the angles per 1 % of the parameter. by log: from the differences between logs."
+        "from, to: 95 % interval; empty: no limit. data: share of the information from the logs. by log: "
+        "from the differences between logs."
     )
-    optional = ("what", *by_log, "effect [deg]", "data [%]", "lower", "upper")
+    optional = ("what", *by_log, "data [%]", "lower", "upper")
     rows = map(row, settings.parameter_set().parameters)
     return Table.of("Parameters", {name: name for name in columns}, rows, note, optional)
 

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from report_fits import MODEL, make_fit, make_problem, make_uncertainty
 
@@ -30,7 +29,6 @@ def test_every_parameter_is_in_the_table():
     table = parameter_table(problem.settings, summarise(problem, fit))
     assert column(table, "name") == list(MODEL)
     assert column(table, "value") == list(fit.best.theta)
-    assert column(table, "effect [deg]") == pytest.approx(np.degrees(fit.uncertainty.sensitivity))
     assert column(table, "from") == pytest.approx(fit.uncertainty.interval[:, 0])
     assert column(table, "to") == pytest.approx(fit.uncertainty.interval[:, 1])
     assert set(table.optional) & set(table.header)

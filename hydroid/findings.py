@@ -109,7 +109,10 @@ WORDS: dict[str, tuple[str, str]] = {
     "state": ("State {0} to ±{sd:.0f} %, from a data sheet or a measurement.", _BRINGS),
     "experiment": ("Run the designed experiment of {0} s (`hydroid design`).", _BRINGS),
     "fit the hydraulics": ("Fit the hydraulics.", "Stage 1 has a gain in their place: most of its error."),
-    "predict unseen": ("Predict a log that this fit has not seen.", "Only such a log can test the model."),
+    "predict unseen": (
+        "Test the fit on a log that it has not seen.",
+        "'Not tested' says that none was given that drives the joint.",
+    ),
     "use the machine": ("Simulate the machine.", "`load_plant` gives it to a controller in Python."),
     "run the experiment": (
         "Run commands.csv on the machine.",

@@ -35,10 +35,10 @@ def validate(
     set: "SettingChanges" = None,
     repair: bool = False,
 ) -> "Result[list[Prediction]]":
-    """Test fits on logs that they were not fitted to: a verdict on each joint beside simple models' errors.
+    """Test fits on logs that they have not seen: a verdict on each joint, beside the errors of simple models.
 
-    Each fit reads the logs with its own settings. The report of each run shows its unseen logs too. Error
-    indices (article, table 9) and responses stand on the page.
+    Each fit reads the logs with its own settings. The page shows every response with its errors (article,
+    table 9). From then on, the report of the fit's own run shows these logs too.
 
     Example: hydroid validate OTHER.csv --fit runs/mech --fit runs/hyd
 
@@ -48,7 +48,7 @@ def validate(
     Args:
         fit (RUN|YAML): An estimate: a run folder, a folder written by Plant.save (Python), or a YAML file.
             Repeat the option for several estimates.
-        tolerance (0.001 to 90): An rms error [deg] that you accept, of every joint; config.yaml can
+        tolerance (0.001 to 90): The rms error [deg] that you accept for every joint; config.yaml can
             hold one for each (tolerance_deg) [default: that of the fit, or else 2 % of a joint's travel].
 
     Raises:
@@ -77,8 +77,7 @@ def validate(
         predictions = [predicted(model, log, unseen) for log, unseen in zip(own, new, strict=True)]
         if out is not None and (run := keep_validation(model, predictions)):
             draw(run)
-        unseen = [prediction for prediction in predictions if prediction.unseen is not False]
-        verdicts[name] = judge(model.settings.changed(stated), fitted, baselines, unseen)
+        verdicts[name] = judge(model.settings.changed(stated), fitted, baselines, predictions)
         results[name] = [replace(prediction, fit=name) for prediction in predictions]
     fits, arm = ordered(verdicts), models[0].settings.arm
     every = [prediction for name in fits for prediction in results[name]]

@@ -58,7 +58,7 @@ def judge(
         settings: of the fit.
         fitted: what it makes of its own logs; none of values that are no fit's.
         baselines: fitted to the same logs; none: a joint is compared with standing still.
-        unseen: its predictions of other logs.
+        unseen: its predictions of other logs; those that it has seen test nothing.
     """
     return tuple(
         _judge(settings, fitted, unseen, baselines.get(j) or {NAMES[0]: Baseline(j, ANYWHERE)})
@@ -73,7 +73,8 @@ def _judge(
     rivals: Mapping[str, Baseline],
 ) -> JointVerdict:
     joint = rivals[NAMES[0]].joint
-    own, new = ([p for p in some if p.log.driven[joint - 1]] for some in (fitted, unseen))
+    new = [p for p in unseen if p.log.driven[joint - 1] and p.unseen is not False]
+    own = [p for p in fitted if p.log.driven[joint - 1]]
     stated = settings.tolerance_deg
     stated = stated.get(joint) if isinstance(stated, dict) else stated
     travel = max((np.ptp(p.log.angle[:, joint - 1]) for p in new or own), default=0.0)

@@ -127,17 +127,13 @@ def next_step(
     settings: FitSettings, verdicts: Sequence[JointVerdict], run: str, logs: str = "LOG.csv"
 ) -> Finding:
     """Return what to do after a fit of `logs` in the folder `run`, and its command."""
-    run, kind = shlex.quote(run), "look for terms"
+    run = shlex.quote(run)
     if settings.stage == "mech":
-        kind = "fit the hydraulics"
+        kind, command = "fit the hydraulics", f"hydroid fit-hyd {logs} --mech {run}"
     elif any(one.verdict == "not tested" for one in verdicts):
-        kind = "predict unseen"
+        kind, command = "predict unseen", f"hydroid validate OTHER.csv --fit {run}"
     elif all(one.verdict == "predicts" for one in verdicts):
-        kind = "use the machine"
-    commands = {
-        "fit the hydraulics": f"hydroid fit-hyd {logs} --mech {run}",
-        "predict unseen": f"hydroid validate OTHER.csv --fit {run}",
-        "use the machine": f"hydroid simulate COMMANDS.csv --fit {run}",
-        "look for terms": f"hydroid suggest --fit {run}",
-    }
-    return Finding(kind, "note", (), {"command": commands[kind]})
+        kind, command = "use the machine", f"hydroid simulate COMMANDS.csv --fit {run}"
+    else:
+        kind, command = "look for terms", f"hydroid suggest --fit {run}"
+    return Finding(kind, "note", (), {"command": command})

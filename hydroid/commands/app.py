@@ -47,14 +47,9 @@ GROUPS = {
 COMMANDS = [name for commands in GROUPS.values() for name in commands]
 PLAIN: Any = {"add_completion": False, "rich_markup_mode": None, "pretty_exceptions_enable": False}
 """of typer's apps; plain help: importing rich would triple the time it takes"""
-PRINTING = {
-    "json": typer.Option("--json", help="Print the result as JSON (docs/json.md)."),
-    "quiet": typer.Option("-q", "--quiet", help="Print errors only."),
-    "verbose": typer.Option(
-        "-v", "--verbose", help="Also print all tables, findings, and the lines that go to run.log."
-    ),
-}
-"""options of every command on the command line"""
+
+
+VERBOSE = "Also print all tables, findings, and the lines that go to run.log."
 
 
 class LazyGroup(TyperGroup):
@@ -83,7 +78,15 @@ def click_command(command: str) -> "TyperCommand":
 
     text, example, parameters = COMMAND_LINES[function]
 
-    def run(json: bool, quiet: bool, verbose: bool, **given: Any) -> None:
+    def run(
+        *,
+        json: Annotated[
+            bool, typer.Option("--json", help="Print the result as JSON (docs/json.md).")
+        ] = False,
+        quiet: Annotated[bool, typer.Option("-q", "--quiet", help="Print errors only.")] = False,
+        verbose: Annotated[bool, typer.Option("-v", "--verbose", help=VERBOSE)] = False,
+        **given: Any,
+    ) -> None:
         if given.get("out", "") is None and command != "view":  # in Python nothing is written then
             given["out"] = "runs/simulated.csv" if command == "simulate" else f"runs/{command}"
         VISIBLE.set(not (quiet or json))
@@ -93,15 +96,9 @@ def click_command(command: str) -> "TyperCommand":
             show(result, as_json=json, verbose=verbose)
         raise typer.Exit(result.exit_status)
 
-    printing = [
-        inspect.Parameter(
-            n, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=Annotated[bool, option]
-        )
-        for n, option in PRINTING.items()
-    ]
-    signature = inspect.Signature([*parameters, *printing])
-    run.__signature__ = signature  # pyright: ignore[reportFunctionMemberAccess]
-    run.__annotations__ = {name: parameter.annotation for name, parameter in signature.parameters.items()}
+    *printing, _ = inspect.signature(run).parameters.values()
+    run.__signature__ = inspect.Signature([*parameters, *printing])  # pyright: ignore[reportFunctionMemberAccess]
+    run.__annotations__ |= {parameter.name: parameter.annotation for parameter in parameters}
     alone = typer.Typer(**PLAIN)
     alone.command(command, help=text, epilog=example)(run)
     return typer.main.get_command(alone)  # pyright: ignore[reportReturnType]  # a group only of several commands

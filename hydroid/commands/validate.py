@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from hydroid.commands.console import Result, written
 from hydroid.commands.inputs import (
@@ -62,7 +62,7 @@ def validate(
     from hydroid.fitting.verdict import judge
     from hydroid.reporting.page import unique
     from hydroid.reporting.predictions import draw, validation_page
-    from hydroid.reporting.verdict_table import next_lines, next_step, ordered, verdict_lines
+    from hydroid.reporting.verdict_table import next_lines, next_steps, ordered, verdict_lines
     from hydroid.run.folder import log_hash
     from hydroid.run.record import fitted_by, keep_validation, run_of
 
@@ -73,8 +73,9 @@ def validate(
         fitted, baselines, hashes = fitted_by(model)
         if not isinstance(one, str | Path | IdentifiedModel):
             fitted, baselines, hashes = one.predictions, one.baselines, {*map(log_hash, one.problem.logs)}
-        new = [None if hashes is None else log_hash(log) not in hashes for log in own]
-        predictions = [predicted(model, log, unseen) for log, unseen in zip(own, new, strict=True)]
+        predictions = [
+            predicted(model, log, None if hashes is None else log_hash(log) not in hashes) for log in own
+        ]
         if out is not None and (run := keep_validation(model, predictions)):
             draw(run)
         verdicts[name] = judge(model.settings.changed(stated), fitted, baselines, predictions)
@@ -82,9 +83,9 @@ def validate(
     fits, arm = ordered(verdicts), models[0].settings.arm
     every = [prediction for name in fits for prediction in results[name]]
     best = next(iter(fits))
-    model, steps = models[[*results].index(best)], list[Any]()
-    if run := run_of(model):
-        steps.append(next_step(model.settings, fits[best], str(run)))
+    model = models[[*results].index(best)]
+    run = run_of(model)
+    steps = next_steps(model.settings, fits[best], str(run))[:1] if run else []
     page = validation_page(every, fits, arm, *steps)
     content = {
         "verdict": [{"fit": name} | one.model_dump() for name in fits for one in fits[name]],

@@ -4,7 +4,6 @@ Colours are named after Okabe and Ito's, which colour-blind readers tell apart; 
 own shade of them.
 """
 
-from collections.abc import Iterable
 from dataclasses import field, replace
 from functools import partial
 from typing import Literal
@@ -95,17 +94,6 @@ class Chart:
         """Return the chart with what is drawn of its curves."""
         panels = (replace(p, marks=tuple(m.thinned(self.bins) for m in p.marks)) for p in self.panels)
         return replace(self, panels=tuple(panels))
-
-
-ZERO = Mark("rule", y=np.zeros(1), color="grey", width=1)
-
-
-def joined(curves: Iterable[Array]) -> tuple[Array, Array]:
-    """Return x and y of several curves, each of shape (n, 2), as one with a gap between them."""
-    gap = np.full((1, 2), np.nan)
-    parts = [part for curve in curves for part in (gap, curve)]
-    x, y = np.concatenate([np.empty((0, 2)), *parts[1:]]).T
-    return x, y
 
 
 def finite(values: Array) -> Array:

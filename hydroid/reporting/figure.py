@@ -17,7 +17,7 @@ from scipy.spatial import ConvexHull, QhullError
 from hydroid.arm.model import load_model
 from hydroid.arrays import Array
 from hydroid.files import Plain
-from hydroid.reporting.chart import SERIES, Chart, Mark, Panel
+from hydroid.reporting.chart import SERIES, Chart, Mark
 from hydroid.reporting.outlines import Shape, body_poses, placed, shapes, sight
 from hydroid.settings.arm import Arm
 from hydroid.settings.cylinder import LinearActuator
@@ -79,8 +79,12 @@ def figure(chart: Chart) -> Figure:
     for one, panel in zip_longest(axes, chart.thinned().panels):
         if panel is None:
             one.set_axis_off()
-        else:
-            _panel(one, panel)
+            continue
+        for mark in panel.marks:
+            if not mark.off:
+                _draw(one, mark)
+        one.set(title=panel.title, xlabel=panel.x, ylabel=panel.y, ylim=panel.y_limits)
+        one.set_yscale("log" if panel.log_y else "linear")
     legend(drawing)
     return drawing
 
@@ -94,22 +98,13 @@ def legend(drawing: Figure) -> None:
         drawing.legend(handles=list(labels.values()), loc=where, ncols=max(1, min(3, columns)))
 
 
-def _panel(axes: Axes, panel: Panel) -> None:
-    for mark in panel.marks:
-        if not mark.off:
-            _draw(axes, mark)
-    axes.set(title=panel.title, xlabel=panel.x, ylabel=panel.y, ylim=panel.y_limits)
-    axes.set_yscale("log" if panel.log_y else "linear")
-
-
 def _draw(axes: Axes, mark: Mark) -> None:
     x, y, end = mark.x, mark.y, mark.end
     look: Plain = {"color": SHADES[mark.color], "alpha": mark.alpha, "label": mark.label or None}
     match mark.kind:
-        case "line":
-            axes.plot(x, y, lw=mark.width, **look)
-        case "step":
-            axes.step(x, y, where="post", lw=mark.width, **look)
+        case "line" | "step":
+            drawn = "default" if mark.kind == "line" else "steps-post"
+            axes.plot(x, y, lw=mark.width, drawstyle=drawn, **look)
         case "points":
             axes.plot(x, y, "o", ms=mark.width, zorder=3, **look)
         case "band":
@@ -138,21 +133,20 @@ def arm_picture(arm: Arm, title: str) -> tuple[bytes, bytes]:
     mujoco.mj_forward(model, data)
     (poses,) = body_poses(model, angles[None])
     outlines = [Shape(shape.body, shape.placed(poses)) for shape in shapes(model)]
-    linear = [
-        one.actuator if isinstance(one.actuator, LinearActuator) and not one.slides else None
-        for one in arm.joints
+    cylinders = [
+        (number, joint, joint.actuator)
+        for number, joint in enumerate(arm.joints)
+        if isinstance(joint.actuator, LinearActuator) and not joint.slides
     ]
-    cylinders = any(linear)
     with style():
         drawing = Figure((7.2, 7.5 if cylinders else 4.4), layout="constrained")
         axes: Any = drawing.subplots(2 if cylinders else 1, 2, squeeze=False)
         for one, name in zip(axes[0], VIEWS, strict=True):
             _view(one, arm, data, outlines, poses, name)
-        for number, (joint, linkage) in enumerate(zip(arm.joints, linear, strict=True)):
-            if linkage is not None:
-                angle, look = np.linspace(*joint.range, 181), {"color": _color(number), "label": joint.name}
-                axes[1, 0].plot(angle, linkage.length(np.radians(angle)), **look)
-                axes[1, 1].plot(angle, linkage.moment_arm(np.radians(angle)), **look)
+        for number, joint, linkage in cylinders:
+            angle, look = np.linspace(*joint.range, 181), {"color": _color(number), "label": joint.name}
+            axes[1, 0].plot(angle, linkage.length(np.radians(angle)), **look)
+            axes[1, 1].plot(angle, linkage.moment_arm(np.radians(angle)), **look)
         if cylinders:
             x = "joint angle [deg]"
             axes[1, 0].set(xlabel=x, ylabel="pivot to pivot [m]", title="lengths of the cylinders")

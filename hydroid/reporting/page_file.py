@@ -22,19 +22,16 @@ from hydroid.reporting.page import Page, Table
 
 
 def write_page(page: Page, out: Path) -> list[Path]:
-    """Write a report to the folder `out`: the page, its tables as CSV, and its data."""
-    content = {**page.data, f"{page.name}.html": html(page)}
+    """Write a report to the folder `out`: its tables as CSV, its data, and last the page."""
+    return write_tables(page.tables, out, **page.data, **{f"{page.name}.html": html(page)})
+
+
+def write_tables(tables: Mapping[str, Table], out: Path, **more: str) -> list[Path]:
+    """Write tables by name as CSV, to tables/ in the folder `out`, and more files by name."""
+    content = {f"tables/{name}.csv": table.csv() for name, table in tables.items()} | more
     for name, text in content.items():
         write_atomic(out / name, text)
-    return [*write_tables(page.tables, out), *(out / name for name in content)]
-
-
-def write_tables(tables: Mapping[str, Table], out: Path) -> list[Path]:
-    """Write tables by name as CSV, to tables/ in the folder `out`."""
-    files = {out / "tables" / f"{name}.csv": table.csv() for name, table in tables.items()}
-    for file, text in files.items():
-        write_atomic(file, text)
-    return [*files]
+    return [out / name for name in content]
 
 
 def write_figures(page: Page, out: Path) -> list[Path]:

@@ -18,6 +18,7 @@ from hydroid.settings.fit import FitSettings
 from hydroid.words import number
 
 BEST_WITHIN = 0.3  # half of a 95 % interval, relative to the value, up to which a property counts as known
+ENDS = ("from", "to", "by log from", "by log to", "profile from", "profile to")
 SPREAD = ("name", "unit", "median", "lowest", "lower_quartile", "upper_quartile", "highest", "flag")
 Intervals = Mapping[str, tuple[float, float]]
 
@@ -40,26 +41,21 @@ def parameter_table(settings: FitSettings, summary: FitSummary, profiles: Interv
     def row(p: Parameter) -> dict[str, Any]:
         one, given = summary.estimate[p.name], settings.parameters[p.name].bounds
         low, high = map(Given, given) if given else (p.lower, p.upper)
-        ends = {"": one.interval, "by log ": one.interval_by_log}
-        ends["profile "] = (profiles or {}).get(p.name, (None, None))
+        ends = *one.interval, *one.interval_by_log, *(profiles or {}).get(p.name, (None, None))
         return {
             "name": p.name,
             "what": _plain_name(settings, p.name),
             "unit": p.unit,
             "value": one.value,
             **({"lower": low, "upper": high} if low < high else {}),
-            **{
-                f"{of}{end}": v
-                for of, pair in ends.items()
-                for end, v in zip(("from", "to"), pair, strict=True)
-            },
+            **dict(zip(ENDS, ends, strict=True)),
             "data [%]": None if one.data_share is None else 100 * one.data_share,
             "flag": status(one),
         }
 
-    by_log = ("by log from", "by log to") if summary.left_out_deg else ()
-    columns = ["name", "what", "unit", "lower", "upper", "value", "from", "to", *by_log]
-    columns += [*(("profile from", "profile to") if profiles else ()), "data [%]", "flag"]
+    by_log = ENDS[2:4] if summary.left_out_deg else ()
+    columns = ["name", "what", "unit", "lower", "upper", "value", *ENDS[:2], *by_log]
+    columns += [*(ENDS[4:] if profiles else ()), "data [%]", "flag"]
     note = (
         "from, to: 95 % interval; empty: no limit. data: share of the information from the logs. by log: "
         "from the differences between logs."
@@ -113,11 +109,9 @@ def direction_table(known: Covariance) -> Table:
     rows: list[tuple[float, str]] = []
     for value, axis in zip(singular.tolist(), axes, strict=True):
         order = np.argsort(-np.abs(axis), kind="stable")
-        parts = [
-            (known.parameters[i], axis[i] * np.sign(axis[order[0]])) for i in order if abs(axis[i]) >= 0.1
-        ]
-        text = ", ".join(f"{name} {part:+.2f}" for name, part in parts).replace("-", "−")
-        rows.append((100 / value if value > 0 else np.inf, text))
+        shares = np.sign(axis[order[0]]) * axis
+        parts = (f"{known.parameters[i]} {shares[i]:+.2f}" for i in order if abs(shares[i]) >= 0.1)
+        rows.append((100 / value if value > 0 else np.inf, ", ".join(parts).replace("-", "−")))
     header = ("standard deviation [%]", "parameters that change together, in proportion to their values")
     return Table("", header, tuple(rows))
 

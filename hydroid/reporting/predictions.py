@@ -1,6 +1,5 @@
 """Pages of predictions, what models make of logs: of a fit, from what its run stores, and of a validation."""
 
-import shlex
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
@@ -14,7 +13,7 @@ from hydroid.fitting.search import HISTORY
 from hydroid.fitting.validation import Prediction
 from hydroid.fitting.verdict import judge, rms_deg
 from hydroid.reporting import page_file
-from hydroid.reporting.chart import SERIES, ZERO, Chart, Mark, Panel, finite
+from hydroid.reporting.chart import SERIES, Chart, Mark, Panel, finite
 from hydroid.reporting.outlines import motion_section
 from hydroid.reporting.page import Page, Plot, Section, Tab, Table, log_names, numbers_csv, short_name
 from hydroid.reporting.parameters_report import (
@@ -25,7 +24,7 @@ from hydroid.reporting.parameters_report import (
     warnings,
 )
 from hydroid.reporting.search_report import search_section
-from hydroid.reporting.verdict_table import Verdicts, horizon_section, lead, next_step, verdict_section
+from hydroid.reporting.verdict_table import Verdicts, horizon_section, lead, next_steps, verdict_section
 from hydroid.run.record import Record, load_record
 from hydroid.settings.arm import Arm
 from hydroid.words import number
@@ -103,7 +102,7 @@ def draw_response(
     place, unit, factor = ("position", "mm", 1e3) if slides else ("angle", "deg", np.degrees(1.0))
     measured = factor * log.angle[:, column]
     upper = [Mark("line", log.time, measured, color="ink", label="measured", width=5, alpha=0.35)]
-    middle = [ZERO]
+    middle = [Mark("rule", y=np.zeros(1), color="grey", width=1)]
     # a response that runs away, by three ranges of the measured angle, must not flatten the others
     far = 3.0 * max(np.ptp(measured), 1.0)
     for i, (one, color) in enumerate(zip(several, cycle(SERIES), strict=False)):
@@ -164,13 +163,13 @@ def fit_page(record: Record) -> Page:
     fits = {final: judge(settings, result.fitted, result.baselines, unseen)}
     # a validation has the name of the run, a fitted log that of the estimate: here both are the fit
     predictions = [replace(p, fit=final) for p in (*unseen, *result.fitted)]
-    step = next_step(settings, fits[final], record.folder, record.given)
+    step, *more = next_steps(settings, fits[final], record.folder, record.given)
     sections = (
         verdict_section(fits, step),
         *prediction_sections(predictions, settings.arm, fits),
         *quantity_section(settings, summary),
         *unknown_sections(summary),
-        Section("Do next", steps=_steps(record, step)),
+        Section("Do next", steps=tuple(more)),
         parameter_section(settings, summary),
         *speed_section(settings, summary, [p.log for p in result.fitted]),
         search_section(record),
@@ -179,17 +178,6 @@ def fit_page(record: Record) -> Page:
     title = f"Fit of {settings.arm.name}, stage {2 if settings.stage == 'hyd' else 1}"
     made_by = {k: str(v) for k, v in record.identity.items() if k in ("hydroid", "mujoco", "numpy", "python")}
     return Page("report", title, lead(fits), tuple(in_order), warnings(summary), made_by, _data(record))
-
-
-def _steps(record: Record, first: Finding) -> tuple[Finding, ...]:
-    """Return what to do after the first step, and how to make the fit again."""
-    run, config, again = (shlex.quote(f"{record.folder}{end}") for end in ("", "/config.yaml", "-again"))
-    commands = {
-        "look for terms": f"hydroid suggest --fit {run}",
-        "fit again": f"hydroid fit-{record.settings.stage} {record.given} --config {config} --out {again}",
-    }
-    more = (Finding(kind, "note", (), {"command": command}) for kind, command in commands.items())
-    return tuple(finding for finding in more if finding.kind != first.kind)
 
 
 def _data(record: Record) -> dict[str, str]:

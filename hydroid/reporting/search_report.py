@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 
 from hydroid.arrays import Array
-from hydroid.reporting.chart import SERIES, Chart, Mark, Panel, finite, joined
+from hydroid.reporting.chart import SERIES, Chart, Mark, Panel, finite
 from hydroid.reporting.page import Plot, Section
 from hydroid.run.record import Record
 from hydroid.settings.problem import ObjectiveSettings
@@ -54,7 +54,8 @@ def pareto(objectives: Array, estimates: dict[str, Array], objective: ObjectiveS
     front = _shown(objective, objectives[np.argsort(objectives[:, -1], kind="stable")[:100], :-1])
     at = np.arange(1.0, front.shape[1] + 1)
     # one line with gaps: a line each would be a legend entry and a glyph each
-    lines = joined(np.column_stack([at, one]) for one in front)
+    gap = np.full((len(front), 1), np.nan)
+    lines = (np.column_stack([one, gap]).ravel()[:-1] for one in (np.broadcast_to(at, front.shape), front))
     kind = "points" if len(at) == 1 else "line"
     marks = [Mark(kind, *lines, color="grey", label=f"Pareto set ({len(objectives)})", width=1, alpha=0.6)]
     for color, (name, segments) in zip(SERIES, estimates.items(), strict=False):

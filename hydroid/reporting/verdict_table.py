@@ -123,17 +123,18 @@ def worst(verdicts: Sequence[JointVerdict]) -> str:
     return f"Worst joint: {one.name}, with an error of {error}; its tolerance is {tolerance}."
 
 
-def next_step(
-    settings: FitSettings, verdicts: Sequence[JointVerdict], run: str, logs: str = "LOG.csv"
-) -> Finding:
-    """Return what to do after a fit of `logs` in the folder `run`, and its command."""
-    run = shlex.quote(run)
+def next_steps(
+    settings: FitSettings, verdicts: Sequence[JointVerdict], folder: str, logs: str = "LOG.csv"
+) -> list[Finding]:
+    """Return what to do after a fit of `logs` in a run folder, the first step first, with their commands."""
+    run, config, again = (shlex.quote(f"{folder}{end}") for end in ("", "/config.yaml", "-again"))
+    steps: dict[str, str] = {}
     if settings.stage == "mech":
-        kind, command = "fit the hydraulics", f"hydroid fit-hyd {logs} --mech {run}"
+        steps["fit the hydraulics"] = f"hydroid fit-hyd {logs} --mech {run}"
     elif any(one.verdict == "not tested" for one in verdicts):
-        kind, command = "predict unseen", f"hydroid validate OTHER.csv --fit {run}"
+        steps["predict unseen"] = f"hydroid validate OTHER.csv --fit {run}"
     elif all(one.verdict == "predicts" for one in verdicts):
-        kind, command = "use the machine", f"hydroid simulate COMMANDS.csv --fit {run}"
-    else:
-        kind, command = "look for terms", f"hydroid suggest --fit {run}"
-    return Finding(kind, "note", (), {"command": command})
+        steps["use the machine"] = f"hydroid simulate COMMANDS.csv --fit {run}"
+    steps["look for terms"] = f"hydroid suggest --fit {run}"
+    steps["fit again"] = f"hydroid fit-{settings.stage} {logs} --config {config} --out {again}"
+    return [Finding(kind, "note", (), {"command": command}) for kind, command in steps.items()]

@@ -19,7 +19,7 @@ from hydroid.fitting.verdict import judge
 from hydroid.reporting.page import Page, Section, Table
 from hydroid.reporting.page_file import html, write_figures, write_page
 from hydroid.reporting.predictions import fit_page, validation_page
-from hydroid.reporting.verdict_table import horizon_section, next_step, ordered, verdict_table, worst
+from hydroid.reporting.verdict_table import horizon_section, next_steps, ordered, verdict_table, worst
 
 HOSTILE = "<b>&_%$.csv"
 
@@ -144,7 +144,7 @@ def test_errors_of_a_joint_that_slides_are_in_millimetres():
 )
 def test_what_to_do_next_follows_from_the_verdicts(stage, words, command):
     verdicts = [JointVerdict(joint=1, name="boom", verdict=word, tolerance_deg=1) for word in words]
-    assert next_step(load_settings(f"fit-{stage}"), verdicts, "a run").numbers == {"command": command}
+    assert next_steps(load_settings(f"fit-{stage}"), verdicts, "a run")[0].numbers == {"command": command}
 
 
 def test_the_worst_joint_is_that_which_errs_most_for_its_tolerance():

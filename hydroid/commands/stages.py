@@ -4,9 +4,9 @@ import logging
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from hydroid.commands.fit import FitResult, fit, fit as run_fit
+from hydroid.commands.fit import FitResult, fit as run_fit
 from hydroid.commands.inputs import (
     ConfigSource,
     LogSources,
@@ -28,9 +28,6 @@ from hydroid.parallel.cluster import open_workers
 from hydroid.quantity_table import MECHANICAL
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.parameters import nominal_value
-
-if TYPE_CHECKING:
-    from hydroid.commands.logs import LogSources
 
 _log = logging.getLogger(__name__)
 
@@ -67,9 +64,7 @@ def fit_mech(
     Raises:
         HydroidError: an input or a folder that cannot be used.
     """
-    changes = _changes(set, algorithm, seed, threads, refinement)
-    settings = load_stage("mech", config, changes, start)
-    return _fit(settings, logs, out, resume=resume, dask=dask, repair=repair)
+    return _fit("mech", locals())
 
 
 @command
@@ -106,21 +101,24 @@ def fit_hyd(
     Raises:
         HydroidError: an input or a folder that cannot be used.
     """
-    changes = _changes(set, algorithm, seed, threads, refinement)
-    settings = load_stage("hyd", config, with_mechanics(mech, config, changes), start)
-    return _fit(settings, logs, out, resume=resume, dask=dask, repair=repair)
+    return _fit("hyd", locals())
 
 
-def _changes(
-    given: SettingChanges,
-    algorithm: str | None,
-    seed: int | None,
-    threads: int | None,
-    refinement: bool | None,
-) -> Plain:
-    """Return the settings that the options of both stages replace."""
-    options = {"search.algorithm": algorithm, "search.seed": seed, "simulation.threads": threads}
-    return setting_changes(given, options) | ({"refinement": None} if refinement is False else {})
+def _fit(stage: str, given: Mapping[str, Any]) -> FitResult:
+    """Fit a stage with the arguments of its command by name, with progress and the workers asked for."""
+    keys = {"search.algorithm": "algorithm", "search.seed": "seed", "simulation.threads": "threads"}
+    changes = setting_changes(given["set"], {key: given[name] for key, name in keys.items()})
+    if given["refinement"] is False:
+        changes["refinement"] = None
+    config = given["config"]
+    if stage == "hyd":
+        changes = with_mechanics(given["mech"], config, changes)
+    settings = load_stage(stage, config, changes, given["start"])
+    read = read_logs(given["logs"], settings, repair=given["repair"])
+    with open_workers(given["dask"]) as workers, FitProgress(settings) as watcher:
+        return run_fit(
+            settings, read, given["out"], resume=given["resume"], progress=watcher, workers=workers
+        )
 
 
 def load_stage(
@@ -189,21 +187,6 @@ def with_mechanics(mech: "ModelSource | None", config: ConfigSource, changes: Ma
         what = f"stage 2 needs the values of {', '.join(missing)} from stage 1"
         raise SettingsError(what, where=mech or "", hint=hint)
     return {**changes, **held}
-
-
-def _fit(
-    settings: FitSettings,
-    logs: LogSources,
-    out: Source | None,
-    *,
-    resume: bool,
-    dask: str | None,
-    repair: bool,
-) -> FitResult:
-    """Fit, with progress and the workers that are asked for."""
-    read = read_logs(logs, settings, repair=repair)
-    with open_workers(dask) as workers, FitProgress(settings) as watcher:
-        return fit(settings, read, out, resume=resume, progress=watcher, workers=workers)
 
 
 @command

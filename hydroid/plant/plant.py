@@ -63,6 +63,7 @@ class Plant:
         wanted = set(joints or fitted or settings.outputs)
         pairs = list(zip(numbers, arm.joint_names, strict=True))
         self.joints = tuple(number for number, name in pairs if wanted & {number, name})
+        self._named = [name for number, name in pairs if number in self.joints]
         self._active = np.isin(numbers, self.joints)
         if stray := wanted.difference(numbers, arm.joint_names):
             what = f"the arm has joints 1 to {len(arm.joints)}: {', '.join(arm.joint_names)}"
@@ -87,8 +88,7 @@ class Plant:
         self.reset()
 
     def __repr__(self) -> str:
-        names = ", ".join(self.names[joint - 1] for joint in self.joints)
-        return f"<Plant: {names}; steps of {self.period:g} s; {self.identified.source}>"
+        return f"<Plant: {', '.join(self._named)}; steps of {self.period:g} s; {self.identified.source}>"
 
     @property
     def time(self) -> float:
@@ -180,9 +180,8 @@ class Plant:
         given = np.asarray(command, float)
         if given.shape != self._active.shape or not np.isfinite(given).all():
             raise ValueError(f"a command needs {len(self._active)} finite numbers [%], not {command}")
-        if given[self._idle].any():
-            names = ", ".join(self.names[joint - 1] for joint in self.joints)
-            raise ValueError(f"only {names} take commands: name the others in joints=")
+        if given[~self._active].any():
+            raise ValueError(f"only {', '.join(self._named)} take commands: name the others in joints=")
         self.data.ctrl[:] = given[self._columns].clip(-100.0, 100.0)
         with quiet_mujoco():
             self._advance(self.data.ctrl)
@@ -211,19 +210,18 @@ class Plant:
         Raises:
             RunError: the folder cannot be written.
         """
-        model, candidate, arm = copy(self.model), self._candidate, self.identified.settings.arm
+        model, candidate = copy(self.model), self._candidate
         model.dof_damping[:], model.dof_armature[:] = self._values["dof_damping"][0], self._armature
         spec = read_mjcf(folder / "arm.xml")  # with the meshes' names there
-        names = [arm.joint_names[j - 1] for j in self.joints]
         motors: Array | None = np.array([self._gain, self._balance])
         actuators: dict[str, dict[str, Any]] | None = None
         if self._chain.joints.size:
             hydraulic = {name: q for name, q in QUANTITIES.items() if name not in MECHANICAL}
             motors, actuators = None, {"units": {name: q.unit for name, q in hydraulic.items()}}
-            for joint, values in zip(names, candidate.joints[0, self._active], strict=True):
+            for joint, values in zip(self._named, candidate.joints[0, self._active], strict=True):
                 actuators[joint] = {name: float(values[name] / q.factor) for name, q in hydraulic.items()}
         fitted = locked_spec(spec, self._locked, model, motors)
-        write_fitted(folder, fitted, self.timestep, ", ".join(names), actuators)
+        write_fitted(folder, fitted, self.timestep, ", ".join(self._named), actuators)
 
     def _advance(self, command: Array) -> None:
         commands, torque, _ = self._course
@@ -251,5 +249,5 @@ class Plant:
         rollout = roll_quasi_static if settings.quasi_static else roll
         self._arm = SteppedArm(model, chain.columns, pushed, self._steps, rollout)
         self.model, self.data = self._arm.model, self._arm.data
-        self._warnings, self._idle = self.data.warning.number, np.flatnonzero(~self._active)
+        self._warnings = self.data.warning.number
         self._record = Record(np.empty((1, len(moving))), np.empty((0, len(chain.columns)), JOINT_STATE))

@@ -155,35 +155,29 @@ def moving_arm(
     parts = sorted(set(roots))
     count = int(np.clip(RATE * np.ptp(log.time) + 1, 2, most))
     moments = np.unique(np.linspace(0, len(log.time) - 1, count).round().astype(int))
-    series = {"measured": log.angle, "simulated": simulated}
-    poses = {name: body_poses(model, angle[moments]) for name, angle in series.items()}
+    poses = np.stack([body_poses(model, angle[moments]) for angle in (log.angle, simulated)])
 
-    view, start = sight(*VIEW), poses["simulated"][0]
+    view, start = sight(*VIEW), poses[1, 0]
     drawn: list[tuple[float, Shape]] = []
     for shape in shapes(model):
         world, pose = shape.placed(start), start[roots[shape.body]]
         corners = (world - pose[:, 3]) @ pose[:, :3]
         drawn.append((float((world @ view[2]).mean()), Shape(parts.index(roots[shape.body]), corners)))
     outlines = [shape for _, shape in sorted(drawn, key=lambda one: -one[0])]  # the farthest first
-    seen = {name: view[:2] @ pose[:, parts] for name, pose in poses.items()}
-    size, fitted = _fitted(outlines, seen)
+    size, fitted = _fitted(outlines, view[:2] @ poses[:, :, parts])
     errors = {names[joint]: np.degrees(error[moments, joint]) for joint in compared}
     worst = int(np.abs([*errors.values()]).max(axis=0).argmax())
     return MovingArm(size, outlines, log.time[moments], fitted, errors, worst)
 
 
-def _fitted(
-    outlines: Sequence[Shape], seen: Mapping[str, Array]
-) -> tuple[tuple[int, int], dict[str, list[Array]]]:
-    """Return the picture's size, and poses (F, parts, 2, 4) in its units, with the arm always inside."""
-    corners = [shape.placed(pose).reshape(-1, 2) for pose in seen.values() for shape in outlines]
-    low, high = (end(np.concatenate(corners), axis=0) for end in (np.min, np.max))
+def _fitted(outlines: Sequence[Shape], seen: Array) -> tuple[tuple[int, int], dict[str, list[Array]]]:
+    """Return the picture's size, and poses (2, F, parts, 2, 4) in its units, with the arm always inside."""
+    corners = np.concatenate([shape.placed(seen).reshape(-1, 2) for shape in outlines])
+    low, high = corners.min(axis=0), corners.max(axis=0)
     scale = (_SIZE - 2 * _MARGIN) / max(high - low)
     width, height = (scale * (high - low) + 2 * _MARGIN).round().astype(int).tolist()
-    fitted: dict[str, list[Array]] = {}
-    for name, pose in seen.items():
-        flipped = scale * pose * [[1], [-1]]  # y points down in a picture
-        flipped[..., 3] += _MARGIN + scale * np.array([-low[0], high[1]])
-        parts = flipped.reshape(*pose.shape[:2], 8).swapaxes(0, 1)
-        fitted[name] = [part if np.ptp(part, axis=0).any() else part[:1] for part in parts]
-    return (width, height), fitted
+    flipped = scale * seen * [[1], [-1]]  # y points down in a picture
+    flipped[..., 3] += _MARGIN + scale * np.array([-low[0], high[1]])
+    arms = flipped.reshape(*seen.shape[:3], 8).swapaxes(1, 2)
+    fitted = [[part if np.ptp(part, axis=0).any() else part[:1] for part in arm] for arm in arms]
+    return (width, height), dict(zip(("measured", "simulated"), fitted, strict=True))

@@ -124,8 +124,7 @@ def draw_response(
         Panel("", f"{place} [{unit}]", tuple(upper), title, 280),
         Panel("", f"residual [{unit}]", tuple(middle), height=190),
     ]
-    pressure = None if log.pressure is None else log.pressure[:, column]
-    if pressure is not None and np.isfinite(pressure).any():
+    if log.pressure is not None and np.isfinite(pressure := log.pressure[:, column]).any():
         marks = tuple(
             Mark("line", log.time, 1e-5 * p, color=color, label=f"chamber {side}")
             for side, color, p in zip("AB", ("green", "pink"), pressure.T, strict=True)

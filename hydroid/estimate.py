@@ -187,11 +187,6 @@ class FitSummary(Settings):
         """The final estimate by name."""
         return {name: parameter.value for name, parameter in self.estimate.items()}
 
-    @property
-    def searched(self) -> str:
-        """Name of the search's estimate, before any refinement."""
-        return next(iter(self.estimates), "")
-
     def plain(self) -> Plain:
         """Return mappings, lists, text and numbers, as YAML and JSON hold them."""
         return self.model_dump(mode="json", by_alias=True)

@@ -128,18 +128,17 @@ def run_study(
 
 def make_tasks(cells: Mapping[str, FitSettings], seeds: int, logs: Sequence[Log]) -> list[Task]:
     """Return all runs of a study, seed by seed, with one thread: the runs are what is shared out."""
-    tasks: list[Task] = []
-    for seed in range(1, seeds + 1):
-        for name, settings in cells.items():
-            seeded = settings.changed({"search.seed": seed, "simulation.threads": 1})
-            tasks.append(Task(name, seed, seeded, tuple(logs)))
-    return tasks
+    return [
+        Task(name, seed, settings.changed({"search.seed": seed, "simulation.threads": 1}), tuple(logs))
+        for seed in range(1, seeds + 1)
+        for name, settings in cells.items()
+    ]
 
 
 def measured(task: Task, result: Result) -> Row:
     """Return the measures of one run (docs/studies.md)."""
     if "failed" in result:
-        return Row(task.cell, task.seed, {}, str(result["failed"]))
+        return Row(task.cell, task.seed, {}, result["failed"])
     values = result["measures"] | {f"value {name}": value for name, value in result["theta"].items()}
     return Row(task.cell, task.seed, {name: float(value) for name, value in values.items()})
 

@@ -139,19 +139,16 @@ def main() -> None:
             group.invoke(context)
     except typer.Exit as end:
         code = end.exit_code
-    except HydroidError as error:
-        show_error(error)
-        code = 2
     except KeyboardInterrupt as stop:
         code, kept = 130, getattr(stop, "kept", None)
     except BrokenPipeError:
         sys.stderr.close()  # the reader has left; Python would complain at exit
     except Exception as error:
-        if stopped():  # what the interrupt met may have made another error of it
-            code = 130
-        elif hasattr(error, "format_message"):
+        if isinstance(error, HydroidError) or hasattr(error, "format_message"):
             show_error(error)
             code = 2
+        elif stopped():  # what the interrupt met may have made another error of it
+            code = 130
         else:
             raise  # a defect of hydroid
     if code == 130:  # as in shells

@@ -11,6 +11,7 @@ from hydroid.commands.inputs import LogSource, LogSources, Source
 from hydroid.commands.logs import read_logs
 from hydroid.errors import RunError, SettingsError
 from hydroid.estimate import NAME, FitSummary
+from hydroid.files import write_atomic
 from hydroid.identified_model import IdentifiedModel
 from hydroid.settings.fit import FitSettings
 
@@ -181,11 +182,13 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
 def _store(folder: "RunFolder", result: FitResult) -> Path:
     """Write a finished fit to its folder; return the page."""
     from hydroid.reporting.predictions import draw
-    from hydroid.run.record import fit_result, save_result
+    from hydroid.run.archive import pack
+    from hydroid.run.record import RESULT, fit_result
 
     began = time.monotonic()
     folder.write_estimate(result.problem.logs[0], result.fit.best.theta, result.summary)
-    save_result(folder.path, fit_result(result.fit, result.predictions, result.baselines))
+    arrays = fit_result(result.fit, result.predictions, result.baselines)
+    write_atomic(folder.path / RESULT, pack(arrays))
     page = draw(folder.path)
     folder.status("done", seconds=dict(result.fit.seconds) | {"report": time.monotonic() - began})
     return page

@@ -85,8 +85,7 @@ class Table:
     @cached_property
     def numeric(self) -> tuple[bool, ...]:
         """Columns that hold numbers only."""
-        columns = list(zip(*self.rows, strict=True)) or [()] * len(self.header)
-        kinds = ({type(cell) for cell in column if cell is not None} for column in columns)
+        kinds = ({type(row[i]) for row in self.rows} - {type(None)} for i in range(len(self.header)))
         return tuple(bool(kind) and str not in kind for kind in kinds)
 
     def _rich(self, left_out: Sequence[str]) -> "rich.table.Table":

@@ -149,19 +149,19 @@ def draw_speeds(curves: Mapping[str, CurveEstimate], logs: Sequence[Log], joints
     """Draw each joint's speed against command with its band and, in stage 2, at 50 % over its travel."""
     panels: list[Panel] = []
     for name, curve in curves.items():
-        at, value, ends = np.array(curve.at), np.array(curve.value), np.array(curve.interval, dtype=float)
-        whole, marks = [np.ones(len(at), dtype=bool)], list[Mark]()
+        rows = np.column_stack([curve.at, curve.value, np.array(curve.interval, dtype=float)])
+        parts, marks = [rows], list[Mark]()
         if name.endswith("_speed"):  # over commands: its two directions, with the dead band between them
             commands = np.concatenate([log.command[:, curve.joint - 1] for log in logs])
-            whole, logged = [at > 0, at < 0], (commands.min(initial=0.0), commands.max(initial=0.0))
-            beyond = np.array([[-105.0, logged[1]], [logged[0], 105.0]])
-            marks = [Mark("spans", beyond[0], end=beyond[1], color="pale", alpha=0.4)]
-        for part, color in zip(whole, ("blue", "orange"), strict=False):
-            low, high = ends[part].T
+            parts = [rows[rows[:, 0] > 0], rows[rows[:, 0] < 0]]
+            low, high = [-105.0, commands.max(initial=0.0)], [commands.min(initial=0.0), 105.0]
+            marks = [Mark("spans", np.array(low), end=np.array(high), color="pale", alpha=0.4)]
+        for part, color in zip(parts, ("blue", "orange"), strict=False):
+            x, y, low, high = part.T
             marks += [
-                Mark("band", at[part], low, high, color=color, alpha=0.25),
-                Mark("line", at[part], value[part], color=color),
-                Mark("points", at[part], value[part], color=color, width=5),
+                Mark("band", x, low, high, color=color, alpha=0.25),
+                Mark("line", x, y, color=color),
+                Mark("points", x, y, color=color, width=5),
             ]
         title = f"{joints[curve.joint - 1]}: {curve.label}"
         panels.append(Panel(curve.along, f"speed [{curve.unit}]", tuple(marks), title, 250))

@@ -185,7 +185,7 @@ def _data(record: Record) -> dict[str, str]:
     theta, objectives = result.front
     unit = "" if record.settings.objective.relative else "_rad"
     segments = (f"segment_{s}{unit}" for s in range(1, objectives.shape[1]))
-    header = (*record.summary.estimates[record.summary.searched].values, *segments, f"overall{unit}")
+    header = (*next(iter(record.summary.estimates.values())).values, *segments, f"overall{unit}")
     return {
         "history.csv": numbers_csv(HISTORY, result.history),
         "pareto.csv": numbers_csv(header, np.column_stack([theta, objectives])),

@@ -72,7 +72,7 @@ def horizon_section(fits: Verdicts) -> tuple[Section, ...]:
 
 def ordered(fits: Verdicts) -> Verdicts:
     """Return the fits, the smallest errors first: in parts of the tolerances of the joints."""
-    return {name: fits[name] for name in sorted(fits, key=lambda name: sum(map(_size, fits[name])))}
+    return dict(sorted(fits.items(), key=lambda fit: sum(map(_size, fit[1]))))
 
 
 def _tested(one: JointVerdict) -> bool:

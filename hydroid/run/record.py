@@ -115,11 +115,6 @@ def fit_result(fit: Fit, fitted: tuple[Prediction, ...], baselines: Baselines) -
     )
 
 
-def save_result(folder: Path, result: FitResult) -> None:
-    """Write `result.npz`; raises RunError: the folder cannot be written."""
-    write_atomic(folder / RESULT, pack(result))
-
-
 def run_of(model: IdentifiedModel) -> Path | None:
     """Return the folder of the finished run that a model is from."""
     file = Path(model.source)

@@ -93,8 +93,12 @@ def test_a_log_that_diverges_is_named_and_judged_with_the_others(
 
 def test_values_that_diverge_are_judged(short: Path, hydroid_cli: Run):
     Path("values.yaml").write_text(yaml.safe_dump(VALUES | {"K": 1e9}))
-    printed = hydroid_cli("validate", short, "--fit", "values.yaml", "--set=simulation.other_joints=passive")
-    assert "✗ predicts no better than standing still          diverged" in printed.out
+    passive = "--set=simulation.other_joints=passive"
+    (judged,) = json.loads(hydroid_cli("validate", short, "--fit=values.yaml", passive, "--json").out)[
+        "verdict"
+    ]
+    assert judged["verdict"] == "predicts no better than standing still"
+    assert judged["unseen_deg"] is None
 
 
 def test_python_does_what_the_terminal_does_and_shows_it(short: Path, hydroid_cli: Run):

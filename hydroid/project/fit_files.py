@@ -62,7 +62,7 @@ refinement: {{iterations: 60, gain_tolerance: 1.0e-5}}
 """
 JOINT = """\
 {actuator}
-  D_{own}: {{quantity: damping, joints: [{name}], fixed: {damping}}}    # {unit}
+  D_{own}: {{quantity: damping, joints: [{name}], nominal: {damping}, within: 5}}    # {unit}
   delay_{own}: {{quantity: delay, joints: [{name}], bounds: [0, 1], start: {delay:.2f}}}    # s
   dead_A_{own}: {{quantity: dead_band_a, joints: [{name}], nominal: {dead}, sd: 15, bounds: [0, 75]}}    # %
   dead_B_{own}: {{quantity: dead_band_b, joints: [{name}], nominal: {dead}, sd: 15, bounds: [0, 75]}}

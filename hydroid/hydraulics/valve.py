@@ -82,8 +82,7 @@ def port_flow(pressure, supply, pump_area, tank_area, c) -> Any:
     Also returns -dQ/dp [m³/(s Pa)], which is never negative, the part of Q that comes from the pump, at
     `supply` pressure [Pa], and its rise with that pressure.
     """
-    drop, kept = supply - pressure, 1.0
-    fed = kept
+    drop, kept, fed = supply - pressure, 1.0, 1.0
     if c.compensation > 0.0:
         beyond = drop > MARGIN * supply
         drop = drop - c.compensation * np.maximum(drop - MARGIN * supply, 0.0)

@@ -35,6 +35,12 @@ def implicit_weight(speed) -> Any:
     return 1.0 - 1.0 / np.maximum(speed, 2.0)
 
 
+@compilable
+def kept(steps) -> Any:
+    """Part of its error that a first-order lag of so many steps leaves after one."""
+    return np.exp(-1.0 / np.maximum(steps, 1e-300))
+
+
 @overload(implicit_weight)
 def _compiled_weight(speed) -> Any:  # pyright: ignore[reportUnusedFunction]
     def scalar(speed) -> Any:

@@ -20,9 +20,15 @@ from hydroid.hydraulics.cylinder import (
     stop_damping,
     volume,
 )
-from hydroid.hydraulics.elementwise import compilable, implicit_weight
+from hydroid.hydraulics.elementwise import compilable, implicit_weight, kept
 from hydroid.hydraulics.records import LINEAR, NONE, ROTARY
-from hydroid.hydraulics.solenoid import drive, plunger_step
+from hydroid.hydraulics.solenoid import (
+    beyond_dead_band,
+    drive,
+    plunger_step,
+    plunger_weight,
+    side_voltage,
+)
 from hydroid.hydraulics.valve import notched, port_flow, slot_share
 
 
@@ -45,37 +51,44 @@ def begin(c, z, w, angle: float, velocity: float) -> None:
 
 
 @compilable
-def _follow(side, z, delayed: float) -> float:
-    """Mean of what the pilot stage has of the command during a step, first-order behind it."""
-    left = (z.pilot - delayed) * (1.0 - side.pilot_keep)
-    z.pilot -= left
-    return delayed + left * side.pilot_steps
+def command(z, w, delayed_a: float, delayed_b: float) -> None:
+    """Take the delayed commands [%]: that towards each side changes `fresh` sub-steps into this step."""
+    w.a.before, w.b.before = z.a.asked, z.b.asked
+    w.a.after, w.b.after = delayed_a, -delayed_b
+    z.a.asked, z.b.asked = w.a.after, w.b.after
 
 
 @compilable
-def command(c, z, w, delayed_a: float, delayed_b: float) -> None:
-    """Take the delayed commands [%]: each coil's drive changes `fresh` sub-steps into this step."""
-    w.a.before, w.b.before = z.a.drive, z.b.drive
-    z.a.drive = drive(_follow(c.a, z.a, delayed_a), c.a, c)
-    z.b.drive = drive(-_follow(c.b, z.b, delayed_b), c.b, c)
-    w.a.after, w.b.after = z.a.drive, z.b.drive
+def _advance(c, side, z, asked: float, step: float, pilot_steps: float, keep: float, weight: float) -> float:
+    """Advance a pilot stage and its plunger under a command towards their side [%]; the mean stroke [m].
+
+    The stage is first-order: of its error a step leaves the part `keep`; its lag is so many steps.
+    """
+    beyond, part = beyond_dead_band(z.pilot, asked, pilot_steps, keep, side.dead_band)
+    z.pilot, before = asked + (z.pilot - asked) * keep, z.stroke
+    pull = drive(side_voltage(beyond, part, side.onset, side.dead_band), c)
+    z.stroke, z.speed = plunger_step((before, z.speed), pull, side.plunger_damping, step, weight, c)
+    return 0.5 * (before + z.stroke)
 
 
 @compilable
-def _move_plunger(c, side, z, w, substep: int, step: float) -> None:
-    part = min(max(substep + 1.0 - side.fresh, 0.0), 1.0)
-    pull = w.before + part * (w.after - w.before)
-    motion, weight = (z.stroke, z.speed), side.plunger_weight
-    z.stroke, z.speed = plunger_step(motion, pull, side.plunger_damping, step, weight, c)
+def _move_plunger(c, side, z, w, substep: int, step: float) -> float:
+    later = min(max(substep + 1.0 - side.fresh, 0.0), 1.0)  # part of the sub-step under the new command
+    if later in (0.0, 1.0) or w.before == w.after:
+        asked = w.after if later > 0.0 else w.before
+        return _advance(c, side, z, asked, step, side.pilot_steps, side.pilot_keep, side.plunger_weight)
+    mean = 0.0
+    for asked, part in ((w.before, 1.0 - later), (w.after, later)):
+        piece = part * step
+        steps, weight = side.pilot_lag / piece, plunger_weight(side.plunger_damping, piece, c)
+        mean += part * _advance(c, side, z, asked, piece, steps, kept(steps), weight)
+    return mean
 
 
 @compilable
 def move_spool(c, z, w, substep: int, step: float) -> float:
     """Advance both plungers; the mean spool displacement of the sub-step [m], equation (6)."""
-    before = z.a.stroke - z.b.stroke
-    _move_plunger(c, c.a, z.a, w.a, substep, step)
-    _move_plunger(c, c.b, z.b, w.b, substep, step)
-    return 0.5 * (before + (z.a.stroke - z.b.stroke))
+    return _move_plunger(c, c.a, z.a, w.a, substep, step) - _move_plunger(c, c.b, z.b, w.b, substep, step)
 
 
 @compilable

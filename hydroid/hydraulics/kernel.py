@@ -168,7 +168,7 @@ def look_ahead(plugin: Plugin, state, commands, now: int, arm, pad: Pad) -> None
             coast(c, z, w, step)
             matrix[a, a] += w.weight * step * w.drag
         else:
-            command(c, z, w, commands[now - c.a.late, j], commands[now - c.b.late, j])
+            command(z, w, commands[now - c.a.late, j], commands[now - c.b.late, j])
         for b in range(a + 1, joints):
             matrix[a, b] = arm.mass[entries[a, b]]
     if shared:

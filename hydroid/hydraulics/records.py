@@ -13,7 +13,8 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from hydroid.arrays import Array, Mask, Structs
+from hydroid.arrays import Mask, Structs
+from hydroid.hydraulics.elementwise import kept
 from hydroid.hydraulics.solenoid import curve_exists, force_curve, plunger_weight
 from hydroid.hydraulics.valve import conductance
 from hydroid.quantity_table import QUANTITIES, ROWS
@@ -55,8 +56,8 @@ SIDE = np.dtype(
         *((field, np.float64) for field in _SIDE_FIELDS.values()),
         ("late", np.int64),  # whole steps of the delay,
         ("fresh", np.float64),  # and sub-steps of the rest
-        ("pilot_keep", np.float64),  # part of the pilot stage's error that a step leaves,
-        ("pilot_steps", np.float64),  # and its lag in steps
+        ("pilot_keep", np.float64),  # part of the pilot stage's error that a sub-step leaves,
+        ("pilot_steps", np.float64),  # and its lag in sub-steps
         ("plunger_weight", np.float64),  # of its new state in a sub-step
         ("has_notches", np.bool_),
     ]
@@ -79,8 +80,8 @@ of the pump's relief valve [Pa]"""
 
 SIDE_STATE = np.dtype(
     _fields(
-        "stroke speed drive "  # of the plunger [m, m/s], its coil at the end of the last step [N·m²]
-        "pilot "  # what the pilot stage has of the command [%]
+        "stroke speed "  # of the plunger [m, m/s]
+        "asked pilot "  # delayed command towards this side [%], and what the pilot stage has of it
         "oil flow"  # oil [Pa] as `cylinder` defines it; mean flow into the chamber over the last step [m³/s]
     )
 )
@@ -105,7 +106,7 @@ JOINT_STATE = np.dtype(
 
 SIDE_SCRATCH = np.dtype(
     _fields(
-        "pressure flow before after "  # of the step: pressure, sum of flows, drive before and after
+        "pressure flow before after "  # of the step: pressure, sum of flows, delayed command before and after
         # of a sub-step: whether oil fills the chamber, pressure, inflow and its fall with the pressure
         "filled pushing inflow relief "
         # torque per pressure, pressure per volume, weight of the new state, pressure rise per flow
@@ -180,7 +181,7 @@ def coefficients(joints: Records, period: float = 0.01, substeps: int = 1) -> Re
     table["coil"], table["gap"] = force_curve(p.force_1, p.force_2, p.stroke_1, p.stroke_2, p.rated_current)
     table["conductance"] = conductance(p.flow_coefficient)
     table["opening_steps"] = p.opening_lag * substeps / period
-    table["opening_keep"] = _left(table["opening_steps"])
+    table["opening_keep"] = kept(table["opening_steps"])
     table["backflow"] = np.where(np.isinf(p.pump_flow), -np.inf, 0.0)
     table["relief"] = np.max(p.supply_pressure, axis=1, where=p.kind != NONE, initial=0.0)[:, None]
     for end, side in (("a", table.a), ("b", table.b)):
@@ -188,13 +189,8 @@ def coefficients(joints: Records, period: float = 0.01, substeps: int = 1) -> Re
             side[field] = joints[f"{name}_{end}"]
         side["late"] = np.floor(side.delay / period)
         side["fresh"] = (side.delay / period - side.late) * substeps
-        side["pilot_steps"] = side.pilot_lag / period
-        side["pilot_keep"] = _left(side["pilot_steps"])
+        side["pilot_steps"] = side.pilot_lag * substeps / period
+        side["pilot_keep"] = kept(side["pilot_steps"])
         side["plunger_weight"] = plunger_weight(side.plunger_damping, period / substeps, table)
         side["has_notches"] = np.any([side[f"notch_{k}"] != 1.0 for k in (1, 2, 3, 4)], axis=0)
     return table
-
-
-def _left(steps: Array) -> Array:
-    """Part of its error that a first-order lag leaves after one step, elementwise; the lag is in steps."""
-    return np.exp(-1.0 / np.maximum(steps, 1e-300))

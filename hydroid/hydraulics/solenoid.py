@@ -29,20 +29,42 @@ FULL_SCALE = 10.0  # voltage at full command, and from which the current is I_ma
 
 
 @compilable
-def side_voltage(command, onset, dead_band=0.0) -> Any:
-    """Voltage of the amplifier that moves the joint in the command's positive direction, (2) and (3).
+def beyond_dead_band(start: float, asked: float, steps: float, keep: float, dead_band: float) -> Any:
+    """What a pilot stage passes on beyond its dead band during a step [%], and for which part of the step.
 
-    For side A give (u, A), for side B (-u, C): command towards this side [%] and voltage at the smallest
-    command [V]. It is 0 unless the command exceeds the dead band [%] of the pilot stage, ours.
+    Both are exact: a lag that is short beside the step would else open the valve earlier or later.
+
+    Args:
+        start: what the stage has of the command at the start [%].
+        asked: the command [%]; the stage is first-order behind it.
+        steps: its lag in steps. keep: part of the error that a step leaves, `elementwise.kept`.
+        dead_band: [%]; ours.
     """
-    beyond = command - dead_band
-    return select(beyond > 0.0, onset + beyond * (FULL_SCALE - onset) / (100.0 - dead_band), 0.0)
+    end = asked + (start - asked) * keep
+    if start <= dead_band and end <= dead_band:
+        return 0.0, 0.0
+    whole = asked - dead_band + (start - asked) * (1.0 - keep) * steps
+    if start > dead_band and end > dead_band:
+        return whole, 1.0
+    reached = steps * np.log((start - asked) / (dead_band - asked)) if asked != dead_band else 0.0
+    first = (start - dead_band) * steps + (asked - dead_band) * reached
+    return (first, reached) if start > dead_band else (whole - first, 1.0 - reached)
 
 
 @compilable
-def drive(command, side, c) -> Any:
-    """Drive k i² [N·m²] of a side's coil at a command towards it [%]: equations (2) to (5)."""
-    current = coil_current(side_voltage(command, side.onset, side.dead_band), c.current_max, c.current_min)
+def side_voltage(beyond, part, onset, dead_band=0.0) -> Any:
+    """Voltage of the amplifier that moves the joint in the command's positive direction, (2) and (3).
+
+    A mean over a time, for a `part` of which the command exceeds the dead band, by `beyond` in the mean [%].
+    `onset` is the voltage at the smallest command that moves it [V]: A of side A, C of side B.
+    """
+    return part * onset + beyond * (FULL_SCALE - onset) / (100.0 - dead_band)
+
+
+@compilable
+def drive(voltage, c) -> Any:
+    """Drive k i² [N·m²] of a coil at a voltage: equations (4) and (5)."""
+    current = coil_current(voltage, c.current_max, c.current_min)
     return c.coil * current * current
 
 

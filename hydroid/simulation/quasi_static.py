@@ -205,7 +205,7 @@ def roll_quasi_static(arm, plugin: Plugin, state, course, record, source: int = 
             c, z, place = plugin.coefficients[j], state[j], arm.columns[j]
             z.angle = arm.angle[place]
             arm.angle[place] = z.angle + 0.5 * period * z.velocity
-            command(c, z, pad.joints[j], commands[now - c.a.late, j], commands[now - c.b.late, j])
+            command(z, pad.joints[j], commands[now - c.a.late, j], commands[now - c.b.late, j])
             meter(c, z, pad.joints[j], substeps, period / substeps)
             demanded |= commands[now, j] != 0.0
         _kinematics(arm.model, arm.data)

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from hydroid.hydraulics.cylinder import holding_pressures, stop_damping, triangle
+from hydroid.hydraulics.elementwise import kept
 from hydroid.hydraulics.records import coefficients, has_force_curve, nominal_joints
 from hydroid.hydraulics.solenoid import (
+    beyond_dead_band,
     coil_force,
     curve_exists,
     force_curve,
@@ -28,10 +30,22 @@ def plunger(gap: float, mass: float = 0.05) -> SimpleNamespace:
 
 
 def test_nothing_passes_the_dead_band_and_the_full_command_stays_full():
-    voltage = side_voltage(np.array([-50.0, 39.9, 40.0, 40.0 + 1e-9, 70.0, 100.0]), 1.4, 40.0)
-    np.testing.assert_allclose(voltage, [0, 0, 0, 1.4, 5.7, 10], atol=1e-9)
-    command = np.linspace(-100, 100, 201)
-    np.testing.assert_array_equal(side_voltage(command, 1.4, 0.0), side_voltage(command, 1.4))
+    passed = np.array(
+        [beyond_dead_band(u, u, 0.0, 0.0, 40.0) for u in (-50.0, 39.9, 40.0, 40.0 + 1e-9, 70.0, 100.0)]
+    )
+    np.testing.assert_allclose(side_voltage(*passed.T, 1.4, 40.0), [0, 0, 0, 1.4, 5.7, 10], atol=1e-9)
+
+
+@pytest.mark.parametrize("start", [-80.0, 0.0, 25.0, 60.0])
+@pytest.mark.parametrize("asked", [-60.0, 30.0, 40.0, 50.0])
+def test_what_a_lag_passes_beyond_the_dead_band_is_its_mean_over_the_step(start: float, asked: float):
+    for steps in (0.05, 0.7, 4.0):
+        keep = float(kept(steps))
+        stage = asked + (start - asked) * np.exp(-(np.arange(100_000) + 0.5) / 100_000 / steps)
+        beyond, part = beyond_dead_band(start, asked, steps, keep, 40.0)
+        assert beyond == pytest.approx(np.maximum(stage - 40.0, 0.0).mean(), abs=1e-3)
+        assert part == pytest.approx(np.mean(stage > 40.0), abs=1e-4)
+    assert beyond_dead_band(start, 40.0, 0.0, 0.0, 40.0) == (0.0, 0.0)
 
 
 @pytest.mark.parametrize("broken", [(0.5, 0.7, 0.8, 12), (8, 0.7, 12, 0.8), (8, 0.7, 5, 12), (8, 0.7, 0, 12)])

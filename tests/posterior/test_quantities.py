@@ -90,7 +90,7 @@ def test_the_dead_band_is_the_command_that_moves_the_spool_over_its_overlap():
     found, (c, _) = measured(bench, estimate), actuator(bench, estimate)
 
     def spool(command: float, onset: float) -> float:
-        current = coil_current(side_voltage(command, onset), c.current_max[0], c.current_min[0])
+        current = coil_current(side_voltage(command, 1.0, onset), c.current_max[0], c.current_min[0])
         currents = np.array([current, c.current_min[0]])
         moved, resting = resting_stroke(c.coil[0] * currents**2, c.gap[0], c.plunger_stiffness[0])
         return float(moved - resting)

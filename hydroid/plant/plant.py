@@ -244,7 +244,7 @@ class Plant:
         self._values = model_values(locked, candidate)
         self._gain = candidate.joints.gain[0, self._columns]
         moving = np.arange(len(self._columns))
-        pushed, substeps = moving[: 0 if settings.stage == "hyd" else None], settings.hydraulics.substeps
+        pushed, substeps = moving[: 0 if settings.stage == "hyd" else None], settings.substeps
         self._chain = chain = Chain(settings.arm, locked, self._active, substeps, pushed)
         rollout = roll_quasi_static if settings.quasi_static else roll
         self._arm = SteppedArm(model, chain.columns, pushed, self._steps, rollout)

@@ -91,7 +91,7 @@ class Movement:
         settings = self.bench.settings
         commands = np.full((self.samples * settings.simulation.steps, 1), self.command)
         scenario = self.bench.scenario.restarted(np.array([self.start]), commands)
-        simulation = Simulation(scenario, settings.arm, settings.hydraulics.substeps)
+        simulation = Simulation(scenario, settings.arm, settings.substeps)
         return simulation.simulate(candidates).angle[:, :, 0]
 
     def speeds(self, candidates: Candidates) -> Array:

@@ -256,5 +256,5 @@ def make_simulation(
     if payload:
         spec = add_payload(spec, settings.arm, payload)
     scenario = Scenario(spec, settings.arm, log, outputs, settings.simulation)
-    substeps = settings.hydraulics.substeps if settings.stage == "hyd" else None
+    substeps = settings.substeps if settings.stage == "hyd" else None
     return Simulation(scenario, settings.arm, substeps, pressures)

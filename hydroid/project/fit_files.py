@@ -13,6 +13,7 @@ from hydroid.settings.arm import Arm
 from hydroid.settings.cylinder import LinearActuator
 
 LONGEST_STEP = 0.025  # of MuJoCo [s], in a log of fewer samples
+VALVE_STEP = 0.0025  # of valves and oil [s]
 DEAD = 0.8  # part of the command below which a joint seems to stand that its dead band is
 DRAG = 0.02  # part of the torque at the pump's pressure that damping takes at full speed
 RESPONSE = 0.1  # of a valve and its oil without any delay [s]
@@ -36,8 +37,9 @@ hydraulics:
   slot_width: 0.33                 # mm     which full command opens
   rotary_volume: {volume}             # cm³    of each chamber of a rotary actuator
   opening_exponent: 1.4            #        speed rises with this power of the command behind the dead band
-  plunger_damping: 20              # N·s/m  a lag of 10 ms
-  substeps: 5                      # of valves and oil in one MuJoCo step
+  plunger_mass: 0.008              # kg     and at once: what lags is before the dead band or behind the valve
+  plunger_damping: 8               # N·s/m  4 ms, without overshoot
+  substeps: {substeps}                     # of valves and oil in one step of the model
 
 # Starts and priors follow from the arm's weight and the speeds in the log. They are wide guesses: write what
 # you know. `within: 4`: with 95 % probability between a quarter and four times the nominal value, which is
@@ -125,12 +127,15 @@ def fit_text(arm: Arm, layout: Layout | None, sizes: Sequence[JointSize], file: 
                 **words,
             )
         )
+    period = 0.01 if layout is None else float(layout.section["period_s"])
+    steps = math.ceil(period / LONGEST_STEP - 1e-9)
     return FIT.format(
         file=file,
         arm=flow(arm_file),
         outputs=flow([arm.joint_names[joint - 1] for joint in outputs]),
         log=_log(arm, layout),
-        others=_others(layout),
+        others=_others(layout, steps),
+        substeps=math.ceil(period / steps / VALVE_STEP - 1e-9),
         volume=short(min(volumes, default=50.0)),
         flow=short(4 * sum(flows.values())),  # so large that it limits no flow
         parameters="\n".join(lines),
@@ -158,10 +163,8 @@ def _log(arm: Arm, layout: Layout | None) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _others(layout: Layout | None) -> str:
+def _others(layout: Layout | None, steps: int) -> str:
     """Settings of the simulation."""
-    period = 0.01 if layout is None else float(layout.section["period_s"])
-    steps = max(math.ceil(period / LONGEST_STEP - 1e-9), 1)
     other = "measured" if layout is not None and layout.followed else "locked"
     text = f"simulation: {{model: ladder, steps_per_sample: {steps}, other_joints: {other}}}"
     return f"{text}    # joints without a command: locked, passive or measured (they follow the log)\n"

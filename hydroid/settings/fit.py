@@ -103,6 +103,12 @@ class FitSettings(Settings):
         return self.stage == "hyd" and self.simulation.model != "dynamic"
 
     @property
+    def substeps(self) -> int:
+        """Sub-steps of valves and oil in one step of the model."""
+        simulation = self.simulation
+        return self.hydraulics.substeps * simulation.steps_per_sample // simulation.steps
+
+    @property
     def terms(self) -> tuple[str, ...]:
         """Names of the terms that a fit may add, in the order of the parameters."""
         return tuple(dict.fromkeys(p.term for p in self.parameters.values() if p.term is not None))

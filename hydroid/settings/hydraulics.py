@@ -35,7 +35,7 @@ class HydraulicSettings(_Quantities):
     rotary_volume: Positive = 50.0
     """volume of each chamber of a rotary actuator [cm³]"""
     substeps: Annotated[int, Field(ge=1, le=100)] = 3
-    """sub-steps of valves and oil in one MuJoCo step"""
+    """sub-steps of valves and oil in one of the `steps_per_sample`"""
 
     @model_validator(mode="before")
     @classmethod

@@ -190,7 +190,7 @@ class SimulationSettings(Settings):
     which is the fastest; passive: they move on their own spring and damper, as in the article; measured:
     they follow their logged motion"""
     steps_per_sample: Annotated[int, Field(ge=1, le=100)] = 1
-    """MuJoCo steps per sample of the log"""
+    """MuJoCo steps per sample of the log; in the quasi-static model only the valves have so many"""
     threads: Annotated[int, Field(ge=0, le=1024)] = 0
     """number of threads. 0 means one per core; with --dask it means one per worker"""
     measured_cutoff_hz: Annotated[float, Field(gt=0, le=50)] = 4.0

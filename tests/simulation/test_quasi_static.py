@@ -65,6 +65,22 @@ def test_the_dynamic_model_converges_to_it_as_oil_stiffens_and_motion_slows(simu
     assert near < 0.5 * far
 
 
+@pytest.mark.parametrize(("lag", "exponent"), [(0.0, 1.0), (0.02, 1.0), (0.02, 1.9)])
+def test_what_comes_later_moves_the_joint_by_as_much_less(simulated, lag, exponent):
+    each = {"plunger_mass": 0.008, "damping": 0.0, "dead_band_a": 25.0, "dead_band_b": 20.0}
+    for end in "ab":
+        own = {"plunger_damping": 8.0, "pilot_lag": lag, "opening_exponent": exponent}
+        each |= {f"{name}_{end}": value for name, value in own.items()}
+    delays, to_and_fro = 0.1 + np.arange(0, 0.01, 0.0005), np.repeat([80.0, -60.0], [12, 13])
+    ends = [
+        simulated({ROLL: to_and_fro}, 0.6, period=0.025, delay_a=delay, delay_b=delay, **each)[0][-2:, 0]
+        for delay in delays  # over four sub-steps
+    ]
+    speed = np.ptp(ends[0]) / 0.025
+    shifts = [(ends[0][-1] - angle[-1]) / speed for angle in ends]
+    np.testing.assert_allclose(shifts, delays[0] - delays, atol=6e-5)
+
+
 @pytest.mark.parametrize("model", ["quasi-static", "dynamic"])
 @pytest.mark.parametrize("command", [50, -50])
 def test_a_load_does_not_slow_a_compensated_valve(simulated, arm, model, command):

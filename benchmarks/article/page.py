@@ -46,8 +46,10 @@ class Medians:
 
     def __getitem__(self, place: str) -> str:
         cell, _, column = place.partition(" / ")
-        middle = median(of_cell(self.runs, cell, column).values() or [np.nan])
-        return f"{middle:,.0f}" if column == "simulations" else number(middle)
+        values = of_cell(self.runs, cell, column).values()
+        if not values:
+            return "(no runs)"
+        return f"{median(values):,.0f}" if column == "simulations" else number(median(values))
 
 
 def head(
@@ -111,7 +113,7 @@ def at_best(made: Verdict) -> str:
 
 
 def percent(part: float) -> str:
-    return f"{100 * part:.0f} %"
+    return "(no runs)" if np.isnan(part) else f"{100 * part:.0f} %"
 
 
 def interval(made: Verdict) -> str:

@@ -23,6 +23,11 @@ def number(value: float) -> str:
     return f"{float(scientific):.{max(0, 3 - exponent)}f}" if -4 <= exponent < 7 else scientific
 
 
+def two_digits(value: float) -> str:
+    """Write two significant digits, or all before the point."""
+    return f"{value:.0f}" if abs(value) >= 100 else f"{value:.2g}"
+
+
 def plain(value: float) -> str:
     """Write at most six significant digits, without trailing zeros."""
     if not math.isfinite(value):

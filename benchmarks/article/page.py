@@ -14,6 +14,8 @@ import numpy as np
 from claims import MOST, POWER, Outcome, Verdict, log_ratios, verdict, verdicts
 from studies import BLIND, CENTRE, RECORDS, Claim, Figure, Runs, Table, load_studies, of_cell, read_runs
 
+from hydroid.words import two_digits
+
 DOCS = Path(__file__).parents[2] / "docs"
 QUICK = "> **The short form: one seed, short data, few generations. It shows that the studies run.**\n\n"
 FEW = 5
@@ -49,7 +51,7 @@ class Medians:
         values = of_cell(self.runs, cell, column).values()
         if not values:
             return "(no runs)"
-        return f"{median(values):,.0f}" if column == "simulations" else number(median(values))
+        return f"{median(values):,.0f}" if column == "simulations" else two_digits(median(values))
 
 
 def head(
@@ -151,7 +153,7 @@ def study_table(shown: Table, runs: Runs, cells: Sequence[str]) -> str:
     for cell in dict.fromkeys((*(shown.cells or cells), *shown.article, *without_search)):
         columns = [values_of(runs, cell, column) for column in shown.columns]
         most = max(map(len, columns))
-        texts = [number(median(v)) if v and len(v) >= min(FEW, most) else "" for v in columns]
+        texts = [two_digits(median(v)) if v and len(v) >= min(FEW, most) else "" for v in columns]
         printed = shown.article.get(cell, [None] * len(columns))
         texts = [t if v is None else f"{t} ({v:g})".strip() for t, v in zip(texts, printed, strict=True)]
         if any(texts):
@@ -178,11 +180,6 @@ def shown_figure(figure: Figure, runs: Runs) -> str:
     behind = "; ".join(f"{cell}: {count}" for cell, count in counts.items())
     weak = f" A curve of fewer than {FEW} shows little but chance." * (min(counts.values()) < FEW)
     return f"{text}\nRuns behind each curve (older runs have no history): {behind}.{weak}\n"
-
-
-def number(value: float) -> str:
-    """Return a number in two digits, or all before the point."""
-    return f"{value:.0f}" if abs(value) >= 100 else f"{value:.2g}"
 
 
 if __name__ == "__main__":

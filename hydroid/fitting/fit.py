@@ -27,6 +27,9 @@ _log = logging.getLogger(__name__)
 TOO_FAR = 20.0
 """times the rms error of the last estimate from which the dynamic model is not refined: lags that stand for
 oil in a quasi-static model are too much beside it, and it errs by several times as much at first"""
+WHITE = 1.6
+"""mean square of the change between samples, in mean squares of the error, from which the error is noise; it
+is 2 of white noise, and that of J. von Neumann (1941)"""
 
 
 @dataclass(frozen=True)
@@ -128,6 +131,8 @@ def fit(problem: Problem, watch: Watcher | None = None, checkpoints: Checkpoints
         own = problem.varied(settings.of_estimate(name))
         theta = own.parameters.started(last.parameters.mapping(start.theta))
         other_model = if_nearer and own.settings.quasi_static != last.settings.quasi_static
+        if other_model and _is_noise(last, start.theta):
+            return
         if other_model and not own.rms(own.output_errors(theta[None]))[0] < TOO_FAR * start.rms:
             return
         result = refine(own, theta, settings.refinement, watch.refining, checkpoints, name)
@@ -161,6 +166,13 @@ def fit(problem: Problem, watch: Watcher | None = None, checkpoints: Checkpoints
     took: dict[str, float] = dict(zip(("search", "refinement", "uncertainty"), seconds, strict=True))
     history = searched.history
     return Fit(estimates, final, front, history, refinements, about, directions, determined, took)
+
+
+def _is_noise(problem: Problem, theta: Array) -> bool:
+    """Whether errors at an estimate, (P,), change between samples as white noise does: nothing is left."""
+    error = problem.output_errors(theta[None])[0]
+    each = [error[c.rows] for c in problem.channels]
+    return all(np.mean(np.diff(one) ** 2) > WHITE * np.mean(one**2) for one in each)
 
 
 def _slopes(problem: Problem, descent: Descent | None) -> Array | None:

@@ -18,6 +18,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.random import Generator
 
+from hydroid.fitting.baselines import fit_baselines
 from hydroid.fitting.checkpoints import Checkpoints, Memo
 from hydroid.fitting.refinement import refine
 from hydroid.parameters import Array
@@ -108,6 +109,9 @@ class Multistart:
             tried = [self._grown(problem, theta, name)]
             for i, start in enumerate(self._drawn(problem, joint, theta), 1):
                 tried.append(self._grown(problem, start, f"{name} draw {i}"))
+            tried.append(
+                self._grown(problem, by_numbers(problem, joint, min(tried, key=_cost)[1]), f"{name} numbers")
+            )
             for i, start in enumerate(splits(problem, joint, min(tried, key=_cost)[1]), 1):
                 tried.append(self._grown(problem, start, f"{name} split {i}"))
             result = min(tried, key=_cost)
@@ -181,6 +185,27 @@ def alone(problem: Problem, joint: int, theta: Array) -> Problem:
     """
     settings = problem.settings.alone(joint, problem.parameters.mapping(theta))
     return problem.varied(settings, [log.driving(joint) for log in problem.logs if log.driven[joint - 1]])
+
+
+def by_numbers(problem: Problem, joint: int, theta: Array) -> Array:
+    """Return theta, (P,), with the valve of a joint whose speed follows the command alone: nine numbers.
+
+    No load slows it. Far from there least squares can end halfway, with a valve that some of the load slows.
+    """
+    settings = problem.settings
+    ends = settings.arm.lower[joint - 1], settings.arm.upper[joint - 1]
+    found = fit_baselines(problem.logs, joint, np.array(ends)).get("nine numbers")
+    if found is None:
+        return theta
+    values = {"delay": found.delay, "pilot_lag": 0.0, "compensation": 1.0}
+    for row, name in (0, "dead_band"), (1, "opening_exponent"), (3, "opening_lag"):
+        both = found.numbers[row]
+        values |= {name: float(both.mean()), f"{name}_a": float(both[0]), f"{name}_b": float(both[1])}
+    start = theta.copy()
+    for i, one in enumerate(settings.parameters.values()):
+        if one.fixed is None and one.joints == (joint,):
+            start[i] = values.get(one.quantity, start[i])
+    return np.clip(start, problem.parameters.lower, problem.parameters.upper)
 
 
 def splits(problem: Problem, joint: int, theta: Array) -> list[Array]:

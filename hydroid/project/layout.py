@@ -13,6 +13,7 @@ from hydroid.log.read import angle_margin
 from hydroid.settings.arm import Arm, Joint
 from hydroid.settings.load import validate
 from hydroid.settings.log import LogSettings
+from hydroid.words import listed
 
 REVERSED = (
     "a reversed command suits a valve that is wired the other way. If a sensor counts the other way instead "
@@ -78,6 +79,9 @@ def find_layout(table: Table, arm: Arm, order: Sequence[str] = ()) -> Layout:
             entries[joint]["command"] = turned(entries[joint]["command"])
     reasons += [REVERSED] if wrong else []
     driven = [joint for joint in measured if entries[joint]["command"] is not None]
+    for what, have in ("angle", measured), ("command", driven):
+        lacking = [name for place, name in enumerate(names, 1) if place not in have]
+        reasons += [f"no {what} found for {listed(lacking)}"] if lacking else []
     followed = any(m.travel > 1 for joint, m in motions.items() if joint not in driven)  # [deg]
     return Layout(section, tuple(driven or measured), tuple(reasons), unused, motions, followed)
 
@@ -97,7 +101,8 @@ def _remarks(motion: JointMotion, joint: Joint, wrong: bool) -> Iterator[str]:
         share = f"on {max(against, 1 - against):.0%} of its way"
         yield f"{joint.name} moves against its command ({share}): the command's sign is reversed"
     if motion.log.driven[motion.joint - 1] and motion.dead_band > 10:
-        yield f"{joint.name} does not move below about {motion.dead_band:g} % of command: a dead band"
+        below = f"below about {motion.dead_band:g} % of command"
+        yield f"{joint.name} hardly moves {below}: a dead band, or little opening"
 
 
 def turned(command: Plain) -> Plain:

@@ -42,7 +42,7 @@ function moveArm(host, arm) {
       polygon.setAttribute("points", outline(places).map((p) => p.map((v) => v.toFixed(1)).join()).join(" "));
     }
     slider.value = time;
-    const errors = Object.entries(arm.errors).map(([name, e]) => `${name} ${between(e[k], e[k + 1]).toFixed(2).replace("-", "−")}°`);
+    const errors = Object.entries(arm.errors).map(([name, e]) => `${name} ${between(e[k], e[k + 1]).toFixed(2).replace("-", "−")}${arm.units[name]}`);
     words.textContent = `${time.toFixed(1)} s. Measured minus simulated: ${errors.join(", ")}`;
   }
 

@@ -117,7 +117,8 @@ class MovingArm:
         time: of the moments [s], shape (F,).
         poses: `measured` and `simulated`: how each part lies in the picture, rows of the 2 × 3 turn and of
             the place, shape (parts, F, 8), or (1, 8) for one that stands still.
-        errors: measured minus simulated angle by the joint's name [deg], shape (F,).
+        errors: measured minus simulated angle by the joint's name [°], of one that slides [mm], shape (F,).
+        units: of the errors, by name.
         start: number of the moment with the largest error.
     """
 
@@ -126,6 +127,7 @@ class MovingArm:
     time: Array
     poses: dict[str, list[Array]]
     errors: dict[str, Array]
+    units: dict[str, str]
     start: int
 
 
@@ -165,9 +167,12 @@ def moving_arm(
         drawn.append((float((world @ view[2]).mean()), Shape(parts.index(roots[shape.body]), corners)))
     outlines = [shape for _, shape in sorted(drawn, key=lambda one: -one[0])]  # the farthest first
     size, fitted = _fitted(outlines, view[:2] @ poses[:, :, parts])
-    errors = {names[joint]: np.degrees(error[moments, joint]) for joint in compared}
+    slides = {names[joint]: model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE for joint in compared}
+    factors = [1e3 if each else np.degrees(1.0) for each in slides.values()]
+    errors = dict(zip(slides, (factors * error[moments][:, compared]).T, strict=True))
+    units = {name: " mm" if each else "°" for name, each in slides.items()}
     worst = int(np.abs([*errors.values()]).max(axis=0).argmax())
-    return MovingArm(size, outlines, log.time[moments], fitted, errors, worst)
+    return MovingArm(size, outlines, log.time[moments], fitted, errors, units, worst)
 
 
 def _fitted(outlines: Sequence[Shape], seen: Array) -> tuple[tuple[int, int], dict[str, list[Array]]]:

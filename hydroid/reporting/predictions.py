@@ -27,7 +27,7 @@ from hydroid.reporting.search_report import search_section
 from hydroid.reporting.verdict_table import Verdicts, horizon_section, lead, next_steps, verdict_section
 from hydroid.run.record import Record, load_record
 from hydroid.settings.arm import Arm
-from hydroid.words import number
+from hydroid.words import number, two_digits
 
 _KINDS = {True: "unseen", False: "fitted", None: ""}
 _COLUMNS = {
@@ -68,7 +68,7 @@ def prediction_sections(predictions: Sequence[Prediction], arm: Arm, fits: Verdi
             state = "good" if error <= tolerance else "fair" if error <= 2 * tolerance else "bad"
             row = f"{names[log]} {_KINDS[first.unseen]}".strip()
             plot = Plot(f"response_{len(tabs) + 1}", title, drawing, zoom=True)
-            size = f"{1e3 * np.radians(error):.2g} mm" if slides else f"{error:.2g}°"
+            size = f"{two_digits(1e3 * np.radians(error))} mm" if slides else f"{two_digits(error)}°"
             size = size if np.isfinite(error) else "diverged"
             tabs.append(Tab(size, plot, row, arm.joint_names[joint - 1], state))
     rows = [

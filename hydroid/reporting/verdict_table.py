@@ -11,7 +11,7 @@ from hydroid.fitting.baselines import NAMES
 from hydroid.fitting.validation import HORIZONS
 from hydroid.reporting.page import Cell, Given, Section, Table, short_name, shown
 from hydroid.settings.fit import FitSettings
-from hydroid.words import listed
+from hydroid.words import listed, two_digits
 
 _SIGNS = {"predicts": "✓", "predicts roughly": "!", "not tested": "?"}  # of verdicts; all others are a ✗
 _NOTE = (
@@ -44,7 +44,7 @@ def verdict_table(fits: Verdicts) -> Table:
 def _shown(error: float | None, slides: bool) -> Cell:
     if error is None:
         return None
-    return f"{1e3 * np.radians(error):.2g} mm" if slides else Given(f"{error:.2g}")
+    return f"{two_digits(1e3 * np.radians(error))} mm" if slides else Given(two_digits(error))
 
 
 def verdict_section(fits: Verdicts, *steps: Finding) -> Section:

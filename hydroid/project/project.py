@@ -96,7 +96,7 @@ def write_project(
         sizes = joint_sizes(arm, {j: m.speed for j, m in layout.motions.items()} if layout else {})
         if imported is not None:
             arm = _write_arm(stage, imported, title, arm, sizes)
-        caption = f"{arm.name} with its joints at 0: does it look and turn like your arm?"
+        caption = f"{arm.name}, all joints at or near 0: does it look and turn like yours?"
         write_atomic(stage / PICTURE, arm_picture(arm, caption)[0])
         write_atomic(stage / FIT, fit_text(arm, layout, sizes, str(folder / FIT), reference))
         # what is written can be read

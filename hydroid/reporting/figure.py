@@ -172,15 +172,16 @@ def _view(axes: Axes, arm: Arm, data: Any, outlines: Sequence[Shape], poses: Arr
             ends = placed(np.array(joint.actuator.pivots)[:, None], poses[bodies])[:, 0]
             axes.plot(*(ends @ onto).T, "o-", color="black", lw=3, ms=4)
     size = 0.12 * (np.ptp(data.xipos[1:], axis=0).max() + np.ptp(data.xanchor, axis=0).max() + 0.1)
+    said = 0
     for number, (joint, at, axis) in enumerate(zip(arm.joints, data.xanchor, data.xaxis, strict=True)):
-        sense = "turns counter-clockwise" if axis @ ahead < 0 else "turns clockwise"
-        sense = "slides along the line" if joint.slides else sense
-        text = f"{joint.name}: + {sense}" if joint.slides != (abs(axis @ ahead) > ACROSS) else joint.name
         axes.plot(*(np.array([at - size * axis, at + size * axis]) @ onto).T, "D-", color="black", lw=1, ms=4)
-        # a step up from joint to joint: names of neighbours do not meet
-        place = (4, 4 + 11 * number)
-        label = axes.annotate(text, at @ onto, place, fontsize=7, textcoords="offset points")
-        label.set_in_layout(False)
+        if joint.slides == (abs(axis @ ahead) > ACROSS):
+            continue  # the other view tells
+        sense = "turns counter-clockwise" if axis @ ahead < 0 else "turns clockwise"
+        text = f"{joint.name}: + {'slides along the line' if joint.slides else sense}"
+        corner = {"transform": axes.transAxes, "va": "top", "fontsize": 7, "color": _color(number)}
+        axes.text(0.03, 0.98 - 0.055 * said, text, **corner).set_in_layout(False)
+        said += 1
     axes.set(title=name, xlabel="x [m]", ylabel=upwards)
     axes.set_aspect("equal", adjustable="datalim")
 

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 import robots
 import trimesh
-from arms import MODELS
-from robots import LIMIT, joint, link, write_robot
+from arms import MODELS, posed
+from robots import LIMIT, compiled, joint, link, write_robot
 
 from hydroid.cad.importer import import_arm
 from hydroid.cad.shapes import SHOWN
@@ -18,15 +18,6 @@ def said(arm, start):
     (line,) = [note for note in arm.notes if note.startswith(start)]
     assert "\n" not in line
     return line
-
-
-def compiled(arm):
-    """The imported model and its data, joints at 0."""
-    model = mujoco.MjSpec.from_string(arm.mjcf, assets=arm.meshes).compile()
-    data = mujoco.MjData(model)
-    data.qpos[:] = 0.0
-    mujoco.mj_forward(model, data)
-    return model, data
 
 
 def joints(model):
@@ -74,16 +65,13 @@ def test_turned_frames_move_as_mujocos_own_import_does(tmp_path):
         "more": tool + joint("weld", "stick", "tool", kind="fixed", at="1.5 0 0", turn="1 0 0", limit=""),
     }  # fmt: skip
     path = write_robot(tmp_path, **changes)
-    found, here = compiled(import_arm(path))
+    found, _ = compiled(import_arm(path))
     assert found.body("stick").mass[0] == 120.0
     text = path.read_text().replace("package://digger/meshes/", str(tmp_path / "digger/meshes") + "/")
     text = text.replace("</robot>", '<mujoco><compiler strippath="false"/></mujoco></robot>')
     model = mujoco.MjSpec.from_string(text).compile()
-    there = mujoco.MjData(model)
     for angles in np.random.default_rng(1).uniform(-1, 1, (5, 3)):
-        here.qpos[:] = there.qpos[:] = angles
-        mujoco.mj_forward(found, here)
-        mujoco.mj_forward(model, there)
+        here, there = posed(found, angles), posed(model, angles)
         for name in ("xanchor", "xaxis", "qfrc_bias", "M"):
             np.testing.assert_allclose(getattr(here, name), getattr(there, name), atol=1e-6)
 

@@ -27,7 +27,7 @@ from typing import Any
 
 import numpy as np
 from common import ARTICLE_TRUTH, EXAMPLES, Clock, near, options, refined, row, table, true_log
-from made_logs import noisy, simulate_log, step_log
+from made_logs import noisy, stepped
 
 import hydroid
 from hydroid import load_settings
@@ -165,8 +165,7 @@ def bands(given: Any) -> None:
     settings = mech([2], "K", "D", "S", free_start=True)
 
     def steps(values: dict[str, float], rng: np.random.Generator) -> Log:
-        drive = step_log(settings.arm.pose("study"), rng.uniform(-60.0, 60.0, 5))
-        return noisy(simulate_log(settings, drive, values), seed=rng, exact_start=False)
+        return noisy(stepped(settings, values, rng.uniform(-60.0, 60.0, 5)), seed=rng, exact_start=False)
 
     table("the other log | inside the band, median (range) | the model is blamed")
     for percent in (0, 5, 20, 50):

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conftest import TRUTH as ARTICLE
-from made_logs import noisy, simulate_log, step_log
+from made_logs import noisy, stepped
 
 import hydroid
 from hydroid.fitting.refinement import refine
@@ -30,8 +30,7 @@ CHANGES = {
 
 def driven(settings, levels, seed: int, values=TRUTH) -> Log:
     """A log of steps of the shoulder with white noise of 0.1 deg, but for its first sample."""
-    drive = replace(step_log(settings.arm.pose("study"), levels), source=f"steps{seed}.csv")
-    return noisy(simulate_log(settings, drive, values), 0.1, seed)
+    return noisy(replace(stepped(settings, values, levels), source=f"steps{seed}.csv"), 0.1, seed)
 
 
 @pytest.fixture(scope="module")

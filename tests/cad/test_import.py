@@ -38,16 +38,20 @@ def tensor(model, body):
     return axes * model.body(body).inertia @ axes.T
 
 
+def of_box(name, mass):
+    """Inertia of a link's box about its centre [kg·m²]."""
+    square = np.array(robots.SIZES[name]) ** 2
+    return np.diag(square.sum() - square) * mass / 12
+
+
 def test_links_joints_and_inertias_are_those_of_the_file(tmp_path):
     model, _ = compiled(import_arm(write_robot(tmp_path)))
     assert [model.body(b).name for b in range(1, 4)] == ["house", "boom", "stick"]
     assert joints(model) == ["swing_joint", "boom_joint", "stick_joint"]
     for name, size in robots.SIZES.items():
-        square = np.array(size) ** 2
         assert model.body(name).mass[0] == robots.MASSES[name]
         np.testing.assert_allclose(model.body(name).ipos, [size[0] / 2, 0, 0], atol=1e-12)
-        expected = np.diag(square.sum() - square) * robots.MASSES[name] / 12
-        np.testing.assert_allclose(tensor(model, name), expected, atol=1e-9)
+        np.testing.assert_allclose(tensor(model, name), of_box(name, robots.MASSES[name]), atol=1e-9)
         np.testing.assert_allclose(extents(model, name), np.sort(size), rtol=1e-6)
     assert model.jnt_range[1] == pytest.approx([-0.5, 1.2])
     assert model.key("home").qpos == pytest.approx([0, 0, -0.2])
@@ -151,7 +155,7 @@ def test_a_trap_is_said_in_one_line(tmp_path, changes, note, masses):
 def test_a_total_mass_scales_all_that_moves(tmp_path):
     model, _ = compiled(import_arm(write_robot(tmp_path, **light("boom")), total_mass=5170.0))
     assert model.body_mass[1:] == pytest.approx(np.array([800, 144, 90]) * 5)
-    assert tensor(model, "stick")[1, 1] == pytest.approx(5 * 90 * (1.5**2 + 0.2**2) / 12)
+    np.testing.assert_allclose(tensor(model, "stick"), of_box("stick", 5 * 90), atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -186,9 +190,7 @@ def test_an_impossible_inertia_is_that_of_the_mesh(tmp_path, fault):
     said(arm, message)
     model, _ = compiled(arm)
     assert model.body("boom").mass[0] == pytest.approx(mass)
-    square = np.array(robots.SIZES["boom"]) ** 2
-    expected = np.diag(square.sum() - square) * mass / 12
-    np.testing.assert_allclose(tensor(model, "boom"), expected, rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(tensor(model, "boom"), of_box("boom", mass), rtol=1e-6, atol=1e-6)
     np.testing.assert_allclose(model.body("boom").ipos, [1, 0, 0], atol=1e-9)
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import Run
-from conftest import TRUTH
+from made_logs import TRUTH
 
 import hydroid
 from hydroid import load_settings
@@ -17,8 +17,6 @@ from hydroid.errors import LogError, SettingsError
 from hydroid.identified_model import IdentifiedModel, identified
 from hydroid.log import Log
 from hydroid.settings.arm import Arm
-
-ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module")

@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from conftest import TRUTH
-from made_logs import stepped
+from made_logs import TRUTH, stepped
 
 from hydroid import load_settings
 from hydroid.errors import HydroidError

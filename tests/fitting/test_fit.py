@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import TRUTH
+from made_logs import TRUTH
 from small_fits import Study, Watcher
 
 from hydroid import load_settings

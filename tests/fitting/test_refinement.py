@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from conftest import TRUTH
-from made_logs import noisy, stepped
+from made_logs import TRUTH, noisy, stepped
 
 from hydroid import load_settings
 from hydroid.fitting.refinement import refine

@@ -4,8 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-from conftest import TRUTH
-from made_logs import at_rest, noisy, simulate_log, stepped
+from made_logs import TRUTH, at_rest, noisy, simulate_log, stepped
 
 from hydroid import load_settings, read_logs
 from hydroid.fitting.fit import Fit, fit

@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import TRUTH as ARTICLE
-from made_logs import noisy, stepped
+from made_logs import TRUTH as ARTICLE, noisy, stepped
 
 import hydroid
 from hydroid.fitting.refinement import refine

@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from conftest import COILS, HYDRAULIC, TRUTH as MECH
-from made_logs import noisy, stepped
+from made_logs import COILS, HYDRAULIC, TRUTH as MECH, noisy, stepped
 
 from hydroid import load_settings
 from hydroid.posterior.identifiability import Identifiability, identifiability

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import HYDRAULIC, SMALL
-from made_logs import noisy, stepped
+from conftest import SMALL
+from made_logs import HYDRAULIC, noisy, stepped
 
 import hydroid
 from hydroid import load_settings

@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import TRUTH
-from made_logs import noisy, simulate_log, stepped
+from made_logs import TRUTH, noisy, simulate_log, stepped
 
 from hydroid import load_settings
 from hydroid.log import Log

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from arms import posed, with_masses
-from conftest import HYDRAULIC, TRUTH, replaced
-from made_logs import step_log
+from conftest import replaced
+from made_logs import HYDRAULIC, TRUTH, step_log
 
 from hydroid import load_settings
 from hydroid.hydraulics.solenoid import coil_current, resting_stroke, side_voltage

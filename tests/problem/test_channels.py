@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from arms import posed
-from conftest import HYDRAULIC, TRUTH
-from made_logs import simulate_log, step_log
+from made_logs import HYDRAULIC, TRUTH, simulate_log, step_log
 
 from hydroid import fit, load_settings, read_logs
 from hydroid.arm.model import add_payload

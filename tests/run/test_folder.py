@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import SMALL, TRUTH
-from made_logs import stepped
+from conftest import SMALL
+from made_logs import TRUTH, stepped
 from small_fits import Watcher
 
 from hydroid import fit, load_settings, read_logs

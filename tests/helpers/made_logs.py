@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from hydroid import load_settings
 from hydroid.identified_model import identified
 from hydroid.log import Log
 from hydroid.prediction import predict_log
@@ -16,7 +17,17 @@ TRUTH = {"K": 0.2, "D": 231.8, "S": 53.4, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4"
 COILS = {"F1": 8.0, "F2": 0.7, "x1": 0.8, "x2": 12.0}
 HYDRAULIC = {"A_A": 1000.0, "A_B": 750.0, "I_max": 0.9, "I_min": 0.3, "A": 1.4, "C": 1.2} | COILS
 """and of stage 2"""
+FAST = TRUTH | {"K": 1.0, "D": 60.0, "S": 100.0}
+"""masses as in the article; K, D, S are ours: with the article's the arm is too slow to feel its masses"""
 Levels = Sequence[float] | np.ndarray | Mapping[int, Sequence[float]]
+
+
+def fast_arm(outputs: list[int], *free: str, **changes: object) -> FitSettings:
+    """Stage 1 of an arm with the values of `FAST`, of which only some are free; other joints are locked."""
+    how: dict[str, object] = {"outputs": outputs, "simulation.other_joints": "locked"} | changes
+    how |= {f"parameters.{name}.bounds": [0.2 * FAST[name], 5 * FAST[name]] for name in ("K", "D", "S")}
+    how |= {f"parameters.{name}.fixed": value for name, value in FAST.items() if name not in free}
+    return load_settings("article-mech", how)
 
 
 def at_rest(pose: np.ndarray, command: np.ndarray, period: float = 0.01, source: str = "commands") -> Log:

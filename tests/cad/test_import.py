@@ -268,17 +268,15 @@ def test_an_mjcf_is_read_too(tmp_path):
         ('<robot xmlns:xacro="http://ros.org/xacro"><xacro:include filename="a"/></robot>', "is a xacro"),
         ('<robot name="a"><link name="b"/></robot>', "has no joint that hydroid could move"),
         ('<robot name="a"><joint name="j" type="revolute"/></robot>', "MuJoCo refuses it"),
+        ("PXR-USDC", "is a USD stage; export the arm as URDF"),
     ],
 )  # fmt: skip
 def test_a_file_that_is_no_arm_is_refused_in_one_line(tmp_path, text, message):
-    path = tmp_path / "arm.urdf"
+    path = tmp_path / ("arm.usd" if text == "PXR-USDC" else "arm.urdf")
     path.write_text(text)
     with pytest.raises(ModelError, match=message) as caught:
         import_arm(path)
     assert str(caught.value).startswith(str(path))
-    (usd := tmp_path / "arm.usd").write_bytes(b"PXR-USDC")
-    with pytest.raises(ModelError, match="is a USD stage; export the arm as URDF"):
-        import_arm(usd)
     assert "\n" not in str(caught.value)
     with pytest.raises(ModelError, match=r"cannot be read as XML .*No such file"):
         import_arm(tmp_path / "none.urdf")

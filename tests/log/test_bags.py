@@ -55,16 +55,11 @@ def write(folder: Path, kind: str, *, gap: tuple[float, float] = (9, 9)) -> tupl
     return path, longest
 
 
-def first(path: Path) -> float:
-    """Time of the first angle after START [s]."""
-    return float(np.random.default_rng(3).uniform(0.008, 0.02, 570)[0])
-
-
 @pytest.mark.parametrize("kind", KINDS)
 def test_unsynchronised_topics_come_to_one_clock(kind: str, tmp_path: Path) -> None:
     path, step = write(tmp_path, kind)
     log, findings = read(path, SETTINGS, RANGES)
-    at = log.time + first(path)
+    at = log.time + np.random.default_rng(3).uniform(0.008, 0.02)  # the first angle, after START
     true = np.array([position(t) for t in at])
     bound = 0.8 * RATE**2 * step**2 / 8  # of a chord over the longest step
     assert np.abs(log.angle - true).max() < bound < 1e-3

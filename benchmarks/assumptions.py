@@ -1,11 +1,7 @@
 """Do the tests of assumptions name a planted error, and are they silent where nothing is wrong?
 
-    python benchmarks/assumptions.py [--machines 20] [--first 0] [--seed 3]
-
-The machines and their three logs are those of strangers.py, of other equations than hydroid's. The same logs
-are tested with the arm as it is, and with the axis of one joint turned round, a sign error; of joints that
-gravity does not load no log can tell. It is named where that joint is among those that are doubted, and first
-where it is the first of them.
+The logs of each machine of strangers.py are tested with the arm as it is, and with the axis of one joint
+turned round, a sign error (docs/measured.md). It is named where that joint is among those that are doubted.
 """
 
 import tempfile

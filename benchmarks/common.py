@@ -3,7 +3,7 @@
 import argparse
 import sys
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,17 +13,16 @@ sys.path.append(str(Path(__file__).parents[1] / "tests" / "helpers"))
 
 from made_logs import at_rest, simulate_log
 
-from hydroid.estimate import read_estimate
+from hydroid.errors import RunError
 from hydroid.fitting.refinement import refine
 from hydroid.log import Log
+from hydroid.posterior.uncertainty import Uncertainty, uncertainty
 from hydroid.problem.problem import Problem
-from hydroid.search.descent import Descent
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.search import RefinementSettings
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES = ROOT / "examples"
-ARTICLE_TRUTH = read_estimate(EXAMPLES / "article" / "truth.yaml")[1]
 
 
 def options(text: str | None, **defaults: Any) -> Any:
@@ -34,7 +33,7 @@ def options(text: str | None, **defaults: Any) -> Any:
         names = default if nargs and isinstance(first, str) else None
         how: dict[str, Any] = {"type": type(first), "default": default, "nargs": nargs, "choices": names}
         how = {"action": "store_true"} if default is False else how
-        parser.add_argument(f"--{name.replace('_', '-')}", **how)
+        parser.add_argument(f"--{name.replace('_', '-')}", help=f"by default {default}", **how)
     return parser.parse_args()
 
 
@@ -92,31 +91,38 @@ def pseudo_random_log(
 def true_log(
     settings: FitSettings,
     truth: Mapping[str, float],
-    joints: Sequence[int],
     seconds: float,
     seed: int = 3,
     pose: np.ndarray | None = None,
+    limits: np.ndarray | None = None,
 ) -> Log:
-    """Return the response to pseudo-random commands, kept off the stops; by default from the study pose."""
-    low, high = settings.arm.lower + 0.05, settings.arm.upper - 0.05
+    """Return the response to pseudo-random commands of the outputs, kept within limits [rad], shape (2, J).
 
-    def off_the_stops(log: Log) -> bool:
-        angle = simulate_log(settings, log, truth).angle
+    By default it starts at the study pose and keeps off the stops.
+    """
+    arm = settings.arm
+    low, high = (arm.lower + 0.05, arm.upper - 0.05) if limits is None else limits
+
+    def inside(log: Log) -> bool:
+        try:
+            angle = simulate_log(settings, log, truth).angle
+        except RunError:
+            return False
         return bool(np.all((angle > low) & (angle < high)))
 
-    pose, period = settings.arm.pose("study") if pose is None else pose, settings.log.period_s
-    drive = pseudo_random_log(pose, list(joints), seconds, period, seed, off_the_stops)
+    pose, joints = arm.pose("study") if pose is None else pose, list(settings.outputs)
+    drive = pseudo_random_log(pose, joints, seconds, settings.log.period_s, seed, inside)
     return simulate_log(settings, drive, truth)
 
 
-def near(problem: Problem, truth: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Return the truth with its free parameters moved by random factors within 5 %, shape (P,)."""
-    return truth * np.where(problem.parameters.free, rng.uniform(0.95, 1.05, len(truth)), 1.0)
-
-
-def refined(
-    problem: Problem, start: np.ndarray, how: RefinementSettings | None = None
-) -> tuple[np.ndarray, Descent]:
-    """Refine an estimate, by default as the settings say; return where it ended, shape (P,), and how."""
+def refined(problem: Problem, start: np.ndarray, how: RefinementSettings | None = None) -> np.ndarray:
+    """Return where the refinement of an estimate ends, by default as the settings say, shape (P,)."""
     result = refine(problem, start, how or problem.settings.refinement or RefinementSettings())
-    return problem.parameters.from_unit(result.point), result
+    return problem.parameters.from_unit(result.point)
+
+
+def known(problem: Problem, truth: Mapping[str, float], rng: np.random.Generator) -> Uncertainty:
+    """Return what a refinement knows that starts with free parameters moved by up to 5 % from the truth."""
+    true = problem.parameters.vector(truth, "truth")
+    start = true * np.where(problem.parameters.free, rng.uniform(0.95, 1.05, len(true)), 1.0)
+    return uncertainty(problem, refined(problem, start))

@@ -1,33 +1,22 @@
 """Do 95 % intervals and bands hold? Fits of simulated logs whose truth is known, counted.
 
-    python benchmarks/coverage.py [--parts intervals start quantities own_arm bands left_out] [--fits 20]
-                                  [--seconds 20] [--correlation-times 0 0.15 1 4]
-
-intervals: shoulder and elbow are driven and measured, the others locked; K, D, S, M2 and M6 are free. The
-noise of 0.1 deg is white, or a first-order autoregression, which each fit estimates from its residual.
-start: the same, with noise on the first sample too, and the start left open.
-quantities: stage 2 of the shoulder, the article's ten parameters free. Three directions are unidentifiable.
-own_arm: the machine of examples/urdf, in the settings that `hydroid init` makes, two new logs a fit. Its
-delays are 0, where the bound is: they have no interval.
-bands: stage 1 of the shoulder, fitted to steps, predicts another log, of the same values or a stiffer spring.
-left_out: five logs of the virtual rig, each predicted by a fit to the others. Expected and actual error.
-
-Refinements start within 5 % of the truth: this is a study of the intervals, not of the search. "predicted /
-spread" is the mean standard deviation over the root of the mean square error.
+docs/uncertainty.md says what `--parts` intervals, start, own_arm and bands simulate, docs/quantities.md what
+quantities does, and docs/measured.md what left_out predicts. "predicted / spread" is the mean standard
+deviation over the root of the mean square error.
 """
 
-import importlib
-import sys
+import runpy
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import count
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from common import ARTICLE_TRUTH, EXAMPLES, Clock, near, options, refined, row, table, true_log
-from made_logs import noisy, simulate_log, step_log
+from common import EXAMPLES, Clock, known, options, refined, row, table, true_log
+from made_logs import FAST, HYDRAULIC, fast_arm, noisy, stepped
 
 import hydroid
 from hydroid import load_settings
@@ -44,28 +33,15 @@ from hydroid.settings.fit import FitSettings
 
 Said = tuple[np.ndarray, np.ndarray, np.ndarray]
 """values, standard deviations, and intervals, shape (m, 2)"""
-MECH = ARTICLE_TRUTH | {"K": 1.0, "D": 60.0, "S": 100.0}
-"""masses as in the article; K, D, S are ours: with the article's the arm is too slow to feel its masses"""
-HYD = {"A_A": 1000.0, "A_B": 750.0, "I_max": 0.9, "I_min": 0.3, "A": 1.4, "C": 1.2}
-HYD |= {"F1": 8.0, "F2": 0.7, "x1": 0.8, "x2": 12.0}
-
-
-def mech(outputs: list[int], *free: str, **changes: object) -> FitSettings:
-    how: dict[str, object] = {"outputs": outputs, "simulation.other_joints": "locked"} | changes
-    how |= {f"parameters.{name}.bounds": [0.2 * MECH[name], 5 * MECH[name]] for name in ("K", "D", "S")}
-    how |= {f"parameters.{name}.fixed": value for name, value in MECH.items() if name not in free}
-    return load_settings("article-mech", how)
 
 
 def fits(
     settings: FitSettings, truth: Mapping[str, float], logs: Callable[[Any], list[Log]], most: int, *key: int
-) -> Iterator[tuple[Problem, Uncertainty]]:
+) -> Iterator[Uncertainty]:
     """Yield what fits of new logs, made from a generator, know."""
     for seed in range(most):
         rng = np.random.default_rng([seed, *key])
-        problem = Problem(settings, logs(rng))
-        start = near(problem, problem.parameters.vector(truth, "truth"), rng)
-        yield problem, uncertainty(problem, refined(problem, start)[0])
+        yield known(Problem(settings, logs(rng)), truth, rng)
 
 
 def report(title: str, names: Sequence[str] | np.ndarray, truth: np.ndarray, said: Iterator[Said]) -> None:
@@ -86,26 +62,23 @@ def report(title: str, names: Sequence[str] | np.ndarray, truth: np.ndarray, sai
     row("all", "", "", f"{100 * np.nanmean(hits):.1f} %", "")
 
 
-def parameters(known: Iterator[tuple[Problem, Uncertainty]], chosen: np.ndarray) -> Iterator[Said]:
+def parameters(made: Iterator[Uncertainty], chosen: np.ndarray) -> Iterator[Said]:
     """Yield what fits say of some parameters, shape (P,)."""
-    for _, one in known:
+    for one in made:
         yield one.theta[chosen], one.standard_deviation[chosen], one.interval[chosen]
 
 
 def intervals(given: Any, *, start: bool = False) -> None:
     how = {"free_start": start, "refinement.gain_tolerance": 1e-6}
-    settings = mech([2, 3], "K", "D", "S", "M2", "M6", **how)
-    clean, free = true_log(settings, MECH, [2, 3], given.seconds), settings.parameter_set().free
-    names, truth = (np.array([*part])[free] for part in (MECH, MECH.values()))
+    settings = fast_arm([2, 3], "K", "D", "S", "M2", "M6", **how)
+    clean, free = true_log(settings, FAST, given.seconds), settings.parameter_set().free
+    names, truth = (np.array([*part])[free] for part in (FAST, FAST.values()))
     for time in given.correlation_times:
         phi = float(np.exp(-clean.period / time)) if time else 0.0
-
-        def logs(rng: Any, phi: float = phi) -> list[Log]:
-            return [noisy(clean, seed=rng, phi=phi, exact_start=not start)]
-
-        known = fits(settings, MECH, logs, given.fits, int(1000 * phi))
+        drawn = partial(noisy, clean, 0.1, phi=phi, exact_start=not start)
+        made = fits(settings, FAST, lambda rng, drawn=drawn: [drawn(rng)], given.fits, int(1000 * phi))
         title = f"noise of {time:g} s, logs of {given.seconds:g} s{', the start with noise' * start}"
-        report(title, names, truth, parameters(known, free))
+        report(title, names, truth, parameters(made, free))
 
 
 def quantities(given: Any) -> None:
@@ -113,9 +86,9 @@ def quantities(given: Any) -> None:
     # the overlaps make a dead band; the article's model has none
     changes |= {"hydraulics.overlap_a": 0.4, "hydraulics.overlap_b": 0.3, "refinement.gain_tolerance": 1e-6}
     settings = load_settings("article-hyd", changes)
-    clean = true_log(settings, HYD, [2], given.seconds)
+    clean = true_log(settings, HYDRAULIC, given.seconds)
     candidates = Problem(settings, [clean]).bindings.candidates
-    true = candidates(settings.parameter_set().vector(HYD, "truth")[None])
+    true = candidates(settings.parameter_set().vector(HYDRAULIC, "truth")[None])
     # planned at the truth once: every fit then states the same quantities
     measure = joint_measure(make_bench(settings, [clean], 2), true)
     columns, actual = zip(*measure(true), strict=True)
@@ -126,8 +99,8 @@ def quantities(given: Any) -> None:
         return np.stack([value for _, value in measure(candidates(theta))], axis=1)
 
     def said() -> Iterator[Said]:
-        for _, known in fits(settings, HYD, lambda rng: [noisy(clean, seed=rng)], given.fits):
-            found = known.posterior.propagate(values, positive)
+        for one in fits(settings, HYDRAULIC, lambda rng: [noisy(clean, seed=rng)], given.fits):
+            found = one.posterior.propagate(values, positive)
             yield found.value, found.sd, found.interval
 
     report(f"quantities, logs of {given.seconds:g} s", labels, np.array([v[0] for v in actual]), said())
@@ -135,24 +108,20 @@ def quantities(given: Any) -> None:
 
 def own_arm(given: Any) -> None:
     folder = EXAMPLES / "urdf"
-    sys.path.insert(0, str(folder))
-    example: Any = importlib.import_module("make_example")
-
+    example = runpy.run_path(str(folder / "make_example.py"))
     with tempfile.TemporaryDirectory() as place:
         machine, mine = Path(place) / "machine", Path(place) / "mine"
         hydroid.init(machine, arm=folder / "robot.urdf")
-        hydroid.init(
-            mine, arm=folder / "robot.urdf", log=[folder / f"log_{number}.csv" for number in (1, 2, 3)]
-        )
-        settings, truth, seeds = load_settings(mine / "fit.yaml"), example.machine(machine), count(1000)
+        hydroid.init(mine, arm=folder / "robot.urdf", log=sorted(folder.glob("log_*.csv")))
+        settings, truth, seeds = load_settings(mine / "fit.yaml"), example["machine"](machine), count(1000)
 
-        def logs(rng: Any) -> list[Log]:
-            return [example.recorded(truth, next(seeds)) for _ in range(2)]
+        def logs(_: Any) -> list[Log]:
+            return [example["recorded"](truth, next(seeds)) for _ in range(2)]
 
-        known = fits(settings, truth.values, logs, given.fits)
+        made = fits(settings, truth.values, logs, given.fits)
         true = settings.parameter_set().vector(truth.values, "truth")
         names = np.array(settings.parameter_set().names)[true > 0]
-        report("own arm", names, true[true > 0], parameters(known, true > 0))
+        report("own arm", names, true[true > 0], parameters(made, true > 0))
 
 
 def predicted(problem: Problem, theta: np.ndarray, log: Log) -> Band:
@@ -162,19 +131,18 @@ def predicted(problem: Problem, theta: np.ndarray, log: Log) -> Band:
 
 
 def bands(given: Any) -> None:
-    settings = mech([2], "K", "D", "S", free_start=True)
+    settings = fast_arm([2], "K", "D", "S", free_start=True)
 
     def steps(values: dict[str, float], rng: np.random.Generator) -> Log:
-        drive = step_log(settings.arm.pose("study"), rng.uniform(-60.0, 60.0, 5))
-        return noisy(simulate_log(settings, drive, values), seed=rng, exact_start=False)
+        return noisy(stepped(settings, values, rng.uniform(-60.0, 60.0, 5)), seed=rng, exact_start=False)
 
     table("the other log | inside the band, median (range) | the model is blamed")
     for percent in (0, 5, 20, 50):
-        found, wrong = [], MECH | {"S": (1 + percent / 100) * MECH["S"]}
+        found, wrong = [], FAST | {"S": (1 + percent / 100) * FAST["S"]}
         for seed in range(given.fits):
             rng = np.random.default_rng(seed)
-            problem = Problem(settings, [steps(MECH, rng)])
-            theta, _ = refined(problem, problem.parameters.vector(MECH, "truth"))
+            problem = Problem(settings, [steps(FAST, rng)])
+            theta = refined(problem, problem.parameters.vector(FAST, "truth"))
             found.append(predicted(problem, theta, steps(wrong, rng)))
         low, middle, high = np.quantile([100 * band.inside for band in found], [0.0, 0.5, 1.0])
         blamed = sum(band.model_limits for band in found)
@@ -183,29 +151,24 @@ def bands(given: Any) -> None:
 
 def left_out(given: Any) -> None:
     # logs, and the samples at which they rest where a piece begins
-    pieces = (
-        ("shoulder_1", 0),
-        ("shoulder_1", 2200),
-        ("shoulder_2", 0),
-        ("shoulder_2", 3300),
-        ("all_joints_1", 0),
-    )
+    pieces = {"shoulder_1": (0, 2200), "shoulder_2": (0, 3300), "all_joints_1": (0,)}
     masses = load_settings("fit-hyd").arm.masses
     changes: dict[str, object] = {"simulation.other_joints": "measured", "search.nsga2.generations": 3}
     changes |= {f"log.joints.{joint}.command": None for joint in (1, 3, 4, 5, 6, 7)}
     changes |= {f"parameters.M{i + 1}.fixed": float(masses[i]) for i in range(6)}
     for stage in ("hyd", "mech"):
         settings, logs = load_settings(f"fit-{stage}", changes), list[Log]()
-        for name, first in pieces:
+        for name, starts in pieces.items():
             (log,) = hydroid.read_logs([EXAMPLES / "logs" / f"rig_{name}.csv"], settings)
-            part = log.part(first, first + round(given.seconds / log.period))
-            logs.append(replace(part, source=f"{name} from {first}.csv", rest=None))
+            for first in starts:
+                part = log.part(first, first + round(given.seconds / log.period))
+                logs.append(replace(part, source=f"{name} from {first}.csv", rest=None))
         model = hydroid.fit(settings, logs).model
         print(f"\nstage {stage}")
         table("left out | expected [deg] | actual [deg] | actual / expected | inside the band")
         for i, log in enumerate(logs):
             problem = Problem(model.settings, [*logs[:i], *logs[i + 1 :]])
-            band = predicted(problem, refined(problem, model.theta)[0], log)
+            band = predicted(problem, refined(problem, model.theta), log)
             errors = f"{np.degrees(band.expected):.3f} | {np.degrees(band.error):.3f}"
             ratio = f"{band.error / band.expected:.1f}"
             row(Path(log.source).stem, errors, ratio, f"{100 * band.inside:.0f} %")

@@ -1,7 +1,5 @@
 """How exact the hydraulics are over the whole search space (takes minutes).
 
-    python benchmarks/hydraulic_accuracy.py [--sets 24]
-
 One joint against Radau (rtol 1e-8) of the full coupled equations: feasible parameter sets drawn from 0.25 to
 2.5 times the article's values, 30 s of pseudo-random pulses, several sub-steps and MuJoCo steps.
 """

@@ -1,9 +1,6 @@
 """Six hydraulic joints at once, 54 parameters, one log of 75 s: time, simulations and error; then per joint.
 
-    python benchmarks/six_joints.py [--seconds 75]
-
-Each joint is fitted alone while the others follow their logged motion, then all are refined together. Start
-values are those of the arm's file and of `START`, none of them tuned to this log. --seconds cuts the log.
+Start values are those of the arm's file and of `START`, none of them tuned to this log. --seconds cuts it.
 """
 
 import numpy as np

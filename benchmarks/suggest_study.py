@@ -1,24 +1,17 @@
 """Does `hydroid suggest` name what a model lacks, and is it silent where it lacks nothing?
 
-    python benchmarks/suggest_study.py [--logs 20] [--seconds 15] [--only delay none]
-
-Stage 2 of the shoulder: the parameters in `TRUTH` are free, as in configs/fit-hyd.yaml, and all else is held
-at the truth. Each log has one term (or none), its own commands and start pose, a second of rest, and 0.1 deg
-of white noise. The model without the term is fitted to it, from within 5 % of the truth. A term is named
-where freeing it, on one side or both, lowers the error on the halves left out.
+docs/measured.md says what is simulated and when a term is named. Stage 2 of the shoulder: the parameters in
+`TRUTH` are free, as in configs/fit-hyd.yaml, and all else is held at the truth.
 """
 
-from dataclasses import replace
-
 import numpy as np
-from common import near, options, refined, row, table, true_log
-from made_logs import at_rest, simulate_log
+from common import known, options, row, table, true_log
+from made_logs import at_rest, noisy, simulate_log
 
 from hydroid import load_settings
 from hydroid.advice.suggestions import advice
 from hydroid.arm.model import load_model
 from hydroid.log import Log
-from hydroid.posterior.uncertainty import uncertainty
 from hydroid.problem.bindings import Bindings
 from hydroid.problem.problem import Problem, make_simulation
 from hydroid.settings.fit import FitSettings
@@ -43,13 +36,11 @@ def make_log(term: str, seconds: float, seed: int) -> Log:
     pose = truth.arm.pose("study").copy()
     pose[1:3] = np.radians([rng.uniform(0, 40), rng.uniform(-100, -40)])
 
-    drive = true_log(truth, TRUTH, [2], seconds, seed, pose).command
+    drive = true_log(truth, TRUTH, seconds, seed, pose).command
     log = at_rest(pose, np.concatenate([np.zeros_like(drive[:rest]), drive[:-rest]]))
     if term == "flow_limit":
         truth = make_settings(term, TERMS[term] * largest_flow(truth, log))
-    angle = simulate_log(truth, log, TRUTH).angle.copy()
-    angle[:, 1] += rng.normal(0.0, np.deg2rad(0.1), len(angle))
-    return replace(log, angle=angle)
+    return noisy(simulate_log(truth, log, TRUTH), 0.1, rng, exact_start=False)
 
 
 def largest_flow(truth: FitSettings, log: Log) -> float:
@@ -63,8 +54,7 @@ def tried(term: str, k: int, seconds: float) -> tuple[bool, bool, bool, float, f
     """Of one log: named, first, anything named, rms without and with it [deg]."""
     # seeds below 100 were used while the test was written
     problem = Problem(make_settings(), [make_log(term, seconds, 1000 * list(TERMS).index(term) + 100 + k)])
-    start = near(problem, problem.parameters.vector(TRUTH, "truth"), np.random.default_rng([k, 5]))
-    content = advice(problem, uncertainty(problem, refined(problem, start)[0]))[0]
+    content = advice(problem, known(problem, TRUTH, np.random.default_rng([k, 5])))[0]
     free = [row["name"] for row in content["terms"] if "command" in row]
     sides = (term, f"{term}_a", f"{term}_b")
     freed = [row["rms_deg"] for row in content["terms"] if row["name"] in sides and "freed" in row]

@@ -1,7 +1,5 @@
 """What a simulation costs, and what hydroid adds to it: ratios inside one run.
 
-    python benchmarks/throughput.py
-
 A population (70 candidates, 7,500 steps, objectives included) against `mujoco.batch.Batch.rollout` alone
 on the same model and candidates, set up beforehand; `locked` against `passive`; stage 2 against stage 1; and
 how fast a plant steps, as a multiple of real time.
@@ -13,8 +11,8 @@ from functools import partial
 
 import mujoco
 import numpy as np
-from common import ARTICLE_TRUTH, pseudo_random_log, row, table
-from made_logs import simulate_log
+from common import pseudo_random_log, row, table
+from made_logs import TRUTH, simulate_log
 from mujoco.batch import Batch
 
 from hydroid import load_settings
@@ -32,7 +30,7 @@ def make_problem(config: str, joints: list[int], other_joints: str) -> Problem:
     settings = load_settings(config, {"simulation.other_joints": other_joints})
     log = pseudo_random_log(settings.arm.pose("study"), joints, duration=75.01)
     if config == "article-mech":
-        log = simulate_log(settings, log, ARTICLE_TRUTH)
+        log = simulate_log(settings, log, TRUTH)
     return Problem(settings, [log])
 
 

@@ -22,11 +22,6 @@ from hydroid.settings.problem import SimulationSettings
 from hydroid.simulation import Candidates, Simulation
 from hydroid.simulation.scenario import Scenario
 
-TRUTH = {"K": 0.2, "D": 231.8, "S": 53.4, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
-"""the article's values of stage 1"""
-COILS = {"F1": 8.0, "F2": 0.7, "x1": 0.8, "x2": 12.0}
-HYDRAULIC = {"A_A": 1000.0, "A_B": 750.0, "I_max": 0.9, "I_min": 0.3, "A": 1.4, "C": 1.2} | COILS
-"""and of stage 2"""
 SMALL = {"search.algorithm": "ga", "search.ga": {"population": 6, "generations": 2}}
 """settings of a search of a second"""
 

@@ -22,11 +22,6 @@ from hydroid.commands.app import app
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
 
-def output(name: str, *arguments: str) -> str:
-    command = [sys.executable, str(EXAMPLES / name), *arguments]
-    return subprocess.run(command, capture_output=True, text=True, check=True, cwd=EXAMPLES.parent).stdout
-
-
 @pytest.fixture
 def gym_env(monkeypatch: pytest.MonkeyPatch):
     """The module of the environment."""
@@ -38,7 +33,9 @@ def gym_env(monkeypatch: pytest.MonkeyPatch):
 
 
 def test_the_controller_brings_the_shoulder_to_its_target():
-    found = re.search(r"after 10 s: ([\d.]+) deg of 30", output("pid.py"))
+    command, how = [sys.executable, str(EXAMPLES / "pid.py")], {"capture_output": True, "text": True}
+    done = subprocess.run(command, check=True, cwd=EXAMPLES.parent, **how)
+    found = re.search(r"after 10 s: ([\d.]+) deg of 30", done.stdout)
     assert found
     assert float(found[1]) == pytest.approx(30.0, abs=0.3)
 
@@ -71,15 +68,6 @@ SHORT = ["--set", "search.multistart={starts: 1, horizons: [], iterations: 1}", 
 """for a fit: as the README has it, but for a step only"""
 
 
-@pytest.fixture
-def copied(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A copy of both examples, as the working folder."""
-    for name in ("boom", "urdf"):
-        shutil.copytree(EXAMPLES / name, tmp_path / "examples" / name, ignore=shutil.ignore_patterns("mine"))
-    monkeypatch.chdir(tmp_path)
-    return tmp_path / "examples"
-
-
 def commands(readme: Path) -> list[list[str]]:
     """The hydroid commands of a README, with its patterns expanded."""
     (block,) = re.findall(r"```sh\n(.*?)```", readme.read_text(encoding="utf-8"), re.DOTALL)
@@ -91,11 +79,12 @@ def commands(readme: Path) -> list[list[str]]:
     return found
 
 
-@pytest.mark.parametrize(("name", "count"), [("boom", 3), ("urdf", 4)])
-def test_the_readmes_commands_run(name: str, count: int, copied: Path, monkeypatch: pytest.MonkeyPatch):
-    if name == "urdf":
-        monkeypatch.chdir(copied / "urdf")
-    run = commands(copied / name / "README.md")
+@pytest.mark.parametrize(("name", "place", "count"), [("boom", ".", 3), ("urdf", "examples/urdf", 4)])
+def test_the_readmes_commands_run(name: str, place: str, count: int, tmp_path: Path, monkeypatch):
+    copy = tmp_path / "examples" / name
+    shutil.copytree(EXAMPLES / name, copy, ignore=shutil.ignore_patterns("mine"))
+    monkeypatch.chdir(tmp_path / place)
+    run = commands(copy / "README.md")
     assert len(run) == count
     for words in run:
         done = CliRunner().invoke(app, [*words, *(SHORT if words[0].startswith("fit-") else [])])

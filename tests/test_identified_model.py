@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import TRUTH
+from made_logs import TRUTH
 
 import hydroid
 from hydroid.errors import RunError, SettingsError

@@ -1,11 +1,13 @@
 """Data goes one way: no package imports one that stands after it."""
 
 import ast
+import runpy
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).parents[1] / "hydroid"
+imports = runpy.run_path(str(ROOT.parent / "benchmarks" / "structure.py"))["imports"]
 
 # a package may import packages of a lower layer, and itself
 LAYERS = [
@@ -48,15 +50,8 @@ def package(path: Path) -> str:
 
 def imported_packages(path: Path) -> set[str]:
     tree = ast.parse(path.read_text())
-    names: set[str] = set()
-    for node in ast.walk(tree):
-        if isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"{path}: relative import"
-            names.add(node.module or "")
-            names |= {f"{node.module}.{alias.name}" for alias in node.names if node.module == "hydroid"}
-        elif isinstance(node, ast.Import):
-            names |= {alias.name for alias in node.names}
-    return {name.split(".")[1] for name in names if name.startswith("hydroid.")} & LEVEL.keys()
+    assert not any(getattr(node, "level", 0) for node in ast.walk(tree)), f"{path}: relative import"
+    return {name.split(".")[1] for name in imports(tree) if name.startswith("hydroid.")} & LEVEL.keys()
 
 
 def test_every_file_belongs_to_a_package():
@@ -73,14 +68,8 @@ def test_no_upward_import(path: Path):
     assert not beside or LEVEL[here] <= 1, f"{here} imports its neighbour {beside}"
 
 
-def test_the_search_knows_no_robot():
-    allowed = {"arrays", "errors", "settings", "search"}
-    for path in (ROOT / "search").glob("*.py"):
-        assert imported_packages(path) <= allowed, path
-        text = path.read_text()
-        assert "mujoco" not in text, path
-
-
-def test_the_workers_know_no_robot():
-    for path in (ROOT / "parallel").glob("*.py"):
-        assert imported_packages(path) <= {"arrays", "errors", "settings", "parallel"}, path
+@pytest.mark.parametrize("name", ["search", "parallel"])
+def test_search_and_workers_know_no_robot(name: str):
+    for path in (ROOT / name).glob("*.py"):
+        assert imported_packages(path) <= {"arrays", "errors", "settings", name}, path
+        assert "mujoco" not in imports(ast.parse(path.read_text())), path

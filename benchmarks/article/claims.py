@@ -1,9 +1,8 @@
 """Verdicts on claims that a ratio of two measures over the same seeds lies below a limit, or near 1.
 
 The ratio is the geometric mean over seeds that both cells have, its interval Student's t of the logarithms.
-The intervals of one item are Holm's, for the article's claims, those of equality and ours apart: that of the
-smallest of m p-values has the level 0.05 / m, the next 0.05 / (m - 1), and so on up to the first that does
-not reject; all others have its level.
+The intervals of one item are Holm's, for the article's claims, those of equality and ours apart; all from the
+first that does not reject have its level.
 """
 
 from collections import defaultdict

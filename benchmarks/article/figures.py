@@ -13,8 +13,6 @@ from studies import Figure, Plan, Runs
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
 
-COLORS = [f"C{i}" for i in range(10)]
-
 
 def draw(plan: Plan, runs: Runs, figure: Figure, file: Path) -> None:
     kinds = {"convergence": _convergence, "sensitivity": _sensitivity, "surface": _surface}
@@ -42,7 +40,7 @@ def _convergence(drawing: Drawing, plan: Plan, runs: Runs, figure: Figure) -> No
     """Best objective by generation: the median over seeds, with the middle half of them shaded."""
     axes = drawing.subplots()
     axes.set(xlabel="generation", ylabel="best objective" + ", 0 to 1" * figure.normalized)
-    for cell, color in zip(figure.cells, COLORS, strict=False):
+    for number, cell in enumerate(figure.cells):
         texts = [run["history"] for run in runs if run["cell"] == cell and "history" in run]
         if not texts:
             continue
@@ -52,8 +50,8 @@ def _convergence(drawing: Drawing, plan: Plan, runs: Runs, figure: Figure) -> No
             curves = (curves - low) / np.where(high > low, high - low, 1.0)
         lower, middle, upper = np.nanquantile(curves, (0.25, 0.5, 0.75), axis=0)
         generation = np.arange(1, len(middle) + 1)
-        axes.plot(generation, middle, color=color, label=f"{cell}, seeds: {len(texts)}")
-        axes.fill_between(generation, lower, upper, color=color, alpha=0.12, linewidth=0)
+        axes.plot(generation, middle, color=f"C{number}", label=f"{cell}, seeds: {len(texts)}")
+        axes.fill_between(generation, lower, upper, color=f"C{number}", alpha=0.12, linewidth=0)
         axes.legend(fontsize=8)
     axes.set_yscale("linear" if figure.normalized else "log")
 
@@ -75,8 +73,8 @@ def _responses(drawing: Drawing, plan: Plan, runs: Runs, figure: Figure) -> None
         theta = [float(run[f"value {name}"]) for name in problem.parameters.names]
         bests = [best.split() for best in run["segment bests"].split(";")] if with_bests else []
         curves = np.degrees(problem.responses(np.array([*bests, theta], float))[0].angle[:, :, 0])
-        _lines(axes, problem, curves[:-1], color=COLORS[number], lw=0.6, alpha=0.5)
-        _lines(axes, problem, curves[-1:], color=COLORS[number], lw=1 + with_bests, label=cell)
+        _lines(axes, problem, curves[:-1], color=f"C{number}", lw=0.6, alpha=0.5)
+        _lines(axes, problem, curves[-1:], color=f"C{number}", lw=1 + with_bests, label=cell)
     axes.legend(fontsize=8)
 
 

@@ -1,8 +1,6 @@
 """Measures of an estimate, of a search's course, and of what a record can tell.
 
-The article sums the relative errors of all parameters. A sum counts directions that the data do not
-determine: there an estimate is where chance left it. `identifiable error` sums the same relative errors after
-projecting them on the directions that the data determine (page.md).
+page.md defines those of the tables.
 """
 
 from collections.abc import Mapping, Sequence
@@ -37,13 +35,13 @@ class Directions:
         self.truth = self.parameters.vector(truth, "truth")
         self.slopes = linearised(problem, self.truth).slopes
         self.axes = determined(self.slopes)
+        self.names = [n for n, free in zip(self.parameters.names, self.parameters.free, strict=True) if free]
 
     def measures(self, values: Mapping[str, float]) -> dict[str, float]:
         estimate, free = self.parameters.vector(values, "a run"), self.parameters.free
         change = ((estimate - self.truth) / self.truth)[free]
-        names = np.array(self.parameters.names)[free]
         masses = [i for i, p in enumerate(self.parameters.parameters) if p.unit == "kg"]
-        result = {f"error {n}": abs(float(c)) for n, c in zip(names, change, strict=True)}  # tables 1 and 6
+        result = {f"error {n}": abs(float(c)) for n, c in zip(self.names, change, strict=True)}
         result["parameter error"] = float(np.abs(change).sum())
         result["identifiable error"] = float(np.abs(self.axes.T @ (self.axes @ change)).sum())
         total = {"mass error": abs(float(np.sum((estimate - self.truth)[masses])))}
@@ -51,12 +49,11 @@ class Directions:
 
     def sensitivities(self, segments: NDArray[np.int64]) -> dict[str, float]:
         """Return how strongly the output depends on each parameter, in all and by segment, (S, 2)."""
-        names = [n for n, free in zip(self.parameters.names, self.parameters.free, strict=True) if free]
         rms = np.degrees(0.01 * np.sqrt(np.mean(self.slopes**2, axis=1)))
         parts = [self.slopes[:, first:end] for first, end in segments]
         norms = np.array([np.linalg.norm(part, axis=1) for part in parts])
-        ratios = norms[:, names.index("D")] / norms[:, names.index("S")]
-        return {f"slope {n}": float(s) for n, s in zip(names, rms, strict=True)} | {
+        ratios = norms[:, self.names.index("D")] / norms[:, self.names.index("S")]
+        return {f"slope {n}": float(s) for n, s in zip(self.names, rms, strict=True)} | {
             "D over S, lowest segment": float(min(ratios)),
             "D over S, highest segment": float(max(ratios)),
             "directions of the record": len(self.axes),

@@ -12,11 +12,12 @@ from typing import Any
 
 import numpy as np
 from claims import MOST, POWER, Outcome, Verdict, log_ratios, verdict, verdicts
+from common import ROOT
 from studies import BLIND, CENTRE, RECORDS, Claim, Figure, Runs, Table, load_studies, of_cell, read_runs
 
 from hydroid.words import two_digits
 
-DOCS = Path(__file__).parents[2] / "docs"
+DOCS = ROOT / "docs"
 QUICK = "> **The short form: one seed, short data, few generations. It shows that the studies run.**\n\n"
 FEW = 5
 """runs below which a median of some of a cell's runs, or a curve, says little"""

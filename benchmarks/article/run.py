@@ -1,21 +1,20 @@
 """The article's tables and figures over many seeds: `make article`, and `make article ARGS=--quick`.
 
-    python benchmarks/article/run.py [--quick] [--minutes N] [--processes N] [STUDY ...]
-
 Only what docs/reproduction/ lacks is run, up to the seeds that the studies state: first the claims that the
 fewest runs would decide, if the effect is that of the article. No run begins after N minutes. In the end
 figures and docs/reproduction.md are made. The short form writes to runs/article-quick alone.
 """
 
-import argparse
 import os
 import time
 from collections.abc import Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from claims import Outcome, verdicts
+from common import ROOT, options
 from figures import draw
 from page import page
 from pandas import DataFrame
@@ -25,28 +24,27 @@ from hydroid.errors import HydroidError
 from hydroid.files import write_atomic
 from hydroid.studies import Result, perform, processes
 
-ROOT = Path(__file__).parents[2]
 Key = tuple[str, str, int]
 """study, cell, seed"""
 ATTEMPT = 6
 """number of seeds after which a claim's spread can be guessed"""
 
 
-def main(chosen: list[str], minutes: float, at_once: int, *, quick: bool) -> None:
-    results = ROOT / ("runs/article-quick/results" if quick else "docs/reproduction")
+def main(given: Any) -> None:
+    results = ROOT / ("runs/article-quick/results" if given.quick else "docs/reproduction")
     results.mkdir(parents=True, exist_ok=True)
-    studies = {name: study for name, study in load_studies().items() if name in chosen or not chosen}
-    plans = {name: Plan(name, study, quick=quick) for name, study in studies.items()}
-    read = {name: read_runs(results / f"{name}_runs.csv") for name in plans}
-    runs = {name: with_what_needs_no_search(plan, read[name]) for name, plan in plans.items()}
-    work(plans, runs, results, at_once, 60 * minutes)
+    studies, runs = load_studies(), dict[str, Runs]()
+    plans = {name: Plan(name, studies[name], quick=given.quick) for name in given.studies}
+    for name, plan in plans.items():
+        runs[name] = with_what_needs_no_search(plan, read_runs(results / f"{name}_runs.csv"))
+    work(plans, runs, results, given.processes, 60 * given.minutes)
     for name, plan in plans.items():
         if runs[name]:
             write(results, name, runs[name])
         for figure in plan.study.figures:
             draw(plan, runs[name], figure, results / figure.file)
     target = results.with_suffix(".md")
-    target.write_text(page(results, quick=quick), encoding="utf-8")
+    target.write_text(page(results, quick=given.quick), encoding="utf-8")
     print(target)
 
 
@@ -121,10 +119,5 @@ def with_what_needs_no_search(plan: Plan, runs: Runs) -> Runs:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("studies", nargs="*")
-    parser.add_argument("--quick", action="store_true")
-    parser.add_argument("--minutes", type=float, default=np.inf)
-    parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)
-    given = parser.parse_args()
-    main(given.studies, given.minutes, given.processes, quick=given.quick)
+    limits = {"minutes": float("inf"), "processes": os.cpu_count() or 1}
+    main(options(__doc__, studies=[*load_studies()], quick=False, **limits))

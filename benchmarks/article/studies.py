@@ -10,18 +10,17 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from common import pseudo_random_log
+from common import pseudo_random_log, true_log
 from made_logs import simulate_log
 from measures import Directions, course, output_errors
 from pydantic import Field
 
 from hydroid import read_logs
-from hydroid.errors import RunError
 from hydroid.log import Log
 from hydroid.problem.problem import Problem
 from hydroid.settings.fit import Changes, FitSettings, StudySettings, cell_settings
 from hydroid.settings.load import Settings, load
-from hydroid.studies import Result, Task
+from hydroid.studies import Result, Task, measured
 
 FOLDER = Path(__file__).parent
 SECONDS, QUICK_SECONDS = 75.0, 15.0
@@ -147,13 +146,12 @@ class Plan:
 
     def row(self, cell: str, seed: int, result: Result) -> dict[str, Any]:
         """Return a run with all its measures, as it is kept."""
-        if "failed" in result:
-            return {"cell": cell, "seed": seed, "failed": result["failed"]}
-        row: dict[str, Any] = {"cell": cell, "seed": seed}
-        row |= {name: float(value) for name, value in result["measures"].items()} | course(result["history"])
-        row |= {f"value {name}": float(value) for name, value in result["theta"].items()}
+        made = measured(self.task(cell, seed), result)
+        row: dict[str, Any] = {"cell": cell, "seed": seed} | dict(made.values)
+        if made.failed:
+            return row | {"failed": made.failed}
         bests = (" ".join(f"{value:.6g}" for value in best.values()) for best in result["segment_bests"])
-        return self.judged(row | {"segment bests": ";".join(bests)})
+        return self.judged(row | course(result["history"]) | {"segment bests": ";".join(bests)})
 
     def judged(self, row: dict[str, Any]) -> dict[str, Any]:
         """Return a run with the measures of its estimate that it lacks."""
@@ -176,19 +174,12 @@ class Plan:
         settings, truth = next(iter(self.cells.values())), self.truth(seed)
         if not truth:
             return read_logs([FOLDER / name for name in self.study.logs], settings)[0].first(self.longest)
-        low, high = self.study.range_deg or (-np.inf, np.inf)
-
-        def inside(log: Log) -> bool:
-            try:
-                angle = np.degrees(simulate_log(settings, log, truth).angle[:, joints[0] - 1])
-            except RunError:
-                return False
-            return bool(low < angle.min() and angle.max() < high)
-
         pose, joints = settings.arm.pose("study"), [*settings.outputs]
-        allowed = inside if self.study.range_deg else lambda log: True
-        commands = pseudo_random_log(pose, joints, self.longest, seed=seed, allowed=allowed)
-        return simulate_log(settings, commands, truth)
+        if self.study.range_deg is None:
+            return simulate_log(settings, pseudo_random_log(pose, joints, self.longest, seed=seed), truth)
+        limits = np.tile([[-np.inf], [np.inf]], len(pose))
+        limits[:, joints[0] - 1] = np.radians(self.study.range_deg)
+        return true_log(settings, truth, self.longest, seed, limits=limits)
 
 
 def read_runs(file: Path) -> Runs:

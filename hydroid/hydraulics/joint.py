@@ -59,11 +59,15 @@ def command(z, w, delayed_a: float, delayed_b: float) -> None:
 
 
 @compilable
-def _advance(c, side, z, asked: float, step: float, pilot_steps: float, keep: float, weight: float) -> float:
+def _advance(c, side, z, asked: float, step: float, whole: bool) -> float:
     """Advance a pilot stage and its plunger under a command towards their side [%]; the mean stroke [m].
 
-    The stage is first-order: of its error a step leaves the part `keep`; its lag is so many steps.
+    `whole`: whether the step is a sub-step, and not a part of one.
     """
+    pilot_steps, keep, weight = side.pilot_steps, side.pilot_keep, side.plunger_weight
+    if not whole:
+        pilot_steps = side.pilot_lag / step
+        keep, weight = kept(pilot_steps), plunger_weight(side.plunger_damping, step, c)
     beyond, part = beyond_dead_band(z.pilot, asked, pilot_steps, keep, side.dead_band)
     z.pilot, before = asked + (z.pilot - asked) * keep, z.stroke
     pull = drive(side_voltage(beyond, part, side.onset, side.dead_band), c)
@@ -73,16 +77,12 @@ def _advance(c, side, z, asked: float, step: float, pilot_steps: float, keep: fl
 
 @compilable
 def _move_plunger(c, side, z, w, substep: int, step: float) -> float:
+    """Advance a side over a sub-step, up to the moment at which its command changes and on; mean stroke."""
     later = min(max(substep + 1.0 - side.fresh, 0.0), 1.0)  # part of the sub-step under the new command
     if later in (0.0, 1.0) or w.before == w.after:
-        asked = w.after if later > 0.0 else w.before
-        return _advance(c, side, z, asked, step, side.pilot_steps, side.pilot_keep, side.plunger_weight)
-    mean = 0.0
-    for asked, part in ((w.before, 1.0 - later), (w.after, later)):
-        piece = part * step
-        steps, weight = side.pilot_lag / piece, plunger_weight(side.plunger_damping, piece, c)
-        mean += part * _advance(c, side, z, asked, piece, steps, kept(steps), weight)
-    return mean
+        return _advance(c, side, z, w.after if later > 0.0 else w.before, step, True)
+    mean = (1.0 - later) * _advance(c, side, z, w.before, (1.0 - later) * step, False)
+    return mean + later * _advance(c, side, z, w.after, later * step, False)
 
 
 @compilable

@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from conftest import TRUTH
-from made_logs import simulate_log
+from made_logs import TRUTH, simulate_log
 
 from hydroid import load_settings
 from hydroid.advice.design import Design, design, forecast, measured, sensor_noise, weakest

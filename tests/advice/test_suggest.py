@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_logs import simulate_log, step_log
+from made_logs import noisy, stepped
 
 from hydroid import load_settings
 from hydroid.advice.growth import promising, refitted, score_terms
@@ -35,10 +35,7 @@ def make_settings(**hydraulics: float) -> FitSettings:
 
 
 def make_log(settings: FitSettings, noise_deg: float = 0.1) -> Log:
-    log = simulate_log(settings, step_log(settings.arm.pose("study"), LEVELS, joint=2), TRUTH)
-    noise = np.random.default_rng(1).normal(0.0, np.radians(noise_deg), log.angle.shape)
-    noise[:, np.arange(log.joints) != 1] = 0.0
-    return replace(log, angle=log.angle + noise)
+    return noisy(stepped(settings, TRUTH, LEVELS), noise_deg, 1)
 
 
 def at_truth(truth: FitSettings, model: FitSettings) -> tuple[Problem, Uncertainty]:

@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 import pytest
-from arms import BOOM, CHILD, CYLINDER, PARENT, write_arm
+from arms import BOOM, CHILD, CYLINDER, PARENT, posed, write_arm
 from hypothesis import given, strategies as st
 
 from hydroid.arm.model import add_payload, load_model
@@ -50,10 +50,10 @@ def test_length_is_the_third_side_and_the_moment_arm_its_derivative(case):
 
 def test_in_every_pose_a_cylinder_is_as_long_as_its_pivots_are_apart():
     model = load_model(SHIPPED).compile()
-    data, rng = mujoco.MjData(model), np.random.default_rng(1)
+    rng = np.random.default_rng(1)
     for _ in range(5):
-        data.qpos[:] = rng.uniform(np.maximum(SHIPPED.lower, -np.pi), np.minimum(SHIPPED.upper, np.pi))
-        mujoco.mj_forward(model, data)
+        pose = rng.uniform(np.maximum(SHIPPED.lower, -np.pi), np.minimum(SHIPPED.upper, np.pi))
+        data = posed(model, pose)
         jacobian = np.zeros((model.ntendon, model.nv))
         rows = model.ten_J_rownnz, model.ten_J_rowadr, model.ten_J_colind
         mujoco.mju_sparse2dense(jacobian, data.ten_J, *rows)
@@ -76,10 +76,8 @@ def test_a_cylinder_between_two_points_of_the_assembled_arm(tmp_path, above):
     np.testing.assert_allclose(here, np.array(ends["parent"]) - [0.2, 0, 2], atol=1e-9)
     np.testing.assert_allclose(there, np.array(ends["child"]) - [6.2, 0, 2], atol=1e-9)
     model, ends = load_model(arm).compile(), {"boom": here, "bar": there}
-    data = mujoco.MjData(model)
     for angle in (-0.9, 0.0, 0.7):
-        data.qpos[:] = 0.3, angle
-        mujoco.mj_forward(model, data)
+        data = posed(model, (0.3, angle))
         pairs = ((data.body("boom"), here), (data.body("bar"), there))
         first, second = (body.xpos + body.xmat.reshape(3, 3) @ point for body, point in pairs)
         assert np.linalg.norm(second - first) == pytest.approx(cylinder.length(angle), abs=1e-9)

@@ -1,7 +1,7 @@
 import mujoco
 import numpy as np
 import pytest
-from arms import BOOM, write_arm
+from arms import BOOM, posed, with_masses, write_arm
 from hypothesis import given, settings, strategies as st
 from mujoco.batch import Batch
 
@@ -12,25 +12,12 @@ from hydroid.settings.arm import load_arm
 
 ARM = load_arm("hydrolek")
 SPEC = load_model(ARM)
-FULL = SPEC.compile()
 J, L = len(ARM.joint_names), len(ARM.link_names)
-LINKS = [FULL.body(name).id for name in ARM.link_names]
-NOMINAL = FULL.body_mass[LINKS].copy()
 
 
 def locked_arm(spec, arm, moving, pose):
     """The arm with all joints locked but these, by name."""
     return lock(spec, arm, np.isin(arm.joint_names, moving), pose)
-
-
-def full_model(masses):
-    """The whole arm with each link's inertia scaled with its mass, contacts off."""
-    model = SPEC.compile()
-    model.body_mass[LINKS] = masses
-    model.body_inertia[LINKS] *= (masses / NOMINAL)[:, None]
-    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
-    mujoco.mj_setConst(model, mujoco.MjData(model))
-    return model
 
 
 def locked_model(locked, masses):
@@ -49,7 +36,7 @@ def random_state(rng):
 
 def constrained(masses, q, v, tau, moving):
     """Accelerations and bias of the moving joints of the whole arm, others held: M_ff a_f = τ_f - bias_f."""
-    model = full_model(masses)
+    model = with_masses(ARM, masses)
     data = mujoco.MjData(model)
     data.qpos[:], data.qvel[moving] = q, v[moving]
     mujoco.mj_forward(model, data)
@@ -64,7 +51,7 @@ def constrained(masses, q, v, tau, moving):
 def test_moves_like_the_whole_arm_with_the_other_joints_held(moving, seed):
     rng = np.random.default_rng(seed)
     moving = sorted(moving)
-    masses = NOMINAL * rng.uniform(0.1, 5, L)
+    masses = ARM.masses * rng.uniform(0.1, 5, L)
     q, v, tau = random_state(rng)
     expected, bias = constrained(masses, q, v, tau, moving)
 
@@ -124,10 +111,7 @@ def test_the_export_stands_where_the_whole_arm_does(tmp_path, moving):
         joint.actfrclimited, joint.actfrcrange = mujoco.mjtLimited.mjLIMITED_TRUE, [-1, 1]
     locked, whole = locked_arm(spec, arm, moving, pose), spec.compile()
     model = locked_spec(spec, locked, locked.model).compile()
-    here, there = mujoco.MjData(model), mujoco.MjData(whole)
-    here.qpos[:], there.qpos[:] = locked.pose, pose
-    mujoco.mj_forward(model, here)
-    mujoco.mj_forward(whole, there)
+    here, there = posed(model, locked.pose), posed(whole, pose)
     assert (model.njnt, model.ntendon, model.jnt_actfrclimited[0]) == (1, 0, 0)
     places = (d.geom_xpos[np.argsort(d.geom_xpos[:, 0])] for d in (here, there))
     np.testing.assert_allclose(*places, atol=1e-9)

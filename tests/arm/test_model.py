@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 import trimesh
+from arms import posed
 
 from hydroid.arm.model import load_machine, load_model
 from hydroid.errors import ModelError, SettingsError
@@ -17,13 +18,6 @@ from hydroid.settings.arm import load_arm
 ARM = load_arm("hydrolek")
 MODEL = load_model(ARM).compile()
 MESHES = sorted((assets() / "meshes").glob("*.stl"))
-
-
-def posed(q):
-    data = mujoco.MjData(MODEL)
-    data.qpos[:] = q
-    mujoco.mj_forward(MODEL, data)
-    return data
 
 
 def test_making_the_models_again_changes_no_byte(tmp_path):
@@ -58,7 +52,8 @@ def test_the_committed_meshes_are_those_of_the_script(tmp_path):
 @pytest.mark.parametrize("joint", ["shoulder", "elbow", "wrist"])
 def test_positive_pitch_lifts_the_jaws(joint):
     angle = 0.1 * (np.array(ARM.joint_names) == joint)
-    assert posed(angle).body("jaw_left").xipos[2] > posed(0 * angle).body("jaw_left").xipos[2] + 0.01
+    there, here = (posed(MODEL, q).body("jaw_left").xipos[2] for q in (angle, 0 * angle))
+    assert there > here + 0.01
 
 
 def test_motors_are_joint_torques_and_nothing_else_pushes():
@@ -74,13 +69,10 @@ def test_motors_are_joint_torques_and_nothing_else_pushes():
 def test_each_arm_of_a_pair_is_the_one_that_stands_alone():
     """Its gravity and inertia, on both sides."""
     machine = load_machine(ARM, pair=True)
-    one, data = mujoco.MjData(MODEL), mujoco.MjData(machine.model)
     rng = np.random.default_rng(1)
     for _ in range(3):
         pose = rng.uniform(np.maximum(ARM.lower, -3), np.minimum(ARM.upper, 3))
-        one.qpos[:], data.qpos[:] = pose, np.tile(pose, 2)
-        mujoco.mj_forward(MODEL, one)
-        mujoco.mj_forward(machine.model, data)
+        one, data = posed(MODEL, pose), posed(machine.model, np.tile(pose, 2))
         np.testing.assert_allclose(data.qfrc_bias, np.tile(one.qfrc_bias, 2), atol=1e-9)
         full, single = np.zeros((14, 14)), np.zeros((7, 7))
         mujoco.mj_fullM(machine.model, data, full)

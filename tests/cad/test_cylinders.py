@@ -1,9 +1,9 @@
 """Cylinders that an MJCF models as loops of links: pivots, linkages and limits against stated truth."""
 
-import mujoco
 import numpy as np
 import pytest
 from arms import MODELS
+from robots import compiled
 from scipy.optimize import least_squares
 
 from hydroid.cad.importer import import_arm
@@ -34,9 +34,7 @@ def arm(tmp_path_factory):
 
 
 def actuator(arm, name) -> LinearActuator:
-    model = mujoco.MjSpec.from_string(arm.mjcf, assets=arm.meshes).compile()
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
+    model, data = compiled(arm)
     own = Cylinder(**arm.cylinders[name], area_a=1000, area_b=600, max_opening=1)
     return make_cylinder(own, tuple(model.joint(name).range), data, name)
 
@@ -56,7 +54,7 @@ def turned(point, angle):
 
 
 def test_rods_are_no_end_of_the_arm_and_weigh_on_their_links(arm):
-    model = mujoco.MjSpec.from_string(arm.mjcf, assets=arm.meshes).compile()
+    model, _ = compiled(arm)
     assert [model.joint(j).name for j in range(model.njnt)] == ["swing", "boom", "stick", "bucket"]
     assert model.body_mass[-4:] == pytest.approx([4080, 800, 450, 310])
     assert set(arm.cylinders) == {"boom", "bucket"}

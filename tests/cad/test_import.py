@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 import robots
 import trimesh
-from arms import MODELS
-from robots import LIMIT, joint, link, write_robot
+from arms import MODELS, posed
+from robots import LIMIT, compiled, joint, link, write_robot
 
 from hydroid.cad.importer import import_arm
 from hydroid.cad.shapes import SHOWN
@@ -18,15 +18,6 @@ def said(arm, start):
     (line,) = [note for note in arm.notes if note.startswith(start)]
     assert "\n" not in line
     return line
-
-
-def compiled(arm):
-    """The imported model and its data, joints at 0."""
-    model = mujoco.MjSpec.from_string(arm.mjcf, assets=arm.meshes).compile()
-    data = mujoco.MjData(model)
-    data.qpos[:] = 0.0
-    mujoco.mj_forward(model, data)
-    return model, data
 
 
 def joints(model):
@@ -47,16 +38,20 @@ def tensor(model, body):
     return axes * model.body(body).inertia @ axes.T
 
 
+def of_box(name, mass):
+    """Inertia of a link's box about its centre [kg·m²]."""
+    square = np.array(robots.SIZES[name]) ** 2
+    return np.diag(square.sum() - square) * mass / 12
+
+
 def test_links_joints_and_inertias_are_those_of_the_file(tmp_path):
     model, _ = compiled(import_arm(write_robot(tmp_path)))
     assert [model.body(b).name for b in range(1, 4)] == ["house", "boom", "stick"]
     assert joints(model) == ["swing_joint", "boom_joint", "stick_joint"]
     for name, size in robots.SIZES.items():
-        square = np.array(size) ** 2
         assert model.body(name).mass[0] == robots.MASSES[name]
         np.testing.assert_allclose(model.body(name).ipos, [size[0] / 2, 0, 0], atol=1e-12)
-        expected = np.diag(square.sum() - square) * robots.MASSES[name] / 12
-        np.testing.assert_allclose(tensor(model, name), expected, atol=1e-9)
+        np.testing.assert_allclose(tensor(model, name), of_box(name, robots.MASSES[name]), atol=1e-9)
         np.testing.assert_allclose(extents(model, name), np.sort(size), rtol=1e-6)
     assert model.jnt_range[1] == pytest.approx([-0.5, 1.2])
     assert model.key("home").qpos == pytest.approx([0, 0, -0.2])
@@ -74,16 +69,13 @@ def test_turned_frames_move_as_mujocos_own_import_does(tmp_path):
         "more": tool + joint("weld", "stick", "tool", kind="fixed", at="1.5 0 0", turn="1 0 0", limit=""),
     }  # fmt: skip
     path = write_robot(tmp_path, **changes)
-    found, here = compiled(import_arm(path))
+    found, _ = compiled(import_arm(path))
     assert found.body("stick").mass[0] == 120.0
     text = path.read_text().replace("package://digger/meshes/", str(tmp_path / "digger/meshes") + "/")
     text = text.replace("</robot>", '<mujoco><compiler strippath="false"/></mujoco></robot>')
     model = mujoco.MjSpec.from_string(text).compile()
-    there = mujoco.MjData(model)
     for angles in np.random.default_rng(1).uniform(-1, 1, (5, 3)):
-        here.qpos[:] = there.qpos[:] = angles
-        mujoco.mj_forward(found, here)
-        mujoco.mj_forward(model, there)
+        here, there = posed(found, angles), posed(model, angles)
         for name in ("xanchor", "xaxis", "qfrc_bias", "M"):
             np.testing.assert_allclose(getattr(here, name), getattr(there, name), atol=1e-6)
 
@@ -163,7 +155,7 @@ def test_a_trap_is_said_in_one_line(tmp_path, changes, note, masses):
 def test_a_total_mass_scales_all_that_moves(tmp_path):
     model, _ = compiled(import_arm(write_robot(tmp_path, **light("boom")), total_mass=5170.0))
     assert model.body_mass[1:] == pytest.approx(np.array([800, 144, 90]) * 5)
-    assert tensor(model, "stick")[1, 1] == pytest.approx(5 * 90 * (1.5**2 + 0.2**2) / 12)
+    np.testing.assert_allclose(tensor(model, "stick"), of_box("stick", 5 * 90), atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -198,9 +190,7 @@ def test_an_impossible_inertia_is_that_of_the_mesh(tmp_path, fault):
     said(arm, message)
     model, _ = compiled(arm)
     assert model.body("boom").mass[0] == pytest.approx(mass)
-    square = np.array(robots.SIZES["boom"]) ** 2
-    expected = np.diag(square.sum() - square) * mass / 12
-    np.testing.assert_allclose(tensor(model, "boom"), expected, rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(tensor(model, "boom"), of_box("boom", mass), rtol=1e-6, atol=1e-6)
     np.testing.assert_allclose(model.body("boom").ipos, [1, 0, 0], atol=1e-9)
 
 
@@ -278,17 +268,15 @@ def test_an_mjcf_is_read_too(tmp_path):
         ('<robot xmlns:xacro="http://ros.org/xacro"><xacro:include filename="a"/></robot>', "is a xacro"),
         ('<robot name="a"><link name="b"/></robot>', "has no joint that hydroid could move"),
         ('<robot name="a"><joint name="j" type="revolute"/></robot>', "MuJoCo refuses it"),
+        ("PXR-USDC", "is a USD stage; export the arm as URDF"),
     ],
 )  # fmt: skip
 def test_a_file_that_is_no_arm_is_refused_in_one_line(tmp_path, text, message):
-    path = tmp_path / "arm.urdf"
+    path = tmp_path / ("arm.usd" if text == "PXR-USDC" else "arm.urdf")
     path.write_text(text)
     with pytest.raises(ModelError, match=message) as caught:
         import_arm(path)
     assert str(caught.value).startswith(str(path))
-    (usd := tmp_path / "arm.usd").write_bytes(b"PXR-USDC")
-    with pytest.raises(ModelError, match="is a USD stage; export the arm as URDF"):
-        import_arm(usd)
     assert "\n" not in str(caught.value)
     with pytest.raises(ModelError, match=r"cannot be read as XML .*No such file"):
         import_arm(tmp_path / "none.urdf")

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from log_files import NAMES, cells
+from log_files import NAMES, RIG, cells
 from log_formats import write_parquet
 from typer.testing import CliRunner
 
@@ -13,9 +13,7 @@ import hydroid
 from hydroid.commands.app import app
 from hydroid.settings.log import LogSettings
 
-ROOT = Path(__file__).parents[2]
-RIG = ROOT / "examples" / "logs" / "rig_shoulder_1.csv"
-EXCAVATOR = ROOT / "examples" / "excavator"
+SHOULDER, EXCAVATOR = RIG / "rig_shoulder_1.csv", RIG.parent / "excavator"
 
 
 @pytest.mark.parametrize("name", ["fit_01", "check_04"])
@@ -34,9 +32,9 @@ def test_a_jittering_log_with_signs_reads_back_to_the_same_bits(name: str, tmp_p
 
 
 def test_a_guessed_log_reads_back_to_the_same_bits(tmp_path: Path) -> None:
-    done = hydroid.convert(RIG, out=tmp_path / "plain.csv")
+    done = hydroid.convert(SHOULDER, out=tmp_path / "plain.csv")
     settings = hydroid.load_settings("fit-mech")
-    (log,), (back,) = (hydroid.read_logs(path, settings) for path in (RIG, tmp_path / "plain.csv"))
+    (log,), (back,) = (hydroid.read_logs(path, settings) for path in (SHOULDER, tmp_path / "plain.csv"))
     np.testing.assert_array_equal(back.command, log.command)
     np.testing.assert_array_equal(back.angle, log.angle)
     assert done.result.guess is not None

@@ -6,12 +6,13 @@ import textwrap
 from pathlib import Path
 
 import pytest
+from conftest import SMALL
+from made_logs import TRUTH
 
 import hydroid
 from hydroid.commands import stages
 from hydroid.reporting import page_file
 
-ROOT = Path(__file__).parents[2]
 NAMES = [
     name
     for name in hydroid.__all__
@@ -22,14 +23,7 @@ ELSEWHERE = {"view", "report", "convert", "init", "study"}
 they have tests of their own"""
 WRITES = {"fit": "a", "fit_mech": "mech", "fit_hyd": "hyd"}
 """the run folder that an example makes"""
-SMALL = {"population": 6, "generations": 2}
-QUICK: dict[str, object] = {
-    "search.ga": SMALL,
-    "search.nsga2": SMALL,
-    "refinement": None,
-    "joint_refinement": False,
-    "design": {"effort": 3, "poses": "any"},
-}
+QUICK = SMALL | {"refinement": None, "joint_refinement": False, "design": {"effort": 3, "poses": "any"}}
 
 
 def example(name: str) -> str:
@@ -49,8 +43,7 @@ def folder(array, tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "runs" / "array").symlink_to(array[0])
     for name in ("a", "mech"):
         (folder / "runs" / name).symlink_to(array[0] / "seed-1")
-    values = {"D": 80.0, "S": 0.0, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
-    fixed = {f"parameters.{name}.fixed": value for name, value in values.items()}
+    fixed = {f"parameters.{name}.fixed": value for name, value in TRUTH.items() if name != "K"}
     hydraulic = hydroid.load_identified(None, "fit-hyd", fixed, nominal=True)
     hydroid.Plant(hydraulic).save(folder / "runs" / "hyd")
     return folder

@@ -6,13 +6,13 @@ import sys
 from pathlib import Path
 
 import pytest
+from log_files import RIG
 from typer.testing import CliRunner
 
 import hydroid
 from hydroid.commands.app import COMMANDS, GROUPS, app, click_command
 
-ROOT = Path(__file__).parents[2]
-LOG = ROOT / "examples" / "logs" / "rig_shoulder_1.csv"
+LOG = RIG / "rig_shoulder_1.csv"
 HEAVY = ("numba", "scipy", "matplotlib", "trimesh", "rich", "jinja2", "PIL", "distributed")
 PRINTED = {"json", "quiet", "verbose"}
 """options of the command line alone"""

@@ -9,16 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import Run
-from conftest import TRUTH
+from made_logs import TRUTH
 
 import hydroid
 from hydroid import load_settings
-from hydroid.errors import LogError, SettingsError
+from hydroid.errors import LogError
 from hydroid.identified_model import IdentifiedModel, identified
 from hydroid.log import Log
 from hydroid.settings.arm import Arm
-
-ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module")
@@ -60,11 +58,6 @@ def test_each_arm_has_its_own_columns(model: IdentifiedModel, tmp_path: Path):
     np.testing.assert_array_equal(both["left"].command[:, 2], rows[:, 2])
     with pytest.raises(LogError, match="u1_pct"):
         hydroid.simulate(tmp_path / "own.csv", fit=model, out=None)
-
-
-def test_an_arm_that_is_none_is_refused(model: IdentifiedModel, study_log: Log):
-    with pytest.raises(SettingsError, match=r"'middle' is no arm of a pair.*right, left or both"):
-        hydroid.simulate(study_log, fit=model, arm="middle", out=None)
 
 
 def test_the_exit_status_says_whether_bodies_meet(arm: Arm, hydroid_cli: Run):

@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from conftest import TRUTH
-from made_logs import simulate_log, step_log
+from made_logs import TRUTH, stepped
 
 from hydroid import load_settings
 from hydroid.errors import HydroidError
@@ -38,8 +37,7 @@ def make(kind=Fragile, **changes) -> Problem:
     small = {f"search.{algorithm}": {"population": 10, "generations": 5} for algorithm in ("ga", "nsga2")}
     small |= {"objective.segments": 3}
     settings = load_settings("article-mech", small | changes)
-    log = simulate_log(settings, step_log(settings.arm.pose("study"), [60.0, -80.0, 30.0]), TRUTH)
-    return kind(settings, [log])
+    return kind(settings, [stepped(settings, TRUTH, [60.0, -80.0, 30.0])])
 
 
 @pytest.mark.parametrize("algorithm", ["ga", "nsga2"])

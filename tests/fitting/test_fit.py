@@ -1,8 +1,6 @@
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from conftest import TRUTH
+from made_logs import TRUTH
 from small_fits import Study, Watcher
 
 from hydroid import load_settings
@@ -33,7 +31,7 @@ def test_truth_has_no_error_and_evaluation_does_not_depend_on_the_chunk(tmp_path
 def test_several_logs_and_outputs_are_one_long_error(tmp_path):
     study = Study(tmp_path, outputs=[2, 3])
     log = study.log
-    short = replace(log, time=log.time[:200], command=log.command[:200], angle=log.angle[:200])
+    short = log.first(1.99)
     problem = Problem(study.settings, [log, short])
     truth = problem.parameters.vector(TRUTH, "truth")[None]
     residuals = problem.residuals(truth * 1.1)

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from made_logs import noisy, simulate_log
-from recovery import duties, settings_of
+from made_logs import noisy, simulate_log, step_log
+from recovery import settings_of
 
 from hydroid.fitting.fit import fit
 from hydroid.problem.problem import Problem
@@ -34,7 +34,7 @@ def test_a_fit_keeps_what_the_logs_ask_for(name):
     }
     ladder = settings.model_copy(update=changes)
     machine = ladder.of_estimate(name)
-    log = duties(machine.arm.pose("study"), {2: SHOULDER, 3: ELBOW})
+    log = step_log(machine.arm.pose("study"), {2: SHOULDER, 3: ELBOW})
     exact = simulate_log(machine, log, {n: TRUTH[n] for n in CONFIG if n in machine.parameters})
     found = fit(Problem(ladder, [noisy(exact, 0.02, 1, exact_start=False)]))
     assert found.final == name

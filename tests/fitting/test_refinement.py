@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from conftest import TRUTH
-from made_logs import noisy, simulate_log, step_log
+from made_logs import TRUTH, noisy, stepped
 
 from hydroid import load_settings
 from hydroid.fitting.refinement import refine
@@ -26,11 +25,10 @@ class Counted(Problem):
 
 
 @pytest.fixture(scope="module", params=["no prior", "a prior"])
-def problem(request, arm):
+def problem(request):
     priors = {} if request.param == "no prior" else {"link 3": {"of": "M3", "value": 22.0, "sd": 0.5}}
     settings = load_settings("article-mech", {"priors": priors})
-    log = simulate_log(settings, step_log(arm.pose("study"), [60.0, -80.0]), TRUTH)
-    return Counted(settings, [noisy(log, 0.06, exact_start=False)])
+    return Counted(settings, [noisy(stepped(settings, TRUTH, [60.0, -80.0]), 0.06, exact_start=False)])
 
 
 def begin(problem) -> np.ndarray:

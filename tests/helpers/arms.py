@@ -1,10 +1,13 @@
-"""Small arms of a few lines of MJCF and YAML."""
+"""Small arms of a few lines of MJCF and YAML, and what plain MuJoCo makes of any arm."""
 
 from pathlib import Path
 from typing import Any
 
+import mujoco
+import numpy as np
 import yaml
 
+from hydroid.arm.model import load_model
 from hydroid.settings.arm import Arm, load_arm
 
 MODELS = Path(__file__).parents[1] / "models"
@@ -20,3 +23,22 @@ def write_arm(folder: Path, model: str = BOOM, **settings: Any) -> Arm:
     (folder / "arm.xml").write_text(model)
     (folder / "arm.yaml").write_text(yaml.safe_dump({"model": "arm.xml"} | settings))
     return load_arm(folder / "arm.yaml")
+
+
+def posed(model: mujoco.MjModel, pose: Any) -> mujoco.MjData:
+    """The model at rest in a pose, and what follows from it."""
+    data = mujoco.MjData(model)
+    data.qpos[:] = pose
+    mujoco.mj_forward(model, data)
+    return data
+
+
+def with_masses(arm: Arm, masses: np.ndarray) -> mujoco.MjModel:
+    """The whole arm with each link's inertia scaled with its mass, contacts off."""
+    model = load_model(arm).compile()
+    links = [model.body(name).id for name in arm.link_names]
+    model.body_inertia[links] *= (masses / model.body_mass[links])[:, None]
+    model.body_mass[links] = masses
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+    return model

@@ -68,12 +68,12 @@ def draw(rng: np.random.Generator, count: int) -> dict[str, np.ndarray]:
     return dict(zip(TEN, np.array(rows).T, strict=True))
 
 
-def pulses(rng: np.random.Generator, samples: int, shortest: int = 20, longest: int = 120) -> np.ndarray:
+def pulses(rng: np.random.Generator, samples: int) -> np.ndarray:
     """Pseudo-random commands [%], (samples,): pulses of random size and length, a third of them rests."""
     command = np.zeros(samples)
     at = 0
     while at < samples:
-        length = int(rng.integers(shortest, longest))
+        length = int(rng.integers(20, 120))
         command[at : at + length] = rng.choice([-1.0, 1.0, 0.0], p=[0.35, 0.35, 0.3]) * rng.uniform(20, 100)
         at += length
     return command

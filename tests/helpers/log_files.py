@@ -59,9 +59,11 @@ def assert_same(log: Log, other: Log) -> None:
     np.testing.assert_array_equal(log.angle, other.angle)
 
 
-def faults(path: Path, settings: LogSettings = SETTINGS, **options: Any) -> list[LogFinding]:
+def faults(
+    path: Path, settings: LogSettings = SETTINGS, ranges: np.ndarray = RANGES, **options: Any
+) -> list[LogFinding]:
     """Errors only."""
-    log, findings = check_log(path, settings, RANGES, **options)
+    log, findings = check_log(path, settings, ranges, **options)
     errors = [finding for finding in findings if finding.level == "error"]
     assert (log is None) == bool(errors)
     return errors

@@ -1,9 +1,9 @@
-"""Stage 2 with known mechanics, logs that are commands alone, and fits that recover what made a log."""
+"""Stage 2 with known mechanics, and fits that recover what made a log."""
 
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from made_logs import at_rest, noisy, simulate_log
+from made_logs import noisy, simulate_log
 
 import hydroid
 from hydroid.fitting.refinement import refine
@@ -14,17 +14,8 @@ from hydroid.settings.fit import FitSettings
 from hydroid.settings.search import RefinementSettings
 
 NOISE_DEG = 0.02
-
-
-def duties(pose: np.ndarray, levels: Mapping[int, Sequence[float]], dwell: float = 1.0) -> Log:
-    """A log without motion: commands [%] from its first sample, each held `dwell` [s], by joint (from 1)."""
-    period = 0.01
-    length = round(dwell * max(map(len, levels.values())) / period) + 1
-    command = np.zeros((length, len(pose)))
-    for joint, values in levels.items():
-        held = np.repeat(values, round(dwell / period))
-        command[: len(held), joint - 1] = held
-    return at_rest(pose, command)
+STOPPED = np.radians([0, -30, -60, 0, 0, 0, 20])
+"""the shoulder at the lower end of its range"""
 
 
 def settings_of(parameters: Mapping[str, Mapping[str, object]], **hydraulics: float | None) -> FitSettings:

@@ -2,7 +2,11 @@
 
 from pathlib import Path
 
+import mujoco
 import trimesh
+from arms import posed
+
+from hydroid.cad.importer import ImportedArm
 
 INERTIAL = """
     <inertial><origin xyz="{centre}"/><mass value="{mass}"/>
@@ -70,3 +74,9 @@ def write_robot(folder: Path, scale: float = 1.0, **parts: str) -> Path:
     path.parent.mkdir(exist_ok=True)
     path.write_text(f'<robot name="digger">{"".join((PARTS | parts).values())}\n</robot>\n')
     return path
+
+
+def compiled(arm: ImportedArm) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    """An imported arm in MuJoCo, joints at 0."""
+    model = mujoco.MjSpec.from_string(arm.mjcf, assets=arm.meshes).compile()
+    return model, posed(model, 0.0)

@@ -4,8 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-from conftest import TRUTH
-from made_logs import at_rest, noisy, simulate_log, step_log
+from made_logs import TRUTH, at_rest, noisy, simulate_log, stepped
 
 from hydroid import load_settings, read_logs
 from hydroid.fitting.fit import Fit, fit
@@ -48,8 +47,7 @@ class Study:
         sizes = {"ga": 10, "nsga2": 8}
         small = {f"search.{a}": {"population": n, "generations": 6} for a, n in sizes.items()}
         self.settings = load_settings("article-mech", small | {"objective.segments": 3} | changes)
-        log = step_log(self.settings.arm.pose("study"), [60.0, -80.0, 30.0, 0.0, -40.0])
-        self.log = simulate_log(self.settings, log, TRUTH)
+        self.log = stepped(self.settings, TRUTH, [60.0, -80.0, 30.0, 0.0, -40.0])
         self.path = folder / "log.csv"
         write_log(self.path, self.log, self.settings.log)
         self.problem = Problem(self.settings, [self.log])

@@ -17,7 +17,7 @@ def arguments(config: str = "article-mech", **changes: Any) -> tuple[FitSettings
     """Settings and logs of a problem with two outputs and two logs."""
     settings = load_settings(config, (PASSIVE if config == "article-mech" else {}) | changes)
     pose = settings.arm.pose("study")
-    return settings, [step_log(pose, [60.0, -80.0]), step_log(pose, [30.0], joint=3)]
+    return settings, [step_log(pose, [60.0, -80.0]), step_log(pose, {3: [30.0]})]
 
 
 def random_candidates(problem: Problem, n: int) -> np.ndarray:

@@ -9,6 +9,7 @@ import numpy as np
 
 from hydroid.errors import ModelError
 
+NINE = np.arange(18.0).reshape(9, 2)
 DEADLY = 1e-3
 """first value of a candidate that kills its worker"""
 

@@ -10,7 +10,6 @@ from hydroid.settings.hydraulics import HydraulicSettings
 
 SETTINGS = HydraulicSettings(substeps=10)
 LITRES = 6e4
-JOINTS = list(range(7))
 
 
 def observe(arm: Arm, command: list[float], samples: int, **pump: float) -> tuple[np.ndarray, ...]:
@@ -96,7 +95,7 @@ def test_at_rest_the_pump_stands_by_again():
 
 def test_random_pumps_and_valves_stay_stable(arm: Arm):
     rng = np.random.default_rng(5)
-    n, command = 20, np.stack([pulses(rng, 300) for _ in JOINTS], axis=1)
+    n, command = 20, np.stack([pulses(rng, 300) for _ in range(7)], axis=1)
     pump = {
         "pump_flow": 10 ** rng.uniform(-1, 1.3, (n, 1)), "pump_droop": rng.choice([0, 20, 100], (n, 1)),
         "pump_idle": rng.uniform(0, 1, (n, 1)), "pump_rise": rng.choice([0, 0.3], (n, 1)),

@@ -6,13 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from recovery import assert_recovered, duties, recover, settings_of
+from made_logs import step_log
+from recovery import STOPPED, assert_recovered, recover, settings_of
 
 DUTIES = [60, -40, 90, -80, 40, 0, -30, 70, -60, 30]
 ROTARY = 4
 """the roll: a rotary actuator turns it"""
-STOPPED = np.radians([0, -30, -60, 0, 0, 0, 20])
-"""the shoulder at the lower end of its range"""
 NOTHING: Mapping[str, float] = MappingProxyType({})
 
 
@@ -111,6 +110,6 @@ def test_a_term_is_recovered(name):
         **case.hydraulics,
     ).model_copy(update={"outputs": joints})
     pose = settings.arm.pose("study") if case.pose is None else case.pose
-    logs = [duties(pose, levels, case.dwell) for levels in case.commands]
+    logs = [step_log(pose, levels, case.dwell) for levels in case.commands]
     truth, start = ({q: row[k] for q, row in case.rows.items()} for k in (2, 3))
     assert_recovered(recover(settings, logs, truth, start), settings, truth)

@@ -1,10 +1,10 @@
 """A telescope: a joint that slides, with its cylinder along it."""
 
-import mujoco
 import numpy as np
 import pytest
-from arms import MODELS
-from recovery import assert_recovered, duties, recover
+from arms import MODELS, posed
+from made_logs import step_log
+from recovery import assert_recovered, recover
 
 import hydroid
 from hydroid.arm.locked import lock
@@ -44,9 +44,7 @@ def test_locking_the_boom_leaves_a_mass_on_a_slope(settings: FitSettings) -> Non
     """Free of its cylinder it slides down at g sin: the reduced model is the whole one."""
     moving = np.array(settings.arm.joint_names) == "telescope"
     locked = lock(load_model(settings.arm), settings.arm, moving, settings.arm.pose("up"))
-    data = mujoco.MjData(locked.model)
-    data.qpos[:] = 0.9
-    mujoco.mj_forward(locked.model, data)
+    data = posed(locked.model, 0.9)
     assert data.qacc[0] == pytest.approx(-9.81 * np.sin(0.9), rel=1e-9)
     assert data.M[0] == pytest.approx(250)
 
@@ -64,6 +62,6 @@ def test_a_reader_meets_millimetres_and_newtons(settings: FitSettings) -> None:
 def test_areas_delay_and_mass_are_recovered(settings: FitSettings) -> None:
     """The slope tells the mass: one log has the boom up, one has it level."""
     levels = {2: [40, -40, 80, -30, 20, -60, 60, -50, 0, 30]}
-    logs = [duties(np.array([boom, 0.4]), levels, dwell=0.8) for boom in (1.2, 0.0)]
+    logs = [step_log(np.array([boom, 0.4]), levels, dwell=0.8) for boom in (1.2, 0.0)]
     start = {"area_A": 3000.0, "area_B": 1800.0, "delay": 0.05, "M_telescope": 250.0}
     assert_recovered(recover(settings, logs, TRUTH, start), settings, TRUTH)

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hydraulic_reference import SHORTEST, START, THETA0, A, B, parameters, simulate
-from recovery import duties, settings_of
+from made_logs import step_log
+from recovery import STOPPED, settings_of
 
 from hydroid.arm.model import load_model
 from hydroid.hydraulics.cylinder import triangle
@@ -13,8 +14,6 @@ from hydroid.problem.bindings import Bindings
 from hydroid.problem.problem import make_simulation
 from hydroid.settings.hydraulics import HydraulicSettings
 
-STOPPED = np.radians([0, -30, -60, 0, 0, 0, 20])
-"""the shoulder at the lower end of its range"""
 TIGHT = HydraulicSettings(leakage=0.0, substeps=10)
 TRAPPED = {"trapped": {"quantity": "trapped_pressure", "joints": [2], "bounds": [0.0, 150.0]}}
 
@@ -61,7 +60,7 @@ def test_more_than_the_load_presses_against_a_stop_above():
 
 def test_a_log_says_in_which_pressures_it_rested():
     settings = settings_of(TRAPPED, start_pressure=None)
-    log = duties(STOPPED, {2: [0, 50]})
+    log = step_log(STOPPED, {2: [0, 50]})
     pressure = np.full((len(log.time), 7, 2), np.nan)
     pressure[:, 1] = 12e5, 3e5
     spec, bindings = load_model(settings.arm), Bindings(settings)
@@ -74,7 +73,7 @@ def test_a_log_says_in_which_pressures_it_rested():
 
 def test_a_joint_away_from_its_stops_is_held_by_its_oil():
     settings = settings_of(TRAPPED)
-    log, bindings = duties(settings.arm.pose("study"), {2: [50, -50]}), Bindings(settings)
+    log, bindings = step_log(settings.arm.pose("study"), {2: [50, -50]}), Bindings(settings)
     simulation = make_simulation(load_model(settings.arm), log, [1], settings)
     angle = simulation.simulate(bindings.candidates(np.array([[231.8, 53.4, p] for p in (0.0, 40.0)]))).angle
     np.testing.assert_array_equal(angle[0], angle[1])

@@ -33,9 +33,9 @@ def values(change):
     return lambda rows: rows.__setitem__(slice(None), lines(change(cells())))
 
 
-def clock(rows: list[list[str]]) -> None:
-    for k, row in enumerate(rows[1:]):
-        row[0] = f"12:00:00.{k:02d}" if k != 7 else "noon"
+def clock(stamp):
+    """A file whose rows have other times."""
+    return lambda rows: [row.__setitem__(0, stamp(k)) for k, row in enumerate(rows[1:])]
 
 
 FINE = ((3, "-30.9"), (3, "88.2"), (1, "100"), (2, "1e1"), (2, "٣"))
@@ -49,7 +49,9 @@ FAULTS = {
     "text": (cell(40, 2, "#N/A"), "line 41, column u2_pct", "is not a number"),
     "a cell more": (cell(40, 2, "3,4"), "line 41", "should have 5 cells"),
     "a jump": (cell(40, 4, "1000"), "line 41, column q2_deg", "jumps by"),
-    "no time of day": (clock, "line 9, column time_s", "12:30:05.25"),
+    "no time of day": (
+        clock(lambda k: "noon" if k == 7 else f"12:00:00.{k:02d}"), "line 9, column time_s", "12:30:05.25",
+    ),
     "no time column": (lambda rows: [r.pop(0) for r in rows], "line 1", "lacks 'time_s'"),
     "two lacking": (
         lambda rows: [r.__delitem__(slice(2, 4)) for r in rows],
@@ -124,13 +126,10 @@ def test_every_fault_of_a_file_is_reported_at_once(tmp_path: Path) -> None:
     ],
 )
 def test_dates_and_times_of_day_count_from_the_first(stamp, tmp_path: Path) -> None:
-    def clock(rows: list[list[str]]) -> None:
-        for k, row in enumerate(rows[1:]):
-            row[0] = stamp(k)
-
-    plain, _ = read(edited(tmp_path, lambda rows: None))
+    plain, _ = read(save(tmp_path / "plain.csv", lines(cells())))
+    path = edited(tmp_path, clock(stamp))
     for unit in ("s", "ms"):  # the unit is that of numbers
-        log, notes = read(edited(tmp_path, clock), LogSettings.model_validate({"time": {"unit": unit}}))
+        log, notes = read(path, LogSettings.model_validate({"time": {"unit": unit}}))
         assert notes == []
         np.testing.assert_array_equal(log.time, plain.time)
         np.testing.assert_array_equal(log.angle, plain.angle)

@@ -7,11 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from log_files import RIG, RIG_RANGES
+from log_files import RIG
 
 import hydroid
-from hydroid.log import check_log
-from hydroid.settings.log import LogSettings
+from hydroid.log import LogFinding
 
 ROOT = Path(__file__).parents[2]
 Table = dict[str, np.ndarray]
@@ -174,9 +173,9 @@ def test_it_is_said_and_the_page_shows_it(wrong: Wrong, tmp_path: Path) -> None:
     assert f"| {wrong.how} | {line} |\n" in page
 
 
-def findings(folder: Path, *tables: dict) -> list[tuple[str, str]]:
-    result = hydroid.check(save(Wrong("", "", lambda: [*tables]), folder), config=SETTINGS).result
-    return [(finding.level, finding.kind) for log in result for finding in log.findings]
+def findings(folder: Path, table: Table) -> list[LogFinding]:
+    (checked,) = hydroid.check(save(Wrong("", "", lambda: [table]), folder), config=SETTINGS).result
+    return [*checked.findings]
 
 
 def test_a_good_log_has_no_finding(tmp_path: Path) -> None:
@@ -186,7 +185,7 @@ def test_a_good_log_has_no_finding(tmp_path: Path) -> None:
 @pytest.mark.parametrize("duties", [[60, -60, 100, -100], [100, 100, -80, -80], [90], [-90, -90]])
 @pytest.mark.parametrize("stop", [22.0, 30.0, 60.0])
 def test_a_stop_is_no_other_sign(duties: list[float], stop: float, tmp_path: Path) -> None:
-    kinds = [kind for _, kind in findings(tmp_path, boom(duties, stop=stop, seconds=8))]
+    kinds = [finding.kind for finding in findings(tmp_path, boom(duties, stop=stop, seconds=8))]
     assert "at a stop" in kinds
     assert not {"turned", "late"} & {*kinds}
 
@@ -201,11 +200,7 @@ def test_how_far_each_joint_moves(tmp_path: Path) -> None:
 def test_small_motions_about_zero_are_not_taken_for_radians(tmp_path: Path) -> None:
     """A quick shake by strong commands stays within 3 deg, and yet moves far more than radians would."""
     time = np.arange(3000) * 0.01
-    values = np.zeros((3000, 15))
-    values[:, 0], values[:, 2] = time, 60 * np.sign(np.sin(2 * np.pi * 0.25 * time + 0.1))
-    values[:, 9] = 2.5 * np.cos(2 * np.pi * 0.25 * time)
-    names = ["time_s", *(f"u{j}_pct" for j in range(1, 8)), *(f"q{j}_deg" for j in range(1, 8))]
-    path = tmp_path / "log.csv"
-    np.savetxt(path, values, fmt="%.6f", delimiter=",", header=",".join(names), comments="")
-    _, findings = check_log(path, LogSettings(), RIG_RANGES)
-    assert not [f for f in findings if "rad" in f.hint and f.level == "warning"]
+    table = {name: np.zeros(3000) for name in rig()} | {"time_s": time}
+    table["u2_pct"] = 60 * np.sign(np.sin(2 * np.pi * 0.25 * time + 0.1))
+    table["q2_deg"] = 2.5 * np.cos(2 * np.pi * 0.25 * time)
+    assert not [f for f in findings(tmp_path, table) if f.level == "warning" and "rad" in f.hint]

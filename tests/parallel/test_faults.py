@@ -16,7 +16,7 @@ import pytest
 import yaml
 from log_files import head
 from spread_problem import arguments, assert_same, random_candidates
-from worker_targets import DEADLY, Deadly, Rows
+from worker_targets import DEADLY, NINE, Deadly, Rows
 
 from hydroid.errors import RunError
 from hydroid.fitting.checkpoints import Memo
@@ -27,7 +27,6 @@ from hydroid.problem.problem import Problem
 dask = pytest.importorskip("dask")
 distributed = pytest.importorskip("distributed")
 pytestmark = pytest.mark.slow
-NINE = np.arange(18.0).reshape(9, 2)
 IMPATIENT = {"distributed.deploy.lost-worker-timeout": "100ms"}
 """as if every worker took too long to start again: hydroid must not let Dask give it up"""
 
@@ -175,15 +174,9 @@ def test_a_lost_scheduler_is_one_error(site: Site):
 QUICK = ["--algorithm", "ga", "--set", "search.ga.population=6", "--set", "refinement.iterations=1"]
 
 
-@pytest.fixture(scope="module")
-def short(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Three seconds of a virtual rig's log."""
-    return head(tmp_path_factory.mktemp("log") / "short.csv", 300)
-
-
 @pytest.mark.parametrize("end", ["SIGTERM", "SIGINT to the group", "SIGKILL"])
-def test_a_stopped_fit_leaves_no_process(short: Path, tmp_path: Path, end: str):
-    hydroid = [sys.executable, "-m", "hydroid", "fit-mech", short]
+def test_a_stopped_fit_leaves_no_process(tmp_path: Path, end: str):
+    hydroid = [sys.executable, "-m", "hydroid", "fit-mech", head(tmp_path / "short.csv", 300)]
     run = subprocess.Popen(
         [*hydroid, *QUICK, "--set", "search.ga.generations=100000", "--out", "run", "--dask", "local:2"],
         cwd=tmp_path,

@@ -12,7 +12,7 @@ import numpy as np
 import psutil
 import pytest
 from spread_problem import arguments, assert_same, random_candidates
-from worker_targets import Rows
+from worker_targets import NINE, Rows
 
 from hydroid.errors import ModelError, RunError, SettingsError
 from hydroid.parallel import cluster, workers
@@ -21,7 +21,6 @@ from hydroid.parallel.workers import DaskWorkers
 from hydroid.problem.problem import Problem
 
 distributed = pytest.importorskip("distributed")
-NINE = np.arange(18.0).reshape(9, 2)
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,8 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from made_logs import at_rest
+from log_files import RIG
+from made_logs import HYDRAULIC, TRUTH, at_rest
 
 from hydroid import fit, load_settings, read_logs
 from hydroid.arm.model import load_machine, load_model
@@ -19,17 +20,12 @@ from hydroid.problem.problem import make_simulation
 from hydroid.settings.fit import FitSettings
 from hydroid.simulation import Response
 
-RIG = Path(__file__).parents[2] / "examples" / "logs" / "rig_shoulder_1.csv"
-MECHANICAL = {"K": 0.21, "D": 250.0, "S": 40.0}
-MECHANICAL |= {f"M{k + 1}": mass for k, mass in enumerate([4.0, 6.0, 20.0, 2.0, 3.0, 5.0])}
-HYDRAULIC = {"A_A": 900, "A_B": 800, "I_max": 0.85, "I_min": 0.3, "A": 1.4, "C": 1.1, "F1": 8.0, "F2": 0.7}
-HYDRAULIC |= {"x1": 0.8, "x2": 12.0, "open_A": 0.4, "open_B": 0.4, "delay": 0.0, "friction": 100.0}
+VALUES = TRUTH | HYDRAULIC | {"A_A": 900.0, "open_A": 0.4, "open_B": 0.4, "delay": 0.0, "friction": 100.0}
 
 
 def model(stage: str = "mech", **changes: object) -> IdentifiedModel:
     settings = load_settings(f"fit-{stage}", {"start_pose": "study"} | changes)
-    values = MECHANICAL | (HYDRAULIC if stage == "hyd" else {})
-    values = {name: value for name, value in values.items() if name in settings.parameters}
+    values = {name: value for name, value in VALUES.items() if name in settings.parameters}
     return identified(settings, values, "test")
 
 
@@ -162,7 +158,7 @@ def test_a_saved_plant_is_the_same_plant(stage, tmp_path):
 def test_plain_mujoco_steps_the_exported_mjcf_to_the_fits_response(joints, tmp_path):
     """Stage 1 on the demo's log: from the XML, with the commands as controls and nothing else."""
     fitted = model()
-    (log,) = read_logs([RIG], fitted.settings)
+    (log,) = read_logs([RIG / "rig_shoulder_1.csv"], fitted.settings)
     log.command[:, 4] = 0.3 * log.command[:, 1] if 5 in joints else 0.0
     expected = response(fitted, log, joints).angle[0]
     plant = Plant(fitted, joints=joints)
@@ -187,7 +183,7 @@ def test_stage_2_exports_no_motors_and_says_that_mujoco_alone_is_not_enough(tmp_
     bare = mujoco.MjModel.from_xml_path(str(tmp_path / "model" / "mechanics.xml"))
     assert bare.nu == 0
     np.testing.assert_allclose(bare.body_mass, plant.model.body_mass)
-    assert bare.dof_damping[0] == MECHANICAL["D"]
+    assert bare.dof_damping[0] == VALUES["D"]
     text = (tmp_path / "model" / "actuators.yaml").read_text()
     assert 900.0 in [round(float(area), 9) for area in re.findall(r"area_a: ([\d.]+)", text)]
 

@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import TRUTH as ARTICLE
-from made_logs import noisy, simulate_log, step_log
+from made_logs import FAST, fast_arm, noisy, stepped
 
 import hydroid
 from hydroid.fitting.refinement import refine
@@ -18,32 +17,23 @@ from hydroid.prediction import predict
 from hydroid.problem.problem import Problem
 from hydroid.settings.search import RefinementSettings
 
-TRUTH = ARTICLE | {"K": 1.0, "D": 60.0, "S": 100.0}
-CHANGES = {
-    "simulation.other_joints": "locked",
-    **{f"parameters.{name}.bounds": [0.2 * TRUTH[name], 5 * TRUTH[name]] for name in ("K", "D", "S")},
-    **{f"parameters.{name}.fixed": value for name, value in TRUTH.items() if name.startswith("M")},
-    "search.algorithm": "ga",
-    "search.ga.generations": 4,
-}
 
-
-def driven(settings, levels, seed: int, values=TRUTH) -> Log:
+def driven(settings, levels, seed: int, values=FAST) -> Log:
     """A log of steps of the shoulder with white noise of 0.1 deg, but for its first sample."""
-    drive = replace(step_log(settings.arm.pose("study"), levels), source=f"steps{seed}.csv")
-    return noisy(simulate_log(settings, drive, values), 0.1, seed)
+    return noisy(replace(stepped(settings, values, levels), source=f"steps{seed}.csv"), 0.1, seed)
 
 
 @pytest.fixture(scope="module")
 def fitted():
-    settings = hydroid.load_settings("article-mech", CHANGES)
+    quick = {"search.algorithm": "ga", "search.ga.generations": 4}
+    settings = fast_arm([2], "K", "D", "S", **quick)
     return settings, hydroid.fit(settings, [driven(settings, [60.0, -80.0, 30.0, 0.0, -40.0], 1)]).model
 
 
 @pytest.mark.parametrize(("factor", "limits"), [(1.0, False), (1.5, True)])
 def test_a_band_holds_what_the_model_explains(fitted, factor, limits):
     settings, model = fitted
-    log = driven(settings, [-30.0, 50.0, 20.0, -70.0], 2, TRUTH | {"S": factor * TRUTH["S"]})
+    log = driven(settings, [-30.0, 50.0, 20.0, -70.0], 2, FAST | {"S": factor * FAST["S"]})
     response = predict(model, log, settings.outputs)
     band = prediction_bands(model, log, response)[2]
     assert band.model_limits is limits

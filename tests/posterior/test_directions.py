@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from conftest import COILS, HYDRAULIC, TRUTH as MECH
-from made_logs import noisy, simulate_log, step_log
+from made_logs import COILS, HYDRAULIC, TRUTH as MECH, noisy, stepped
 
 from hydroid import load_settings
 from hydroid.posterior.identifiability import Identifiability, identifiability
@@ -19,8 +18,7 @@ def look(config: str, truth: dict[str, float], **changes) -> tuple[Problem, Unce
     """The article's protocol, ten seconds of it: joint 2 driven and measured with 0.1 deg of noise."""
     settings = load_settings(config, changes)
     levels = LEVELS if config == "article-mech" else [0.4 * level for level in LEVELS]
-    log = simulate_log(settings, step_log(settings.arm.pose("study"), levels, 1.25), truth)
-    problem = Problem(settings, [noisy(log, 0.1)])
+    problem = Problem(settings, [noisy(stepped(settings, truth, levels, 1.25), 0.1)])
     told = uncertainty(problem, problem.parameters.vector(truth, "truth"))
     return problem, told, identifiability(problem, told)
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import HYDRAULIC, SMALL
-from made_logs import noisy, simulate_log, step_log
+from conftest import SMALL
+from made_logs import HYDRAULIC, noisy, stepped
 
 import hydroid
 from hydroid import load_settings
@@ -25,8 +25,7 @@ def fitted(tmp_path_factory: pytest.TempPathFactory) -> FitResult:
     held = {f"parameters.{name}.fixed": HYDRAULIC[name] for name in HELD}
     settings = load_settings("article-hyd", SMALL | held)
     truth = {name: HYDRAULIC[name] for name in settings.parameters if name in HYDRAULIC}
-    steps = step_log(settings.arm.pose("study"), [0.0, 60.0, -40.0, 90.0, -80.0, 30.0])
-    log = noisy(simulate_log(settings, steps, truth), 0.05, exact_start=False)
+    log = noisy(stepped(settings, truth, [0.0, 60.0, -40.0, 90.0, -80.0, 30.0]), 0.05, exact_start=False)
     return hydroid.fit(settings, log, tmp_path_factory.mktemp("fit") / "run")
 
 

@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import TRUTH
-from made_logs import noisy, simulate_log, step_log
+from made_logs import TRUTH, noisy, simulate_log, stepped
 
 from hydroid import load_settings
 from hydroid.log import Log
@@ -41,8 +40,7 @@ def test_a_slope_is_what_simulate_shows_for_one_percent(problem: Problem, effect
 def noisy_log(level_deg: float = 0.1) -> Log:
     settings = load_settings("article-mech")
     values = settings.parameter_set().mapping(settings.parameter_set().start)
-    log = simulate_log(settings, step_log(settings.arm.pose("study"), [60.0, -40.0, 80.0]), values)
-    return noisy(log, level_deg, 2, exact_start=False)
+    return noisy(stepped(settings, values, [60.0, -40.0, 80.0]), level_deg, 2, exact_start=False)
 
 
 def test_a_reading_has_the_noise_of_the_residual_but_not_the_error_of_the_model():

@@ -1,10 +1,10 @@
 """Quantities of an arm by laws: ratios, gravity, symmetry, the plant, analytic dead bands, delays."""
 
-import mujoco
 import numpy as np
 import pytest
-from conftest import HYDRAULIC, TRUTH, replaced
-from made_logs import step_log
+from arms import posed, with_masses
+from conftest import replaced
+from made_logs import HYDRAULIC, TRUTH, step_log
 
 from hydroid import load_settings
 from hydroid.hydraulics.solenoid import coil_current, resting_stroke, side_voltage
@@ -25,7 +25,7 @@ def model(stage: str = "hyd", **changes: object) -> IdentifiedModel:
 
 
 def shoulder_bench(one: IdentifiedModel, joint: int = 2) -> tuple[Bench, Candidates]:
-    log = step_log(one.settings.arm.pose("study"), [50.0], joint=joint)
+    log = step_log(one.settings.arm.pose("study"), {joint: [50.0]})
     log.angle[-1, joint - 1] += 0.6  # the travel
     return make_bench(one.settings, [log], joint), Bindings(one.settings).candidates(one.theta[None])
 
@@ -49,16 +49,10 @@ def shoulder() -> tuple[IdentifiedModel, Bench, Candidates, dict[str, list[float
 def test_gravity_torque_is_what_mujoco_needs_to_hold_the_whole_arm(shoulder):
     one, bench, estimate, found = shoulder
     arm = one.settings.arm
-    whole = mujoco.MjModel.from_xml_path(str(arm.model))
-    for link, mass in zip(arm.link_names, estimate.mass[0], strict=True):
-        body = whole.body(link)
-        body.inertia[:] *= mass / body.mass[0]
-        body.mass[0] = mass
-    data = mujoco.MjData(whole)
-    data.qpos[:] = arm.pose("study")
-    data.qpos[1] = bench.angle
-    mujoco.mj_inverse(whole, data)
-    assert found["joint2_gravity_torque_at_pose"] == [pytest.approx(data.qfrc_inverse[1], rel=1e-6)]
+    pose = arm.pose("study")
+    pose[1] = bench.angle
+    held = posed(with_masses(arm, estimate.mass[0]), pose).qfrc_bias[1]
+    assert found["joint2_gravity_torque_at_pose"] == [pytest.approx(held, rel=1e-6)]
 
 
 def test_a_speed_is_that_of_the_plant_when_it_passes_the_pose(shoulder):

@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from conftest import TRUTH
-from made_logs import noisy, simulate_log, step_log
+from made_logs import TRUTH, noisy, stepped
 
 from hydroid import load_settings
 from hydroid.errors import SettingsError
@@ -94,8 +93,7 @@ def test_a_refinement_weighs_priors_against_the_logs():
     """K, D, S and the masses but for the jaws have a common scale, which only the prior decides."""
     known = {"total": {"of": ["M1", "M2", "M3", "M4", "M5", "M6"], "value": 30.0, "sd": 0.3}}
     settings = load_settings("article-mech", {"priors": known, "objective.segments": 2})
-    log = step_log(settings.arm.pose("study"), [60.0, -80.0, 30.0, 0.0])
-    problem = Problem(settings, [noisy(simulate_log(settings, log, TRUTH), 0.1)])
+    problem = Problem(settings, [noisy(stepped(settings, TRUTH, [60.0, -80.0, 30.0, 0.0]), 0.1)])
     truth = problem.parameters.vector(TRUTH, "truth")
     result = refine(problem, 0.9 * truth, RefinementSettings(iterations=30), lambda *_: None)
     theta = problem.parameters.from_unit(result.point[None])

@@ -136,8 +136,6 @@ def test_an_error_leaves_nothing_behind(tmp_path: Path):
     robot.write_text(robot.read_text().replace("</robot>", ""))
     with pytest.raises(ModelError, match="cannot be read as XML"):
         init(tmp_path / "new" / "mine", robot)
-    with pytest.raises(SettingsError, match="no such file"):
-        init(tmp_path / "new" / "mine", tmp_path / "none.urdf")
     assert sorted(tmp_path.rglob("*")) == before
 
 

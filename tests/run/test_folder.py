@@ -9,8 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_logs import simulate_log, step_log
-from small_fits import TRUTH, Watcher
+from conftest import SMALL
+from made_logs import TRUTH, stepped
+from small_fits import Watcher
 
 from hydroid import fit, load_settings, read_logs
 from hydroid.errors import RunError
@@ -19,22 +20,14 @@ from hydroid.reporting import page_file
 from hydroid.run.folder import RunFolder
 from hydroid.run.process import locked
 
-SMALL = {
-    "search.algorithm": "ga",
-    "search.ga.population": 6,
-    "search.ga.generations": 3,
-    "refinement": None,
-    "objective.segments": 2,
-}
-SETTINGS = load_settings("article-mech", SMALL)
+SETTINGS = load_settings("article-mech", SMALL | {"refinement": None})
 
 
 @pytest.fixture(scope="module")
 def path(tmp_path_factory) -> Path:
     """The log of a small fit."""
-    log = step_log(SETTINGS.arm.pose("study"), [60.0, -80.0])
     path = tmp_path_factory.mktemp("log") / "log.csv"
-    write_log(path, simulate_log(SETTINGS, log, TRUTH), SETTINGS.log)
+    write_log(path, stepped(SETTINGS, TRUTH, [60.0, -80.0]), SETTINGS.log)
     return path
 
 

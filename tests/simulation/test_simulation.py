@@ -8,6 +8,7 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
+from arms import posed, with_masses
 from conftest import candidates, replaced, scattered, simulation
 from made_logs import step_log
 from scipy.integrate import solve_ivp
@@ -32,20 +33,12 @@ def test_without_commands_and_leakage_the_arm_stands_for_a_minute(spec, arm, kin
 def test_passive_arm_equals_a_plain_mujoco_loop(spec, arm, study_log):
     parameters = candidates(arm, 1)
     response = simulation(spec, arm, study_log, range(7), other_joints="passive").simulate(parameters)
-    own = spec.copy()
-    for name, mass, nominal in zip(arm.link_names, parameters.mass[0], arm.masses, strict=True):
-        body = own.body(name)
-        body.fullinertia = np.asarray(body.fullinertia) * mass / nominal
-        body.mass = mass
-    own.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT.value
-    model = own.compile()
+    model = with_masses(arm, parameters.mass[0])
     model.dof_damping[:] = parameters.joints.damping[0]
     model.jnt_stiffness[:] = parameters.joints.stiffness[0]
     pose = study_log.angle[0]
     model.qpos_spring[:] = pose
-    data = mujoco.MjData(model)
-    data.qpos[:] = pose
-    mujoco.mj_forward(model, data)
+    data = posed(model, pose)
     balance = data.qfrc_bias.copy()
     angle = [pose]
     for command in study_log.command[:-1]:
@@ -59,20 +52,12 @@ def test_passive_arm_equals_a_plain_mujoco_loop(spec, arm, study_log):
 def test_locked_arm_converges_to_the_equation_of_motion(spec, arm, study_log):
     """Against Radau on I q'' = K u + tau0 - g(q) - D q' - S (q - q0), with first order in the step."""
     parameters = candidates(arm, 1)
-    model = spec.copy().compile()
-    for name, mass, nominal in zip(arm.link_names, parameters.mass[0], arm.masses, strict=True):
-        body = model.body(name).id
-        model.body_inertia[body] *= mass / nominal
-        model.body_mass[body] = mass
-    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT.value
-    data = mujoco.MjData(model)
+    model = with_masses(arm, parameters.mass[0])
     pose = study_log.angle[0]
     mass_matrix = np.empty((7, 7))
 
     def gravity_and_inertia(q: float) -> tuple[float, float]:
-        data.qpos[:] = pose
-        data.qpos[1] = q
-        mujoco.mj_forward(model, data)
+        data = posed(model, np.where(np.arange(7) == 1, q, pose))
         mujoco.mj_fullM(model, data, mass_matrix)
         return data.qfrc_bias[1], mass_matrix[1, 1]
 

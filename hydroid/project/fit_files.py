@@ -13,7 +13,7 @@ from hydroid.settings.arm import Arm
 from hydroid.settings.cylinder import LinearActuator
 
 LONGEST_STEP = 0.025  # of MuJoCo [s], in a log of fewer samples
-VALVE_STEP = 0.00125  # of valves and oil [s]
+VALVE_STEP = 0.002  # of valves and oil [s]
 DEAD = 0.8  # part of the command below which a joint seems to stand that its dead band is
 DRAG = 0.02  # part of the torque at the pump's pressure that damping takes at full speed
 RESPONSE = 0.1  # of a valve and its oil without any delay [s]

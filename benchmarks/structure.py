@@ -1,8 +1,8 @@
 """The size and shape of the code, beside what it may be at most.
 
-Tokens are names, operators, numbers and strings: comments and the packing of lines do not count, nor docstrings
-among the statements. A function's arguments are all but `self` and `cls`; a command's are its options, and are
-not counted. Constants are names in capitals at the top level of a file.
+Tokens are names, operators, numbers and strings: comments and the packing of lines do not count, nor do
+docstrings among the statements. A function's arguments are all but `self` and `cls`; a command's are its
+options, and are not counted. Constants are names in capitals at the top level of a file.
 """
 
 import ast

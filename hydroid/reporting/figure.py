@@ -179,7 +179,7 @@ def _view(axes: Axes, arm: Arm, data: Any, outlines: Sequence[Shape], poses: Arr
             continue  # the other view tells
         sense = "turns counter-clockwise" if axis @ ahead < 0 else "turns clockwise"
         text = f"{joint.name}: + {'slides along the line' if joint.slides else sense}"
-        corner = {"transform": axes.transAxes, "va": "top", "fontsize": 7, "color": _color(number)}
+        corner: Plain = {"transform": axes.transAxes, "va": "top", "fontsize": 7, "color": _color(number)}
         axes.text(0.03, 0.98 - 0.055 * said, text, **corner).set_in_layout(False)
         said += 1
     axes.set(title=name, xlabel="x [m]", ylabel=upwards)

@@ -17,7 +17,7 @@ from hydroid.arrays import Array, Index, Structs, record
 from hydroid.hydraulics.cylinder import GIVE, fills, holding_pressures, rod_motion
 from hydroid.hydraulics.kernel import Plugin
 from hydroid.hydraulics.records import JOINT_STATE, NONE, Records, coefficients
-from hydroid.hydraulics.solenoid import resting_stroke
+from hydroid.hydraulics.solenoid import drive, resting_stroke
 
 START_PRESSURE = 50e5  # in chamber B at the start where neither settings nor log say [Pa]; ours
 
@@ -69,7 +69,8 @@ def at_rest(plugin: Plugin, angle: Array, torque: Array) -> Structs:
     sides = (state["a"], c.a, pressure_a), (state["b"], c.b, pressure_b)
     for (z, _, pressure), fill in zip(sides, fills(angle, c), strict=True):
         z["oil"] = pressure + c.bulk_modulus * fill
-        z["stroke"] = resting_stroke(c.coil * c.current_min**2, c.gap, c.plunger_stiffness)
+        z["drive"] = drive(0.0, c)
+        z["stroke"] = resting_stroke(z["drive"], c.gap, c.plunger_stiffness)
     state["hold"], state["external"] = torque, -torque
     carried = np.where(rests, torque - lever * (c.a.area * pressure_a - c.b.area * pressure_b), 0.0)
     state["contact"], state["stop"] = carried / GIVE, angle + np.sign(carried) * GIVE

@@ -68,10 +68,12 @@ def _advance(c, side, z, asked: float, step: float, whole: bool) -> float:
     if not whole:
         pilot_steps = side.pilot_lag / step
         keep, weight = kept(pilot_steps), plunger_weight(side.plunger_damping, step, c)
-    beyond, part = beyond_dead_band(z.pilot, asked, pilot_steps, keep, side.dead_band)
-    z.pilot, before = asked + (z.pilot - asked) * keep, z.stroke
-    pull = drive(side_voltage(beyond, part, side.onset, side.dead_band), c)
-    z.stroke, z.speed = plunger_step((before, z.speed), pull, side.plunger_damping, step, weight, c)
+    if z.pilot != asked:
+        beyond, part = beyond_dead_band(z.pilot, asked, pilot_steps, keep, side.dead_band)
+        z.pilot = asked + (z.pilot - asked) * keep
+        z.drive = drive(side_voltage(beyond, part, side.onset, side.dead_band), c)
+    before = z.stroke
+    z.stroke, z.speed = plunger_step((before, z.speed), z.drive, side.plunger_damping, step, weight, c)
     return 0.5 * (before + z.stroke)
 
 

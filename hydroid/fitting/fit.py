@@ -131,9 +131,10 @@ def fit(problem: Problem, watch: Watcher | None = None, checkpoints: Checkpoints
         own = problem.varied(settings.of_estimate(name))
         theta = own.parameters.started(last.parameters.mapping(start.theta))
         other_model = if_nearer and own.settings.quasi_static != last.settings.quasi_static
-        if other_model and _is_noise(last, start.theta):
-            return
-        if other_model and not own.rms(own.output_errors(theta[None]))[0] < TOO_FAR * start.rms:
+        if other_model and (
+            _is_noise(last, start.theta)
+            or not own.rms(own.output_errors(theta[None]))[0] < TOO_FAR * start.rms
+        ):
             return
         result = refine(own, theta, settings.refinement, watch.refining, checkpoints, name)
         estimates.update(_estimates(own, {name: own.parameters.from_unit(result.point)}))

@@ -18,7 +18,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.random import Generator
 
-from hydroid.fitting.baselines import fit_baselines
+from hydroid.fitting.baselines import NAMES, fit_baselines
 from hydroid.fitting.checkpoints import Checkpoints, Memo
 from hydroid.fitting.refinement import refine
 from hydroid.parameters import Array
@@ -194,7 +194,7 @@ def by_numbers(problem: Problem, joint: int, theta: Array) -> Array:
     """
     settings = problem.settings
     ends = settings.arm.lower[joint - 1], settings.arm.upper[joint - 1]
-    found = fit_baselines(problem.logs, joint, np.array(ends)).get("nine numbers")
+    found = fit_baselines(problem.logs, joint, np.array(ends)).get(NAMES[-1])
     if found is None:
         return theta
     values = {"delay": found.delay, "pilot_lag": 0.0, "compensation": 1.0}

@@ -68,7 +68,7 @@ def _advance(c, side, z, asked: float, step: float, whole: bool) -> float:
     if not whole:
         pilot_steps = side.pilot_lag / step
         keep, weight = kept(pilot_steps), plunger_weight(side.plunger_damping, step, c)
-    if z.pilot != asked:
+    if z.pilot != asked:  # else the coil's drive stays
         beyond, part = beyond_dead_band(z.pilot, asked, pilot_steps, keep, side.dead_band)
         z.pilot = asked + (z.pilot - asked) * keep
         z.drive = drive(side_voltage(beyond, part, side.onset, side.dead_band), c)

@@ -119,18 +119,7 @@ def _fused(
         above = carriers[parent] if number else 0
         if number in moved:
             position, turn = _place(data, number, kept[above])
-            body = bodies[above].add_body(
-                name=full.body(number).name,
-                pos=position,
-                quat=turn,
-                simple=False,  # MuJoCo's short cut for aligned inertias, which other masses would break
-                explicitinertial=True,
-                mass=1.0,
-                inertia=[1.0, 1.0, 1.0],
-            )
-            joint = moved[number]
-            body.add_joint(name=joint.name, type=joint.type[0], pos=joint.pos, axis=joint.axis)
-            bodies.append(body)
+            bodies.append(_add(bodies[above], full.body(number).name, position, turn, moved[number]))
             kept.append(number)
             above = len(kept) - 1
         carriers.append(above)
@@ -142,13 +131,56 @@ def _fused(
             parts.append((above, column.get(number, -1), mass, centre, inertia))
     with quiet_mujoco():
         model = spec.compile()
-    ids = [moved[number].id for number in kept[1:]]
-    for name in _JOINT_FIELDS:
-        getattr(model, name)[:] = getattr(full, name)[ids]
-    for name in _OPTIONS:
-        setattr(model.opt, name, getattr(full.opt, name))
+    _take_over(model, full, [moved[number].id for number in kept[1:]])
     off = mujoco.mjtDisableBit
     # looking for what the chain lacks takes a tenth of a step; a diverged candidate must stay diverged
-    idle = off.mjDSBL_ACTUATION | off.mjDSBL_SENSOR | off.mjDSBL_EQUALITY | off.mjDSBL_ISLAND
+    idle = off.mjDSBL_ACTUATION | off.mjDSBL_SENSOR | off.mjDSBL_EQUALITY
+    idle |= off.mjDSBL_ISLAND | off.mjDSBL_WARMSTART  # which is taken for all arms of a model or for none
     model.opt.disableflags = full.opt.disableflags | off.mjDSBL_CONTACT | off.mjDSBL_AUTORESET | idle
     return model, np.array(parts, PART).view(np.recarray)
+
+
+def repeat(model: mujoco.MjModel, copies: int) -> mujoco.MjModel:
+    """Return a `LockedArm`'s model as often as asked for, side by side; bodies weigh nothing in particular.
+
+    None changes a bit of another, and a step of many costs little more than a step of one.
+    """
+    spec = mujoco.MjSpec()
+    for copy in range(copies):
+        bodies = [spec.worldbody]
+        for number, joint in enumerate(map(model.joint, range(model.njnt)), 1):  # a body each
+            body = model.body(number)
+            above, name = bodies[body.parentid[0]], f"{body.name} {copy}"
+            bodies.append(_add(above, name, body.pos, body.quat, joint, copy))
+    with quiet_mujoco():
+        many = spec.compile()
+    many.body_pos[1:], many.body_quat[1:] = (
+        np.tile(field[1:], (copies, 1)) for field in (model.body_pos, model.body_quat)
+    )
+    _take_over(many, model, [*range(model.njnt)] * copies)
+    many.stat.meaninertia = model.stat.meaninertia
+    many.opt.disableflags = model.opt.disableflags & ~int(mujoco.mjtDisableBit.mjDSBL_ISLAND)
+    return many
+
+
+def _add(above: Any, name: str, position: Array, turn: Array, joint: Any, copy: int | str = "") -> Any:
+    """A body in another that moves like a model's joint, without what it weighs."""
+    body = above.add_body(
+        name=name,
+        pos=position,
+        quat=turn,
+        simple=False,  # MuJoCo's short cut for aligned inertias, which other masses would break
+        explicitinertial=True,
+        mass=1.0,
+        inertia=[1.0, 1.0, 1.0],
+    )
+    body.add_joint(name=f"{joint.name}{copy}", type=joint.type[0], pos=joint.pos, axis=joint.axis)
+    return body
+
+
+def _take_over(model: mujoco.MjModel, source: mujoco.MjModel, ids: Sequence[int]) -> None:
+    """Give a model the options of another, and its joints the fields of some joints there."""
+    for name in _JOINT_FIELDS:
+        getattr(model, name)[:] = getattr(source, name)[ids]
+    for name in _OPTIONS:
+        setattr(model.opt, name, getattr(source.opt, name))

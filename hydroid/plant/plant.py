@@ -150,7 +150,7 @@ class Plant:
         start_angle = self._pose[self._columns]
         self.model.qpos_spring[:] = start_angle
         with quiet_mujoco():
-            self._balance = self._arm.start(self._values, 0, start_angle)
+            self._balance = self._arm.start(self._values, [0], start_angle)
             plugin, states = self._chain.start(self._candidate, start_angle, self._balance[None])
             self._plugin, self._state = plugin.of(0), states[0]
             commands = np.zeros((self._plugin.past + self._steps, len(self._state)))

@@ -51,7 +51,7 @@ class Bench:
         arm, values = SteppedArm(self.scenario.arm.model), self.scenario.values(candidates)
         with quiet_mujoco():
             for row in range(len(candidates)):
-                arm.start(values, row, np.array([self.angle]))
+                arm.start(values, [row], np.array([self.angle]))
                 torque[row], inertia[row] = arm.data.qfrc_bias[0], arm.data.M[0]
         return torque, inertia
 

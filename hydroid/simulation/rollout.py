@@ -13,7 +13,7 @@ raising; a model that gets through `SteppedArm.start` has none to expect.
 import ctypes
 import logging
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from copy import copy
 from functools import cache
 from pathlib import Path
@@ -84,13 +84,17 @@ class Record(NamedTuple):
 
 
 class SteppedArm:
-    """One arm in MuJoCo, a copy of a model, which candidates take in turn and compiled code steps.
+    """An arm in MuJoCo, a copy of a model, which candidates take in turn and compiled code steps.
+
+    Without hydraulics several can be stepped at once (`hydroid.arm.locked.repeat`): V and P
+    count the joints of all of them, and each takes a candidate.
 
     Args:
         columns: the moving joints with actuators, and those they couple with, shape (J,).
         pushed: all others, whose torques are given, shape (P,).
         steps: of MuJoCo in one sample.
         rollout: the compiled one, with the arguments of `roll`, which it is by default.
+        copies: how often the arm is in the model.
 
     Attributes:
         model, data: with the values of the candidate that was started last, and its state.
@@ -103,10 +107,12 @@ class SteppedArm:
         pushed: Index = NO_JOINTS,
         steps: int = 1,
         rollout: Callable[..., None] | None = None,
+        copies: int = 1,
     ) -> None:
-        self._roll = rollout or roll
+        self._roll, self.copies = rollout or roll, copies
         self.model, self.data = m, d = copy(model), mujoco.MjData(model)
         self._armature = own = model.dof_armature.copy()
+        self._inertia = model.stat.meaninertia
         limits = np.where(m.jnt_limited[:, None], m.jnt_range, [-np.inf, np.inf])
         live = (d.qpos, d.qvel, d.M, d.qfrc_applied, m.dof_armature, d.warning.number)
         self._handles = Handles(
@@ -121,18 +127,21 @@ class SteppedArm:
             limits,
         )
 
-    def start(self, values: dict[str, Array], row: int, pose: Array) -> Array:
+    def start(self, values: dict[str, Array], rows: Sequence[int] | Index, pose: Array) -> Array:
         """Put the candidate of a row of `values` into `pose` [rad], shape (V,), at rest; within
-        `quiet_mujoco`.
+        `quiet_mujoco`. `rows` has one for each copy of the arm.
 
         `values` is what candidates change in the model, as `Scenario.values` returns it. Returned is what
         holds it there, tau0 = g(q0) of equation (1), and springs that are not slack there [N·m], shape (V,).
         """
         model, data = self.model, self.data
         for name, value in values.items():
-            getattr(model, name)[:] = value[row]
+            field = getattr(model, name)
+            world = len(field) % self.copies  # its row stands before those of all copies
+            field[world:] = value[rows, world:].reshape(field[world:].shape)
         model.dof_armature[:] = self._armature  # a rollout steps with another
         mujoco.mj_setConst(model, data)
+        model.stat.meaninertia = self._inertia  # constraints are solved as well whoever stands beside
         mujoco.mj_resetData(model, data)
         data.qpos[:] = pose
         mujoco.mj_fwdPosition(model, data)

@@ -15,7 +15,8 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from scipy.signal import lfilter
 
-from hydroid.arrays import Array, Mask, Structs
+from hydroid.arm.locked import repeat
+from hydroid.arrays import Array, Index, Mask, Structs
 from hydroid.hydraulics.actuator import Observation, observe
 from hydroid.hydraulics.records import JOINT_STATE, has_force_curve
 from hydroid.mjcf import quiet_mujoco
@@ -24,8 +25,11 @@ from hydroid.simulation.quasi_static import roll_quasi_static
 from hydroid.simulation.rollout import Course, Record, SteppedArm, compile_rollout, roll
 from hydroid.simulation.scenario import Candidates, Chain, Response, Scenario
 
-Follow = Callable[[SteppedArm, int], tuple[Array, Observation | None]]
-"""simulates one of n candidates: angles of the moving joints [rad], (1 + T, V), and what its actuators do"""
+Follow = Callable[[SteppedArm, Index], tuple[Array, Observation | None]]
+"""simulates some of n candidates, one for each copy of an arm: angles of the moving joints [rad],
+(1 + T, copies, V), and what the actuators of a single one do"""
+TOGETHER = 56
+"""joints of all arms stepped at once: MuJoCo computes with sparse matrices from 60"""
 
 
 class Simulation:
@@ -68,22 +72,29 @@ class Simulation:
         threads = min(scenario.settings.threads or os.cpu_count() or 1, rows.size)
         if not threads:
             return Response(angle, exists, pressure)
+        candidates = candidates[rows]
         sensors = candidates.joints[:, scenario.arm.columns[scenario.outputs]]
 
-        def simulate(place: int) -> None:
-            arm, row = free.pop(), rows[place]
-            followed, actuators = follow(arm, place)
+        def simulate(some: Index) -> None:
+            arm = free.pop()
+            followed, actuators = follow(arm, np.resize(some, arm.copies))
             if arm.healthy:
-                seen = followed[:, scenario.outputs]
-                angle[row] = reading(seen, sensors[row], scenario.period) if self.joints.size else seen
+                for place, seen in zip(some, followed[:, :, scenario.outputs].swapaxes(0, 1), strict=False):
+                    read = reading(seen, sensors[place], scenario.period) if self.joints.size else seen
+                    angle[rows[place]] = read
                 if pressure is not None and actuators is not None:
-                    pressure[row] = actuators.pressure[:, wanted]
+                    pressure[rows[some[0]]] = actuators.pressure[:, wanted]
             free.append(arm)
 
         with quiet_mujoco(), ThreadPoolExecutor(threads) as pool:
-            free = deque(self._stepped() for _ in range(threads))
-            follow = self._follower(candidates[rows], free[0], observed=pressure is not None)
-            deque(pool.map(simulate, range(rows.size)), maxlen=0)
+            copies = self._copies(candidates, threads)
+            free = deque(self._stepped(copies) for _ in range(threads))
+            follow = self._follower(candidates, free[0], observed=pressure is not None)
+            deque(pool.map(simulate, np.array_split(range(rows.size), -(-rows.size // copies))), maxlen=0)
+            if copies > 1:  # one that diverges stops those beside it
+                free = deque(self._stepped() for _ in range(threads))
+                left = np.flatnonzero(np.isnan(angle[rows, -1]).any(axis=1))
+                deque(pool.map(simulate, left[:, None]), maxlen=0)
         feasible: Mask = np.all(np.isfinite(angle), axis=(1, 2))
         return Response(angle, feasible, pressure)
 
@@ -91,15 +102,28 @@ class Simulation:
         """Simulate one candidate; return what its actuators did, at T samples, shape (T, J) or (T, J, 2)."""
         arm = self._stepped()
         with quiet_mujoco():
-            observation = self._follower(candidates, arm, observed=True)(arm, 0)[1]
+            observation = self._follower(candidates, arm, observed=True)(arm, np.array([0]))[1]
         assert observation is not None
         return observation
 
-    def _stepped(self) -> SteppedArm:
+    def _copies(self, candidates: Candidates, threads: int) -> int:
+        """How many arms can be stepped at once without changing a bit of any.
+
+        Actuators need an arm of their own; MuJoCo integrates one without any damping otherwise.
+        """
+        damped = (self.scenario.values(candidates)["dof_damping"] > 0.0).any(axis=1).all()
+        if self.joints.size or not damped:
+            return 1
+        most, n = TOGETHER // len(self.scenario.arm.columns), len(candidates)
+        return -(-n // max(threads, -(-n // most)))
+
+    def _stepped(self, copies: int = 1) -> SteppedArm:
         scenario, chain = self.scenario, self._chain
-        steps = scenario.settings.steps
+        steps, model = scenario.settings.steps, scenario.arm.model
         rollout = roll_quasi_static if self._quasi_static else roll
-        return SteppedArm(scenario.arm.model, chain.columns, chain.pushed, steps, rollout)
+        model = repeat(model, copies) if copies > 1 else model
+        pushed = np.arange(model.nv) if copies > 1 else chain.pushed
+        return SteppedArm(model, chain.columns, pushed, steps, rollout, copies)
 
     def _follower(self, candidates: Candidates, arm: SteppedArm, *, observed: bool) -> Follow:
         """Return what simulates each of n candidates, and observes its actuators, under the log's commands.
@@ -109,25 +133,30 @@ class Simulation:
         scenario, chain, n = self.scenario, self._chain, len(candidates)
         values, pose, servo = scenario.values(candidates), scenario.arm.pose, scenario.prescribed
         samples = len(scenario.command) // scenario.settings.steps
-        balance = np.array([arm.start(values, row, pose) for row in range(n)])
+        starts = [np.resize(range(first, n), arm.copies) for first in range(0, n, arm.copies)]
+        balance = np.concatenate([arm.start(values, some, np.tile(pose, arm.copies)) for some in starts])
+        balance = balance.reshape(-1, len(pose))[:n]
         plugin, states = chain.start(candidates, pose, balance, scenario.pressure)
         taken = chain.taken(candidates, servo.angle, servo.velocity)
         gain = candidates.joints.gain[:, scenario.arm.columns[chain.pushed]]
         served = np.searchsorted(chain.pushed, servo.columns)
 
-        def follow(arm: SteppedArm, row: int) -> tuple[Array, Observation | None]:
-            arm.start(values, row, pose)
-            torque = gain[row] * scenario.command[:, chain.pushed] + balance[row, chain.pushed]
+        def follow(arm: SteppedArm, some: Index) -> tuple[Array, Observation | None]:
+            start, row = np.tile(pose, arm.copies), some[0]
+            arm.start(values, some, start)
+            torque = gain[some] * scenario.command[:, None, chain.pushed] + balance[some][:, chain.pushed]
             if served.size:
-                torque[:, served] = servo.angle if self._quasi_static else servo.torque
+                torque[:, :, served] = (servo.angle if self._quasi_static else servo.torque)[:, None]
             one, state = plugin.of(row), states[row]
             before = np.zeros((one.past, len(state)))
             commands = np.concatenate([before, scenario.command[:, chain.columns]])
-            angle = np.full((1 + samples, len(pose)), np.nan)
+            angle = np.full((1 + samples, start.size), np.nan)
             record = np.zeros((1 + samples if observed else 1, len(state)), JOINT_STATE)
-            angle[0], record[0] = pose, state
-            arm.roll(one, state, Course(commands, torque, taken[row]), Record(angle[1:], record[1:]))
-            return angle, observe(one.coefficients, record, angle[:, chain.columns]) if observed else None
+            angle[0], record[0] = start, state
+            course = Course(commands, torque.reshape(len(torque), -1), taken[row])
+            arm.roll(one, state, course, Record(angle[1:], record[1:]))
+            seen = observe(one.coefficients, record, angle[:, chain.columns]) if observed else None
+            return angle.reshape(len(angle), arm.copies, -1), seen
 
         return follow
 

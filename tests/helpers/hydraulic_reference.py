@@ -115,10 +115,10 @@ def simulate(p, command, settings, steps=1, observe=None, start=START, model=Non
     arm, pose = SteppedArm(model, np.zeros(1, np.intp), steps=steps), np.array([start])
     angle, states = np.full((n, samples + 1, 1), start), np.zeros((n, samples, 1), JOINT_STATE)
     with quiet_mujoco():
-        balance = np.tile(arm.start({}, 0, pose), (n, 1))
+        balance = np.tile(arm.start({}, [0], pose), (n, 1))
         state = at_rest(plugin, np.full((n, 1), start), balance)
         for i in range(n):
-            arm.start({}, 0, pose)
+            arm.start({}, [0], pose)
             arm.data.qvel[:] = velocity
             one = plugin.of(i)
             held = np.concatenate([np.zeros(one.past), np.repeat(command, steps)])[:, None]

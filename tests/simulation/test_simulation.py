@@ -125,6 +125,24 @@ def test_dry_friction_holds_the_arm_against_small_commands(spec, arm):
     assert np.ptp(run(holding).angle) < 0.05 * moved
 
 
+@pytest.mark.parametrize("other", ["locked", "passive"])
+def test_candidates_at_their_stops_or_diverging_change_no_bit_of_those_beside_them(
+    spec, arm, study_log, other
+):
+    some = candidates(arm, 8)
+    gain, friction = some.joints["gain"], some.joints["friction"]
+    gain[2:6] *= 40.0
+    friction[4:] = 30.0
+    gain[7] = 1e12
+    run = simulation(spec, arm, study_log, other_joints=other).simulate
+    together = run(some)
+    assert together.feasible.tolist() == [True] * 7 + [False]
+    beyond = (together.angle > arm.upper[1]) | (together.angle < arm.lower[1])
+    assert beyond.any(axis=(1, 2)).sum() > 1
+    alone = [run(some[k : k + 1]).angle for k in range(8)]
+    np.testing.assert_array_equal(together.angle, np.concatenate(alone))
+
+
 def test_passive_joints_that_hardly_move_leave_the_shoulder_as_locked_ones(spec, arm, study_log):
     everyone, shoulder = scattered(arm, 2), np.arange(7) == 1
     held = {"stiffness": 1e5, "damping": 1e4}

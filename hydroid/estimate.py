@@ -127,11 +127,28 @@ class JointVerdict(Settings):
     """on logs that it was not fitted to; null: there are none"""
     tolerance_deg: float
     """error up to which it predicts"""
+    inside_percent: float | None = None
+    """part of the samples of the unseen logs inside the 95 % bands; null: there are none"""
     baselines_deg: dict[str, float] = {}
     """of the baselines on the unseen logs, or on the fitted logs where there are no others"""
     horizons_deg: dict[str, tuple[float | None, ...]] = {}
     """rms error of the angle's change over 0.5, 1, 2, 5 and 10 s from starts all along the unseen logs, of
     the fit and of the baselines; empty where there are none"""
+
+    @property
+    def tested(self) -> bool:
+        """Whether unseen logs test the joint: if their error is unknown, it diverged."""
+        return self.unseen_deg is not None or self.verdict not in ("not tested", "does not fit")
+
+    @property
+    def outside(self) -> bool:
+        """Whether the bands are too narrow: a right model's hold 95 %, or somewhat less by its start."""
+        return self.inside_percent is not None and self.inside_percent < 80.0
+
+    @property
+    def fails(self) -> bool:
+        """Whether the verdict is a bad one."""
+        return self.verdict not in ("predicts", "predicts roughly", "not tested")
 
 
 def _finding(value: Any) -> Any:

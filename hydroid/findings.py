@@ -84,21 +84,28 @@ WORDS: dict[str, tuple[str, str]] = {
     "weakly identifiable": ("{few} {is} known to 30 to 100 % only.", ""),
     "effect unknown": ("The simulation diverges when {few} {is} changed: {its} effect is unknown.", ""),
     "combination": ("{few} cannot be told apart: changed together, they give nearly the same motion.", ""),
-    "more combinations": ("{count} more combinations are open: see Directions.", ""),
     "quantities open": ("The logs do not determine these quantities: {few}.", ""),
+    "behind nine numbers": (
+        "On its own logs the fit errs more than nine numbers do in {few}: it is at a wrong optimum, or its "
+        "model is wrong.",
+        "Try another --seed, then `hydroid suggest`.",
+    ),
     # advice: the statement says what to do, the hint what it would bring
+    "fails unseen": (
+        "Fit the unseen logs too: the fit fails on them in {few}.",
+        "Keep one more log to validate on. Where only the load or the pump has changed, use `hydroid adapt`.",
+    ),
     "nothing missing": (
         "Tested: {count} quantities that the fit holds. Freeing none of them would lower the error on data "
         "left out.",
         "",
     ),
-    "fit again": ("Make this fit again.", ""),
     "look for terms": (
         "Find what the model lacks, and what to measure next.",
         "`suggest` tries the most promising terms.",
     ),
     "term missing": (
-        "Free {0}: the rms error on parts of the logs left out falls from {error}° to {freed}°.",
+        "Free {0}: the error of {1} on parts of the logs left out falls by {part:.0f} %.",
         "Keep it if the error on an unseen log falls too.",
     ),
     "more terms missing": (

@@ -54,16 +54,16 @@ def steps(
 ) -> list[Plain]:
     """Return what freeing parameters one after another does, after the model as it is (""), as JSON has it.
 
-    `free` are those to be freed; without any, those that pay. Errors are of the logs, and of parts left out.
+    `free` are those to be freed; without any, those that pay. Errors are those of parts of the logs left out.
     """
     shared = {n: p for n, p in model.settings.parameters.items() if p.joints is None and p.can_be_free}
     pool = list(free) or [n for n, p in shared.items() if p.fixed is None or p.term is not None]
     problem, taken = Problem(adapted(model, pool), logs), list[str]()
-    rms = float(problem.rms(problem.output_errors(model.theta[None]))[0])
-    last, path = Refit(model.theta, rms, rms), list[Plain]()
+    last = Refit.of(problem, model.theta, problem.output_errors(model.theta[None])[0])
+    path = list[Plain]()
     name = ""
     while True:
-        path.append({"parameter": name} | last.degrees)
+        path.append({"parameter": name, "left_out_deg": last.by_joint})
         trials = dict[str, Refit]()
         for trial in pool[:1] if free else pool:
             progress(f"freeing {trial}", len(taken), len(taken) + len(pool))

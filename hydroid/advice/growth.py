@@ -21,7 +21,9 @@ its effective samples; less the one that a took.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import field
 from functools import partial
 
 import numpy as np
@@ -30,6 +32,7 @@ from scipy.stats import t as student
 
 from hydroid.advice.terms import Term, terms
 from hydroid.arrays import Array, Mask, record
+from hydroid.estimate import finite
 from hydroid.posterior.linear import least_squares_rows
 from hydroid.posterior.noise import Noise, prior_weight, problem_noise
 from hydroid.posterior.uncertainty import Uncertainty
@@ -167,18 +170,27 @@ class Refit:
 
     Attributes:
         theta: shape (P,).
-        rms: of the angles [rad]; infinite where the start cannot be simulated.
-        left_out: the same on each part of the samples, of refinements without that part.
+        left_out: rms error of the angles on each part of the samples, of refinements without that part [rad];
+            infinite where the start cannot be simulated.
+        by_joint: the same of each joint by name [deg].
     """
 
     theta: Array
-    rms: float
-    left_out: float
+    left_out: float = math.inf
+    by_joint: Mapping[str, float | None] = field(default_factory=dict[str, float | None])
 
-    @property
-    def degrees(self) -> dict[str, float]:
-        """Its errors [deg], as JSON has them."""
-        return {"rms_deg": math.degrees(self.rms), "left_out_deg": math.degrees(self.left_out)}
+    @classmethod
+    def of(cls, problem: Problem, theta: Array, errors: Array) -> "Refit":
+        """Judge a refinement by the output errors of samples that it has not seen, shape (R,)."""
+        parts = defaultdict[str, list[Array]](list)
+        for c in problem.channels:
+            if c.quantity == "angle":
+                parts[problem.settings.arm.joint_names[c.joint - 1]].append(errors[c.rows] / c.weight)
+        by_joint = {
+            name: finite(np.degrees(np.sqrt(np.mean(np.concatenate(each) ** 2))))
+            for name, each in parts.items()
+        }
+        return cls(theta, float(problem.rms(errors[None])[0]), by_joint)
 
 
 def score_terms(problem: Problem, known: Uncertainty, progress: Progress = no_progress) -> list[Candidate]:
@@ -219,7 +231,7 @@ def refitted(problem: Problem, theta: Array, weight: float | None = None) -> Ref
 
     whole = fitted(parameters.to_unit(theta))
     if not np.isfinite(whole.cost):
-        return Refit(theta, np.inf, np.inf)
+        return Refit(theta)
     number, unseen = np.zeros(whole.residual.size), np.empty(size)
     for c in problem.channels:
         halves = np.arange(len(c.measured)) >= len(c.measured) // 2
@@ -227,8 +239,7 @@ def refitted(problem: Problem, theta: Array, weight: float | None = None) -> Ref
     for part in np.unique(number[:size]):
         out = number == part
         unseen[out[:size]] = rows(parameters.from_unit(fitted(whole.point, ~out).point)[None])[0, out]
-    rms = problem.rms(problem.unfiltered(np.stack([whole.residual[:size], unseen]))).tolist()
-    return Refit(parameters.from_unit(whole.point), *rms)
+    return Refit.of(problem, parameters.from_unit(whole.point), problem.unfiltered(unseen[None])[0])
 
 
 def _tested(term: Term, problem: Problem, known: Uncertainty, fit: Explained) -> list[Candidate]:

@@ -2,7 +2,7 @@
 
 import math
 import shlex
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from hydroid.errors import SettingsError
 from hydroid.estimate import finite
 from hydroid.files import Plain
 from hydroid.findings import Finding
+from hydroid.log import Log
 from hydroid.posterior.noise import error_level
 from hydroid.posterior.posterior import Posterior
 from hydroid.posterior.uncertainty import WEAK_ABOVE, Uncertainty
@@ -29,6 +30,8 @@ MOST_TRIED = 6  # terms that are really freed, the most promising first
 
 STATED_SD = {"weigh": 0.02, "state": 0.05}
 """relative standard deviation of a mass that was weighed, and of a value from a data sheet (ours)"""
+MEASURABLE = "kg", "m", "mm", "mm²", "cm³", "bar", "L/min", "A", "V"
+"""units of what scales, rulers, gauges and data sheets say"""
 FEWEST_TIMES = 1.5  # factor by which an action must improve a parameter to be listed
 MOST_ACTIONS = 5  # actions that are listed
 Content = Mapping[str, Any]
@@ -44,8 +47,9 @@ def advice(
     tests, weight = score_terms(problem, known, progress), known.linear.prior_weight
     best = promising(tests)
     without = refitted(problem, known.theta, weight)
-    rows: list[Plain] = []
+    rows: list[tuple[bool, float, Plain]] = []
     for i, one in enumerate(best):
+        error = math.inf
         row = {
             "name": one.term.name,
             "unit": one.term.entries[one.term.name].unit,
@@ -59,17 +63,17 @@ def advice(
             more = one.term.added_to(problem)
             freed = refitted(more, one.term.theta(problem, known.theta, one.start), weight)
             value = more.parameters.mapping(freed.theta)[one.term.name]
-            row |= {"freed": value} | {name: finite(error) for name, error in freed.degrees.items()}
-            if freed.left_out < (1 - MIN_GAIN) * without.left_out:
+            error = freed.left_out
+            row |= {"freed": value, "left_out_deg": freed.by_joint}
+            if error < (1 - MIN_GAIN) * without.left_out:
                 entries = proposed(one, value)
                 row |= {"parameters": entries, "command": freeing_command(problem, entries, run)}
-        rows.append(row)
-    rows.sort(key=lambda row: ("command" not in row, row.get("left_out_deg") or math.inf))
+        rows.append(("command" not in row, error, row))
     doubted = doubts(problem.settings, problem.logs)
     content = {
-        **without.degrees,
+        "left_out_deg": without.by_joint,
         "tested": len(tests),
-        "terms": rows,
+        "terms": [row for *_, row in sorted(rows, key=lambda one: one[:2])],
         "actions": next_actions(problem, known),
         "assumptions": [{"kind": "sign", "joint": j, "evidence": e} for j, e in doubted.items()],
     }
@@ -103,11 +107,12 @@ def _forecasts(problem: Problem, known: Uncertainty, now: Posterior) -> Iterator
     the noise of the fit's worst angle.
     """
     settings, names = problem.settings, np.array(problem.parameters.names)[now.box.varied].tolist()
+    levers = (p.joints or () for p in settings.parameters.values() if p.quantity.startswith("lever"))
+    stand_ins = {joint for joints in levers for joint in joints}  # for cylinders of unknown size
     for name, row in zip(names, np.eye(len(names)), strict=True):
-        quantity = settings.parameters[name].quantity
-        # in stage 1 these stand for the hydraulics: no data sheet has them
-        if settings.stage != "mech" or quantity not in ("gain", "damping", "stiffness"):
-            kind = "weigh" if quantity == "mass" else "state"
+        own = settings.parameters[name]
+        if own.unit in MEASURABLE and stand_ins.isdisjoint(own.joints or ()):
+            kind = "weigh" if own.quantity == "mass" else "state"
             yield kind, name, row[None] / STATED_SD[kind]
     level, time = max(
         (error_level(channel, noise), noise.correlation_time * problem.logs[channel.log].period)
@@ -147,25 +152,31 @@ def proposed(one: Candidate, value: float) -> dict[str, Plain]:
 
 def freeing_command(problem: Problem, entries: Mapping[str, Any], run: str) -> str:
     """Return the command that fits the same logs again from a run's estimate, with a term freed."""
-    given = " ".join(shlex.quote(log.source) for log in problem.logs)
     changes = ""
     for name, entry in entries.items():
         line = yaml.safe_dump(entry, default_flow_style=True, sort_keys=False, width=math.inf).strip()
         changes += f"--set {shlex.quote(f'parameters.{name}={line}')} "
-    config, own, out = (shlex.quote(path) for path in (f"{run}/config.yaml", run, f"{run}-{[*entries][-1]}"))
-    stage = problem.settings.stage
+    return refit_command(problem.settings.stage, problem.logs, run, [*entries][-1], changes)
+
+
+def refit_command(stage: str, logs: Iterable[Log], run: str, ending: str, changes: str = "") -> str:
+    """Return the command that fits logs with the settings of a run, from its estimate, to RUN-ending."""
+    given = " ".join(shlex.quote(log.source) for log in logs)
+    config, own, out = (shlex.quote(path) for path in (f"{run}/config.yaml", run, f"{run}-{ending}"))
     return f"hydroid fit-{stage} {given} --config {config} --start {own} {changes}--out {out}"
 
 
 def missing_findings(content: Content) -> Iterator[Finding]:
     """Yield what the model lacks: the term to free, with its command."""
     free = [row for row in content["terms"] if "command" in row]
-    numbers = {"error": content["left_out_deg"], "count": str(content["tested"])}
     if not free:
-        yield Finding("nothing missing", "note", (), numbers)
+        yield Finding("nothing missing", "note", (), {"count": str(content["tested"])})
         return
-    freed = {"freed": free[0]["left_out_deg"], "command": free[0]["command"]}
-    yield Finding("term missing", "warning", (free[0]["name"],), numbers | freed)
+    freed, before = free[0]["left_out_deg"], content["left_out_deg"]
+    left = {joint: (error or 0.0) / before[joint] for joint, error in freed.items() if before[joint]}
+    joint = min(left, key=lambda one: left[one])
+    numbers = {"part": 100 * (1 - left[joint]), "command": free[0]["command"]}
+    yield Finding("term missing", "warning", (free[0]["name"], joint), numbers)
     if others := tuple(row["name"] for row in free[1:]):
         yield Finding("more terms missing", "note", others)
 

@@ -153,7 +153,7 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
     from hydroid.advice.assumptions import assumption_findings, doubts
     from hydroid.fitting.summary import summarise
     from hydroid.fitting.validation import fitted
-    from hydroid.fitting.verdict import baselines_of, judge
+    from hydroid.fitting.verdict import baselines_of, behind, judge
     from hydroid.reporting.parameters_report import parameter_table, warnings
     from hydroid.reporting.verdict_table import next_lines, next_steps, verdict_lines
 
@@ -162,7 +162,7 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
     predictions = fitted(last, fit)
     verdict, summary = judge(settings, predictions, baselines), summarise(problem, fit)
     doubted = assumption_findings(settings, problem.logs, doubts(settings, problem.logs))
-    changes = {"verdict": verdict, "findings": (*summary.findings, *doubted)}
+    changes = {"verdict": verdict, "findings": (*behind(settings, verdict), *summary.findings, *doubted)}
     summary = summary.changed(changes)
     source = "the fit" if folder is None else str(folder / NAME)
     model = IdentifiedModel(settings, fit.best.theta, source, summary)

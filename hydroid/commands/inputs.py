@@ -45,7 +45,8 @@ SHARED = """
         YAML file of values by name.
     out (DIR): Folder for page and tables [default: runs/COMMAND on the command line; in Python nothing is
         written].
-    config (YAML): Settings: a file, or the name of a shipped config. A run needs none: it holds its own.
+    config (YAML): Settings: a file, as `hydroid init` writes it for your machine, or the name of a shipped
+        config, which is the shipped arm's. A run needs none: it holds its own.
     set (KEY=VALUE): Replace a setting, such as search.ga.generations=80.
     repair: Fill gaps in the logs up to log.repair_s (0.1 s), and list what was filled. The files themselves
         stay as they are.

@@ -29,16 +29,7 @@ TERMS = {
     "held": "held at",
     "gain_percent": "promised [%]",
     "freed": "freed",
-    "rms_deg": "rms [deg]",
-    "left_out_deg": "rms left out [deg]",
     "verdict": "verdict",
-}
-ACTIONS = {
-    "action": "action",
-    "of": "of",
-    "parameter": "improves most",
-    "before_percent": "from ± [%]",
-    "after_percent": "to ± [%]",
 }
 PRECISION = {
     "parameter": "name",
@@ -86,21 +77,22 @@ def suggest(
     from hydroid.advice.suggestions import advice
     from hydroid.posterior.uncertainty import uncertainty
     from hydroid.reporting.page import Table
+    from hydroid.reporting.verdict_table import LEFT_OUT, errors_by_joint
+    from hydroid.run.record import load_record, run_of
 
     folder = Path(model.source).parent
     run = str(folder) if is_file(folder / CONFIG) else "RUN"
     with Progress() as progress:
         content, findings = advice(problem, uncertainty(problem, model.theta), run, progress)
-    none = {"name": "none of them", "rms_deg": content["rms_deg"], "left_out_deg": content["left_out_deg"]}
+    if finished := run_of(model):
+        findings = (*load_record(finished).failing, *findings)
     note = (
         f"Of {content['tested']} quantities that the fit holds. promised: part of the rms error that freeing "
-        "it saves. left out: the error on parts of the logs, each predicted by a fit without it."
+        f"it saves. {LEFT_OUT}"
     )
-    terms = [none, *(term | {"verdict": _verdict(term)} for term in content["terms"])]
-    tables = {"missing_terms": Table.of("Quantities that the fit holds", TERMS, terms, note)}
-    if actions := content["actions"]:
-        title = "Predicted effect of each action on standard deviations"
-        tables["next_actions"] = Table.of(title, ACTIONS, actions)
+    terms = [term | {"verdict": _verdict(term)} for term in content["terms"]]
+    columns, rows = errors_by_joint(model.settings.arm, [{**content, "name": "none of them"}, *terms])
+    tables = {"missing_terms": Table.of("Quantities that the fit holds", TERMS | columns, rows, note)}
     said = [line for one in findings for line in (f"- {one}", f"  {one.numbers.get('command', '')}")]
     lines = [*tables.values(), *filter(str.strip, said), *written(tables, out)]
     return Result(lines, content, findings)

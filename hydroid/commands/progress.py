@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Any, Self
 
 import typer
 
+from hydroid.units import way
+
 if TYPE_CHECKING:
     from hydroid.arrays import Array
     from hydroid.settings.fit import FitSettings
@@ -83,11 +85,13 @@ class FitProgress(Progress):
 
     def __init__(self, settings: "FitSettings") -> None:
         super().__init__()
-        search, self._joints = settings.search, settings.arm.joint_names
+        search, self._arm, self._outputs = settings.search, settings.arm, settings.outputs
+        self._errors = dict[tuple[str, str], list[float]]()
         names = {"ga": "GA population", "nsga2": "NSGA-II population", "multistart": "multi-start start"}
         self._step = names[search.algorithm]
         self._total = 1 + getattr(search, search.algorithm).generations
-        self._scale, self._unit = (1.0, "") if settings.objective.relative else (math.degrees(1), " deg")
+        mixed = settings.objective.relative or {*settings.outputs} & {*settings.arm.slides}
+        self._scale, self._unit = (1.0, "") if mixed else (math.degrees(1), " deg")
 
     def generation(self, row: "Array") -> None:
         """Take a row of `fitting.search.HISTORY`."""
@@ -96,10 +100,20 @@ class FitProgress(Progress):
         self(self._step, number, self._total, text)
 
     def refining(self, name: str, simulated: int, rms: float) -> None:
-        """Take the name of a least squares, its number of simulations, and its rms error [rad] so far."""
-        alone = (joint for k, joint in enumerate(self._joints, start=1) if f" joint {k} " in name)
-        name = next(alone, name.replace("refined", "all joints together"))
-        self(f"{name}: simulations", simulated, None, f"rms error {math.degrees(rms):.3g} deg")
+        """Take the name of a least squares, its number of simulations, and its rms error [rad] so far.
+
+        Shown is the best error of a joint's several starts, or of joints together its part of the first one.
+        """
+        joints = [k for k in self._outputs if f" joint {k} " in name] or self._outputs
+        alone, what = len(joints) == 1, name.replace("refined", "all joints together")
+        if alone:
+            what = self._arm.joint_names[joints[0] - 1]
+        errors = self._errors.setdefault((what, name.rpartition(" part ")[2]), [rms])
+        errors.append(min(errors[-1], rms))
+        best = f"{errors[-1] / errors[0]:.0%} of that at the start"
+        if alone:
+            best = way(math.degrees(errors[-1]), slides=joints[0] in self._arm.slides)
+        self(f"{what}: simulations", simulated, None, f"rms error {best}")
 
 
 def _new_bar() -> Any:

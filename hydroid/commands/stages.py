@@ -25,6 +25,7 @@ from hydroid.commands.progress import FitProgress, Progress
 from hydroid.errors import SettingsError
 from hydroid.files import Plain
 from hydroid.parallel.cluster import open_workers
+from hydroid.progress import NOTE
 from hydroid.quantity_table import MECHANICAL
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.parameters import nominal_value
@@ -89,7 +90,7 @@ def fit_hyd(
     By default it estimates piston areas, valve openings, onsets, delay and damping. The config can free more,
     such as the amplifier's currents and the solenoid. Writes a run folder as fit-mech does.
 
-    Example: hydroid fit-hyd LOG.csv --mech runs/mech --out runs/hyd
+    Example: hydroid fit-hyd LOG.csv --config mine/fit.yaml --out runs/hyd
 
         fitted = hydroid.fit_hyd("a.csv", mech="runs/mech", out="runs/hyd")
         print(fitted.summary.values)
@@ -114,6 +115,9 @@ def _fit(stage: str, given: Mapping[str, Any]) -> FitResult:
     if stage == "hyd":
         changes = with_mechanics(given["mech"], config, changes)
     settings = load_stage(stage, config, changes, given["start"])
+    if config == f"fit-{stage}":
+        note = "note: the arm is the shipped %s: for your machine give --config, which `hydroid init` writes"
+        _log.log(NOTE, note, settings.arm.name)
     read = read_logs(given["logs"], settings, repair=given["repair"])
     with open_workers(given["dask"]) as workers, FitProgress(settings) as watcher:
         return run_fit(
@@ -221,6 +225,7 @@ def adapt(
     read = read_logs(logs, model.settings, repair=repair)
     from hydroid.advice.adaptation import adapted, steps
     from hydroid.reporting.page import Table
+    from hydroid.reporting.verdict_table import LEFT_OUT, errors_by_joint
 
     with Progress() as progress:
         path = steps(model, read, names(free), progress)
@@ -231,9 +236,9 @@ def adapt(
     settings = adapted(model, chosen)
     with FitProgress(settings) as watcher:
         result = run_fit(settings, read, out and Path(out), progress=watcher)
-    rows = [step | {"parameter": step["parameter"] or "none"} for step in path]
-    columns = {"parameter": "freed", "rms_deg": "rms [deg]", "left_out_deg": "left out [deg]"}
-    note = "left out: the error on parts of the logs, each predicted by an adaptation without it."
-    steps_table = Table.of("Parameters freed one after another", columns, rows, note)
+    named = [step | {"parameter": step["parameter"] or "none"} for step in path]
+    columns, rows = errors_by_joint(settings.arm, named)
+    columns = {"parameter": "freed"} | columns
+    steps_table = Table.of("Parameters freed one after another", columns, rows, LEFT_OUT)
     content = {**result.content, "steps": path}
     return replace(result, lines=[steps_table, *result.lines], content=content)

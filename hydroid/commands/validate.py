@@ -136,12 +136,16 @@ def report(
 
     collected = read_runs([str(run) for run in as_list(runs)], out)
     tables, best = merged_tables(collected), min(collected, key=lambda run: run.rms_deg)
-    line = f"smallest error: {best.folder} (seed {best.seed}, rms {best.rms_deg:.4g} deg)"
+    line = f"smallest error: {best.folder} (seed {best.seed})"
     spread = tables["spread"]
     content = {
         "out": out and str(out),
         "best": best.folder,
-        "runs": {run.folder: {"seed": run.seed, "rms_deg": run.rms_deg} for run in collected},
+        "runs": {
+            run.folder: {"seed": run.seed}
+            | {"fitted_deg": {v.name: v.fitted_deg for v in run.summary.verdict}}
+            for run in collected
+        },
         "parameters": [dict(zip(spread.header, row, strict=True)) for row in spread.rows],
     }
     return Result([spread, line, *written(tables, out)], content, collected)

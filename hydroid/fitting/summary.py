@@ -17,7 +17,6 @@ from hydroid.problem.problem import Problem
 
 STRAINED_ABOVE = 2.0
 """standard deviations from its prior beyond which an estimate strains it"""
-_MOST_DIRECTIONS = 6
 _WARNINGS = ("at bound", "effect unknown")
 _NOTES = ("at zero", "no effect", "not identifiable", "prior only", "weakly identifiable")
 """of what is found about single parameters, the most important first"""
@@ -142,7 +141,5 @@ def _parameter_findings(parameters: ParameterSet, estimate: Mapping[str, Paramet
 
 
 def _direction_findings(directions: Identifiability) -> list[Finding]:
-    several = [Finding("combination", "note", tuple(one)) for one in directions.combinations if len(one) > 1]
-    more = len(several) - _MOST_DIRECTIONS
-    rest = [Finding("more combinations", "note", (), {"count": str(more)})] if more > 0 else []
-    return several[:_MOST_DIRECTIONS] + rest
+    several = [one for one in directions.combinations if len(one) > 1]
+    return [Finding("combination", "note", tuple(one)) for one in several[:6]]  # Directions has all

@@ -5,11 +5,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from math import degrees
-from typing import Any
 
 import numpy as np
 
 from hydroid.estimate import finite
+from hydroid.files import Plain
 from hydroid.fitting.fit import Fit
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
@@ -71,15 +71,15 @@ class Prediction:
         """Return measured minus simulated angle of a joint [rad], shape (T,)."""
         return self.log.angle[:, joint - 1] - self.response[:, self.joints.index(joint)]
 
-    def plain(self, names: Sequence[str]) -> list[dict[str, Any]]:
+    def plain(self, names: Sequence[str]) -> list[Plain]:
         """Return one mapping per joint, as JSON has them (docs/json.md); `names` are of all joints."""
-        rows: list[dict[str, Any]] = []
+        rows: list[Plain] = []
         for joint, one in self.indices.items():
-            row = {"fit": self.fit, "log": self.log.source, "joint": joint, "name": names[joint - 1]}
+            row = Plain({"fit": self.fit, "log": self.log.source, "joint": joint, "name": names[joint - 1]})
             errors = {"mae": one.mean_absolute, "rms": one.rms, "max": one.largest}
             if band := self.bands.get(joint):
-                row |= {"inside_percent": 100 * band.inside, "model_limits": band.model_limits}
-                errors |= {"noise": band.noise, "expected": band.expected, "model_error": band.model_error}
+                row["inside_percent"] = 100 * band.inside
+                errors |= {"noise": band.noise, "expected": band.expected}
             row |= {f"{name}_deg": finite(degrees(error)) for name, error in errors.items()}
             rows.append(row | {"fit_percent": finite(one.fit)})
         return rows

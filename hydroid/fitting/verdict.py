@@ -2,13 +2,12 @@
 
 Errors are rms over the logs that drive the joint. The tolerance is `tolerance_deg` of the settings, or 2 % of
 the joint's travel in the unseen logs. A baseline is as good on these unless the fit's error is below 90 % of
-its, or below a tenth of the tolerance. The first of these that is true is the verdict:
+its. The first of these that is true is the verdict:
 
-1. does not fit: on the fitted logs the error is outside the tolerance, and a baseline is as good; where there
-   are unseen logs, one must be as good there too;
-2. not tested: no unseen log drives the joint;
-3. predicts: the error on the unseen logs is within the tolerance and, unless that is stated, below those of
-   all baselines;
+1. predicts: the error on the unseen logs is within the tolerance, whatever the baselines do;
+2. does not fit: on the fitted logs the error is outside the tolerance, and a baseline's is smaller; where
+   there are unseen logs, one must be as good there too;
+3. not tested: no unseen log drives the joint;
 4. predicts no better than a baseline: one is as good on the unseen logs; the simplest such is named;
 5. fits but does not predict: the error on the unseen logs is more than twice that on the fitted ones, or it
    diverges;
@@ -20,6 +19,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from hydroid.estimate import JointVerdict, finite
+from hydroid.findings import Finding
 from hydroid.fitting.baselines import NAMES, Baseline, fit_baselines
 from hydroid.fitting.validation import Prediction, errors_ahead
 from hydroid.log import Log
@@ -29,9 +29,7 @@ from hydroid.settings.fit import FitSettings
 SHARE = 0.02
 """of a joint's travel that its error may be where no tolerance is stated"""
 CLEARLY = 0.9
-"""part of a baseline's error on unseen logs that a better fit stays below"""
-TINY = 0.1
-"""part of the tolerance below which an error does not count, whatever a baseline does"""
+"""part of another model's error that a better one stays below"""
 WORSE = 2.0
 """times the error on fitted logs, beyond which a fit does not predict"""
 ANYWHERE = np.array([-np.inf, np.inf])
@@ -84,6 +82,7 @@ def _judge(
         {name: rms_deg(one.errors([p.log]) for p in some) for name, one in rivals.items()} if some else {}
         for some in (own, new)
     ]
+    inside = [np.full(len(p.log.time), p.bands[joint].inside) for p in new if joint in p.bands]
     ahead: dict[str, list[Array]] = {}
     if new and all(len(p.ahead) for p in new):
         ahead["the fit"] = [p.ahead[..., p.joints.index(joint)] for p in new]
@@ -93,34 +92,42 @@ def _judge(
         joint=joint,
         name=settings.arm.joint_names[joint - 1],
         slides=settings.arm.joints[joint - 1].slides,
-        verdict=_word(errors, by_rival, tolerance, stated=stated is not None),
+        verdict=_word(errors, by_rival, tolerance),
         fitted_deg=finite(errors[0]),
         unseen_deg=finite(errors[1]),
         tolerance_deg=tolerance,
+        inside_percent=100 * float(np.mean(np.concatenate(inside))) if inside else None,
         baselines_deg=by_rival[1] or by_rival[0],
         horizons_deg={name: _rms_ahead(np.concatenate(rows)) for name, rows in ahead.items()},
     )
 
 
-def _word(
-    errors: Sequence[float | None], rivals: Sequence[Mapping[str, float]], tolerance: float, *, stated: bool
-) -> str:
+def _word(errors: Sequence[float | None], rivals: Sequence[Mapping[str, float]], tolerance: float) -> str:
     """Return the verdict from errors [deg] on the fitted and on the unseen logs, and the baselines' there."""
     (fitted, unseen), (there, here) = errors, rivals
-    small = TINY * tolerance
-    as_good = [n for n, e in here.items() if unseen is not None and not unseen < max(CLEARLY * e, small)]
+    if unseen is not None and unseen <= tolerance:
+        return "predicts"
+    as_good = [n for n, e in here.items() if unseen is not None and not unseen < CLEARLY * e]
     misfit = fitted is not None and not fitted <= tolerance and not fitted < min(there.values())
     if misfit and (unseen is None or as_good):
         return "does not fit"
     if unseen is None:
         return "not tested"
-    if unseen <= tolerance and (stated or not as_good):
-        return "predicts"
     if as_good and (fitted is None or np.isfinite(unseen)):
         return f"predicts no better than {as_good[0]}"
     if fitted is not None and not unseen <= WORSE * fitted:
         return "fits but does not predict"
     return "predicts roughly"
+
+
+def behind(settings: FitSettings, verdicts: Sequence[JointVerdict]) -> list[Finding]:
+    """Return that a fit of the hydraulics errs more on its own logs than nine numbers do, which it holds."""
+    joints = tuple(
+        one.name
+        for one in verdicts
+        if one.baselines_deg.get(NAMES[-1], np.inf) < CLEARLY * (one.fitted_deg or 0.0)
+    )
+    return [Finding("behind nine numbers", "warning", joints)] if joints and settings.stage == "hyd" else []
 
 
 def rms_deg(errors: Iterable[Array]) -> float:

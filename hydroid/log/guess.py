@@ -42,12 +42,9 @@ class _Column(NamedTuple):
     unit: str
     values: Array
 
-    @property
-    def why(self) -> str:
-        return "by its unit" if self.unit else "by its name"
 
-
-_Pairs = dict[int, list[_Column]]  # the column, or the two for the directions of a command, of each joint
+_Pairs = dict[int, tuple[list[_Column], str]]
+"""the column, or the two for the directions of a command, of each joint, and what says that they are its"""
 
 
 def guess_columns(
@@ -66,27 +63,28 @@ def guess_columns(
     step = np.nanmedian(np.diff(time.values))
     unit = time.unit or likely_time_unit(step) or "s"
     step *= UNITS[unit].factor
-    reasons = [f"{time.name}: time in {unit}, {time.why}, every {step:.3g} s"]
+    reasons = [f"{time.name}: time in {unit}, every {step:.3g} s"]
     commands, angles = (
         _by_joint([c for c in columns if c.kind == kind], (joints, links), slides, reasons)
         for kind in ("command", "angle")
     )
-    unitless = [c.values for joint, (c,) in angles.items() if joint not in slides and not c.unit]
+    unitless = [c.values for joint, ((c,), _) in angles.items() if joint not in slides and not c.unit]
     default = "rad" if max((np.nanmax(np.abs(x)) for x in unitless), default=np.inf) <= 6.3 else "deg"
     entries = dict[int, Plain]()
     for joint in sorted({*angles, *commands}):
         entry: Plain = {"command": None, "angle": None}
         entries[joint], of = entry, joints[joint - 1]
-        if pair := commands.get(joint):
+        if joint in commands:
+            pair, why = commands[joint]
             entry["command"], said = _command(table, pair)
-            reasons.append(f"{said} of {of}, {pair[0].why}")
-        for column in angles.get(joint, ()):
-            what, usual = "angle", default
+            reasons.append(f"{said} of {of}, {why}")
+        if joint in angles:
+            ((column,), why), what, usual = angles[joint], "angle", default
             if joint in slides:  # no telescope is 50 m long
                 what, usual = "position", "mm" if np.nanmax(np.abs(column.values)) > 50 else "m"
             entry["angle"] = {"column": column.name, "unit": column.unit or usual}
-            reasons.append(f"{column.name}: {what} in {column.unit or usual} of {of}, {column.why}")
-    used = {time.name} | {c.name for pairs in (commands, angles) for pair in pairs.values() for c in pair}
+            reasons.append(f"{column.name}: {what} in {column.unit or usual} of {of}, {why}")
+    used = {time.name} | {c.name for pairs in (commands, angles) for pair, _ in pairs.values() for c in pair}
     log = {"time": {"column": time.name, "unit": unit}, "command": None, "angle": None}
     log |= {"period_s": min(PERIODS, key=lambda p: max(p, step) / max(min(p, step), 1e-9)), "joints": entries}
     unused = tuple(name for name in table.names if name and name not in used)
@@ -132,26 +130,27 @@ def _by_joint(
     pairs = [sorted(pair, key=lambda c: -direction(c.name)[0])[:2] for pair in groups.values()]
     from_zero = any(number_in(column.name) == 0 for column in columns)
 
-    def give(pair: list[_Column], joint: int) -> bool:
+    def give(pair: list[_Column], joint: int, why: str) -> bool:
         """Give columns to a joint that has none yet and moves in their unit; return whether it does."""
         unit = pair[0].unit
         fits = kind == "command" or not unit or (UNITS[unit].quantity == "length") == (joint in slides)
-        if fits and 0 < joint <= len(names) and joint not in given:
-            given[joint] = pair
-        return given.get(joint) is pair
+        free = fits and 0 < joint <= len(names) and joint not in given
+        if free:
+            given[joint] = pair, why
+        return free
 
-    def named(name: str) -> int:
+    def named(name: str) -> tuple[int, str]:
+        if joint := next(filter(None, (joint_of(name, of) for of in known)), 0):
+            return joint, "by its name"
         number = number_in(name)
-        joints = (joint_of(name, of) for of in known)
-        return next(filter(None, joints), 0 if number is None else number + from_zero)
+        return 0 if number is None else number + from_zero, "by its number"
 
-    left = [pair for pair in pairs if not give(pair, named(pair[0].name))]
+    left = [pair for pair in pairs if not give(pair, *named(pair[0].name))]
     if given and from_zero:
         reasons.append("the numbers in the names count from 0: joint 1 is number 0")
     if left and not given:
-        left = [pair for pair in left if not any(give(pair, joint + 1) for joint in range(len(names)))]
-        said = listed([f"{pair[0].name} of {names[joint - 1]}" for joint, pair in given.items()], 12)
-        reasons.append(f"{kind}s by their order: check them: {said}")
+        order, why = range(1, len(names) + 1), "by its place in the log: check it"
+        left = [pair for pair in left if not any(give(pair, joint, why) for joint in order)]
     if left:
         spare = listed([column.name for pair in left for column in pair], 12)
         free = [name for joint, name in enumerate(names, 1) if joint not in given]

@@ -153,7 +153,7 @@ def _match(
             what = listed([f"{one.name!r} ({one}{guess.get(one.name, '')})" for one in lacking], 2)
             what = f"lacks {what}; unused: {listed([*filter(None, free.values())] or ['no column'], 3)}"
             places = listed([*dict.fromkeys(f"log.{one.kind}" for one in lacking)])
-            hint = f"name its columns in {places}, null for none (`hydroid convert` guesses them)"
+            hint = f"give {places} in the config the right column, or null if the log has none"
         line = f", line {table.header}" if table.header else ""
         raise LogError(what, where=f"{table.source}{line}", hint=hint)
     return wanted

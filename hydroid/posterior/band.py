@@ -8,10 +8,9 @@ Student's t. What an unseen log shows beyond all this is a further error of the 
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
-from scipy.stats import chi2, t as student
+from scipy.stats import t as student
 
 from hydroid.arrays import Array, record
 from hydroid.identified_model import IdentifiedModel
@@ -35,8 +34,6 @@ class Band:
         inside: part of the samples whose error lies within it.
         error: rms error [rad].
         expected: rms error that all of this explains [rad].
-        limit: rms error that is larger for 5 % of the logs only, if nothing else is wrong [rad]. Errors of
-            the start and of the parameters are few random numbers for a whole log: far above `expected`.
     """
 
     noise: float
@@ -44,17 +41,6 @@ class Band:
     inside: float
     error: float
     expected: float
-    limit: float = np.inf
-
-    @property
-    def model_error(self) -> float:
-        """Rms error that neither noise nor parameters explain [rad]."""
-        return np.sqrt(max(self.error**2 - self.expected**2, 0.0))
-
-    @property
-    def model_limits(self) -> bool:
-        """Whether the model, not the noise, limits the prediction."""
-        return bool(self.inside < 0.9 and self.error > self.limit)  # 5 % are expected outside
 
 
 def fitted_bands(problem: Problem, known: Uncertainty, responses: Sequence[Array]) -> list[dict[int, Band]]:
@@ -101,10 +87,7 @@ def prediction_bands(model: IdentifiedModel, log: Log, response: Array) -> dict[
         wrong = max(np.mean(unseen**2) - np.mean(variance + noise**2), 0.0) if unseen.size else 0.0
         widened = wrong * float(student.ppf(0.5 + COVERAGE / 2, unseen.size or 1) / NORMAL) ** 2
         variance = variance + np.sum(start[joint] ** 2, axis=0)
-        few = np.vstack([parts[:, :, column], start[joint]])
-        square = np.sum((few @ few.T / few.shape[1]) ** 2) + widened**2
-        limit = _limit(np.mean(variance) + noise**2 + widened, square)
-        bands[joint] = replace(_band(known, noise, variance, error, wrong, widened), limit=limit)
+        bands[joint] = _band(known, noise, variance, error, wrong, widened)
     return bands
 
 
@@ -119,19 +102,6 @@ def _band(
     half = np.sqrt(known.quantile**2 * variance + NORMAL**2 * widened)
     inside, rms = float(np.mean(np.abs(error) <= half)), np.sqrt(np.mean(error**2))
     return Band(noise, half, inside, rms, np.sqrt(np.mean(variance) + wrong))
-
-
-def _limit(mean: float, square: float) -> float:
-    """Root of the mean square error that 5 % of the logs exceed.
-
-    `mean` is its expected value. Parts of it are the squares of one normal number each, of which `square` is
-    the sum of squares; the rest is the mean of many. The sum is about a multiple of chi-square
-    (F. E. Satterthwaite, 1946).
-    """
-    if not np.isfinite(mean):
-        return np.inf
-    freedom = mean**2 / max(square, 1e-3 * mean**2)
-    return float(np.sqrt(mean * chi2.ppf(COVERAGE, freedom) / freedom))
 
 
 def start_effects(problem: Problem, theta: Array, levels: dict[int, float]) -> dict[int, Array]:

@@ -172,19 +172,26 @@ def merged_tables(runs: Sequence[Record]) -> dict[str, Table]:
     """Return the tables `spread` and `runs` of runs that differ in their seeds only, the best run first."""
     runs = sorted(runs, key=lambda run: run.rms_deg)
     parameters = runs[0].settings.parameter_set().parameters
-    names, rms = tuple(f"{p.name} [{p.unit}]" for p in parameters), [run.rms_deg for run in runs]
-    theta = np.array([[run.summary.values[p.name] for p in parameters] for run in runs])
-
-    columns, best = np.column_stack([theta, rms]), runs[0].summary.estimate
-    units = {p.name: p.unit for p in parameters} | {"rms output error": "deg"}
+    units = {f"error of {one.name}": "mm" if one.slides else "deg" for one in runs[0].summary.verdict}
+    units |= {p.name: p.unit for p in parameters}
+    columns = np.array([[*_errors(run), *(run.summary.values[p.name] for p in parameters)] for run in runs])
+    best = runs[0].summary.estimate
     spread = np.quantile(columns, [0.5, 0, 0.25, 0.75, 1], axis=0).T.tolist()
     rows = [
         (name, unit, *row, status(best[name]) if name in best else "")
         for (name, unit), row in zip(units.items(), spread, strict=True)
     ]
-    each = [(run.folder, run.seed, run.rms_deg, *row) for run, row in zip(runs, theta.tolist(), strict=True)]
-    header = ("run", "seed", "rms output error [deg]", *names)
+    each = [(run.folder, run.seed, *row) for run, row in zip(runs, columns.tolist(), strict=True)]
+    header = "run", "seed", *(f"{name} [{unit}]" for name, unit in units.items())
     return {
         "spread": Table(f"{len(runs)} runs", SPREAD, tuple(rows), optional=SPREAD[4:6]),
-        "runs": Table("Runs, smallest error first", header, tuple(each), optional=names[::-1]),
+        "runs": Table("Runs, smallest error first", header, tuple(each), optional=header[:1:-1]),
     }
+
+
+def _errors(run: Record) -> list[float]:
+    """Return the error of each joint on the fitted logs [deg or mm]."""
+    return [
+        (one.fitted_deg or 0.0) * (1e3 * np.radians(1.0) if one.slides else 1.0)
+        for one in run.summary.verdict
+    ]

@@ -11,7 +11,7 @@ import numpy as np
 from hydroid.findings import Finding
 from hydroid.fitting.search import HISTORY
 from hydroid.fitting.validation import Prediction
-from hydroid.fitting.verdict import judge, rms_deg
+from hydroid.fitting.verdict import rms_deg
 from hydroid.reporting import page_file
 from hydroid.reporting.chart import SERIES, Chart, Mark, Panel, finite
 from hydroid.reporting.outlines import motion_section
@@ -157,20 +157,20 @@ def draw(run: str | Path, *, figures: bool = False) -> Path:
 
 def fit_page(record: Record) -> Page:
     """Return the page of a fit, with the unseen logs that it was validated on."""
-    settings, summary, result = record.settings, record.summary, record.result
-    final, unseen = str(summary.final), [*record.validations.values()]
-    fits = {final: judge(settings, result.fitted, result.baselines, unseen)}
+    settings, summary, fitted = record.settings, record.summary, record.result.fitted
+    final = str(summary.final)
     # a validation has the name of the run, a fitted log that of the estimate: here both are the fit
-    predictions = [replace(p, fit=final) for p in (*unseen, *result.fitted)]
-    step, *more = next_steps(settings, fits[final], record.folder, record.given)
+    predictions = [replace(p, fit=final) for p in (*record.validations.values(), *fitted)]
+    fits = {final: record.verdict}
+    step, *more = next_steps(settings, record.verdict, record.folder, record.given)
     sections = (
         verdict_section(fits, step),
         *prediction_sections(predictions, settings.arm, fits),
         *quantity_section(settings, summary),
         *unknown_sections(summary),
-        Section("Do next", steps=tuple(more)),
+        *([Section("To improve the fit", steps=tuple(more))] if more else []),
         parameter_section(settings, summary),
-        *speed_section(settings, summary, [p.log for p in result.fitted]),
+        *speed_section(settings, summary, [p.log for p in fitted]),
         search_section(record),
     )
     in_order = sorted(sections, key=lambda section: section.folded)

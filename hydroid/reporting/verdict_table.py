@@ -6,10 +6,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from hydroid.estimate import JointVerdict
+from hydroid.files import Plain
 from hydroid.findings import Finding
 from hydroid.fitting.baselines import NAMES
 from hydroid.fitting.validation import HORIZONS
 from hydroid.reporting.page import Cell, Given, Section, Table, short_name, shown
+from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
 from hydroid.words import listed, two_digits
 
@@ -19,6 +21,9 @@ _NOTE = (
     "models on the {logs} logs: no motion, mean speeds by command, and nine numbers (dead band, exponent, "
     "speed, lag)."
 )
+
+LEFT_OUT = "By joint: the rms error [deg] on parts of the logs, each predicted by a fit without it."
+"""said of errors by joint"""
 
 Verdicts = Mapping[str, Sequence[JointVerdict]]  # by fit
 
@@ -31,12 +36,12 @@ def verdict_table(fits: Verdicts) -> Table:
         for one in verdicts:
             errors = {"fitted": one.fitted_deg, "unseen": one.unseen_deg} | one.baselines_deg
             row = {name: _shown(error, one.slides) for name, error in errors.items()}
-            row["unseen"] = row["unseen"] or ("diverged" if _tested(one) else None)
+            row["unseen"] = row["unseen"] or ("diverged" if one.tested else None)
             verdict = f"{_SIGNS.get(one.verdict, '✗')} {one.verdict}"
             rows.append(row | {"fit": short_name(fit), "joint": one.name, "verdict": verdict})
     if len(fits) == 1:
         del columns["fit"]
-    unseen = any(_tested(one) for verdicts in fits.values() for one in verdicts)
+    unseen = any(one.tested for verdicts in fits.values() for one in verdicts)
     note = _NOTE.format(logs="unseen" if unseen else "fitted")
     return Table.of("Verdict", columns, rows, note, NAMES[:2])
 
@@ -45,6 +50,15 @@ def _shown(error: float | None, slides: bool) -> Cell:
     if error is None:
         return None
     return f"{two_digits(1e3 * np.radians(error))} mm" if slides else Given(two_digits(error))
+
+
+def errors_by_joint(arm: Arm, rows: Sequence[Plain]) -> tuple[dict[str, str], list[Plain]]:
+    """Return one column for each joint of errors by joint, and rows with them in place of `left_out_deg`."""
+    columns = {name: name for row in rows for name in row.get("left_out_deg", ())}
+    slides = {arm.joint_names[joint - 1] for joint in arm.slides}
+    return columns, [
+        row | {n: _shown(e, n in slides) for n, e in row.get("left_out_deg", {}).items()} for row in rows
+    ]
 
 
 def verdict_section(fits: Verdicts, *steps: Finding) -> Section:
@@ -75,14 +89,9 @@ def ordered(fits: Verdicts) -> Verdicts:
     return dict(sorted(fits.items(), key=lambda fit: sum(map(_size, fit[1]))))
 
 
-def _tested(one: JointVerdict) -> bool:
-    """Return whether unseen logs test the joint: if their error is unknown, it diverged."""
-    return one.unseen_deg is not None or one.verdict not in ("not tested", "does not fit")
-
-
 def _error(one: JointVerdict) -> float:
     """Return the error on the unseen logs, or of a joint that they do not test on the fitted ones [deg]."""
-    error = one.unseen_deg if _tested(one) else one.fitted_deg
+    error = one.unseen_deg if one.tested else one.fitted_deg
     return np.inf if error is None else error  # it diverged
 
 
@@ -91,8 +100,9 @@ def _size(one: JointVerdict) -> float:
 
 
 def verdict_lines(fits: Verdicts) -> list[Table | str]:
-    """Return the verdicts as a terminal shows them: the table, and the worst joint of the first fit."""
-    return [verdict_table(fits), *filter(None, [worst(next(iter(fits.values())))])]
+    """Return the verdicts as a terminal shows them: the table, and what is worst about the first fit."""
+    first = next(iter(fits.values()))
+    return [verdict_table(fits), *filter(None, [worst(first), outside(first)])]
 
 
 def next_lines(step: Finding) -> tuple[str, str]:
@@ -108,7 +118,13 @@ def lead(fits: Verdicts) -> str:
     for one in verdicts:
         by_word.setdefault(one.verdict, []).append(one.name)
     said = "; ".join(f"{listed(names)}: {word}" for word, names in by_word.items())
-    return f"{of}{said}. {worst(verdicts)}".strip()
+    return " ".join(filter(None, [f"{of}{said}.", worst(verdicts), outside(verdicts)]))
+
+
+def outside(verdicts: Sequence[JointVerdict]) -> str:
+    """Say of which joints the prediction bands are too narrow; nothing where all hold their samples."""
+    missed = listed([f"{one.inside_percent:.0f} % of {one.name}" for one in verdicts if one.outside])
+    return f"The 95 % bands are too narrow: in the unseen logs they hold {missed}." if missed else ""
 
 
 def worst(verdicts: Sequence[JointVerdict]) -> str:
@@ -127,8 +143,7 @@ def next_steps(
     settings: FitSettings, verdicts: Sequence[JointVerdict], folder: str, logs: str = "LOG.csv"
 ) -> list[Finding]:
     """Return what to do after a fit of `logs` in a run folder, the first step first, with their commands."""
-    run, config, again = (shlex.quote(f"{folder}{end}") for end in ("", "/config.yaml", "-again"))
-    steps: dict[str, str] = {}
+    run, steps = shlex.quote(folder), dict[str, str]()
     if settings.stage == "mech":
         steps["fit the hydraulics"] = f"hydroid fit-hyd {logs} --mech {run}"
     elif any(one.verdict == "not tested" for one in verdicts):
@@ -136,5 +151,4 @@ def next_steps(
     elif all(one.verdict == "predicts" for one in verdicts):
         steps["use the machine"] = f"hydroid simulate COMMANDS.csv --fit {run}"
     steps["look for terms"] = f"hydroid suggest --fit {run}"
-    steps["fit again"] = f"hydroid fit-{settings.stage} {logs} --config {config} --out {again}"
     return [Finding(kind, "note", (), {"command": command}) for kind, command in steps.items()]

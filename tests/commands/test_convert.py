@@ -45,7 +45,7 @@ def test_the_command_prints_each_guess_and_json(tmp_path: Path) -> None:
     write_parquet(tmp_path / "a.parquet", dict(zip(NAMES, cells(300).T, strict=True)))
     arguments = ["convert", str(tmp_path / "a.parquet"), "-o", str(tmp_path / "a.csv")]
     said = CliRunner().invoke(app, arguments).output
-    assert "u2_pct: command in % of joint 2, by its unit" in said
+    assert "u2_pct: command in % of joint 2, by its name" in said
     assert "300 samples, 2.99 s, every 0.01 s" in said
     plain = json.loads(CliRunner().invoke(app, [*arguments, "--json"]).output)
     assert plain["log"]["joints"]["1"]["angle"] == {"column": "q1_deg", "unit": "deg"}

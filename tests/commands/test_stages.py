@@ -156,9 +156,9 @@ def test_analyse_tells_what_a_log_determines(short: Path, hydroid_cli: Run, tmp_
 def test_a_term_to_free_is_said_with_its_command(
     short: Path, hydroid_cli: Run, monkeypatch: pytest.MonkeyPatch
 ):
-    numbers = {"error": 2.0, "freed": 1.0, "command": "hydroid fit-hyd a.csv"}
-    said = {"tested": 1, "rms_deg": 2.0, "left_out_deg": 2.0, "terms": [], "actions": []}
-    advised = said, [Finding("term missing", "warning", ("delay",), numbers)]
+    numbers = {"part": 50.0, "command": "hydroid fit-hyd a.csv"}
+    said = {"tested": 1, "left_out_deg": {"shoulder": 2.0}, "terms": [], "actions": []}
+    advised = said, [Finding("term missing", "warning", ("delay", "shoulder"), numbers)]
     monkeypatch.setattr("hydroid.advice.suggestions.advice", lambda *_: advised)
     Path("values.yaml").write_text(yaml.safe_dump(VALUES | {"K": 1.5, "S": 80.0}))
     printed = hydroid_cli("suggest", short, "--fit", "values.yaml").out

@@ -8,8 +8,9 @@ import pytest
 from hydroid import load_settings
 from hydroid.fitting.baselines import NAMES
 from hydroid.fitting.validation import HORIZONS, Prediction, errors_ahead
-from hydroid.fitting.verdict import judge
+from hydroid.fitting.verdict import behind, judge
 from hydroid.log import Log
+from hydroid.reporting.verdict_table import outside
 
 SETTINGS = load_settings("fit-mech")
 TIME = np.arange(1200) * 0.01
@@ -50,13 +51,7 @@ ROWS = {
     "nothing unseen, worse than nine numbers, but good": ((1.0, None), {"nine": (0.5, 9)}, "not tested"),
     "small error": ((1.0, 1.9), {}, "predicts"),
     "small error from a smaller one": ((0.1, 1.9), {}, "predicts"),
-    "small error, smaller from nine numbers": (
-        (1.0, 1.9),
-        {"nine": (1, 1.5)},
-        "predicts no better than nine numbers",
-    ),
-    "an error too small to count": ((0.1, 0.15), {"nine": (0.1, 0.1)}, "predicts"),
-    "that is within what the user asked for": ((1, 1.9), {"nine": (1, 1.5), "tolerance": 2}, "predicts"),
+    "small error, smaller from nine numbers": ((1.0, 1.9), {"nine": (0.1, 0.1)}, "predicts"),
     "better than anything, not good": ((2.5, 4.4), {}, "predicts roughly"),
     "as bad as the user allows": ((2.5, 4.5), {"tolerance": 5}, "predicts"),
     "worse than the user allows": ((0.4, 0.7), {"tolerance": 0.5}, "predicts roughly"),
@@ -92,6 +87,14 @@ def test_the_errors_are_those_of_the_joint_by_name():
     assert (one.fitted_deg, one.unseen_deg) == (pytest.approx(1.0), pytest.approx(3.0))
     assert list(one.baselines_deg) == [*NAMES]
     assert one.baselines_deg["nine numbers"] == pytest.approx(5.0)
+
+
+def test_what_nine_numbers_fit_better_is_named_and_what_bands_miss():
+    (finding,) = behind(load_settings("fit-hyd"), [verdict(6.0), verdict(5.2).changed({"name": "elbow"})])
+    assert finding.subjects == ("shoulder",)
+    assert "too narrow: in the unseen logs they hold 7 % of shoulder." in outside(
+        [verdict(1, 1).changed({"inside_percent": 7.0})]
+    )
 
 
 def test_an_error_ahead_begins_anew_at_every_start():

@@ -154,7 +154,7 @@ def make_prediction(
 ) -> Prediction:
     """An unseen log that is predicted with a constant error [rad], as the fit leads to expect."""
     response = log.angle[:, [joint - 1 for joint in joints]] - error
-    bands = {j: Band(0.01, np.full(len(log.time), 0.02), 1.0, error, 0.01, 0.02) for j in joints if band}
+    bands = {j: Band(0.01, np.full(len(log.time), 0.02), 1.0, error, 0.01) for j in joints if band}
     return Prediction(fit, log, joints, response, bands, unseen=True)
 
 

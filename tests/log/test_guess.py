@@ -51,7 +51,7 @@ def test_names_without_a_joint_go_by_their_order_and_that_is_said(tmp_path: Path
     found = guess(tmp_path, ["t", "up", "down", "pot (deg)"], T, STEPS.clip(0), (-STEPS).clip(0), SWEEP)
     assert found.log["joints"][1]["command"]["column"] == ["up", "down"]
     assert found.log["joints"][1]["angle"]["column"] == "pot (deg)"
-    assert any("by their order: check" in reason for reason in found.reasons)
+    assert any("by its place in the log: check" in reason for reason in found.reasons)
 
 
 def test_a_current_loop_for_each_direction_is_its_range(tmp_path: Path) -> None:

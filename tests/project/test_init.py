@@ -50,7 +50,7 @@ def test_columns_units_and_scales_are_those_of_the_log(place: Path):
     assert settings.log.columns("angle", 3).unit == "rad"
     assert settings.log.time.unit == "ms"
     page = (place / "mine" / "fit.yaml").read_text()
-    assert "# - boom valve [V]: command in ±10 V of boom_joint, by its unit" in page
+    assert "# - boom valve [V]: command in ±10 V of boom_joint, by its name" in page
 
 
 def test_a_fit_starts_near_the_log(place: Path):
@@ -118,7 +118,7 @@ def test_a_telescopes_column_is_its_own(tmp_path: Path):
     assert settings.log.columns("angle", 3).column == ("tele_length_m",)
     assert settings.log.columns("angle", 3).unit == "m"
     assert settings.log.columns("command", 3).column == ("tele_V",)
-    assert "tele_length_m: position in m of telescope, by its unit" in made.columns
+    assert "tele_length_m: position in m of telescope, by its name" in made.columns
     assert any(line.startswith("left out, though like a joint's command: u9") for line in made.columns)
     (log,) = hydroid.read_logs(tmp_path / "a.csv", settings)
     assert np.ptp(log.angle[:, 2]) == pytest.approx(0.4 * np.ptp(way), rel=1e-3)

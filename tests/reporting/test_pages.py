@@ -120,7 +120,7 @@ def test_the_verdict_comes_first_and_is_not_tested_until_a_log_is_unseen():
         ("b.csv unseen", "shoulder", "good"),
         ("a.csv fitted", "shoulder", "fair"),
     ]
-    (steps,) = [section.steps for section in page.sections if section.title == "Do next"]
+    (steps,) = [section.steps for section in page.sections if section.title == "To improve the fit"]
     assert not any("has not seen" in step.what for step in steps)
 
 

@@ -140,16 +140,6 @@ class JointVerdict(Settings):
         """Whether unseen logs test the joint: if their error is unknown, it diverged."""
         return self.unseen_deg is not None or self.verdict not in ("not tested", "does not fit")
 
-    @property
-    def outside(self) -> bool:
-        """Whether the bands are too narrow: a right model's hold 95 %, or somewhat less by its start."""
-        return self.inside_percent is not None and self.inside_percent < 80.0
-
-    @property
-    def fails(self) -> bool:
-        """Whether the verdict is a bad one."""
-        return self.verdict not in ("predicts", "predicts roughly", "not tested")
-
 
 def _finding(value: Any) -> Any:
     """Return a finding from a mapping: files have no dataclasses."""

@@ -88,12 +88,12 @@ WORDS: dict[str, tuple[str, str]] = {
     "behind nine numbers": (
         "On its own logs the fit errs more than nine numbers do in {few}: it is at a wrong optimum, or its "
         "model is wrong.",
-        "Try another --seed, then `hydroid suggest`.",
+        "Try another seed.",
     ),
     # advice: the statement says what to do, the hint what it would bring
     "fails unseen": (
-        "Fit the unseen logs too: the fit fails on them in {few}.",
-        "Keep one more log to validate on. Where only the load or the pump has changed, use `hydroid adapt`.",
+        "The fit fails on unseen logs in {few}.",
+        "Fit them too, and keep another to validate on. Where only the load differs, use `hydroid adapt`.",
     ),
     "nothing missing": (
         "Tested: {count} quantities that the fit holds. Freeing none of them would lower the error on data "

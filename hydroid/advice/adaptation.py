@@ -59,7 +59,7 @@ def steps(
     shared = {n: p for n, p in model.settings.parameters.items() if p.joints is None and p.can_be_free}
     pool = list(free) or [n for n, p in shared.items() if p.fixed is None or p.term is not None]
     problem, taken = Problem(adapted(model, pool), logs), list[str]()
-    last = Refit.of(problem, model.theta, problem.output_errors(model.theta[None])[0])
+    last = Refit.of(problem, model.theta, problem.output_errors(model.theta[None]))
     path = list[Plain]()
     name = ""
     while True:

@@ -21,7 +21,6 @@ its effective samples; less the one that a took.
 """
 
 import math
-from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
 from functools import partial
@@ -181,16 +180,10 @@ class Refit:
 
     @classmethod
     def of(cls, problem: Problem, theta: Array, errors: Array) -> "Refit":
-        """Judge a refinement by the output errors of samples that it has not seen, shape (R,)."""
-        parts = defaultdict[str, list[Array]](list)
-        for c in problem.channels:
-            if c.quantity == "angle":
-                parts[problem.settings.arm.joint_names[c.joint - 1]].append(errors[c.rows] / c.weight)
-        by_joint = {
-            name: finite(np.degrees(np.sqrt(np.mean(np.concatenate(each) ** 2))))
-            for name, each in parts.items()
-        }
-        return cls(theta, float(problem.rms(errors[None])[0]), by_joint)
+        """Judge a refinement by the output errors of samples that it has not seen, shape (1, R)."""
+        names, settings = problem.settings.arm.joint_names, problem.settings
+        by_joint = {names[j - 1]: finite(np.degrees(problem.rms(errors, [j])[0])) for j in settings.outputs}
+        return cls(theta, float(problem.rms(errors)[0]), by_joint)
 
 
 def score_terms(problem: Problem, known: Uncertainty, progress: Progress = no_progress) -> list[Candidate]:
@@ -239,7 +232,7 @@ def refitted(problem: Problem, theta: Array, weight: float | None = None) -> Ref
     for part in np.unique(number[:size]):
         out = number == part
         unseen[out[:size]] = rows(parameters.from_unit(fitted(whole.point, ~out).point)[None])[0, out]
-    return Refit.of(problem, parameters.from_unit(whole.point), problem.unfiltered(unseen[None])[0])
+    return Refit.of(problem, parameters.from_unit(whole.point), problem.unfiltered(unseen[None]))
 
 
 def _tested(term: Term, problem: Problem, known: Uncertainty, fit: Explained) -> list[Candidate]:

@@ -2,7 +2,7 @@
 
 import math
 import shlex
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -17,10 +17,9 @@ from hydroid.errors import SettingsError
 from hydroid.estimate import finite
 from hydroid.files import Plain
 from hydroid.findings import Finding
-from hydroid.log import Log
 from hydroid.posterior.noise import error_level
 from hydroid.posterior.posterior import Posterior
-from hydroid.posterior.uncertainty import WEAK_ABOVE, Uncertainty
+from hydroid.posterior.uncertainty import Uncertainty
 from hydroid.problem.problem import Problem
 from hydroid.progress import Progress, no_progress
 from hydroid.quantity_table import MECHANICAL
@@ -85,19 +84,17 @@ def next_actions(problem: Problem, known: Uncertainty) -> list[Plain]:
     """Return the actions that would help most, the best first, as JSON has them (docs/json.md)."""
     now = forecast(known.posterior)
     wide, names = now.deviations, np.array(problem.parameters.names)[now.box.varied]
-    useful: list[tuple[int, float, Plain]] = []
+    useful: list[tuple[float, Plain]] = []
     for kind, subject, rows in _forecasts(problem, known, now):
         narrow = now.add(rows).deviations
-        before, after = (int(np.sum(each <= WEAK_ABOVE)) for each in (wide, narrow))
         # the one that improves most, but for the one that is stated
         best = int(np.argmax(np.where(names == subject, 0.0, wide / narrow)))
-        if after > before or wide[best] > FEWEST_TIMES * narrow[best]:
-            action = {"action": kind, "of": subject, "known_before": before, "known_after": after}
-            action |= {"total": len(names), "parameter": str(names[best])}
+        if wide[best] > FEWEST_TIMES * narrow[best]:
+            action = {"action": kind, "of": subject, "parameter": str(names[best])}
             action |= {"before_percent": 100 * wide[best], "after_percent": 100 * narrow[best]}
             # by which all deviations shrink on geometric average
-            useful.append((after, float(np.mean(np.log(wide / narrow))), action))
-    return [action for *_, action in sorted(useful, key=lambda one: one[:2], reverse=True)[:MOST_ACTIONS]]
+            useful.append((-float(np.mean(np.log(wide / narrow))), action))
+    return [action for _, action in sorted(useful, key=lambda one: one[0])[:MOST_ACTIONS]]
 
 
 def _forecasts(problem: Problem, known: Uncertainty, now: Posterior) -> Iterator[tuple[str, str, Array]]:
@@ -156,13 +153,9 @@ def freeing_command(problem: Problem, entries: Mapping[str, Any], run: str) -> s
     for name, entry in entries.items():
         line = yaml.safe_dump(entry, default_flow_style=True, sort_keys=False, width=math.inf).strip()
         changes += f"--set {shlex.quote(f'parameters.{name}={line}')} "
-    return refit_command(problem.settings.stage, problem.logs, run, [*entries][-1], changes)
-
-
-def refit_command(stage: str, logs: Iterable[Log], run: str, ending: str, changes: str = "") -> str:
-    """Return the command that fits logs with the settings of a run, from its estimate, to RUN-ending."""
-    given = " ".join(shlex.quote(log.source) for log in logs)
-    config, own, out = (shlex.quote(path) for path in (f"{run}/config.yaml", run, f"{run}-{ending}"))
+    given = " ".join(shlex.quote(log.source) for log in problem.logs)
+    config, own, out = (shlex.quote(path) for path in (f"{run}/config.yaml", run, f"{run}-{[*entries][-1]}"))
+    stage = problem.settings.stage
     return f"hydroid fit-{stage} {given} --config {config} --start {own} {changes}--out {out}"
 
 

@@ -84,8 +84,11 @@ def suggest(
     run = str(folder) if is_file(folder / CONFIG) else "RUN"
     with Progress() as progress:
         content, findings = advice(problem, uncertainty(problem, model.theta), run, progress)
-    if finished := run_of(model):
-        findings = (*load_record(finished).failing, *findings)
+    verdicts = load_record(finished).verdict if (finished := run_of(model)) else ()
+    if bad := tuple(
+        one.name for one in verdicts if one.tested and not one.verdict.endswith(("predicts", "roughly"))
+    ):
+        findings = (Finding("fails unseen", "warning", bad), *findings)
     note = (
         f"Of {content['tested']} quantities that the fit holds. promised: part of the rms error that freeing "
         f"it saves. {LEFT_OUT}"

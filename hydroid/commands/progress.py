@@ -4,7 +4,6 @@ A bar shows it on a terminal, plain lines elsewhere, and nothing in Python or wi
 time is nearly up ends a run as Ctrl-C does: with a checkpoint.
 """
 
-import math
 import signal
 import sys
 import time
@@ -13,8 +12,6 @@ from types import FrameType
 from typing import TYPE_CHECKING, Any, Self
 
 import typer
-
-from hydroid.units import way
 
 if TYPE_CHECKING:
     from hydroid.arrays import Array
@@ -85,35 +82,29 @@ class FitProgress(Progress):
 
     def __init__(self, settings: "FitSettings") -> None:
         super().__init__()
-        search, self._arm, self._outputs = settings.search, settings.arm, settings.outputs
-        self._errors = dict[tuple[str, str], list[float]]()
+        search, self._joints = settings.search, settings.arm.joint_names
         names = {"ga": "GA population", "nsga2": "NSGA-II population", "multistart": "multi-start start"}
         self._step = names[search.algorithm]
         self._total = 1 + getattr(search, search.algorithm).generations
-        mixed = settings.objective.relative or {*settings.outputs} & {*settings.arm.slides}
-        self._scale, self._unit = (1.0, "") if mixed else (math.degrees(1), " deg")
+        self._errors = dict[tuple[str, str], list[float]]()
+
+    def _fallen(self, what: str, part: str, error: float) -> str:
+        """Say how far the best error has fallen: as a part of the first one, since joints differ in size."""
+        errors = self._errors.setdefault((what, part), [error])
+        errors.append(min(errors[-1], error))
+        return f"error down to {errors[-1] / max(errors[0], 1e-12):.0%} of that at the start"
 
     def generation(self, row: "Array") -> None:
         """Take a row of `fitting.search.HISTORY`."""
         number, _, simulated, _, best, _ = map(float, row)
-        text = f"best {best * self._scale:.4g}{self._unit}, {simulated:.0f} simulations"
+        text = f"{self._fallen(self._step, '', best)}, {simulated:.0f} simulations"
         self(self._step, number, self._total, text)
 
     def refining(self, name: str, simulated: int, rms: float) -> None:
-        """Take the name of a least squares, its number of simulations, and its rms error [rad] so far.
-
-        Shown is the best error of a joint's several starts, or of joints together its part of the first one.
-        """
-        joints = [k for k in self._outputs if f" joint {k} " in name] or self._outputs
-        alone, what = len(joints) == 1, name.replace("refined", "all joints together")
-        if alone:
-            what = self._arm.joint_names[joints[0] - 1]
-        errors = self._errors.setdefault((what, name.rpartition(" part ")[2]), [rms])
-        errors.append(min(errors[-1], rms))
-        best = f"{errors[-1] / errors[0]:.0%} of that at the start"
-        if alone:
-            best = way(math.degrees(errors[-1]), slides=joints[0] in self._arm.slides)
-        self(f"{what}: simulations", simulated, None, f"rms error {best}")
+        """Take the name of a least squares, its number of simulations, and its rms error [rad] so far."""
+        alone = (joint for k, joint in enumerate(self._joints, start=1) if f" joint {k} " in name)
+        what = next(alone, name.replace("refined", "refinement"))
+        self(f"{what}: simulations", simulated, None, self._fallen(what, name.rpartition(" part ")[2], rms))
 
 
 def _new_bar() -> Any:

@@ -4,7 +4,7 @@ Evaluating a population is one function, `Problem.evaluate`; the search knows on
 simulated by threads of this process, or on workers (`Spread`); no bit of a result depends on how many.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from copy import copy
 from dataclasses import replace
 from functools import cached_property
@@ -215,9 +215,12 @@ class Problem:
         """Return output errors from residuals, shape (n, R)."""
         return np.concatenate([c.unfiltered(residuals[:, c.rows]) for c in self.channels], axis=1)
 
-    def rms(self, errors: Array) -> Array:
-        """Rms error of the angles, unweighted [rad], shape (n,), from output errors, shape (n, R)."""
-        angles = [errors[:, c.rows] / c.weight for c in self.channels if c.quantity == "angle"]
+    def rms(self, errors: Array, joints: Collection[int] = ()) -> Array:
+        """Rms error of the angles of some joints (number, from 1) or of all, unweighted [rad], shape (n,),
+        from output errors, shape (n, R).
+        """
+        some = (c for c in self.channels if c.quantity == "angle" and (not joints or c.joint in joints))
+        angles = [errors[:, c.rows] / c.weight for c in some]
         return np.sqrt(np.mean(np.concatenate(angles, axis=1) ** 2, axis=1))
 
     @cached_property

@@ -87,7 +87,9 @@ def prediction_sections(predictions: Sequence[Prediction], arm: Arm, fits: Verdi
     return (
         *motion_section(arm, {names[log]: first for log, (first, *_) in by_log.items()}),
         Section(
-            "Errors by log", "Rms error of each joint; choose one to see its response.", tabs=tuple(tabs)
+            "Errors by log",
+            "Rms error of each joint; choose one to see its response." if len(tabs) > 1 else "",
+            tabs=tuple(tabs),
         ),
         Section(errors.title, tables={"errors": errors}, folded=True),
         *horizon_section(fits),

@@ -123,8 +123,12 @@ def lead(fits: Verdicts) -> str:
 
 def outside(verdicts: Sequence[JointVerdict]) -> str:
     """Say of which joints the prediction bands are too narrow; nothing where all hold their samples."""
-    missed = listed([f"{one.inside_percent:.0f} % of {one.name}" for one in verdicts if one.outside])
-    return f"The 95 % bands are too narrow: in the unseen logs they hold {missed}." if missed else ""
+    inside = {one.name: one.inside_percent for one in verdicts}
+    # a right model's hold somewhat less than 95 % where the start of a log is off
+    missed = listed(
+        [f"{part:.0f} % of {name}" for name, part in inside.items() if part is not None and part < 80]
+    )
+    return f"The 95 % bands are too narrow. Of the unseen samples they hold {missed}." if missed else ""
 
 
 def worst(verdicts: Sequence[JointVerdict]) -> str:

@@ -19,12 +19,10 @@ from typing import Any, TypeVar
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
-from hydroid.advice.suggestions import refit_command
 from hydroid.arrays import Array, record
 from hydroid.errors import HydroidError, RunError
 from hydroid.estimate import NAME, FitSummary, JointVerdict
 from hydroid.files import file_name, write_atomic
-from hydroid.findings import Finding
 from hydroid.fitting.fit import Fit
 from hydroid.fitting.validation import Prediction
 from hydroid.fitting.verdict import Baselines, judge
@@ -107,14 +105,6 @@ class Record:
     def verdict(self) -> tuple[JointVerdict, ...]:
         """By its logs and the unseen ones."""
         return judge(self.settings, self.result.fitted, self.result.baselines, [*self.validations.values()])
-
-    @property
-    def failing(self) -> list[Finding]:
-        """That the fit fails on unseen logs, with the command that fits them too; nothing if it does not."""
-        joints = tuple(one.name for one in self.verdict if one.tested and one.fails)
-        logs = [one.log for one in (*self.result.fitted, *self.validations.values())]
-        command = refit_command(self.settings.stage, logs, self.folder, "more")
-        return [Finding("fails unseen", "warning", joints, {"command": command})] if joints else []
 
 
 def fit_result(fit: Fit, fitted: tuple[Prediction, ...], baselines: Baselines) -> FitResult:

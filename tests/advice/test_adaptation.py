@@ -16,8 +16,7 @@ def test_what_changed_is_freed_and_found(tmp_path):
     model, log = identified(settings, TRUTH, "a fit"), drive(settings, 3, SLOWER)
     path = steps(model, [log])
     assert [step["parameter"] for step in path] == ["", "flow"]
-    before, after = (step["left_out_deg"] for step in path)
-    assert all(after[joint] < 0.3 * before[joint] for joint in before)
+    assert max(path[1]["left_out_deg"].values()) < 0.3 * max(path[0]["left_out_deg"].values())
     result = hydroid.adapt(log, fit=model, free="flow", out=tmp_path / "run")
     assert result.summary.values["flow"] == pytest.approx(90.0, rel=0.02)
     assert {n: v for n, v in result.summary.values.items() if n != "flow"} == {

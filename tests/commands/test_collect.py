@@ -123,5 +123,4 @@ def test_the_command_names_the_best_run_and_warns_on_the_side(runs):
     found = json.loads(done.stdout)
     assert set(found["runs"]) == {"seed-1", "seed-2"}
     assert found["best"] == min(found["runs"], key=lambda run: found["runs"][run]["fitted_deg"]["shoulder"])
-    assert [row["name"] for row in found["parameters"]][1:4] == ["K", "D", "S"]
     assert done.stderr == "hydroid: left out: seed-3: is not finished (running); resume it\n"

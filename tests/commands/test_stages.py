@@ -51,7 +51,6 @@ def test_fit_validate_and_simulate_walk_through(short: Path, hydroid_cli: Run, t
     assert (verdict["fit"], verdict["name"], verdict["unseen_deg"]) == ("run", "shoulder", None)
     assert verdict["fitted_deg"] == pytest.approx(found["rms_deg"])
     assert set(verdict["baselines_deg"]) == {"standing still", "speed tables", "nine numbers"}
-    assert set(row) >= {"fit", "log", "joint", "mae_deg", "rms_deg", "max_deg", "fit_percent"}
     assert 0 <= row["inside_percent"] <= 100
     assert row["rms_deg"] == pytest.approx(found["estimates"]["refined"]["rms_deg"], rel=1e-9)
 
@@ -98,7 +97,6 @@ def test_values_that_diverge_are_judged(short: Path, hydroid_cli: Run):
         "verdict"
     ]
     assert judged["verdict"] == "predicts no better than standing still"
-    assert judged["unseen_deg"] is None
 
 
 def test_python_does_what_the_terminal_does_and_shows_it(short: Path, hydroid_cli: Run):

@@ -48,9 +48,7 @@ def verdict(fitted=None, unseen=None, nine=(5, 5), tolerance=None, log=None):
 ROWS = {
     "nothing unseen": ((1.0, None), {}, "not tested"),
     "nothing unseen, worse than nine numbers": ((6.0, None), {}, "does not fit"),
-    "nothing unseen, worse than nine numbers, but good": ((1.0, None), {"nine": (0.5, 9)}, "not tested"),
     "small error": ((1.0, 1.9), {}, "predicts"),
-    "small error from a smaller one": ((0.1, 1.9), {}, "predicts"),
     "small error, smaller from nine numbers": ((1.0, 1.9), {"nine": (0.1, 0.1)}, "predicts"),
     "better than anything, not good": ((2.5, 4.4), {}, "predicts roughly"),
     "as bad as the user allows": ((2.5, 4.5), {"tolerance": 5}, "predicts"),
@@ -85,14 +83,13 @@ def test_the_errors_are_those_of_the_joint_by_name():
     one = verdict(1.0, 3.0)
     assert (one.joint, one.name, one.tolerance_deg) == (2, "shoulder", pytest.approx(2.0, rel=1e-3))
     assert (one.fitted_deg, one.unseen_deg) == (pytest.approx(1.0), pytest.approx(3.0))
-    assert list(one.baselines_deg) == [*NAMES]
     assert one.baselines_deg["nine numbers"] == pytest.approx(5.0)
 
 
 def test_what_nine_numbers_fit_better_is_named_and_what_bands_miss():
     (finding,) = behind(load_settings("fit-hyd"), [verdict(6.0), verdict(5.2).changed({"name": "elbow"})])
     assert finding.subjects == ("shoulder",)
-    assert "too narrow: in the unseen logs they hold 7 % of shoulder." in outside(
+    assert "Of the unseen samples they hold 7 % of shoulder." in outside(
         [verdict(1, 1).changed({"inside_percent": 7.0})]
     )
 

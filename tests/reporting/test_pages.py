@@ -120,8 +120,6 @@ def test_the_verdict_comes_first_and_is_not_tested_until_a_log_is_unseen():
         ("b.csv unseen", "shoulder", "good"),
         ("a.csv fitted", "shoulder", "fair"),
     ]
-    (steps,) = [section.steps for section in page.sections if section.title == "To improve the fit"]
-    assert not any("has not seen" in step.what for step in steps)
 
 
 def test_errors_of_a_joint_that_slides_are_in_millimetres():

@@ -70,7 +70,7 @@ WORDS: dict[str, tuple[str, str]] = {
     ),
     "logs disagree": (
         "The model errs differently in each log, so the 95 % intervals of {few} are too narrow.",
-        "Use the intervals by log.",
+        "Use the intervals by log. Of less than six logs these are rough too: add logs.",
     ),
     "no effect": (
         "{few} {has} no effect on the compared angles.",
@@ -141,10 +141,6 @@ WORDS: dict[str, tuple[str, str]] = {
     "better optimum": (
         "The profile{s} of {few} found a better fit than the estimate, which is no optimum.",
         "Fit again from there, with more iterations or another seed.",
-    ),
-    "few logs disagree": (
-        "The logs disagree about {few} by more than the noise explains.",
-        "Add logs before you use these values: so few cannot tell why.",
     ),
     # a log: statements follow the file, line and column, and end with no full stop; `{rows}` is empty, or
     # counts the rows below the first one

@@ -9,7 +9,7 @@ from hydroid.estimate import FitSummary, NamedEstimate, ParameterEstimate, finit
 from hydroid.findings import Finding
 from hydroid.fitting.fit import Fit
 from hydroid.parameters import Array, ParameterSet
-from hydroid.posterior.by_log import FEW, ByLog, by_log
+from hydroid.posterior.by_log import ByLog, by_log
 from hydroid.posterior.identifiability import Identifiability
 from hydroid.posterior.noise import error_level
 from hydroid.posterior.uncertainty import Flag, Source, Uncertainty
@@ -113,9 +113,7 @@ def fit_findings(problem: Problem, fit: Fit) -> list[Finding]:
 
 def log_findings(logs: ByLog) -> list[Finding]:
     """Return which parameters differ from log to log by more than the noise explains."""
-    few = max(logs.freedom[np.isfinite(logs.freedom)], default=0.0) < FEW
-    kind = "few logs disagree" if few else "logs disagree"
-    return [Finding(kind, "warning", logs.differing)] if logs.differing else []
+    return [Finding("logs disagree", "warning", logs.differing)] if logs.differing else []
 
 
 def _parameter_findings(parameters: ParameterSet, estimate: Mapping[str, ParameterEstimate]) -> list[Finding]:

@@ -30,8 +30,6 @@ from hydroid.posterior.posterior import COVERAGE
 from hydroid.posterior.uncertainty import Source, Uncertainty, ends
 from hydroid.problem.problem import Problem
 
-FEW = 5.0  # degrees of freedom below which a standard deviation by log is rough: to a third, or worse
-
 
 @record
 class ByLog:

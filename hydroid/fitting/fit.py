@@ -10,7 +10,8 @@ import numpy as np
 
 from hydroid.advice.growth import MIN_GAIN, refitted
 from hydroid.fitting.checkpoints import Checkpoints
-from hydroid.fitting.refinement import refine
+from hydroid.fitting.multistart import each_alone
+from hydroid.fitting.refinement import ROUGH, refine
 from hydroid.fitting.search import Searched, search
 from hydroid.parameters import Array
 from hydroid.posterior.identifiability import Identifiability, identifiability
@@ -136,6 +137,11 @@ def fit(problem: Problem, watch: Watcher | None = None, checkpoints: Checkpoints
             or not own.rms(own.output_errors(theta[None]))[0] < TOO_FAR * start.rms
         ):
             return
+        if len(own.settings.terms) > len(last.settings.terms):  # other parameters may stand for it
+            rough = settings.refinement.changed({"gain_tolerance": ROUGH})
+            first = refine(own, theta, rough, watch.refining, checkpoints, f"{name} at first")
+            theta = own.parameters.from_unit(first.point)
+            theta = each_alone(own, theta, settings.refinement, watch.refining, checkpoints, name)
         result = refine(own, theta, settings.refinement, watch.refining, checkpoints, name)
         estimates.update(_estimates(own, {name: own.parameters.from_unit(result.point)}))
         refinements[name], new = result, estimates[name]
@@ -149,12 +155,12 @@ def fit(problem: Problem, watch: Watcher | None = None, checkpoints: Checkpoints
     if settings.refinement is not None:
         ladder = settings.stage == "hyd" and settings.simulation.model == "ladder"
         climb("refined", if_nearer=False)
-        if ladder:
-            climb("dynamic", if_nearer=True)
         for term in settings.terms:
             climb(f"{final}+{term}", if_nearer=True)
-        if ladder and final.startswith("refined+"):
+        if ladder:
             climb(final.replace("refined", "dynamic"), if_nearer=True)
+        for term in settings.terms if final == "dynamic" else ():
+            climb(f"{final}+{term}", if_nearer=True)
         if settings.joint_refinement:
             climb(final.replace("refined", "joint"), if_nearer=False)
         if not refinements[final].converged:

@@ -187,6 +187,32 @@ def alone(problem: Problem, joint: int, theta: Array) -> Problem:
     return problem.varied(settings, [log.driving(joint) for log in problem.logs if log.driven[joint - 1]])
 
 
+def each_alone(
+    problem: Problem,
+    theta: Array,
+    settings: RefinementSettings,
+    progress: Callable[[str, int, float], None],
+    checkpoints: Checkpoints,
+    name: str,
+) -> Array:
+    """Return theta, (P,), after every joint that can be was refined alone; other arguments as of `refine`.
+
+    What the joints share is known better than when they were first fitted alone. A valve whose compensation
+    stood for it also starts without.
+    """
+    for joint in lone_joints(problem):
+        own, parameters = alone(problem, joint, theta), problem.settings.parameters.values()
+        loaded = np.array([p.quantity == "compensation" and p.joints == (joint,) for p in parameters])
+        starts = np.unique([theta, np.where(loaded & own.parameters.free, 0.0, theta)], axis=0)
+        tried = [
+            refine(own.from_afar(), start, settings, progress, checkpoints, f"{name} joint {joint} start {i}")
+            for i, start in enumerate(starts, 1)
+        ]
+        best = min(tried, key=lambda one: one.cost)
+        theta = np.where(own.parameters.free, own.parameters.from_unit(best.point), theta)
+    return theta
+
+
 def by_numbers(problem: Problem, joint: int, theta: Array) -> Array:
     """Return theta, (P,), with the valve of a joint whose speed follows the command alone: nine numbers.
 

@@ -72,7 +72,7 @@ JOINT = """\
   open_B_{own}: {{quantity: opening_b, joints: [{name}], within: 4}}
   exponent_A_{own}: {{quantity: opening_exponent_a, joints: [{name}], within: 3}}
   exponent_B_{own}: {{quantity: opening_exponent_b, joints: [{name}], within: 3}}
-  compensation_{own}: {{quantity: compensation, joints: [{name}], nominal: 0, sd: 0.5, bounds: [0, 1]}}
+  compensation_{own}: {{quantity: compensation, joints: [{name}], bounds: [0, 1], start: 0}}    # of the load
   lag_{own}: {{quantity: opening_lag, joints: [{name}], bounds: [0, 0.6], start: 0.05}}    # s
   pilot_{own}: {{quantity: pilot_lag, joints: [{name}], bounds: [0, 0.6], start: 0.03}}    # s
   draw_A_{own}: {{quantity: draw_a, joints: [{name}], nominal: {draw}, within: 5, term: pump}}    # from the

@@ -56,8 +56,8 @@ parameters:
 priors:
 {alike}
 
-# Each joint alone, then all together, without oil stiffness and inertia, which takes seconds; then with the pump,
-# and then with oil and inertia: what is not clearly nearer to the logs is not kept.
+# Each joint alone, then all together, without oil stiffness and inertia, which takes seconds; then with the
+# pump, and then with oil and inertia: what is not clearly nearer to the logs is not kept.
 objective: {{norm: 2, segments: 4}}
 search: {{algorithm: multistart, seed: 1, multistart: {{starts: 1, horizons: [], iterations: 40}}}}
 refinement: {{iterations: 60, gain_tolerance: 1.0e-5}}

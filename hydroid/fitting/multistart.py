@@ -216,17 +216,23 @@ def each_alone(
 def by_numbers(problem: Problem, joint: int, theta: Array) -> Array:
     """Return theta, (P,), with the valve of a joint whose speed follows the command alone: nine numbers.
 
-    No load slows it. Far from there least squares can end halfway, with a valve that some of the load slows.
+    No load slows it, its lever is the same everywhere, and both sides of its valve are alike. Far from there
+    least squares can end halfway, with a lever or a side that stands for a load.
     """
     settings = problem.settings
     ends = settings.arm.lower[joint - 1], settings.arm.upper[joint - 1]
     found = fit_baselines(problem.logs, joint, np.array(ends)).get(NAMES[-1])
     if found is None:
         return theta
-    values = {"delay": found.delay, "pilot_lag": 0.0, "compensation": 1.0}
+    values = {
+        "delay": found.delay,
+        "pilot_lag": 0.0,
+        "compensation": 1.0,
+        "lever_slope": 0.0,
+        "lever_bend": 0.0,
+    }
     for row, name in (0, "dead_band"), (1, "opening_exponent"), (3, "opening_lag"):
-        both = found.numbers[row]
-        values |= {name: float(both.mean()), f"{name}_a": float(both[0]), f"{name}_b": float(both[1])}
+        values |= dict.fromkeys((name, f"{name}_a", f"{name}_b"), float(found.numbers[row].mean()))
     start = theta.copy()
     for i, one in enumerate(settings.parameters.values()):
         if one.fixed is None and one.joints == (joint,):

@@ -224,13 +224,8 @@ def by_numbers(problem: Problem, joint: int, theta: Array) -> Array:
     found = fit_baselines(problem.logs, joint, np.array(ends)).get(NAMES[-1])
     if found is None:
         return theta
-    values = {
-        "delay": found.delay,
-        "pilot_lag": 0.0,
-        "compensation": 1.0,
-        "lever_slope": 0.0,
-        "lever_bend": 0.0,
-    }
+    values = dict.fromkeys(("pilot_lag", "lever_slope", "lever_bend"), 0.0)
+    values |= {"delay": found.delay, "compensation": 1.0}
     for row, name in (0, "dead_band"), (1, "opening_exponent"), (3, "opening_lag"):
         values |= dict.fromkeys((name, f"{name}_a", f"{name}_b"), float(found.numbers[row].mean()))
     start = theta.copy()

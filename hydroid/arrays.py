@@ -1,7 +1,7 @@
-"""Arrays by what they hold, and records of them; shapes and units stand where one is made."""
+"""Arrays by what they hold, records of them, and their size; shapes and units stand where one is made."""
 
 from dataclasses import dataclass, field
-from typing import TypeVar, dataclass_transform
+from typing import Any, TypeVar, dataclass_transform
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,3 +19,8 @@ T = TypeVar("T")
 def record(kind: type[T]) -> type[T]:
     """Make a frozen dataclass that equals itself alone: whether arrays are equal has no one answer."""
     return dataclass(frozen=True, eq=False)(kind)
+
+
+def rms(values: Array, axis: int | None = None) -> Any:
+    """Return the root mean square of values, of all or along an axis."""
+    return np.sqrt(np.mean(values**2, axis=axis))

@@ -71,7 +71,6 @@ def load_identified(
     config: str | Path | None = None,
     overrides: Mapping[str, Any] | None = None,
     *,
-    default: str = "fit-mech",
     nominal: bool = False,
 ) -> IdentifiedModel:
     """Read an estimate and the settings it belongs to.
@@ -79,7 +78,7 @@ def load_identified(
     Args:
         source: a run folder, the folder of a saved plant, an `estimate.yaml`, or a YAML file of values by
             name; None: no values.
-        config: settings, a path or a shipped name; left out: those beside the estimate, or `default`.
+        config: settings, a path or a shipped name; left out: those beside the estimate, or those shipped.
         nominal: take parameters without a value as the settings and the arm's file have them.
 
     Raises:
@@ -88,7 +87,8 @@ def load_identified(
     """
     file, values, summary = (None, {}, None) if source is None else read_estimate(Path(source))
     beside = file and file.parent / CONFIG
-    chosen = config or (beside if beside and is_file(beside) else default)
+    shipped = "fit-hyd" if nominal else "fit-mech"
+    chosen = config or (beside if beside and is_file(beside) else shipped)
     settings = load(find_config(chosen), FitSettings, dict(overrides or {}))
     if config is None and summary is not None:
         settings = settings.of_estimate(summary.final)

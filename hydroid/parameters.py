@@ -103,11 +103,6 @@ class ParameterSet:
         return np.array([p.upper for p in self.parameters])
 
     @property
-    def has_start(self) -> bool:
-        """Whether a free parameter states where a search starts."""
-        return any(p.start is not None and p.fixed is None for p in self.parameters)
-
-    @property
     def start(self) -> Array:
         """Where a search starts, shape (P,): as stated, or in the middle of the bounds on their scale."""
         middle = self.from_unit(np.full(int(self.free.sum()), 0.5))

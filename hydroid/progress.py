@@ -16,8 +16,10 @@ def no_progress(what: str, done: int, total: int) -> None:
 
 
 @contextmanager
-def logging_to(handler: logging.Handler) -> Generator[None]:
-    """Let a handler take the lines of hydroid's loggers, INFO and above."""
+def logging_to(handler: logging.Handler, form: str = "") -> Generator[None]:
+    """Let a handler take the lines of hydroid's loggers, INFO and above, in a form or with their times."""
+    form = form or "%(asctime)s %(levelname)-7s %(message)s"
+    handler.setFormatter(logging.Formatter(form, datefmt="%Y-%m-%dT%H:%M:%S%z"))
     logger = logging.getLogger("hydroid")
     level = logger.level
     logger.addHandler(handler)

@@ -23,7 +23,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hydroid.arrays import record
+from hydroid.arrays import record, rms
 from hydroid.errors import HydroidError, RunError
 from hydroid.estimate import finite
 from hydroid.files import Plain, write_atomic
@@ -82,7 +82,7 @@ def perform(task: Task) -> Result:
         "objective": unit * result.best.overall,
         "largest error": np.abs(angles).max(),
         "mean absolute error": np.abs(angles).mean(),
-        "rms error": np.sqrt(np.mean(angles**2)),
+        "rms error": rms(angles),
         "simulations": int(result.history[-1, 2]) + refined,
         "diverged": int(result.history[-1, 3]),
         "seconds": round(sum(result.seconds.values()), 3),

@@ -1,7 +1,8 @@
 """How sentences, lists and numbers are written."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import chain, count
 
 
 def listed(names: Sequence[str], most: int | None = None) -> str:
@@ -10,6 +11,20 @@ def listed(names: Sequence[str], most: int | None = None) -> str:
         return f"{', '.join(names[:most])} and {len(names) - most} more"
     *first, last = names or ("",)
     return f"{', '.join(first)} and {last}" if first else last
+
+
+def distinct(name: str, taken: set[str], ending: str = "_{}") -> str:
+    """Return a name that is not taken, whatever its case, numbered where it must be; from now on it is."""
+    others = (name + ending.format(n) for n in count(2))
+    free = next(one for one in chain([name], others) if one.lower() not in taken)
+    taken.add(free.lower())
+    return free
+
+
+def numbered(names: Iterable[str]) -> list[str]:
+    """Return names for readers, all different."""
+    taken = set[str]()
+    return [distinct(name, taken, " ({})") for name in names]
 
 
 def number(value: float) -> str:

@@ -16,7 +16,7 @@ from hydroid.settings.arm import Arm
 
 
 def nominal(source: Path | None = None, **overrides: object):
-    model = load_identified(source, None, overrides, default="fit-hyd", nominal=True)
+    model = load_identified(source, None, overrides, nominal=True)
     return model, Bindings(model.settings).candidates(model.theta[None])
 
 

@@ -30,7 +30,7 @@ from scipy.linalg import matmul_toeplitz
 from scipy.stats import t as student
 
 from hydroid.advice.terms import Term, terms
-from hydroid.arrays import Array, Mask, record
+from hydroid.arrays import Array, Mask, record, rms
 from hydroid.estimate import finite
 from hydroid.posterior.linear import least_squares_rows
 from hydroid.posterior.noise import Noise, prior_weight, problem_noise
@@ -243,8 +243,8 @@ def _tested(term: Term, problem: Problem, known: Uncertainty, fit: Explained) ->
     values = np.geomspace(high, low, 16) if limit else term.value + parts * (end - term.value)
     residual = known.linear.residual
     effects = term.residuals(problem, known.theta, values.tolist()) - residual
-    unit = max(np.sqrt(np.mean(residual**2)), MIN_RESIDUAL)
-    sizes = np.sqrt(np.mean(effects**2, axis=1)) / unit
+    unit = max(rms(residual), MIN_RESIDUAL)
+    sizes = rms(effects, axis=1) / unit
     acting = np.flatnonzero(np.isfinite(sizes) & (sizes > 0))
     if not limit:
         acting = acting[: max(int(np.sum(sizes[acting] <= LARGEST_EFFECT)), 1)][-1:]

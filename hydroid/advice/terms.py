@@ -6,12 +6,11 @@ side or joint in a parameter that serves several.
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from hydroid.arrays import Array
+from hydroid.arrays import Array, record
 from hydroid.hydraulics.actuator import START_PRESSURE
 from hydroid.posterior.linear import with_open_start
 from hydroid.problem.problem import Problem
@@ -21,7 +20,7 @@ from hydroid.settings.hydraulics import actuator_values
 from hydroid.settings.problem import ParameterSettings
 
 
-@dataclass(frozen=True)
+@record
 class Term:
     """One more free parameter.
 

@@ -1,12 +1,13 @@
 """`hydroid analyse` and `hydroid.quantity`: what logs determine of the parameters, and of what follows."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hydroid.arrays import Array, record
 from hydroid.commands.console import Result, written
 from hydroid.commands.inputs import (
     ConfigSource,
@@ -27,13 +28,12 @@ from hydroid.findings import Finding
 from hydroid.identified_model import start_values
 
 if TYPE_CHECKING:
-    from hydroid.arrays import Array
     from hydroid.plant import Plant
     from hydroid.posterior.identifiability import Identifiability, Profile
     from hydroid.posterior.uncertainty import Uncertainty
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Analysis:
     """What logs determine at an estimate: intervals, directions, and the profiles that were asked for."""
 
@@ -42,7 +42,7 @@ class Analysis:
     profiles: "dict[str, Profile]"
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class QuantityResult:
     """A quantity with what a fit knows of it.
 
@@ -53,9 +53,9 @@ class QuantityResult:
         unit: as given.
     """
 
-    value: "Array"
-    sd: "Array"
-    interval: "Array"
+    value: Array
+    sd: Array
+    interval: Array
     unit: str = ""
 
 
@@ -156,7 +156,7 @@ def quantity(
         raise RunError("holds no covariance of these parameters", where=opened.source, hint=hint)
     shape = np.shape(function(Plant(opened)))
 
-    def values(theta: "Array") -> "Array":
+    def values(theta: Array) -> Array:
         plants = (Plant(replace(opened, theta=row)) for row in theta)
         return np.stack([np.ravel(np.asarray(function(plant), float)) for plant in plants])
 

@@ -85,8 +85,7 @@ def check(
         row = {"log": str(path), "usable": log is not None, "samples": samples, "duration_s": duration}
         rows.append(row | {"driven_joints": driven, "moved_deg": moved, "findings": plain_findings(findings)})
         checks.append(LogCheck(path, log, findings, moved))
-    every = [finding for one in checks for finding in one.findings]
-    every.sort(key=lambda finding: ("error", "warning", "note").index(finding.level))
+    every = (finding for one in checks for finding in one.findings)
     lines = [f"{level}: {line}" for level, line in grouped(every)]
     exit_status = 0 if len(sizes) == len(checks) else 2
     return Result([*lines, *sizes], {"logs": rows}, checks, exit_status=exit_status)

@@ -153,10 +153,8 @@ def log_lines(*, verbose: bool, quiet: bool) -> AbstractContextManager[None]:
     An error is not among them: it ends the command, which prints it.
     """
     handler = _Terminal()
-    form = "%(asctime)s %(levelname)-7s %(message)s" if verbose else "hydroid: %(message)s"
-    handler.setFormatter(logging.Formatter(form, datefmt="%Y-%m-%dT%H:%M:%S%z"))
     handler.addFilter(lambda record: verbose or (logging.INFO < record.levelno < logging.ERROR and not quiet))
-    return logging_to(handler)
+    return logging_to(handler, "" if verbose else "hydroid: %(message)s")
 
 
 class _Terminal(logging.Handler):

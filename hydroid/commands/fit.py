@@ -22,8 +22,9 @@ if TYPE_CHECKING:
     from hydroid.fitting.fit import Fit, Watcher
     from hydroid.fitting.validation import Prediction
     from hydroid.fitting.verdict import Baselines
+    from hydroid.parallel.workers import DaskWorkers
     from hydroid.plant import Plant
-    from hydroid.problem.problem import Problem, Spread
+    from hydroid.problem.problem import Problem
     from hydroid.reporting.page import Table
     from hydroid.run.folder import RunFolder
 
@@ -105,7 +106,7 @@ def fit(
     *,
     resume: bool = False,
     progress: "Watcher | None" = None,
-    workers: "Spread | None" = None,
+    workers: "DaskWorkers | None" = None,
 ) -> FitResult:
     """Fit parameters to logs.
 

@@ -130,8 +130,7 @@ def open_model(
         return fit if isinstance(fit, IdentifiedModel) else fit.model
     if isinstance(config, FitSettings):
         raise SettingsError("settings that are read make a model with `identified`", where="config")
-    default = "fit-hyd" if nominal else "fit-mech"
-    model = load_identified(fit, config, setting_changes(overrides), nominal=nominal, default=default)
+    model = load_identified(fit, config, setting_changes(overrides), nominal=nominal)
     if model.nominal:
         if model.settings.stage != "hyd":
             hint = "give a fit of stage 2 with --fit, or use --config fit-hyd"

@@ -18,7 +18,7 @@ from hydroid.commands.inputs import (
 from hydroid.commands.logs import read_logs
 from hydroid.files import Plain
 from hydroid.identified_model import IdentifiedModel
-from hydroid.words import listed
+from hydroid.words import listed, numbered
 
 if TYPE_CHECKING:
     from hydroid.fitting.validation import Prediction
@@ -60,7 +60,6 @@ def validate(
     read = [read_logs(logs, model.settings, repair=repair) for model in models]
     from hydroid.fitting.validation import predicted
     from hydroid.fitting.verdict import judge
-    from hydroid.reporting.page import unique
     from hydroid.reporting.predictions import draw, validation_page
     from hydroid.reporting.verdict_table import next_lines, next_steps, ordered, verdict_lines
     from hydroid.run.folder import log_hash
@@ -68,8 +67,8 @@ def validate(
 
     stated = {} if tolerance is None else {"tolerance_deg": tolerance}
     results, verdicts = Plain(), Plain()
-    for one, model, own in zip(given, models, read, strict=True):
-        name = unique(model.name, results)
+    names = numbered(model.name for model in models)
+    for one, name, model, own in zip(given, names, models, read, strict=True):
         fitted, baselines, hashes = fitted_by(model)
         if not isinstance(one, str | Path | IdentifiedModel):
             fitted, baselines, hashes = one.predictions, one.baselines, {*map(log_hash, one.problem.logs)}

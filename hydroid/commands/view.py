@@ -177,27 +177,22 @@ def _collisions(logs: "dict[str, Log]", settings: "FitSettings") -> "Result[Clea
     angle = machine.joined({side: log.angle for side, log in logs.items()}, rest)
     result = machine.checker.clearance(next(iter(logs.values())).time, angle)
     nearest = int(result.distance.argmin())
-    meetings = [
-        {"bodies": [m.first, m.second], "from_s": m.begins, "to_s": m.ends}
-        | {"depth_m": m.depth, "deepest_at_s": m.deepest}
-        for m in result.meetings
-    ]
     content = {
-        "free": not meetings,
+        "free": not result.meetings,
         "clearance_m": result.distance[nearest],
         "clearance_at_s": result.time[nearest],
         "clearance_between": [*result.nearest[nearest]],
-        "collisions": meetings,
+        "collisions": [*map(vars, result.meetings)],
         "checked_pairs": result.checked,
         "excluded": [[*pair] for pair in result.excluded],
     }
     lines = [
-        f"{m.first} and {m.second} meet from {m.begins:.2f} to {m.ends:.2f} s, {1e3 * m.depth:.1f} mm deep"
+        f"{' and '.join(m.bodies)} meet from {m.from_s:.2f} to {m.to_s:.2f} s, {1e3 * m.depth_m:.1f} mm deep"
         for m in result.meetings
     ]
     pair, size = " and ".join(result.nearest[nearest]), f"{1e3 * result.distance[nearest]:.1f} mm"
     none = f"no bodies meet; the nearest are {pair}: {size} at {result.time[nearest]:.2f} s"
-    return Result(lines or [none], content, result, exit_status=1 if meetings else 0)
+    return Result(lines or [none], content, result, exit_status=1 if lines else 0)
 
 
 def _span(text: str) -> tuple[float, float]:

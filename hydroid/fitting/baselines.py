@@ -6,7 +6,7 @@ must predict better than they do, and can start its own fit from them.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import partial
 
 import numpy as np
@@ -14,7 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.optimize import OptimizeResult, least_squares
 
-from hydroid.arrays import Array
+from hydroid.arrays import Array, record
 from hydroid.log import Log
 
 NAMES = ("standing still", "speed tables", "nine numbers")
@@ -23,7 +23,7 @@ LONGEST_DELAY = 1.0
 """between a command and its motion [s]"""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Baseline:
     """A joint whose speed follows its command; it stands still on zero command.
 

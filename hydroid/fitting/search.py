@@ -2,13 +2,12 @@
 
 import logging
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
+from hydroid.arrays import Array, record
 from hydroid.fitting.checkpoints import Arrays, Checkpoints, Memo, saving
 from hydroid.fitting.multistart import Multistart
-from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
 from hydroid.search.chromosomes import Genes
 from hydroid.search.genetic import Nsga2, Population, SimpleGa
@@ -20,7 +19,7 @@ HISTORY = ("generation", "evaluations", "simulated", "infeasible", "best", "medi
 _log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Searched:
     """Result of a search.
 

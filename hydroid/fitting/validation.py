@@ -2,18 +2,18 @@
 
 import logging
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import partial
 from math import degrees
 
 import numpy as np
 
+from hydroid.arrays import Array, record, rms
 from hydroid.estimate import finite
 from hydroid.files import Plain
 from hydroid.fitting.fit import Fit
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
-from hydroid.parameters import Array
 from hydroid.posterior.band import Band, fitted_bands, prediction_bands
 from hydroid.prediction import predict
 from hydroid.problem.problem import Problem
@@ -26,7 +26,7 @@ SETTLING = 2.0
 """simulated before each start of a horizon, and from start to start [s]"""
 
 
-@dataclass(frozen=True)
+@record
 class ErrorIndices:
     """Indices of an output error: mean absolute, rms and largest [rad], and fit [%].
 
@@ -40,7 +40,7 @@ class ErrorIndices:
     fit: float
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Prediction:
     """What a model makes of a log's commands.
 
@@ -87,9 +87,9 @@ class Prediction:
 
 def error_indices(measured: Array, error: Array) -> ErrorIndices:
     """Return the indices of an error of the measured angle [rad], both of shape (T,)."""
-    rms, spread, size = np.sqrt(np.mean(error**2)), np.std(measured), np.abs(error)
-    fit = 100 * (1 - rms / spread) if spread > 1e-9 else np.nan  # else it moves by rounding only
-    return ErrorIndices(size.mean(), rms, size.max(), fit)
+    size, spread, part = rms(error), np.std(measured), np.abs(error)
+    fit = 100 * (1 - size / spread) if spread > 1e-9 else np.nan  # else it moves by rounding only
+    return ErrorIndices(part.mean(), size, part.max(), fit)
 
 
 def predicted(model: IdentifiedModel, log: Log, unseen: bool | None) -> Prediction:

@@ -1,6 +1,6 @@
 """What a file is read as: the log as the rest of the program sees it, and findings about it."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -149,10 +149,15 @@ def log_finding(
     return LogFinding(kind, level, tuple(map(str, subjects)), numbers, where, source, column)
 
 
-def grouped(findings: Sequence[LogFinding]) -> list[tuple[Level, str]]:
+def by_level(findings: Iterable[LogFinding]) -> list[LogFinding]:
+    """Return findings, errors first, then warnings, then notes."""
+    return sorted(findings, key=lambda finding: ("error", "warning", "note").index(finding.level))
+
+
+def grouped(findings: Iterable[LogFinding]) -> list[tuple[Level, str]]:
     """Return findings as lines with their levels: what several joints or logs share stands once."""
     groups: dict[tuple[object, ...], list[LogFinding]] = {}
-    for finding in findings:
+    for finding in by_level(findings):
         several = "{names}" in WORDS[finding.kind][0]  # its sentence has room for several subjects
         about = finding.hint if several else (finding.column, finding.numbers.get("what"))
         groups.setdefault((finding.level, finding.kind, about), []).append(finding)

@@ -16,7 +16,7 @@ from hydroid.files import write_atomic
 from hydroid.log.binary import open_bag, open_mat, open_parquet
 from hydroid.log.checks import check_motion, check_recording
 from hydroid.log.csv import open_csv
-from hydroid.log.log import Log, LogFinding, log_finding
+from hydroid.log.log import Log, LogFinding, by_level, log_finding
 from hydroid.log.repair import fill, hold, resample, unwrap
 from hydroid.log.table import Signal, Table
 from hydroid.settings.log import Kind, LogSettings
@@ -95,7 +95,7 @@ def check_log(
     except LogError as error:
         fault = log_finding("error", "unreadable", source, what=error.what, hint=error.hint)
         findings.append(replace(fault, where=error.where))
-    return log, sorted(findings, key=lambda finding: ("error", "warning", "note").index(finding.level))
+    return log, by_level(findings)
 
 
 def map_signals(settings: LogSettings, ranges: Array) -> list[Signal]:

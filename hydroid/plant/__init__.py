@@ -10,7 +10,7 @@ It gives, bit for bit, what the simulations of a fit give; contacts are off as t
 `qfrc_applied` is its own. Between two steps use `mj_kinematics` to refresh the positions of bodies.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -21,14 +21,7 @@ from hydroid.plant.plant import Plant
 __all__ = ["Plant", "load_plant"]
 
 
-def load_plant(
-    source: Any,
-    *,
-    overrides: Mapping[str, Any] | None = None,
-    joints: Sequence[int | str] | None = None,
-    period: float | None = None,
-    payload: float = 0.0,
-) -> Plant:
+def load_plant(source: Any, *, overrides: Mapping[str, Any] | None = None, **how: Any) -> Plant:
     """Read a plant.
 
     Args:
@@ -37,10 +30,7 @@ def load_plant(
             these do not fix are then nominal: as the hydraulics and the arm's file have them, and 0 for
             dampers and springs.
         overrides: settings to replace in what is read, by dotted key.
-        joints: numbers, from 1, or names of the joints that take commands; by default those that the fit
-            drove or compared, or those of the saved plant.
-        period: how long one command is held [s].
-        payload: mass in the gripper [kg].
+        how: keywords of `Plant`.
 
     Raises:
         RunError: the folder holds no estimate.
@@ -54,4 +44,4 @@ def load_plant(
         identified = load_identified(None, source, overrides, nominal=True)
         if identified.settings.stage == "mech":
             raise SettingsError("stage mech has no nominal gain", where=source, hint="name a run folder")
-    return Plant(identified, joints=joints, period=period, payload=payload)
+    return Plant(identified, **how)

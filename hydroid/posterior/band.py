@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.stats import t as student
 
-from hydroid.arrays import Array, record
+from hydroid.arrays import Array, record, rms
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
 from hydroid.posterior.linear import start_deviations
@@ -100,8 +100,8 @@ def _band(
     """
     variance = variance + noise**2
     half = np.sqrt(known.quantile**2 * variance + NORMAL**2 * widened)
-    inside, rms = float(np.mean(np.abs(error) <= half)), np.sqrt(np.mean(error**2))
-    return Band(noise, half, inside, rms, np.sqrt(np.mean(variance) + wrong))
+    inside = float(np.mean(np.abs(error) <= half))
+    return Band(noise, half, inside, rms(error), np.sqrt(np.mean(variance) + wrong))
 
 
 def start_effects(problem: Problem, theta: Array, levels: dict[int, float]) -> dict[int, Array]:

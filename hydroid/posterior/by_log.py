@@ -25,7 +25,7 @@ from collections import defaultdict
 import numpy as np
 from scipy.stats import chi2, t as student
 
-from hydroid.arrays import Array, record
+from hydroid.arrays import Array, record, rms
 from hydroid.posterior.posterior import COVERAGE
 from hydroid.posterior.uncertainty import Source, Uncertainty, ends
 from hydroid.problem.problem import Problem
@@ -75,7 +75,7 @@ def by_log(problem: Problem, uncertainty: Uncertainty) -> ByLog:
     left_out = defaultdict[str, list[float]](list)
     for channel in problem.channels:
         if channel.quantity == "angle":
-            error = np.sqrt(np.mean((channel.unfiltered(row[channel.rows]) / channel.weight) ** 2))
+            error = rms(channel.unfiltered(row[channel.rows]) / channel.weight)
             left_out[f"q{channel.joint}"].append(float(np.degrees(error)))
 
     rows, pooled = linear.changes, scatters.sum(axis=0)  # of the p parameters that vary

@@ -8,12 +8,12 @@ that is not compared has a sensor like the others', and no more noise than its a
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, lru_cache
 
 import numpy as np
 
-from hydroid.arrays import Array, Mask
+from hydroid.arrays import Array, Mask, record
 from hydroid.errors import SettingsError
 from hydroid.log import Log
 from hydroid.parameters import ParameterSet
@@ -29,7 +29,7 @@ NO_EFFECT_BELOW = 1e-6
 """a parameter whose effect is below this part of the strongest one's has none"""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Linear:
     """Derivatives at an estimate by relative changes of the p parameters that vary, of P.
 

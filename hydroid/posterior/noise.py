@@ -10,7 +10,7 @@ A variance that follows from an estimated process is uncertain because the proce
 normal, with a variance from the process's own information (P. Whittle, 1953): see `neighbours`.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, reduce
 from typing import Literal
 
@@ -19,7 +19,7 @@ from scipy.fft import next_fast_len
 from scipy.linalg import matmul_toeplitz
 from scipy.signal import lfilter, lfiltic
 
-from hydroid.parameters import Array
+from hydroid.arrays import Array, record
 from hydroid.problem.channels import Channel
 from hydroid.problem.problem import Problem
 from hydroid.settings.problem import ObjectiveSettings
@@ -30,7 +30,7 @@ MIN_LEVEL = {"angle": np.deg2rad(0.05), "pressure_a": 1e4, "pressure_b": 1e4}
 """smallest noise level that a residual can show [rad, Pa]: no potentiometer or gauge is better (ours)"""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Noise:
     """A stationary AR process, sampled T times.
 
@@ -175,8 +175,8 @@ def neighbours(noise: Noise) -> list[Noise]:
     return others
 
 
-def fit_noise(rows: Array, max_order: int = 30) -> Noise:
-    """Fit an average of AR processes of order 0 to `max_order` to a residual of zero mean, shape (T,).
+def fit_noise(rows: Array) -> Noise:
+    """Fit an average of AR processes of order 0 to 30 to a residual of zero mean, shape (T,).
 
     A process of order m has no reflection coefficients beyond k_m: the average of k_j is k_j times the weight
     of all orders from j. Of several rows, (n, T), the products are added.
@@ -186,7 +186,7 @@ def fit_noise(rows: Array, max_order: int = 30) -> Noise:
     level = np.sqrt(np.sum(rows**2) / samples)
     reflection: list[float] = []
     criterion = [0.0]
-    for _ in range(min(max_order, samples // 4)):
+    for _ in range(min(30, samples // 4)):
         forward, backward = forward[:, 1:], backward[:, :-1]
         power = np.vdot(forward, forward) + np.vdot(backward, backward)
         k = float(-2 * np.vdot(forward, backward) / power) if power > 0 else np.inf

@@ -1,12 +1,11 @@
 """All quantities of a fit: what its logs determine, in the words of an engineer."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from hydroid.arrays import Array
+from hydroid.arrays import Array, record
 from hydroid.estimate import CurveEstimate, Interval, QuantityEstimate, finite
 from hydroid.hydraulics.cylinder import rod_motion, volume
 from hydroid.hydraulics.records import LINEAR, Records, coefficients
@@ -35,7 +34,7 @@ Measured: TypeAlias = Iterator[tuple[Column, Array]]
 NaN where one is undefined"""
 
 
-@dataclass(frozen=True)
+@record
 class Quantities:
     """What follows from an estimate: single quantities and curves by name.
 

@@ -33,7 +33,7 @@ from scipy.linalg import solve_triangular
 from scipy.optimize import brentq
 from scipy.stats import norm as normal
 
-from hydroid.arrays import Array, record
+from hydroid.arrays import Array, record, rms
 from hydroid.parameters import ParameterSet
 from hydroid.posterior.linear import Linear, linearised, white_posterior
 from hydroid.posterior.noise import STEP, Noise, neighbours, problem_noise, transformed, unbiased
@@ -158,8 +158,8 @@ def uncertainty_from(problem: Problem, whole: Linear, noise: Sequence[Noise] = (
     Without `noise` of each channel it is that which the residual shows.
     """
     free, room, white = whole.box.varied, whole.box.room, whole.white.deviations
-    rms = 0.01 * np.sqrt(np.mean(problem.unfiltered(whole.slopes) ** 2, axis=1))
-    sensitivity = whole.spread(np.where(whole.diverging, np.nan, rms))
+    effects = 0.01 * rms(problem.unfiltered(whole.slopes), axis=1)
+    sensitivity = whole.spread(np.where(whole.diverging, np.nan, effects))
     edge = held_by_bound(room, white)
     held = edge & (white <= UNIDENTIFIABLE_ABOVE)
     linear = whole.of(~held | held.all())

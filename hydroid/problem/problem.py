@@ -1,7 +1,7 @@
 """The estimation problem: parameters in, objectives out (equations (17) to (22)).
 
 Evaluating a population is one function, `Problem.evaluate`; the search knows only its arrays. Candidates are
-simulated by threads of this process, or on workers (`Spread`); no bit of a result depends on how many.
+simulated by threads of this process, or on workers (`DaskWorkers`); no bit of a result depends on how many.
 """
 
 from collections.abc import Callable, Collection, Sequence
@@ -9,15 +9,15 @@ from copy import copy
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import Protocol
 
 import mujoco
 import numpy as np
 
 from hydroid.arm.model import add_payload, load_model
-from hydroid.arrays import Array, Ints, record
+from hydroid.arrays import Array, Ints, record, rms
 from hydroid.errors import SettingsError
 from hydroid.log import Log
+from hydroid.parallel.workers import DaskWorkers
 from hydroid.problem.bindings import Bindings
 from hydroid.problem.channels import (
     UNFILTERED,
@@ -58,14 +58,6 @@ class Evaluation:
         return self.values[:, -1]
 
 
-class Spread(Protocol):
-    """Computes rows of candidates on workers (`DaskWorkers`)."""
-
-    def __call__(self, target: object, method: str, theta: Array, columns: int) -> Array:
-        """Apply `target.method`, (m, P) -> (m, columns), to the rows of theta; NaN where no worker can."""
-        ...
-
-
 class Problem:
     """Logs, each with its own start pose, the model that should reproduce them, and the measure of the
     difference.
@@ -87,7 +79,7 @@ class Problem:
         self,
         settings: FitSettings,
         logs: Sequence[Log],
-        spread: Spread | None = None,
+        spread: DaskWorkers | None = None,
         spec: mujoco.MjSpec | None = None,
     ) -> None:
         spec = load_model(settings.arm) if spec is None else spec
@@ -160,7 +152,8 @@ class Problem:
     def start(self) -> Array | None:
         """The point of the search's unit box where it starts, shape (p,); None: not stated."""
         searched = self.priors.searched
-        return searched.to_unit(searched.start) if searched.has_start else None
+        stated = any(p.start is not None and p.fixed is None for p in searched.parameters)
+        return searched.to_unit(searched.start) if stated else None
 
     def evaluate(self, theta: Array) -> Evaluation:
         """Evaluate theta, shape (n, P); memory does not grow with n beyond the result."""
@@ -221,7 +214,7 @@ class Problem:
         """
         some = (c for c in self.channels if c.quantity == "angle" and (not joints or c.joint in joints))
         angles = [errors[:, c.rows] / c.weight for c in some]
-        return np.sqrt(np.mean(np.concatenate(angles, axis=1) ** 2, axis=1))
+        return rms(np.concatenate(angles, axis=1), axis=1)
 
     @cached_property
     def _on_worker(self) -> "Problem":

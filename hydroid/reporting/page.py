@@ -3,17 +3,16 @@
 import csv
 import io
 import os
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hydroid.arrays import Array
 from hydroid.findings import Finding
 from hydroid.log import Log
-from hydroid.words import number, plain
+from hydroid.words import number, numbered, plain
 
 if TYPE_CHECKING:
     import rich.table
@@ -205,16 +204,7 @@ class Page:
 
 def log_names(logs: Sequence[Log]) -> list[str]:
     """Return short names of logs, all different."""
-    names: list[str] = []
-    for log in logs:
-        names.append(unique(short_name(Path(log.source).name or log.source), names))
-    return names
-
-
-def unique(name: str, taken: Collection[str]) -> str:
-    """Return the name, numbered where it is taken."""
-    candidates = (f"{name} ({n})" if n > 1 else name for n in count(1))
-    return next(candidate for candidate in candidates if candidate not in taken)
+    return numbered(short_name(Path(log.source).name or log.source) for log in logs)
 
 
 def short_name(name: str) -> str:

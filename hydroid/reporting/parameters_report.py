@@ -136,28 +136,22 @@ def quantity_section(settings: FitSettings, summary: FitSummary) -> tuple[Sectio
 
 def speed_section(settings: FitSettings, summary: FitSummary, logs: Sequence[Log]) -> tuple[Section, ...]:
     """Return the section with the curves of speed; none where there are none."""
-    speeds = {name: curve for name, curve in summary.curves.items() if "_speed" in name}
-    text = (
-        "Speeds with 95 % intervals, against command in mid travel and over the travel. Grey: commands "
-        "beyond the logs."
-    )
-    plot = Plot("speed", text, partial(draw_speeds, speeds, logs, settings.arm.joint_names))
-    return (Section("Speeds", plots=(plot,), folded=True),) if speeds else ()
+    text = "Speeds in mid travel against command, with 95 % intervals. Grey: commands beyond the logs."
+    curves = tuple(summary.curves.values())
+    plot = Plot("speed", text, partial(draw_speeds, curves, logs, settings.arm.joint_names))
+    return (Section("Speeds", plots=(plot,), folded=True),) if curves else ()
 
 
-def draw_speeds(curves: Mapping[str, CurveEstimate], logs: Sequence[Log], joints: Sequence[str]) -> Chart:
-    """Draw each joint's speed against command with its band and, in stage 2, at 50 % over its travel."""
+def draw_speeds(curves: Sequence[CurveEstimate], logs: Sequence[Log], joints: Sequence[str]) -> Chart:
+    """Draw each joint's speed against command, with its band."""
     panels: list[Panel] = []
-    for name, curve in curves.items():
+    for curve in curves:
         rows = np.column_stack([curve.at, curve.value, np.array(curve.interval, dtype=float)])
-        parts, marks = [rows], list[Mark]()
-        if name.endswith("_speed"):  # over commands: its two directions, with the dead band between them
-            commands = np.concatenate([log.command[:, curve.joint - 1] for log in logs])
-            parts = [rows[rows[:, 0] > 0], rows[rows[:, 0] < 0]]
-            low, high = [-105.0, commands.max(initial=0.0)], [commands.min(initial=0.0), 105.0]
-            marks = [Mark("spans", np.array(low), end=np.array(high), color="pale", alpha=0.4)]
-        for part, color in zip(parts, ("blue", "orange"), strict=False):
-            x, y, low, high = part.T
+        commands = np.concatenate([log.command[:, curve.joint - 1] for log in logs])
+        low, high = [-105.0, commands.max(initial=0.0)], [commands.min(initial=0.0), 105.0]
+        marks = [Mark("spans", np.array(low), end=np.array(high), color="pale", alpha=0.4)]
+        for sign, color in (1, "blue"), (-1, "orange"):  # with the dead band between them
+            x, y, low, high = rows[sign * rows[:, 0] > 0].T
             marks += [
                 Mark("band", x, low, high, color=color, alpha=0.25),
                 Mark("line", x, y, color=color),
@@ -165,7 +159,7 @@ def draw_speeds(curves: Mapping[str, CurveEstimate], logs: Sequence[Log], joints
             ]
         title = f"{joints[curve.joint - 1]}: {curve.label}"
         panels.append(Panel(curve.along, f"speed [{curve.unit}]", tuple(marks), title, 250))
-    return Chart(tuple(panels), columns=len(panels) // len({curve.joint for curve in curves.values()}))
+    return Chart(tuple(panels))
 
 
 def merged_tables(runs: Sequence[Record]) -> dict[str, Table]:

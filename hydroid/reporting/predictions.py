@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hydroid.arrays import rms
 from hydroid.findings import Finding
 from hydroid.fitting.search import HISTORY
 from hydroid.fitting.validation import Prediction
@@ -109,8 +110,8 @@ def draw_response(
     far = 3.0 * max(np.ptp(measured), 1.0)
     for i, (one, color) in enumerate(zip(several, cycle(SERIES), strict=False)):
         residual, name, time = factor * finite(one.error(joint)), short_name(one.fit), one.log.time
-        rms = np.sqrt(np.mean(residual**2))
-        label = f"{name} ({number(rms)} {unit} rms)" if np.isfinite(rms) else f"{name} (diverged)"
+        size = rms(residual)
+        label = f"{name} ({number(size)} {unit} rms)" if np.isfinite(size) else f"{name} (diverged)"
         residual[np.abs(residual) > far] = np.nan
         angle = factor * one.log.angle[:, column] - residual
         upper.append(Mark("line", time, angle, color=color, label=label, off=i > 0))

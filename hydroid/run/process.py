@@ -76,8 +76,6 @@ def run_log(file: Path) -> Generator[None]:
         handler = _File(file, encoding="utf-8")
     except OSError as error:
         raise RunError(f"cannot be written ({error.strerror})", where=file) from None
-    form = "%(asctime)s %(levelname)-7s %(message)s"
-    handler.setFormatter(logging.Formatter(form, datefmt="%Y-%m-%dT%H:%M:%S%z"))
     with logging_to(handler):
         yield
 

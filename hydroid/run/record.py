@@ -10,6 +10,7 @@ import glob
 import logging
 import math
 import os
+import re
 import shlex
 from collections.abc import Mapping, Sequence
 from functools import cache, cached_property
@@ -22,7 +23,7 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 from hydroid.arrays import Array, record
 from hydroid.errors import HydroidError, RunError
 from hydroid.estimate import NAME, FitSummary, JointVerdict
-from hydroid.files import file_name, write_atomic
+from hydroid.files import write_atomic
 from hydroid.fitting.fit import Fit
 from hydroid.fitting.validation import Prediction
 from hydroid.fitting.verdict import Baselines, judge
@@ -31,6 +32,7 @@ from hydroid.run.archive import pack, unpack
 from hydroid.run.folder import RunFolder, difference
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load
+from hydroid.words import distinct
 
 RESULT, VALIDATIONS = "result.npz", "validations"
 """names of the file of arrays, and of the folder of unseen logs"""
@@ -137,7 +139,8 @@ def keep_validation(model: IdentifiedModel, predictions: Sequence[Prediction]) -
         return None
     taken: set[str] = set()
     for one in unseen:
-        write_atomic(folder / VALIDATIONS / file_name(Path(one.log.source).name, taken) / RESULT, pack(one))
+        name = distinct(re.sub(r"[^A-Za-z0-9._-]+", "_", Path(one.log.source).name), taken)
+        write_atomic(folder / VALIDATIONS / name / RESULT, pack(one))
     return folder
 
 

@@ -6,7 +6,7 @@ import sys
 import threading
 import time
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -27,45 +27,31 @@ KINDS = {".mp4": ((1920, 1080), 20.0), ".gif": ((960, 540), 10.0), ".png": ((192
 AZIMUTH, ELEVATION = 125.0, -18.0  # where a camera looks to at first [deg]
 
 
-class Stage:
-    """Renders a motion by MuJoCo's renderer in pictures of a size [px]; it is a context.
-
+def rendered(motion: Motion, size: tuple[int, int], frames: Iterable[tuple[float, str]]) -> Iterator[Picture]:
+    """Yield a machine at times [s], each with a text above it, in a size [px]: RGB, shape (height, width, 3).
     Raises RunError: this machine cannot render.
     """
-
-    def __init__(self, motion: Motion, size: tuple[int, int]) -> None:
-        self._replay, (width, height) = Replay(motion), size
-        model = self._replay.model
-        look = model.vis
-        look.global_.offwidth, look.global_.offheight = width, height
-        # the map covers what the camera sees, or its border shows as dots on the floor
-        look.map.shadowclip, look.quality.shadowsize = 3.0, 4096
-        try:
-            self._renderer = mujoco.Renderer(model, height=height, width=width)
-        except (mujoco.FatalError, ImportError, RuntimeError, AttributeError) as error:
-            how = f"MUJOCO_GL={os.environ.get('MUJOCO_GL')}: {' '.join(str(error).split())}"
-            hint = "install libegl1 or libosmesa6, and set MUJOCO_GL=egl or osmesa before Python starts"
-            raise RunError(f"no picture can be rendered ({how})", hint=hint) from None
-        self._camera = mujoco.MjvCamera()
-        look_at(self._camera, model)
-
-    def __enter__(self) -> "Stage":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._renderer.close()
-
-    def picture(self, time: float, text: str = "") -> Picture:
-        """Return the machine at a time [s] with a text above it as RGB, shape (height, width, 3)."""
-        replay = self._replay
-        replay.advance(time)
-        self._renderer.update_scene(replay.data, self._camera)
-        add_ghost(replay, self._renderer.scene, (AZIMUTH, ELEVATION))
-        picture = Image.fromarray(self._renderer.render())
-        letters = picture.height // 30
-        place_of_text = letters, letters // 2
-        ImageDraw.Draw(picture).text(place_of_text, text, "black", ImageFont.load_default(letters))
-        return np.asarray(picture)
+    replay, (width, height), camera = Replay(motion), size, mujoco.MjvCamera()
+    look = replay.model.vis
+    look.global_.offwidth, look.global_.offheight = width, height
+    # the map covers what the camera sees, or its border shows as dots on the floor
+    look.map.shadowclip, look.quality.shadowsize = 3.0, 4096
+    try:
+        renderer = mujoco.Renderer(replay.model, height=height, width=width)
+    except (mujoco.FatalError, ImportError, RuntimeError, AttributeError) as error:
+        how = f"MUJOCO_GL={os.environ.get('MUJOCO_GL')}: {' '.join(str(error).split())}"
+        hint = "install libegl1 or libosmesa6, and set MUJOCO_GL=egl or osmesa before Python starts"
+        raise RunError(f"no picture can be rendered ({how})", hint=hint) from None
+    look_at(camera, replay.model)
+    letters = height // 30
+    with renderer:
+        for time, text in frames:
+            replay.advance(time)
+            renderer.update_scene(replay.data, camera)
+            add_ghost(replay, renderer.scene, (AZIMUTH, ELEVATION))
+            picture, place = Image.fromarray(renderer.render()), (letters, letters // 2)
+            ImageDraw.Draw(picture).text(place, text, "black", ImageFont.load_default(letters))
+            yield np.asarray(picture)
 
 
 def render_motion(
@@ -82,14 +68,14 @@ def render_motion(
     size, rate = KINDS[kind]
     count = max(1, int(np.ceil((end - begin) * rate - 1e-9)))
     error = f", rms error {motion.error:.2g}°" if np.isfinite(motion.error) else ""
-    with Stage(motion, size) as stage:
 
-        def picture(k: int) -> Picture:
+    def frames() -> Iterator[tuple[float, str]]:
+        for k in range(count):
             progress("pictures", k, count)
             time = begin + k / max(rate, 1.0)
-            return stage.picture(time, f"{time:.1f} s{error}")
+            yield time, f"{time:.1f} s{error}"
 
-        return (_mp4 if kind == ".mp4" else _still)(map(picture, range(count)), kind)
+    return (_mp4 if kind == ".mp4" else _still)(rendered(motion, size, frames()), kind)
 
 
 def check_kind(file: Path) -> str:

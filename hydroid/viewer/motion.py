@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from hydroid.arm.model import ALONE, Machine, load_machine
-from hydroid.arrays import Array, Mask, record
+from hydroid.arrays import Array, Mask, record, rms
 from hydroid.errors import SettingsError
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
@@ -49,8 +49,8 @@ def simulated_motion(model: IdentifiedModel, logs: Mapping[str, Log]) -> Motion:
     rest, error = arm.pose(model.settings.start_pose), np.concatenate(errors)
     moved = {side: log.angle for side, log in logs.items() if _moves(log.angle).any()}
     measured = machine.joined(simulated | moved, rest) if moved else None
-    rms = np.degrees(np.sqrt(np.mean(error**2))) if error.size else np.nan
-    return Motion(machine, first.time, machine.joined(simulated, rest), measured, rms)
+    size = np.degrees(rms(error)) if error.size else np.nan
+    return Motion(machine, first.time, machine.joined(simulated, rest), measured, size)
 
 
 def _moves(angle: Array) -> Mask:

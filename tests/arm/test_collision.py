@@ -48,11 +48,11 @@ def test_depth_and_time_of_a_meeting():
     time = np.linspace(0.0, 2.0, 201)
     angle = np.column_stack([0.4 * (1 - time), np.zeros(201)])  # past the other ball, 0.1 m from it
     (meeting,) = CollisionChecker(model).clearance(time, angle).meetings
-    assert (meeting.first, meeting.second) == ("first", "second")
-    assert meeting.deepest == pytest.approx(1.0)
-    assert meeting.depth == pytest.approx(0.1)
+    assert meeting.bodies == ["first", "second"]
+    assert meeting.deepest_at_s == pytest.approx(1.0)
+    assert meeting.depth_m == pytest.approx(0.1)
     near = np.hypot(np.cos(angle[:, 0]) - 1.1, np.sin(angle[:, 0])) < 0.2
-    assert (meeting.begins, meeting.ends) == pytest.approx(tuple(time[near][[0, -1]]))
+    assert (meeting.from_s, meeting.to_s) == pytest.approx(tuple(time[near][[0, -1]]))
     assert CollisionChecker(model).first_below(angle, 0.0) == (int(np.argmax(near)), ("first", "second"))
 
 

@@ -101,5 +101,4 @@ def test_a_start_is_stated_clipped_or_in_the_middle_of_the_scale():
     assert parameter(**entry, start=300.0).start == 300
     assert parameter(**entry | {"bounds": [1500.0, 4000.0], "nominal": 2000.0}).start == 2000
     plain = load_settings("article-hyd").parameter_set()
-    assert not plain.has_start
     assert plain.start[plain.names.index("A_A")] == 0.5 * (250 + 2500)

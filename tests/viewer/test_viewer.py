@@ -16,7 +16,7 @@ from hydroid.identified_model import IdentifiedModel, load_identified
 from hydroid.log import Log
 from hydroid.plant import Plant
 from hydroid.viewer import film
-from hydroid.viewer.film import LATE, Stage, play
+from hydroid.viewer.film import LATE, play, rendered
 from hydroid.viewer.motion import Motion, Replay, Sliders, simulated_motion
 
 SHOULDER = 1
@@ -97,10 +97,10 @@ def test_a_slow_machine_shows_slow_motion_without_jumps(slide: Sliders):
     assert np.diff(viewer.times) == pytest.approx(LATE, abs=0.011)
 
 
-def renderable(motion: Motion) -> Stage:
-    """A small stage where this machine has OpenGL without a display; otherwise the test is skipped."""
+def pictures(motion: Motion, *times: float) -> list[Any]:
+    """Small ones where this machine has OpenGL without a display; otherwise the test is skipped."""
     try:
-        return Stage(motion, (480, 270))
+        return [*rendered(motion, (480, 270), ((time, "2.0 s") for time in times))]
     except RunError as error:
         if "no picture can be rendered" not in str(error):
             raise
@@ -112,8 +112,7 @@ def test_the_picture_shows_arm_and_ghost_in_full_and_moves(nominal: IdentifiedMo
     bent[:, SHOULDER] += np.radians(30) * study_log.time / study_log.time[-1]
     motion = simulated_motion(nominal, {"alone": replace(study_log, angle=bent)})
     assert motion.measured is not None
-    with renderable(motion) as stage:
-        first, last = (stage.picture(time, "2.0 s").astype(float) for time in (0.0, 5.0))
+    first, last = (picture.astype(float) for picture in pictures(motion, 0.0, 5.0))
     assert last.shape == (270, 480, 3)
     assert np.abs(first - last).max() > 50  # the arm has moved
     blue = last[..., 2] - last[..., 0]
@@ -129,7 +128,7 @@ def test_the_picture_shows_arm_and_ghost_in_full_and_moves(nominal: IdentifiedMo
 def test_every_kind_of_file_is_written(nominal: IdentifiedModel, study_log: Log, kind, monkeypatch):
     av: Any = pytest.importorskip("av") if kind == ".mp4" else None
     motion = simulated_motion(nominal, {"alone": study_log})
-    renderable(motion).__exit__()
+    pictures(motion)
     rate = film.KINDS[kind][1]
     monkeypatch.setitem(film.KINDS, kind, ((480, 270), rate))
     content = film.render_motion(motion, kind, (1.0, 1.5))

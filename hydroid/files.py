@@ -2,13 +2,11 @@
 
 import logging
 import os
-import re
 import signal
 import tempfile
 import threading
 from collections.abc import Generator
 from contextlib import contextmanager
-from itertools import count
 from pathlib import Path
 from typing import Any, Literal
 
@@ -18,30 +16,6 @@ Plain = dict[str, Any]  # a mapping as YAML and JSON hold it
 PART = ".part"  # suffix of a file that is being written
 
 _log = logging.getLogger(__name__)
-
-
-def write_atomic(path: Path, content: str | bytes, *, keep: Path | None = None) -> None:
-    """Write a file so that readers see either the old content or the new, also after a crash.
-
-    The content, text as UTF-8, reaches the disk before the file gets its name, so a power cut leaves the old
-    file or the new one. A killed process may leave a hidden file with the suffix PART. `keep` is a path in
-    the same folder to which the old file, if any, is moved first: after a crash between the two renamings
-    only it exists. Raises RunError: the folder cannot be written, or the disk is full.
-    """
-    with undisturbed():
-        _write(path, content.encode() if isinstance(content, str) else content, keep)
-
-
-def file_name(text: str, taken: set[str]) -> str:
-    """Return a name of letters, digits, dot, dash and underscore, and add it to `taken`.
-
-    It is numbered where a name that differs only in case is taken.
-    """
-    safe = re.sub(r"[^A-Za-z0-9._-]+", "_", text)
-    candidates = (f"{safe}_{n}" if n > 1 else safe for n in count(1))
-    name = next(candidate for candidate in candidates if candidate.lower() not in taken)
-    taken.add(name.lower())
-    return name
 
 
 @contextmanager
@@ -68,13 +42,21 @@ def undisturbed() -> Generator[None]:
             signal.raise_signal(number)
 
 
-def _write(path: Path, data: bytes, keep: Path | None) -> None:
+@undisturbed()
+def write_atomic(path: Path, content: str | bytes, *, keep: Path | None = None) -> None:
+    """Write a file so that readers see either the old content or the new, also after a crash.
+
+    The content, text as UTF-8, reaches the disk before the file gets its name, so a power cut leaves the old
+    file or the new one. A killed process may leave a hidden file with the suffix PART. `keep` is a path in
+    the same folder to which the old file, if any, is moved first: after a crash between the two renamings
+    only it exists. Raises RunError: the folder cannot be written, or the disk is full.
+    """
     temporary = ""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=PART)
         with os.fdopen(handle, "wb") as file:
-            file.write(data)
+            file.write(content.encode() if isinstance(content, str) else content)
             file.flush()
             os.fsync(file.fileno())
         os.umask(mask := os.umask(0))  # it can only be read by setting it
@@ -102,6 +84,21 @@ def is_file(path: Path) -> bool:
         return path.is_file()
     except (OSError, ValueError):
         return False
+
+
+def fill_template(path: str, /, **values: Any) -> str:
+    """Return the text of a template in the package with values in it."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
+
+    environment = Environment(
+        loader=PackageLoader("hydroid", ""),
+        autoescape=select_autoescape(["html.j2"]),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    return environment.get_template(path).render(values)
 
 
 _PACKAGE = Path(__file__).parent

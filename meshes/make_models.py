@@ -20,7 +20,8 @@ import mujoco
 import numpy as np
 import trimesh
 
-from hydroid.cad.importer import SCENE, arrange
+from hydroid.cad.importer import arrange
+from hydroid.files import fill_template
 
 ROOT = Path(__file__).parents[1]
 ARM, DUAL = ROOT / "models" / "hydrolek.xml", ROOT / "models" / "hydrolek_dual.xml"
@@ -63,7 +64,7 @@ def write_inertias(path: Path) -> None:
 
 def two_arms(arm: Path) -> str:
     """Return the MJCF of the arm and its mirror image on their carrier, with meshes relative to DUAL."""
-    machine = mujoco.MjSpec.from_string(f"<mujoco>{SCENE}</mujoco>")
+    machine = mujoco.MjSpec.from_string(f"<mujoco>{fill_template('cad/scene.xml')}</mujoco>")
     machine.modelname = "hydrolek_dual"
     machine.comment = "the arm of hydrolek.xml and its mirror image, by `make model`: change that"
     machine.compiler.savecompiled = machine.compiler.savecanonical = False

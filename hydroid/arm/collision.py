@@ -18,14 +18,13 @@ FARTHEST = 100.0  # distance beyond which MuJoCo need not look [m]
 
 @record
 class Meeting:
-    """Two bodies inside each other, from one sample to another."""
+    """Two bodies inside each other, from one sample to another; at most by a depth, reached at a time."""
 
-    first: str
-    second: str
-    begins: float  # [s]
-    ends: float  # [s]
-    depth: float  # how far they are inside each other at most [m]
-    deepest: float  # when [s]
+    bodies: list[str]
+    from_s: float
+    to_s: float
+    depth_m: float
+    deepest_at_s: float
 
 
 @record
@@ -72,7 +71,7 @@ class CollisionChecker:
             inside = np.maximum(-distance[:, pair], 0.0)
             depths[self.names[pair]] = np.maximum(depths.get(self.names[pair], 0.0), inside)
         meetings = [meeting for names, depth in depths.items() for meeting in _meetings(names, time, depth)]
-        meetings.sort(key=lambda meeting: meeting.begins)
+        meetings.sort(key=lambda meeting: meeting.from_s)
         nearest = tuple(self.names[pair] for pair in distance.argmin(axis=1))
         checked = len({*map(frozenset, self.names)})
         pairs = [(s >> 16, s & 0xFFFF) for s in self._model.exclude_signature.tolist()]
@@ -121,5 +120,4 @@ def _meetings(names: tuple[str, str], time: Array, depth: Array) -> Generator[Me
     samples = np.flatnonzero(depth)
     for run in np.split(samples, np.flatnonzero(np.diff(samples) > 1) + 1):
         begins, ends, worst = run[0], run[-1], run[np.argmax(depth[run])]
-        when = float(time[begins]), float(time[ends])
-        yield Meeting(*names, *when, float(depth[worst]), float(time[worst]))
+        yield Meeting([*names], *map(float, (time[begins], time[ends], depth[worst], time[worst])))

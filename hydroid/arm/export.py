@@ -13,33 +13,9 @@ import yaml
 from numpy.typing import ArrayLike
 
 from hydroid.arm.locked import LockedArm
-from hydroid.files import Plain, write_atomic
+from hydroid.files import Plain, fill_template, write_atomic
 from hydroid.mjcf import mjcf_text, quiet_mujoco
 
-_MECHANICAL_README = """\
-fitted.xml is the fitted arm for MuJoCo alone. Set ctrl to the commands [%] and call mj_step once per
-{timestep:g} s: it moves as the fit does, within 1e-6 rad.
-It holds for one start pose, the keyframe `start`, and moves {joints}. Other joints are fused in that
-pose, springs are slack there, and each motor adds the constant torque that balances gravity there.
-For another pose use hydroid:
-
-    plant = hydroid.load_plant(FOLDER)      # the folder that holds model/
-    plant.reset(pose)                       # plant.save(OTHER) writes fitted.xml for this pose
-    q = plant.step(command)
-
-arm.xml is the arm before the fit.
-"""
-_HYDRAULIC_README = """\
-MuJoCo alone cannot step this arm: the fit has hydraulics, and MuJoCo has none. Use hydroid:
-
-    plant = hydroid.load_plant(FOLDER)      # the folder that holds model/
-    plant.reset(pose)
-    q = plant.step(command)                 # plant.model and plant.data are MuJoCo's
-
-mechanics.xml is the fitted arm without its hydraulics: masses, dampers and springs, and no motors. Its
-moving joints are {joints}; the others are fused in the start pose, which is the keyframe `start`.
-actuators.yaml lists the hydraulic parameters of each joint. arm.xml is the arm before the fit.
-"""
 _FIELDS = (
     *("body_pos", "body_quat", "body_ipos", "body_iquat", "body_mass", "body_inertia", "body_simple"),
     *("body_sameframe", "jnt_pos", "jnt_axis", "dof_simplenum"),
@@ -137,10 +113,11 @@ def write_fitted(
     `joints` names those that take commands; `actuators` are hydraulic parameters by joint (stage 2), or None:
     the MJCF has motors (stage 1).
     """
-    name, words = "fitted.xml", _MECHANICAL_README
+    name = "fitted"
     if actuators is not None:
-        name, words = "mechanics.xml", _HYDRAULIC_README
+        name = "mechanics"
         text = yaml.safe_dump(actuators, sort_keys=False, allow_unicode=True)
         write_atomic(folder / "actuators.yaml", text)
-    write_atomic(folder / name, mjcf_text(fitted))
-    write_atomic(folder / "README.txt", words.format(timestep=timestep, joints=joints))
+    write_atomic(folder / f"{name}.xml", mjcf_text(fitted))
+    readme = fill_template(f"arm/{name}.txt.j2", timestep=timestep, joints=joints)
+    write_atomic(folder / "README.txt", readme)

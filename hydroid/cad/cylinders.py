@@ -9,13 +9,12 @@ carry them, and the joint that it moves gets the cylinder. A URDF cannot close l
 import math
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import mujoco
 import numpy as np
 
-from hydroid.arrays import Array
+from hydroid.arrays import Array, record
 from hydroid.cad.repair import compiled
 from hydroid.cad.source import Notes
 from hydroid.files import Plain
@@ -25,7 +24,7 @@ PARTS = {"rod", "piston", "cylinder", "cyl", "ram", "tube", "barrel"}
 """words in the names of a cylinder's links and joints"""
 
 
-@dataclass(frozen=True)
+@record
 class _Pin:
     """Where two bodies turn on each other [m], shape (3,), in the file's pose; `joint` None: an equality."""
 

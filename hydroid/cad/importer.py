@@ -11,33 +11,11 @@ from hydroid.arrays import Array, record
 from hydroid.cad.chain import choose_chain
 from hydroid.cad.cylinders import take_cylinders
 from hydroid.cad.repair import repair_inertias, weigh
-from hydroid.cad.shapes import convert_meshes, distinct, sort_shapes, word
+from hydroid.cad.shapes import convert_meshes, sort_shapes, word
 from hydroid.cad.source import Notes, read_source
+from hydroid.files import fill_template
 from hydroid.mjcf import mjcf_text, mujoco_errors
-
-SCENE = """
-  <option timestep="0.01" integrator="Euler"/>
-  <visual>
-    <headlight ambient="0.25 0.25 0.25" diffuse="0.2 0.2 0.2"/>
-    <global offwidth="1600" offheight="1200"/>
-  </visual>
-  <asset>
-    <texture name="sky" type="skybox" builtin="gradient" rgb1="0.86 0.9 0.94" rgb2="0.5 0.57 0.65"
-             width="128" height="128"/>
-    <texture name="floor" type="2d" builtin="checker" rgb1="0.58 0.6 0.62" rgb2="0.52 0.54 0.56"
-             width="256" height="256"/>
-    <material name="floor" texture="floor" texrepeat="10 10"/>
-  </asset>
-  <worldbody>
-    <geom name="floor" type="plane" size="5 5 0.1" material="floor"/>
-    <light name="key" type="directional" dir="-0.6 1.6 -3" diffuse="0.5 0.5 0.5" specular="0.15 0.15 0.15"/>
-    <light name="fill" type="directional" dir="-1.2 -2 -2.2" diffuse="0.2 0.2 0.2"
-           specular="0.06 0.06 0.06" castshadow="false"/>
-    <camera name="side" pos="0 -1 0.15" xyaxes="1 0 0 0 0.15 1" fovy="40"/>
-    <camera name="corner" pos="0.75 -0.75 0.5" xyaxes="1 1 0 -0.5 0.5 1.5" fovy="40"/>
-  </worldbody>
-"""
-"""sections of an MJCF; `arrange` puts lights and cameras around the arm"""
+from hydroid.words import distinct
 
 
 @record
@@ -116,7 +94,8 @@ def _clear(spec: mujoco.MjSpec, path: Path) -> None:
 
 def _in_scene(spec: mujoco.MjSpec, meshes: dict[str, bytes]) -> str:
     """Return the arm's MJCF with light, floor and cameras, and the pose nearest to 0 as `home`."""
-    text = mjcf_text(spec).replace("<worldbody>", f"{SCENE}<worldbody>", 1)
+    scene = fill_template("cad/scene.xml")  # `arrange` puts its lights and cameras around the arm
+    text = mjcf_text(spec).replace("<worldbody>", scene + "<worldbody>", 1)
     with mujoco_errors(spec.modelname):
         whole = mujoco.MjSpec.from_string(text, assets=meshes)
         model = whole.compile()

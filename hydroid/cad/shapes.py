@@ -12,6 +12,7 @@ from hydroid.arrays import Array
 from hydroid.cad.source import Notes
 from hydroid.errors import ModelError
 from hydroid.mjcf import mujoco_errors
+from hydroid.words import distinct
 
 MESHES = "links"  # folder of the meshes beside the model
 SHOWN, HIDDEN = 2, 3  # groups of shapes that are seen, and of those that only collide
@@ -72,13 +73,6 @@ def word(name: str) -> str:
     """Return a plain word from any name."""
     plain = re.sub(r"\W", "_", name, flags=re.ASCII) or "arm"
     return f"_{plain}" if plain[0].isdigit() else plain
-
-
-def distinct(name: str, taken: set[str]) -> str:
-    """Return a name that is not taken, which it is from now on."""
-    free = next(n for n in (name, *(f"{name}_{k}" for k in range(2, 10_000))) if n not in taken)
-    taken.add(free)
-    return free
 
 
 def _read_mesh(path: Path, notes: Notes) -> trimesh.Trimesh | None:

@@ -20,18 +20,7 @@ REFUSED = {
     "xacro": ("is a xacro, not a URDF", "expand it first: xacro {name} > robot.urdf"),
 }
 """files that hold robots and are not read, and what to do"""
-IGNORED = (
-    "extension",
-    "plugin",
-    "sensor",
-    "texture",
-    "hfield",
-    "skin",
-    "flex",
-    "flexcomp",
-    "composite",
-    "size",
-)
+IGNORED = "extension plugin sensor texture hfield skin flex flexcomp composite size"
 """elements of an MJCF that the arm does not need, whose files or libraries are often missing"""
 
 
@@ -113,7 +102,7 @@ def _prepare_mjcf(root: ElementTree.Element, folder: Path) -> None:
                 inner = _parsed(folder / str(part.get("file")))
                 _prepare_mjcf(inner, folder)
                 parent[at : at + 1] = [*inner]
-            elif part.tag in IGNORED or "hfield" in (part.get("type"), *part.keys()):
+            elif part.tag in IGNORED.split() or "hfield" in (part.get("type"), *part.keys()):
                 parent.remove(part)
             elif part.tag == "material":
                 part.attrib.pop("texture", None)

@@ -1,15 +1,15 @@
 """The arm's files of a project: those of an imported arm, or a template to be filled in."""
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
 import yaml
 
 from hydroid.arm.model import load_model
-from hydroid.cad.importer import SCENE, ImportedArm
-from hydroid.files import Plain
+from hydroid.cad.importer import ImportedArm
+from hydroid.files import Plain, fill_template
 from hydroid.hydraulics.valve import DENSITY
 from hydroid.settings.arm import Arm
 from hydroid.settings.cylinder import LinearActuator
@@ -67,69 +67,6 @@ def joint_sizes(arm: Arm, speeds: Mapping[int, float]) -> tuple[JointSize, ...]:
     return tuple(sizes)
 
 
-ARM_FILE = """\
-# {title}
-#
-# The model, arm.xml, has links, joints, ranges, masses and meshes: correct them there. Its keyframe `home` is
-# where joints stand that a log does not measure. Positive angles turn about a joint's axis as a right-handed
-# screw does: compare them with your log.
-{notes}model: arm.xml
-
-# ACTUATORS ARE STAND-INS: each is sized to lift the arm {lift:g} times at 150 bar, at the speed of the log.
-# Angles can be predicted with them. Pressures and forces need your cylinders: their areas, and where the file
-# had none their two pivots [m], as CAD shows them with all joints at 0. One along a slide needs no pivots:
-#   JOINT: {{kind: linear, pivots: {{parent: [x, y, z], child: [x, y, z]}},
-#           area_a: 3117, area_b: 2099, max_opening: 2}}
-# area_a [mm²] pushes the rod out (bore 63 mm: 3117), area_b is what the rod (36 mm) leaves; max_opening [mm²]
-# is the valve's at full command: your best guess. `stroke` [mm] is by default what the range takes.
-actuators:
-{actuators}
-"""
-TEMPLATE_FILE = """\
-# A boom and a stick. THE NUMBERS ARE NO MACHINE'S. The model, arm.xml, has links, joints, ranges and masses.
-model: arm.xml
-
-# A cylinder is pinned at two points of the assembled arm, with all joints at 0 [m]. area_a [mm²] pushes the
-# rod out, area_b is what the rod leaves; max_opening [mm²] is the valve's at full command. `stroke` [mm] is
-# by default what the range takes.
-actuators:
-  boom: {kind: linear, pivots: {parent: [0.4, 0, 0.3], child: [1.2, 0, 0.9]},
-         area_a: 7854, area_b: 4000, max_opening: 20}
-  stick: {kind: linear, pivots: {parent: [1.2, 0, 1.3], child: [2.7, 0, 1.3]},
-          area_a: 7854, area_b: 4000, max_opening: 20}
-"""
-TEMPLATE_MODEL = f"""\
-<!-- A boom and a stick of boxes: put your sizes in, add or remove links and joints. THE NUMBERS ARE NO
-     MACHINE'S. MuJoCo's XML: lengths in m, angles in degrees; a box has half its lengths in `size`; `mass` is
-     a link's in kg. About the axis 0 -1 0 positive angles lift. A mesh:
-     <asset><mesh name="boom" file="boom.stl" inertia="exact"/></asset> and
-     <geom type="mesh" mesh="boom" mass="400"/>. -->
-<mujoco model="my_arm">
-{SCENE}
-  <asset>
-    <material name="paint" rgba="0.94 0.53 0.08 1" specular="0.35" shininess="0.35"/>
-  </asset>
-  <statistic center="2 0 1" extent="4"/>
-  <worldbody>
-    <body name="base" pos="0 0 1">
-      <body name="boom">
-        <joint name="boom" axis="0 -1 0" range="-30 60"/>
-        <geom type="box" size="1.5 0.125 0.2" pos="1.5 0 0" mass="400" group="2" material="paint"/>
-        <body name="stick" pos="3 0 0">
-          <joint name="stick" axis="0 -1 0" range="-130 -20"/>
-          <geom type="box" size="1 0.1 0.15" pos="1 0 0" mass="200" group="2" material="paint"/>
-        </body>
-      </body>
-    </body>
-  </worldbody>
-  <keyframe>
-    <!-- where joints stand that a log does not measure [rad] -->
-    <key name="home" qpos="0 -1.0472"/>
-  </keyframe>
-</mujoco>
-"""
-
-
 def arm_text(imported: ImportedArm, arm: Arm | None, sizes: Sequence[JointSize], title: str) -> str:
     """Return the arm's file of an import, with an actuator of each joint of sizes, (J,).
 
@@ -147,10 +84,14 @@ def arm_text(imported: ImportedArm, arm: Arm | None, sizes: Sequence[JointSize],
         if own is not None:  # the rod leaves about 65 % of the area
             oil = own | {"area_a": rounded(area), "area_b": rounded(0.65 * area)}
         actuators[joint.name] = oil | {"max_opening": rounded(size.opening)}
-    flow: Plain = {"default_flow_style": True, "sort_keys": False, "width": 1e9}
-    lines = [f"  {name}: {yaml.safe_dump(own, **flow).strip()}" for name, own in actuators.items()]
-    notes = "".join(f"# - {note}\n" for note in imported.notes)
-    return ARM_FILE.format(title=title, notes=notes, lift=LIFT, actuators="\n".join(lines) or "  {}")
+    values: Plain = {"title": title, "notes": imported.notes, "lift": LIFT, "actuators": actuators}
+    return fill_template("project/arm.yaml.j2", flow=flow, **values)
+
+
+def flow(value: Any) -> str:
+    """Write a value as YAML, on one line."""
+    text = yaml.safe_dump(value, default_flow_style=True, width=10_000, allow_unicode=True, sort_keys=False)
+    return text.removesuffix("...\n").strip()
 
 
 def rounded(value: float) -> float:

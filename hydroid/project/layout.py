@@ -1,11 +1,11 @@
 """What a log holds: its columns, and how the joints move in it."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from hydroid.arrays import record
 from hydroid.errors import LogError, SettingsError
 from hydroid.files import Plain
 from hydroid.log import JointMotion, Table, check_log, guess_columns, motion_of
@@ -21,7 +21,7 @@ REVERSED = (
 )
 
 
-@dataclass(frozen=True)
+@record
 class Layout:
     """The columns of a log, and what its numbers say.
 

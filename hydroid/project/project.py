@@ -2,7 +2,6 @@
 
 import os
 import shlex
-import shutil
 import tempfile
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
@@ -13,9 +12,9 @@ from typing import Any
 from hydroid.cad.importer import ImportedArm, import_arm
 from hydroid.cad.shapes import MESHES
 from hydroid.errors import RunError, SettingsError
-from hydroid.files import undisturbed, write_atomic
+from hydroid.files import fill_template, undisturbed, write_atomic
 from hydroid.log import open_table
-from hydroid.project.arm_file import TEMPLATE_FILE, TEMPLATE_MODEL, JointSize, arm_text, joint_sizes
+from hydroid.project.arm_file import JointSize, arm_text, joint_sizes
 from hydroid.project.fit_files import fit_text
 from hydroid.project.layout import find_layout
 from hydroid.reporting.figure import arm_picture
@@ -29,24 +28,6 @@ from hydroid.words import listed
 ARM, MODEL, PICTURE = "arm.yaml", "arm.xml", "arm.png"
 FIT, STEPS = "fit.yaml", "next-steps.md"
 FILES = (ARM, MODEL, PICTURE, FIT, STEPS, MESHES)
-PAGE = """\
-# {name}
-
-Look first: `arm.png` shows the arm, its axes, and the cylinders that are known. Compare the directions of
-positive angles with your log.
-
-Then, from the folder in which you ran `hydroid init`:
-
-```sh
-{commands}
-```
-
-- `arm.xml` is the arm's model, `arm.yaml` has its actuators: correct both.
-- `fit.yaml` are the settings of the fit: columns of the log, parameters, starts, priors.
-- A log should begin with a second without a command. Record several: fit on some, validate on another.
-- OTHER.csv stands for a log that the fit has not seen. Of one long log, cut off the last third where the arm
-  rests, keep the header on top of both parts, and fit the first.
-"""
 
 
 @dataclass(frozen=True)
@@ -108,10 +89,8 @@ def write_project(
         if imported and guessed:
             what = "no cylinder is known. A stand-in predicts angles; its pressures and forces mean nothing"
             notes = (*notes, f"{listed(guessed)}: {what}")
-        page = PAGE.format(name=arm.name, commands="\n".join(steps))
-        for heading, lines in (("What was assumed of the arm", notes), ("The log's columns", reasons)):
-            page += f"\n## {heading}\n\n" + "".join(f"- {line}\n" for line in lines) if lines else ""
-        write_atomic(stage / STEPS, page)
+        said = {"steps": steps, "notes": notes, "reasons": reasons}
+        write_atomic(stage / STEPS, fill_template("project/next-steps.md.j2", name=arm.name, **said))
         written = _move(stage, folder)
     return Project(folder, written, notes, reasons, layout.unused if layout else (), steps)
 
@@ -138,8 +117,10 @@ def _write_arm(
     sizes: Sequence[JointSize] = (),
 ) -> Arm:
     """Write model, meshes and the arm's file, with actuators of the given sizes, and return the arm."""
-    files: dict[str, str | bytes] = {MODEL: TEMPLATE_MODEL, ARM: TEMPLATE_FILE}
-    if imported is not None:
+    if imported is None:
+        files: dict[str, Any] = {MODEL: fill_template("project/boxes.xml.j2")}
+        files[ARM] = fill_template("project/boxes.yaml")
+    else:
         files = {MODEL: imported.mjcf, ARM: arm_text(imported, arm, sizes, title), **imported.meshes}
     for name, content in files.items():
         write_atomic(stage / name, content)
@@ -151,13 +132,11 @@ def _stage(folder: Path) -> Generator[Path]:
     """A folder beside the project, or in it where it exists, that disappears."""
     home = next(path for path in (folder.absolute(), *folder.absolute().parents) if path.is_dir())
     try:
-        stage = Path(tempfile.mkdtemp(prefix=".hydroid-init-", dir=home))
+        stage = tempfile.TemporaryDirectory(prefix=".hydroid-init-", dir=home, ignore_cleanup_errors=True)
     except OSError as error:
         raise RunError(f"cannot be written ({error.strerror})", where=folder) from None
-    try:
-        yield stage
-    finally:
-        shutil.rmtree(stage, ignore_errors=True)
+    with stage as path:
+        yield Path(path)
 
 
 def _move(stage: Path, folder: Path) -> tuple[str, ...]:

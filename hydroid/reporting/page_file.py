@@ -14,9 +14,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from hydroid.files import write_atomic
+from hydroid.files import fill_template, write_atomic
 from hydroid.reporting.chart import Chart
 from hydroid.reporting.page import Page, Table
 
@@ -64,15 +63,11 @@ def plain(drawn: Any) -> Any:
 
 def html(page: Page) -> str:
     """Return the page as one file."""
-    loader = PackageLoader("hydroid", "reporting")
-    environment = Environment(
-        loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
     drawings = {plot.name: plot.draw() for plot in page.plots}
     charts = {name for name, drawing in drawings.items() if isinstance(drawing, Chart)}
     content = _packed(json.dumps(drawings, default=plain, ensure_ascii=False, separators=(",", ":")))
-    template = environment.get_template("template.html.j2")
-    return template.render(page=page, charts=charts, content=content, library=_library() if charts else "")
+    parts = {"charts": charts, "content": content, "library": _library() if charts else ""}
+    return fill_template("reporting/template.html.j2", page=page, **parts)
 
 
 @cache

@@ -18,7 +18,7 @@ class HydroidError(Exception):
         hint: what is allowed, or what to do.
     """
 
-    def __init__(self, what: str, *, where: object = "", hint: str = "") -> None:
+    def __init__(self, what: str, where: object = "", hint: str = "") -> None:
         self.what, self.where, self.hint = what, str(where), hint
         text = f"{where}: {what}" if self.where else what
         super().__init__(_one_line(f"{text}; {hint}" if hint else text))

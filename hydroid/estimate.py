@@ -217,7 +217,7 @@ def read_estimate(source: Path) -> tuple[Path, Plain, FitSummary | None]:
     if source.is_dir() and not is_file(file):
         begun = is_file(source / "run.json")
         hint = "resume the fit" if begun else "name a run folder, a folder of Plant.save or a YAML file"
-        raise RunError("holds no estimate" + (" yet" if begun else ""), where=source, hint=hint)
+        raise RunError("holds no estimate" + (" yet" if begun else ""), source, hint)
     content, _ = read_yaml(file)
     if "estimate" in content:
         summary = load(file, FitSummary)
@@ -225,7 +225,7 @@ def read_estimate(source: Path) -> tuple[Path, Plain, FitSummary | None]:
     values = content.get("parameters", content)
     if not isinstance(values, dict) or any(isinstance(value, dict) for value in values.values()):
         hint = "give the run folder, its estimate.yaml, or a YAML file of `K: 0.2` lines"
-        raise SettingsError("is no estimate", where=file, hint=hint)
+        raise SettingsError("is no estimate", file, hint)
     return file, values, None
 
 

@@ -65,7 +65,7 @@ def write_atomic(path: Path, content: str | bytes, *, keep: Path | None = None) 
             os.replace(path, keep)
         os.replace(temporary, path)
     except OSError as error:
-        raise RunError(f"cannot be written ({error.strerror})", where=path) from None
+        raise RunError(f"cannot be written ({error.strerror})", path) from None
     finally:
         if temporary and os.path.exists(temporary):
             os.unlink(temporary)
@@ -125,6 +125,6 @@ def find_config(
             if is_file(candidate):
                 return candidate
     if len(Path(name).parts) > 1:
-        raise SettingsError("no such file or folder", where=name)
+        raise SettingsError("no such file or folder", name)
     known = sorted(p.stem for p in shipped.glob("*.yaml") if (p.stem == "hydrolek") == (kind == "arm"))
-    raise SettingsError(f"no such {kind}", where=name, hint=f"give a YAML file or one of: {', '.join(known)}")
+    raise SettingsError(f"no such {kind}", name, f"give a YAML file or one of: {', '.join(known)}")

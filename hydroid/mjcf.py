@@ -19,22 +19,19 @@ def read_mjcf(path: Path) -> mujoco.MjSpec:
     """
     where = str(path)
     if not is_file(path):
-        raise ModelError("no such model", where=where)
+        raise ModelError("no such model", where)
     with mujoco_errors(where):
         spec = mujoco.MjSpec.from_file(where)
     if not spec.joints:
-        raise ModelError("has no joint", where=where)
+        raise ModelError("has no joint", where)
     for joint in spec.joints:
         if not joint.name or not joint.parent.name:
-            what = f"joint {joint.name!r} of body {joint.parent.name!r}: both need a name"
-            raise ModelError(what, where=where)
+            raise ModelError(f"joint {joint.name!r} of body {joint.parent.name!r}: both need a name", where)
         kinds = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
         if joint.type not in kinds or len(joint.parent.joints) > 1:
-            raise ModelError(
-                f"joint {joint.name!r} must be a hinge or a slide, alone on its body", where=where
-            )
+            raise ModelError(f"joint {joint.name!r} must be a hinge or a slide, alone on its body", where)
     if spec.equalities:
-        raise ModelError("has equality constraints, which hydroid does not simulate", where=where)
+        raise ModelError("has equality constraints, which hydroid does not simulate", where)
     return spec
 
 
@@ -52,7 +49,7 @@ def copy_models(models: Mapping[str, Path], folder: Path) -> None:
             try:
                 content = source.read_bytes()
             except OSError as error:
-                raise RunError(f"mesh cannot be read ({error.strerror})", where=source) from None
+                raise RunError(f"mesh cannot be read ({error.strerror})", source) from None
             # meshes of different folders may have one name
             taken = kept.get(source.name, content) != content
             mesh.file = f"{len(kept)}_{source.name}" if taken else source.name
@@ -78,7 +75,7 @@ def mujoco_errors(where: str) -> Generator[None]:
         with quiet_mujoco():
             yield
     except (ValueError, mujoco.FatalError) as error:
-        raise ModelError(f"MuJoCo refuses it ({' '.join(str(error).split())})", where=where) from None
+        raise ModelError(f"MuJoCo refuses it ({' '.join(str(error).split())})", where) from None
 
 
 @contextmanager

@@ -142,7 +142,7 @@ class ParameterSet:
         unknown = [name for name in values if name not in self.names]
         if unknown:
             known = ", ".join(self.names)
-            raise SettingsError(f"unknown parameter {unknown[0]!r}", where=source, hint=f"known: {known}")
+            raise SettingsError(f"unknown parameter {unknown[0]!r}", source, f"known: {known}")
         return np.array([_number(p, values.get(p.name, p.fixed), source) for p in self.parameters])
 
     def mapping(self, theta: Array) -> dict[str, float]:
@@ -152,13 +152,13 @@ class ParameterSet:
 
 def _number(parameter: Parameter, value: object, source: str) -> float:
     if value is None:
-        raise SettingsError(f"parameter {parameter.name!r} is missing", where=source)
+        raise SettingsError(f"parameter {parameter.name!r} is missing", source)
     # most quantities cannot be negative; the comparison is False for NaN, and squares stay finite
     least = min(parameter.lower, 0.0)
     if isinstance(value, bool) or not isinstance(value, int | float) or not least <= value < 1e100:
         raise SettingsError(
             f"parameter {parameter.name!r} is {value!r}",
-            where=source,
-            hint=f"a number from {least:g}, in {parameter.unit}",
+            source,
+            f"a number from {least:g}, in {parameter.unit}",
         )
     return float(value)

@@ -41,7 +41,7 @@ def predict_log(model: IdentifiedModel, log: Log) -> Log:
         measured = [j for j in range(log.joints) if log.driven[j] and columns("pressure", j + 1)]
     response = _respond(model, log, moving, measured)
     if not response.feasible[0]:
-        raise RunError("the simulation diverged with these parameters", where=model.source)
+        raise RunError("the simulation diverged with these parameters", model.source)
     angle[:, [j - 1 for j in moving]] = response.angle[0]
     pressure = None
     if response.pressure is not None:

@@ -192,7 +192,7 @@ def _read(file: Path) -> Result:
         what = "is no result of a run"
     except (OSError, ValueError, AttributeError) as error:
         what = f"cannot be read ({error})"
-    raise RunError(what, where=file, hint="remove it: the run is repeated")
+    raise RunError(what, file, "remove it: the run is repeated")
 
 
 @contextmanager

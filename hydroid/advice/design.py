@@ -208,8 +208,8 @@ def design(
     if not random:
         raise SettingsError(
             f"none of {first} random experiments keeps the limits in simulation",
-            where="design",
-            hint="allow more speed, less margin or clearance, a smaller command, or other poses",
+            "design",
+            "allow more speed, less margin or clearance, a smaller command, or other poses",
         )
     typical = np.mean([t.gained.T @ t.gained for t in random], axis=0)
     values, vectors = np.linalg.eigh(fitted.root.T @ fitted.root + typical)

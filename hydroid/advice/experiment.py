@@ -124,7 +124,7 @@ def _driven_joints(settings: FitSettings) -> list[int]:
     """Joints that may be driven, 0-based; refuse one that the arm lacks, or that stage 1 has no gain for."""
     count, joints = len(settings.arm.joints), sorted(settings.design.joints or settings.outputs)
     if joints[-1] > count:
-        raise SettingsError(f"the arm has joints 1 to {count}", where="design.joints")
+        raise SettingsError(f"the arm has joints 1 to {count}", "design.joints")
     driven = np.isin(np.arange(count) + 1, joints)
     Bindings(settings).refuse_idle(driven, [j - 1 for j in settings.outputs])
     return np.flatnonzero(driven).tolist()
@@ -142,8 +142,8 @@ def _start_poses(settings: FitSettings) -> Array:
     if not len(poses) and design.poses != "any":
         raise SettingsError(
             f"no pose of {', '.join(names)} is {design.margin_deg:g} deg inside the ranges of what moves",
-            where="design.poses",
-            hint="add one to the arm's file, reduce design.margin_deg, or set design.poses=any",
+            "design.poses",
+            "add one to the arm's file, reduce design.margin_deg, or set design.poses=any",
         )
     return poses
 

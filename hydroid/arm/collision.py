@@ -59,7 +59,7 @@ class CollisionChecker:
         self._pairs = _pairs(model)
         if not self._pairs:
             hint = "give bodies geoms with contype and conaffinity 1"
-            raise ModelError("no two of its bodies can collide", where=source, hint=hint)
+            raise ModelError("no two of its bodies can collide", source, hint)
         self.names = [(_name(model, first), _name(model, second)) for first, second in self._pairs]
         """of the bodies of each pair of shapes"""
 

@@ -31,7 +31,7 @@ def add_payload(spec: mujoco.MjSpec, arm: Arm, mass: float) -> mujoco.MjSpec:
     """
     if arm.payload is None:
         hint = "name the site of the model that holds it in the arm's file, payload: SITE"
-        raise SettingsError(f"{arm.name} has no place for a payload", where="payloads", hint=hint)
+        raise SettingsError(f"{arm.name} has no place for a payload", "payloads", hint)
     loaded = spec.copy()
     # of a ball of 5 cm: its own inertia is small beside what its distance makes
     site, moment = loaded.site(arm.payload), 0.4 * mass * 0.05**2
@@ -79,11 +79,11 @@ def load_machine(arm: Arm, *, pair: bool) -> Machine:
         return Machine(arm, load_model(arm).compile(), (ALONE,))
     if arm.pair is None:
         hint = "name its MJCF in the arm's file, pair: MODEL.xml"
-        raise SettingsError(f"{arm.name} stands alone", where="--arm", hint=hint)
+        raise SettingsError(f"{arm.name} stands alone", "--arm", hint)
     spec = read_mjcf(arm.pair)
     wanted = [f"{side}_{name}" for side in SIDES for name in arm.joint_names]
     if [joint.name for joint in spec.joints] != wanted:
         hint = f"the joints of two arms are {', '.join(wanted)}"
-        raise ModelError("is not the model of two of the arm", where=arm.pair, hint=hint)
+        raise ModelError("is not the model of two of the arm", arm.pair, hint)
     with mujoco_errors(str(arm.pair)):
         return Machine(arm, spec.compile(), SIDES)

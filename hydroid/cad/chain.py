@@ -26,12 +26,12 @@ def choose_chain(
     for joint in spec.joints:
         if len(joint.parent.joints) > 1:
             hint = "put a small body between them: hydroid moves one joint per link"
-            raise ModelError(f"body {joint.parent.name!r} has several joints", where=where, hint=hint)
+            raise ModelError(f"body {joint.parent.name!r} has several joints", where, hint)
         chains[joint.parent.name] = _path(joint.parent)
     inner = {name for chain in chains.values() for name in chain[:-1]}
     tips = {link: chain for link, chain in chains.items() if chain[-1] not in inner}
     if not tips:
-        raise ModelError("has no joint that hydroid could move", where=where)
+        raise ModelError("has no joint that hydroid could move", where)
     if tip is None:
         wanted = max(tips.values(), key=lambda chain: (_named(spec, chain, columns), len(chain)))
         why = "the log names most of its joints" if _named(spec, wanted, columns) else "the longest branch"
@@ -39,7 +39,7 @@ def choose_chain(
         link, why = spec.body(tip), "as asked"
         wanted = () if link is None else _path(link)
         if not wanted:
-            raise ModelError(f"no joint moves a link {tip!r}", where=where, hint=f"tips: {', '.join(tips)}")
+            raise ModelError(f"no joint moves a link {tip!r}", where, f"tips: {', '.join(tips)}")
     left = [joint for joint in spec.joints if joint.name not in wanted]
     if left:
         others = listed([f"--tip {link}" for link, chain in tips.items() if chain != wanted], 6)

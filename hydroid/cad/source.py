@@ -51,11 +51,11 @@ def read_source(path: Path, notes: Notes) -> tuple[mujoco.MjSpec, dict[str, Path
     kind = "xacro" if any("xacro" in str(part.tag).lower() for part in root.iter()) else str(root.tag)
     if kind in REFUSED:
         what, hint = REFUSED[kind]
-        raise ModelError(what, where=where, hint=hint.format(name=path.name))
+        raise ModelError(what, where, hint.format(name=path.name))
     urdf, folder = kind == "robot", path.resolve().parent
     if not urdf and kind != "mujoco":
         what = f"is neither URDF nor MJCF: its root element is <{root.tag}>"
-        raise ModelError(what, where=where, hint="export the arm as URDF")
+        raise ModelError(what, where, "export the arm as URDF")
     files = _prepare_urdf(root, notes) if urdf else {}
     if not urdf:
         _prepare_mjcf(root, folder)
@@ -71,7 +71,7 @@ def _parsed(path: Path) -> ElementTree.Element:
     try:
         return ElementTree.fromstring(path.read_bytes())
     except (ElementTree.ParseError, OSError, ValueError) as error:
-        raise ModelError(f"cannot be read as XML ({error})", where=path) from None
+        raise ModelError(f"cannot be read as XML ({error})", path) from None
 
 
 def _prepare_urdf(root: ElementTree.Element, notes: Notes) -> dict[str, str]:

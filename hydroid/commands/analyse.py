@@ -153,7 +153,7 @@ def quantity(
     known = stored_posterior(opened)
     if known is None:
         hint = "name the folder of a fit, with the settings that it used"
-        raise RunError("holds no covariance of these parameters", where=opened.source, hint=hint)
+        raise RunError("holds no covariance of these parameters", opened.source, hint)
     shape = np.shape(function(Plant(opened)))
 
     def values(theta: Array) -> Array:

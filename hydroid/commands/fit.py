@@ -129,8 +129,7 @@ def fit(
     read = read_logs(logs, settings)
     names = [Path(log.source).name for log in read]
     if stray := sorted(set(settings.payloads) - set(names)):  # misspelt, it would be left out silently
-        hint = f"logs: {', '.join(names)}"
-        raise SettingsError("is none of the logs", where=f"payloads.{stray[0]}", hint=hint)
+        raise SettingsError("is none of the logs", f"payloads.{stray[0]}", f"logs: {', '.join(names)}")
     from hydroid.fitting.fit import fit as run_fit
     from hydroid.problem.problem import Problem
     from hydroid.run.folder import RunFolder
@@ -138,7 +137,7 @@ def fit(
 
     folder = None if out is None else RunFolder(Path(out))
     if folder is not None and folder.exists and not resume:
-        raise RunError("holds a run already", where=out, hint="resume it, or choose another folder")
+        raise RunError("holds a run already", out, "resume it, or choose another folder")
     problem = Problem(settings, read, workers)
     if folder is None:
         return _result(problem, run_fit(problem, progress), None)

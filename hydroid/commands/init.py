@@ -54,7 +54,7 @@ def init(
     logs, robots = ([Path(path) for path in as_list(given)] for given in (log, arm))
     for path in (*logs, *robots):
         if not (is_file(path) or is_file(path / "metadata.yaml")):  # a ROS 2 bag is a folder
-            raise SettingsError("no such file", where=path)
+            raise SettingsError("no such file", path)
     from hydroid.project import write_project
 
     project = write_project(

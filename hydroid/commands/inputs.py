@@ -108,7 +108,7 @@ def load_settings(config: ConfigSource, overrides: SettingChanges = None) -> Fit
     if not isinstance(config, FitSettings):
         return load(find_config(config), FitSettings, changes)
     if changes:
-        raise SettingsError("cannot be replaced in settings that are read", where=", ".join(changes))
+        raise SettingsError("cannot be replaced in settings that are read", ", ".join(changes))
     return config
 
 
@@ -129,12 +129,12 @@ def open_model(
     if fit is not None and not isinstance(fit, str | Path):
         return fit if isinstance(fit, IdentifiedModel) else fit.model
     if isinstance(config, FitSettings):
-        raise SettingsError("settings that are read make a model with `identified`", where="config")
+        raise SettingsError("settings that are read make a model with `identified`", "config")
     model = load_identified(fit, config, setting_changes(overrides), nominal=nominal)
     if model.nominal:
         if model.settings.stage != "hyd":
             hint = "give a fit of stage 2 with --fit, or use --config fit-hyd"
-            raise SettingsError("stage 1 (mech) does not model the actuators", where=model.source, hint=hint)
+            raise SettingsError("stage 1 (mech) does not model the actuators", model.source, hint)
         _log.log(NOTE, "note: nominal values for %s", ", ".join(model.nominal) if fit else "all parameters")
     return model
 
@@ -154,7 +154,7 @@ def open_values(fit: ModelSource) -> tuple[Plain, FitSummary | None]:
 def refuse_overwriting(source: Any, out: Source | None) -> None:
     """Refuse to write a log over the one that is read."""
     if out is not None and isinstance(source, str | Path) and Path(out).resolve() == Path(source).resolve():
-        raise SettingsError("would overwrite the log", where=out, hint="name another file")
+        raise SettingsError("would overwrite the log", out, "name another file")
 
 
 def as_list(sources: Any) -> list[Any]:

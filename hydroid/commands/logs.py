@@ -122,8 +122,7 @@ def read_arms(
     from hydroid.log import open_table
 
     if arm not in (None, *SIDES, "both"):
-        hint = f"choose {', '.join(SIDES)} or both"
-        raise SettingsError(f"{arm!r} is no arm of a pair", where="--arm", hint=hint)
+        raise SettingsError(f"{arm!r} is no arm of a pair", "--arm", f"choose {', '.join(SIDES)} or both")
     moving = (ALONE,) if arm is None else SIDES if arm == "both" else (arm,)
     columns = settings.log.angles_only() if angles else settings.log
     names = open_table(Path(log), settings.log).names if isinstance(log, str | Path) and arm else ()
@@ -153,7 +152,7 @@ def run_logs(folder: Path) -> list[Path]:
     logs = [Path(name) for name in RunFolder(folder).identity().get("logs", {})]
     missing = [str(log) for log in logs if not log.is_file()]
     if missing or not logs:
-        raise RunError(f"its log {', '.join(missing)} is not there", where=folder, hint="name the log")
+        raise RunError(f"its log {', '.join(missing)} is not there", folder, "name the log")
     return logs
 
 
@@ -167,5 +166,5 @@ def problem_of(model: IdentifiedModel, logs: LogSources, *, repair: bool = False
 
     problem = Problem(model.settings, read)
     if not np.isfinite(problem.residuals(model.theta[None])).all():
-        raise RunError("the simulation diverged with these parameters", where=model.source)
+        raise RunError("the simulation diverged with these parameters", model.source)
     return problem

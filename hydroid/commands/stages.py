@@ -136,14 +136,13 @@ def load_stage(
     settings = load_settings(config, changes)
     if settings.stage != stage:
         what = f"has stage: {settings.stage}, but hydroid fit-{stage} needs stage: {stage}"
-        hint = f"use hydroid fit-{settings.stage}, or another --config"
-        raise SettingsError(what, where=config, hint=hint)
+        raise SettingsError(what, config, f"use hydroid fit-{settings.stage}, or another --config")
     if start is None:
         return settings
     values, _ = open_values(start)
     free = [name for name, p in settings.parameters.items() if p.fixed is None and name in values]
     if not free:
-        raise SettingsError("has a value of none of the free parameters", where=start)
+        raise SettingsError("has a value of none of the free parameters", start)
     starts = {f"parameters.{name}.start": values[name] for name in free}
     return load_settings(config, {**changes, **starts, **changes})
 
@@ -159,9 +158,7 @@ def with_mechanics(mech: "ModelSource | None", config: ConfigSource, changes: Ma
     values, summary = ({}, None) if mech is None else open_values(mech)
     if summary is not None and summary.stage != "mech":
         hint = "name a run of fit-mech, or begin at this fit with --start"
-        raise SettingsError(
-            "is a fit of stage 2, but --mech takes one of stage 1", where=str(mech), hint=hint
-        )
+        raise SettingsError("is a fit of stage 2, but --mech takes one of stage 1", str(mech), hint)
     settings = load_stage("hyd", config, changes)
     held, missing = Plain(), list[str]()
     for name, p in settings.parameters.items():
@@ -189,7 +186,7 @@ def with_mechanics(mech: "ModelSource | None", config: ConfigSource, changes: Ma
     if missing:
         hint = "give the run of stage 1 with --mech RUN, or set fixed, nominal or start for each"
         what = f"stage 2 needs the values of {', '.join(missing)} from stage 1"
-        raise SettingsError(what, where=mech or "", hint=hint)
+        raise SettingsError(what, mech or "", hint)
     return {**changes, **held}
 
 
@@ -232,7 +229,7 @@ def adapt(
     chosen = [step["parameter"] for step in path[1:]]
     if not chosen:
         hint = "name parameters with --free, or fit anew with --start RUN"
-        raise SettingsError("no parameter lowers the error on parts left out", where=model.source, hint=hint)
+        raise SettingsError("no parameter lowers the error on parts left out", model.source, hint)
     settings = adapted(model, chosen)
     with FitProgress(settings) as watcher:
         result = run_fit(settings, read, out and Path(out), progress=watcher)

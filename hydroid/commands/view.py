@@ -133,12 +133,11 @@ def view(
     log = source
     if isinstance(source, str | Path) and is_file(Path(source) / "run.json"):
         if fit is not None:
-            hint = f"name a log, or leave out --fit {fit}"
-            raise SettingsError("is a run itself", where=source, hint=hint)
+            raise SettingsError("is a run itself", source, f"name a log, or leave out --fit {fit}")
         fit, log = source, run_logs(Path(source))[0]
     wanting = {"--collisions": collisions, "--arm": arm, "--out": out}
     if log is None and (where := next((name for name, given in wanting.items() if given), None)):
-        raise SettingsError("needs a log or a run", where=where, hint="name the log")
+        raise SettingsError("needs a log or a run", where, "name the log")
     if collisions:
         known = open_model(fit, config, set, nominal=True).settings if fit else None
         settings = known or load_settings(config or "fit-hyd", set)
@@ -200,4 +199,4 @@ def _span(text: str) -> tuple[float, float]:
     try:
         return float(begin or 0.0), float(end or "inf")
     except ValueError:
-        raise SettingsError(f"{text!r} is no span", where="--span", hint="write FROM:TO in seconds") from None
+        raise SettingsError(f"{text!r} is no span", "--span", "write FROM:TO in seconds") from None

@@ -44,7 +44,7 @@ class BagTable(Table):
         start, end = max(int(times[0]) for times in smooth), min(int(times[-1]) for times in smooth)
         if end - start < self.period * 1e9:
             hint = "record them together, with one clock"
-            raise LogError("the channels have no common time", where=self.source, hint=hint)
+            raise LogError("the channels have no common time", self.source, hint)
         grid = self.period * np.arange(int((end - start) / (1e9 * self.period) + 1e-6) + 1, dtype=np.float64)
         columns = {time: grid}
         for name, times in at.items():
@@ -74,7 +74,7 @@ def open_bag(path: Path, time: str, period: float) -> BagTable:
                 for name, number in _numbers(message, f"{connection.topic}."):
                     channels.setdefault(name, {}).setdefault(at or recorded, number)
     if not channels:
-        raise LogError("holds no channel of numbers", where=path)
+        raise LogError("holds no channel of numbers", path)
     return BagTable(source=str(path), names=(time, *channels), channels=channels, period=period)
 
 
@@ -123,7 +123,7 @@ def open_mat(path: Path, *, hdf5: bool) -> Table:
             "save commands, angles and time as arrays or structs; of a timeseries ts in MATLAB: "
             "time = ts.Time; data = ts.Data; save('arrays.mat', 'time', 'data')"
         )
-        raise LogError("holds no array of numbers", where=path, hint=hint)
+        raise LogError("holds no array of numbers", path, hint)
     return Table(source=str(path), names=tuple(columns), columns=columns)
 
 

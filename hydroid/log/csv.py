@@ -30,7 +30,7 @@ def open_csv(path: Path, data: bytes) -> Table:
     lines = _decode(path, data).replace("\r\n", "\n").replace("\r", "\n").split("\n")
     content = [k for k, line in enumerate(lines) if _is_content(line)]
     if not content:
-        raise LogError("is empty", where=path, hint=IS_CSV)
+        raise LogError("is empty", path, IS_CSV)
     separator = _separator([lines[k] for k in content[:400]])
     rows = {k: split(lines[k], separator) for k in content[:400]}
     header, left_out = _header(rows)
@@ -38,9 +38,9 @@ def open_csv(path: Path, data: bytes) -> Table:
     if all(number(name.replace(",", ".")) is not None for name in names if name):
         hint = "write the columns' names above it (a line that starts with # is a comment)"
         where = f"{path}, line {header + 1}"
-        raise LogError("has no header: this line holds numbers", where=where, hint=hint)
+        raise LogError("has no header: this line holds numbers", where, hint)
     if width == 1:
-        raise LogError("has one column only", where=path, hint="part cells by , ; | tabs or spaces")
+        raise LogError("has one column only", path, "part cells by , ; | tabs or spaces")
     units = dict[str, str]()
     remarks = [f"line {k + 1} is text and left out" for k in left_out]
     if content[0] < header:
@@ -76,7 +76,7 @@ def _decode(path: Path, data: bytes) -> str:
             if "\0" not in text:
                 return text
     hint = "save the sheet as CSV" if path.suffix.startswith(".xls") else IS_CSV
-    raise LogError("is not a text file", where=path, hint=hint)
+    raise LogError("is not a text file", path, hint)
 
 
 def split(line: str, separator: str) -> list[str]:

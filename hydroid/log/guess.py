@@ -59,7 +59,7 @@ def guess_columns(
     time = max((c for c in columns if c.kind == "time"), key=lambda c: _rises(c.values), default=None)
     if time is None:
         hint = f"it has {listed([*filter(None, table.names)], 6)}"
-        raise LogError("has no column that looks like a time", where=table.source, hint=hint)
+        raise LogError("has no column that looks like a time", table.source, hint)
     step = np.nanmedian(np.diff(time.values))
     unit = time.unit or likely_time_unit(step) or "s"
     step *= UNITS[unit].factor

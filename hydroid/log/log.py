@@ -129,7 +129,7 @@ class LogFinding(Finding):
 
     def error(self) -> LogError:
         """Return the finding as the error that ends a command."""
-        return LogError(self.what, where=self.where, hint=self.hint)
+        return LogError(self.what, self.where, self.hint)
 
     def __str__(self) -> str:
         return str(self.error())

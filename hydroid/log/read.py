@@ -41,7 +41,7 @@ def open_table(path: Path, settings: LogSettings = DEFAULT) -> Table:
         data = b"#ROSBAG V" if folder else path.read_bytes()
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        raise LogError(f"cannot be read ({reason})", where=path) from None
+        raise LogError(f"cannot be read ({reason})", path) from None
     if data.startswith((b"#ROSBAG V", b"\x89MCAP0", b"SQLite format 3")):
         return open_bag(path, settings.time.column, settings.period_s)
     if data.startswith(b"PAR1"):
@@ -75,10 +75,10 @@ def check_log(
         needed, signals = {*compared, *settings.joints}, map_signals(settings, ranges)
         if (last := max(needed, default=0)) > len(ranges):
             what = f"no joint {last}; the arm has joints 1 to {len(ranges)}"
-            raise LogError(what, where=source, hint="correct outputs or log.joints")
+            raise LogError(what, source, "correct outputs or log.joints")
         if unmapped := [joint for joint in compared if settings.columns("angle", joint) is None]:
             what = f"output joint {unmapped[0]} has no angle column"
-            raise LogError(what, where=source, hint="map it in log.joints, or take another")
+            raise LogError(what, source, "map it in log.joints, or take another")
         table = open_table(path, settings)
         if outputs is None:
             signals = [s for s in signals if s.kind in ("time", "command") or s.name in table.names]
@@ -155,7 +155,7 @@ def _match(
             places = listed([*dict.fromkeys(f"log.{one.kind}" for one in lacking)])
             hint = f"give {places} in the config the right column, or null if the log has none"
         line = f", line {table.header}" if table.header else ""
-        raise LogError(what, where=f"{table.source}{line}", hint=hint)
+        raise LogError(what, f"{table.source}{line}", hint)
     return wanted
 
 
@@ -202,10 +202,10 @@ def _refuse_loss(path: Path, log: Log, mapped: set[tuple[str, int]]) -> None:
     for joint, (driven, measured) in enumerate(zip(log.driven, log.measured, strict=True), 1):
         if driven and ("command", joint) not in mapped:
             what = f"joint {joint} is driven but no column holds its command"
-            raise LogError(what, where=path, hint=f"map a column in log.joints.{joint}.command")
+            raise LogError(what, path, f"map a column in log.joints.{joint}.command")
         if not measured and ("angle", joint) in mapped:
             hint = f"set log.joints.{joint}.angle: null"
-            raise LogError(f"joint {joint} has no angle to write", where=path, hint=hint)
+            raise LogError(f"joint {joint} has no angle to write", path, hint)
 
 
 def _cells(signal: Signal, values: Array, exact: bool) -> list[str]:

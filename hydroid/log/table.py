@@ -79,7 +79,7 @@ class Table:
             if len(cells) != len(column):
                 what = f"holds {len(cells)} values, but column {first} holds {len(column)}"
                 where = f"{self.source}, column {signal.name}"
-                raise LogError(what, where=where, hint="all columns of a log have one clock: resample it")
+                raise LogError(what, where, "all columns of a log have one clock: resample it")
             numbers, timed = _as_numbers(cells)
             with np.errstate(all="ignore"):
                 column[:] = numbers * (1.0 if timed else signal.gain) + signal.offset
@@ -175,10 +175,9 @@ def format_library(package: str, extra: str, path: Path, kind: str) -> Generator
         library = import_module(package)
     except ImportError:
         what = f"needs the package {package.partition('.')[0]}, which is not installed"
-        raise LogError(what, where=path, hint=f"pip install 'hydroid[{extra}]'") from None
+        raise LogError(what, path, f"pip install 'hydroid[{extra}]'") from None
     try:
         yield library
     except Exception as error:
         reason = " ".join(str(error).split())[:200] or type(error).__name__
-        what = f"cannot be read as {kind} ({reason})"
-        raise LogError(what, where=path, hint="save it again") from None
+        raise LogError(f"cannot be read as {kind} ({reason})", path, "save it again") from None

@@ -46,7 +46,7 @@ def open_workers(dask: str | None) -> Generator[DaskWorkers | None]:
         from distributed import Client
     except ImportError as error:
         hint = "install it: pip install 'hydroid[cluster]'"
-        raise SettingsError(f"Dask cannot be imported ({error})", where="--dask", hint=hint) from None
+        raise SettingsError(f"Dask cannot be imported ({error})", "--dask", hint) from None
     with ExitStack() as stack:
         # HTTP servers of what is started here have no TLS, and serve nothing
         closed = {f"distributed.{name}.http.routes": list[str]() for name in ("scheduler", "worker")}
@@ -67,9 +67,7 @@ def open_workers(dask: str | None) -> Generator[DaskWorkers | None]:
             _close(client)
             words = " ".join(str(error).split())
             hint = "check the address; for tls:// name the folder of its credentials in DASK_CONFIG"
-            raise RunError(
-                f"no Dask scheduler answers ({words})", where=f"--dask {dask}", hint=hint
-            ) from None
+            raise RunError(f"no Dask scheduler answers ({words})", f"--dask {dask}", hint) from None
         stack.callback(_close, client)
         yield DaskWorkers(client)
 
@@ -138,14 +136,13 @@ def _address(given: str) -> str:
         scheme, host = parse_address(address)[0], get_address_host(address)
     except (OSError, ValueError, TypeError, KeyError):
         hint = "give local[:N], tls://HOST:PORT, or a scheduler file"
-        raise SettingsError("is no Dask scheduler", where=where, hint=hint) from None
+        raise SettingsError("is no Dask scheduler", where, hint) from None
     local = host == "localhost"
     with suppress(ValueError):
         local |= ipaddress.ip_address(host).is_loopback
     if scheme != "tls" and not local:
         what = "without TLS anyone who reaches it can run code as you"
-        hint = "start it with TLS as examples/cluster/dask.sbatch does"
-        raise SettingsError(what, where=where, hint=hint)
+        raise SettingsError(what, where, "start it with TLS as examples/cluster/dask.sbatch does")
     return address
 
 

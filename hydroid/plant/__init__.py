@@ -43,5 +43,5 @@ def load_plant(source: Any, *, overrides: Mapping[str, Any] | None = None, **how
     else:
         identified = load_identified(None, source, overrides, nominal=True)
         if identified.settings.stage == "mech":
-            raise SettingsError("stage mech has no nominal gain", where=source, hint="name a run folder")
+            raise SettingsError("stage mech has no nominal gain", source, "name a run folder")
     return Plant(identified, **how)

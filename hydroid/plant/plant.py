@@ -67,14 +67,13 @@ class Plant:
         self._active = np.isin(numbers, self.joints)
         if stray := wanted.difference(numbers, arm.joint_names):
             what = f"the arm has joints 1 to {len(arm.joints)}: {', '.join(arm.joint_names)}"
-            raise SettingsError(what, where=f"joints {[*stray]}")
+            raise SettingsError(what, f"joints {[*stray]}")
         self._moving = self._active | (settings.simulation.other_joints == "passive")
         self.timestep = settings.log.period_s / settings.simulation.steps
         self.period = settings.log.period_s if period is None else period
         self._steps = round(self.period / self.timestep)
         if self._steps < 1 or abs(self._steps * self.timestep - self.period) > 1e-9:
-            what = f"must be a multiple of {self.timestep:g} s"
-            raise SettingsError(what, where=f"period {self.period:g} s")
+            raise SettingsError(f"must be a multiple of {self.timestep:g} s", f"period {self.period:g} s")
         self._spec = load_model(arm)
         if payload:
             self._spec = add_payload(self._spec, arm, payload)
@@ -82,8 +81,7 @@ class Plant:
         self._locked_pose: Array | None = None
         if settings.stage == "hyd" and not has_force_curve(self._candidate.joints)[0]:
             hint = "it takes F1 > F2 > 0, x2 > x1 > 0 and F1/F2 < (x2/x1)²"
-            what = "no force-stroke curve runs through its two points"
-            raise SettingsError(what, where=identified.source, hint=hint)
+            raise SettingsError("no force-stroke curve runs through its two points", identified.source, hint)
         compile_rollout()
         self.reset()
 
@@ -143,7 +141,7 @@ class Plant:
         else:
             self._pose = np.array(start, float)
             if self._pose.shape != self._active.shape or not np.isfinite(self._pose).all():
-                raise SettingsError(f"a pose needs {len(self._active)} finite angles [rad]", where=f"{start}")
+                raise SettingsError(f"a pose needs {len(self._active)} finite angles [rad]", f"{start}")
         locked = np.where(self._moving, 0.0, self._pose)
         if self._locked_pose is None or not np.array_equal(locked, self._locked_pose):
             self._lock(locked)
@@ -187,7 +185,7 @@ class Plant:
             self._advance(self.data.ctrl)
         self._taken += self._steps
         if self._warnings.any() or not np.isfinite(self.data.qpos).all():
-            raise RunError(f"the simulation diverged before {self.time:.2f} s", where=self.identified.source)
+            raise RunError(f"the simulation diverged before {self.time:.2f} s", self.identified.source)
         return self.angle
 
     def save(self, folder: str | Path) -> None:

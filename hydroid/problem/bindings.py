@@ -72,8 +72,8 @@ class Bindings:
             for joint in sorted(moved - served)[:1]:
                 raise SettingsError(
                     f"joint {joint + 1} is driven or compared, but no parameter is its {quantity}",
-                    where="parameters",
-                    hint="add one, or leave the joint's command out with log.joints",
+                    "parameters",
+                    "add one, or leave the joint's command out with log.joints",
                 )
 
     def _refuse_overlap(self, names: list[str]) -> None:
@@ -84,8 +84,8 @@ class Bindings:
                 if (other := taken.setdefault((row.quantity, place, row.logs), name)) != name:
                     raise SettingsError(
                         f"{other} and {name} both set the {row.quantity} of the same joint or link",
-                        where=f"parameters.{name}",
-                        hint="give each its own joints, or remove one",
+                        f"parameters.{name}",
+                        "give each its own joints, or remove one",
                     )
 
 
@@ -95,10 +95,10 @@ def _places(arm: Arm, name: str, settings: ParameterSettings) -> list[int]:
     if settings.link is not None:
         if settings.link not in arm.link_names:
             known = ", ".join(arm.link_names)
-            raise SettingsError(f"no link {settings.link!r}", where=where, hint=f"links: {known}")
+            raise SettingsError(f"no link {settings.link!r}", where, f"links: {known}")
         return [arm.link_names.index(settings.link)]
     count = len(arm.joint_names)
     joints = range(1, count + 1) if settings.joints is None else settings.joints
     if any(joint > count for joint in joints):
-        raise SettingsError(f"the arm has joints 1 to {count}", where=f"{where}.joints")
+        raise SettingsError(f"the arm has joints 1 to {count}", f"{where}.joints")
     return [joint - 1 for joint in joints]

@@ -161,8 +161,8 @@ def overall_objective(error: Array, measured: Array, settings: ObjectiveSettings
     if scale == 0:
         raise SettingsError(
             "a relative norm has nothing to divide by: the measured output of a segment is zero throughout",
-            where="objective.relative",
-            hint="use relative: false, or other segments",
+            "objective.relative",
+            "use relative: false, or other segments",
         )
     return value / scale
 
@@ -187,6 +187,6 @@ def segment_bounds(samples: int, segments: int) -> Ints:
     """
     if segments > samples:
         what = f"{segments} segments do not fit into {samples} samples"
-        raise SettingsError(what, where="objective.segments", hint="each segment needs a sample of its own")
+        raise SettingsError(what, "objective.segments", "each segment needs a sample of its own")
     edges = np.arange(segments + 1, dtype=np.int64) * samples // segments
     return np.stack((edges[:-1], edges[1:]), axis=1)

@@ -107,8 +107,8 @@ class Priors:
         if off[worst] > 1.5 * REACH:
             raise SettingsError(
                 "cannot hold within the bounds together with the other priors",
-                where=f"priors.{self.names[worst]}",
-                hint="widen the bounds, correct the value, or give it a larger sd",
+                f"priors.{self.names[worst]}",
+                "widen the bounds, correct the value, or give it a larger sd",
             )
 
 
@@ -130,7 +130,7 @@ def _combination(name: str, prior: PriorSettings, parameters: ParameterSet) -> _
     for parameter in prior.factors:
         if parameter not in names:
             hint = f"parameters: {', '.join(names)}"
-            raise SettingsError(f"no parameter {parameter!r}", where=f"priors.{name}", hint=hint)
+            raise SettingsError(f"no parameter {parameter!r}", f"priors.{name}", hint)
     factors = np.array([prior.factors.get(n, 0.0) for n in names])
     if not factors[free].any():
         return None
@@ -142,5 +142,5 @@ def _combination(name: str, prior: PriorSettings, parameters: ParameterSet) -> _
     divisor = names.index(prior.ratio[1])
     p = parameters.parameters[divisor]
     if (p.lower if p.fixed is None else p.fixed) <= 0:
-        raise SettingsError(f"a ratio divides by {p.name}, which may be 0", where="priors")
+        raise SettingsError(f"a ratio divides by {p.name}, which may be 0", "priors")
     return _Combination(name, factors, 0.0, sd, divisor, step)

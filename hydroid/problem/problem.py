@@ -91,7 +91,7 @@ class Problem:
         self.bindings.refuse_idle(np.any([log.driven for log in logs], axis=0), outputs)
         self.parameters = self.bindings.parameters
         if not self.parameters.free.any():
-            raise SettingsError("no parameter is free", where="parameters", hint="fix fewer of them")
+            raise SettingsError("no parameter is free", "parameters", "fix fewer of them")
         self.priors = Priors(settings.priors, self.parameters)
         pressures = [compared_pressures(log, settings) for log in logs]
         self._simulations = [

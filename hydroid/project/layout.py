@@ -50,8 +50,7 @@ def find_layout(table: Table, arm: Arm, order: Sequence[str] = ()) -> Layout:
     names = arm.joint_names
     for name in order:
         if name not in names:
-            hint = f"the arm's joints: {', '.join(names)}"
-            raise SettingsError(f"no joint {name!r}", where="--joints", hint=hint)
+            raise SettingsError(f"no joint {name!r}", "--joints", f"the arm's joints: {', '.join(names)}")
     places = [names.index(name) for name in order or names]
     slides = [k for k, place in enumerate(places, 1) if arm.joints[place].slides]
     links = [arm.link_names[place] for place in places]
@@ -64,7 +63,7 @@ def find_layout(table: Table, arm: Arm, order: Sequence[str] = ()) -> Layout:
     measured = [joint for joint, entry in section["joints"].items() if entry["angle"]]
     if not measured:
         hint = f"rename them, or write the log section by hand; columns: {', '.join(table.names)}"
-        raise LogError("has no column that looks like an angle", where=table.source, hint=hint)
+        raise LogError("has no column that looks like an angle", table.source, hint)
     free = np.tile([-np.inf, np.inf], (len(names), 1))
     settings = validate(section, LogSettings, table.source)
     log, findings = check_log(Path(table.source), settings, free)

@@ -63,7 +63,7 @@ def write_project(
     taken = [name for name in FILES if os.path.lexists(folder / name)]
     if not options.pop("force", False) and taken:
         hint = "name another folder, or replace the project's files with --force"
-        raise SettingsError(f"holds {taken[0]} already", where=folder, hint=hint)
+        raise SettingsError(f"holds {taken[0]} already", folder, hint)
     table = open_table(logs[0]) if logs else None
     imported, reference, own = None, ARM, None
     if robot is not None and robot.suffix.lower() in (".yaml", ".yml"):
@@ -134,7 +134,7 @@ def _stage(folder: Path) -> Generator[Path]:
     try:
         stage = tempfile.TemporaryDirectory(prefix=".hydroid-init-", dir=home, ignore_cleanup_errors=True)
     except OSError as error:
-        raise RunError(f"cannot be written ({error.strerror})", where=folder) from None
+        raise RunError(f"cannot be written ({error.strerror})", folder) from None
     with stage as path:
         yield Path(path)
 
@@ -155,5 +155,5 @@ def _move(stage: Path, folder: Path) -> tuple[str, ...]:
                 for place, back in ((folder, stage), (old, folder)):
                     if os.path.lexists(place / name) and not os.path.lexists(back / name):
                         os.rename(place / name, back / name)
-            raise RunError(f"cannot be written ({error.strerror})", where=folder) from None
+            raise RunError(f"cannot be written ({error.strerror})", folder) from None
     return names

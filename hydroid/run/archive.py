@@ -100,12 +100,11 @@ class CheckpointFile(UserDict[str, Arrays]):
         except (ValueError, OSError) as error:
             if not before:
                 hint = "remove the run's checkpoints to begin again from the seed"
-                what = f"is damaged ({type(error).__name__})"
-                raise RunError(what, where=file, hint=hint) from None
+                raise RunError(f"is damaged ({type(error).__name__})", file, hint) from None
             earlier = self._read(*before)
             _log.warning("%s: is damaged; going on from the checkpoint before it", file)
             file.replace(file.with_suffix(f".damaged{file.suffix}"))
             return earlier
         if content["run"] != self._run:
-            raise RunError("is another run's", where=file, hint="put the run's own checkpoint back")
+            raise RunError("is another run's", file, "put the run's own checkpoint back")
         return content["parts"]

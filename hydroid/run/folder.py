@@ -131,8 +131,7 @@ class RunFolder:
         # it is the run's if it is empty, or holds a run's description or at least its lock
         other = self.path.exists() and not (self.exists or (self.path / LOCK).exists())
         if other and (not self.path.is_dir() or any(self.path.iterdir())):
-            hint = "choose another folder with --out"
-            raise RunError("exists and holds no run", where=self.path, hint=hint)
+            raise RunError("exists and holds no run", self.path, "choose another folder with --out")
         with locked(self.path), run_log(self.path / "run.log"):
             remove_parts(self.path)
             try:
@@ -159,7 +158,7 @@ class RunFolder:
         self.refuse_changes()
         if other := difference(self.identity(), own):
             hint = "continue it with the command that began it, or choose another folder"
-            raise RunError(f"the run here {other}", where=self.path, hint=hint)
+            raise RunError(f"the run here {other}", self.path, hint)
         checkpoints = self.checkpoints()
         self.status("running")
         _log.info("resumed from %s", ", ".join(checkpoints) or "no checkpoint")
@@ -173,7 +172,7 @@ class RunFolder:
         for name, known in self.identity().get("files", {}).items():
             if hashes.get(name) != known:
                 hint = "put it back as it was, or choose another folder"
-                raise RunError("has changed since the run began", where=self.path / name, hint=hint)
+                raise RunError("has changed since the run began", self.path / name, hint)
 
     def identity(self) -> Plain:
         """Read the run's description; raises RunError: missing or damaged."""
@@ -182,9 +181,9 @@ class RunFolder:
             content = json.loads(file.read_text(encoding="utf-8"))
         except (OSError, ValueError, RecursionError) as error:
             what = f"cannot be read as a run ({getattr(error, 'strerror', None) or 'it is damaged'})"
-            raise RunError(what, where=file, hint="name a folder that a fit has made") from None
+            raise RunError(what, file, "name a folder that a fit has made") from None
         if not (isinstance(content, dict) and isinstance(content.get("logs", {}), dict)):
-            raise RunError("is not a run's description", where=file)
+            raise RunError("is not a run's description", file)
         return content
 
     def settings(self) -> FitSettings:

@@ -45,7 +45,7 @@ def locked(folder: Path) -> Generator[None]:
         file = (folder / LOCK).open("a+b", buffering=0)  # for writing: NFS grants no exclusive lock otherwise
         _take(file, folder)
     except OSError as error:
-        raise RunError(f"cannot be written ({error.strerror})", where=folder) from None
+        raise RunError(f"cannot be written ({error.strerror})", folder) from None
     with file:  # to close it ends the lock
         yield
 
@@ -60,7 +60,7 @@ def _take(file: IO[bytes], folder: Path) -> None:
             file.seek(0)
             holder = file.read(200).decode(errors="replace").strip() or "another process"
             hint = "wait for it to end, or choose another --out"
-            raise RunError(f"is in use by {holder}", where=folder, hint=hint) from None
+            raise RunError(f"is in use by {holder}", folder, hint) from None
         _log.warning("%s: no lock on this file system (%s); let no two runs use it", folder, error.strerror)
         return
     file.truncate(0)
@@ -75,7 +75,7 @@ def run_log(file: Path) -> Generator[None]:
     try:
         handler = _File(file, encoding="utf-8")
     except OSError as error:
-        raise RunError(f"cannot be written ({error.strerror})", where=file) from None
+        raise RunError(f"cannot be written ({error.strerror})", file) from None
     with logging_to(handler):
         yield
 

@@ -170,10 +170,10 @@ def _read(file: Path, kind: type[T]) -> T:
     try:
         return _adapter(kind).validate_python((unpack(file),))[0]
     except FileNotFoundError:
-        raise RunError("holds no result", where=file.parent, hint="finish the fit: --resume") from None
+        raise RunError("holds no result", file.parent, "finish the fit: --resume") from None
     except (OSError, ValueError, KeyError, EOFError, ValidationError) as error:
         what = f"cannot be read ({type(error).__name__})"
-        raise RunError(what, where=file, hint="fit again with this version") from None
+        raise RunError(what, file, "fit again with this version") from None
 
 
 @cache
@@ -194,7 +194,7 @@ def read_runs(names: Sequence[str], out: str | Path | None) -> tuple[Record, ...
     Raises RunError: no run is left, two differ in more than their seeds or in nothing, or `out` is a run.
     """
     if out is not None and RunFolder(Path(out)).exists:
-        raise RunError("is a run itself", where=out, hint="name another folder")
+        raise RunError("is a run itself", out, "name another folder")
     runs: list[Record] = []
     groups = ([name] if os.path.exists(name) else glob.glob(name) or [name] for name in names)
     for path in sorted({path for group in groups for path in group}):
@@ -203,15 +203,14 @@ def read_runs(names: Sequence[str], out: str | Path | None) -> tuple[Record, ...
         except HydroidError as error:
             _log.warning("left out: %s", error)
     if not runs:
-        hint = "resume those that were stopped"
-        raise RunError("no finished run is there", where=" ".join(names), hint=hint)
+        raise RunError("no finished run is there", " ".join(names), "resume those that were stopped")
     runs.sort(key=lambda run: run.seed)
     for before, run in pairwise(runs):
         other = difference(run.identity, before.identity, but="search.seed")
         if run.seed == before.seed:
             other = f"has seed {run.seed}, as {before.folder} has"
         if other:
-            raise RunError(other, where=run.folder, hint="leave it out, or merge it apart")
+            raise RunError(other, run.folder, "leave it out, or merge it apart")
     return tuple(runs)
 
 
@@ -219,9 +218,9 @@ def _finished(path: str) -> Record:
     """Read a finished run; raises HydroidError: it is not finished or is damaged."""
     folder = RunFolder(Path(path))
     if (status := folder.identity().get("status")) != "done":
-        raise RunError(f"is not finished ({status})", where=path, hint="resume it")
+        raise RunError(f"is not finished ({status})", path, "resume it")
     folder.refuse_changes()
     record = load_record(path)
     if record.summary.rms_deg is None:
-        raise RunError("has no final estimate that could be simulated", where=path)
+        raise RunError("has no final estimate that could be simulated", path)
     return record

@@ -104,9 +104,9 @@ class Arm(Settings):
         for name in self.actuators:
             if name not in names:
                 hint = f"the model's joints: {', '.join(names)}"
-                raise SettingsError(f"actuators.{name}: no such joint", where=self.where, hint=hint)
+                raise SettingsError(f"actuators.{name}: no such joint", self.where, hint)
         if self.payload is not None and self.payload not in [model.site(s).name for s in range(model.nsite)]:
-            raise SettingsError(f"payload: the model has no site {self.payload!r}", where=self.where)
+            raise SettingsError(f"payload: the model has no site {self.payload!r}", self.where)
         return tuple(self._joint(name) for name in names)
 
     @cached_property
@@ -151,7 +151,7 @@ class Arm(Settings):
                 zero = _at_zero(self.model)
                 actuator = make_cylinder(actuator, bare.limits, zero, name, slides=slides)
             except ValueError as error:
-                raise SettingsError(f"actuators.{name}: {error}", where=self.where) from None
+                raise SettingsError(f"actuators.{name}: {error}", self.where) from None
         return replace(bare, actuator=actuator)
 
     @property
@@ -215,8 +215,7 @@ def load_arm(name: str | Path, beside: Path | None = None) -> Arm:
 def _at_zero(path: Path) -> "mujoco.MjData":
     """The compiled MJCF with all joints at 0."""
     if not path.is_file():
-        hint = "give the arm's MJCF; `hydroid init` writes one"
-        raise ModelError("no such model", where=path, hint=hint)
+        raise ModelError("no such model", path, "give the arm's MJCF; `hydroid init` writes one")
     state = path.stat()
     return _compiled(path, state.st_mtime_ns, state.st_size)
 

@@ -37,12 +37,12 @@ def read_yaml(path: Path) -> tuple[dict[str, Any], Lines]:
         text = data.decode("utf-8-sig")
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
-        raise SettingsError(f"cannot be read ({reason})", where=path) from None
+        raise SettingsError(f"cannot be read ({reason})", path) from None
     if len(data) > most:
-        raise SettingsError(f"is larger than {most >> 10} KiB, too large for settings", where=path)
+        raise SettingsError(f"is larger than {most >> 10} KiB, too large for settings", path)
     values, lines = read_document(text, str(path))
     if not isinstance(values, dict):
-        raise SettingsError("must be a mapping of settings", where=path, hint="write `key: value` lines")
+        raise SettingsError("must be a mapping of settings", path, "write `key: value` lines")
     return values, lines
 
 
@@ -59,21 +59,21 @@ def read_document(text: str, source: str) -> tuple[Any, Lines]:
         where = f"{source}, line {mark.line + 1}, column {mark.column + 1}" if mark else source
         problem = str(getattr(error, "problem", None) or getattr(error, "reason", None))
         plain = next((words for part, words in _PLAIN.items() if part in problem), problem)
-        raise SettingsError(f"is not YAML: {plain}", where=where) from None
+        raise SettingsError(f"is not YAML: {plain}", where) from None
     except RecursionError:
-        raise SettingsError("is not YAML: it is nested too deeply", where=source) from None
+        raise SettingsError("is not YAML: it is nested too deeply", source) from None
 
 
 def _value(node: yaml.Node, path: tuple[str, ...], lines: Lines, source: str) -> Any:
     """The value of a node; the lines of all that is in it are noted."""
     where = f"{source}, line {node.start_mark.line + 1}"
     if len(lines) >= 20_000:  # aliases count whenever they are used: a few lines cannot expand to billions
-        raise SettingsError("holds more than 20000 values", where=source)
+        raise SettingsError("holds more than 20000 values", source)
     if len(path) > 40:
-        raise SettingsError("is nested more than 40 deep", where=where)
+        raise SettingsError("is nested more than 40 deep", where)
     kind = node.tag.removeprefix("tag:yaml.org,2002:")
     if kind not in ("str", "seq", "map"):
-        raise SettingsError(f"a value of type {kind!r} is not allowed", where=where)
+        raise SettingsError(f"a value of type {kind!r} is not allowed", where)
     lines.setdefault(path, node.start_mark.line + 1)
     if isinstance(node, yaml.ScalarNode):
         return _scalar(node, where)
@@ -83,11 +83,11 @@ def _value(node: yaml.Node, path: tuple[str, ...], lines: Lines, source: str) ->
     for key, item in node.value:
         where = f"{source}, line {key.start_mark.line + 1}"
         if not isinstance(key, yaml.ScalarNode):
-            raise SettingsError("a key must be plain text or a number", where=where)
+            raise SettingsError("a key must be plain text or a number", where)
         name = _scalar(key, where)
         place = (*path, str(name))  # 02 and 2 are the same joint
         if place in lines:
-            raise SettingsError(f"{'.'.join(place)} occurs twice", where=where)
+            raise SettingsError(f"{'.'.join(place)} occurs twice", where)
         lines[place] = key.start_mark.line + 1
         values[name] = _value(item, place, lines, source)
     return values
@@ -96,7 +96,7 @@ def _value(node: yaml.Node, path: tuple[str, ...], lines: Lines, source: str) ->
 def _scalar(node: yaml.ScalarNode, where: str) -> Any:
     text = str(node.value)
     if not all(c.isprintable() or c in "\t\n" for c in text):
-        raise SettingsError("a text contains characters that cannot be printed", where=where)
+        raise SettingsError("a text contains characters that cannot be printed", where)
     if node.style is not None:  # quoted, or a block of text
         return text
     if text.lower() in _WORDS:

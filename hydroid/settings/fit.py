@@ -207,4 +207,4 @@ def cell_settings(study: StudySettings, path: Path, extra: Changes | None = None
         }
     except SettingsError as error:
         where = error.where.replace("--set", f"{path}:")
-        raise SettingsError(error.what, where=where, hint=error.hint) from None
+        raise SettingsError(error.what, where, error.hint) from None

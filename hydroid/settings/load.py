@@ -119,7 +119,7 @@ def validate(
         found.setdefault(where, f"{name}: {problem}" if name else problem)
     (where, what), *others = found.items()
     also = listed([f"{place.removeprefix(f'{source}, ')}: {other}" for place, other in others], 3)
-    raise SettingsError(what, where=where, hint=also and f"also {also}")
+    raise SettingsError(what, where, also and f"also {also}")
 
 
 def parse_override(text: str) -> tuple[str, Any]:
@@ -128,7 +128,7 @@ def parse_override(text: str) -> tuple[str, Any]:
     """
     key, equals, value = text.partition("=")
     if not equals or not key.strip():
-        raise SettingsError("needs key=value", where=f"--set {text}", hint="for example --set search.seed=3")
+        raise SettingsError("needs key=value", f"--set {text}", "for example --set search.seed=3")
     return key.strip(), read_document(value, f"--set {text}")[0]
 
 
@@ -140,7 +140,7 @@ def replace_setting(values: Plain, key: str, value: Any) -> None:
     for folder in folders:
         inner = values.setdefault(folder, {})
         if not isinstance(inner, dict):
-            raise SettingsError(f"{folder} has no settings below it", where=f"--set {key}")
+            raise SettingsError(f"{folder} has no settings below it", f"--set {key}")
         values = inner
     values[last] = value
 

@@ -64,7 +64,7 @@ def render_motion(
     begin, end = max(span[0], 0.0), min(span[1], motion.time[-1])
     if not begin < end:
         what = f"{span[0]:g}:{span[1]:g} s holds nothing of a motion of {motion.time[-1]:g} s"
-        raise SettingsError(what, where="--span", hint="write FROM:TO in seconds")
+        raise SettingsError(what, "--span", "write FROM:TO in seconds")
     size, rate = KINDS[kind]
     count = max(1, int(np.ceil((end - begin) * rate - 1e-9)))
     error = f", rms error {motion.error:.2g}°" if np.isfinite(motion.error) else ""
@@ -82,7 +82,7 @@ def check_kind(file: Path) -> str:
     """Return the ending of a file that `render_motion` writes; raises SettingsError: another one."""
     kind = file.suffix.lower()
     if kind not in KINDS:
-        raise SettingsError("is no film or picture", where=file, hint=f"end it in {', '.join(KINDS)}")
+        raise SettingsError("is no film or picture", file, f"end it in {', '.join(KINDS)}")
     return kind
 
 

@@ -41,7 +41,7 @@ def simulated_motion(model: IdentifiedModel, logs: Mapping[str, Log]) -> Motion:
     machine = load_machine(arm, pair=ALONE not in logs)
     for log in logs.values():
         if not log.driven.any():
-            raise SettingsError("commands nothing", where=log.source, hint="name a log with commands")
+            raise SettingsError("commands nothing", log.source, "name a log with commands")
     simulated = {side: predict_log(model, log).angle for side, log in logs.items()}
     errors = [
         (log.angle - simulated[side])[:, log.driven & _moves(log.angle)].ravel() for side, log in logs.items()

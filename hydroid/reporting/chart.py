@@ -79,14 +79,13 @@ class Panel:
 
 @record
 class Chart:
-    """Panels that belong together, with one legend, row by row in `columns` on a wide screen and in files.
+    """Panels that belong together, with one legend, one below the other.
 
     Where `linked`, all share their x axis. Of a curve the lowest and the highest sample of `bins` parts is
     drawn.
     """
 
     panels: tuple[Panel, ...]
-    columns: int = 1
     linked: bool = False
     bins: int = 1000
 

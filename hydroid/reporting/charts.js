@@ -95,12 +95,9 @@
     const shown = before?.shown ?? new Map(chart.panels.flatMap((p) => p.marks).filter((m) => m.label).map((m) => [m.label, !m.off]));
     const cells = host.querySelector(".panels");
     cells.replaceChildren();
-    cells.style.setProperty("--columns", chart.columns);
-    const columns = getComputedStyle(cells).gridTemplateColumns.split(" ").length;
-    const each = host.clientWidth / columns;
     let shared = null;
     const panels = chart.panels.filter((panel) => panel.marks.length).map((panel) => {
-      const one = addPanel(panel, shared, shown, each);
+      const one = addPanel(panel, shared, shown, host.clientWidth);
       if (chart.linked) {
         if (!shared) {
           const all = chart.panels.map((p) => extent(p, "x", shown));

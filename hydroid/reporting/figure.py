@@ -4,7 +4,6 @@ import io
 import warnings
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
-from itertools import zip_longest
 from typing import Any
 
 import matplotlib as mpl
@@ -70,16 +69,10 @@ def saved(drawing: Figure, title: str = "") -> tuple[bytes, bytes]:
 
 def figure(chart: Chart) -> Figure:
     """Draw a chart without what is off; within `style`."""
-    rows = -(-len(chart.panels) // chart.columns)
-    heights = [p.height / 80 for p in chart.panels[:: chart.columns]]  # [in], of 80 px
-    width = 6.4 if chart.columns == 1 else 3.6 * chart.columns
-    drawing = Figure((width, sum(heights) + 0.6 * rows + 0.5), layout="constrained")
-    shared = "col" if chart.linked else "none"
-    axes = drawing.subplots(rows, chart.columns, squeeze=False, sharex=shared, height_ratios=heights).ravel()
-    for one, panel in zip_longest(axes, chart.thinned().panels):
-        if panel is None:
-            one.set_axis_off()
-            continue
+    heights = [panel.height / 80 for panel in chart.panels]  # [in], of 80 px
+    drawing = Figure((6.4, sum(heights) + 0.6 * len(heights) + 0.5), layout="constrained")
+    axes = drawing.subplots(len(heights), squeeze=False, sharex=chart.linked, height_ratios=heights).ravel()
+    for one, panel in zip(axes, chart.thinned().panels, strict=True):
         for mark in panel.marks:
             if not mark.off:
                 _draw(one, mark)

@@ -130,7 +130,7 @@ def test_every_kind_of_mark_can_be_drawn():
         Mark("spans", x[:1], end=x[1:2]),
         Mark("rule", y=x[:1]),
     )
-    check(Chart((Panel("x", "y", marks), Panel("x", "", marks[1:4])), columns=2))
+    check(Chart((Panel("x", "y", marks), Panel("x", "", marks[1:4]))))
 
 
 @pytest.mark.parametrize("samples", [1, 7, 2000, 2001, 100_003])

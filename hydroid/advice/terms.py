@@ -68,7 +68,6 @@ def terms(problem: Problem, theta: Array) -> tuple[Term, ...]:
 
 
 def _held(settings: FitSettings) -> Iterator[Term]:
-    """Yield the fixed parameters."""
     for name, p in settings.parameters.items():
         if p.fixed is not None:
             # without bounds from a quarter to four times the value

@@ -104,7 +104,6 @@ def _name(model: mujoco.MjModel, geom: int) -> str:
 
 
 def _pairs(model: mujoco.MjModel) -> list[list[int]]:
-    """Pairs of geoms that MuJoCo would let collide."""
     g, h = np.triu_indices(model.ngeom, 1)
     kinds, masks, bodies = model.geom_contype, model.geom_conaffinity, model.geom_bodyid
     weld, parent = model.body_weldid, model.body_weldid[model.body_parentid[model.body_weldid]]

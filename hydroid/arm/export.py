@@ -82,7 +82,6 @@ def locked_spec(
 
 
 def _set_joint(joint: mujoco.MjsJoint, model: mujoco.MjModel, j: int, *, degrees: bool) -> None:
-    """Give a joint and its body the inertia, damping and spring of the locked arm."""
     body, k, slack = joint.parent, int(model.jnt_bodyid[j]), float(model.qpos_spring[j])
     body.explicitinertial, body.mass, body.ipos = True, model.body_mass[k], model.body_ipos[k]
     body.iquat, body.ialt.type = model.body_iquat[k], mujoco.mjtOrientation.mjORIENTATION_QUAT

@@ -179,7 +179,6 @@ def _add(above: Any, name: str, position: Array, turn: Array, joint: Any, copy: 
 
 
 def _take_over(model: mujoco.MjModel, source: mujoco.MjModel, ids: Sequence[int]) -> None:
-    """Give a model the options of another, and its joints the fields of some joints there."""
     for name in _JOINT_FIELDS:
         getattr(model, name)[:] = getattr(source, name)[ids]
     for name in _OPTIONS:

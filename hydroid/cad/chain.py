@@ -76,7 +76,6 @@ def _hold(spec: mujoco.MjSpec, notes: Notes) -> None:
 
 
 def _path(body: mujoco.MjsBody | None) -> tuple[str, ...]:
-    """The joints from the base to a body."""
     return () if body is None else (*_path(body.parent), *(joint.name for joint in body.joints))
 
 

@@ -8,7 +8,6 @@ import sys
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
-from html import escape
 from pathlib import Path
 from shutil import which
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
@@ -16,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 import typer
 
 from hydroid.errors import HydroidError
-from hydroid.files import Plain
+from hydroid.files import Plain, fill_template
 from hydroid.progress import logging_to
 
 if TYPE_CHECKING:
@@ -59,7 +58,7 @@ class Printed:
         return f"<{type(self).__name__}: {text}>"
 
     def _repr_html_(self) -> str:
-        return "".join(_html(line) for line in (*self.lines, *self.details))
+        return fill_template("commands/notebook.html.j2", lines=(*self.lines, *self.details))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -89,17 +88,6 @@ def written(report: "Page | Mapping[str, Table]", out: str | Path | None) -> lis
 
     write = write_tables if isinstance(report, Mapping) else write_page
     return [*map(str, write(report, Path(out))[-1:])]  # pyright: ignore[reportArgumentType]
-
-
-def _html(line: "Table | str") -> str:
-    if isinstance(line, str):
-        return f"<p>{escape(line)}</p>"
-
-    def row(kind: str, cells: Sequence[str]) -> str:
-        return f"<tr>{''.join(f'<{kind}>{escape(cell)}</{kind}>' for cell in cells)}</tr>"
-
-    body = "".join(row("td", cells) for cells in line.shown)
-    return f"<table><caption>{escape(line.title)}</caption>{row('th', line.header)}{body}</table>"
 
 
 def show(result: Printed, *, as_json: bool, verbose: bool = False) -> None:

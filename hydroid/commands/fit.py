@@ -180,7 +180,6 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
 
 
 def _store(folder: "RunFolder", result: FitResult) -> Path:
-    """Write a finished fit to its folder; return the page."""
     from hydroid.reporting.predictions import draw
     from hydroid.run.archive import pack
     from hydroid.run.record import RESULT, fit_result

@@ -180,13 +180,11 @@ def command(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def _entries(text: str) -> dict[str, tuple[str, str]]:
-    """Return VALUE and text of the parameters that a docstring describes."""
     found = re.findall(r"^ {4}(\w+)(?: \((.+?)\))?: (.*(?:\n {8}.*)*)", text, re.MULTILINE)
     return {name: (value, " ".join(words.split())) for name, value, words in found}
 
 
 def _typed(parameter: inspect.Parameter, value: str, text: str) -> inspect.Parameter:
-    """Return a parameter as typer takes it."""
     names = re.findall(r"\w+", inspect.formatannotation(parameter.annotation))
     one = next(TERMINAL[name] for name in names if name in TERMINAL)
     kind = list[one] if {"Sequence", "LogSources", "SettingChanges"} & {*names} else one

@@ -106,7 +106,6 @@ def fit_hyd(
 
 
 def _fit(stage: str, given: Mapping[str, Any]) -> FitResult:
-    """Fit a stage with the arguments of its command by name, with progress and the workers asked for."""
     keys = {"search.algorithm": "algorithm", "search.seed": "seed", "simulation.threads": "threads"}
     changes = setting_changes(given["set"], {key: given[name] for key, name in keys.items()})
     if given["refinement"] is False:

@@ -168,7 +168,6 @@ def view(
 
 
 def _collisions(logs: "dict[str, Log]", settings: "FitSettings") -> "Result[Clearance]":
-    """Find which bodies meet along a trajectory, when and how deep, and how near they come otherwise."""
     from hydroid.arm.model import ALONE, load_machine
 
     machine = load_machine(settings.arm, pair=ALONE not in logs)

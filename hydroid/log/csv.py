@@ -68,7 +68,6 @@ def open_csv(path: Path, data: bytes) -> Table:
 
 
 def _decode(path: Path, data: bytes) -> str:
-    """Return a file's text."""
     wide = data.startswith((b"\xff\xfe", b"\xfe\xff"))
     for encoding in ("utf-16",) if wide else ("utf-8-sig", "latin-1"):
         with suppress(UnicodeDecodeError):
@@ -132,5 +131,4 @@ def _is_content(line: str, separator: str = ",") -> bool:
 
 
 def _are_units(row: Sequence[str]) -> bool:
-    """Return whether all cells that are not empty hold units."""
     return any(row) and all(map(unit_of, filter(None, row)))

@@ -110,7 +110,6 @@ def _columns(table: Table) -> Iterator[_Column]:
 
 
 def _rises(values: Array) -> bool:
-    """Return whether a time rises steadily."""
     steps = np.diff(values[np.isfinite(values)])
     return bool(len(steps) and (steps > 0).all() and np.median(steps) > 0.5 * steps.mean())
 
@@ -160,7 +159,6 @@ def _by_joint(
 
 
 def _command(table: Table, columns: Sequence[_Column]) -> tuple[Plain, str]:
-    """Return the settings of a command, and its name with what its numbers seem to be."""
     names = [column.name for column in columns]
     likely = likely_range(*np.nan_to_num(table.read([Signal(name, "command") for name in names]).values.T))
     entry: Plain = {"column": names[0] if len(names) == 1 else names}

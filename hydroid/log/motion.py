@@ -143,10 +143,8 @@ def _correlations(leading: Array, following: Array, most: int) -> Array:
         return np.nan_to_num(np.abs([np.corrcoef(*pair)[0, 1] for pair in pairs]))
 
 
-@lru_cache(maxsize=64)
-def motion_of(log: Log, joint: int) -> JointMotion:
-    """Return the motion of a measured joint (number, from 1); all that ask share what it has computed."""
-    return JointMotion(log, joint)
+motion_of = lru_cache(maxsize=64)(JointMotion)
+"""returns the motion of a measured joint (number, from 1); all that ask share what it has computed"""
 
 
 def driven_joints(log: Log) -> dict[int, JointMotion]:

@@ -198,7 +198,6 @@ def write_logs(path: Path, logs: Sequence[tuple[Log, LogSettings]], *, exact: bo
 
 
 def _refuse_loss(path: Path, log: Log, mapped: set[tuple[str, int]]) -> None:
-    """Refuse to lose a command, or to write an angle that is not there."""
     for joint, (driven, measured) in enumerate(zip(log.driven, log.measured, strict=True), 1):
         if driven and ("command", joint) not in mapped:
             what = f"joint {joint} is driven but no column holds its command"

@@ -218,7 +218,6 @@ class Problem:
 
     @cached_property
     def _on_worker(self) -> "Problem":
-        """The same problem as a worker has it."""
         threads = self.settings.simulation.threads or 1
         return Problem(self.settings.changed({"simulation.threads": threads}), self.logs)
 

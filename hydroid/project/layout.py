@@ -86,7 +86,6 @@ def find_layout(table: Table, arm: Arm, order: Sequence[str] = ()) -> Layout:
 
 
 def _remarks(motion: JointMotion, joint: Joint, wrong: bool) -> Iterator[str]:
-    """Yield what a user should know of a joint and its angles in the log."""
     angle, against = motion.log.angle[:, motion.joint - 1], motion.directed[1]
     what, unit, factor = ("positions", "m", 1.0) if joint.slides else ("angles", "deg", np.degrees(1))
     low, high, margin = angle.min(), angle.max(), angle_margin(*joint.limits)

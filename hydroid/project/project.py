@@ -116,7 +116,6 @@ def _write_arm(
     arm: Arm | None = None,
     sizes: Sequence[JointSize] = (),
 ) -> Arm:
-    """Write model, meshes and the arm's file, with actuators of the given sizes, and return the arm."""
     if imported is None:
         files: dict[str, Any] = {MODEL: fill_template("project/boxes.xml.j2")}
         files[ARM] = fill_template("project/boxes.yaml")

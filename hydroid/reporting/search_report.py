@@ -73,5 +73,4 @@ def _chart(x: str, objective: ObjectiveSettings, marks: tuple[Mark, ...]) -> Cha
 
 
 def _shown(objective: ObjectiveSettings, values: Array) -> Array:
-    """Return objectives in deg, or as they are where relative."""
     return finite(values if objective.relative else np.degrees(values))

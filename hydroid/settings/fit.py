@@ -22,7 +22,6 @@ from hydroid.settings.search import DesignSettings, RefinementSettings, SearchSe
 
 
 def _read_arm(value: Any, info: ValidationInfo) -> Any:
-    """Read the arm's file where the settings name one."""
     folder = (info.context or {}).get("folder")
     if isinstance(value, str):
         return load_arm(value, folder)

@@ -146,7 +146,6 @@ def replace_setting(values: Plain, key: str, value: Any) -> None:
 
 
 def _line(key: str, lines: Lines) -> str:
-    """The line of the deepest part of a dotted key that the file contains."""
     parts = tuple(key.split("."))
     place = next((lines[parts[:end]] for end in range(len(parts), 0, -1) if parts[:end] in lines), None)
     return f", line {place}" if place else ""

@@ -81,7 +81,6 @@ ALLOWED = {
 
 
 def _checked(columns: Columns | None, info: ValidationInfo) -> Columns | None:
-    """Refuse a unit or a number of columns that the quantity does not have."""
     kind = str(info.field_name)
     counts, units = ALLOWED[kind]
     if columns and columns.unit not in (None, *units):

@@ -108,7 +108,6 @@ def add_ghost(playback: Playback, scene: mujoco.MjvScene, view: tuple[float, flo
 
 
 def _still(pictures: Iterable[Picture], kind: str) -> bytes:
-    """Return a GIF, or a PNG of the first picture."""
     content, pause = io.BytesIO(), round(1e3 / KINDS[".gif"][1])  # [ms]
     if kind == ".png":
         Image.fromarray(next(iter(pictures))).save(content, "PNG", optimize=True)

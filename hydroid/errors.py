@@ -4,8 +4,6 @@ The command line shows them as one line and ends with exit status 2. Any other e
 hydroid and keeps its traceback.
 """
 
-from functools import partial
-
 LONGEST = 1500  # largest length of a message, in characters
 
 
@@ -25,7 +23,7 @@ class HydroidError(Exception):
 
     def __reduce__(self) -> tuple[object, ...]:
         """Keep the three parts when an error crosses a process boundary."""
-        return partial(type(self), where=self.where, hint=self.hint), (self.what,)
+        return type(self), (self.what, self.where, self.hint)
 
 
 def _one_line(text: str) -> str:

@@ -87,6 +87,10 @@ class ParameterSet:
         """Which parameters are not fixed, shape (P,)."""
         return np.array([p.fixed is None for p in self.parameters], dtype=bool)
 
+    def named(self, chosen: Mask) -> tuple[str, ...]:
+        """Return the names of some of the parameters, shape (P,), in order."""
+        return tuple(np.array(self.names)[chosen].tolist())
+
     @property
     def log(self) -> Mask:
         """Which parameters are on a log scale, shape (P,)."""

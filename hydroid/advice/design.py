@@ -225,5 +225,4 @@ def design(
         if child is not None and score(child) > elite[-1][0]:
             elite = sorted([*elite[:-1], (score(child), tried, child)], reverse=True)
         progress(f"improving: weakest {-100 * elite[0][0]:.3g} %", tried, effort)
-    names = tuple(np.array(parameters.names)[known.box.varied].tolist())
-    return Design(elite[0][2], tuple(random), known, directions, names)
+    return Design(elite[0][2], tuple(random), known, directions, parameters.named(known.box.varied))

@@ -126,7 +126,7 @@ def show_error(error: Any) -> None:
         kind = "usage" if usage else type(error).__name__.removesuffix("Error").lower()
         _print_json({"error": {"kind": kind, "what": what, "where": where, "hint": hint}})
     else:
-        text = str(type(error)(what, where=where, hint=hint))
+        text = str(type(error)(what, where, hint))
         typer.echo(f"hydroid: {' '.join(text.split())}", err=True)
 
 

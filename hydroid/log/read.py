@@ -1,7 +1,5 @@
 """A log file -> `Log`: open, map, repair, check, resample; and back to CSV, which reads the same."""
 
-import csv
-import io
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
@@ -12,7 +10,7 @@ import numpy as np
 
 from hydroid.arrays import Array
 from hydroid.errors import LogError
-from hydroid.files import write_atomic
+from hydroid.files import csv_text, write_atomic
 from hydroid.log.binary import open_bag, open_mat, open_parquet
 from hydroid.log.checks import check_motion, check_recording
 from hydroid.log.csv import open_csv
@@ -190,11 +188,7 @@ def write_logs(path: Path, logs: Sequence[tuple[Log, LogSettings]], *, exact: bo
                     continue
                 values = log.pressure[:, joint, signal.part]
             columns[signal.name] = _cells(signal, values, exact)
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows(zip(*columns.values(), strict=True))
-    write_atomic(path, text.getvalue())
+    write_atomic(path, csv_text([columns, *zip(*columns.values(), strict=True)]))
 
 
 def _refuse_loss(path: Path, log: Log, mapped: set[tuple[str, int]]) -> None:

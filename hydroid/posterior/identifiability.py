@@ -48,7 +48,7 @@ def profile(problem: Problem, uncertainty: Uncertainty, name: str) -> Profile:
     Raises SettingsError: no free parameter of that name.
     """
     parameters, linear, theta = problem.parameters, uncertainty.linear, uncertainty.theta
-    free = [p.name for p in parameters.parameters if p.fixed is None]
+    free = parameters.named(parameters.free)
     if name not in free:
         raise SettingsError(f"no free parameter {name!r} to profile", hint=f"free: {', '.join(free)}")
     i, residuals = parameters.names.index(name), least_squares_rows(problem, theta, linear.prior_weight)

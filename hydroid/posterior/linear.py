@@ -145,7 +145,7 @@ def estimate_box(parameters: ParameterSet, theta: Array) -> Box:
     """
     least = np.where(parameters.log, 0.0, 0.01 * (parameters.upper - parameters.lower))
     scale = np.maximum(np.abs(theta), least)
-    for name in np.array(parameters.names)[parameters.free & (scale == 0)]:
+    for name in parameters.named(parameters.free & (scale == 0)):
         raise SettingsError(
             f"parameter {name} is 0", hint="it is on a log scale: state a value above 0, or fix it"
         )

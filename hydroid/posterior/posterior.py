@@ -136,7 +136,7 @@ class Posterior:
         """Return what a file keeps of it."""
         varied = self.box.varied
         return Covariance(
-            parameters=tuple(np.array(parameters.names)[varied].tolist()),
+            parameters=parameters.named(varied),
             scale=tuple(self.box.scale[varied].tolist()),
             root=tuple(map(tuple, self.root.tolist())),
             quantile=self.quantile,
@@ -166,7 +166,7 @@ def stored_posterior(model: IdentifiedModel) -> Posterior | None:
     if summary is None or summary.covariance is None:
         return None
     known, fitted = summary.covariance, summary.estimate
-    free = {p.name for p in parameters.parameters if p.fixed is None}
+    free = {*parameters.named(parameters.free)}
     if any(name not in fitted or model.values[name] != fitted[name].value for name in free):
         return None
     held = {name for name in free if fitted[name].at_bound}

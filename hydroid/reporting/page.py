@@ -1,7 +1,5 @@
 """A report as data: tables for readers and scripts, sections, charts, steps; `page_file` writes it."""
 
-import csv
-import io
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -9,7 +7,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hydroid.arrays import Array
+from hydroid.files import csv_text
 from hydroid.findings import Finding
 from hydroid.log import Log
 from hydroid.words import number, numbered, plain
@@ -52,9 +50,7 @@ class Table:
 
     def csv(self) -> str:
         """Return header and rows with every bit of the numbers, without title and note."""
-        buffer = io.StringIO()
-        csv.writer(buffer, lineterminator="\n").writerows([self.header, *self.rows])
-        return buffer.getvalue()
+        return csv_text([self.header, *self.rows])
 
     def show(self) -> None:
         """Print the table within the width of the terminal or of COLUMNS; elsewhere lines have any length.
@@ -112,11 +108,6 @@ class Table:
         for row in self.shown:
             table.add_row(*(Text(row[i]) for i in kept))
         return table
-
-
-def numbers_csv(header: Sequence[str], rows: Array) -> str:
-    """Return an array of shape (n, m) as CSV with every bit of the numbers."""
-    return Table("", tuple(header), tuple(map(tuple, rows.tolist()))).csv()
 
 
 def shown(cell: Cell) -> str:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from hydroid.arrays import rms
+from hydroid.files import csv_text
 from hydroid.findings import Finding
 from hydroid.fitting.search import HISTORY
 from hydroid.fitting.validation import Prediction
@@ -16,7 +17,7 @@ from hydroid.fitting.verdict import rms_deg
 from hydroid.reporting import page_file
 from hydroid.reporting.chart import SERIES, Chart, Mark, Panel, finite
 from hydroid.reporting.outlines import motion_section
-from hydroid.reporting.page import Page, Plot, Section, Tab, Table, log_names, numbers_csv, short_name
+from hydroid.reporting.page import Page, Plot, Section, Tab, Table, log_names, short_name
 from hydroid.reporting.parameters_report import (
     parameter_section,
     quantity_section,
@@ -190,6 +191,6 @@ def _data(record: Record) -> dict[str, str]:
     segments = (f"segment_{s}{unit}" for s in range(1, objectives.shape[1]))
     header = (*next(iter(record.summary.estimates.values())).values, *segments, f"overall{unit}")
     return {
-        "history.csv": numbers_csv(HISTORY, result.history),
-        "pareto.csv": numbers_csv(header, np.column_stack([theta, objectives])),
+        "history.csv": csv_text([HISTORY, *result.history.tolist()]),
+        "pareto.csv": csv_text([header, *np.column_stack([theta, objectives]).tolist()]),
     }

@@ -197,8 +197,7 @@ def each_alone(
 ) -> Array:
     """Return theta, (P,), after every joint that can be was refined alone; other arguments as of `refine`.
 
-    What the joints share is known better than when they were first fitted alone. A valve whose compensation
-    stood for it also starts without.
+    What the joints share is known better by now. A valve whose compensation stood for it starts without, too.
     """
     for joint in lone_joints(problem):
         own, parameters = alone(problem, joint, theta), problem.settings.parameters.values()

@@ -111,15 +111,15 @@ def analyse(
     better = tuple(name for name, one in profiles.items() if one.better_optimum)
     findings = (*([Finding("better optimum", "warning", better)] if better else []), *summary.findings)
     intervals = {name: one.interval for name, one in profiles.items()}
-    tables = {"parameters": parameter_table(problem.settings, summary, intervals)}
-    every = tables | {name: t for s in unknown_sections(summary) for name, t in s.tables.items()}
+    table = parameter_table(problem.settings, summary, intervals)
+    tables = {"parameters": table} | {n: t for s in unknown_sections(summary) for n, t in s.tables.items()}
     content: dict[str, Any] = {"at": model.source, "rank": identified.rank}
     content |= summary.changed({"findings": findings}).model_dump(
         mode="json", include={"findings", "estimate"}
     )
     for name, parameter in content["estimate"].items():
         parameter["profile_interval"] = [*map(finite, intervals[name])] if name in intervals else None
-    lines = [*tables.values(), *(f"- {finding}" for finding in findings), *written(every, out)]
+    lines = [table, *(f"- {finding}" for finding in findings), *written(tables, out)]
     return Result(lines, content, Analysis(known, identified, profiles))
 
 

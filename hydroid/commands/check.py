@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from hydroid.commands.inputs import (
     refuse_overwriting,
 )
 from hydroid.commands.logs import check_file, named, plain_findings
+from hydroid.files import Plain
 from hydroid.settings.log import LogSettings
 from hydroid.units import way
 
@@ -69,20 +70,20 @@ def check(
     from hydroid.log import driven_joints, grouped, motion_findings
 
     names, slides = settings.arm.joint_names, settings.arm.slides
-    checks, rows, sizes = list[LogCheck](), list[dict[str, Any]](), list[str]()
+    checks, rows, sizes = list[LogCheck](), list[Plain](), list[str]()
     for path in map(Path, as_list(logs)):
         log, findings = check_file(path, settings, repair=repair)
-        moved, driven, samples, duration = dict[str, float](), list[str](), None, None
+        row: Plain = {"log": str(path), "usable": log is not None, "samples": None, "duration_s": None}
+        moved, driven = dict[str, float](), list[str]()
         if log is not None:
             findings = [*findings, *named([*motion_findings(log)], names)]
-            travels = {joint: motion.travel for joint, motion in driven_joints(log).items()}
-            moved = {names[joint - 1]: travel for joint, travel in travels.items()}
-            driven = [name for name, one in zip(names, log.driven, strict=True) if one]
-            samples, duration = len(log.time), log.duration
-            ways = (f"{names[j - 1]} by {way(d, slides=j in slides)}" for j, d in travels.items())
+            motions = driven_joints(log)
+            moved = {names[j - 1]: motion.travel for j, motion in motions.items()}
+            driven = np.array(names)[log.driven].tolist()
+            row |= {"samples": len(log.time), "duration_s": log.duration}
+            ways = (f"{names[j - 1]} by {way(m.travel, slides=j in slides)}" for j, m in motions.items())
             moves = ", ".join(ways) or "nothing"
-            sizes.append(f"{path}: {samples} samples, {duration:.2f} s; driven and moved: {moves}")
-        row = {"log": str(path), "usable": log is not None, "samples": samples, "duration_s": duration}
+            sizes.append(f"{path}: {len(log.time)} samples, {log.duration:.2f} s; driven and moved: {moves}")
         rows.append(row | {"driven_joints": driven, "moved_deg": moved, "findings": plain_findings(findings)})
         checks.append(LogCheck(path, log, findings, moved))
     every = (finding for one in checks for finding in one.findings)
@@ -123,7 +124,7 @@ def convert(
     """
     from hydroid.log import check_log, guess_columns, open_table, write_log
 
-    path, guess, lines = Path(log), None, list[str]()
+    path, guess, reasons = Path(log), None, list[str]()
     refuse_overwriting(path, out)
     if config is not None or set:
         settings = load_settings(config or "fit-mech", set)
@@ -133,13 +134,13 @@ def convert(
         guess = guess_columns(open_table(path, LogSettings()), most)
         layout = LogSettings.model_validate(guess.log)
         ranges = np.full((max(layout.joints, default=1), 2), np.inf) * [-1, 1]
-        lines = [*guess.reasons]
+        reasons = [*guess.reasons]
     read, findings = check_log(path, layout, ranges, repair=repair)
     if read is None:
         raise findings[0].error()
     write_log(Path(out), read, _plain_layout(read), exact=True)
-    lines += [f"{finding.level}: {finding}" for finding in findings]
-    lines.append(f"{out}: {len(read.time)} samples, {read.duration:.2f} s, every {read.period:g} s")
+    said = (f"{finding.level}: {finding}" for finding in findings)
+    size = f"{out}: {len(read.time)} samples, {read.duration:.2f} s, every {read.period:g} s"
     content = {
         "out": str(out),
         "samples": len(read.time),
@@ -147,9 +148,9 @@ def convert(
         "period_s": read.period,
         "findings": plain_findings(findings),
         "log": guess and guess.log,
-        "reasons": [*guess.reasons] if guess else [],
+        "reasons": reasons,
     }
-    return Result(lines, content, Converted(replace(read, source=str(out)), guess))
+    return Result([*reasons, *said, size], content, Converted(replace(read, source=str(out)), guess))
 
 
 def _plain_layout(log: "Log") -> LogSettings:

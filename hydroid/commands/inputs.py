@@ -10,7 +10,7 @@ import logging
 import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ParamSpec, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, TypeVar
 
 import typer
 
@@ -25,8 +25,7 @@ from hydroid.settings.load import load, parse_override
 if TYPE_CHECKING:
     from hydroid.log import Log
 
-P = ParamSpec("P")
-R = TypeVar("R")
+F = TypeVar("F", bound=Callable[..., Any])
 
 Source = str | Path
 ConfigSource = str | Path | FitSettings
@@ -164,7 +163,7 @@ def as_list(sources: Any) -> list[Any]:
     return [] if sources is None else [sources]
 
 
-def command(function: Callable[P, R]) -> Callable[P, R]:
+def command(function: F) -> F:
     """Make a command of a function: describe all its parameters in its docstring, and keep them for typer."""
     text, _, raises = inspect.cleandoc(function.__doc__ or "").partition("\n\nRaises:")
     text, _, arguments = text.partition("\n\nArgs:")

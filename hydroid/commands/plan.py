@@ -93,16 +93,16 @@ def suggest(
         f"Of {content['tested']} quantities that the fit holds. promised: part of the rms error that freeing "
         f"it saves. {LEFT_OUT}"
     )
-    terms = [term | {"verdict": _verdict(term)} for term in content["terms"]]
+    terms = [
+        term
+        | {"verdict": "free it" if "command" in term else "leave it" if "freed" in term else "others first"}
+        for term in content["terms"]
+    ]
     columns, rows = errors_by_joint(model.settings.arm, [{**content, "name": "none of them"}, *terms])
     tables = {"missing_terms": Table.of("Quantities that the fit holds", TERMS | columns, rows, note)}
     said = [line for one in findings for line in (f"- {one}", f"  {one.numbers.get('command', '')}")]
     lines = [*tables.values(), *filter(str.strip, said), *written(tables, out)]
     return Result(lines, content, findings)
-
-
-def _verdict(term: Plain) -> str:
-    return "free it" if "command" in term else "leave it" if "freed" in term else "others first"
 
 
 @command
@@ -141,8 +141,7 @@ def design(
         SettingsError: limits that no experiment keeps.
         RunError: the folder cannot be written.
     """
-    driven = [int(name) if name.isdigit() else name for name in names(joints)] or None
-    options = {"design.duration_s": duration, "design.joints": driven}
+    options = {"design.duration_s": duration, "design.joints": names(joints) or None}
     model = open_model(fit, config, setting_changes(set, options))
     from hydroid.advice.design import design as best_experiment
     from hydroid.log import write_log
@@ -153,14 +152,12 @@ def design(
     with Progress() as progress:
         existing = read_logs(logs, settings, repair=repair)
         result = best_experiment(settings, model.theta, existing, seed, progress)
-    stages = (result.known.deviations, result.random_deviations, result.after.deviations)
+    deviations = result.known.deviations, result.random_deviations, result.after.deviations
     rows: list[Plain] = [
         {"parameter": name, "estimate": model.values[name]}
         | {"before_percent": 100 * before, "random_percent": 100 * random, "designed_percent": 100 * after}
         | {"gain": random / after, "flag": flag_of(after).value}
-        for name, before, random, after in zip(
-            result.names, *(deviations.tolist() for deviations in stages), strict=True
-        )
+        for name, before, random, after in zip(result.names, *deviations, strict=True)
     ]
     note = (
         f"Noise: {settings.design.noise_deg:g} deg. before: every parameter ±100 % unless logs say more. "

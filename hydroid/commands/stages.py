@@ -3,7 +3,6 @@
 import logging
 from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 from hydroid.commands.fit import FitResult, fit as run_fit
@@ -115,8 +114,8 @@ def _fit(stage: str, given: Mapping[str, Any]) -> FitResult:
         changes = with_mechanics(given["mech"], config, changes)
     settings = load_stage(stage, config, changes, given["start"])
     if config == f"fit-{stage}":
-        note = "note: the arm is the shipped %s: for your machine give --config, which `hydroid init` writes"
-        _log.log(NOTE, note, settings.arm.name)
+        what = f"note: the arm is the shipped {settings.arm.name}"
+        _log.log(NOTE, f"{what}: for your machine give --config, which `hydroid init` writes")
     read = read_logs(given["logs"], settings, repair=given["repair"])
     with open_workers(given["dask"]) as workers, FitProgress(settings) as watcher:
         return run_fit(
@@ -171,16 +170,13 @@ def with_mechanics(mech: "ModelSource | None", config: ConfigSource, changes: Ma
         if key in changes or (p.states_start and not mass):
             continue
         held[key] = value
-        nominal, flag = (
-            nominal_value(settings.arm, settings.hydraulics, p),
-            summary and summary.estimate[name].flag,
-        )
+        nominal = nominal_value(settings.arm, settings.hydraulics, p)
+        flag = summary and summary.estimate[name].flag
         doubtful = mass and flag not in (None, "identifiable", "fixed")
         if doubtful and nominal and abs(value - nominal) > 0.1 * nominal:
             _log.warning(
-                "%s is held at %.3g kg: stage 1 moved it from %.3g kg, but its logs do not determine it "
-                "(%s). Without --mech it is estimated here",
-                *(name, value, nominal, flag),
+                f"{name} is held at {value:.3g} kg: stage 1 moved it from {nominal:.3g} kg, but its logs do "
+                f"not determine it ({flag}). Without --mech it is estimated here"
             )
     if missing:
         hint = "give the run of stage 1 with --mech RUN, or set fixed, nominal or start for each"
@@ -231,7 +227,7 @@ def adapt(
         raise SettingsError("no parameter lowers the error on parts left out", model.source, hint)
     settings = adapted(model, chosen)
     with FitProgress(settings) as watcher:
-        result = run_fit(settings, read, out and Path(out), progress=watcher)
+        result = run_fit(settings, read, out, progress=watcher)
     named = [step | {"parameter": step["parameter"] or "none"} for step in path]
     columns, rows = errors_by_joint(settings.arm, named)
     columns = {"parameter": "freed"} | columns

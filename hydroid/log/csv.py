@@ -12,6 +12,7 @@ import csv
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -41,13 +42,11 @@ def open_csv(path: Path, data: bytes) -> Table:
         raise LogError("has no header: this line holds numbers", where, hint)
     if width == 1:
         raise LogError("has one column only", path, "part cells by , ; | tabs or spaces")
-    units = dict[str, str]()
-    remarks = [f"line {k + 1} is text and left out" for k in left_out]
-    if content[0] < header:
-        remarks.insert(0, f"the names are in line {header + 1}; what stands above is left out")
-    for k in left_out:
-        if _are_units(rows[k]):
-            units |= zip(names, map(bare, rows[k]), strict=True)
+    above = f"the names are in line {header + 1}; what stands above is left out"
+    remarks = [above] if content[0] < header else []
+    remarks += [f"line {k + 1} is text and left out" for k in left_out]
+    cells_of_units = (zip(names, map(bare, rows[k]), strict=True) for k in left_out if _are_units(rows[k]))
+    units = dict(chain.from_iterable(cells_of_units))
     below = [k for k in content if k > header and k not in left_out and _is_content(lines[k], separator)]
     commas = separator != "," and any("," in lines[k] for k in below)
     if commas:

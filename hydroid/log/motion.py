@@ -106,7 +106,6 @@ class JointMotion:
 
     @property
     def _logged(self) -> Array:
-        """The joint's command [%], shape (T,)."""
         return self.log.command[:, self.joint - 1]
 
     @cached_property
@@ -114,14 +113,14 @@ class JointMotion:
         return _correlations(self._logged, self._quick[2], round(0.8 / self.log.period))
 
     @cached_property
-    def _quick(self) -> tuple[Array, Array, Array]:
+    def _quick(self) -> tuple[Array, ...]:
         return self._smoothed(QUICK)
 
     @cached_property
-    def _slow(self) -> tuple[Array, Array, Array]:
+    def _slow(self) -> tuple[Array, ...]:
         return self._smoothed(SLOW)
 
-    def _smoothed(self, seconds: float) -> tuple[Array, Array, Array]:
+    def _smoothed(self, seconds: float) -> tuple[Array, ...]:
         """Return command [%], angle [rad] and speed [rad/s] behind a Gaussian."""
         width, angle = seconds / self.log.period, self.log.angle[:, self.joint - 1]
         reach = int(4 * width + 0.5)
@@ -129,10 +128,9 @@ class JointMotion:
         bell = np.exp(-0.5 * (at / width) ** 2)
         bell /= bell.sum()
         slope = -at / width**2 * bell / self.log.period
-        command, angle = (np.pad(each, reach, "symmetric") for each in (self._logged, angle))
-        pairs = (command, bell), (angle, bell), (angle, slope)
-        command, angle, speed = (np.convolve(*pair, "valid").astype(np.float64) for pair in pairs)
-        return command, angle, speed
+        pairs = (self._logged, bell), (angle, bell), (angle, slope)
+        padded = ((np.pad(signal, reach, "symmetric"), by) for signal, by in pairs)
+        return tuple(np.convolve(*pair, "valid").astype(np.float64) for pair in padded)
 
 
 def _correlations(leading: Array, following: Array, most: int) -> Array:

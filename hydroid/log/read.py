@@ -80,8 +80,7 @@ def check_log(
         table = open_table(path, settings)
         if outputs is None:
             signals = [s for s in signals if s.kind in ("time", "command") or s.name in table.names]
-        signals = _match(table, signals, needed, findings)
-        recording = table.read(signals)
+        recording = table.read(_match(table, signals, needed, findings))
         findings += [log_finding("note", "layout", source, what=one) for one in recording.table.remarks]
         recording = unwrap(recording, findings)
         if repair:
@@ -89,7 +88,7 @@ def check_log(
         findings += check_recording(recording, settings, repaired=repair)
         if all(finding.level != "error" for finding in findings):
             log = resample(recording, settings, len(ranges))
-            findings += check_motion(log, signals, compared, backward, settings.delay_s)
+            findings += check_motion(log, recording.signals, compared, backward, settings.delay_s)
     except LogError as error:
         fault = log_finding("error", "unreadable", source, what=error.what, hint=error.hint)
         findings.append(replace(fault, where=error.where))
@@ -175,7 +174,14 @@ def write_logs(path: Path, logs: Sequence[tuple[Log, LogSettings]], *, exact: bo
     columns: dict[str, list[str]] = {}
     for log, settings in logs:
         signals = map_signals(settings, np.full((log.joints, 2), np.inf))
-        _refuse_loss(path, log, {(signal.kind, signal.joint) for signal in signals})
+        mapped = {(signal.kind, signal.joint) for signal in signals}
+        for joint, (driven, measured) in enumerate(zip(log.driven, log.measured, strict=True), 1):
+            if driven and ("command", joint) not in mapped:
+                what = f"joint {joint} is driven but no column holds its command"
+                raise LogError(what, path, f"map a column in log.joints.{joint}.command")
+            if not measured and ("angle", joint) in mapped:
+                hint = f"set log.joints.{joint}.angle: null"
+                raise LogError(f"joint {joint} has no angle to write", path, hint)
         command = hold(log.time, log.command, log.time + settings.delay_s, log.period)
         for signal in signals:
             values, joint = log.time, signal.joint - 1
@@ -189,16 +195,6 @@ def write_logs(path: Path, logs: Sequence[tuple[Log, LogSettings]], *, exact: bo
                 values = log.pressure[:, joint, signal.part]
             columns[signal.name] = _cells(signal, values, exact)
     write_atomic(path, csv_text([columns, *zip(*columns.values(), strict=True)]))
-
-
-def _refuse_loss(path: Path, log: Log, mapped: set[tuple[str, int]]) -> None:
-    for joint, (driven, measured) in enumerate(zip(log.driven, log.measured, strict=True), 1):
-        if driven and ("command", joint) not in mapped:
-            what = f"joint {joint} is driven but no column holds its command"
-            raise LogError(what, path, f"map a column in log.joints.{joint}.command")
-        if not measured and ("angle", joint) in mapped:
-            hint = f"set log.joints.{joint}.angle: null"
-            raise LogError(f"joint {joint} has no angle to write", path, hint)
 
 
 def _cells(signal: Signal, values: Array, exact: bool) -> list[str]:

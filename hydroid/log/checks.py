@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from hydroid.arrays import Array
-from hydroid.log.clues import KINDS, column_unit, likely_range
+from hydroid.log.clues import CLUES, column_unit, likely_range
 from hydroid.log.log import Log, LogFinding, log_finding
 from hydroid.log.motion import driven_joints
 from hydroid.log.repair import GAP, sample_period
@@ -100,7 +100,7 @@ def _units(recording: Recording) -> Iterator[LogFinding]:
     """Units that the file states and the settings contradict; a time's only where they are plausible."""
     for signal in recording.signals:
         unit, gain = column_unit(signal.name, recording.table.units.get(signal.name, "")), abs(signal.gain)
-        if unit is None or KINDS.get(unit.quantity) != signal.kind:
+        if unit is None or CLUES["units"].get(unit.quantity) != signal.kind:
             continue
         wrong, remedy = unit.factor != gain, f"unit: {unit.name}"
         if signal.kind == "time":

@@ -2,61 +2,16 @@
 
 import re
 from collections.abc import Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from hydroid.arrays import Array
+from hydroid.files import read_table
 from hydroid.units import Unit, unit_of
 
-WORDS = {
-    "time": "time t timestamp stamp zeit sec seconds temps",
-    "other": "flow pump pressure press p pa pb tank supply current",
-    "command": """u cmd command commands valve joystick joy input inputs pwm control ctrl duty lever out
-    output spool demand volt voltage stell drive""",
-    "angle": """q angle angles ang theta phi pos position positions winkel encoder deg rad pitch yaw roll
-    length stroke""",
-}
-"""words that tell the kind of a column; the last one in its name counts"""
-DERIVED = """velocity vel speed qd dq qdot acc acceleration torque force load effort temp temperature error
-fault status count index sample date"""
-"""words of what is neither command nor angle, whatever its unit"""
-KINDS = {
-    "time": "time",
-    "angle": "angle",
-    "length": "angle",
-    "command": "command",
-    "voltage": "command",
-    "current": "command",
-}
-"""kind of a column by what its unit measures; of all other units it is "other\""""
-SAME = (
-    "arm stick dipper",
-    "swing slew azimuth house base turret",
-    "bucket tool gripper",
-    "shoulder boom",
-    "elbow stick",
-    "telescope extension slide",
-)
-"""names that machines have for the same joint"""
-OPPOSITE = (
-    "up:down raise:lower pos:neg plus:minus out:in extend:retract left:right open:close forward:backward a:b"
-)
-"""words for the positive and the negative direction"""
-RANGES = (
-    (4, 20, "4 to 20 mA"),
-    (0, 5, "0 to 5 V"),
-    (0, 10, "0 to 10 V"),
-    (0, 1, "0 to 1"),
-    (0, 100, "0 to 100"),
-    (1000, 2000, "1000 to 2000 µs"),
-    (-1, 1, "±1"),
-    (-10, 10, "±10 V"),
-    (-100, 100, "%"),
-    (-1000, 1000, "±1000"),
-    (-32767, 32767, "±32767"),
-)
-"""what amplifiers and joysticks give; the middle stands for no command"""
+CLUES = read_table(Path(__file__).with_name("clues.yaml"))
 
 
 class CommandRange(NamedTuple):
@@ -92,7 +47,7 @@ def likely_range(values: Array, negative: Array | None = None) -> CommandRange |
     kinds, counts = np.unique(values, return_counts=True)
     rests = np.array([values[0], kinds[counts.argmax()]])
     raised = low >= 0 and 0 not in kinds[counts >= 0.05 * len(values)]
-    for start, end, name in RANGES:
+    for name, (start, end) in CLUES["ranges"].items():
         middle, half = (start + end) / 2, (end - start) / 2
         slack = 0.06 * half / (1 + (start < 0))
         if low < start - slack or high > end + slack:
@@ -118,13 +73,13 @@ def column_unit(name: str, given: str = "") -> Unit | None:
 def kind_of(name: str, unit: Unit | None) -> str:
     """Return time, command, angle or other: what the unit, or else the words of a name say of a column."""
     there = words(name)
-    if {*there} & {*DERIVED.split()}:
+    if {*there} & {*CLUES["derived"]}:
         return "other"
     if unit:
-        return KINDS.get(unit.quantity, "other")
+        return CLUES["units"].get(unit.quantity, "other")
     if {*there} & {"cmd", "command", "commands", "joystick", "joy"}:
         return "command"  # also in /joint_commands.position[boom]
-    named = (kind for word in reversed(there) for kind, those in WORDS.items() if word in those.split())
+    named = (kind for word in reversed(there) for kind, those in CLUES["kinds"].items() if word in those)
     return next(named, "command" if direction(name)[0] else "other")
 
 
@@ -135,7 +90,7 @@ def joint_of(name: str, joints: Sequence[str]) -> int | None:
     """
     there = {*words(name)} - {"joint", "link"}
     exact = [{*words(joint)} - {"joint", "link"} for joint in joints]
-    alike = [own.union(*(group.split() for group in SAME if own & {*group.split()})) for own in exact]
+    alike = [own.union(*(group for group in CLUES["same"] if own & {*group})) for own in exact]
     short = [{w[:n] for w in own for n in range(3, len(w))} for own in alike]
     for named in (exact, alike, short):
         hits = [k for k, mine in enumerate(named, 1) if mine & there]
@@ -153,7 +108,7 @@ def number_in(name: str) -> int | None:
 def direction(name: str) -> tuple[int, frozenset[str]]:
     """Return +1, −1 or 0 for the direction that a name tells, and its other words."""
     there = frozenset(words(name))
-    for positive, negative in (pair.split(":") for pair in OPPOSITE.split()):
+    for positive, negative in CLUES["opposite"]:
         if word := {positive, negative} & there:
             return (positive in word) - (negative in word), there - word
     return 0, there

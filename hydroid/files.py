@@ -31,10 +31,8 @@ def undisturbed() -> Generator[None]:
         return
     held: list[int] = []
     stops = (getattr(signal, name, None) for name in ("SIGINT", "SIGTERM", "SIGUSR1"))
-    handlers = {number: signal.getsignal(number) for number in stops if number is not None}
-    before = {number: handler for number, handler in handlers.items() if handler is not None}
-    for number in before:
-        signal.signal(number, lambda number, _: held.append(number))
+    ours = [number for number in stops if number is not None and signal.getsignal(number) is not None]
+    before = {number: signal.signal(number, lambda number, _: held.append(number)) for number in ours}
     try:
         yield
     finally:
@@ -105,16 +103,16 @@ def fill_template(path: str, /, **values: Any) -> str:
     return environment.get_template(path).render(values)
 
 
-def read_table(file: Path) -> Plain:
-    """Return a table of the package, a YAML file of its rows by name."""
+_PACKAGE = Path(__file__).parent
+
+
+def read_table(path: str) -> Plain:
+    """Return a table of the package, rows by name, from a YAML file in it."""
     import yaml
 
-    with file.open("rb") as rows:
+    with (_PACKAGE / path).open("rb") as rows:
         # libyaml, where it is there, takes a tenth of the time
         return yaml.load(rows, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
-
-
-_PACKAGE = Path(__file__).parent
 
 
 def assets() -> Path:

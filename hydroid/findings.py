@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Literal
 
 from hydroid.files import read_table
@@ -44,7 +43,7 @@ class Finding:
         return f"{self.what} {self.hint}".strip()
 
 
-_TABLE: dict[str, list[str]] = read_table(Path(__file__).with_name("findings.yaml"))
+_TABLE: dict[str, list[str]] = read_table("findings.yaml")
 
 WORDS = {kind: (statement, " ".join(hint)) for kind, (statement, *hint) in _TABLE.items()}
 """statement and hint by kind; a hint may be empty"""

@@ -7,7 +7,6 @@ causes, and `delay_b` towards B; the name without an ending sets both.
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import chain
-from pathlib import Path
 
 from hydroid.files import Plain, read_table
 from hydroid.units import UNITS
@@ -79,8 +78,9 @@ def _quantity(name: str, row: Plain) -> Quantity:
     return Quantity(name, **values)
 
 
-_TABLE = read_table(Path(__file__).with_name("quantities.yaml"))
-_GROUPS = {group: tuple(map(_quantity, rows, rows.values())) for group, rows in _TABLE.items()}
+_GROUPS = {
+    group: tuple(map(_quantity, rows, rows.values())) for group, rows in read_table("quantities.yaml").items()
+}
 
 ROWS = tuple(chain(*_GROUPS.values()))  # the one table
 

@@ -3,35 +3,7 @@
 import math
 from dataclasses import dataclass
 
-_UNITS = (
-    ("time", 1.0, "s sec secs second seconds"),
-    ("time", 1e-3, "ms msec"),
-    ("time", 1e-6, "us µs"),
-    ("time", 1e-9, "ns"),
-    ("time", 60.0, "min"),
-    ("time", 3600.0, "h"),
-    ("time", 86400.0, "day"),
-    ("angle", 1.0, "rad"),
-    ("angle", math.pi / 180, "deg ° degree degrees"),
-    ("pressure", 1.0, "Pa"),
-    ("pressure", 1e3, "kPa"),
-    ("pressure", 1e5, "bar"),
-    ("pressure", 1e6, "MPa"),
-    ("command", 1.0, "% pct percent"),
-    ("voltage", 1.0, "V volt volts"),
-    ("voltage", 1e-3, "mV"),
-    ("current", 1e-3, "mA"),
-    ("length", 1.0, "m meter metre"),
-    ("length", 1e-2, "cm"),
-    ("length", 1e-3, "mm"),
-    ("area", 1e-6, "mm²"),
-    ("volume", 1e-6, "cm³"),
-    ("stiffness", 1e3, "N/mm"),
-    ("flow", 1e-3 / 60, "l/min"),
-    ("other", 1.0, "mbar psi N kN Nm m/s deg/s rad/s °/s rpm °C kg"),
-    ("ambiguous", 1.0, "1 - none a amp mrad hz"),
-)
-"""quantity, factor to SI (of a command to %), spellings; an ambiguous one counts only in a row of units"""
+from hydroid.files import read_table
 
 
 @dataclass(frozen=True)
@@ -45,7 +17,8 @@ class Unit:
 
 UNITS = {
     spelling.lower(): Unit(names.split()[0], quantity, factor)
-    for quantity, factor, names in _UNITS
+    for quantity, units in read_table("units.yaml").items()
+    for names, factor in units.items()
     for spelling in names.split()
 }
 """by their spelling in lower case"""

@@ -5,6 +5,7 @@ cameras and lights of a fused body hang on the body that carries it; contacts ar
 """
 
 import math
+from itertools import chain
 from pathlib import Path
 
 import mujoco
@@ -48,7 +49,7 @@ def locked_spec(
     """
     source = spec.copy()
     forces = source.actuators, source.sensors, source.equalities, source.keys, source.excludes, source.pairs
-    for part in [part for section in (*forces, source.flexes, source.skins) for part in section]:
+    for part in [*chain(*forces, source.flexes, source.skins)]:
         source.delete(part)
     _draw_tendons(source)
     for name, (position, turn) in locked.held.items():

@@ -101,7 +101,6 @@ def lock(spec: mujoco.MjSpec, arm: Arm, moving: Mask, pose: Array) -> LockedArm:
 
 
 def _place(data: mujoco.MjData, body: int, above: int) -> tuple[Array, Array]:
-    """Position and quaternion of a body in another."""
     turn = np.empty(4)
     mujoco.mju_mulQuat(turn, data.xquat[above] * [1, -1, -1, -1], data.xquat[body])
     return data.xmat[above].reshape(3, 3).T @ (data.xpos[body] - data.xpos[above]), turn

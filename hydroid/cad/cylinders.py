@@ -148,10 +148,6 @@ def _planar(joint: Any, point: Array) -> complex:
     return complex(away @ x, away @ np.cross(axis, x))
 
 
-def _wrapped(angle: float) -> float:
-    return (angle + math.pi) % (2 * math.pi) - math.pi
-
-
 def _four_bar(joint: Any, pins: Sequence[_Pin]) -> Plain | None:
     """Return the settings of a cylinder that turns a joint by a rocker and a coupler, as the file stands.
 
@@ -161,24 +157,16 @@ def _four_bar(joint: Any, pins: Sequence[_Pin]) -> Plain | None:
     ground, pin, child, foot, eye = (_planar(joint, one.at) for one in pins)
     turn = abs(ground) / ground  # the rocker's pivot lies at (ground, 0)
     side = "left" if ((pin - ground) * np.conj(child - ground)).imag > 0 else "right"
-    bars = FourBar(
-        ground=round(abs(ground), 6),
-        rocker=round(abs(pin - ground), 6),
-        coupler=round(abs(child - pin), 6),
-        child=round(abs(child), 6),
-        phase_deg=round(math.degrees(np.angle(child * turn) - joint.qpos[0]), 6),
-        side=side,
-    )
+    sides = {"ground": ground, "rocker": pin - ground, "coupler": child - pin, "child": child}
+    phase = round(math.degrees(np.angle(child * turn) - joint.qpos[0]), 6)
+    bars = FourBar(**{n: round(abs(way), 6) for n, way in sides.items()}, phase_deg=phase, side=side)
     psi, first, _ = map(float, four_bar(joint.qpos[0], bars))
     if not math.isfinite(psi):
         return None
-    theta = _wrapped(np.angle(eye - ground) - np.angle(foot - ground))
+    theta = float(np.angle((eye - ground) * np.conj(foot - ground)))
     sense = 1.0 if math.sin(theta) * first > 0 else -1.0  # the rod's pin turns with the rocker, by psi
-    theta0 = math.degrees(_wrapped(theta - psi))
+    theta0 = math.degrees(math.remainder(theta - psi, math.tau))
     theta0 += 360.0 * sense if theta0 * sense < 0 else 0.0  # its sign is the rod's way
-    shape = Triangle(
-        a=round(abs(foot - ground), 6),
-        b=round(abs(eye - ground), 6),
-        theta0=round(theta0, 6),
-    )
+    a, b = (round(abs(pivot - ground), 6) for pivot in (foot, eye))
+    shape = Triangle(a=a, b=b, theta0=round(theta0, 6))
     return {"kind": "linear", "triangle": shape.model_dump(), "four_bar": bars.model_dump()}

@@ -79,7 +79,7 @@ def _clear(spec: mujoco.MjSpec, path: Path) -> None:
         spec.delete(part)
     spec.modelname = word(path.stem if spec.modelname in ("", "MuJoCo Model") else spec.modelname)
     renamed, taken = dict[str, str](), {"world"}
-    for number, body in enumerate(spec.bodies[1:], start=1):
+    for number, body in enumerate(spec.bodies[1:], 1):
         old, body.name = body.name, distinct(word(body.name or f"link{number}"), taken)
         renamed[old] = body.name
     taken, joints = set(), dict[str, str]()

@@ -159,5 +159,4 @@ def _stated_fault(body: mujoco.MjsBody, urdf: bool) -> str:
 
 
 def _gyration(tensor: Array, mass: float) -> float:
-    """Return the largest radius of gyration [m]."""
     return float(np.sqrt(np.linalg.eigvalsh(tensor)[-1] / mass))

@@ -86,11 +86,11 @@ def _prepare_urdf(root: ElementTree.Element, notes: Notes) -> dict[str, str]:
     names: dict[str, str] = {}
     for mesh in root.iterfind("link/*/geometry/mesh"):
         mesh.set("filename", names.setdefault(str(mesh.get("filename")), f"mesh{len(names)}.stl"))
-    section = root.find("mujoco")
-    section = ElementTree.SubElement(root, "mujoco") if section is None else section
-    compiler = section.find("compiler")
-    compiler = ElementTree.SubElement(section, "compiler") if compiler is None else compiler
-    compiler.attrib.update(URDF_OPTIONS)
+    section = root
+    for tag in ("mujoco", "compiler"):
+        there = section.find(tag)
+        section = ElementTree.SubElement(section, tag) if there is None else there
+    section.attrib.update(URDF_OPTIONS)
     return {name: given for given, name in names.items()}
 
 

@@ -74,7 +74,7 @@ def check_file(
 
 def named(findings: "Sequence[LogFinding]", names: Sequence[str]) -> "list[LogFinding]":
     """Return findings that call joints by their names, as subjects and after the word joint."""
-    by_number = {str(number): name for number, name in enumerate(names, start=1)}
+    by_number = {str(number): name for number, name in enumerate(names, 1)}
 
     def name(text: Any) -> Any:
         if not isinstance(text, str):

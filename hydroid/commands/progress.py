@@ -102,7 +102,7 @@ class FitProgress(Progress):
 
     def refining(self, name: str, simulated: int, rms: float) -> None:
         """Take the name of a least squares, its number of simulations, and its rms error [rad] so far."""
-        alone = (joint for k, joint in enumerate(self._joints, start=1) if f" joint {k} " in name)
+        alone = (joint for k, joint in enumerate(self._joints, 1) if f" joint {k} " in name)
         what = next(alone, name.replace("refined", "refinement"))
         self(f"{what}: simulations", simulated, None, self._fallen(what, name.rpartition(" part ")[2], rms))
 

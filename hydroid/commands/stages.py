@@ -163,11 +163,9 @@ def with_mechanics(mech: "ModelSource | None", config: ConfigSource, changes: Ma
         if p.quantity not in MECHANICAL or p.quantity == "gain":
             continue
         value, key, mass = values.get(name), f"parameters.{name}.fixed", p.quantity == "mass"
-        if value is None:
-            if p.fixed is None and (mech is not None or not p.states_start):
-                missing.append(name)
-            continue
-        if key in changes or (p.states_start and not mass):
+        if value is None and p.fixed is None and (mech is not None or not p.states_start):
+            missing.append(name)
+        if value is None or key in changes or (p.states_start and not mass):
             continue
         held[key] = value
         nominal = nominal_value(settings.arm, settings.hydraulics, p)

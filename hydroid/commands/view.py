@@ -72,8 +72,7 @@ def simulate(
         LogError: the commands cannot be used.
         RunError: the simulation diverged, or a file cannot be written.
     """
-    target = None if out is None else Path(out)
-    refuse_overwriting(commands, target)
+    refuse_overwriting(commands, out)
     model = open_model(fit, config, set)
     read = read_arms(commands, model.settings, arm, pose=pose, repair=repair)
     from hydroid.log import write_logs
@@ -85,9 +84,9 @@ def simulate(
         noise = np.random.default_rng(seed + number).normal(0.0, np.deg2rad(noise_deg), log.angle.shape)
         logs[name] = replace(predicted, angle=predicted.angle + noise)
     columns = model.settings.log
-    if target:
-        write_logs(target, [(log, columns.of_arm(n) if arm else columns) for n, log in logs.items()])
-    first, file = next(iter(logs.values())), target and str(target)
+    if out is not None:
+        write_logs(Path(out), [(log, columns.of_arm(n) if arm else columns) for n, log in logs.items()])
+    first, file = next(iter(logs.values())), out and str(out)
     content = {"out": file, "samples": len(first.time), "duration_s": first.duration}
     return Simulated([file] if file else [], content, logs)
 

@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Sequence
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +10,7 @@ from hydroid.arrays import Array
 from hydroid.files import read_table
 from hydroid.units import Unit, unit_of
 
-CLUES = read_table(Path(__file__).with_name("clues.yaml"))
+CLUES = read_table("log/clues.yaml")
 
 
 class CommandRange(NamedTuple):

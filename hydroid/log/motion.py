@@ -121,7 +121,7 @@ class JointMotion:
         return self._smoothed(SLOW)
 
     def _smoothed(self, seconds: float) -> tuple[Array, ...]:
-        """Return command [%], angle [rad] and speed [rad/s] behind a Gaussian."""
+        """Return command [%], angle [rad] and speed [rad/s], each (T,), behind a Gaussian."""
         width, angle = seconds / self.log.period, self.log.angle[:, self.joint - 1]
         reach = int(4 * width + 0.5)
         at = np.arange(-reach, reach + 1)

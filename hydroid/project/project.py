@@ -83,16 +83,15 @@ def write_project(
         # what is written can be read
         validate(read_yaml(stage / FIT)[0] | {"arm": arm}, FitSettings, FIT)
         steps = next_steps(folder, logs)
-        notes: tuple[str, ...]
-        notes, reasons = imported.notes if imported else (), layout.reasons if layout else ()
+        notes, reasons = [*imported.notes] if imported else [], layout.reasons if layout else ()
         guessed = [joint.name for joint in arm.joints if isinstance(joint.actuator, RotaryActuator)]
         if imported and guessed:
             what = "no cylinder is known. A stand-in predicts angles; its pressures and forces mean nothing"
-            notes = (*notes, f"{listed(guessed)}: {what}")
+            notes.append(f"{listed(guessed)}: {what}")
         said = {"steps": steps, "notes": notes, "reasons": reasons}
         write_atomic(stage / STEPS, fill_template("project/next-steps.md.j2", name=arm.name, **said))
         written = _move(stage, folder)
-    return Project(folder, written, notes, reasons, layout.unused if layout else (), steps)
+    return Project(folder, written, tuple(notes), reasons, layout.unused if layout else (), steps)
 
 
 def next_steps(folder: Path, logs: Sequence[Path]) -> tuple[str, ...]:
@@ -139,7 +138,6 @@ def _stage(folder: Path) -> Generator[Path]:
 
 
 def _move(stage: Path, folder: Path) -> tuple[str, ...]:
-    """Move all files to the project, or none."""
     names, old = tuple(name for name in FILES if (stage / name).exists()), stage / "old"
     old.mkdir()
     with undisturbed():

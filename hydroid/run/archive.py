@@ -94,7 +94,6 @@ class CheckpointFile(UserDict[str, Arrays]):
             write_atomic(self._file, packed, keep=self._previous)
 
     def _read(self, file: Path, *before: Path) -> dict[str, Arrays]:
-        """Read a file; where it is damaged, the one before it."""
         try:
             content = unpack(file)
         except (ValueError, OSError) as error:

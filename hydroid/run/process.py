@@ -62,9 +62,9 @@ def _take(file: IO[bytes], folder: Path) -> None:
             hint = "wait for it to end, or choose another --out"
             raise RunError(f"is in use by {holder}", folder, hint) from None
         _log.warning("%s: no lock on this file system (%s); let no two runs use it", folder, error.strerror)
-        return
-    file.truncate(0)
-    file.write(f"process {os.getpid()} on {socket.gethostname()}".encode())
+    else:
+        file.truncate(0)
+        file.write(f"process {os.getpid()} on {socket.gethostname()}".encode())
 
 
 @contextmanager

@@ -166,7 +166,6 @@ def load_record(folder: str | Path) -> Record:
 
 
 def _read(file: Path, kind: type[T]) -> T:
-    """Read a stored dataclass; raises RunError: it cannot be read, or another version wrote it."""
     try:
         return _adapter(kind).validate_python((unpack(file),))[0]
     except FileNotFoundError:

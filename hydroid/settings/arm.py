@@ -213,7 +213,6 @@ def load_arm(name: str | Path, beside: Path | None = None) -> Arm:
 
 
 def _at_zero(path: Path) -> "mujoco.MjData":
-    """The compiled MJCF with all joints at 0."""
     if not path.is_file():
         raise ModelError("no such model", path, "give the arm's MJCF; `hydroid init` writes one")
     state = path.stat()

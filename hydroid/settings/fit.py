@@ -88,8 +88,7 @@ class FitSettings(Settings):
         if self.joint_refinement and self.simulation.model == "ladder":
             raise ValueError("joint_refinement: refines one model; set simulation.model to it")
         for name, own in self.parameters.items():
-            hydraulic = own.quantity not in MECHANICAL
-            if self.stage == "mech" and hydraulic:
+            if self.stage == "mech" and own.quantity not in MECHANICAL:
                 raise ValueError(f"parameters.{name}: stage mech has no {own.quantity}; set stage: hyd")
             if self.stage == "hyd" and own.quantity == "gain":
                 raise ValueError(f"parameters.{name}: stage hyd has no gain; the hydraulics take its place")

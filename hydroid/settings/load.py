@@ -180,7 +180,6 @@ def _shown(value: object) -> str:
 
 
 def _allowed(kind: type[Settings], loc: tuple[Any, ...]) -> list[str]:
-    """Names of the settings at `loc`, if the path can be followed through nested classes."""
     for part in loc:
         field = kind.model_fields.get(str(part))
         inner = field.annotation if field else None

@@ -67,22 +67,17 @@ class ColumnMap:
     offset: float = 0.0
 
 
-DEFAULTS: dict[Kind, ColumnMap] = {
-    "command": ColumnMap((f"u{JOINT}_pct",), "%"),
-    "angle": ColumnMap((f"q{JOINT}_deg",), "deg"),
-    "pressure": ColumnMap((f"pA{JOINT}_bar", f"pB{JOINT}_bar"), "bar"),
+KINDS = {
+    "command": ((f"u{JOINT}_pct",), (1, 2), ("%",)),
+    "angle": ((f"q{JOINT}_deg",), (1,), ("deg", "rad", "m", "cm", "mm")),
+    "pressure": ((f"pA{JOINT}_bar", f"pB{JOINT}_bar"), (2,), ("bar", "Pa", "MPa")),
 }
-ALLOWED = {
-    "command": ((1, 2), ("%",)),
-    "angle": ((1,), ("deg", "rad", "m", "cm", "mm")),
-    "pressure": ((2,), ("bar", "Pa", "MPa")),
-}
-"""how many columns may hold a quantity, and their units"""
+"""default columns of a quantity, how many may hold it, and their units, the default first"""
 
 
 def _checked(columns: Columns | None, info: ValidationInfo) -> Columns | None:
     kind = str(info.field_name)
-    counts, units = ALLOWED[kind]
+    _, counts, units = KINDS[kind]
     if columns and columns.unit not in (None, *units):
         raise ValueError(f"{columns.unit} is no unit of a log's {kind}s")
     if columns and columns.column and len(columns.column) not in counts:
@@ -140,11 +135,14 @@ class LogSettings(Settings):
         """Return the columns of a joint (number, from 1), its number in their names; None: not in the log."""
         common: Columns | None = getattr(self, kind)
         own: Columns | None = getattr(self.joints.get(joint, JointColumns()), kind, None)
-        if own is None or (common is None and not _given(own)):
+        if own is None or (common is None and own == Columns()):
             return None
-        given: Plain = vars(DEFAULTS[kind]) | (_given(common) if common else {}) | _given(own)
-        names = tuple(self._prefix + name.replace(JOINT, str(joint)) for name in given["column"])
-        return ColumnMap(names, given["unit"], given["scale"], given["offset"])
+        default, _, (unit, *_) = KINDS[kind]
+        given: Plain = {"column": default, "unit": unit}
+        for columns in filter(None, (common, own)):
+            given |= columns.model_dump(exclude_none=True)
+        names = tuple(self._prefix + name.replace(JOINT, str(joint)) for name in given.pop("column"))
+        return ColumnMap(names, **given)
 
     def of_arm(self, side: str) -> "LogSettings":
         """Return the columns of one of two arms: their names begin with its own; the time's is common."""
@@ -157,7 +155,3 @@ class LogSettings(Settings):
         nothing = {"command": None, "pressure": None}
         joints = {joint: own and own.changed(nothing) for joint, own in self.joints.items()}
         return self.changed(nothing | {"joints": joints})
-
-
-def _given(columns: Columns) -> Plain:
-    return {name: value for name, value in columns if value is not None}

@@ -13,7 +13,6 @@ from hydroid.files import is_file, write_atomic
 
 def read_mjcf(path: Path) -> mujoco.MjSpec:
     """Read an MJCF whose joints turn or slide, each alone on its body.
-
     Raises ModelError: missing or refused by MuJoCo; no joint, another kind of joint, a joint or its body
     without a name; an equality constraint.
     """

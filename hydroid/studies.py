@@ -115,7 +115,6 @@ def run_study(
     path: Path, folder: Path, read: Read, executor: Executor, progress: Progress
 ) -> tuple[Row, ...]:
     """Perform the runs of a study that `folder` does not have yet; return the measures of all, by seed.
-
     Raises SettingsError: a key or value of the file that is not allowed, with file and line; LogError: a log
     cannot be used; RunError: the folder cannot be written, or a process died.
     """
@@ -199,7 +198,7 @@ def _read(file: Path) -> Result:
 def processes(count: int = 0) -> Generator[Executor]:
     """Open that many processes, one per core for 0; they end with this one, however it ends."""
     context = multiprocessing.get_context("spawn")  # threads of the simulation do not survive a fork
-    pool = ProcessPoolExecutor(count or os.cpu_count() or 1, context, initializer=_end_with_parent)
+    pool = ProcessPoolExecutor(count or None, context, initializer=_end_with_parent)
     try:
         yield pool
     except BaseException:

@@ -71,7 +71,6 @@ class Machine:
 
 def load_machine(arm: Arm, *, pair: bool) -> Machine:
     """Read the model of an arm alone, or that of two of them.
-
     Raises SettingsError: a pair that the arm's file does not name; ModelError: as `read_mjcf`, or a pair
     whose joints are not those of two of the arm.
     """

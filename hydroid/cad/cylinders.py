@@ -118,7 +118,6 @@ def _linkage(
     pins: Sequence[_Pin], foot: _Pin, eye: _Pin, cylinder: tuple[str, str], data: mujoco.MjData
 ) -> tuple[Any, Plain, tuple[str, ...]] | None:
     """Return the joint that a cylinder moves, its settings, and links between them; None: it moves none.
-
     `foot` pins the tube to a link, `eye` the rod to another.
     """
     tube, rod = cylinder
@@ -151,8 +150,7 @@ def _planar(joint: Any, point: Array) -> complex:
 def _four_bar(joint: Any, pins: Sequence[_Pin]) -> Plain | None:
     """Return the settings of a cylinder that turns a joint by a rocker and a coupler, as the file stands.
 
-    The pins are those of the rocker on its link and on the coupler, of the coupler on the child, of tube and
-    rod.
+    The pins are those of rocker and link, rocker and coupler, coupler and child, of the tube, of the rod.
     """
     ground, pin, child, foot, eye = (_planar(joint, one.at) for one in pins)
     turn = abs(ground) / ground  # the rocker's pivot lies at (ground, 0)

@@ -78,9 +78,7 @@ class Result(Printed, Generic[T_co]):
 
 def written(report: "Page | Mapping[str, Table]", out: str | Path | None) -> list[str]:
     """Write a report, or tables by name, to a folder, if there is one; return the file that is written last.
-
-    Raises:
-        RunError: the folder cannot be written.
+    Raises RunError: the folder cannot be written.
     """
     if out is None:
         return []
@@ -111,10 +109,7 @@ def program() -> str:
 
 
 def show_error(error: Any) -> None:
-    """Print what the user can correct, in one line or as JSON, by the option that set what is wrong.
-
-    The error is a `HydroidError`, or typer's of a wrong command line.
-    """
+    """Print a `HydroidError`, or typer's, in one line or as JSON, by the option that set what is wrong."""
     if usage := hasattr(error, "format_message"):
         text = error.format_message().rstrip(".")
         error = HydroidError(text[:1].lower() + text[1:], hint=f"see {error.ctx.command_path} --help")
@@ -136,10 +131,7 @@ def _print_json(content: Plain) -> None:
 
 
 def log_lines(*, verbose: bool, quiet: bool) -> AbstractContextManager[None]:
-    """Print warnings and notes of hydroid's loggers, nothing where quiet, every line where verbose.
-
-    An error is not among them: it ends the command, which prints it.
-    """
+    """Print hydroid's warnings and notes, all lines if verbose; errors are printed where a command ends."""
     handler = _Terminal()
     handler.addFilter(lambda record: verbose or (logging.INFO < record.levelno < logging.ERROR and not quiet))
     return logging_to(handler, "" if verbose else "hydroid: %(message)s")

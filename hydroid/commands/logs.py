@@ -140,9 +140,7 @@ def read_arms(
 
 def run_logs(folder: Path) -> list[Path]:
     """Return the logs that a run folder was fitted to.
-
-    Raises:
-        SettingsError: it is no run folder. RunError: a log is not there.
+    Raises SettingsError: it is no run folder. RunError: a log is not there.
     """
     if not is_file(folder / "run.json"):
         hint = "name one, as in hydroid suggest LOG.csv --fit RUN, or give a run folder as --fit"
@@ -158,7 +156,6 @@ def run_logs(folder: Path) -> list[Path]:
 
 def problem_of(model: IdentifiedModel, logs: LogSources, *, repair: bool = False) -> "Problem":
     """Return the estimation problem of a model and logs, or those of its run where none is given.
-
     Raises RunError: the simulation diverges at the model's parameters.
     """
     read = read_logs(logs or run_logs(Path(model.source).parent), model.settings, repair=repair)

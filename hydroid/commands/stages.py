@@ -127,9 +127,7 @@ def load_stage(
     stage: str, config: ConfigSource, changes: Mapping[str, Any], start: "ModelSource | None" = None
 ) -> FitSettings:
     """Read the settings of a stage, with the start that an estimate gives.
-
-    Raises:
-        SettingsError: as of `load_settings`, they are those of the other stage, or there is no start.
+    Raises SettingsError: as of `load_settings`, they are those of the other stage, or there is no start.
     """
     settings = load_settings(config, changes)
     if settings.stage != stage:

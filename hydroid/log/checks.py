@@ -18,10 +18,7 @@ DEGREE = UNITS["deg"].factor
 
 
 def check_recording(recording: Recording, settings: LogSettings, *, repaired: bool) -> Iterator[LogFinding]:
-    """Yield every fault of the recording, in the order in which a user should mend them.
-
-    `repaired`: gaps up to `settings.repair_s` are no faults.
-    """
+    """Yield the faults in the order to mend them; `repaired`: gaps up to `settings.repair_s` are none."""
     table, longest = recording.table, settings.repair_s
     torn = np.isnan(recording.values).all(axis=1)
     if torn.any():

@@ -93,10 +93,7 @@ def guess_columns(
 
 
 def _columns(table: Table) -> Iterator[_Column]:
-    """Yield all columns whose names or units say that they are times, commands or angles.
-
-    Of arrays only those of the most frequent length: the others are no signals.
-    """
+    """Yield the columns that seem to be times, commands or angles; arrays of a rare length are no signals."""
     units = {name: column_unit(name, table.units.get(name, "")) for name in table.names if name}
     kinds = {name: kind for name, unit in units.items() if (kind := kind_of(name, unit)) != "other"}
     lengths = [len(table.columns.get(name, ())) for name in kinds]  # 0 in a bag

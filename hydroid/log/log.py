@@ -119,10 +119,7 @@ class Log:
 
 @dataclass(frozen=True)
 class LogFinding(Finding):
-    """A finding of one log; its `column` is a name in the header.
-
-    An error: the log cannot be used; a warning: look at it; a note: what the reader did.
-    """
+    """A finding of one log; its `column` is a name in the header."""
 
     source: str = ""
     column: str = ""

@@ -28,9 +28,8 @@ class Signal:
     """One column in use: value = gain · cell + offset in [s], [%], [rad], [m] or [Pa], from `low` to `high`.
 
     `name` is that in the header, `kind` time, command, angle or pressure, `joint` a number from 1, or 0 for
-    the time. `part` is 0, or 1 for the column
-    of a command's negative direction and of the pressure in chamber B. `unit` is the one to be read: %, deg,
-    mm of a joint that slides, or bar.
+    the time. `part` is 0, or 1 for the column of a command's negative direction and of the pressure in
+    chamber B. `unit` is the one to be read: %, deg, mm of a joint that slides, or bar.
     """
 
     name: str

@@ -44,10 +44,7 @@ def identity(settings: FitSettings, logs: Sequence[Log]) -> Plain:
 
 
 def deciding(settings: FitSettings) -> Plain:
-    """Return the settings that decide a result, and the arm's.
-
-    Without threads and unused searches, and without where the arm's files are.
-    """
+    """Return the settings that decide a result, the arm's too: no threads, unused searches, or paths."""
     values, search = portable(settings), settings.search.algorithm
     del values["simulation"]["threads"]
     values["search"] = {n: v for n, v in values["search"].items() if n == search or not isinstance(v, dict)}
@@ -124,7 +121,6 @@ class RunFolder:
     @contextmanager
     def owned(self) -> Generator[None]:
         """Hold the folder against other processes, and write the `hydroid` logger's lines to `run.log`.
-
         Raises RunError: another process holds it, it holds other files, or it cannot be written; Stopped: the
         run was interrupted; says what is kept.
         """
@@ -146,7 +142,6 @@ class RunFolder:
 
     def begin(self, settings: FitSettings, logs: Sequence[Log]) -> CheckpointFile:
         """Describe a new run, or check that the run here is the same; return its checkpoints.
-
         Raises RunError: the run here had other settings, another arm, another log or another version, one of
         its files was changed, no checkpoint is whole, or the folder cannot be written.
         """

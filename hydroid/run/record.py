@@ -186,8 +186,7 @@ _log = logging.getLogger(__name__)
 
 
 def read_runs(names: Sequence[str], out: str | Path | None) -> tuple[Record, ...]:
-    """Read finished runs that differ in nothing but their seeds, in their order; unfinished ones are left
-    out.
+    """Read finished runs that differ in nothing but their seeds, in their order, and leave out the others.
 
     `names` are run folders, or patterns of them; `out` is the folder for what is to be written about them.
     Raises RunError: no run is left, two differ in more than their seeds or in nothing, or `out` is a run.

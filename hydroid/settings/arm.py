@@ -65,7 +65,6 @@ class Joint:
 
 class Arm(Settings):
     """An arm as its YAML file and its MJCF describe it; the MJCF is read when something of it is asked for.
-
     Raises SettingsError: where the MJCF is read, a setting that does not fit it; ModelError: then, no MJCF,
     or one that hydroid cannot simulate.
     """

@@ -89,10 +89,7 @@ def make_cylinder(
 
 
 def _along(given: Pivots | None, data: Any, joint: str) -> Triangle:
-    """Return what stands for the triangle of a cylinder along its joint: b is 0.
-
-    The rod runs out forward unless pivots say otherwise.
-    """
+    """Return the triangle of a cylinder along its joint, b = 0; by default its rod runs out forward."""
     way = 1.0 if given is None else float(np.subtract(given.child, given.parent) @ data.joint(joint).xaxis)
     return Triangle.model_construct(a=1.0, b=0.0, theta0=90.0 if way > 0 else -90.0)
 

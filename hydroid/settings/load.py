@@ -78,9 +78,7 @@ S = TypeVar("S", bound=Settings)
 
 
 def load(path: Path, kind: type[S], overrides: Mapping[str, Any] | None = None) -> S:
-    """Read one YAML file as settings of a kind, with overrides by dotted key, as `--set search.seed=3` gives
-    them.
-
+    """Read one YAML file as settings of a kind, with overrides by dotted key.
     Raises SettingsError: a key or value that is not allowed, with file and line.
     """
     values, lines = read_yaml(path)

@@ -58,7 +58,6 @@ def render_motion(
     motion: Motion, kind: str, span: tuple[float, float], progress: Progress = no_progress
 ) -> bytes:
     """Return the content of a film of a motion in a span [s], or of a picture of its beginning (.png).
-
     Raises SettingsError: a span without time; RunError: this machine cannot render, or cannot write films.
     """
     begin, end = max(span[0], 0.0), min(span[1], motion.time[-1])

@@ -34,7 +34,6 @@ class Motion:
 
 def simulated_motion(model: IdentifiedModel, logs: Mapping[str, Log]) -> Motion:
     """Simulate the commands of logs, by the name of the arm that they move (`Machine.sides`).
-
     Raises SettingsError: a log commands nothing; RunError: the simulation diverged.
     """
     arm, first = model.settings.arm, next(iter(logs.values()))
@@ -66,11 +65,7 @@ def place(model: mujoco.MjModel, data: mujoco.MjData, angle: Array) -> None:
 
 
 class Sliders:
-    """A plant with all joints on the viewer's sliders, from a pose of the arm's file or the settings' start
-    pose.
-
-    Its physics can be pushed about.
-    """
+    """A plant with all joints on the viewer's sliders, from a named pose or the settings' start pose."""
 
     duration, ghost = np.inf, None
 

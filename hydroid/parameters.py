@@ -151,7 +151,7 @@ class ParameterSet:
 
     def mapping(self, theta: Array) -> dict[str, float]:
         """Return values by name from theta, shape (P,)."""
-        return dict(zip(self.names, map(float, theta), strict=True))
+        return dict(zip(self.names, theta.tolist(), strict=True))
 
 
 def _number(parameter: Parameter, value: object, source: str) -> float:

@@ -35,10 +35,8 @@ def predict_log(model: IdentifiedModel, log: Log) -> Log:
     angle = log.angle.copy()
     if settings.simulation.other_joints == "locked":
         angle[:] = log.start
-    measured: list[int] = []
-    if settings.stage == "hyd":
-        columns = settings.log.columns
-        measured = [j for j in range(log.joints) if log.driven[j] and columns("pressure", j + 1)]
+    gauged = [j for j in range(log.joints) if log.driven[j] and settings.log.columns("pressure", j + 1)]
+    measured = gauged if settings.stage == "hyd" else []
     response = _respond(model, log, moving, measured)
     if not response.feasible[0]:
         raise RunError("the simulation diverged with these parameters", model.source)

@@ -53,7 +53,7 @@ def measured(signals: Iterable[tuple[Array, Noise]]) -> Array:
     bread, scatter = np.sum(parts, axis=0)
     floor = 1e-12 * np.trace(scatter) + np.finfo(float).tiny
     lower = np.linalg.cholesky(scatter + floor * np.eye(len(scatter)))
-    return np.asarray(solve_triangular(lower, bread, lower=True), dtype=float)
+    return solve_triangular(lower, bread, lower=True)
 
 
 def sensor_noise(settings: DesignSettings, samples: int, period: float) -> Noise:
@@ -178,7 +178,7 @@ class Design:
 
 def weakest(known: Posterior, directions: Array) -> float:
     """Relative standard deviation of the least known of some directions, (p, d)."""
-    return float(np.sqrt(np.linalg.eigh(directions.T @ known.covariance @ directions)[0][-1]))
+    return np.sqrt(np.linalg.eigh(directions.T @ known.covariance @ directions)[0][-1])
 
 
 def design(

@@ -78,21 +78,21 @@ class RandomExperiments:
         """Draw an experiment: half of them drive all allowed joints, the others a random part of them."""
         some = self._rng.random(len(self._joints)) < 0.5
         driven = self._joints if self._rng.random() < 0.5 or not some.any() else np.array(self._joints)[some]
-        return Experiment(self._pose(), {int(j): self._input() for j in driven})
+        return Experiment(self._pose(), {j: self._input() for j in driven})
 
     def change(self, experiment: Experiment) -> Experiment:
         """Change an experiment in one to three places: its pose, a joint's input, or some levels of it."""
         rng, limit = self._rng, self._limit
-        for _ in range(int(rng.integers(1, 4))):
-            kind, joint = rng.random(), int(rng.choice(self._joints))
+        for _ in range(rng.integers(1, 4)):
+            kind, joint = rng.random(), rng.choice(self._joints)
             if kind < 0.1:
                 experiment = replace(experiment, pose=self._moved(experiment.pose))
             elif kind < 0.25 or joint not in experiment.inputs:
                 experiment = replace(experiment, inputs={**experiment.inputs, joint: self._input()})
             else:
                 level = experiment.inputs[joint].level
-                first = int(rng.integers(len(level)))
-                place = slice(first, first + 1 + int(rng.integers(4)))
+                first = rng.integers(len(level))
+                place = slice(first, first + 1 + rng.integers(4))
                 near = np.clip(level[place] + rng.normal(0.0, 0.25 * limit), -limit, limit)
                 far = self._levels(len(near))
                 experiment = experiment.with_level(joint, place, near if kind < 0.5 else far)
@@ -174,7 +174,7 @@ def repaired(experiment: Experiment, first: Violation) -> Experiment:
         if len(left):
             level = (0.7 if first.fast else -0.7) * signal.level[left[-1]]
             # below 10 % an earlier level is to blame
-            return experiment.with_level(first.joint, int(left[-1]), level if abs(level) > 10.0 else 0.0)
+            return experiment.with_level(first.joint, left[-1], level if abs(level) > 10.0 else 0.0)
     for joint, one in experiment.inputs.items():
         experiment = experiment.with_level(joint, slice(None), 0.7 * one.level)
     return experiment

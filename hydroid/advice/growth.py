@@ -94,14 +94,14 @@ class Explained:
         gain = -float(row @ self.residual)
         left = (self.residual + gain / square * row)[: change.size]
         variance, freedom = self._variance(row, self.noise_of(left))
-        deviation = float(np.sqrt(variance))
+        deviation = np.sqrt(variance)
         before = max(float(np.linalg.norm(self.residual[: change.size])), np.finfo(float).tiny)
         saved = 1.0 - float(np.linalg.norm(left)) / before
         return Score(gain / deviation, gain / square, saved, square / deviation, freedom)
 
     def _variance(self, row: Array, noise: Sequence[Noise]) -> tuple[float, float]:
         """Variance of the product of a row, (R + M + p,), with the residuals, and its degrees of freedom."""
-        variance = self.prior_weight**2 * float(np.sum(row[self.rows[-1].stop :] ** 2))
+        variance = self.prior_weight**2 * np.sum(row[self.rows[-1].stop :] ** 2)
         spectra: list[Array] = []
         for process, part in zip(noise, self.rows, strict=True):
             weighed = matmul_toeplitz(process.autocovariance, row[part])
@@ -109,7 +109,7 @@ class Explained:
             power = np.real(np.conj(np.fft.rfft(row[part])) * np.fft.rfft(weighed))
             spectra.append(np.maximum(power, 0.0) / weighed.size)
         spectrum = np.concatenate(spectra)
-        equal = float(np.sum(spectrum) ** 2 / np.sum(spectrum**2))
+        equal = np.sum(spectrum) ** 2 / np.sum(spectrum**2)
         level = 0.5 * sum(process.effective_sample_size for process in noise)
         return variance, max(max(2 * equal, level) - 1, 1.0)
 
@@ -183,7 +183,7 @@ class Refit:
         """Judge a refinement by the output errors of samples that it has not seen, shape (1, R)."""
         names, settings = problem.settings.arm.joint_names, problem.settings
         by_joint = {names[j - 1]: finite(np.degrees(problem.rms(errors, [j])[0])) for j in settings.outputs}
-        return cls(theta, float(problem.rms(errors)[0]), by_joint)
+        return cls(theta, problem.rms(errors)[0], by_joint)
 
 
 def score_terms(problem: Problem, known: Uncertainty, progress: Progress = no_progress) -> list[Candidate]:
@@ -247,7 +247,7 @@ def _tested(term: Term, problem: Problem, known: Uncertainty, fit: Explained) ->
     sizes = rms(effects, axis=1) / unit
     acting = np.flatnonzero(np.isfinite(sizes) & (sizes > 0))
     if not limit:
-        acting = acting[: max(int(np.sum(sizes[acting] <= LARGEST_EFFECT)), 1)][-1:]
+        acting = acting[: max(np.sum(sizes[acting] <= LARGEST_EFFECT), 1)][-1:]
     one_sided = limit or term.value in term.span
     scores: list[tuple[float, Score, float]] = []
     for i in acting:

@@ -88,7 +88,7 @@ def next_actions(problem: Problem, known: Uncertainty) -> list[Plain]:
     for kind, subject, rows in _forecasts(problem, known, now):
         narrow = now.add(rows).deviations
         # the one that improves most, but for the one that is stated
-        best = int(np.argmax(np.where(names == subject, 0.0, wide / narrow)))
+        best = np.argmax(np.where(names == subject, 0.0, wide / narrow))
         if wide[best] > FEWEST_TIMES * narrow[best]:
             action = {"action": kind, "of": subject, "parameter": str(names[best])}
             action |= {"before_percent": 100 * wide[best], "after_percent": 100 * narrow[best]}
@@ -117,7 +117,7 @@ def _forecasts(problem: Problem, known: Uncertainty, now: Posterior) -> Iterator
         if channel.quantity == "angle"
     )
     # what the best of a few could measure; hydroid design then looks for one free of collisions
-    noise = {"noise_deg": float(np.degrees(level)), "noise_correlation_s": time}
+    noise = {"noise_deg": np.degrees(level), "noise_correlation_s": time}
     settings = settings.changed({"design": settings.design.changed(noise | {"clearance_m": None})})
     try:
         draws = RandomExperiments(settings, np.random.default_rng(1))

@@ -77,7 +77,9 @@ def account(problem: Problem, known: Uncertainty, directions: Identifiability | 
         if channel.quantity == "angle":
             squares[f"q{channel.joint}"].append(error_level(channel, noise) ** 2)
     findings = [*_parameter_findings(parameters, estimate), *log_findings(logs)]
-    findings += _direction_findings(directions) if directions else []
+    combinations = directions.combinations if directions else ()
+    # six of them: the table of directions has all
+    findings += [Finding("combination", "note", tuple(one)) for one in combinations if len(one) > 1][:6]
     return FitSummary(
         stage=problem.settings.stage,
         estimate=estimate,
@@ -136,8 +138,3 @@ def _parameter_findings(parameters: ParameterSet, estimate: Mapping[str, Paramet
         for (own, side), names in kinds.items()
         if own == kind
     ]
-
-
-def _direction_findings(directions: Identifiability) -> list[Finding]:
-    several = [one for one in directions.combinations if len(one) > 1]
-    return [Finding("combination", "note", tuple(one)) for one in several[:6]]  # Directions has all

@@ -18,12 +18,12 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
+from hydroid.arrays import Array, rms
 from hydroid.estimate import JointVerdict, finite
 from hydroid.findings import Finding
 from hydroid.fitting.baselines import NAMES, Baseline, fit_baselines
 from hydroid.fitting.validation import Prediction, errors_ahead
 from hydroid.log import Log
-from hydroid.parameters import Array
 from hydroid.settings.fit import FitSettings
 
 SHARE = 0.02
@@ -132,7 +132,7 @@ def behind(settings: FitSettings, verdicts: Sequence[JointVerdict]) -> list[Find
 
 def rms_deg(errors: Iterable[Array]) -> float:
     """Return the rms of errors [rad] over all samples [deg]; NaN where one diverged."""
-    return float(np.degrees(np.sqrt(np.mean(np.concatenate([*errors]) ** 2))))
+    return float(np.degrees(rms(np.concatenate([*errors]))))
 
 
 def _rms_ahead(errors: Array) -> tuple[float | None, ...]:

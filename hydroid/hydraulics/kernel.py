@@ -92,7 +92,7 @@ class Plugin(NamedTuple):
     @property
     def past(self) -> int:
         """Number of steps that the longest delay reaches back."""
-        return int(max(self.coefficients[side]["late"].max(initial=0) for side in "ab"))
+        return max(self.coefficients[side]["late"].max(initial=0) for side in "ab")
 
     def of(self, candidate: int) -> "Plugin":
         """Return one candidate's."""

@@ -39,7 +39,7 @@ JOINT = np.dtype(
     [
         *((name, np.float64) for name in QUANTITIES if name != "mass"),
         ("kind", np.int64),
-        *_fields(" ".join(("middle half sense retracted stroke", *BARS))),
+        *_fields(f"middle half sense retracted stroke {' '.join(BARS)}"),
     ]
 )
 """all quantities of a joint and its actuator, in SI, and how it is moved: kind (NONE, LINEAR or ROTARY);
@@ -151,7 +151,7 @@ def nominal_joints(arm: Arm, settings: HydraulicSettings) -> Structs:
             row["kind"], row["middle"], row["half"] = ROTARY, ends.mean(), 0.5 * np.ptp(ends)
         if isinstance(actuator, LinearActuator):
             row["kind"], row["sense"], row["stroke"] = LINEAR, actuator.sense, 1e-3 * actuator.stroke
-            row["retracted"] = ends[int(np.argmin(actuator.length(ends)))]
+            row["retracted"] = ends[np.argmin(actuator.length(ends))]
             if (bars := actuator.settings.four_bar) is not None:
                 for name in BARS:
                     row[name] = getattr(bars, name)
@@ -162,7 +162,7 @@ def nominal_joints(arm: Arm, settings: HydraulicSettings) -> Structs:
 def has_force_curve(joints: Any) -> Mask:
     """Return which candidates have a force-stroke curve at every actuator, shape (n,)."""
     exists = curve_exists(joints.force_1, joints.force_2, joints.stroke_1, joints.stroke_2)
-    return np.asarray(exists.all(axis=1), dtype=bool)
+    return exists.all(axis=1)
 
 
 def coefficients(joints: Records, period: float = 0.01, substeps: int = 1) -> Records:

@@ -194,11 +194,9 @@ class Plant:
         Raises:
             RunError: the folder cannot be written.
         """
-        folder, settings = Path(folder), self.identified.settings
-        write_settings(folder, settings)
-        summary = self.identified.summarise()
-        write_estimate(folder, summary.changed({"joints": self.joints}))
-        self.export(folder / "model")
+        write_settings(Path(folder), self.identified.settings)
+        write_estimate(Path(folder), self.identified.summarise().changed({"joints": self.joints}))
+        self.export(Path(folder) / "model")
 
     def export(self, folder: Path) -> None:
         """Write the arm for other programs to `model/` of a saved plant or a run folder, beside `arm.xml`.

@@ -133,7 +133,7 @@ class Movement:
             move = replace(move, start=min(max(start, low), high))
             turned = move.angles(estimate)[0]
         passed = self.sign * (turned - angle) >= 0
-        last = int(passed.argmax()) + half if passed.any() else self.samples
+        last = passed.argmax() + half if passed.any() else self.samples
         return replace(move, samples=min(max(last, self.window + 1), self.samples))
 
 

@@ -155,13 +155,13 @@ def estimate_box(parameters: ParameterSet, theta: Array) -> Box:
 def prior_slopes(priors: Priors, box: Box) -> Array:
     """Derivatives of the M priors' scores, shape (p, M), per relative change of each free parameter."""
     if not len(priors):
-        return np.zeros((int(box.varied.sum()), 0))
+        return np.zeros((box.varied.sum(), 0))
     return differentiate(priors.scores, box, single_axes(box, 1e-4))  # they are smooth
 
 
 def white_posterior(box: Box, *parts: Array) -> Posterior:
     """Return the posterior of independent measurements, each (p, m): derivatives over their noise."""
-    weak = np.eye(int(box.varied.sum())) / WEAK_PRIOR
+    weak = np.eye(box.varied.sum()) / WEAK_PRIOR
     return Posterior(box, regular(np.vstack([weak, *(part.T for part in parts)])))
 
 

@@ -194,7 +194,7 @@ def fit_noise(rows: Array) -> Noise:
             break
         forward, backward = forward + k * backward, backward + k * forward
         reflection.append(k)
-        criterion.append(criterion[-1] + samples * float(np.log1p(-(k**2))) + 2.0)
+        criterion.append(criterion[-1] + samples * np.log1p(-(k**2)) + 2.0)
     weight = np.exp(-0.5 * (np.array(criterion) - min(criterion)))
     share = np.cumsum((weight / weight.sum())[::-1])[::-1][1:]
     order = int(np.sum(share > 0.05))  # higher orders weigh less than this together

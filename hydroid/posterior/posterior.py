@@ -77,7 +77,7 @@ class Posterior:
 
         The sum of their squares is the variance.
         """
-        return np.asarray(solve_triangular(self.root.T, slopes, lower=True), dtype=float)
+        return solve_triangular(self.root.T, slopes, lower=True)
 
     def sd(self, slopes: Array) -> Array:
         """Standard deviations of quantities, shape (m,), from derivatives per relative change, (p, m)."""
@@ -98,7 +98,7 @@ class Posterior:
         inside = chosen[self.box.varied]
         # with the others first, the last block of the triangle is the root of what is left (Schur complement)
         triangle = regular(self.root[:, np.argsort(inside, kind="stable")])
-        others = int(np.sum(~inside))
+        others = np.sum(~inside)
         return replace(self, box=self.box.of(inside), root=triangle[others:, others:])
 
     def propagate(

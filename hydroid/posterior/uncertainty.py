@@ -185,7 +185,7 @@ def uncertainty_from(problem: Problem, whole: Linear, noise: Sequence[Noise] = (
     relative[unknown] = np.inf
     status = [ParameterStatus(Flag.FIXED)] * len(free)
     for i, at_edge, (down, up) in zip(np.flatnonzero(free).tolist(), edge, room.T, strict=True):
-        flag = Flag.NO_EFFECT if sensitivity[i] == 0 else flag_of(float(widened[i]), shares[i])
+        flag = Flag.NO_EFFECT if sensitivity[i] == 0 else flag_of(widened[i], shares[i])
         side = ("lower" if down <= up else "upper") if at_edge else None
         status[i] = ParameterStatus(flag, side, float(shares[i]), not unknown[i])
     between = ends(problem.parameters, linear.box, widths * relative)

@@ -22,7 +22,7 @@ the settings say that the noise is white.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import field
 from typing import Literal
 
 import numpy as np
@@ -118,17 +118,13 @@ def make_channels(
                 measured = log.pressure[:, joint, side]
                 if not np.isnan(measured[0]):
                     signals.append((i, joint + 1, quantity, column, measured, weight))
-    ends = np.cumsum([len(measured) for *_, measured, _ in signals]).tolist()
-    channels = [
-        Channel(*signal, slice(end - len(signal[4]), end)) for signal, end in zip(signals, ends, strict=True)
-    ]
-    if drifting:
-        seen = [np.array(bilinear((STAYING, 1), (STAYING / FAST_GAIN, 1), 1 / log.period)) for log in logs]
-        white = objective.noise_of
-        return tuple(
-            replace(c, prefilter=seen[c.log]) if c.quantity == "angle" and white(c.joint) is None else c
-            for c in channels
-        )
+    end, channels = 0, list[Channel]()
+    for i, joint, quantity, column, measured, weight in signals:
+        rows, end = slice(end, end + len(measured)), end + len(measured)
+        prefilter = UNFILTERED
+        if drifting and quantity == "angle" and objective.noise_of(joint) is None:
+            prefilter = np.array(bilinear((STAYING, 1), (STAYING / FAST_GAIN, 1), 1 / logs[i].period))
+        channels.append(Channel(i, joint, quantity, column, measured, weight, rows, prefilter))
     return tuple(channels)
 
 

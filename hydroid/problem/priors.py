@@ -103,7 +103,7 @@ class Priors:
         if not self._combinations:
             return
         off = np.abs(self.scores(self.project(self.searched.start[None]))[0])
-        worst = int(np.argmax(off))
+        worst = np.argmax(off)
         if off[worst] > 1.5 * REACH:
             raise SettingsError(
                 "cannot hold within the bounds together with the other priors",

@@ -63,7 +63,7 @@ class Problem:
     difference.
 
     Candidates are simulated by `spread`, where a worker has `simulation.threads` threads, one where that is
-    0; None: in this process. `spec` is the arm's model, if not that of the settings; then without `spread`.
+    0; None: in this process.
 
     Attributes:
         channels: the compared signals, in the order of a row of residuals.
@@ -80,15 +80,14 @@ class Problem:
         settings: FitSettings,
         logs: Sequence[Log],
         spread: DaskWorkers | None = None,
-        spec: mujoco.MjSpec | None = None,
     ) -> None:
-        spec = load_model(settings.arm) if spec is None else spec
-        outputs = [j - 1 for j in settings.outputs]
+        spec, outputs = load_model(settings.arm), [j - 1 for j in settings.outputs]
         self.settings, self.logs, self.outputs = settings, tuple(logs), outputs
         self._spread = spread
         self.open_starts: tuple[OpenStart, ...] = ()
         self.bindings = Bindings(settings)
-        self.bindings.refuse_idle(np.any([log.driven for log in logs], axis=0), outputs)
+        self._driven = np.any([log.driven for log in logs], axis=0)
+        self.bindings.refuse_idle(self._driven, outputs)
         self.parameters = self.bindings.parameters
         if not self.parameters.free.any():
             raise SettingsError("no parameter is free", "parameters", "fix fewer of them")
@@ -106,8 +105,7 @@ class Problem:
     @property
     def active_joints(self) -> tuple[int, ...]:
         """Joints that a log drives or that are compared, numbered from 1."""
-        driven = np.any([log.driven for log in self.logs], axis=0)
-        return tuple(sorted({*(np.flatnonzero(driven) + 1).tolist(), *self.settings.outputs}))
+        return tuple(sorted({*(np.flatnonzero(self._driven) + 1).tolist(), *self.settings.outputs}))
 
     def varied(self, settings: FitSettings, logs: Sequence[Log] | None = None) -> "Problem":
         """Return the problem with other settings, or other logs too, simulated in the same place."""

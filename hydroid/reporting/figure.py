@@ -6,9 +6,9 @@ from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-import matplotlib as mpl
 import mujoco
 import numpy as np
+from matplotlib import style as styles
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.spatial import ConvexHull, QhullError
@@ -50,9 +50,7 @@ _STYLE: Plain = {
 @contextmanager
 def style() -> Generator[None]:
     """Draw in this style, whatever matplotlib's settings are; they come back afterwards."""
-    with mpl.rc_context(), warnings.catch_warnings():
-        mpl.rcdefaults()
-        mpl.rcParams.update(_STYLE.items())  # pyright: ignore[reportArgumentType, reportCallIssue]  # names are typed as literals
+    with styles.context(_STYLE, after_reset=True), warnings.catch_warnings():
         # a log's name may hold letters that the font lacks: a box is drawn instead
         warnings.filterwarnings("ignore", message="Glyph .* missing")
         yield

@@ -105,7 +105,7 @@ def unknown_sections(summary: FitSummary) -> tuple[Section, ...]:
 
 def direction_table(known: Covariance) -> Table:
     """Return every direction with its standard deviation and its largest parts, best determined first."""
-    _, singular, axes = np.linalg.svd(np.array(known.root))
+    _, singular, axes = np.linalg.svd(known.root)
     rows: list[tuple[float, str]] = []
     for value, axis in zip(singular.tolist(), axes, strict=True):
         order = np.argsort(-np.abs(axis), kind="stable")

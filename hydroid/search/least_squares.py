@@ -107,7 +107,7 @@ def _advance(now: State, residuals: Function, settings: RefinementSettings) -> S
         return _no_step(now)
     rows = residuals(points)
     cost = costs(rows)
-    best = int(np.argmin(cost))
+    best = np.argmin(cost)
     if not cost[best] < now.cost:
         return _damped(now, model, settings)
     ratio = (now.cost - cost[best]) / promised if promised > 0 else 0.0

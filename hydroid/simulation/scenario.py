@@ -73,7 +73,7 @@ def smooth(angle: Array, cutoff: float) -> Array:
     if cutoff >= 0.5 or len(angle) < 16 or not angle.size:
         return angle
     sections = butter(2, 2 * cutoff, output="sos")
-    return np.asarray(sosfiltfilt(sections, angle, axis=0, padlen=min(len(angle) - 1, 100)))
+    return sosfiltfilt(sections, angle, axis=0, padlen=min(len(angle) - 1, 100))
 
 
 @record

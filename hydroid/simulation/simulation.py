@@ -16,7 +16,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from hydroid.arm.locked import repeat
-from hydroid.arrays import Array, Index, Mask, Structs
+from hydroid.arrays import Array, Index, Structs
 from hydroid.hydraulics.actuator import Observation, observe
 from hydroid.hydraulics.records import JOINT_STATE, has_force_curve
 from hydroid.mjcf import quiet_mujoco
@@ -95,8 +95,7 @@ class Simulation:
                 free = deque(self._stepped() for _ in range(threads))
                 left = np.flatnonzero(np.isnan(angle[rows, -1]).any(axis=1))
                 deque(pool.map(simulate, left[:, None]), maxlen=0)
-        feasible: Mask = np.all(np.isfinite(angle), axis=(1, 2))
-        return Response(angle, feasible, pressure)
+        return Response(angle, np.all(np.isfinite(angle), axis=(1, 2)), pressure)
 
     def trace(self, candidates: Candidates) -> Observation:
         """Simulate one candidate; return what its actuators did, at T samples, shape (T, J) or (T, J, 2)."""

@@ -145,8 +145,9 @@ class ParameterSet:
         """
         unknown = [name for name in values if name not in self.names]
         if unknown:
-            known = ", ".join(self.names)
-            raise SettingsError(f"unknown parameter {unknown[0]!r}", source, f"known: {known}")
+            raise SettingsError(
+                f"unknown parameter {unknown[0]!r}", source, f"known: {', '.join(self.names)}"
+            )
         return np.array([_number(p, values.get(p.name, p.fixed), source) for p in self.parameters])
 
     def mapping(self, theta: Array) -> dict[str, float]:

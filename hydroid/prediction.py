@@ -16,9 +16,7 @@ from hydroid.simulation import Response
 
 
 def predict(model: IdentifiedModel, log: Log, joints: Sequence[int]) -> Array:
-    """Return the angles [rad] of some joints, numbered from 1, for a log's commands, shape (T, K); NaN if the
-    simulation diverged.
-    """
+    """Return angles [rad] of joints, numbered from 1, for a log's commands, (T, K); NaN if it diverged."""
     return _respond(model, log, joints).angle[0]
 
 

@@ -36,8 +36,9 @@ def bare(text: str) -> str:
 
 def likely_time_unit(step: float) -> str:
     """Return the unit in which a step between samples is one of 2 to 1000 samples a second; "": in none."""
-    units = ("s", "ms", "us", "ns", "min", "day")
-    return next((name for name in units if 9e-4 < step * UNITS[name].factor < 0.6), "")
+    return next(
+        (name for name in ("s", "ms", "us", "ns", "min", "day") if 9e-4 < step * UNITS[name].factor < 0.6), ""
+    )
 
 
 def way(degrees: float, *, slides: bool) -> str:

@@ -28,8 +28,8 @@ def adapted(model: IdentifiedModel, free: Sequence[str]) -> FitSettings:
     possible = [name for name, own in parameters.items() if own.can_be_free]
     for name in free:
         if name not in possible:
-            hint = f"one of {', '.join(possible)}"
-            raise SettingsError(f"no parameter {name!r} has bounds or a prior", where="--free", hint=hint)
+            what = f"no parameter {name!r} has bounds or a prior"
+            raise SettingsError(what, "--free", f"one of {', '.join(possible)}")
     for name, own in parameters.items():
         value = model.values[name]
         freed = {"fixed": None, "start": value} | ({"nominal": value} if own.has_prior else {})

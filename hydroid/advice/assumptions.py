@@ -49,8 +49,9 @@ class _Motion:
 
     def command(self, joint: int, earlier: int) -> Array:
         """A joint's commands some windows earlier, shape (n,)."""
-        columns = [np.pad(one[:, joint], (earlier, 0), "edge")[: len(one)] for one in self.commands]
-        return np.concatenate(columns)
+        return np.concatenate(
+            [np.pad(one[:, joint], (earlier, 0), "edge")[: len(one)] for one in self.commands]
+        )
 
     def follows(self, joint: int, other: int) -> tuple[float, int]:
         """How a joint's speed correlates with a joint's command, and the windows after which it does most."""
@@ -115,8 +116,7 @@ def _motion(settings: FitSettings, logs: Sequence[Log]) -> _Motion:
     step = max(round(PERIOD / logs[0].period), 1)
     period, pose = step * logs[0].period, settings.arm.pose(settings.start_pose)
     width, windows = step * max(round(WINDOW / period), 1), list[tuple[Array, ...]]()
-    shortest = 2 * LATEST + WINDOW
-    logs = [log for log in logs if log.duration > shortest and log.measured[log.driven].all()]
+    logs = [log for log in logs if log.duration > 2 * LATEST + WINDOW and log.measured[log.driven].all()]
     for log in logs:
         angle = np.where(log.measured, log.angle, pose)
         begin, end = angle[:-width:step], angle[width::step]

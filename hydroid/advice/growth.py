@@ -44,14 +44,11 @@ from hydroid.settings.search import RefinementSettings
 
 @record
 class Score:
-    """Statistic of one change of the model.
+    """Statistic z of one change of the model, positive where the change lowers the error.
 
-    Attributes:
-        statistic: z; positive where the change lowers the error.
-        amount: of the change that lowers it most, by the linear approximation.
-        part: of the rms residual that this saves, by the same approximation.
-        strength: the statistic that the whole change would have without noise: what can be seen at all.
-        freedom: degrees of freedom of the statistic.
+    By the linear approximation the `amount` of it that lowers the error most saves a `part` of the rms
+    residual. `strength` is the statistic that the whole change would have without noise: what can be seen at
+    all. `freedom` are the degrees of freedom of z.
     """
 
     statistic: float
@@ -215,8 +212,7 @@ def refitted(problem: Problem, theta: Array, weight: float | None = None) -> Ref
     """
     parameters, size = problem.parameters, problem.measured.size
     if weight is None:
-        row = problem.residuals(theta[None])[0]
-        weight = prior_weight(problem, row)
+        weight = prior_weight(problem, problem.residuals(theta[None])[0])
     rows = least_squares_rows(problem, theta, weight)
 
     def fitted(point: Array, kept: slice | Mask = slice(None)) -> Descent:
@@ -243,13 +239,12 @@ def _tested(term: Term, problem: Problem, known: Uncertainty, fit: Explained) ->
     values = np.geomspace(high, low, 16) if limit else term.value + parts * (end - term.value)
     residual = known.linear.residual
     effects = term.residuals(problem, known.theta, values.tolist()) - residual
-    unit = max(rms(residual), MIN_RESIDUAL)
-    sizes = rms(effects, axis=1) / unit
+    sizes = rms(effects, axis=1) / max(rms(residual), MIN_RESIDUAL)
     acting = np.flatnonzero(np.isfinite(sizes) & (sizes > 0))
     if not limit:
         acting = acting[: max(np.sum(sizes[acting] <= LARGEST_EFFECT), 1)][-1:]
     one_sided = limit or term.value in term.span
-    scores: list[tuple[float, Score, float]] = []
+    scores = list[tuple[float, Score, float]]()
     for i in acting:
         score = fit.score(effects[i])
         if score.strength >= VISIBLE * parts[i]:

@@ -155,8 +155,9 @@ def freeing_command(problem: Problem, entries: Mapping[str, Any], run: str) -> s
         changes += f"--set {shlex.quote(f'parameters.{name}={line}')} "
     given = " ".join(shlex.quote(log.source) for log in problem.logs)
     config, own, out = (shlex.quote(path) for path in (f"{run}/config.yaml", run, f"{run}-{[*entries][-1]}"))
-    stage = problem.settings.stage
-    return f"hydroid fit-{stage} {given} --config {config} --start {own} {changes}--out {out}"
+    return (
+        f"hydroid fit-{problem.settings.stage} {given} --config {config} --start {own} {changes}--out {out}"
+    )
 
 
 def missing_findings(content: Content) -> Iterator[Finding]:

@@ -74,8 +74,7 @@ def _held(settings: FitSettings) -> Iterator[Term]:
             low, high = p.bounds or CHOICES[p.quantity].span or (p.fixed / 4.0, 4.0 * p.fixed)
             span = min(low, p.fixed), max(high, p.fixed)
             if span[0] < span[1]:
-                free = p.changed({"fixed": None, "bounds": span})
-                yield Term(name, {name: free}, p.fixed)
+                yield Term(name, {name: p.changed({"fixed": None, "bounds": span})}, p.fixed)
 
 
 def _split(problem: Problem, theta: Array) -> Iterator[Term]:

@@ -89,8 +89,7 @@ def _follow(
 def fit_baselines(logs: Sequence[Log], joint: int, limits: Array) -> dict[str, Baseline]:
     """Fit the baselines of a joint (number, from 1) to the logs that measure it; `limits` is its range [rad].
 
-    Returns:
-        By name, the simplest first. A joint that is never driven has only the first.
+    They are by name, the simplest first. A joint that is never driven has only that.
     """
     limits = np.asarray(limits, float)
     measured = [log for log in logs if log.measured[joint - 1]]

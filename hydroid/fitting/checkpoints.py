@@ -80,9 +80,7 @@ class Memo:
 
     def evaluate(self, theta: Array) -> Evaluation:
         """Evaluate theta, shape (n, P), simulating what is new in it.
-
-        Raises:
-            RunError: a resumed search does not repeat itself.
+        Raises RunError: a resumed search does not repeat itself.
         """
         new = {row.tobytes(): row for row in theta if row.tobytes() not in self._values}
         values = {key: self._stored.pop(key) for key in new if key in self._stored}

@@ -10,6 +10,7 @@ from hydroid.fitting.checkpoints import Checkpoints, saving
 from hydroid.parameters import Array
 from hydroid.posterior.linear import least_squares_rows, with_open_start
 from hydroid.posterior.noise import prior_weight
+from hydroid.problem.channels import UNFILTERED
 from hydroid.problem.problem import Problem
 from hydroid.search.descent import Descent, start
 from hydroid.search.least_squares import step
@@ -59,20 +60,13 @@ def refine(
     Fast errors have more optima than slow ones: where there is a prefilter, least squares goes most of the
     way without it.
 
-    Args:
-        problem: the problem.
-        theta: where to start, shape (P,).
-        settings: when to end.
-        progress: takes the name, the number of simulations and the rms error [rad] so far.
-        checkpoints: where it continues from, and stores how far it is; a result is stored too.
-        name: of this refinement among them.
-
-    Raises:
-        RunError: the checkpoint cannot be written.
+    It starts at theta, shape (P,). `progress` takes the name, the number of simulations and the rms error
+    [rad] so far. It continues from `checkpoints`, and stores there by its name how far it is; a result too.
+    Raises RunError: the checkpoint cannot be written.
     """
     checkpoints = {} if checkpoints is None else checkpoints
     simulated = 0
-    if problem.is_filtered:
+    if any(channel.prefilter is not UNFILTERED for channel in problem.channels):
         rough = settings.changed({"gain_tolerance": max(settings.gain_tolerance, ROUGH)})
         first = refine(
             problem.from_afar(filtered=False), theta, rough, progress, checkpoints, f"{name} from afar"

@@ -43,16 +43,11 @@ def search(
     progress: Callable[[str, int, float], None],
     checkpoints: Checkpoints,
 ) -> Searched:
-    """Search to the last generation, from the seed or from what `checkpoints` holds.
+    """Search to the last generation, from the seed or from what `checkpoints` holds as "search".
 
-    Args:
-        problem: what is minimised.
-        watch: takes a row of HISTORY after every generation, but for those that a resumed run repeats.
-        progress: takes name, simulations and rms error [rad] of least squares within multi-start.
-        checkpoints: where the search is stored as "search".
-
-    Raises:
-        RunError: the search does not repeat what it did before the checkpoint.
+    `watch` takes a row of HISTORY after every generation, but for those that a resumed run repeats;
+    `progress` the name, simulations and rms error [rad] of least squares within multi-start. Raises RunError:
+    the search does not repeat what it did before the checkpoint.
     """
     settings, free = problem.settings.search, int(problem.parameters.free.sum())
     memo = Memo(problem, checkpoints.get("search"))

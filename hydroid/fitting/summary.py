@@ -36,21 +36,22 @@ def summarise(problem: Problem, fit: Fit) -> FitSummary:
         )
         for e in fit.estimates.values()
     }
-    own = {
-        "joints": problem.active_joints,
-        "final": fit.final,
-        "converged": refinement and refinement.converged,
-        "ending": refinement and refinement.ending.value,
-        "rms_deg": finite(np.degrees(fit.best.rms)),
-        "seed": settings.search.seed,
-        "simulations": int(fit.history[-1, 2]),
-        "diverged": int(fit.history[-1, 3]),
-        "findings": (*fit_findings(last, fit), *known.findings),
-        "estimates": estimates,
-        "quantities": fit.quantities.scalars,
-        "curves": fit.quantities.curves,
-    }
-    return known.changed(own)
+    return known.changed(
+        {
+            "joints": problem.active_joints,
+            "final": fit.final,
+            "converged": refinement and refinement.converged,
+            "ending": refinement and refinement.ending.value,
+            "rms_deg": finite(np.degrees(fit.best.rms)),
+            "seed": settings.search.seed,
+            "simulations": int(fit.history[-1, 2]),
+            "diverged": int(fit.history[-1, 3]),
+            "findings": (*fit_findings(last, fit), *known.findings),
+            "estimates": estimates,
+            "quantities": fit.quantities.scalars,
+            "curves": fit.quantities.curves,
+        }
+    )
 
 
 def account(problem: Problem, known: Uncertainty, directions: Identifiability | None = None) -> FitSummary:
@@ -100,8 +101,9 @@ def fit_findings(problem: Problem, fit: Fit) -> list[Finding]:
     if fit.refinement is None:
         findings.append(Finding("not refined", "warning"))
     elif not fit.refinement.converged:
-        ending = {"ending": fit.refinement.ending.value}
-        findings.append(Finding("not converged", "warning", (fit.final,), ending))
+        findings.append(
+            Finding("not converged", "warning", (fit.final,), {"ending": fit.refinement.ending.value})
+        )
     scores = zip(problem.priors.names, problem.priors.scores(fit.best.theta[None])[0].tolist(), strict=True)
     for prior, score in sorted(scores, key=lambda pair: -abs(pair[1])):
         numbers = {"score": abs(score), "side": "above" if score > 0 else "below"}

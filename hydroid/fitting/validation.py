@@ -112,14 +112,9 @@ def errors_ahead(log: Log, errors: Callable[[Log], Array]) -> Array:
     """Return by how much predicted changes of angles over HORIZONS are off, from starts all along a log.
 
     Each start is simulated from SETTLING before it, at the angles measured there: valves, pilot stages and
-    pump are then as the commands have left them.
-
-    Args:
-        log: the log.
-        errors: of a part of it [rad], shape (T,) or (T, K).
-
-    Returns:
-        One row for each start [rad], shape (N, HORIZONS) or (N, HORIZONS, K); NaN where the log ends before.
+    pump are then as the commands have left them. `errors` are those of a part of the log [rad], shape (T,) or
+    (T, K). Each start has a row [rad], shape (N, HORIZONS) or (N, HORIZONS, K); NaN where the log ends
+    before.
     """
     before, rows = round(SETTLING / log.period), list[Array]()
     steps = np.array([before + round(seconds / log.period) for seconds in HORIZONS])

@@ -52,11 +52,9 @@ def judge(
 ) -> tuple[JointVerdict, ...]:
     """Return the verdict on each compared joint.
 
-    Args:
-        settings: of the fit.
-        fitted: what it makes of its own logs; none of values that are no fit's.
-        baselines: fitted to the same logs; none: a joint is compared with standing still.
-        unseen: its predictions of other logs; those that it has seen test nothing.
+    `fitted` is what the fit makes of its own logs; none of values that are no fit's. `baselines` are fitted
+    to the same logs; none: a joint is compared with standing still. Of the predictions `unseen`, those of
+    logs that the fit has seen test nothing.
     """
     return tuple(
         _judge(settings, fitted, unseen, baselines.get(j) or {NAMES[0]: Baseline(j, ANYWHERE)})

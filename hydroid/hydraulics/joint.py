@@ -22,13 +22,7 @@ from hydroid.hydraulics.cylinder import (
 )
 from hydroid.hydraulics.elementwise import compilable, implicit_weight, kept
 from hydroid.hydraulics.records import LINEAR, NONE, ROTARY
-from hydroid.hydraulics.solenoid import (
-    beyond_dead_band,
-    drive,
-    plunger_step,
-    plunger_weight,
-    side_voltage,
-)
+from hydroid.hydraulics.solenoid import beyond_dead_band, drive, plunger_step, plunger_weight, side_voltage
 from hydroid.hydraulics.valve import notched, port_flow, slot_share
 
 

@@ -161,8 +161,7 @@ def nominal_joints(arm: Arm, settings: HydraulicSettings) -> Structs:
 
 def has_force_curve(joints: Any) -> Mask:
     """Return which candidates have a force-stroke curve at every actuator, shape (n,)."""
-    exists = curve_exists(joints.force_1, joints.force_2, joints.stroke_1, joints.stroke_2)
-    return exists.all(axis=1)
+    return curve_exists(joints.force_1, joints.force_2, joints.stroke_1, joints.stroke_2).all(axis=1)
 
 
 def coefficients(joints: Records, period: float = 0.01, substeps: int = 1) -> Records:

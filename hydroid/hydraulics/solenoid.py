@@ -32,13 +32,9 @@ FULL_SCALE = 10.0  # voltage at full command, and from which the current is I_ma
 def beyond_dead_band(start: float, asked: float, steps: float, keep: float, dead_band: float) -> Any:
     """What a pilot stage passes on beyond its dead band during a step [%], and for which part of the step.
 
-    Both are exact: a lag that is short beside the step would else open the valve earlier or later.
-
-    Args:
-        start: what the stage has of the command at the start [%].
-        asked: the command [%]; the stage is first-order behind it.
-        steps: its lag in steps. keep: part of the error that a step leaves, `elementwise.kept`.
-        dead_band: [%]; ours.
+    Both are exact: a lag that is short beside the step would else open the valve earlier or later. The stage
+    has `start` of the command at the start [%], and is first-order behind the one that is `asked` [%]: its
+    lag is so many steps, of which each leaves the part `keep` of the error (`elementwise.kept`).
     """
     end = asked + (start - asked) * keep
     if start <= dead_band and end <= dead_band:

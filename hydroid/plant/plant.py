@@ -58,9 +58,8 @@ class Plant:
     ) -> None:
         settings = identified.settings
         arm = settings.arm
-        fitted = () if identified.summary is None else identified.summary.joints
         self.identified, numbers = identified, range(1, 1 + len(arm.joints))
-        wanted = set(joints or fitted or settings.outputs)
+        wanted = set(joints or identified.summarise().joints or settings.outputs)
         pairs = list(zip(numbers, arm.joint_names, strict=True))
         self.joints = tuple(number for number, name in pairs if wanted & {number, name})
         self._named = [name for number, name in pairs if number in self.joints]
@@ -115,9 +114,8 @@ class Plant:
     @property
     def pressure(self) -> Array:
         """Pressures of chambers A and B [Pa], shape (J, 2); NaN where a joint has no hydraulics."""
-        pressure, chain = np.full((len(self._pose), 2), np.nan), self._chain
-        seen = observe(self._plugin.coefficients, self._state, self.data.qpos[chain.columns])
-        pressure[chain.joints] = seen.pressure
+        pressure, angle = np.full((len(self._pose), 2), np.nan), self.data.qpos[self._chain.columns]
+        pressure[self._chain.joints] = observe(self._plugin.coefficients, self._state, angle).pressure
         pressure[~self._active] = np.nan
         return pressure
 

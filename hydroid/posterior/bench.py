@@ -36,8 +36,7 @@ class Bench:
     @property
     def unit(self) -> tuple[float, str]:
         """What 1 rad, or 1 m of a joint that slides, is in the unit of quantities."""
-        slides = self.settings.arm.joints[self.joint - 1].slides
-        return (1e3, "mm") if slides else (np.degrees(1.0), "deg")
+        return (1e3, "mm") if self.settings.arm.joints[self.joint - 1].slides else (np.degrees(1.0), "deg")
 
     @property
     def sense(self) -> float:
@@ -91,8 +90,7 @@ class Movement:
         settings = self.bench.settings
         commands = np.full((self.samples * settings.simulation.steps, 1), self.command)
         scenario = self.bench.scenario.restarted(np.array([self.start]), commands)
-        simulation = Simulation(scenario, settings.arm, settings.substeps)
-        return simulation.simulate(candidates).angle[:, :, 0]
+        return Simulation(scenario, settings.arm, settings.substeps).simulate(candidates).angle[:, :, 0]
 
     def speeds(self, candidates: Candidates) -> Array:
         """Return speeds between samples, shape (n, samples)."""

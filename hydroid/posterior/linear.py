@@ -86,9 +86,8 @@ class Linear:
 
     def of(self, kept: Mask) -> "Linear":
         """Return it with only some of the p parameters varying, shape (p,)."""
-        slopes, prior_slopes, diverging = self.slopes[kept], self.prior_slopes[kept], self.diverging[kept]
-        box = self.box.of(kept)
-        return replace(self, box=box, slopes=slopes, prior_slopes=prior_slopes, diverging=diverging)
+        rows = {name: getattr(self, name)[kept] for name in ("slopes", "prior_slopes", "diverging")}
+        return replace(self, box=self.box.of(kept), **rows)
 
     def spread(self, values: Array) -> Array:
         """Return values of the parameters that vary, shape (p,), among all, shape (P,); NaN elsewhere."""
@@ -102,12 +101,8 @@ def linearised(problem: Problem, theta: Array, first: Array | None = None) -> Li
 
     The first differences are by each parameter, p simulations. Then come differences of a standard deviation
     to each side along the axes of the covariance that follows, 2 p or more. They are taken once more where a
-    standard deviation changed to four times or a quarter: the first axes were that far off.
-
-    Args:
-        problem: the problem.
-        theta: the parameters.
-        first: derivatives to begin with, shape (p, R), such as those of the least squares that ended there.
+    standard deviation changed to four times or a quarter: the first axes were that far off. `first` are
+    derivatives to begin with, shape (p, R), such as those of the least squares that ended there.
     """
     problem = with_open_start(problem, theta)
     box, residual = estimate_box(problem.parameters, theta), problem.residuals(theta[None])[0]
@@ -201,8 +196,11 @@ def _opened(problem: Problem, values: tuple[float, ...]) -> Problem:
         return free
     opened, noise, weight = list[OpenStart](), problem_noise(problem, row), prior_weight(problem, row)
     for each in slopes:
-        own = [(c, n) for c, n in zip(problem.channels, noise, strict=True) if c.log == each.log]
-        levels = {c.joint: error_level(c, n) for c, n in own if c.quantity == "angle"}
+        levels = {
+            c.joint: error_level(c, n)
+            for c, n in zip(problem.channels, noise, strict=True)
+            if c.log == each.log and c.quantity == "angle"
+        }
         deviations = start_deviations(problem.logs[each.log], each.joints, levels)
         opened.append(each.opened(deviations / weight))
     return problem.with_open_starts(opened)

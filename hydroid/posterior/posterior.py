@@ -84,9 +84,7 @@ class Posterior:
         return np.linalg.norm(self.parts(slopes), axis=0)
 
     def add(self, rows: Array) -> "Posterior":
-        """Return it with information N = rows' rows: derivatives per relative change over the sd of each, (k,
-        p).
-        """
+        """Return it with information rows' rows, (k, p): derivatives per relative change over their sd."""
         return replace(self, root=regular(np.vstack([self.root, rows])))
 
     def axes(self, step: float) -> Axes:

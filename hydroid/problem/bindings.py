@@ -47,7 +47,16 @@ class Bindings:
             for quantity in TARGETS[p.quantity]
         ]
         self._rows = sorted(rows, key=lambda row: row.logs is not None)  # what is added comes last
-        self._refuse_overlap(list(settings.parameters))
+        names, taken = list(settings.parameters), dict[tuple[str, int, str | None], str]()
+        for row in self._rows:
+            name = names[row.column]
+            for place in row.places:
+                if (other := taken.setdefault((row.quantity, place, row.logs), name)) != name:
+                    raise SettingsError(
+                        f"{other} and {name} both set the {row.quantity} of the same joint or link",
+                        f"parameters.{name}",
+                        "give each its own joints, or remove one",
+                    )
         self.parameters = settings.parameter_set()
 
     def candidates(self, theta: Array, log: str = "") -> Candidates:
@@ -76,26 +85,13 @@ class Bindings:
                     "add one, or leave the joint's command out with log.joints",
                 )
 
-    def _refuse_overlap(self, names: list[str]) -> None:
-        taken: dict[tuple[str, int, str | None], str] = {}
-        for row in self._rows:
-            name = names[row.column]
-            for place in row.places:
-                if (other := taken.setdefault((row.quantity, place, row.logs), name)) != name:
-                    raise SettingsError(
-                        f"{other} and {name} both set the {row.quantity} of the same joint or link",
-                        f"parameters.{name}",
-                        "give each its own joints, or remove one",
-                    )
-
 
 def _places(arm: Arm, name: str, settings: ParameterSettings) -> list[int]:
     """0-based joints or links that the parameter acts on."""
     where = f"parameters.{name}"
     if settings.link is not None:
         if settings.link not in arm.link_names:
-            known = ", ".join(arm.link_names)
-            raise SettingsError(f"no link {settings.link!r}", where, f"links: {known}")
+            raise SettingsError(f"no link {settings.link!r}", where, f"links: {', '.join(arm.link_names)}")
         return [arm.link_names.index(settings.link)]
     count = len(arm.joint_names)
     joints = range(1, count + 1) if settings.joints is None else settings.joints

@@ -55,8 +55,11 @@ class Priors:
 
     def __init__(self, settings: Mapping[str, PriorSettings], parameters: ParameterSet) -> None:
         self.searched = _within_reach(parameters)
-        each = enumerate(parameters.parameters)
-        self._own = [(column, p.prior) for column, p in each if p.fixed is None and p.prior is not None]
+        self._own = [
+            (column, p.prior)
+            for column, p in enumerate(parameters.parameters)
+            if p.fixed is None and p.prior is not None
+        ]
         self._combinations = [
             combination
             for name, prior in settings.items()

@@ -59,8 +59,7 @@ class Evaluation:
 
 
 class Problem:
-    """Logs, each with its own start pose, the model that should reproduce them, and the measure of the
-    difference.
+    """Logs, each with its start pose, a model that should reproduce them, and the measure of the difference.
 
     Candidates are simulated by `spread`, where a worker has `simulation.threads` threads, one where that is
     0; None: in this process.
@@ -117,11 +116,6 @@ class Problem:
     def leaves_start_open(self) -> bool:
         """Whether the start angle of any log is open."""
         return self.settings.free_start and any(self.started(log) for log in self.logs)
-
-    @property
-    def is_filtered(self) -> bool:
-        """Whether any channel has a prefilter."""
-        return any(c.prefilter is not UNFILTERED for c in self.channels)
 
     def from_afar(self, *, filtered: bool = True) -> "Problem":
         """Return it with priors that count more (`prior_weight`), with or without its prefilter."""
@@ -207,17 +201,18 @@ class Problem:
         return np.concatenate([c.unfiltered(residuals[:, c.rows]) for c in self.channels], axis=1)
 
     def rms(self, errors: Array, joints: Collection[int] = ()) -> Array:
-        """Rms error of the angles of some joints (number, from 1) or of all, unweighted [rad], shape (n,),
-        from output errors, shape (n, R).
-        """
-        some = (c for c in self.channels if c.quantity == "angle" and (not joints or c.joint in joints))
-        angles = [errors[:, c.rows] / c.weight for c in some]
+        """Rms of output errors, (n, R), of the angles of joints (from 1), or all, unweighted [rad], (n,)."""
+        angles = [
+            errors[:, c.rows] / c.weight
+            for c in self.channels
+            if c.quantity == "angle" and (not joints or c.joint in joints)
+        ]
         return rms(np.concatenate(angles, axis=1), axis=1)
 
     @cached_property
     def _on_worker(self) -> "Problem":
-        threads = self.settings.simulation.threads or 1
-        return Problem(self.settings.changed({"simulation.threads": threads}), self.logs)
+        threads = {"simulation.threads": self.settings.simulation.threads or 1}
+        return Problem(self.settings.changed(threads), self.logs)
 
     def _segments(self, channel: Channel) -> Ints:
         """Samples of each objective: an angle's segments; a pressure is one objective, however long."""

@@ -166,8 +166,7 @@ class Section:
 
 @dataclass(frozen=True)
 class Page:
-    """A report: the answer in a sentence, `lead`, and its sections; `name` is that of its file, without
-    ending.
+    """A report: the answer in a sentence, `lead`, and its sections; its file has the `name`, and an ending.
 
     `warnings` must be read before using the answer, and stand behind the first section; `versions` of the
     software stand at the foot; `data` are further files by name, such as CSV for scripts.

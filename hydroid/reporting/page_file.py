@@ -66,8 +66,9 @@ def html(page: Page) -> str:
     drawings = {plot.name: plot.draw() for plot in page.plots}
     charts = {name for name, drawing in drawings.items() if isinstance(drawing, Chart)}
     content = _packed(json.dumps(drawings, default=plain, ensure_ascii=False, separators=(",", ":")))
-    parts = {"charts": charts, "content": content, "library": _library() if charts else ""}
-    return fill_template("reporting/template.html.j2", page=page, **parts)
+    library = _library() if charts else ""
+    path = "reporting/template.html.j2"
+    return fill_template(path, page=page, charts=charts, content=content, library=library)
 
 
 @cache

@@ -38,12 +38,13 @@ def search_section(record: Record) -> Section:
 def learning(history: Array, objective: ObjectiveSettings) -> Chart:
     """Draw the best objective so far and the population's median against evaluations."""
     tried, (best, median) = history[:, 1], _shown(objective, history[:, 4:6].T)
-    marks = (
+    return _chart(
+        "candidates evaluated",
+        objective,
         Mark("line", tried, median, color="grey", label="median of the population"),
         Mark("line", tried, best, color="blue", label="best so far", width=2),
         Mark("points", tried, best, color="blue", width=5),
     )
-    return _chart("candidates evaluated", objective, marks)
 
 
 def pareto(objectives: Array, estimates: dict[str, Array], objective: ObjectiveSettings) -> Chart:
@@ -62,10 +63,10 @@ def pareto(objectives: Array, estimates: dict[str, Array], objective: ObjectiveS
         one = _shown(objective, segments)
         marks.append(Mark("line", at, one, color=color, label=name, width=2))
         marks.append(Mark("points", at, one, color=color, width=6))
-    return _chart("segment", objective, tuple(marks))
+    return _chart("segment", objective, *marks)
 
 
-def _chart(x: str, objective: ObjectiveSettings, marks: tuple[Mark, ...]) -> Chart:
+def _chart(x: str, objective: ObjectiveSettings, *marks: Mark) -> Chart:
     label = {1: "mean absolute error", 2: "rms error", "inf": "largest error"}[objective.norm]
     label = f"relative {label} [-]" if objective.relative else f"{label} [deg]"
     drawable = any(np.isfinite(mark.y).any() for mark in marks)

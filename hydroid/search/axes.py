@@ -90,11 +90,10 @@ def differentiate(
     have in common, or where the slope exceeds the former one by far, a shorter step tells whether the effect
     of the long one is mostly curvature.
 
-    Args:
-        function: is called with all points of the differences at once, and with those of the shorter steps.
-        value: of the function at the point, shape (R,), where it is known.
-        former: derivatives to keep along axes that fail, shape (p, R). Without them, axes that are not
-            single coordinates must not fail; a coordinate's row is NaN.
+    The function is called with all points of the differences at once, and with those of the shorter steps.
+    Its `value` at the point, shape (R,), is given where it is known. `former` derivatives, (p, R), are kept
+    along axes that fail; without them, axes that are not single coordinates must not: a coordinate's row is
+    NaN.
     """
     centre = function(at.at[None])[0] if value is None else value
     expected = None if former is None else axes.directions @ former
@@ -157,8 +156,7 @@ def _slopes(function: Function, at: Box, axes: Axes, value: Array) -> tuple[Arra
         if len(steps) == 1:
             return near, np.zeros(len(near), dtype=bool)
         both = (near * steps[1] - far * steps[0]) / (steps[1] - steps[0])
-    odd = np.linalg.norm(both, axis=1)
-    curved = np.linalg.norm(near - both, axis=1) > odd
+    curved = np.linalg.norm(near - both, axis=1) > np.linalg.norm(both, axis=1)
     slopes = np.where(np.isfinite(both), both, np.where(np.isfinite(near), near, far))
     return slopes, curved
 

@@ -39,8 +39,7 @@ class GrayCoding:
 
     def decode(self, chromosomes: Genes) -> Array:
         """Points of the unit box, shape (n, parameters)."""
-        gray = chromosomes.reshape(-1, self.parameters, BITS)
-        bits = np.bitwise_xor.accumulate(gray, axis=-1)
+        bits = np.bitwise_xor.accumulate(chromosomes.reshape(-1, self.parameters, BITS), axis=-1)
         return bits @ 2.0 ** np.arange(BITS - 1, -1, -1) / STEPS
 
     def encode(self, points: Array) -> Genes:
@@ -52,8 +51,7 @@ class GrayCoding:
 
     def altered(self, chromosomes: Genes, rng: Generator) -> Genes:
         """Flip one random bit of every element."""
-        flipped = rng.integers(0, BITS, (len(chromosomes), self.parameters, 1))
-        flips = flipped == np.arange(BITS)
+        flips = rng.integers(0, BITS, (len(chromosomes), self.parameters, 1)) == np.arange(BITS)
         return chromosomes ^ flips.reshape(chromosomes.shape).astype(np.uint8)
 
 

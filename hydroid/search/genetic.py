@@ -16,15 +16,7 @@ import numpy as np
 from numpy.random import Generator
 
 from hydroid.arrays import Array, Ints, record
-from hydroid.search.chromosomes import (
-    Coding,
-    Genes,
-    GrayCoding,
-    IntegerCoding,
-    crossover,
-    mutate,
-    roulette,
-)
+from hydroid.search.chromosomes import Coding, Genes, GrayCoding, IntegerCoding, crossover, mutate, roulette
 from hydroid.search.pareto import crowding, feasible, ranks
 from hydroid.settings.search import GeneticSettings
 
@@ -51,8 +43,10 @@ class Population:
 
     def join(self, other: "Population") -> "Population":
         """Return these candidates, then the others."""
-        chromosomes = np.concatenate([self.chromosomes, other.chromosomes])
-        return Population(chromosomes, np.concatenate([self.objectives, other.objectives]))
+        return Population(
+            np.concatenate([self.chromosomes, other.chromosomes]),
+            np.concatenate([self.objectives, other.objectives]),
+        )
 
 
 @record

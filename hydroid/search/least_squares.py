@@ -58,10 +58,9 @@ SLOW_STEPS = 2
 
 
 def least_squares(start_at: Array, residuals: Function, settings: RefinementSettings) -> Descent:
-    """Minimise the sum of squared residuals from a point of the unit box, shape (p,).
+    """Minimise the sum of squared residuals from a point of the unit box, shape (p,); return the last state.
 
-    Returns:
-        The last state. Its point is the best one evaluated, and its ending says whether that is an optimum.
+    Its point is the best one evaluated, and its ending says whether that is an optimum.
     """
     descent = start(start_at, residuals(start_at[None])[0])
     while not descent.ended:

@@ -19,10 +19,8 @@ actuator stand still. Leakage is left out, so nothing sags.
 # pyright: reportMissingParameterType=false
 # a law takes floats or arrays that broadcast, and compiled code whatever has its fields
 
-import ctypes
 from typing import Any
 
-import llvmlite.binding
 import numpy as np
 from numba import njit, types
 
@@ -33,13 +31,11 @@ from hydroid.hydraulics.kernel import SOURCE, Plugin, make_pad
 from hydroid.hydraulics.pump import begin_line, come_up, delivery
 from hydroid.hydraulics.records import LINEAR
 from hydroid.hydraulics.valve import MARGIN
-from hydroid.simulation.rollout import mujoco_library, write_sample
+from hydroid.simulation.rollout import mujoco_function, write_sample
 
-for _name in ("mj_kinematics", "mj_comPos", "mj_rne"):
-    llvmlite.binding.add_symbol(_name, ctypes.cast(getattr(mujoco_library, _name), ctypes.c_void_p).value)
-_kinematics: Any = types.ExternalFunction("mj_kinematics", types.void(types.intp, types.intp))
-_com_pos: Any = types.ExternalFunction("mj_comPos", types.void(types.intp, types.intp))
-_rne: Any = types.ExternalFunction("mj_rne", types.void(types.intp, types.intp, types.int32, types.intp))
+_kinematics = mujoco_function("mj_kinematics", types.intp, types.intp)
+_com_pos = mujoco_function("mj_comPos", types.intp, types.intp)
+_rne = mujoco_function("mj_rne", types.intp, types.intp, types.int32, types.intp)
 
 ITERATIONS = 30  # for the line's pressure at most; three to five suffice
 LEAST_LEVER = 1e-6  # moment arm below which a cylinder stands at its dead centre [m]
@@ -48,13 +44,10 @@ SETTLED = 1e-9  # part of the pump's flow, or of its pressure, that may be left 
 
 @compilable
 def rod_speed(c, w, supply: float) -> Any:
-    """Speed at which a chamber fills [m/s], its flow from the pump [m³/s], and how that rises with P.
+    """Speed at which a chamber fills [m/s], its flow from the pump [m³/s], and how that rises with P [Pa].
 
-    Args:
-        c: the joint's COEFFICIENTS.
-        w: its scratch space: net opening `travel` [m²], above 0 towards A, load `push` of gravity and
-            springs, dry friction `thrust` [N], damping `drag` [N·s/m]; of a rotary actuator torques.
-        supply: P [Pa].
+    The scratch space w has the net opening `travel` [m²], above 0 towards A, the load `push` of gravity and
+    springs, dry friction `thrust` [N], damping `drag` [N·s/m]; of a rotary actuator torques. P is `supply`.
     """
     if w.travel == 0.0:
         return 0.0, 0.0, 0.0
@@ -169,11 +162,9 @@ def weigh(c, w, angle: float, torque: float) -> None:
     """Lever and load of a joint that a torque [N·m] must hold at an angle [rad]."""
     w.arm = linkage(c, angle)[1]
     lever = max(abs(w.arm), LEAST_LEVER)
-    w.push, w.thrust, w.drag = (
-        torque / w.arm,
-        c.dry_friction + c.friction / lever,
-        c.damping / (lever * lever),
-    )
+    w.push = torque / w.arm
+    w.thrust = c.dry_friction + c.friction / lever
+    w.drag = c.damping / (lever * lever)
 
 
 @compilable

@@ -37,9 +37,17 @@ NO_ACTUATORS = Plugin(np.empty(0, COEFFICIENTS), NO_JOINTS, np.empty((0, 0), np.
 """of an arm whose joints are all pushed"""
 
 # libmujoco.so.*, libmujoco.*.dylib or mujoco.dll: the one that the bindings have loaded
-mujoco_library = ctypes.CDLL(str(next(Path(mujoco.__file__).parent.glob("*mujoco.*"))))
-llvmlite.binding.add_symbol("mj_step", ctypes.cast(mujoco_library.mj_step, ctypes.c_void_p).value)
-_mj_step: Any = types.ExternalFunction("mj_step", types.void(types.intp, types.intp))
+_library = ctypes.CDLL(str(next(Path(mujoco.__file__).parent.glob("*mujoco.*"))))
+
+
+def mujoco_function(name: str, *arguments: Any) -> Any:
+    """Return a function of MuJoCo for compiled code, which returns nothing, by its arguments' numba types."""
+    address = ctypes.cast(getattr(_library, name), ctypes.c_void_p).value
+    llvmlite.binding.add_symbol(name, address)
+    return types.ExternalFunction(name, types.void(*arguments))
+
+
+_mj_step = mujoco_function("mj_step", types.intp, types.intp)
 
 
 class Handles(NamedTuple):
@@ -112,7 +120,6 @@ class SteppedArm:
         self.model, self.data = m, d = copy(model), mujoco.MjData(model)
         self._armature = own = model.dof_armature.copy()
         self._inertia = model.stat.meaninertia
-        limits = np.where(m.jnt_limited[:, None], m.jnt_range, [-np.inf, np.inf])
         self._handles = Handles(
             m._address,  # pyright: ignore[reportPrivateUsage]
             d._address,  # pyright: ignore[reportPrivateUsage]
@@ -128,7 +135,7 @@ class SteppedArm:
             steps,
             d.qfrc_bias,
             m.qpos_spring,
-            limits,
+            np.where(m.jnt_limited[:, None], m.jnt_range, [-np.inf, np.inf]),
         )
 
     def start(self, values: dict[str, Array], rows: Sequence[int] | Index, pose: Array) -> Array:
@@ -158,8 +165,9 @@ class SteppedArm:
     @property
     def healthy(self) -> bool:
         """Whether the arm is finite and drew no warning of MuJoCo's since its start."""
-        finite = np.isfinite([self.data.qpos, self.data.qvel]).all()
-        return bool(finite) and not self.data.warning.number.any()
+        return (
+            bool(np.isfinite([self.data.qpos, self.data.qvel]).all()) and not self.data.warning.number.any()
+        )
 
     def roll(self, plugin: Plugin, state: Structs, course: Course, record: Record) -> None:
         """Step one candidate up to the first warning of MuJoCo's; call it within `quiet_mujoco`.

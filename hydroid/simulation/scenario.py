@@ -72,8 +72,7 @@ def smooth(angle: Array, cutoff: float) -> Array:
     """Low-pass angles, shape (T, K), without phase shift; `cutoff` is in cycles per sample."""
     if cutoff >= 0.5 or len(angle) < 16 or not angle.size:
         return angle
-    sections = butter(2, 2 * cutoff, output="sos")
-    return sosfiltfilt(sections, angle, axis=0, padlen=min(len(angle) - 1, 100))
+    return sosfiltfilt(butter(2, 2 * cutoff, output="sos"), angle, axis=0, padlen=min(len(angle) - 1, 100))
 
 
 @record
@@ -199,8 +198,12 @@ class Chain:
                     "add actuator: to the joint",
                 )
         self._range = np.array([arm.lower, arm.upper])[:, self.joints]
-        self._entries = mass_entries(locked.model)[np.ix_(self.columns, self.columns)]
-        self._period, self._substeps = locked.model.opt.timestep, substeps
+        model = locked.model
+        entries = np.zeros((model.nv, model.nv), np.intp)  # of M[i, j] in MuJoCo's sparse mass matrix
+        rows, columns = np.repeat(np.arange(model.nv), model.M_rownnz), model.M_colind
+        entries[rows, columns] = entries[columns, rows] = np.arange(model.nC)
+        self._entries = entries[np.ix_(self.columns, self.columns)]
+        self._period, self._substeps = model.opt.timestep, substeps
 
     def start(
         self, candidates: Candidates, pose: Array, balance: Array, pressure: Array | None = None
@@ -235,11 +238,3 @@ class Chain:
             return np.empty((len(candidates), 0))
         each: Records = coefficients(joints)[:, None]  # pyright: ignore[reportAssignmentType]
         return swallowed(each, angle, velocity).sum(axis=2)
-
-
-def mass_entries(model: mujoco.MjModel) -> Index:
-    """Where M[i, j] stands in a row of MuJoCo's sparse mass matrix, shape (V, V)."""
-    entries = np.zeros((model.nv, model.nv), np.intp)
-    rows, columns = np.repeat(np.arange(model.nv), model.M_rownnz), model.M_colind
-    entries[rows, columns] = entries[columns, rows] = np.arange(model.nC)
-    return entries

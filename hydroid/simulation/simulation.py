@@ -36,8 +36,6 @@ class Simulation:
     """Simulates candidates on one log; in stage 2 the scenario's active joints have hydraulics.
 
     Args:
-        scenario: what is simulated.
-        arm: the arm's settings, for its linkages.
         substeps: of valves and oil in one MuJoCo step; None: stage 1, without hydraulics.
         pressures: active joints whose chamber pressures are wanted in the response, 0-based.
 
@@ -57,11 +55,9 @@ class Simulation:
         self._pressures = np.searchsorted(self.joints, np.array(pressures, int))
 
     def simulate(self, candidates: Candidates) -> Response:
-        """Return what the outputs' sensors read, and the pressures asked for, at the log's samples of n
-        candidates.
+        """Return what n candidates' sensors read, and the pressures asked for, at the log's samples.
 
-        The first sample is the start. A candidate without a force-stroke curve, or that diverged, is
-        infeasible.
+        The first is the start. A candidate without a force-stroke curve, or that diverged, is infeasible.
         """
         scenario, n, wanted = self.scenario, len(candidates), self._pressures
         samples = 1 + len(scenario.command) // scenario.settings.steps
@@ -125,10 +121,7 @@ class Simulation:
         return SteppedArm(model, chain.columns, pushed, steps, rollout, copies)
 
     def _follower(self, candidates: Candidates, arm: SteppedArm, *, observed: bool) -> Follow:
-        """Return what simulates each of n candidates, and observes its actuators, under the log's commands.
-
-        All are balanced here, one after another, on one arm.
-        """
+        """Return what simulates some of n candidates; all are balanced here, one by one, on one arm."""
         scenario, chain, n = self.scenario, self._chain, len(candidates)
         values, pose, servo = scenario.values(candidates), scenario.arm.pose, scenario.prescribed
         samples = len(scenario.command) // scenario.settings.steps

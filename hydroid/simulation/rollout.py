@@ -12,6 +12,7 @@ raising; a model that gets through `SteppedArm.start` has none to expect.
 
 import ctypes
 import logging
+import threading
 from collections.abc import Callable, Sequence
 from copy import copy
 from functools import cache
@@ -121,8 +122,7 @@ class SteppedArm:
         self._armature = own = model.dof_armature.copy()
         self._inertia = model.stat.meaninertia
         self._handles = Handles(
-            m._address,  # pyright: ignore[reportPrivateUsage]
-            d._address,  # pyright: ignore[reportPrivateUsage]
+            *_addresses(m, d),
             d.qpos,
             d.qvel,
             d.M,
@@ -175,6 +175,22 @@ class SteppedArm:
         `state` is its actuators', (J,) of JOINT_STATE: steps change it.
         """
         self._roll(self._handles, plugin, state, course, record)
+
+
+def _addresses(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[int, int]:
+    """Where MuJoCo keeps a model and its data: it tells every physics callback."""
+    addresses: dict[int, tuple[int, int]] = {}
+
+    @ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
+    def passive(m: int, d: int) -> None:
+        addresses[threading.get_ident()] = (m, d)  # other threads may be stepping
+
+    mujoco.set_mjcb_passive(passive)
+    try:
+        mujoco.mj_forward(model, data)
+    finally:
+        mujoco.set_mjcb_passive(None)
+    return addresses[threading.get_ident()]
 
 
 @compilable

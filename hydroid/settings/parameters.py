@@ -1,6 +1,7 @@
 """From the settings of parameters to parameters: one per joint, nominal values, priors, bounds and starts."""
 
 import math
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -11,6 +12,7 @@ from hydroid.settings.arm import Actuator, Arm
 from hydroid.settings.hydraulics import HydraulicSettings, actuator_values
 from hydroid.settings.linkage import RotaryActuator
 from hydroid.settings.problem import ParameterSettings
+from hydroid.words import distinct
 
 
 def expanded(parameters: Mapping[str, Any], compared: Any, arm: Arm | None) -> Plain:
@@ -45,8 +47,11 @@ def expanded(parameters: Mapping[str, Any], compared: Any, arm: Arm | None) -> P
                 everywhere = each is True and quantity in MECHANICAL
                 result[name] = shared | ({} if everywhere else {"joints": places})
                 continue
+        taken = set[str]()
         for place in places:
-            own = f"{name}_{place}"
+            known = isinstance(place, int) and arm and 0 < place <= len(arm.joint_names)
+            label = arm.joint_names[place - 1] if known else place
+            own = distinct(re.sub(r"\W", "_", f"{name}_{label}"), taken)  # --set splits names at dots
             changes = result.get(own, parameters.get(own, {}))
             result[own] = shared | {key: place if key == "link" else [place]} | changes
     return result

@@ -16,7 +16,7 @@ class ParameterSettings(Settings):
     parameters:
       A_A: {quantity: area_a, joints: [2], within: 2}                  # around the value of the arm's file
       M3:  {quantity: mass, link: link3, nominal: 20, sd: 1}           # weighed
-      D:   {quantity: damping, each: true, bounds: [20, 5000]}         # D_2, D_3, ... of compared joints
+      D:   {quantity: damping, each: true, bounds: [20, 5000]}         # D_shoulder, D_elbow, ... of compared joints
       M:   {quantity: mass, each: true, within: 2}                     # M_link1, M_link2, ... of all links
     """
 
@@ -26,9 +26,8 @@ class ParameterSettings(Settings):
     joints: tuple[JointNumber, ...] | None = None
     """joints that share the parameter; null: all"""
     each: bool | tuple[JointNumber, ...] = False
-    """joints that have a parameter each, NAME_2, NAME_3, ...; true: those that are compared. With one joint
-    the name stays as it is. Entries under NAME_2 change joint 2's. Of a mass: links that have one each,
-    NAME_LINK; true: all links"""
+    """joints that have a parameter each, NAME_boom, NAME_arm, ...; true: those that are compared. With one
+    joint the name stays as it is. Entries under NAME_boom change the boom's. Of a mass: links; true: all"""
     link: str | None = None
     """link whose mass the parameter is"""
     bounds: tuple[float, float] | None = None

@@ -14,7 +14,7 @@ from hydroid.settings.fit import FitSettings
 PERIOD = 0.05
 FIT = yaml.safe_load((MODELS / "two_joints.yaml").read_text())
 PARAMETERS = FIT["parameters"]
-OPENINGS = {"open_A_1": 24.0, "open_A_2": 3.0, "open_B_1": 16.0, "open_B_2": 4.0}
+OPENINGS = {"open_A_lift": 24.0, "open_A_tilt": 3.0, "open_B_lift": 16.0, "open_B_tilt": 4.0}
 TRUTH = OPENINGS | {"M_boom": 1300.0, "M_bar": 110.0, "flow": 120.0, "droop": 60.0}
 
 

@@ -134,7 +134,7 @@ def test_joints_and_links_may_be_given_by_name(tmp_path):
     assert settings.objective.weights == {2: 2.0}
     assert settings.design.joints == (2,)
     joints = {name: p.joints for name, p in settings.parameters.items() if p.link is None}
-    assert joints == {"K_1": (1,), "K_2": (2,), "D_2": (2,), "D_4": (4,), "S": (3,)}
+    assert joints == {"K_swing": (1,), "K_boom": (2,), "D_boom": (2,), "D_bucket": (4,), "S": (3,)}
     masses = [p.link for p in settings.parameters.values() if p.quantity == "mass"]
     assert masses == list(settings.arm.link_names)
     assert "M_bucket" in settings.parameters

@@ -76,14 +76,14 @@ def test_each_writes_one_parameter_per_joint_with_its_own_nominal_value():
     changes = {
         "outputs": [1, 2],
         "parameters.A_A": {"quantity": "area_a", "each": True, "within": 2},
-        "parameters.A_A_2.within": 1.5,
+        "parameters.A_A_shoulder.within": 1.5,
         "parameters.C": {"quantity": "onset_b", "each": [2], "bounds": [0.1, 3.0]},
     }
     settings = load_settings("fit-hyd", changes)
     parameters = {p.name: p for p in settings.parameter_set().parameters}
-    assert (parameters["A_A_1"].start, parameters["A_A_2"].start) == (800, 1000)
-    assert parameters["A_A_2"].prior.sd == pytest.approx(math.log(1.5) / 1.96)
-    assert settings.parameters["A_A_1"].joints == (1,)
+    assert (parameters["A_A_azimuth"].start, parameters["A_A_shoulder"].start) == (800, 1000)
+    assert parameters["A_A_shoulder"].prior.sd == pytest.approx(math.log(1.5) / 1.96)
+    assert settings.parameters["A_A_azimuth"].joints == (1,)
     assert settings.parameters["C"].joints == (2,)
 
 

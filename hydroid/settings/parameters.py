@@ -49,8 +49,9 @@ def expanded(parameters: Mapping[str, Any], compared: Any, arm: Arm | None) -> P
                 continue
         taken = set[str]()
         for place in places:
-            known = isinstance(place, int) and arm and 0 < place <= len(arm.joint_names)
-            label = arm.joint_names[place - 1] if known else place
+            label = place
+            if arm and isinstance(place, int) and 0 < place <= len(arm.joint_names):
+                label = arm.joint_names[place - 1]
             own = distinct(re.sub(r"\W", "_", f"{name}_{label}"), taken)  # --set splits names at dots
             changes = result.get(own, parameters.get(own, {}))
             result[own] = shared | {key: place if key == "link" else [place]} | changes

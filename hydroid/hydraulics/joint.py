@@ -62,7 +62,8 @@ def _advance(c, side, z, asked: float, step: float, whole: bool) -> float:
     if not whole:
         pilot_steps = side.pilot_lag / step
         keep, weight = kept(pilot_steps), plunger_weight(side.plunger_damping, step, c)
-    if z.pilot != asked:  # else the coil's drive stays
+    if z.held != asked:  # else the coil's drive stays; while the pilot stage follows, it is a mean of its own
+        z.held = asked if z.pilot == asked else np.nan
         beyond, part = beyond_dead_band(z.pilot, asked, pilot_steps, keep, side.dead_band)
         z.pilot = asked + (z.pilot - asked) * keep
         z.drive = drive(side_voltage(beyond, part, side.onset, side.dead_band), c)

@@ -80,7 +80,8 @@ of the pump's relief valve [Pa]"""
 
 SIDE_STATE = np.dtype(
     _fields(
-        "stroke speed drive "  # of the plunger [m, m/s], its coil, changed where `pilot` is [N·m²]
+        "stroke speed drive "  # of the plunger [m, m/s], its coil [N·m²]
+        "held "  # command that has settled, of which `drive` is [%]; else NaN
         "asked pilot "  # delayed command towards this side [%], and what the pilot stage has of it
         "oil flow"  # oil [Pa] as `cylinder` defines it; mean flow into the chamber over the last step [m³/s]
     )

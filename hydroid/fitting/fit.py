@@ -28,9 +28,6 @@ _log = logging.getLogger(__name__)
 TOO_FAR = 20.0
 """times the rms error of the last estimate from which the dynamic model is not refined: lags that stand for
 oil in a quasi-static model are too much beside it, and it errs by several times as much at first"""
-WHITE = 1.6
-"""mean square of the change between samples, in mean squares of the error, from which the error is noise; it
-is 2 of white noise, and that of J. von Neumann (1941)"""
 
 
 @dataclass(frozen=True)
@@ -131,10 +128,10 @@ def fit(problem: Problem, watch: Watcher | None = None, checkpoints: Checkpoints
         assert settings.refinement is not None
         own = problem.varied(settings.of_estimate(name))
         theta = own.parameters.started(last.parameters.mapping(start.theta))
-        other_model = if_nearer and own.settings.quasi_static != last.settings.quasi_static
-        if other_model and (
-            _is_noise(last, start.theta)
-            or not own.rms(own.output_errors(theta[None]))[0] < TOO_FAR * start.rms
+        other_model = own.settings.quasi_static != last.settings.quasi_static
+        if if_nearer and (
+            last.leaves_noise(start.theta)
+            or (other_model and not own.rms(own.output_errors(theta[None]))[0] < TOO_FAR * start.rms)
         ):
             return
         if len(own.settings.terms) > len(last.settings.terms):  # other parameters may stand for it
@@ -173,13 +170,6 @@ def fit(problem: Problem, watch: Watcher | None = None, checkpoints: Checkpoints
     took: dict[str, float] = dict(zip(("search", "refinement", "uncertainty"), seconds, strict=True))
     history = searched.history
     return Fit(estimates, final, front, history, refinements, about, directions, determined, took)
-
-
-def _is_noise(problem: Problem, theta: Array) -> bool:
-    """Whether errors at an estimate, (P,), change between samples as white noise does: nothing is left."""
-    error = problem.output_errors(theta[None])[0]
-    each = [error[c.rows] for c in problem.channels]
-    return all(np.mean(np.diff(one) ** 2) > WHITE * np.mean(one**2) for one in each)
 
 
 def _slopes(problem: Problem, descent: Descent | None) -> Array | None:

@@ -22,15 +22,13 @@ from hydroid.fitting.baselines import NAMES, fit_baselines
 from hydroid.fitting.checkpoints import Checkpoints, Memo
 from hydroid.fitting.refinement import refine
 from hydroid.parameters import Array
+from hydroid.posterior.bench import make_bench
 from hydroid.problem.problem import Problem
 from hydroid.search.chromosomes import Genes
 from hydroid.search.genetic import Population
 from hydroid.settings.search import RefinementSettings
 
-DRAWS, BEST = 64, 2
-"""candidates drawn for a start, and how many of them are refined for a joint alone"""
-LATE = {"delay": 1.0, "opening_lag": 1.0, "pilot_lag": 1.0, "plunger_damping": 1 / 2000}
-"""what may make a joint late, and the seconds of a unit [s]; of a plunger with the default spring"""
+DRAWS = 64  # candidates drawn for a start that can be simulated
 MOVES = 0.01
 """part of an angle's travel over the whole record, below which a shorter part of it shows no motion"""
 
@@ -106,31 +104,14 @@ class Multistart:
         """Fit start `number`, (P,), to every joint alone; the last start takes the best one of each joint."""
         for joint in joints:
             problem, name = alone(self._problem, joint, theta), f"start {number + 1} joint {joint}"
-            tried = [self._grown(problem, theta, name)]
-            for i, start in enumerate(self._drawn(problem, joint, theta), 1):
-                tried.append(self._grown(problem, start, f"{name} draw {i}"))
-            tried.append(
-                self._grown(problem, by_numbers(problem, joint, min(tried, key=_cost)[1]), f"{name} numbers")
-            )
-            for i, start in enumerate(splits(problem, joint, min(tried, key=_cost)[1]), 1):
-                tried.append(self._grown(problem, start, f"{name} split {i}"))
+            tried = [self._grown(problem, by_numbers(problem, joint, theta), f"{name} numbers")]
+            if not problem.leaves_noise(tried[0][1]):
+                tried.append(self._grown(problem, theta, name))
             result = min(tried, key=_cost)
             best = self._best[joint] = min(self._best.get(joint, result), result, key=_cost)
             _, reached = best if number == self.settings.generations else result
             theta = np.where(problem.parameters.free, reached, theta)
         return theta
-
-    def _drawn(self, problem: Problem, joint: int, theta: Array) -> Array:
-        """Draw free parameters from their priors; return the best few candidates, shape (BEST, P)."""
-        rng = np.random.default_rng([problem.settings.search.seed, joint])
-        drawn = np.tile(theta, (DRAWS, 1))
-        for column, p in zip(drawn.T, problem.parameters.parameters, strict=True):
-            scores = rng.normal(size=DRAWS)
-            if p.fixed is None and p.prior is not None:
-                column[:] = np.clip([p.prior.value(score) for score in scores], p.lower, p.upper)
-        self._memo.elsewhere += DRAWS
-        errors = np.nan_to_num(np.sum(problem.residuals(drawn) ** 2, axis=1), nan=np.inf)
-        return drawn[np.argsort(errors, kind="stable")[:BEST]]
 
     def _grown(self, problem: Problem, theta: Array, name: str) -> tuple[float, Array]:
         """Fit theta, (P,), to growing parts of the records, at last all of them; return its cost, and it."""
@@ -215,8 +196,7 @@ def each_alone(
 def by_numbers(problem: Problem, joint: int, theta: Array) -> Array:
     """Return theta, (P,), with the valve of a joint whose speed follows the command alone: nine numbers.
 
-    No load slows it, its lever is the same everywhere, and both sides of its valve are alike. Far from there
-    least squares can end halfway, with a lever or a side that stands for a load.
+    No load slows it, and its lever is the same everywhere.
     """
     settings = problem.settings
     ends = settings.arm.lower[joint - 1], settings.arm.upper[joint - 1]
@@ -226,34 +206,21 @@ def by_numbers(problem: Problem, joint: int, theta: Array) -> Array:
     values = dict.fromkeys(("pilot_lag", "lever_slope", "lever_bend"), 0.0)
     values |= {"delay": found.delay, "compensation": 1.0}
     for row, name in (0, "dead_band"), (1, "opening_exponent"), (3, "opening_lag"):
-        values |= dict.fromkeys((name, f"{name}_a", f"{name}_b"), float(found.numbers[row].mean()))
-    start = theta.copy()
+        values |= dict(zip((f"{name}_a", f"{name}_b"), found.numbers[row].tolist(), strict=True))
+        values[name] = float(found.numbers[row].mean())
+    start, places = theta.copy(), dict[str, int]()
     for i, one in enumerate(settings.parameters.values()):
         if one.fixed is None and one.joints == (joint,):
+            prior, places[one.quantity] = problem.parameters.parameters[i].prior, i
             start[i] = values.get(one.quantity, start[i])
+            if one.quantity.startswith("area") and prior is not None:
+                start[i] = prior.value(1.0)  # strong enough for any load
+    bench = make_bench(settings, problem.logs, joint)
+    for side, (name, full) in enumerate((("opening_a", 100.0), ("opening_b", -100.0))):
+        speed = bench.movement(full).speeds(problem.bindings.candidates(start[None])).max() / bench.unit[0]
+        if name in places and speed > 0:  # in proportion, where no load slows it
+            start[places[name]] *= abs(found.numbers[2, side]) / speed
     return np.clip(start, problem.parameters.lower, problem.parameters.upper)
-
-
-def splits(problem: Problem, joint: int, theta: Array) -> list[Array]:
-    """Return starts at which a joint is as late as at theta, (P,), for another reason.
-
-    Delay and lags can stand for each other, so that least squares ends with the wrong one: each has an
-    optimum of its own. A start has half of all in the delay, or nothing, and the rest in one of the lags.
-    """
-    own = dict[str, list[int]]()
-    for i, one in enumerate(problem.settings.parameters.values()):
-        name = one.quantity.removesuffix("_a").removesuffix("_b")
-        if one.fixed is None and one.joints == (joint,) and name in LATE:
-            own.setdefault(name, []).append(i)
-    late = sum(LATE[name] * float(np.mean(theta[places])) for name, places in own.items())
-    starts = list[Array]()
-    for name in own if len(own) > 1 else ():
-        shares = {"delay": 0.5, name: 0.5} if "delay" in own and name != "delay" else {name: 1.0}
-        start = theta.copy()
-        for other, places in own.items():
-            start[places] = shares.get(other, 0.0) * late / LATE[other]
-        starts.append(np.clip(start, problem.parameters.lower, problem.parameters.upper))
-    return starts
 
 
 def _cost(reached: tuple[float, Array]) -> float:

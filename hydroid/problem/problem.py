@@ -34,6 +34,10 @@ from hydroid.simulation.scenario import Scenario
 
 CHUNK = 2**23  # residuals that are held in memory at a time, 64 MiB
 
+WHITE = 1.6
+"""mean square of the change between samples, in variances of the error, from which the error is noise; it is
+2 of white noise, and that of J. von Neumann (1941)"""
+
 OpenStart = Callable[[Array], None]
 """takes what one log's open start angles can explain out of residuals, shape (n, R)"""
 
@@ -186,6 +190,12 @@ class Problem:
         """Weighted output errors of (17) [rad] of theta, shape (n, P), simulated in this process: (n, R)."""
         responses = self.responses(theta)
         return np.concatenate([channel.error(responses) for channel in self.channels], axis=1)
+
+    def leaves_noise(self, theta: Array) -> bool:
+        """Whether errors at an estimate, (P,), change between samples as white noise does."""
+        error = self.output_errors(theta[None])[0]
+        each = [error[c.rows] for c in self.channels]
+        return all(np.mean(np.diff(one) ** 2) > WHITE * np.var(one) for one in each)
 
     def filtered(self, errors: Array) -> Array:
         """Return residuals from output errors, shape (n, R)."""

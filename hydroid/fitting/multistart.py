@@ -196,7 +196,7 @@ def each_alone(
 def by_numbers(problem: Problem, joint: int, theta: Array) -> Array:
     """Return theta, (P,), with the valve of a joint whose speed follows the command alone: nine numbers.
 
-    No load slows it, and its lever is the same everywhere.
+    No load slows it, its actuator is strong enough for any, and its lever is the same everywhere.
     """
     settings = problem.settings
     ends = settings.arm.lower[joint - 1], settings.arm.upper[joint - 1]
@@ -214,7 +214,7 @@ def by_numbers(problem: Problem, joint: int, theta: Array) -> Array:
             prior, places[one.quantity] = problem.parameters.parameters[i].prior, i
             start[i] = values.get(one.quantity, start[i])
             if one.quantity.startswith("area") and prior is not None:
-                start[i] = prior.value(1.0)  # strong enough for any load
+                start[i] = prior.value(1.0)  # a weaker one may stall, where nothing has an effect
     bench = make_bench(settings, problem.logs, joint)
     for side, (name, full) in enumerate((("opening_a", 100.0), ("opening_b", -100.0))):
         speed = bench.movement(full).speeds(problem.bindings.candidates(start[None])).max() / bench.unit[0]

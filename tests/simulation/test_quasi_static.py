@@ -82,10 +82,8 @@ def test_what_comes_later_moves_the_joint_by_as_much_less(simulated, lag, expone
 
 
 def test_what_a_short_pilot_lag_costs_is_in_proportion_to_it(simulated):
-    own, lags = (
-        {"plunger_mass": 0.008, "dead_band_a": 25.0, "plunger_damping_a": 8.0},
-        [0, 1e-8, 1e-6, 1e-4, 1e-3],
-    )
+    own = {"plunger_mass": 0.008, "dead_band_a": 25.0, "plunger_damping_a": 8.0}
+    lags = [0, 1e-8, 1e-6, 1e-4, 1e-3]
     ends = [simulated({ROLL: 80.0}, 0.6, pilot_lag_a=lag, **own)[0][-1, 0] for lag in lags]
     lost = (ends[0] - np.array(ends[1:])) / lags[1:]
     np.testing.assert_allclose(lost, lost[-1], rtol=0.1)  # 6 % is left by the sub-steps

@@ -18,7 +18,7 @@ from hydroid.commands.inputs import (
     load_settings,
     refuse_overwriting,
 )
-from hydroid.commands.logs import check_file, named, plain_findings
+from hydroid.commands.logs import check_file, plain_findings
 from hydroid.files import Plain
 from hydroid.settings.log import LogSettings
 from hydroid.units import way
@@ -76,7 +76,7 @@ def check(
         row: Plain = {"log": str(path), "usable": log is not None, "samples": None, "duration_s": None}
         moved, driven = dict[str, float](), list[str]()
         if log is not None:
-            findings = [*findings, *named([*motion_findings(log)], names)]
+            findings = [*findings, *motion_findings(log, names)]
             motions = driven_joints(log)
             moved = {names[j - 1]: motion.travel for j, motion in motions.items()}
             driven = np.array(names)[log.driven].tolist()
@@ -133,7 +133,7 @@ def convert(
         most = [f"joint {number}" for number in range(1, 13)]  # more joints than an arm has
         guess = guess_columns(open_table(path, LogSettings()), most)
         layout = LogSettings.model_validate(guess.log)
-        ranges = np.full((max(layout.joints, default=1), 2), np.inf) * [-1, 1]
+        ranges = {str(number): (-np.inf, np.inf) for number in range(1, 1 + max(layout.joints, default=1))}
         reasons = [*guess.reasons]
     read, findings = check_log(path, layout, ranges, repair=repair)
     if read is None:

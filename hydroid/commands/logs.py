@@ -1,11 +1,10 @@
 """Logs that commands read: files, or logs that were read before, of an arm alone or of the arms of a pair."""
 
 import logging
-import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -62,33 +61,11 @@ def read_logs(
 def check_file(
     path: Path, settings: FitSettings, *, repair: bool, angles: bool = True
 ) -> "tuple[Log | None, list[LogFinding]]":
-    """Read a log as the settings map it; None if it cannot be used. Findings call joints by their names."""
+    """Read a log as the settings map it; None if it cannot be used."""
     from hydroid.log import check_log
 
     arm, outputs = settings.arm, settings.outputs if angles else None
-    log, findings = check_log(
-        path, settings.log, arm.ranges, outputs=outputs, backward=arm.backward, repair=repair
-    )
-    return log, named(findings, arm.joint_names)
-
-
-def named(findings: "Sequence[LogFinding]", names: Sequence[str]) -> "list[LogFinding]":
-    """Return findings that call joints by their names, as subjects and after the word joint."""
-    by_number = {str(number): name for number, name in enumerate(names, 1)}
-
-    def name(text: Any) -> Any:
-        if not isinstance(text, str):
-            return text
-        return re.sub(r"(?<=joint )\d+", lambda found: by_number.get(found[0], found[0]), text)
-
-    return [
-        replace(
-            finding,
-            subjects=tuple(by_number.get(one, name(one)) for one in finding.subjects),
-            numbers={key: name(value) for key, value in finding.numbers.items()},
-        )
-        for finding in findings
-    ]
+    return check_log(path, settings.log, arm.ranges, outputs=outputs, backward=arm.backward, repair=repair)
 
 
 def plain_findings(findings: "Sequence[LogFinding]") -> list[dict[str, str]]:

@@ -73,7 +73,7 @@ def _values(recording: Recording) -> Iterator[LogFinding]:
             numbers = {"value": values[rows[0]], "low": signal.low, "high": signal.high}
             shown = {name: value / UNITS[signal.unit].factor for name, value in numbers.items()}
             names = {"quantity": signal.kind, "unit": signal.unit, "name": signal.name}
-            yield recording.finding("error", kind, rows, signal, signal.joint, **names, **shown, **remedy)
+            yield recording.finding("error", kind, rows, signal, signal.owner, **names, **shown, **remedy)
 
 
 def _explained(signal: Signal, values: Array) -> tuple[str, dict[str, str]]:
@@ -126,7 +126,7 @@ def check_motion(
     motions, common = driven_joints(log), likely_range(log.command.ravel())
 
     def warning(kind: str, signal: Signal, **numbers: Any) -> LogFinding:
-        return log_finding("warning", kind, log.source, signal.joint, column=signal.name, **numbers)
+        return log_finding("warning", kind, log.source, signal.owner, column=signal.name, **numbers)
 
     undriven = not log.driven.any() and any(kind == "command" for kind, _ in of)
     if undriven:
@@ -153,11 +153,11 @@ def check_motion(
             yield warning("late", command, lag=ahead, delay=delay - ahead)
 
 
-def motion_findings(log: Log) -> Iterator[LogFinding]:
-    """Yield joints that stand at a stop, and whether a log does not begin at rest."""
+def motion_findings(log: Log, names: Sequence[str]) -> Iterator[LogFinding]:
+    """Yield joints of these names that stand at a stop, and whether a log does not begin at rest."""
     for joint, motion in driven_joints(log).items():
         if motion.stopped >= 0.5:
-            yield log_finding("note", "at a stop", log.source, joint, seconds=motion.stopped)
+            yield log_finding("note", "at a stop", log.source, names[joint - 1], seconds=motion.stopped)
     rest = log.first_command * log.period
     if log.driven.any() and rest < 0.2:
         after = f" after {rest:.2g} s" if rest else ""

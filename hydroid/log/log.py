@@ -141,7 +141,7 @@ def log_finding(
     column: str = "",
     **numbers: float | str,
 ) -> LogFinding:
-    """Make a finding about a file, at a `row` such as "line 12"; joints among the subjects count from 1."""
+    """Make a finding about a file, at a `row` such as "line 12"; joints are named."""
     where = ", ".join(filter(None, (source, row, column and f"column {column}")))
     return LogFinding(kind, level, tuple(map(str, subjects)), numbers, where, source, column)
 

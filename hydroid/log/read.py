@@ -1,6 +1,6 @@
 """A log file -> `Log`: open, map, repair, check, resample; and back to CSV, which reads the same."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
@@ -24,6 +24,10 @@ from hydroid.words import listed
 DEFAULT = LogSettings()
 SHOWN = {"command": "%", "angle": "deg", "length": "mm", "pressure": "bar"}
 """units in which messages state what is measured"""
+
+
+Ranges = Mapping[str, tuple[float, float]]
+"""of all joints [rad, m], by their names"""
 
 
 def open_table(path: Path, settings: LogSettings = DEFAULT) -> Table:
@@ -53,7 +57,7 @@ def open_table(path: Path, settings: LogSettings = DEFAULT) -> Table:
 def check_log(
     path: Path,
     settings: LogSettings,
-    ranges: Array,
+    ranges: Ranges,
     *,
     outputs: Sequence[int] | None = (),
     backward: Collection[int] = (),
@@ -62,7 +66,7 @@ def check_log(
     """Find everything that is wrong with a log: return it, None if any finding is an error, and all findings.
 
     Args:
-        ranges: of the joints [rad], shape (J, 2), (-inf, inf) for a continuous joint.
+        ranges: (-inf, inf) for a continuous joint. Findings call joints by these names.
         outputs: joints (numbers, from 1) whose angles a fit compares; None: a joint whose angle column the
             file lacks is unmeasured, which else is an error.
         backward: joints (from 1) that a positive command turns to negative angles.
@@ -75,7 +79,7 @@ def check_log(
             what = f"no joint {last}; the arm has joints 1 to {len(ranges)}"
             raise LogError(what, source, "correct outputs or log.joints")
         if unmapped := [joint for joint in compared if settings.columns("angle", joint) is None]:
-            what = f"output joint {unmapped[0]} has no angle column"
+            what = f"output joint {[*ranges][unmapped[0] - 1]} has no angle column"
             raise LogError(what, source, "map it in log.joints, or take another")
         table = open_table(path, settings)
         if outputs is None:
@@ -95,11 +99,11 @@ def check_log(
     return log, by_level(findings)
 
 
-def map_signals(settings: LogSettings, ranges: Array) -> list[Signal]:
-    """Return the signals that the settings ask for, time first; joint ranges [rad, m], shape (J, 2)."""
+def map_signals(settings: LogSettings, ranges: Ranges) -> list[Signal]:
+    """Return the signals that the settings ask for, time first."""
     signals = [Signal(settings.time.column, "time", gain=UNITS[settings.time.unit].factor)]
     for kind in get_args(Kind):
-        for joint, (low, high) in enumerate(ranges.tolist(), 1):
+        for joint, (owner, (low, high)) in enumerate(ranges.items(), 1):
             if columns := settings.columns(kind, joint):
                 margin = angle_margin(low, high)
                 limits = {
@@ -110,7 +114,8 @@ def map_signals(settings: LogSettings, ranges: Array) -> list[Signal]:
                 unit = UNITS[columns.unit.lower()]
                 scale = columns.scale * unit.factor, columns.offset * unit.factor
                 for part, name in enumerate(columns.column):
-                    signals.append(Signal(name, kind, joint, part, *scale, *limits, SHOWN[unit.quantity]))
+                    shown = SHOWN[unit.quantity]
+                    signals.append(Signal(name, kind, joint, part, *scale, *limits, shown, owner))
     return signals
 
 
@@ -134,7 +139,8 @@ def _match(
     there = {signal.joint for signal in wanted if signal not in missing or signal.name in close} - {0}
     absent = {signal.joint for signal in wanted} - there - {0, *needed} if there else set[int]()
     if absent:
-        findings.append(log_finding("note", "absent joints", table.source, *sorted(absent)))
+        names = dict(sorted((signal.joint, signal.owner) for signal in wanted if signal.joint in absent))
+        findings.append(log_finding("note", "absent joints", table.source, *names.values()))
     wanted = [signal for signal in wanted if signal.joint not in absent]
     for signal in wanted:
         count = table.names.count(signal.name)
@@ -173,7 +179,7 @@ def write_logs(path: Path, logs: Sequence[tuple[Log, LogSettings]], *, exact: bo
     """Write logs of the same time side by side into one file, each with its settings, as `write_log` does."""
     columns: dict[str, list[str]] = {}
     for log, settings in logs:
-        signals = map_signals(settings, np.full((log.joints, 2), np.inf))
+        signals = map_signals(settings, dict.fromkeys(map(str, range(1, 1 + log.joints)), (np.inf, np.inf)))
         mapped = {(signal.kind, signal.joint) for signal in signals}
         for joint, (driven, measured) in enumerate(zip(log.driven, log.measured, strict=True), 1):
             if driven and ("command", joint) not in mapped:

@@ -23,13 +23,13 @@ _TIME = re.compile(
 """a time of day, behind a date or without one"""
 
 
-@dataclass(frozen=True)
+@record
 class Signal:
     """One column in use: value = gain · cell + offset in [s], [%], [rad], [m] or [Pa], from `low` to `high`.
 
     `name` is that in the header, `kind` time, command, angle or pressure, `joint` a number from 1, or 0 for
-    the time. `part` is 0, or 1 for the column of a command's negative direction and of the pressure in
-    chamber B. `unit` is the one to be read: %, deg, mm of a joint that slides, or bar.
+    the time, `owner` the joint's name. `part` is 0, or 1 for the column of a command's negative direction and
+    of the pressure in chamber B. `unit` is the one to be read: %, deg, mm of a joint that slides, or bar.
     """
 
     name: str
@@ -41,9 +41,10 @@ class Signal:
     low: float = -np.inf
     high: float = np.inf
     unit: str = ""
+    owner: str = ""
 
     def __str__(self) -> str:
-        return f"{self.kind} of joint {self.joint}" if self.joint else self.kind
+        return f"{self.kind} of joint {self.owner}" if self.joint else self.kind
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -64,7 +64,7 @@ def find_layout(table: Table, arm: Arm, order: Sequence[str] = ()) -> Layout:
     if not measured:
         hint = f"rename them, or write the log section by hand; columns: {', '.join(table.names)}"
         raise LogError("has no column that looks like an angle", table.source, hint)
-    free = np.tile([-np.inf, np.inf], (len(names), 1))
+    free = dict.fromkeys(names, (-np.inf, np.inf))
     settings = validate(section, LogSettings, table.source)
     log, findings = check_log(Path(table.source), settings, free)
     if log is None:

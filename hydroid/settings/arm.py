@@ -169,10 +169,10 @@ class Arm(Settings):
         return np.array([*self.mass_of.values()])
 
     @property
-    def ranges(self) -> Array:
-        """Lower and upper joint stops [rad], or [m] of a slide, shape (J, 2); infinite where none is."""
-        free = (-np.inf, np.inf)
-        return np.array([free if joint.continuous else joint.limits for joint in self.joints])
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        """Lower and upper stop of each joint by its name [rad], or [m] of a slide; infinite where none is."""
+        free = (-math.inf, math.inf)
+        return {joint.name: free if joint.continuous else joint.limits for joint in self.joints}
 
     @property
     def slides(self) -> tuple[int, ...]:
@@ -188,12 +188,12 @@ class Arm(Settings):
     @property
     def lower(self) -> Array:
         """Lower joint stops [rad], shape (J,)."""
-        return self.ranges[:, 0]
+        return np.array([low for low, _ in self.ranges.values()])
 
     @property
     def upper(self) -> Array:
         """Upper joint stops [rad], shape (J,)."""
-        return self.ranges[:, 1]
+        return np.array([high for _, high in self.ranges.values()])
 
     def pose(self, name: str) -> Array:
         """Return a named pose [rad], shape (J,).

@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 
 from hydroid.log import Log, LogFinding, check_log
+from hydroid.log.read import Ranges
 from hydroid.settings.log import LogSettings
 
 RIG = Path(__file__).parents[2] / "examples" / "logs"
-RIG_RANGES = np.deg2rad(
-    [(-50, 50), (-30, 90), (-120, 0), (-90, 90), (-50, 50), (-np.inf, np.inf), (0, 60)],
-)
-RANGES = np.array([(-0.5, 1.5), (-np.inf, np.inf)])
+DEGREES = (-50, 50), (-30, 90), (-120, 0), (-90, 90), (-50, 50), (-np.inf, np.inf), (0, 60)
+RIG_RANGES = {f"{joint}": tuple(np.deg2rad(ends)) for joint, ends in enumerate(DEGREES, 1)}
+RANGES = {"1": (-0.5, 1.5), "2": (-np.inf, np.inf)}
 NAMES = ("time_s", "u1_pct", "u2_pct", "q1_deg", "q2_deg")
 SETTINGS = LogSettings()
 
@@ -43,7 +43,7 @@ def head(path: Path, samples: int) -> Path:
 
 
 def read(
-    path: Path, settings: LogSettings = SETTINGS, ranges: np.ndarray = RANGES, **options: Any
+    path: Path, settings: LogSettings = SETTINGS, ranges: Ranges = RANGES, **options: Any
 ) -> tuple[Log, list[LogFinding]]:
     """A log that can be used, and its findings; else the first error is raised."""
     log, findings = check_log(path, settings, ranges, **options)
@@ -60,7 +60,7 @@ def assert_same(log: Log, other: Log) -> None:
 
 
 def faults(
-    path: Path, settings: LogSettings = SETTINGS, ranges: np.ndarray = RANGES, **options: Any
+    path: Path, settings: LogSettings = SETTINGS, ranges: Ranges = RANGES, **options: Any
 ) -> list[LogFinding]:
     """Errors only."""
     log, findings = check_log(path, settings, ranges, **options)

@@ -10,7 +10,7 @@ from log_formats import BagWriter
 from hydroid.settings.log import LogSettings
 
 KINDS = ("ros1", "ros2", "mcap")
-RANGES = np.array([(-2, 2), (-2, 2)])
+RANGES = {"1": (-2.0, 2.0), "2": (-2.0, 2.0)}
 RATE = 1.2  # [rad/s], of the sines below
 START = 1_700_000_000.0
 SETTINGS = LogSettings.model_validate(

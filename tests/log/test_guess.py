@@ -42,7 +42,7 @@ def test_the_range_of_a_command(scale: float, offset: float, unit: str, entry: d
     assert mapped["command"] == {"column": names[1], **entry}
     assert mapped["angle"] == {"column": "boomAngle", "unit": "rad"}
     settings = LogSettings.model_validate(found.log)
-    log, _ = read(tmp_path / "log.csv", settings, np.deg2rad([[-70, 70]] * 4))
+    log, _ = read(tmp_path / "log.csv", settings, dict.fromkeys("1234", (-1.22, 1.22)))
     np.testing.assert_allclose(log.command[:, 1], STEPS, atol=1e-9)
     np.testing.assert_allclose(np.rad2deg(log.angle[:, 1]), SWEEP, atol=1e-9)
 
@@ -59,7 +59,9 @@ def test_a_current_loop_for_each_direction_is_its_range(tmp_path: Path) -> None:
     found = guess(tmp_path, ["t", "u2_up_mA", "u2_down_mA", "q2_deg"], T, up, down, SWEEP)
     command = found.log["joints"][2]["command"]
     assert command == {"column": ["u2_up_mA", "u2_down_mA"], "scale": 6.25, "offset": -25.0}
-    log, _ = read(tmp_path / "log.csv", LogSettings.model_validate(found.log), np.full((2, 2), [-9, 9]))
+    log, _ = read(
+        tmp_path / "log.csv", LogSettings.model_validate(found.log), dict.fromkeys("12", (-9.0, 9.0))
+    )
     np.testing.assert_allclose(log.command[:, 1], STEPS, atol=1e-9)
 
 

@@ -79,8 +79,7 @@ def test_pressures_survive_a_file(hydraulic, tmp_path, arm):
     settings = load_settings("article-hyd", FIXED | PRESSURE | columns)
     write_log(tmp_path / "log.csv", log, settings.log)
     assert "pA2,pB2" in (tmp_path / "log.csv").read_text().splitlines()[0]
-    ranges = np.stack([arm.lower, arm.upper], axis=1)
-    again, _ = check_log(tmp_path / "log.csv", settings.log, ranges)
+    again, _ = check_log(tmp_path / "log.csv", settings.log, arm.ranges)
     assert again.pressure[:, 1] == pytest.approx(log.pressure[:, 1], rel=1e-8)
     assert np.isnan(again.pressure[:, 0]).all()
 

@@ -109,10 +109,22 @@ def _fit(stage: str, given: Mapping[str, Any]) -> FitResult:
     changes = setting_changes(given["set"], {key: given[name] for key, name in keys.items()})
     if given["refinement"] is False:
         changes["refinement"] = None
-    config = given["config"]
+    config, start = given["config"], given["start"]
+    settings, more = load_settings(config, changes), Plain()
+    if settings.stage != stage:
+        what = f"has stage: {settings.stage}, but hydroid fit-{stage} needs stage: {stage}"
+        raise SettingsError(what, config, f"use hydroid fit-{settings.stage}, or another --config")
     if stage == "hyd":
-        changes = with_mechanics(given["mech"], config, changes)
-    settings = load_stage(stage, config, changes, given["start"])
+        more |= held_mechanics(given["mech"], settings, changes)
+    if start is not None:
+        values, _ = open_values(start)
+        free = [name for name, p in settings.parameters.items() if p.fixed is None and name in values]
+        starts = {f"parameters.{n}.start": values[n] for n in free if f"parameters.{n}.fixed" not in more}
+        if not starts:
+            raise SettingsError("has a value of none of the free parameters", start)
+        more |= starts
+    if more:
+        settings = load_settings(config, {**changes, **more, **changes})
     if config == f"fit-{stage}":
         what = f"note: the arm is the shipped {settings.arm.name}"
         _log.log(NOTE, f"{what}: for your machine give --config, which `hydroid init` writes")
@@ -123,39 +135,18 @@ def _fit(stage: str, given: Mapping[str, Any]) -> FitResult:
         )
 
 
-def load_stage(
-    stage: str, config: ConfigSource, changes: Mapping[str, Any], start: "ModelSource | None" = None
-) -> FitSettings:
-    """Read the settings of a stage, with the start that an estimate gives.
-    Raises SettingsError: as of `load_settings`, they are those of the other stage, or there is no start.
-    """
-    settings = load_settings(config, changes)
-    if settings.stage != stage:
-        what = f"has stage: {settings.stage}, but hydroid fit-{stage} needs stage: {stage}"
-        raise SettingsError(what, config, f"use hydroid fit-{settings.stage}, or another --config")
-    if start is None:
-        return settings
-    values, _ = open_values(start)
-    free = [name for name, p in settings.parameters.items() if p.fixed is None and name in values]
-    if not free:
-        raise SettingsError("has a value of none of the free parameters", start)
-    starts = {f"parameters.{name}.start": values[name] for name in free}
-    return load_settings(config, {**changes, **starts, **changes})
-
-
-def with_mechanics(mech: "ModelSource | None", config: ConfigSource, changes: Mapping[str, Any]) -> Plain:
-    """Return changes of stage 2's settings `config` that hold the parameters of stage 1 at its estimate.
+def held_mechanics(mech: "ModelSource | None", settings: FitSettings, changes: Plain) -> Plain:
+    """Return what of stage 2's settings, read with `changes`, stage 1 says: its parameters at its estimate.
 
     Of a run folder or a result of stage 1, or a YAML file of values by name, the masses hold, and damping and
-    stiffness where `config` states no start or nominal value of its own. None: `config` fixes them, or says
-    what is known of them (a prior or a start), and they are estimated with the others. `changes` have the
+    stiffness where the settings state no start or nominal value of their own. None: the settings fix them, or
+    say what is known of them (a prior or a start), and they are estimated with the others. `changes` have the
     last word. Raises RunError, SettingsError: no values there, or one that stage 2 needs is missing.
     """
     values, summary = ({}, None) if mech is None else open_values(mech)
     if summary is not None and summary.stage != "mech":
         hint = "name a run of fit-mech, or begin at this fit with --start"
         raise SettingsError("is a fit of stage 2, but --mech takes one of stage 1", str(mech), hint)
-    settings = load_stage("hyd", config, changes)
     held, missing = Plain(), list[str]()
     for name, p in settings.parameters.items():
         if p.quantity not in MECHANICAL or p.quantity == "gain":
@@ -178,7 +169,7 @@ def with_mechanics(mech: "ModelSource | None", config: ConfigSource, changes: Ma
         hint = "give the run of stage 1 with --mech RUN, or set fixed, nominal or start for each"
         what = f"stage 2 needs the values of {', '.join(missing)} from stage 1"
         raise SettingsError(what, mech or "", hint)
-    return {**changes, **held}
+    return held
 
 
 @command

@@ -13,7 +13,7 @@ from command_line import Run
 from conftest import SMALL
 
 import hydroid
-from hydroid.commands.stages import with_mechanics
+from hydroid.commands.stages import held_mechanics
 from hydroid.estimate import FitSummary, ParameterEstimate, write_estimate
 from hydroid.findings import Finding
 from hydroid.fitting import validation
@@ -196,11 +196,10 @@ def test_stage_two_holds_masses_and_says_which_stage_1_moved_without_knowing_it(
     known = {n: ParameterEstimate(value=v, unit="?", flag=flags[n]) for n, v in values.items()}
     write_estimate(tmp_path, FitSummary(stage="mech", estimate=known))
     with caplog.at_level(logging.WARNING, "hydroid"):
-        changes = with_mechanics(tmp_path, "fit-hyd", {"log.delay_s": 0.2})
+        held = held_mechanics(tmp_path, hydroid.load_settings("fit-hyd"), {})
     (line,) = caplog.messages
     assert line.startswith("M2 is held at 8 kg: stage 1 moved it from 5.1 kg, but its logs do not")
-    settings = hydroid.load_settings("fit-hyd", changes)
-    assert settings.log.delay_s == 0.2
+    settings = hydroid.load_settings("fit-hyd", held)
     # the masses hold; the damping and the spring of stage 2 have a start and a value of their own
     masses = {name: value for name, value in values.items() if name.startswith("M")}
     assert {name: settings.parameters[name].fixed for name in masses} == masses

@@ -185,7 +185,7 @@ def _store(folder: "RunFolder", result: FitResult) -> Path:
     from hydroid.run.record import RESULT, fit_result
 
     began = time.monotonic()
-    folder.write_estimate(result.problem.logs[0], result.fit.best.theta, result.summary)
+    folder.write_estimate(result.model, result.problem.logs[0])
     arrays = fit_result(result.fit, result.predictions, result.baselines)
     write_atomic(folder.path / RESULT, pack(arrays))
     page = draw(folder.path)

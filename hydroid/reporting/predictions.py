@@ -1,5 +1,6 @@
 """Pages of predictions, what models make of logs: of a fit, from what its run stores, and of a validation."""
 
+import shlex
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
@@ -166,7 +167,8 @@ def fit_page(record: Record) -> Page:
     # a validation has the name of the run, a fitted log that of the estimate: here both are the fit
     predictions = [replace(p, fit=final) for p in (*record.validations.values(), *fitted)]
     fits = {final: record.verdict}
-    step, *more = next_steps(settings, record.verdict, record.folder, record.given)
+    logs = " ".join(shlex.quote(one.log.source) for one in fitted)
+    step, *more = next_steps(settings, record.verdict, record.folder, logs)
     sections = (
         verdict_section(fits, step),
         *prediction_sections(predictions, settings.arm, fits),

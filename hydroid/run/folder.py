@@ -14,9 +14,8 @@ from typing import Any
 import numpy as np
 
 from hydroid.arm.model import load_model
-from hydroid.arrays import Array
 from hydroid.errors import RunError, Stopped
-from hydroid.estimate import NAME, FitSummary, write_estimate
+from hydroid.estimate import write_estimate
 from hydroid.files import Plain, is_file, remove_parts, write_atomic
 from hydroid.identified_model import ARM, CONFIG, MODEL, IdentifiedModel, portable, write_settings
 from hydroid.log import Log
@@ -25,7 +24,6 @@ from hydroid.run.archive import CheckpointFile
 from hydroid.run.process import LOCK, locked, run_log
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
-from hydroid.settings.load import load
 
 DESCRIPTION = "run.json"
 """name of the file that describes the run: versions, seed, hashes of its logs and files, status, seconds"""
@@ -181,19 +179,10 @@ class RunFolder:
             raise RunError("is not a run's description", file)
         return content
 
-    def settings(self) -> FitSettings:
-        """Read back the resolved settings.
-        Raises RunError, SettingsError: they are missing or damaged.
-        """
-        self.identity()  # raises the clearer error where the folder holds no run
-        return load(self.path / CONFIG, FitSettings)
-
-    def write_estimate(self, log: Log, theta: Array, summary: FitSummary) -> None:
-        """Write `estimate.yaml`, and the fitted arm in `model/` as it began a log."""
-        write_estimate(self.path, summary)
-        settings = self.settings().of_estimate(summary.final)
-        model = IdentifiedModel(settings, theta, str(self.path / NAME), summary)
-        plant = Plant(model, payload=settings.payloads.get(Path(log.source).name, 0.0))
+    def write_estimate(self, model: IdentifiedModel, log: Log) -> None:
+        """Write `estimate.yaml` of a fit's model, and the fitted arm in `model/` as it began a log."""
+        write_estimate(self.path, model.summarise())
+        plant = Plant(model, payload=model.settings.payloads.get(Path(log.source).name, 0.0))
         plant.reset(log.start)
         plant.export(self.path / "model")
 

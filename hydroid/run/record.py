@@ -11,7 +11,6 @@ import logging
 import math
 import os
 import re
-import shlex
 from collections.abc import Mapping, Sequence
 from functools import cache, cached_property
 from itertools import pairwise
@@ -27,7 +26,7 @@ from hydroid.files import write_atomic
 from hydroid.fitting.fit import Fit
 from hydroid.fitting.validation import Prediction
 from hydroid.fitting.verdict import Baselines, judge
-from hydroid.identified_model import IdentifiedModel, load_identified
+from hydroid.identified_model import CONFIG, IdentifiedModel, load_identified
 from hydroid.run.archive import pack, unpack
 from hydroid.run.folder import RunFolder, difference
 from hydroid.settings.fit import FitSettings
@@ -98,11 +97,6 @@ class Record:
         """Error of the final estimate on its logs; infinite where it diverged."""
         return math.inf if self.summary.rms_deg is None else self.summary.rms_deg
 
-    @property
-    def given(self) -> str:
-        """Its logs as a command takes them."""
-        return " ".join(shlex.quote(p.log.source) for p in self.result.fitted)
-
     @cached_property
     def verdict(self) -> tuple[JointVerdict, ...]:
         """By its logs and the unseen ones."""
@@ -159,7 +153,7 @@ def load_record(folder: str | Path) -> Record:
     path = Path(folder)
     identity = RunFolder(path).identity()
     summary = load(path / NAME, FitSummary)
-    settings = RunFolder(path).settings().of_estimate(summary.final)
+    settings = load(path / CONFIG, FitSettings).of_estimate(summary.final)
     files = sorted(path.glob(f"{VALIDATIONS}/*/{RESULT}"))
     unseen = {file.parent.name: _read(file, Prediction) for file in files}
     return Record(str(folder), identity, settings, summary, _read(path / RESULT, FitResult), unseen)

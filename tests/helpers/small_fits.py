@@ -9,6 +9,7 @@ from made_logs import TRUTH, at_rest, noisy, simulate_log, stepped
 from hydroid import load_settings, read_logs
 from hydroid.fitting.fit import Fit, fit
 from hydroid.fitting.summary import summarise
+from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log, write_log
 from hydroid.problem.problem import Problem
 from hydroid.run.folder import RunFolder
@@ -60,5 +61,6 @@ class Study:
         """A fit in a folder, continued where the folder has a checkpoint."""
         checkpoints = folder.begin(self.settings, read_logs([self.path], self.settings))
         result = fit(self.problem, watcher, checkpoints)
-        folder.write_estimate(self.problem.logs[0], result.best.theta, summarise(self.problem, result))
+        settings, summary = self.settings.of_estimate(result.final), summarise(self.problem, result)
+        folder.write_estimate(IdentifiedModel(settings, result.best.theta, "", summary), self.log)
         return result

@@ -46,7 +46,7 @@ def make_log(term: str, seconds: float, seed: int) -> Log:
 def largest_flow(truth: FitSettings, log: Log) -> float:
     """Flow from the pump that the true arm exceeds for 1 % of a log [L/min]."""
     simulation, stage = make_simulation(load_model(truth.arm), log, [1], truth), Bindings(truth)
-    flow = simulation.trace(stage.candidates(stage.parameters.vector(TRUTH, "truth")[None])).flow[:, 0]
+    flow = simulation.trace(stage.candidates(truth.parameter_set().vector(TRUTH, "truth")[None])).flow[:, 0]
     return 6e4 * float(np.quantile(np.maximum(flow[:, 0], -flow[:, 1]), 0.99))
 
 

@@ -190,7 +190,7 @@ def design(
     changed one replaces the worst of them where it is better. The same seed gives the same experiment. Raises
     SettingsError: joints or poses that cannot be used, or no experiment within the limits was found.
     """
-    effort, parameters = settings.design.effort, Bindings(settings).parameters
+    effort, parameters = settings.design.effort, settings.parameter_set()
     rng = np.random.default_rng(seed)
     if logs:
         fitted = uncertainty(Problem(settings, logs), theta).posterior

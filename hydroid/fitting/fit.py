@@ -3,25 +3,23 @@
 import logging
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from hydroid.advice.growth import MIN_GAIN, refitted
+from hydroid.arrays import Array, record
 from hydroid.fitting.checkpoints import Checkpoints
 from hydroid.fitting.multistart import each_alone
 from hydroid.fitting.refinement import ROUGH, refine
 from hydroid.fitting.search import Searched, search
-from hydroid.parameters import Array
 from hydroid.posterior.identifiability import Identifiability, identifiability
 from hydroid.posterior.linear import estimate_box
 from hydroid.posterior.quantities import Quantities, quantities
 from hydroid.posterior.uncertainty import Uncertainty, uncertainty
-from hydroid.problem.channels import overall_objective, segment_objectives
 from hydroid.problem.problem import Evaluation, Problem
 from hydroid.search.descent import Descent
-from hydroid.search.pareto import average, best, non_dominated, utopia
+from hydroid.search.pareto import average, non_dominated, segment_best, utopia
 
 _log = logging.getLogger(__name__)
 
@@ -30,7 +28,7 @@ TOO_FAR = 20.0
 oil in a quasi-static model are too much beside it, and it errs by several times as much at first"""
 
 
-@dataclass(frozen=True)
+@record
 class Estimate:
     """One parameter set with its response.
 
@@ -51,7 +49,7 @@ class Estimate:
         return bool(np.isfinite(self.rms))
 
 
-@dataclass(frozen=True)
+@record
 class Fit:
     """The estimates of a fit, and what is known of the one to use.
 
@@ -151,13 +149,10 @@ def fit(problem: Problem, watch: Watcher | None = None, checkpoints: Checkpoints
 
     if settings.refinement is not None:
         ladder = settings.stage == "hyd" and settings.simulation.model == "ladder"
-        climb("refined", if_nearer=False)
-        for term in settings.terms:
-            climb(f"{final}+{term}", if_nearer=True)
-        if ladder:
-            climb(final.replace("refined", "dynamic"), if_nearer=True)
-        for term in settings.terms if final == "dynamic" else ():
-            climb(f"{final}+{term}", if_nearer=True)
+        for model in ("refined", "dynamic")[: 1 + ladder]:
+            climb("+".join([model, *final.split("+")[1:]]), if_nearer=model == "dynamic")
+            for term in settings.terms if final == model else ():
+                climb(f"{final}+{term}", if_nearer=True)
         if settings.joint_refinement:
             climb(final.replace("refined", "joint"), if_nearer=False)
         if not refinements[final].converged:
@@ -186,7 +181,7 @@ def _candidates(problem: Problem, searched: Searched) -> dict[str, Array]:
     """The estimates that a search gives, by name, the one that the settings ask for first."""
     theta, memo = searched.theta, searched.memo
     if searched.single:
-        return {"best": best(theta, searched.population.objectives[:, 0])}
+        return {"best": theta[segment_best(searched.population.objectives)[0]]}
     segments = memo.evaluate(theta).segments
     candidates = {
         "average": average(theta, segments),
@@ -201,14 +196,12 @@ def _estimates(problem: Problem, candidates: dict[str, Array]) -> dict[str, Esti
     """Simulate candidates by name, each of shape (P,), and measure them; those that diverged come last."""
     theta = np.array(list(candidates.values()))
     responses = problem.responses(theta)
-    errors = np.concatenate([channel.error(responses) for channel in problem.channels], axis=1)
-    objective = problem.settings.objective
-    segments = segment_objectives(errors, problem.measured, problem.bounds, objective)
-    overall, rms = overall_objective(errors, problem.measured, objective), problem.rms(errors)
+    errors = problem.errors(responses)
+    norms, rms = problem.norms(errors), problem.rms(errors)
     estimates: list[Estimate] = []
     for i, name in enumerate(candidates):
         angles = tuple(response.angle[i] for response in responses)
-        estimates.append(Estimate(name, theta[i], segments[i], overall[i], rms[i], angles))
+        estimates.append(Estimate(name, theta[i], norms[i, :-1], norms[i, -1], rms[i], angles))
         if not estimates[-1].usable:
             _log.warning("the estimate %s diverged when it was simulated; it is not used", name)
     return {e.name: e for e in sorted(estimates, key=lambda e: not e.usable)}

@@ -1,13 +1,12 @@
 """Where each parameter of a fit enters the model (article section 3, equations (15) and (16))."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from fnmatch import fnmatch
 from pathlib import Path
 
 import numpy as np
 
-from hydroid.arrays import Array, Mask
+from hydroid.arrays import Array, Mask, record
 from hydroid.errors import SettingsError
 from hydroid.hydraulics.records import Records, nominal_joints
 from hydroid.quantity_table import QUANTITIES, TARGETS
@@ -17,7 +16,7 @@ from hydroid.settings.problem import ParameterSettings
 from hydroid.simulation import Candidates
 
 
-@dataclass(frozen=True)
+@record
 class Binding:
     """One column of theta sets one quantity of some joints, or the mass of a link, 0-based.
 
@@ -57,7 +56,6 @@ class Bindings:
                         f"parameters.{name}",
                         "give each its own joints, or remove one",
                     )
-        self.parameters = settings.parameter_set()
 
     def candidates(self, theta: Array, log: str = "") -> Candidates:
         """Spread theta, shape (n, P), over joints and links, in SI, as they are in a log of this name."""

@@ -74,17 +74,16 @@ class Channel:
             simulated = response.pressure[:, :, self.column, "ab".index(self.quantity[-1])]
         return self.weight * (self.measured - simulated)
 
-    def filtered(self, errors: Array) -> Array:
-        """Return residuals, shape (n, T), from weighted output errors."""
+    def filtered(self, errors: Array, way: int = 1) -> Array:
+        """Return residuals, shape (n, T), from weighted output errors; `way` -1: errors from residuals."""
         if self.prefilter is UNFILTERED:
             return errors
-        return np.asarray(lfilter(self.prefilter[0], self.prefilter[1], errors))
+        above, below = self.prefilter[::way]
+        return np.asarray(lfilter(above, below, errors))
 
     def unfiltered(self, residuals: Array) -> Array:
         """Return the weighted output errors that residuals, shape (n, T), come from."""
-        if self.prefilter is UNFILTERED:
-            return residuals
-        return np.asarray(lfilter(self.prefilter[1], self.prefilter[0], residuals))
+        return self.filtered(residuals, -1)
 
     def gain(self, size: int) -> Array:
         """Return |F| at the frequencies of a transform of so many real samples, shape (1 + size / 2,)."""

@@ -52,7 +52,7 @@ def start_slopes(problem: Problem, theta: Array) -> list[StartSlopes]:
     One simulation for each. A start angle from which the simulation diverges has no effect.
     """
     spec = load_model(problem.settings.arm)
-    base, slopes = problem.filtered(problem.output_errors(theta[None]))[0], list[StartSlopes]()
+    base, slopes = problem.residuals(theta[None])[0], list[StartSlopes]()
     for i, log in enumerate(problem.logs):
         joints, pressures = problem.started(log), compared_pressures(log, problem.settings)
         channels = [channel for channel in problem.channels if channel.log == i]

@@ -91,7 +91,7 @@ class Problem:
         self.bindings = Bindings(settings)
         self._driven = np.any([log.driven for log in logs], axis=0)
         self.bindings.refuse_idle(self._driven, outputs)
-        self.parameters = self.bindings.parameters
+        self.parameters = settings.parameter_set()
         if not self.parameters.free.any():
             raise SettingsError("no parameter is free", "parameters", "fix fewer of them")
         self.priors = Priors(settings.priors, self.parameters)
@@ -162,15 +162,15 @@ class Problem:
 
     def objectives(self, theta: Array) -> Array:
         """Objectives of theta, shape (n, P), simulated in this process: shape (n, S + 1), overall last."""
-        objective = self.settings.objective
-        values = np.empty((len(theta), len(self.bounds) + 1))
         size = max(1, CHUNK // len(self.measured))
-        for start in range(0, len(theta), size):
-            rows = slice(start, start + size)
-            error = self.output_errors(theta[rows])
-            values[rows, :-1] = segment_objectives(error, self.measured, self.bounds, objective)
-            values[rows, -1] = overall_objective(error, self.measured, objective)
-        return values
+        parts = (self.norms(self.output_errors(theta[at : at + size])) for at in range(0, len(theta), size))
+        return np.vstack([*parts])
+
+    def norms(self, errors: Array) -> Array:
+        """Return the objectives of output errors, (n, R), by segment and overall last: shape (n, S + 1)."""
+        objective = self.settings.objective
+        segments = segment_objectives(errors, self.measured, self.bounds, objective)
+        return np.column_stack([segments, overall_objective(errors, self.measured, objective)])
 
     def residuals(self, theta: Array) -> Array:
         """Output errors through the prefilter [rad], shape (n, R): channel after channel; NaN where diverged.
@@ -181,14 +181,17 @@ class Problem:
             rows = self.output_errors(theta)
         else:
             rows = self._spread(self._on_worker, "output_errors", theta, len(self.measured))
-        rows = self.filtered(rows)
+        rows = np.concatenate([c.filtered(rows[:, c.rows]) for c in self.channels], axis=1)
         for close in self.open_starts:
             close(rows)
         return rows
 
     def output_errors(self, theta: Array) -> Array:
         """Weighted output errors of (17) [rad] of theta, shape (n, P), simulated in this process: (n, R)."""
-        responses = self.responses(theta)
+        return self.errors(self.responses(theta))
+
+    def errors(self, responses: Sequence[Response]) -> Array:
+        """Return the weighted output errors of n candidates' responses to all logs [rad], shape (n, R)."""
         return np.concatenate([channel.error(responses) for channel in self.channels], axis=1)
 
     def leaves_noise(self, theta: Array) -> bool:
@@ -196,10 +199,6 @@ class Problem:
         error = self.output_errors(theta[None])[0]
         each = [error[c.rows] for c in self.channels]
         return all(np.mean(np.diff(one) ** 2) > WHITE * np.var(one) for one in each)
-
-    def filtered(self, errors: Array) -> Array:
-        """Return residuals from output errors, shape (n, R)."""
-        return np.concatenate([c.filtered(errors[:, c.rows]) for c in self.channels], axis=1)
 
     def responses(self, theta: Array) -> list[Response]:
         """Simulate theta, shape (n, P); return one response of n candidates per log."""
@@ -255,4 +254,4 @@ def make_simulation(
         spec = add_payload(spec, settings.arm, payload)
     scenario = Scenario(spec, settings.arm, log, outputs, settings.simulation)
     substeps = settings.substeps if settings.stage == "hyd" else None
-    return Simulation(scenario, settings.arm, substeps, pressures)
+    return Simulation(scenario, substeps, pressures)

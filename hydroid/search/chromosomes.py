@@ -10,14 +10,13 @@ Both codings divide a parameter's range into the same 65,535 steps, ends include
 The operators work on whole populations, leave their arguments alone, and draw from the generator passed in.
 """
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from hydroid.arrays import Array, Ints, Mask
+from hydroid.arrays import Array, Ints, Mask, record
 from hydroid.settings.search import GeneticSettings
 
 Genes = NDArray[Any]  # Chromosomes, shape (n, length): bits (uint8) or integers (uint16).
@@ -26,7 +25,7 @@ BITS = 16
 STEPS = 2**BITS - 1
 
 
-@dataclass(frozen=True)
+@record
 class GrayCoding:
     """16 Gray-coded bits per element (MVBS)."""
 
@@ -55,7 +54,7 @@ class GrayCoding:
         return chromosomes ^ flips.reshape(chromosomes.shape).astype(np.uint8)
 
 
-@dataclass(frozen=True)
+@record
 class IntegerCoding:
     """One integer from 0 to 65,535 per element."""
 

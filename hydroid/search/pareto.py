@@ -107,14 +107,6 @@ def utopia(points: Array, objectives: Array) -> Array:
     return points[distance.argmin()]
 
 
-def best(points: Array, overall: Array) -> Array:
-    """The candidate, (p,), of points, (n, p), with the lowest norm over the whole record, (n,).
-
-    Raises SettingsError: no candidate is feasible.
-    """
-    return points[segment_best(overall[:, None])[0]]
-
-
 def _ranked(objectives: Array) -> Array:
     """Objectives with inf throughout for infeasible candidates."""
     usable = feasible(objectives)

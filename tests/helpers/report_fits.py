@@ -17,7 +17,6 @@ from hydroid.posterior.linear import Linear, estimate_box
 from hydroid.posterior.noise import problem_noise
 from hydroid.posterior.quantities import Quantities
 from hydroid.posterior.uncertainty import Uncertainty, uncertainty_from
-from hydroid.problem.channels import overall_objective, segment_objectives
 from hydroid.problem.problem import Evaluation, Problem
 from hydroid.run.record import Record, fit_result
 from hydroid.search.descent import Descent, Ending
@@ -76,12 +75,12 @@ def make_fit(
             log.angle[:, problem.outputs] - wave for log, wave in zip(problem.logs, waves, strict=True)
         )
         error = np.concatenate([wave.T.ravel() for wave in waves])[None]
-        how = problem.settings.objective
+        norms = problem.norms(error)[0]
         estimates[name] = Estimate(
             name,
             parameters.from_unit(rng.uniform(0.1, 0.9, (1, free)))[0],
-            segment_objectives(error, problem.measured, problem.bounds, how)[0],
-            float(overall_objective(error, problem.measured, how)[0]),
+            norms[:-1],
+            float(norms[-1]),
             float(np.sqrt(np.mean(error**2))),
             responses,
         )

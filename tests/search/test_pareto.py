@@ -7,7 +7,7 @@ from pymoo.problems import get_problem
 from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
 
 from hydroid.errors import SettingsError
-from hydroid.search.pareto import average, best, crowding, non_dominated, ranks, segment_best, utopia
+from hydroid.search.pareto import average, crowding, non_dominated, ranks, segment_best, utopia
 
 PROBLEMS = [("zdt1", {}), ("zdt4", {}), ("dtlz7", {"n_var": 10, "n_obj": 8})]
 
@@ -82,19 +82,15 @@ def test_a_candidate_that_is_best_everywhere_is_every_compromise(seed):
     rng = np.random.default_rng(seed)
     points, objectives = rng.random((9, 4)), rng.random((9, 5)) + 1
     objectives[6] = rng.random(5)
-    for point in (
-        average(points, objectives),
-        utopia(points, objectives),
-        best(points, objectives.max(axis=1)),
-    ):
+    for point in (average(points, objectives), utopia(points, objectives)):
         np.testing.assert_allclose(point, points[6], rtol=1e-15)
 
 
 def test_best_ignores_the_infeasible():
-    assert best(POINTS, np.array([3.0, 2.0, np.inf, -np.inf])).tolist() == POINTS[1].tolist()
+    assert segment_best(np.array([[3.0], [2.0], [np.inf], [-np.inf]])).tolist() == [1]
 
 
-@pytest.mark.parametrize("choose", [average, utopia, lambda points, rows: best(points, rows[:, 0])])
+@pytest.mark.parametrize("choose", [average, utopia, lambda _, rows: segment_best(rows[:, :1])])
 def test_nothing_to_choose_from_is_said_so(choose):
     with pytest.raises(SettingsError, match="could be simulated"):
         choose(POINTS, np.full((4, 3), np.nan))

@@ -54,6 +54,7 @@ class Memo:
     Attributes:
         infeasible: candidates whose simulation diverged.
         elsewhere: candidates that a local method simulated on its way to those evaluated here.
+        stored: objectives of the resumed run's candidates that have not been asked for yet.
     """
 
     def __init__(self, problem: Problem, stored: Arrays | None = None) -> None:
@@ -61,17 +62,12 @@ class Memo:
         self._values: dict[bytes, Array] = {}
         """objectives of each candidate, overall last, shape (S + 1,)"""
         pairs = zip(stored["theta"], stored["values"], strict=True) if stored else ()
-        self._stored = {theta.tobytes(): values.copy() for theta, values in pairs}
+        self.stored = {theta.tobytes(): values.copy() for theta, values in pairs}
 
     @property
     def simulated(self) -> int:
         """Candidates simulated so far, those of a run that this one resumes included."""
         return len(self._values) + self.elsewhere
-
-    @property
-    def replays(self) -> bool:
-        """Whether candidates of the resumed run have not been asked for yet."""
-        return bool(self._stored)
 
     @property
     def best(self) -> Array:
@@ -83,9 +79,9 @@ class Memo:
         Raises RunError: a resumed search does not repeat itself.
         """
         new = {row.tobytes(): row for row in theta if row.tobytes() not in self._values}
-        values = {key: self._stored.pop(key) for key in new if key in self._stored}
+        values = {key: self.stored.pop(key) for key in new if key in self.stored}
         unknown = [key for key in new if key not in values]
-        if unknown and self._stored:
+        if unknown and self.stored:
             raise RunError(
                 "the search cannot be continued: its library does not repeat what it did before",
                 hint="use the versions that the run began with, or begin another with --out",

@@ -13,14 +13,14 @@ another start's. What the joints share (masses, the pump) stays at the start's v
 together is left to the refinement that follows the search.
 """
 
-from collections.abc import Callable
+from operator import itemgetter
 
 import numpy as np
 from numpy.random import Generator
 
 from hydroid.fitting.baselines import NAMES, fit_baselines
 from hydroid.fitting.checkpoints import Checkpoints, Memo
-from hydroid.fitting.refinement import refine
+from hydroid.fitting.refinement import Refining, refine
 from hydroid.parameters import Array
 from hydroid.posterior.bench import make_bench
 from hydroid.problem.problem import Problem
@@ -31,6 +31,7 @@ from hydroid.settings.search import RefinementSettings
 DRAWS = 64  # candidates drawn for a start that can be simulated
 MOVES = 0.01
 """part of an angle's travel over the whole record, below which a shorter part of it shows no motion"""
+COST = itemgetter(0)  # of a cost and the theta that it is of
 
 
 class Multistart:
@@ -41,24 +42,15 @@ class Multistart:
     Args:
         problem: what is minimised.
         memo: counts the simulations.
-        progress: takes name, number of simulations and rms error [rad] of each least squares.
+        progress: of each least squares.
         checkpoints: of the refinements.
     """
 
     single = True
 
-    def __init__(
-        self,
-        problem: Problem,
-        memo: Memo,
-        progress: Callable[[str, int, float], None],
-        checkpoints: Checkpoints,
-    ) -> None:
+    def __init__(self, problem: Problem, memo: Memo, progress: Refining, checkpoints: Checkpoints) -> None:
         self.settings = problem.settings.search.multistart
         self._problem, self._memo, self._progress, self._checkpoints = problem, memo, progress, checkpoints
-        self._descent = RefinementSettings(
-            iterations=self.settings.iterations, gain_tolerance=self.settings.gain_tolerance
-        )
         self._best: dict[int, tuple[float, Array]] = {}
         """the best fit of each joint alone, over the starts so far: its cost, and theta"""
         self._rms = np.inf
@@ -107,8 +99,8 @@ class Multistart:
             tried = [self._grown(problem, by_numbers(problem, joint, theta), f"{name} numbers")]
             if not problem.leaves_noise(tried[0][1]):
                 tried.append(self._grown(problem, theta, name))
-            result = min(tried, key=_cost)
-            best = self._best[joint] = min(self._best.get(joint, result), result, key=_cost)
+            result = min(tried, key=COST)
+            best = self._best[joint] = min(self._best.get(joint, result), result, key=COST)
             _, reached = best if number == self.settings.generations else result
             theta = np.where(problem.parameters.free, reached, theta)
         return theta
@@ -121,7 +113,7 @@ class Multistart:
             result = refine(
                 part.from_afar(),
                 theta,
-                self._descent,
+                self.settings,
                 lambda what, n, rms, before=before: self._progress(what, before + n, rms),
                 self._checkpoints,
                 f"{name} part {number}",
@@ -172,7 +164,7 @@ def each_alone(
     problem: Problem,
     theta: Array,
     settings: RefinementSettings,
-    progress: Callable[[str, int, float], None],
+    progress: Refining,
     checkpoints: Checkpoints,
     name: str,
 ) -> Array:
@@ -221,7 +213,3 @@ def by_numbers(problem: Problem, joint: int, theta: Array) -> Array:
         if name in places and speed > 0:  # in proportion, where no load slows it
             start[places[name]] *= abs(found.numbers[2, side]) / speed
     return np.clip(start, problem.parameters.lower, problem.parameters.upper)
-
-
-def _cost(reached: tuple[float, Array]) -> float:
-    return reached[0]

@@ -21,6 +21,8 @@ SETTLED = 1e-3
 MAX_NOISES = 8
 """times at most that the noise is estimated: its model may jump to and fro between two orders"""
 
+Refining = Callable[[str, int, float], None]
+"""takes the name of a least squares, its number of simulations, and its rms error [rad] so far"""
 ROUGH = 0.1
 """gain below which least squares without the prefilter ends"""
 
@@ -46,7 +48,7 @@ def refine(
     problem: Problem,
     theta: Array,
     settings: RefinementSettings,
-    progress: Callable[[str, int, float], None] = lambda *_: None,
+    progress: Refining = lambda *_: None,
     checkpoints: Checkpoints | None = None,
     name: str = "refined",
 ) -> Descent:
@@ -60,8 +62,8 @@ def refine(
     Fast errors have more optima than slow ones: where there is a prefilter, least squares goes most of the
     way without it.
 
-    It starts at theta, shape (P,). `progress` takes the name, the number of simulations and the rms error
-    [rad] so far. It continues from `checkpoints`, and stores there by its name how far it is; a result too.
+    It starts at theta, shape (P,). It continues from `checkpoints`, and stores there by its name how far it
+    is; a result too.
     Raises RunError: the checkpoint cannot be written.
     """
     checkpoints = {} if checkpoints is None else checkpoints

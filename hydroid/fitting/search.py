@@ -8,6 +8,7 @@ import numpy as np
 from hydroid.arrays import Array, record
 from hydroid.fitting.checkpoints import Arrays, Checkpoints, Memo, saving
 from hydroid.fitting.multistart import Multistart
+from hydroid.fitting.refinement import Refining
 from hydroid.problem.problem import Problem
 from hydroid.search.chromosomes import Genes
 from hydroid.search.genetic import Nsga2, Population, SimpleGa
@@ -40,14 +41,14 @@ class Searched:
 def search(
     problem: Problem,
     watch: Callable[[Array], None],
-    progress: Callable[[str, int, float], None],
+    progress: Refining,
     checkpoints: Checkpoints,
 ) -> Searched:
     """Search to the last generation, from the seed or from what `checkpoints` holds as "search".
 
     `watch` takes a row of HISTORY after every generation, but for those that a resumed run repeats;
-    `progress` the name, simulations and rms error [rad] of least squares within multi-start. Raises RunError:
-    the search does not repeat what it did before the checkpoint.
+    `progress` watches least squares within multi-start. Raises RunError: the search does not repeat what it
+    did before the checkpoint.
     """
     settings, free = problem.settings.search, int(problem.parameters.free.sum())
     memo = Memo(problem, checkpoints.get("search"))
@@ -72,7 +73,7 @@ def search(
     population, history, evaluations = None, np.empty((0, len(HISTORY))), 0
     with saving(checkpoints, "search") as keep:
         while population is None or len(history) < generations:
-            repeats = memo.replays
+            repeats = bool(memo.stored)
             chromosomes = algorithm.ask(population, rng)
             result = memo.evaluate(theta(chromosomes))
             evaluations += len(chromosomes)

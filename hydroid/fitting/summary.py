@@ -9,7 +9,7 @@ from hydroid.estimate import FitSummary, NamedEstimate, ParameterEstimate, finit
 from hydroid.findings import Finding
 from hydroid.fitting.fit import Fit
 from hydroid.parameters import Array, ParameterSet
-from hydroid.posterior.by_log import ByLog, by_log
+from hydroid.posterior.by_log import by_log
 from hydroid.posterior.identifiability import Identifiability
 from hydroid.posterior.noise import error_level
 from hydroid.posterior.uncertainty import Flag, Source, Uncertainty
@@ -77,7 +77,8 @@ def account(problem: Problem, known: Uncertainty, directions: Identifiability | 
     for channel, noise in zip(problem.channels, known.noise, strict=True):
         if channel.quantity == "angle":
             squares[f"q{channel.joint}"].append(error_level(channel, noise) ** 2)
-    findings = [*_parameter_findings(parameters, estimate), *log_findings(logs)]
+    findings = _parameter_findings(parameters, estimate)
+    findings += [Finding("logs disagree", "warning", logs.differing)] if logs.differing else []
     combinations = directions.combinations if directions else ()
     # six of them: the table of directions has all
     findings += [Finding("combination", "note", tuple(one)) for one in combinations if len(one) > 1][:6]
@@ -113,11 +114,6 @@ def fit_findings(problem: Problem, fit: Fit) -> list[Finding]:
     # half of a 95 % interval as large as the value, or without end
     lost = dict.fromkeys(q.label for q in fit.quantities.scalars.values() if not q.within <= 1.0)
     return [*findings, *([Finding("quantities open", "note", tuple(lost))] if lost else [])]
-
-
-def log_findings(logs: ByLog) -> list[Finding]:
-    """Return which parameters differ from log to log by more than the noise explains."""
-    return [Finding("logs disagree", "warning", logs.differing)] if logs.differing else []
 
 
 def _parameter_findings(parameters: ParameterSet, estimate: Mapping[str, ParameterEstimate]) -> list[Finding]:

@@ -25,12 +25,10 @@ class Profile:
     """What a profile of a parameter shows.
 
     Attributes:
-        name: of the parameter.
         interval: where the deviance is below THRESHOLD; infinite on a side where it never exceeds it.
         lowest: least deviance of all points; clearly below 0 the estimate is no optimum.
     """
 
-    name: str
     interval: tuple[float, float]
     lowest: float
 
@@ -77,7 +75,7 @@ def profile(problem: Problem, uncertainty: Uncertainty, name: str) -> Profile:
                 break
             near = deviance
         ends.append(crossing)
-    return Profile(name, (ends[0], ends[1]), lowest)
+    return Profile((ends[0], ends[1]), lowest)
 
 
 def _fit_others(

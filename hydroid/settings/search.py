@@ -8,6 +8,7 @@ from hydroid.settings.load import JointNumber, NotNegative, Positive, Settings
 
 Rate = Annotated[float, Field(ge=0, le=1)]
 Count = Annotated[int, Field(ge=1)]
+Part = Annotated[float, Field(gt=0, lt=1)]
 Population = Annotated[int, Field(ge=4, le=100_000)]
 Generations = Annotated[int, Field(ge=0)]
 
@@ -42,7 +43,18 @@ class ParetoSettings(GeneticSettings):
     mutation_rate: Rate = 0.2
 
 
-class MultistartSettings(Settings):
+class RefinementSettings(Settings):
+    """The refinement: bounded least squares that start from the search's estimate (ours; not in the
+    article)."""
+
+    iterations: Count = 300
+    """largest number of steps; a step takes one to three simulations, some a Jacobian besides"""
+    gain_tolerance: Part = 1e-8
+    """the refinement ends where a step promises to lower the sum of squared errors by less than this
+    fraction"""
+
+
+class MultistartSettings(RefinementSettings):
     """Bounded least squares from several random start points (ours; not in the article)."""
 
     starts: Annotated[int, Field(ge=1, le=100_000)] = 10
@@ -52,24 +64,13 @@ class MultistartSettings(Settings):
     command on [s]; those in which nothing moves yet are left out"""
     iterations: Count = 100
     """largest number of steps of each of these fits"""
-    gain_tolerance: Annotated[float, Field(gt=0, lt=1)] = 1e-4
+    gain_tolerance: Part = 1e-4
     """as the refinement's; coarser, since the refinement starts from the best result"""
 
     @property
     def generations(self) -> int:
         """Starts after the first: what other searches call generations."""
         return self.starts - 1
-
-
-class RefinementSettings(Settings):
-    """The refinement: bounded least squares that start from the search's estimate (ours; not in the
-    article)."""
-
-    iterations: Count = 300
-    """largest number of steps; a step takes one to three simulations, some a Jacobian besides"""
-    gain_tolerance: Annotated[float, Field(gt=0, lt=1)] = 1e-8
-    """the refinement ends where a step promises to lower the sum of squared errors by less than this
-    fraction"""
 
 
 class SearchSettings(Settings):

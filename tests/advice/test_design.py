@@ -100,8 +100,7 @@ def test_the_forecast_is_what_a_fit_to_the_same_log_knows(designed: tuple[FitSet
     """The search's one-sided differences against the uncertainty of a fit; two logs have twice as much."""
     settings, result = designed
     log = simulate_log(settings, result.log, TRUTH)
-    how = settings.objective.model_copy(update={"noise_deg": settings.design.noise_deg})
-    given = settings.model_copy(update={"objective": how})
+    given = settings.changed({"objective.noise_deg": settings.design.noise_deg})
     fitted = forecast(uncertainty(Problem(given, [log]), THETA).posterior)
     np.testing.assert_allclose(result.after.deviations, fitted.deviations, rtol=0.02)
     two = forecast(uncertainty(Problem(given, [log, log]), THETA).posterior)

@@ -84,12 +84,10 @@ def test_runs_of_other_settings_logs_and_versions_are_not_mixed(runs, caplog, ar
     from hydroid.run.folder import RunFolder
 
     plain = array[1][3].problem.settings
-    ga = plain.search.ga.model_copy(update={"generations": 3})
-    longer = plain.search.model_copy(update={"ga": ga})
 
     def begun(name: str, **changes: object) -> None:
         """The run of seed 3 with the same estimate under other settings."""
-        settings = plain.model_copy(update=changes)
+        settings = plain.changed(changes)
         shutil.rmtree("seed-3")
         RunFolder(tmp_path / "seed-3").begin(settings, read_logs([array[0] / name], settings))
         for file in ("estimate.yaml", "result.npz"):
@@ -102,7 +100,7 @@ def test_runs_of_other_settings_logs_and_versions_are_not_mixed(runs, caplog, ar
         assert not Path("out").exists()
         return str(error.value)
 
-    begun("a.csv", search=longer)
+    begun("a.csv", **{"search.ga.generations": 3})
     assert refused().startswith("seed-3: has search.ga.generations = 3, not 2; ")
     lines = (array[0] / "a.csv").read_text().splitlines()
     (array[0] / "other.csv").write_text("\n".join(lines[:-1]))
@@ -112,7 +110,7 @@ def test_runs_of_other_settings_logs_and_versions_are_not_mixed(runs, caplog, ar
     change(Path("seed-3/run.json"), hydroid="0.0")
     assert refused().startswith("seed-3: was made by hydroid 0.0, not ")
     # threads change no bit
-    begun("a.csv", simulation=plain.simulation.model_copy(update={"threads": 1}))
+    begun("a.csv", **{"simulation.threads": 1})
     assert collected(caplog, "seed-*") == ([1, 2, 3], [])
 
 

@@ -23,16 +23,14 @@ CONFIG = {
 @pytest.mark.parametrize("name", ["refined", "refined+pump", "dynamic", "dynamic+pump"])
 def test_a_fit_keeps_what_the_logs_ask_for(name):
     """Soft oil shows in the logs, and a droop shows where two joints move together."""
-    settings = settings_of(CONFIG, bulk_modulus=20.0)
     changes = {
         "outputs": (2, 3),
-        "simulation": settings.simulation.model_copy(update={"model": "ladder"}),
-        "search": settings.search.model_copy(
-            update={"algorithm": "multistart", "multistart": MultistartSettings(starts=1, horizons=())}
-        ),
+        "simulation.model": "ladder",
+        "search.algorithm": "multistart",
+        "search.multistart": MultistartSettings(starts=1, horizons=()),
         "refinement": RefinementSettings(iterations=40),
     }
-    ladder = settings.model_copy(update=changes)
+    ladder = settings_of(CONFIG, bulk_modulus=20.0).changed(changes)
     machine = ladder.of_estimate(name)
     log = step_log(machine.arm.pose("study"), {2: SHOULDER, 3: ELBOW})
     exact = simulate_log(machine, log, {n: TRUTH[n] for n in CONFIG if n in machine.parameters})

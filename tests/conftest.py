@@ -69,7 +69,7 @@ def simulation(
 ) -> Simulation:
     """Of some joints, from 0, in the stage `kind`."""
     scenario = Scenario(spec, arm, log, list(outputs), SimulationSettings(**settings))
-    return Simulation(scenario, arm, HydraulicSettings().substeps if kind == "hyd" else None)
+    return Simulation(scenario, HydraulicSettings().substeps if kind == "hyd" else None)
 
 
 def replaced(candidates: Candidates, **joints: np.ndarray | float) -> Candidates:

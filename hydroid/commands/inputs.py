@@ -122,7 +122,7 @@ def open_model(
     Raises RunError, SettingsError: as of `load_identified`.
     """
     if fit is not None and not isinstance(fit, str | Path):
-        return fit if isinstance(fit, IdentifiedModel) else fit.model
+        return getattr(fit, "model", fit)
     if isinstance(config, FitSettings):
         raise SettingsError("settings that are read make a model with `identified`", "config")
     model = load_identified(fit, config, setting_changes(overrides), nominal=nominal)

@@ -182,7 +182,7 @@ class Plant:
         with quiet_mujoco():
             self._advance(self.data.ctrl)
         self._taken += self._steps
-        if self._warnings.any() or not np.isfinite(self.data.qpos).all():
+        if not self._arm.healthy:
             raise RunError(f"the simulation diverged before {self.time:.2f} s", self.identified.source)
         return self.angle
 
@@ -243,5 +243,4 @@ class Plant:
         rollout = roll_quasi_static if settings.quasi_static else roll
         self._arm = SteppedArm(model, chain.columns, pushed, self._steps, rollout)
         self.model, self.data = self._arm.model, self._arm.data
-        self._warnings = self.data.warning.number
         self._record = Record(np.empty((1, len(moving))), np.empty((0, len(chain.columns)), JOINT_STATE))

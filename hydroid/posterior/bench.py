@@ -90,7 +90,7 @@ class Movement:
         settings = self.bench.settings
         commands = np.full((self.samples * settings.simulation.steps, 1), self.command)
         scenario = self.bench.scenario.restarted(np.array([self.start]), commands)
-        return Simulation(scenario, settings.arm, settings.substeps).simulate(candidates).angle[:, :, 0]
+        return Simulation(scenario, settings.substeps).simulate(candidates).angle[:, :, 0]
 
     def speeds(self, candidates: Candidates) -> Array:
         """Return speeds between samples, shape (n, samples)."""

@@ -2,11 +2,12 @@
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from hydroid.arrays import record
 from hydroid.files import csv_text
 from hydroid.findings import Finding
 from hydroid.log import Log
@@ -22,7 +23,7 @@ class Given(float):
     """A number from the user, such as a bound: it is shown as given, not rounded to four digits."""
 
 
-@dataclass(frozen=True)
+@record
 class Table:
     """A table; each row has one cell per column of the header.
 
@@ -117,7 +118,7 @@ def shown(cell: Cell) -> str:
     return "" if cell is None else str(cell)
 
 
-@dataclass(frozen=True)
+@record
 class Plot:
     """A figure: its name on the page, what it shows in words, and the function that makes it.
 
@@ -130,7 +131,7 @@ class Plot:
     zoom: bool = False
 
 
-@dataclass(frozen=True)
+@record
 class Tab:
     """One of several figures of which a reader sees one at a time.
 
@@ -145,7 +146,7 @@ class Tab:
     state: str = ""
 
 
-@dataclass(frozen=True)
+@record
 class Section:
     """A heading with text, points to note, tables by file name, and figures; folded sections open on demand.
 
@@ -164,7 +165,7 @@ class Section:
     folded: bool = False
 
 
-@dataclass(frozen=True)
+@record
 class Page:
     """A report: the answer in a sentence, `lead`, and its sections; its file has the `name`, and an ending.
 

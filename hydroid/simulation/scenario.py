@@ -113,6 +113,7 @@ class Scenario:
     what the others do.
 
     Attributes:
+        machine: the whole arm.
         arm: the arm reduced to its V moving joints, springs slack in the start pose.
         active: shape (J,).
         outputs: columns of the outputs among the moving joints, shape (K,).
@@ -125,7 +126,7 @@ class Scenario:
     def __init__(
         self, spec: mujoco.MjSpec, arm: Arm, log: Log, outputs: list[int], settings: SimulationSettings
     ) -> None:
-        self.settings = settings
+        self.settings, self.machine = settings, arm
         self.active = log.driven.copy()
         self.active[outputs] = True
         moving = self.active | (settings.other_joints != "locked")

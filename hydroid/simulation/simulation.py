@@ -20,7 +20,6 @@ from hydroid.arrays import Array, Index, Structs
 from hydroid.hydraulics.actuator import Observation, observe
 from hydroid.hydraulics.records import JOINT_STATE, has_force_curve
 from hydroid.mjcf import quiet_mujoco
-from hydroid.settings.arm import Arm
 from hydroid.simulation.quasi_static import roll_quasi_static
 from hydroid.simulation.rollout import Course, Record, SteppedArm, compile_rollout, roll
 from hydroid.simulation.scenario import Candidates, Chain, Response, Scenario
@@ -43,14 +42,12 @@ class Simulation:
         joints: those that a trace describes, among the arm's, 0-based.
     """
 
-    def __init__(
-        self, scenario: Scenario, arm: Arm, substeps: int | None, pressures: Sequence[int] = ()
-    ) -> None:
+    def __init__(self, scenario: Scenario, substeps: int | None, pressures: Sequence[int] = ()) -> None:
         compile_rollout()
         self.scenario = scenario
         self._quasi_static = bool(substeps) and scenario.settings.model != "dynamic"
         pushed = scenario.prescribed.columns if substeps else np.arange(len(scenario.arm.columns))
-        self._chain = Chain(arm, scenario.arm, scenario.active, substeps or 1, pushed)
+        self._chain = Chain(scenario.machine, scenario.arm, scenario.active, substeps or 1, pushed)
         self.joints = self._chain.joints
         self._pressures = np.searchsorted(self.joints, np.array(pressures, int))
 

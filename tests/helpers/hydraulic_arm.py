@@ -28,7 +28,7 @@ class DrivenArm:
         log = at_rest(pose, np.concatenate([command, np.zeros((1, command.shape[1]))]))
         chosen = SimulationSettings(steps_per_sample=steps)
         scenario = Scenario(load_model(arm), arm, log, list(range(len(pose))), chosen)
-        self._simulation = Simulation(scenario, arm, settings.substeps)
+        self._simulation = Simulation(scenario, settings.substeps)
         self._candidates = Candidates(joints, np.tile(arm.masses, (len(joints), 1)))
 
     def run(self) -> np.ndarray:

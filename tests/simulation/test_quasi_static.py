@@ -30,7 +30,7 @@ def simulated(spec, arm):
         for name, value in values.items():
             (one.mass if name == "mass" else one.joints[name])[:] = value
         settings = SimulationSettings(model=model)
-        simulation = Simulation(Scenario(spec, arm, log, sorted(commands), settings), arm, 10)
+        simulation = Simulation(Scenario(spec, arm, log, sorted(commands), settings), 10)
         return simulation.simulate(one).angle[0], simulation.trace(one), one.joints[0]
 
     return run

@@ -81,12 +81,12 @@ class ExperimentSimulator:
     def __init__(self, settings: FitSettings, known: Posterior) -> None:
         if settings.simulation.other_joints == "measured":  # an experiment has no measured motion
             settings = settings.changed({"simulation.other_joints": "locked"})
-        self._settings, self._design, self._bindings = settings, settings.design, Bindings(settings)
-        self._outputs, self._period = [j - 1 for j in settings.outputs], settings.log.period_s
-        self._noise = sensor_noise(settings.design, experiment_samples(settings), self._period)
-        arm, margin = settings.arm, settings.design.clearance_m
+        self._settings, self._bindings = settings, Bindings(settings)
+        self._outputs = [j - 1 for j in settings.outputs]
+        self._noise = sensor_noise(settings.design, experiment_samples(settings), settings.log.period_s)
+        arm, self._margin = settings.arm, settings.design.clearance_m
         self._spec, self._pose = load_model(arm), arm.pose(settings.start_pose)
-        self._machine = None if margin is None else load_machine(arm, pair=arm.pair is not None)
+        self._machine = None if self._margin is None else load_machine(arm, pair=arm.pair is not None)
         self._box, self._axes = known.box, known.axes(1e-5).one_sided  # little curvature
 
     def trial(self, experiment: Experiment) -> Trial | None:
@@ -98,7 +98,7 @@ class ExperimentSimulator:
             (angle,) = self._simulate(experiment, self._box.at[None])
             if not np.isfinite(angle).all():
                 return None
-            first = violation(angle, self._period, self._settings.arm, self._design)
+            first = violation(angle, self._settings)
             first = first or self._too_near(angle)
             if first is None:
                 gained, log = self.information(experiment, angle), experiment.log(self._settings)
@@ -112,12 +112,12 @@ class ExperimentSimulator:
         """Where a motion [rad], shape (T, J), first brings bodies nearer to each other than the margin."""
         if (machine := self._machine) is None:
             return None
-        motion, margin = machine.joined({machine.sides[0]: angle}, self._pose), self._design.clearance_m
-        if (found := machine.checker.first_below(motion, margin or 0.0)) is None:
+        motion = machine.joined({machine.sides[0]: angle}, self._pose)
+        if (sample := machine.checker.first_below(motion, self._margin or 0.0)) is None:
             return None
         # the cause is the joint that turned most lately; joints far out on the arm count as the others do
-        turned = np.ptp(angle[max(0, found[0] - 20) : found[0] + 1], axis=0)
-        return Violation(found[0], int(np.argmax(turned)), False)
+        turned = np.ptp(angle[max(0, sample - 20) : sample + 1], axis=0)
+        return Violation(sample, int(np.argmax(turned)), False)
 
     def information(self, experiment: Experiment, angle: Array) -> Array | None:
         """Return the information of an experiment whose angles are known, (T, J); None where it diverges."""

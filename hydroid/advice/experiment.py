@@ -14,9 +14,7 @@ from hydroid.arrays import Array, Ints, record
 from hydroid.errors import SettingsError
 from hydroid.log import Log
 from hydroid.problem.bindings import Bindings
-from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
-from hydroid.settings.search import DesignSettings
 
 
 class Input(NamedTuple):
@@ -156,10 +154,11 @@ class Violation(NamedTuple):
     fast: bool
 
 
-def violation(angle: Array, period: float, arm: Arm, limits: DesignSettings) -> Violation | None:
+def violation(angle: Array, settings: FitSettings) -> Violation | None:
     """Return where a motion [rad], shape (T, J), first leaves the joints' ranges or is too fast; or None."""
-    margin = np.radians(limits.margin_deg)
-    fast = np.abs(np.diff(angle, axis=0, prepend=angle[:1])) / period > np.radians(limits.speed_deg_s)
+    limits, arm = settings.design, settings.arm
+    margin, speed = np.radians([limits.margin_deg, limits.speed_deg_s])
+    fast = np.abs(np.diff(angle, axis=0, prepend=angle[:1])) / settings.log.period_s > speed
     # a joint that stands at the end of its range, and never moves, breaks no limit
     out = ((angle < arm.lower + margin) | (angle > arm.upper - margin)) & (np.ptp(angle, axis=0) > 0)
     for sample, joint in np.argwhere(out | fast)[:1].tolist():

@@ -78,16 +78,13 @@ class CollisionChecker:
         excluded = tuple((self._model.body(a).name, self._model.body(b).name) for a, b in pairs)
         return Clearance(time, distance.min(axis=1), nearest, tuple(meetings), checked, excluded)
 
-    def first_below(self, angle: Array, margin: float) -> tuple[int, tuple[str, str]] | None:
+    def first_below(self, angle: Array, margin: float) -> int | None:
         """Return the first sample of a trajectory [rad], (T, nq), with two bodies nearer than a margin [m].
 
-        Also their names; None where every distance keeps the margin, 0 or more.
+        None where every distance keeps the margin, 0 or more.
         """
-        for sample, pose in enumerate(angle):
-            distance = self._distances(pose, margin)
-            if distance.min() < margin:
-                return sample, self.names[distance.argmin()]
-        return None
+        near = (k for k, pose in enumerate(angle) if self._distances(pose, margin).min() < margin)
+        return next(near, None)
 
     def _distances(self, pose: Array, within: float) -> Array:
         """Distances of all pairs of shapes in a pose [m], shape (P,); farther than `within` they are that."""

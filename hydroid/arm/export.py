@@ -105,9 +105,7 @@ def _draw_tendons(spec: mujoco.MjSpec) -> None:
         tendon.frictionloss = tendon.armature = 0.0
 
 
-def write_fitted(
-    folder: Path, fitted: mujoco.MjSpec, timestep: float, joints: str, actuators: Plain | None
-) -> None:
+def write_fitted(folder: Path, fitted: mujoco.MjSpec, joints: str, actuators: Plain | None) -> None:
     """Write the fitted arm to `model/`, beside `arm.xml`, and a README that says what it is good for.
 
     `joints` names those that take commands; `actuators` are hydraulic parameters by joint (stage 2), or None:
@@ -119,5 +117,5 @@ def write_fitted(
         text = yaml.safe_dump(actuators, sort_keys=False, allow_unicode=True)
         write_atomic(folder / "actuators.yaml", text)
     write_atomic(folder / f"{name}.xml", mjcf_text(fitted))
-    readme = fill_template(f"arm/{name}.txt.j2", timestep=timestep, joints=joints)
+    readme = fill_template(f"arm/{name}.txt.j2", timestep=fitted.option.timestep, joints=joints)
     write_atomic(folder / "README.txt", readme)

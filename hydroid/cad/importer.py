@@ -20,15 +20,16 @@ from hydroid.words import distinct
 
 @record
 class ImportedArm:
-    """A serial arm out of a robot's file: its model's name and MJCF.
+    """A serial arm out of a robot's file: its MJCF.
 
     Attributes:
+        title: names of the model and of the file.
         meshes: binary STL files by their path from the model.
         cylinders: settings of the cylinders that the file models, but for areas, by joint.
         notes: what was assumed, left out or mended, a line each.
     """
 
-    name: str
+    title: str
     mjcf: str
     meshes: dict[str, bytes]
     cylinders: dict[str, dict[str, Any]]
@@ -66,7 +67,8 @@ def import_arm(
             joint.limited = mujoco.mjtLimited.mjLIMITED_FALSE
             notes.add("without limits: moving without stops, unless you give a range in arm.xml", joint.name)
     kept = {joint.name: own for joint in spec.joints if (own := cylinders.get(joint.name))}
-    return ImportedArm(spec.modelname, _in_scene(spec, meshes), meshes, kept, tuple(notes.lines()))
+    title = f"{spec.modelname}, from {path.name}"
+    return ImportedArm(title, _in_scene(spec, meshes), meshes, kept, tuple(notes.lines()))
 
 
 def _clear(spec: mujoco.MjSpec, path: Path) -> None:

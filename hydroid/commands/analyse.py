@@ -107,7 +107,7 @@ def analyse(
             progress("profiles", done, len(names(profile)))
             profiles[name] = identifiability.profile(problem, known, name)
     identified = identifiability.identifiability(problem, known)
-    summary = account(problem, known, identified)
+    summary = account(problem, known)
     better = tuple(name for name, one in profiles.items() if one.better_optimum)
     findings = (*([Finding("better optimum", "warning", better)] if better else []), *summary.findings)
     intervals = {name: one.interval for name, one in profiles.items()}

@@ -157,9 +157,8 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
     from hydroid.reporting.parameters_report import parameter_table, warnings
     from hydroid.reporting.verdict_table import next_lines, next_steps, verdict_lines
 
-    settings = problem.settings.of_estimate(fit.final)
-    last, baselines = problem.varied(settings), baselines_of(settings, problem.logs)
-    predictions = fitted(last, fit)
+    settings, predictions = fit.problem.settings, fitted(fit)
+    baselines = baselines_of(settings, problem.logs)
     verdict, summary = judge(settings, predictions, baselines), summarise(problem, fit)
     doubted = assumption_findings(settings, problem.logs, doubts(settings, problem.logs))
     changes = {"verdict": verdict, "findings": (*behind(settings, verdict), *summary.findings, *doubted)}

@@ -13,7 +13,6 @@ from hydroid.fitting.checkpoints import Checkpoints
 from hydroid.fitting.multistart import each_alone
 from hydroid.fitting.refinement import ROUGH, refine
 from hydroid.fitting.search import Searched, search
-from hydroid.posterior.identifiability import Identifiability, identifiability
 from hydroid.posterior.linear import estimate_box
 from hydroid.posterior.quantities import Quantities, quantities
 from hydroid.posterior.uncertainty import Uncertainty, uncertainty
@@ -53,19 +52,20 @@ class Estimate:
 class Fit:
     """The estimates of a fit, and what is known of the one to use.
 
-    estimates: by name, that of the search first; `final` names the one to use. front: the non-dominated
-    candidates, shape (n, P), and their objectives. history: shape (G, len(HISTORY)). refinements: by the
-    estimate that each gave. uncertainty, identifiability, quantities: of the final estimate. seconds:
-    wall-clock time of "search", "refinement" and "uncertainty" [s]; of a resumed fit, since it was resumed.
+    problem: with the settings of the estimate to use, which `final` names. estimates: by name, that of the
+    search first. front: the non-dominated candidates, shape (n, P), and their objectives. history: shape
+    (G, len(HISTORY)). refinements: by the estimate that each gave. uncertainty, quantities: of the final
+    estimate. seconds: wall-clock time of "search", "refinement" and "uncertainty" [s]; of a resumed fit,
+    since it was resumed.
     """
 
+    problem: Problem
     estimates: dict[str, Estimate]
     final: str
     front: tuple[Array, Evaluation]
     history: Array
     refinements: dict[str, Descent]
     uncertainty: Uncertainty
-    identifiability: Identifiability
     quantities: Quantities
     seconds: Mapping[str, float]
 
@@ -160,11 +160,10 @@ def fit(problem: Problem, watch: Watcher | None = None, checkpoints: Checkpoints
             _log.warning(words, refinements[final].ending.value, final)
     times.append(time.perf_counter())
     about = uncertainty(last, estimates[final].theta, _slopes(last, refinements.get(final)))
-    directions, determined, front = identifiability(last, about), quantities(last, about), _front(searched)
+    determined, front, history = quantities(last, about), _front(searched), searched.history
     seconds = np.diff([*times, time.perf_counter()]).tolist()
     took: dict[str, float] = dict(zip(("search", "refinement", "uncertainty"), seconds, strict=True))
-    history = searched.history
-    return Fit(estimates, final, front, history, refinements, about, directions, determined, took)
+    return Fit(last, estimates, final, front, history, refinements, about, determined, took)
 
 
 def _slopes(problem: Problem, descent: Descent | None) -> Array | None:

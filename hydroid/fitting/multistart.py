@@ -75,10 +75,6 @@ class Multistart:
         reached = Population(offspring.chromosomes, np.array([[self._rms]]))
         return reached if population is None else population.join(reached)
 
-    def decode(self, chromosomes: Genes) -> Array:
-        """The points themselves, shape (n, P)."""
-        return chromosomes
-
     def start(self, number: int) -> Array:
         """Draw start `number`, shape (P,): the first of DRAWS that can be simulated at all.
 
@@ -191,8 +187,8 @@ def by_numbers(problem: Problem, joint: int, theta: Array) -> Array:
     No load slows it, its actuator is strong enough for any, and its lever is the same everywhere.
     """
     settings = problem.settings
-    ends = settings.arm.lower[joint - 1], settings.arm.upper[joint - 1]
-    found = fit_baselines(problem.logs, joint, np.array(ends)).get(NAMES[-1])
+    ends = np.array([*settings.arm.ranges.values()][joint - 1])
+    found = fit_baselines(problem.logs, joint, ends).get(NAMES[-1])
     if found is None:
         return theta
     values = dict.fromkeys(("pilot_lag", "lever_slope", "lever_bend"), 0.0)

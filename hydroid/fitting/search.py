@@ -60,8 +60,9 @@ def search(
         algorithm = Nsga2(settings.nsga2, free, problem.start)
 
     def theta(chromosomes: Genes) -> Array:
-        points = algorithm.decode(chromosomes)
-        return points if settings.algorithm == "multistart" else problem.theta(points)
+        if isinstance(algorithm, Multistart):  # its chromosomes are theta
+            return chromosomes
+        return problem.theta(algorithm.decode(chromosomes))
 
     def state() -> Arrays:
         done, _, simulated, diverged, best, _ = history[-1]

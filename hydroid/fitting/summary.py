@@ -10,7 +10,7 @@ from hydroid.findings import Finding
 from hydroid.fitting.fit import Fit
 from hydroid.parameters import Array, ParameterSet
 from hydroid.posterior.by_log import by_log
-from hydroid.posterior.identifiability import Identifiability
+from hydroid.posterior.identifiability import identifiability
 from hydroid.posterior.noise import error_level
 from hydroid.posterior.uncertainty import Flag, Source, Uncertainty
 from hydroid.problem.problem import Problem
@@ -26,8 +26,7 @@ def summarise(problem: Problem, fit: Fit) -> FitSummary:
     """Return the final estimate with its uncertainty, and the estimates it was chosen from."""
     settings, refinement = problem.settings, fit.refinement
     objective = 1.0 if settings.objective.relative else 180 / np.pi
-    last = problem.varied(settings.of_estimate(fit.final))
-    known = account(last, fit.uncertainty, fit.identifiability)
+    known = account(fit.problem, fit.uncertainty)
     estimates = {
         e.name: NamedEstimate(
             values=settings.of_estimate(e.name).parameter_set().mapping(e.theta),
@@ -46,7 +45,7 @@ def summarise(problem: Problem, fit: Fit) -> FitSummary:
             "seed": settings.search.seed,
             "simulations": int(fit.history[-1, 2]),
             "diverged": int(fit.history[-1, 3]),
-            "findings": (*fit_findings(last, fit), *known.findings),
+            "findings": (*fit_findings(fit), *known.findings),
             "estimates": estimates,
             "quantities": fit.quantities.scalars,
             "curves": fit.quantities.curves,
@@ -54,7 +53,7 @@ def summarise(problem: Problem, fit: Fit) -> FitSummary:
     )
 
 
-def account(problem: Problem, known: Uncertainty, directions: Identifiability | None = None) -> FitSummary:
+def account(problem: Problem, known: Uncertainty) -> FitSummary:
     """Return an estimate with what its logs say about it, whatever led to it."""
     logs, scale, parameters = by_log(problem, known), known.linear.box.scale, problem.parameters
     estimate = {
@@ -79,7 +78,7 @@ def account(problem: Problem, known: Uncertainty, directions: Identifiability | 
             squares[f"q{channel.joint}"].append(error_level(channel, noise) ** 2)
     findings = _parameter_findings(parameters, estimate)
     findings += [Finding("logs disagree", "warning", logs.differing)] if logs.differing else []
-    combinations = directions.combinations if directions else ()
+    combinations = identifiability(problem, known).combinations
     # six of them: the table of directions has all
     findings += [Finding("combination", "note", tuple(one)) for one in combinations if len(one) > 1][:6]
     return FitSummary(
@@ -96,16 +95,16 @@ def _ends(interval: Array) -> tuple[float | None, float | None]:
     return finite(interval[0]), finite(interval[1])
 
 
-def fit_findings(problem: Problem, fit: Fit) -> list[Finding]:
-    """Return what is to be said about a fit's way to its estimate; the problem is that of the last one."""
-    findings = list[Finding]()
+def fit_findings(fit: Fit) -> list[Finding]:
+    """Return what is to be said about a fit's way to its estimate."""
+    findings, priors = list[Finding](), fit.problem.priors
     if fit.refinement is None:
         findings.append(Finding("not refined", "warning"))
     elif not fit.refinement.converged:
         findings.append(
             Finding("not converged", "warning", (fit.final,), {"ending": fit.refinement.ending.value})
         )
-    scores = zip(problem.priors.names, problem.priors.scores(fit.best.theta[None])[0].tolist(), strict=True)
+    scores = zip(priors.names, priors.scores(fit.best.theta[None])[0].tolist(), strict=True)
     for prior, score in sorted(scores, key=lambda pair: -abs(pair[1])):
         numbers = {"score": abs(score), "side": "above" if score > 0 else "below"}
         if abs(score) > STRAINED_ABOVE:

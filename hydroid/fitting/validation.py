@@ -16,7 +16,6 @@ from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
 from hydroid.posterior.band import Band, fitted_bands, prediction_bands
 from hydroid.prediction import predict
-from hydroid.problem.problem import Problem
 
 _log = logging.getLogger(__name__)
 
@@ -126,8 +125,9 @@ def errors_ahead(log: Log, errors: Callable[[Log], Array]) -> Array:
     return np.array(rows)
 
 
-def fitted(problem: Problem, fit: Fit) -> tuple[Prediction, ...]:
+def fitted(fit: Fit) -> tuple[Prediction, ...]:
     """Return what the final estimate of a fit makes of its own logs."""
-    joints, responses = tuple(problem.settings.outputs), fit.best.responses
-    logs = zip(problem.logs, responses, fitted_bands(problem, fit.uncertainty, responses), strict=True)
+    joints, responses = tuple(fit.problem.settings.outputs), fit.best.responses
+    bands = fitted_bands(fit.problem, fit.uncertainty, responses)
+    logs = zip(fit.problem.logs, responses, bands, strict=True)
     return tuple(Prediction(fit.final, log, joints, angles, bands, False) for log, angles, bands in logs)

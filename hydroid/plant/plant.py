@@ -215,7 +215,7 @@ class Plant:
             for joint, values in zip(self._named, candidate.joints[0, self._active], strict=True):
                 actuators[joint] = {name: float(values[name] / q.factor) for name, q in hydraulic.items()}
         fitted = locked_spec(spec, self._locked, model, motors)
-        write_fitted(folder, fitted, self.timestep, ", ".join(self._named), actuators)
+        write_fitted(folder, fitted, ", ".join(self._named), actuators)
 
     def _advance(self, command: Array) -> None:
         commands, torque, _ = self._course

@@ -31,6 +31,7 @@ from scipy.signal import bilinear, lfilter
 from hydroid.arrays import Array, Ints, record
 from hydroid.errors import SettingsError
 from hydroid.log import Log
+from hydroid.settings.fit import FitSettings
 from hydroid.settings.problem import ObjectiveSettings
 from hydroid.simulation import Response
 
@@ -92,25 +93,22 @@ class Channel:
         return above / below
 
 
-def make_channels(
-    logs: Sequence[Log],
-    outputs: Sequence[int],
-    pressures: Sequence[Sequence[int]],
-    objective: ObjectiveSettings,
-    *,
-    drifting: bool,
-) -> tuple[Channel, ...]:
-    """List the channels log by log, angles first.
+def compared_pressures(log: Log, settings: FitSettings) -> list[int]:
+    """Joints whose chamber pressures count in the objectives, 0-based: driven ones that the log measures."""
+    if settings.stage != "hyd" or settings.objective.pressure_weight == 0 or log.pressure is None:
+        return []
+    return [j for j in range(log.joints) if log.driven[j] and not np.isnan(log.pressure[0, j]).all()]
 
-    Compared are the angles of the joints `outputs`, and in log i the pressures of `pressures[i]`, 0-based.
-    Errors of angles that are `drifting` have a prefilter.
-    """
+
+def make_channels(logs: Sequence[Log], settings: FitSettings) -> tuple[Channel, ...]:
+    """List the channels log by log, angles first; those of stage 2, whose errors drift, have a prefilter."""
+    objective = settings.objective
     signals: list[tuple[int, int, Quantity, int, Array, float]] = []
     for i, log in enumerate(logs):
-        for column, joint in enumerate(outputs):
-            weight = objective.weights.get(joint + 1, 1.0)
-            signals.append((i, joint + 1, "angle", column, log.angle[:, joint], weight))
-        for column, joint in enumerate(pressures[i]):
+        for column, joint in enumerate(settings.outputs):
+            weight = objective.weights.get(joint, 1.0)
+            signals.append((i, joint, "angle", column, log.angle[:, joint - 1], weight))
+        for column, joint in enumerate(compared_pressures(log, settings)):
             assert log.pressure is not None
             weight = np.deg2rad(objective.pressure_weight) / 1e5  # deg/bar -> rad/Pa
             for side, quantity in enumerate(SIDES):
@@ -121,7 +119,7 @@ def make_channels(
     for i, joint, quantity, column, measured, weight in signals:
         rows, end = slice(end, end + len(measured)), end + len(measured)
         prefilter = UNFILTERED
-        if drifting and quantity == "angle" and objective.noise_of(joint) is None:
+        if settings.stage == "hyd" and quantity == "angle" and objective.noise_of(joint) is None:
             prefilter = np.array(bilinear((STAYING, 1), (STAYING / FAST_GAIN, 1), 1 / logs[i].period))
         channels.append(Channel(i, joint, quantity, column, measured, weight, rows, prefilter))
     return tuple(channels)

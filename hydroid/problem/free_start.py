@@ -13,7 +13,8 @@ import numpy as np
 
 from hydroid.arm.model import load_model
 from hydroid.arrays import Array, record
-from hydroid.problem.problem import OpenStart, Problem, compared_pressures, make_simulation
+from hydroid.problem.channels import compared_pressures
+from hydroid.problem.problem import OpenStart, Problem, make_simulation
 
 STEP = np.radians(0.05)  # of the differences by a start angle
 

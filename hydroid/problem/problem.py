@@ -22,6 +22,7 @@ from hydroid.problem.bindings import Bindings
 from hydroid.problem.channels import (
     UNFILTERED,
     Channel,
+    compared_pressures,
     make_channels,
     overall_objective,
     segment_bounds,
@@ -95,13 +96,10 @@ class Problem:
         if not self.parameters.free.any():
             raise SettingsError("no parameter is free", "parameters", "fix fewer of them")
         self.priors = Priors(settings.priors, self.parameters)
-        pressures = [compared_pressures(log, settings) for log in logs]
         self._simulations = [
-            make_simulation(spec, log, outputs, settings, joints)
-            for log, joints in zip(logs, pressures, strict=True)
+            make_simulation(spec, log, outputs, settings, compared_pressures(log, settings)) for log in logs
         ]
-        drifting = settings.stage == "hyd"
-        self.channels = make_channels(logs, outputs, pressures, settings.objective, drifting=drifting)
+        self.channels = make_channels(logs, settings)
         self.measured = np.concatenate([c.weight * c.measured for c in self.channels])
         self.bounds: Ints = np.concatenate([self._segments(c) for c in self.channels])
 
@@ -229,13 +227,6 @@ class Problem:
             return np.array([[channel.rows.start, channel.rows.stop]])
         bounds = segment_bounds(len(channel.measured), self.settings.objective.segments)
         return bounds + channel.rows.start
-
-
-def compared_pressures(log: Log, settings: FitSettings) -> list[int]:
-    """Joints whose chamber pressures count in the objectives, 0-based: driven ones that the log measures."""
-    if settings.stage != "hyd" or settings.objective.pressure_weight == 0 or log.pressure is None:
-        return []
-    return [j for j in range(log.joints) if log.driven[j] and not np.isnan(log.pressure[0, j]).all()]
 
 
 def make_simulation(

@@ -67,11 +67,11 @@ def joint_sizes(arm: Arm, speeds: Mapping[int, float]) -> tuple[JointSize, ...]:
     return tuple(sizes)
 
 
-def arm_text(imported: ImportedArm, arm: Arm | None, sizes: Sequence[JointSize], title: str) -> str:
+def arm_text(imported: ImportedArm, arm: Arm | None, sizes: Sequence[JointSize]) -> str:
     """Return the arm's file of an import, with an actuator of each joint of sizes, (J,).
 
     `arm` is what an earlier text of it says; None: this is that text, and cylinders have a size that nothing
-    uses. `title` says where the arm came from.
+    uses.
     """
     actuators = dict[str, Plain]()
     if arm is None:
@@ -84,7 +84,7 @@ def arm_text(imported: ImportedArm, arm: Arm | None, sizes: Sequence[JointSize],
         if own is not None:  # the rod leaves about 65 % of the area
             oil = own | {"area_a": rounded(area), "area_b": rounded(0.65 * area)}
         actuators[joint.name] = oil | {"max_opening": rounded(size.opening)}
-    values: Plain = {"title": title, "notes": imported.notes, "lift": LIFT, "actuators": actuators}
+    values: Plain = {"title": imported.title, "notes": imported.notes, "lift": LIFT, "actuators": actuators}
     return fill_template("project/arm.yaml.j2", flow=flow, **values)
 
 

@@ -70,13 +70,12 @@ def write_project(
         own, reference = robot, Path(os.path.relpath(robot.resolve(), folder.resolve())).as_posix()
     elif robot is not None:
         imported = import_arm(robot, table.names if table else (), **options)
-    title = f"{imported.name}, from {robot.name}" if imported and robot else ""
     with _stage(folder) as stage:
-        arm = load_arm(own) if own else _write_arm(stage, imported, title)
+        arm = load_arm(own) if own else _write_arm(stage, imported)
         layout = find_layout(table, arm, joints) if table is not None else None
         sizes = joint_sizes(arm, {j: m.speed for j, m in layout.motions.items()} if layout else {})
         if imported is not None:
-            arm = _write_arm(stage, imported, title, arm, sizes)
+            arm = _write_arm(stage, imported, arm, sizes)
         caption = f"{arm.name}, all joints at or near 0: does it look and turn like yours?"
         write_atomic(stage / PICTURE, arm_picture(arm, caption)[0])
         write_atomic(stage / FIT, fit_text(arm, layout, sizes, str(folder / FIT), reference))
@@ -109,17 +108,13 @@ def next_steps(folder: Path, logs: Sequence[Path]) -> tuple[str, ...]:
 
 
 def _write_arm(
-    stage: Path,
-    imported: ImportedArm | None,
-    title: str,
-    arm: Arm | None = None,
-    sizes: Sequence[JointSize] = (),
+    stage: Path, imported: ImportedArm | None, arm: Arm | None = None, sizes: Sequence[JointSize] = ()
 ) -> Arm:
     if imported is None:
         files: dict[str, Any] = {MODEL: fill_template("project/boxes.xml.j2")}
         files[ARM] = fill_template("project/boxes.yaml")
     else:
-        files = {MODEL: imported.mjcf, ARM: arm_text(imported, arm, sizes, title), **imported.meshes}
+        files = {MODEL: imported.mjcf, ARM: arm_text(imported, arm, sizes), **imported.meshes}
     for name, content in files.items():
         write_atomic(stage / name, content)
     return load_arm(stage / ARM)

@@ -12,11 +12,11 @@ import socket
 import sys
 from collections.abc import Generator
 from contextlib import contextmanager
-from importlib.metadata import version
 from pathlib import Path
 from typing import IO
 
 from hydroid.errors import RunError
+from hydroid.parallel.workers import VERSIONS
 from hydroid.progress import logging_to
 
 try:
@@ -82,7 +82,7 @@ def run_log(file: Path) -> Generator[None]:
 
 def log_start() -> None:
     """Log what runs, where, with what."""
-    versions = ", ".join(f"{name} {version(name)}" for name in ("hydroid", "mujoco", "numpy", "numba"))
+    versions = ", ".join(map(" ".join, VERSIONS.items()))
     _log.info("%s, Python %s", versions, platform.python_version())
     _log.info("process %d on %s: %s", os.getpid(), socket.gethostname(), shlex.join(sys.argv))
 

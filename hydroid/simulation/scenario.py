@@ -229,13 +229,10 @@ class Chain:
         angle = np.tile(pose[self.columns], (len(balance), 1))
         return plugin, at_rest(plugin, angle, balance[:, self.columns])
 
-    def taken(self, candidates: Candidates, angle: Array, velocity: Array) -> Array:
-        """What P joints that follow a log take from the pump [m³/s], (n, steps); (n, 0) if there are none.
-
-        Angle [rad] and velocity [rad/s] of their motion have the shape (steps, P).
-        """
+    def taken(self, candidates: Candidates, motion: Prescribed) -> Array:
+        """What P joints that follow a log take from the pump [m³/s], (n, steps); (n, 0) if there are none."""
         joints: Records = candidates.joints[:, self._pushed]  # pyright: ignore[reportAssignmentType]
         if not self.joints.size or np.isinf(joints.pump_flow).all():
             return np.empty((len(candidates), 0))
         each: Records = coefficients(joints)[:, None]  # pyright: ignore[reportAssignmentType]
-        return swallowed(each, angle, velocity).sum(axis=2)
+        return swallowed(each, motion.angle, motion.velocity).sum(axis=2)

@@ -126,7 +126,7 @@ class Simulation:
         balance = np.concatenate([arm.start(values, some, np.tile(pose, arm.copies)) for some in starts])
         balance = balance.reshape(-1, len(pose))[:n]
         plugin, states = chain.start(candidates, pose, balance, scenario.pressure)
-        taken = chain.taken(candidates, servo.angle, servo.velocity)
+        taken = chain.taken(candidates, servo)
         gain = candidates.joints.gain[:, scenario.arm.columns[chain.pushed]]
         served = np.searchsorted(chain.pushed, servo.columns)
 

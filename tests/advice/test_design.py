@@ -43,7 +43,7 @@ def keeps_limits(settings: FitSettings, result: Design) -> bool:
     assert clearance(settings, run.angle).min() >= limits.clearance_m
     assert np.abs(run.angle - result.best.log.angle).max() < 1e-9
     assert np.abs(run.command).max() <= settings.design.command_pct
-    return violation(run.angle, settings.log.period_s, settings.arm, settings.design) is None
+    return violation(run.angle, settings) is None
 
 
 def clearance(settings: FitSettings, angle: np.ndarray) -> np.ndarray:

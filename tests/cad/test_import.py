@@ -248,7 +248,7 @@ def test_an_mjcf_is_read_too(tmp_path):
     path = tmp_path / "digger" / "arm.xml"
     path.write_text((MODELS / "arm.xml").read_text())
     arm = import_arm(path)
-    assert arm.name == "my_arm"
+    assert arm.title == "my_arm, from arm.xml"
     said(arm, "slide_joint: without limits: moving without stops")
     model, data = compiled(arm)
     assert model.body("boom").mass[0] == pytest.approx(0.12 * 500)

@@ -68,7 +68,7 @@ def test_a_compromise_that_diverges_gives_way_to_one_that_does_not(caplog):
     assert result.final == result.searched.name == "utopia"
     assert result.best.usable
     assert "estimate average diverged" in caplog.text
-    assert Finding("diverged", "warning", ("average",)) in fit_findings(problem, result)
+    assert Finding("diverged", "warning", ("average",)) in fit_findings(result)
 
 
 def test_where_everything_diverges_the_run_says_so():

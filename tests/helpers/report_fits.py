@@ -12,7 +12,6 @@ from hydroid.fitting.validation import Prediction, fitted
 from hydroid.fitting.verdict import baselines_of
 from hydroid.log import Log
 from hydroid.posterior.band import Band
-from hydroid.posterior.identifiability import identifiability
 from hydroid.posterior.linear import Linear, estimate_box
 from hydroid.posterior.noise import problem_noise
 from hydroid.posterior.quantities import Quantities
@@ -101,6 +100,7 @@ def make_fit(
         ending=Ending.GAIN,
     )
     return Fit(
+        problem,
         estimates,
         final,
         (
@@ -110,7 +110,6 @@ def make_fit(
         history,
         {"refined": refined} if "refined" in names else {},
         uncertain,
-        identifiability(problem, uncertain),
         make_quantities(problem),
         {"search": 2.0, "refinement": 1.0, "uncertainty": 0.5},
     )
@@ -143,7 +142,7 @@ def make_record(
     """What the run of a fit stores, with predictions of unseen logs by name."""
     logs = {log.source: "f" * 64 for log in problem.logs}
     identity = {"hydroid": "0", "mujoco": "4", "logs": logs}
-    predictions, baselines = fitted(problem, fit), baselines_of(problem.settings, problem.logs)
+    predictions, baselines = fitted(fit), baselines_of(problem.settings, problem.logs)
     result = fit_result(fit, predictions, baselines)
     return Record(folder, identity, problem.settings, summarise(problem, fit), result, unseen or {})
 

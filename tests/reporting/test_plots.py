@@ -33,7 +33,7 @@ def drawn_front(problem, fit) -> Chart:
 def draw_all(problem, fit) -> list[Chart]:
     objective = problem.settings.objective
     return [
-        *(draw_response("one", joint, [p], 1000) for p in fitted(problem, fit) for joint in p.joints),
+        *(draw_response("one", joint, [p], 1000) for p in fitted(fit) for joint in p.joints),
         learning(fit.history, objective),
         drawn_front(problem, fit),
     ]
@@ -102,7 +102,7 @@ def test_what_is_not_finite_is_left_out():
 def test_a_response_shows_measured_and_simulated_angle_residual_pressures_and_command():
     problem = make_problem()
     fit = make_fit(problem)
-    (one,) = fitted(problem, fit)
+    (one,) = fitted(fit)
     log = one.log
     pressed = replace(log, pressure=np.tile([5e6, 2e6], (*log.angle.shape, 1)))
     upper, middle, pressure, lower = draw_response("one", 2, [replace(one, log=pressed)], 1000).panels

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 import yaml
 from pydantic import BeforeValidator, Field, model_validator
 
+from hydroid.arrays import Array
 from hydroid.errors import RunError, SettingsError
 from hydroid.files import Plain, is_file, write_atomic
 from hydroid.findings import Finding
@@ -227,6 +228,11 @@ def read_estimate(source: Path) -> tuple[Path, Plain, FitSummary | None]:
         hint = "give the run folder, its estimate.yaml, or a YAML file of `K: 0.2` lines"
         raise SettingsError("is no estimate", file, hint)
     return file, values, None
+
+
+def finite_ends(interval: Array) -> Interval:
+    """Return the ends of an interval, shape (2,), or None for one without a limit."""
+    return finite(interval[0]), finite(interval[1])
 
 
 def finite(value: float | None) -> float | None:

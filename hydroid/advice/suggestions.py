@@ -103,7 +103,7 @@ def _forecasts(problem: Problem, known: Uncertainty, now: Posterior) -> Iterator
     A weighed link, a value of a data sheet, and the best of six random experiments for the designed one, with
     the noise of the fit's worst angle.
     """
-    settings, names = problem.settings, np.array(problem.parameters.names)[now.box.varied].tolist()
+    settings, names = problem.settings, problem.parameters.named(now.box.varied)
     levers = (p.joints or () for p in settings.parameters.values() if p.quantity.startswith("lever"))
     stand_ins = {joint for joints in levers for joint in joints}  # for cylinders of unknown size
     for name, row in zip(names, np.eye(len(names)), strict=True):

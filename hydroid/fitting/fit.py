@@ -79,11 +79,6 @@ class Fit:
         """The estimate to use."""
         return self.estimates[self.final]
 
-    @property
-    def searched(self) -> Estimate:
-        """The search's own estimate, before the refinement."""
-        return next(iter(self.estimates.values()))
-
 
 class Watcher(Protocol):
     """Takes the progress of a fit."""

@@ -5,10 +5,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from hydroid.estimate import FitSummary, NamedEstimate, ParameterEstimate, finite
+from hydroid.estimate import FitSummary, NamedEstimate, ParameterEstimate, finite, finite_ends
 from hydroid.findings import Finding
 from hydroid.fitting.fit import Fit
-from hydroid.parameters import Array, ParameterSet
+from hydroid.parameters import ParameterSet
 from hydroid.posterior.by_log import by_log
 from hydroid.posterior.identifiability import identifiability
 from hydroid.posterior.noise import error_level
@@ -62,8 +62,8 @@ def account(problem: Problem, known: Uncertainty) -> FitSummary:
             unit=parameter.unit,
             sd=finite(known.standard_deviation[i]),
             sd_by_log=finite(logs.relative[i] * scale[i]),
-            interval=_ends(known.interval[i]),
-            interval_by_log=_ends(logs.interval[i]),
+            interval=finite_ends(known.interval[i]),
+            interval_by_log=finite_ends(logs.interval[i]),
             flag=status.flag.value,
             source=status.source and status.source.value,
             data_share=None if status.flag is Flag.FIXED else status.share,
@@ -89,10 +89,6 @@ def account(problem: Problem, known: Uncertainty) -> FitSummary:
         noise_deg={angle: float(np.degrees(np.sqrt(np.mean(each)))) for angle, each in squares.items()},
         left_out_deg={angle: tuple(errors) for angle, errors in logs.left_out.items()},
     )
-
-
-def _ends(interval: Array) -> tuple[float | None, float | None]:
-    return finite(interval[0]), finite(interval[1])
 
 
 def fit_findings(fit: Fit) -> list[Finding]:

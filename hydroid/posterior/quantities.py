@@ -6,7 +6,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from hydroid.arrays import Array, record
-from hydroid.estimate import CurveEstimate, Interval, QuantityEstimate, finite
+from hydroid.estimate import CurveEstimate, Interval, QuantityEstimate, finite, finite_ends
 from hydroid.hydraulics.cylinder import rod_motion, volume
 from hydroid.hydraulics.records import LINEAR, Records, coefficients
 from hydroid.posterior.bench import Bench, make_bench
@@ -70,7 +70,7 @@ def _add_joint(result: Quantities, problem: Problem, uncertainty: Uncertainty, j
     curve, given, unit = list[tuple[float, float, Interval]](), True, ""
     for i in np.flatnonzero(np.isfinite(known.value)).tolist():
         (name, label, unit_, _, command), value = columns[i], float(known.value[i])
-        interval = finite(known.interval[i, 0]), finite(known.interval[i, 1])
+        interval = finite_ends(known.interval[i])
         if command is not None:
             curve.append((command, value, interval))
             given, unit = given and known.given[i], unit_

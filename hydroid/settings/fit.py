@@ -119,7 +119,10 @@ class FitSettings(Settings):
         if name is None:
             return self
         model, *terms = name.split("+")
-        settings = self.freed() if model == "joint" else self
+        settings = self
+        if model == "joint":  # every parameter is free that can be
+            free = {n: p.changed({"fixed": None}) for n, p in self.parameters.items() if p.can_be_free}
+            settings = self.with_parameters(free)
         if self.terms != tuple(terms):
             own = {n: p for n, p in settings.parameters.items() if p.term is None or p.term in terms}
             settings = settings.changed({"parameters": own})
@@ -139,11 +142,6 @@ class FitSettings(Settings):
     def with_parameters(self, changed: Mapping[str, ParameterSettings]) -> "FitSettings":
         """Return the settings with parameters changed, or further ones behind their own."""
         return self.changed({"parameters": self.parameters | dict(changed)})
-
-    def freed(self) -> "FitSettings":
-        """Return the settings with every parameter free that can be, as a joint refinement has them."""
-        free = {n: p.changed({"fixed": None}) for n, p in self.parameters.items() if p.can_be_free}
-        return self.with_parameters(free)
 
     def acting_on(self, joint: int) -> set[str]:
         """Return the names of the free parameters that act on this joint only."""

@@ -86,8 +86,8 @@ def test_joint_by_joint_then_together_finds_the_truth(problem, truth):
     result = fit(problem, watcher)
     assert [row[0] for row in watcher.rows] == [1]
     own = [n[:4] in ("open", "over") for n in problem.parameters.names]
-    assert np.rad2deg(result.searched.rms) < 0.5
-    np.testing.assert_allclose(result.searched.theta[own], truth[own], rtol=0.2)
+    assert np.rad2deg(result.estimates["best"].rms) < 0.5
+    np.testing.assert_allclose(result.estimates["best"].theta[own], truth[own], rtol=0.2)
     np.testing.assert_allclose(result.best.theta, truth, rtol=1e-3)
     assert result.refinement is not None
     assert result.refinement.converged

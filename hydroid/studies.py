@@ -67,11 +67,12 @@ def perform(task: Task) -> Result:
     of the estimate.
     Raises RunError: every candidate diverged.
     """
-    problem = Problem(task.settings, task.logs)
-    result = fit(problem)
+    result = fit(Problem(task.settings, task.logs))
     if not result.best.usable:
         raise RunError("the estimate diverged when it was simulated")
-    error = problem.residuals(result.best.theta[None])[0]
+    # the estimate may have terms, or a model, that the search had not
+    problem, searched = result.problem, task.settings.of_estimate("best").parameter_set()
+    error = problem.output_errors(result.best.theta[None])[0]
     angles = np.degrees(
         np.concatenate([error[c.rows] / c.weight for c in problem.channels if c.quantity == "angle"])
     )
@@ -91,7 +92,7 @@ def perform(task: Task) -> Result:
     return {
         "measures": measures,
         "theta": problem.parameters.mapping(result.best.theta),
-        "segment_bests": [problem.parameters.mapping(theta) for theta in bests],
+        "segment_bests": [searched.mapping(theta) for theta in bests],
         "history": [[int(g), int(n), finite(unit * best)] for g, _, n, _, best, _ in result.history],
     }
 

@@ -53,6 +53,8 @@ class NamedEstimate(Settings):
     """rms error of the compared angles [deg]"""
     objective: float | None = None
     """over the whole record: [deg], or [-] where `objective.relative` is set"""
+    left_out_deg: tuple[float | None, float | None] | None = None
+    """rms error on parts of the logs left out, without the term that it adds and with it [deg]"""
 
 
 class Covariance(Settings):

@@ -3,6 +3,7 @@
 import logging
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
@@ -32,7 +33,8 @@ class Estimate:
     """One parameter set with its response.
 
     theta: shape (P,). segments: objectives by segment, shape (S,). overall: norm over the whole record.
-    rms: of the output error [rad]. responses: simulated outputs [rad], (T, K) a log.
+    rms: of the output error [rad]. responses: simulated outputs [rad], (T, K) a log. left_out: of an estimate
+    with another term, the rms error on parts of the logs left out, without the term and with it [rad].
     """
 
     name: str
@@ -41,6 +43,7 @@ class Estimate:
     overall: float
     rms: float
     responses: tuple[Array, ...]
+    left_out: tuple[float, float] | None = None
 
     @property
     def usable(self) -> bool:
@@ -137,8 +140,9 @@ def fit(problem: Problem, watch: Watcher | None = None, checkpoints: Checkpoints
         refinements[name], new = result, estimates[name]
         nearer = new.rms < (1 - MIN_GAIN) * start.rms
         if nearer and own.settings.terms != last.settings.terms:
-            with_it, without = refitted(own, new.theta), refitted(last, start.theta)
-            nearer = with_it.left_out < (1 - MIN_GAIN) * without.left_out
+            without, with_it = (refitted(p, e.theta).left_out for p, e in ((last, start), (own, new)))
+            estimates[name] = new = replace(new, left_out=(without, with_it))
+            nearer = with_it < (1 - MIN_GAIN) * without
         if nearer or not if_nearer:
             final, last, start = name, own, new
 

@@ -32,6 +32,7 @@ def summarise(problem: Problem, fit: Fit) -> FitSummary:
             values=settings.of_estimate(e.name).parameter_set().mapping(e.theta),
             rms_deg=finite(np.degrees(e.rms)),
             objective=finite(objective * e.overall),
+            left_out_deg=e.left_out and finite_ends(np.degrees(e.left_out)),
         )
         for e in fit.estimates.values()
     }

@@ -9,6 +9,7 @@ from hydroid.reporting.chart import SERIES, Chart, Mark, Panel, finite
 from hydroid.reporting.page import Plot, Section
 from hydroid.run.record import Record
 from hydroid.settings.problem import ObjectiveSettings
+from hydroid.words import two_digits
 
 
 def search_section(record: Record) -> Section:
@@ -18,10 +19,14 @@ def search_section(record: Record) -> Section:
         _, tried, simulated, diverged = (f"{int(v):,}" for v in result.history[-1, :4])
         name = record.settings.search.algorithm
         points.append(f"{name}: {tried} candidates, {simulated} simulated, {diverged} of them diverged.")
-    points += [
-        f"{one.name}: {one.iterations} iterations, {one.simulations:,} simulations; {one.ending}."
-        for one in result.refinements
-    ]
+    for one in result.refinements:
+        points.append(
+            f"{one.name}: {one.iterations} iterations, {one.simulations:,} simulations; {one.ending}."
+        )
+        without, with_it = record.summary.estimates[one.name].left_out_deg or (None, None)
+        if without and with_it:
+            errors = f"{two_digits(without)} deg without its term, {two_digits(with_it)} with it"
+            points[-1] += f" Error on parts of the logs left out: {errors}."
     final = str(record.summary.final)
     segments = {final: result.segments[final], **result.segments}
     plots = (

@@ -57,9 +57,12 @@ def _convergence(drawing: Drawing, plan: Plan, runs: Runs, figure: Figure) -> No
 
 
 def _responses(drawing: Drawing, plan: Plan, runs: Runs, figure: Figure) -> None:
-    """The angle, and responses of a run of each cell: the one of median error among those of one record."""
+    """The angle, and responses of a run of each cell: the one of median error among those of one record.
+
+    With the segments' best candidates it is the errors, since the responses lie on each other.
+    """
     axes, with_bests = drawing.subplots(), figure.kind == "segment bests"
-    axes.set(xlabel="time [s]", ylabel="angle [deg]")
+    axes.set(xlabel="time [s]", ylabel="error [deg]" if with_bests else "angle [deg]")
     column = "segment bests" if with_bests else "rms error"
     if not (shown := [run for run in runs if run["cell"] in figure.cells and column in run]):
         return
@@ -68,11 +71,12 @@ def _responses(drawing: Drawing, plan: Plan, runs: Runs, figure: Figure) -> None
         of_one = [r for r in shown if r["cell"] == cell and plan.log(r["seed"]) is plan.log(seed)]
         run = sorted(of_one, key=lambda r: r["rms error"])[(len(of_one) - 1) // 2]
         problem = plan.problem(seed, cell)
-        if not number:
+        if not number and not with_bests:
             _data(axes, problem)
         theta = [float(run[f"value {name}"]) for name in problem.parameters.names]
         bests = [best.split() for best in run["segment bests"].split(";")] if with_bests else []
-        curves = np.degrees(problem.responses(np.array([*bests, theta], float))[0].angle[:, :, 0])
+        angles = problem.responses(np.array([*bests, theta], float))[0].angle[:, :, 0]
+        curves = np.degrees(angles - with_bests * problem.logs[0].angle[:, problem.outputs[0]])
         _lines(axes, problem, curves[:-1], color=f"C{number}", lw=0.6, alpha=0.5)
         _lines(axes, problem, curves[-1:], color=f"C{number}", lw=1 + with_bests, label=cell)
     axes.legend(fontsize=8)

@@ -53,7 +53,11 @@ class Directions:
         parts = [self.slopes[:, first:end] for first, end in segments]
         norms = np.array([np.linalg.norm(part, axis=1) for part in parts])
         ratios = norms[:, self.names.index("D")] / norms[:, self.names.index("S")]
-        return {f"slope {n}": float(s) for n, s in zip(self.names, rms, strict=True)} | {
+        slopes = {f"slope {n}": float(s) for n, s in zip(self.names, rms, strict=True)}
+        for p, true in zip(self.parameters.parameters, self.truth.tolist(), strict=True):
+            if p.unit == "kg" and p.name in self.names:
+                slopes[f"slope {p.name} per kg"] = slopes[f"slope {p.name}"] / (0.01 * true)
+        return slopes | {
             "D over S, lowest segment": float(min(ratios)),
             "D over S, highest segment": float(max(ratios)),
             "directions of the record": len(self.axes),

@@ -13,14 +13,19 @@ from typing import Any
 import numpy as np
 from claims import MOST, POWER, Outcome, Verdict, log_ratios, verdict, verdicts
 from common import ROOT
-from studies import BLIND, CENTRE, RECORDS, Claim, Figure, Runs, Table, load_studies, of_cell, read_runs
+from studies import BLIND, CENTRE, RECORDS, Claim, Runs, Table, load_studies, of_cell, read_runs
 
 from hydroid.words import two_digits
 
 DOCS = ROOT / "docs"
 QUICK = "> **The short form: one seed, short data, few generations. It shows that the studies run.**\n\n"
 FEW = 5
-"""runs below which a median of some of a cell's runs, or a curve, says little"""
+"""runs below which a median of some of a cell's runs says little"""
+KINDS: dict[str, str] = {"parameter": "parameters", "mass": "parameters"}
+KINDS |= {"slope": "sensitivity", "D": "sensitivity", "": "fit, convergence, validation"}
+"""what a claim is about, by the first word of its measure"""
+NO_HALVING = "no halving"
+SHOWN: tuple[str, ...] = (Outcome.HOLDS, Outcome.OPPOSITE, Outcome.EXCLUDED, NO_HALVING, Outcome.UNDECIDED)
 KNOWN = Claim(says="", item="", lower="multi-objective", than="simple GA", column="identifiable error")
 """what the head says of the wide box besides the article's claim"""
 
@@ -34,8 +39,9 @@ def page(results: Path, *, quick: bool = False) -> str:
     for name, study in studies.items():
         link, cells = f"[Settings](../benchmarks/article/{name}.yaml)", [*study.changes()]
         numbers["studies"] += f"\n## {study.title}\n\n{study.about.strip()} {link}.\n"
-        numbers["studies"] += "".join(study_table(shown, runs[name], cells) for shown in study.tables)
-        numbers["studies"] += "".join(shown_figure(figure, runs[name]) for figure in study.figures)
+        numbers["studies"] += "".join(study_table(each, runs[name], cells) for each in study.tables)
+        for figure in study.figures:
+            numbers["studies"] += f"\n![{figure.title.partition(':')[0]}](reproduction/{figure.file})\n"
     for word, ours in (("theirs", False), ("ours", True)):
         numbers[word] = claims_table(v for each in made.values() for v in each if v.claim.ours is ours)
     return QUICK * quick + text.format(enough=percent(POWER), **numbers)
@@ -61,7 +67,7 @@ def head(
     """Return what page.md needs besides; `shared`: seeds up to this one share a record, by study."""
     says = "ulti-objective GA: lower parameter error than simple GA"
     narrow, wide = (next(v for v in made[n] if says in v.claim.says) for n in ("mechanical", "wide"))
-    both = [of_cell(runs["mechanical"], cell, "parameter error") for cell in ("multi-objective", "simple GA")]
+    known = {n: verdict(KNOWN, log_ratios(KNOWN, runs[n]), 0.05, None) for n in ("mechanical", "wide")}
     hydraulic = [
         of_cell(runs["hydraulic"], cell, "simulations") for cell in ("multi-start", "multi-objective")
     ]
@@ -69,50 +75,40 @@ def head(
     searches = [(n, r) for n in ("mechanical", "hydraulic") for r in runs[n] if "generations" in r]
     return {
         **{f"{name}_median": Medians(made) for name, made in runs.items()},
-        "main": at_best(narrow),
-        "wide": at_best(wide),
-        "seeds": narrow.seeds,
-        "shared": sum(seed <= shared["mechanical"] for seed in both[0] if seed in both[1]),
-        "wide_seeds": wide.seeds,
-        "wide_known": interval(verdict(KNOWN, log_ratios(KNOWN, runs["wide"]), 0.05, None)),
+        "narrow": interval(narrow),
+        "narrow_gain": gain(narrow),
+        "wide": interval(wide),
+        "wide_gain": gain(wide),
+        "narrow_known": interval(known["mechanical"]),
+        "wide_known": interval(known["wide"]),
         "own": sum(run["seed"] > shared[name] for name, run in searches),  # with a record of their own
         "searches": len(searches),
         "count": sum(not v.claim.ours for each in made.values() for v in each),
-        "tally": tally(made, Medians(runs["mechanical"])[f"{CENTRE} / largest error"]),
+        "tally": tally(made),
         "dearer": percent(least / multi - 1),
     }
 
 
-def tally(made: Mapping[str, Sequence[Verdict]], centre: str) -> str:
-    """Return how many of the article's claims have each outcome, and which."""
-    every = [(name, v) for name, each in made.items() for v in each if not v.claim.ours]
-    held = [(name, v.claim.item) for name, v in every if v.outcome is Outcome.HOLDS]
-    excluded = [(v.claim.says, v.printed is not None) for _, v in every if v.outcome is Outcome.EXCLUDED]
-    printed, halved = ([says for says, there in excluded if there is which] for which in (True, False))
-    log, slopes = sum(n == "rig" for n, _ in held), sum(item == "section 3.1" for _, item in held)
-    near = sum(item == "figure 16" for _, item in held)
-    of = {o: [v.claim.says for _, v in every if v.outcome is o] for o in Outcome}
-    lists = {
-        f"**{len(held)} hold** ({log} are of one log of a virtual rig; {slopes} are sensitivities, without a "
-        f"search; {near}, of figure 16, ask for an error within 5 % of the motion, and the box's centre "
-        f"meets that without a search: {centre} deg)": of[Outcome.HOLDS],
-        f"**in {len(of[Outcome.OPPOSITE])} the opposite holds**": of[Outcome.OPPOSITE],
-        f"**in {len(printed)} the effect that the article prints is excluded**": printed,
-        f"**in {len(halved)} the article prints no effect, and a halving is excluded**": halved,
-    }
-    lines = [f"- {what}: {'; '.join(says)}.\n" for what, says in lists.items() if says]
-    undecided = f"- **{len(of[Outcome.UNDECIDED])} are undecided**: the seeds are too few so far.\n"
-    return "".join(lines) + undecided
+def tally(made: Mapping[str, Sequence[Verdict]]) -> str:
+    """Return how many of the article's claims of each kind have each verdict."""
+    counts = {kind: dict[str, int].fromkeys(("claims", *SHOWN), 0) for kind in KINDS.values()}
+    for one in (v for each in made.values() for v in each if not v.claim.ours):
+        kind = KINDS.get(one.claim.column.split()[0], KINDS[""])
+        counts[kind]["claims"] += 1
+        counts[kind][called(one)] += 1
+    rows = [(kind, *map(str, found.values())) for kind, found in counts.items()]
+    return table("", ("about", "claims", *SHOWN), rows)
 
 
-def at_best(made: Verdict) -> str:
-    """Return a ratio, and how much better the multi-objective GA can be within its interval."""
-    low, printed = made.interval[0], made.printed
-    if not np.isfinite(made.interval[1]):
-        return interval(made)
-    best = f"at best {percent(1 - low)} better" if low < 1 else "worse"
-    other = f", not {percent(1 - printed)}" if printed and made.outcome is Outcome.EXCLUDED else ""
-    return f"{interval(made)}: the multi-objective GA is {best}{other}"
+def called(made: Verdict) -> str:
+    """Return a verdict as a page has it: where the article prints no such effect, a halving is excluded."""
+    stated = made.printed is not None and made.printed < made.claim.below
+    return made.outcome if stated or made.outcome is not Outcome.EXCLUDED else NO_HALVING
+
+
+def gain(made: Verdict) -> str:
+    """Return by how much the first measure can be lower than the second at best, within the interval."""
+    return percent(max(0.0, 1 - made.interval[0]) if np.isfinite(made.interval[1]) else np.nan)
 
 
 def percent(part: float) -> str:
@@ -132,7 +128,7 @@ def claims_table(made: Iterable[Verdict]) -> str:
         printed = "" if v.printed is None else f"{v.printed:.2g}"
         open_still = v.outcome is Outcome.UNDECIDED and 2 < v.seeds < v.enough
         more = f"/{v.enough if v.enough <= MOST else f'{MOST}+'}" if open_still else ""
-        numbers = (interval(v), printed, f"{v.power:.2f}", v.outcome, f"{v.seeds}{more}")
+        numbers = (interval(v), printed, f"{v.power:.2f}", called(v), f"{v.seeds}{more}")
         lines.append(("" if v.claim.item == item else v.claim.item, v.claim.says, *numbers))
         item = v.claim.item
     return table("", ("item", "claim", "ratio", "article's", "power", "verdict", "seeds"), lines)
@@ -170,17 +166,6 @@ def values_of(runs: Runs, cell: str, column: str) -> list[float]:
         return [*upper.values()]
     lower = of_cell(runs, cell, below)
     return [value / lower[seed] for seed, value in upper.items() if seed in lower]
-
-
-def shown_figure(figure: Figure, runs: Runs) -> str:
-    """Return a figure, with the runs behind each curve where only runs with a history count."""
-    text = f"\n![{figure.title.partition(':')[0]}](reproduction/{figure.file})\n"
-    if figure.kind != "convergence":
-        return text
-    counts = {cell: sum(run["cell"] == cell and "history" in run for run in runs) for cell in figure.cells}
-    behind = "; ".join(f"{cell}: {count}" for cell, count in counts.items())
-    weak = f" A curve of fewer than {FEW} shows little but chance." * (min(counts.values()) < FEW)
-    return f"{text}\nRuns behind each curve (older runs have no history): {behind}.{weak}\n"
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ RNG = np.random.default_rng(1)
 CLAIM = Claim(says="A beats B", item="table 1", column="error", lower="A", than="B")
 BASE, NOISE = RNG.uniform(1, 2, 10), np.exp(RNG.normal(0, 0.1, 10))
 HALF = Table(title="", columns=("error",), article={"A": (1.0,), "B": (2.0,)})
+TWICE = Table(title="", columns=("error",), article={"A": (2.0,), "B": (1.0,)})
 HOLDS, OPPOSITE, EXCLUDED, UNDECIDED = Outcome
 EQUAL = Claim(says="A is as good as B", item="table 1", column="error", lower="A", than="B", equal=True)
 OF_ONE = Claim(says="A is below 2", item="table 1", column="error", lower="A", below=2)
@@ -48,6 +49,12 @@ def test_the_answer_is_the_known_one(claim, a, b, printed: bool, outcome: Outcom
     assert verdict.printed == (0.5 if printed else None)
     ratio = a / b if claim.than else a
     assert verdict.ratio == pytest.approx(np.exp(np.mean(np.log(ratio)))) or len(a) < 3
+
+
+def test_a_printed_ratio_against_the_claim_is_no_effect_that_could_be_excluded():
+    (verdict,) = verdicts([CLAIM], rows(error=(0.7 * BASE, BASE * NOISE**20)), [TWICE])
+    assert verdict.interval[1] < 2  # without what is printed
+    assert (verdict.printed, verdict.outcome) == (2.0, UNDECIDED)
 
 
 def test_only_seeds_that_both_cells_have_are_compared():

@@ -131,10 +131,13 @@ def test_stating_a_value_leaves_it_as_stated_and_helps_what_goes_with_it(late: t
     problem, known = late
     # two parameters of which only the sum is known well
     root = np.array([[100.0, 100.0, 0.0], [0.5, -0.5, 0.0], [0.0, 0.0, 50.0]])
-    posterior = replace(known.posterior, root=regular(root))
-    actions = next_actions(problem, replace(known, posterior=posterior))
-    stated = [action for action in actions if action["action"] == "state"]
+    known = replace(known, posterior=replace(known.posterior, root=regular(root)))
+    stated = [action for action in next_actions(problem, known) if action["action"] == "state"]
     assert {action["of"] for action in stated} == {"A_A", "A_B"}
     for action in stated:
         assert action["parameter"] in {"A_A", "A_B"} - {action["of"]}
         assert action["after_percent"] == pytest.approx(5, rel=0.05)
+    # a lever shows that the actuator stands in for a cylinder, whose areas nobody can measure
+    lever = ParameterSettings(quantity="lever_slope", joints=(2,), bounds=(-0.8, 0.8))
+    rotary = problem.varied(problem.settings.with_parameters({"D": lever}))
+    assert "state" not in {action["action"] for action in next_actions(rotary, known)}

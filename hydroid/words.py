@@ -57,10 +57,11 @@ class _Number(float):
 
 
 def filled(words: str, names: Sequence[str], numbers: Mapping[str, float | str]) -> str:
-    """Return a sentence of WORDS with a finding's subjects and numbers."""
+    """Return a sentence of WORDS with a finding's subjects and numbers; a subject's own one follows it."""
     one, many = ("is", "has", "", "it", "it", "its"), ("are", "have", "s", "they", "them", "their")
     grammar = dict(
         zip(("is", "has", "s", "it", "them", "its"), one if len(names) == 1 else many, strict=True)
     )
     shown = {key: value if isinstance(value, str) else _Number(value) for key, value in numbers.items()}
-    return words.format(*names, **grammar, **shown, names=listed(names), few=listed(names, 4))
+    names = [f"{name} ({shown[name]})" if name in shown else name for name in names]
+    return words.format(*names, **(shown | grammar), names=listed(names), few=listed(names, 4))

@@ -12,20 +12,13 @@ ROOT = Path(__file__).parents[1] / "hydroid"
 
 def test_every_row_of_words_is_used():
     text = "\n".join(file.read_text() for file in ROOT.rglob("*.py") if file != ROOT / "findings.py")
-    made = {kind for kind in WORDS if f'"{kind}"' in text}
-    assert set(WORDS) == made
+    assert not [kind for kind in WORDS if f'"{kind}"' not in text]
 
 
-@pytest.mark.parametrize(
-    ("subjects", "expected"),
-    [
-        (("A_A",), "A_A is at the upper bound."),
-        (("A_A", "A_B"), "A_A and A_B are at the upper bound."),
-    ],
-)
-def test_a_sentence_agrees_with_its_subjects(subjects: tuple[str, ...], expected: str):
-    finding = Finding("at bound", "warning", subjects, {"side": "upper"})
-    assert finding.what.startswith(expected)
+@pytest.mark.parametrize("names", ["A_A is", "A_A and A_B are"])
+def test_a_sentence_agrees_with_its_subjects(names: str):
+    finding = Finding("at bound", "warning", tuple(names.split()[:-1:2]), {"side": "upper"})
+    assert finding.what.startswith(f"{names} at the upper bound: ")
     assert str(finding).endswith("Otherwise the model lacks something.")
 
 

@@ -16,7 +16,7 @@ from hydroid.posterior.uncertainty import Flag, Source, Uncertainty
 from hydroid.problem.problem import Problem
 
 STRAINED_ABOVE = 2.0
-"""standard deviations from its prior beyond which an estimate strains it"""
+"""standard deviations from its prior beyond which an estimate strains it, if the logs determine it"""
 _WARNINGS = ("at bound", "effect unknown")
 _NOTES = ("at zero", "no effect", "not identifiable", "prior only", "weakly identifiable")
 """of what is found about single parameters, the most important first"""
@@ -102,10 +102,15 @@ def fit_findings(fit: Fit) -> list[Finding]:
             Finding("not converged", "warning", (fit.final,), {"ending": fit.refinement.ending.value})
         )
     scores = zip(priors.names, priors.scores(fit.best.theta[None])[0].tolist(), strict=True)
-    for prior, score in sorted(scores, key=lambda pair: -abs(pair[1])):
-        numbers = {"score": abs(score), "side": "above" if score > 0 else "below"}
-        if abs(score) > STRAINED_ABOVE:
-            findings.append(Finding("strained prior", "warning", (prior,), numbers))
+    each = zip(fit.problem.parameters.names, fit.uncertainty.status, strict=True)
+    vague = {name for name, s in each if s.source is Source.PRIOR or s.flag is Flag.UNIDENTIFIABLE}
+    far = {
+        prior: f"{abs(score):.1f} {'above' if score > 0 else 'below'}"
+        for prior, score in sorted(scores, key=lambda pair: -abs(pair[1]))
+        if abs(score) > STRAINED_ABOVE and prior not in vague
+    }
+    if far:
+        findings.append(Finding("strained prior", "warning", tuple(far), far))
     findings += [Finding("diverged", "warning", (e.name,)) for e in fit.estimates.values() if not e.usable]
     # half of a 95 % interval as large as the value, or without end
     lost = dict.fromkeys(q.label for q in fit.quantities.scalars.values() if not q.within <= 1.0)

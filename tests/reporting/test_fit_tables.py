@@ -38,14 +38,22 @@ def test_flags_and_findings_name_what_the_data_cannot_tell():
     problem = make_problem(fixed={"D": 100.0})
     effects = (1e-3, 0.0, 0.0, 1e-3)
     fit = make_fit(problem, effects=effects)
-    low = MODEL["K"][0]
     summary = summarise(problem, fit)
     assert column(parameter_table(problem.settings, summary), "flag") == ["", "fixed", "no effect", ""]
     assert Finding("no effect", "note", ("M1",)) in summary.findings
-    at = with_theta(fit, problem, effects, K=low, M2=MODEL["M2"][1])
+    at = with_theta(fit, problem, effects, K=MODEL["K"][0], M2=MODEL["M2"][1])
     expected = ["at lower bound", "fixed", "no effect", "at upper bound"]
     assert column(parameter_table(problem.settings, summarise(problem, at)), "flag") == expected
     assert Finding("at bound", "warning", ("M2",), {"side": "upper"}) in summarise(problem, at).findings
+
+
+def test_what_the_logs_move_far_from_its_prior_is_one_finding():
+    own, stated = make_problem().settings, {"K": (0.25, 0.05), "D": (100.0, 50.0), "M1": (5.0, 1.0)}
+    free = {n: own.parameters[n].changed({"nominal": v, "sd": sd}) for n, (v, sd) in stated.items()}
+    problem, effects = make_problem().varied(own.with_parameters(free)), (1e-2, 1e-2, 1e-9, 1e-3)
+    fit = with_theta(make_fit(problem, effects=effects), problem, effects, K=0.1, D=300.0, M1=9.0)
+    (finding,) = [one for one in summarise(problem, fit).findings if one.kind == "strained prior"]
+    assert finding.what.endswith("in standard deviations: D (4.0 above) and K (3.0 below).")
 
 
 @pytest.mark.parametrize(

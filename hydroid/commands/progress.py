@@ -67,14 +67,13 @@ class Progress:
             raise KeyboardInterrupt
         if not VISIBLE.get():
             return
-        line = f"{what} {done:.0f}"
+        line = f"{what}:" if total is None else f"{what} {done:.0f} of {total:.0f}"
         if sys.stderr.isatty():
             self._bar = self._bar or _new_bar()
             self._bar.update(self._bar.task_ids[0], completed=done, total=total, description=line, text=text)
         elif time.monotonic() - self._shown > 30.0:  # seconds between plain lines
             self._shown = time.monotonic()
-            of = "" if total is None else f" of {total:.0f}"
-            typer.echo(f"{line}{of} {text}".strip(), err=True)
+            typer.echo(f"{line} {text}".strip(), err=True)
 
 
 class FitProgress(Progress):
@@ -92,7 +91,7 @@ class FitProgress(Progress):
         """Say how far the best error has fallen: as a part of the first one, since joints differ in size."""
         errors = self._errors.setdefault((what, part), [error])
         errors.append(min(errors[-1], error))
-        return f"error down to {errors[-1] / max(errors[0], 1e-12):.0%} of that at the start"
+        return f"error at {100 * errors[-1] / max(errors[0], 1e-12):.0f} % of the start's"
 
     def generation(self, row: "Array") -> None:
         """Take a row of `fitting.search.HISTORY`."""
@@ -102,9 +101,10 @@ class FitProgress(Progress):
 
     def refining(self, name: str, simulated: int, rms: float) -> None:
         """Take the name of a least squares, its number of simulations, and its rms error [rad] so far."""
-        alone = (joint for k, joint in enumerate(self._joints, 1) if f" joint {k} " in name)
+        alone = (f"joint {joint}" for k, joint in enumerate(self._joints, 1) if f" joint {k} " in name)
         what = next(alone, name.replace("refined", "refinement"))
-        self(f"{what}: simulations", simulated, None, self._fallen(what, name.rpartition(" part ")[2], rms))
+        fallen = self._fallen(what, name.rpartition(" part ")[2], rms)
+        self(what, simulated, None, f"{simulated} simulations, {fallen}")
 
 
 def _new_bar() -> Any:

@@ -162,8 +162,8 @@ def held_mechanics(mech: "ModelSource | None", settings: FitSettings, changes: P
         doubtful = mass and flag not in (None, "identifiable", "fixed")
         if doubtful and nominal and abs(value - nominal) > 0.1 * nominal:
             _log.warning(
-                f"{name} is held at {value:.3g} kg: stage 1 moved it from {nominal:.3g} kg, but its logs do "
-                f"not determine it ({flag}). Without --mech it is estimated here"
+                f"{name} is held at {value:.3g} kg, which the logs of stage 1 do not determine ({flag}). "
+                f"Expected was {nominal:.3g} kg; to take that: --set parameters.{name}.fixed={nominal:.3g}"
             )
     if missing:
         hint = "give the run of stage 1 with --mech RUN, or set fixed, nominal or start for each"

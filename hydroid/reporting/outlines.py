@@ -104,7 +104,7 @@ VIEW = 112.0, -16.0  # where a camera would look to: azimuth and elevation [deg]
 _SIZE, _MARGIN = 1000, 30  # longer side of the picture, and what stays free around the arm
 _CAPTION = (
     "Orange: simulated. Grey: measured, hidden where both agree. The picture begins where they differ "
-    "most. Joints that are not compared follow the log."
+    "most. Other joints replay their measured angles."
 )
 
 
@@ -132,13 +132,16 @@ class MovingArm:
 
 
 def motion_section(arm: Arm, predictions: Mapping[str, Prediction]) -> tuple[Section, ...]:
-    """Return the section with a tab for each of the first logs, by name; none for what diverged."""
-    finite = [item for item in predictions.items() if np.isfinite(item[1].response).all()][:LOGS]
+    """Return the section with a tab for each of the worst logs, by name; none for what diverged."""
+    finite = [item for item in predictions.items() if np.isfinite(item[1].response).all()]
     if not finite:
         return ()
+    finite.sort(key=lambda item: -max(one.rms for one in item[1].indices.values()))
+    few = f"{LOGS} of {len(finite)} logs, the worst first. " if len(finite) > LOGS else ""
+    del finite[LOGS:]
     draw = partial(moving_arm, load_model(arm).compile(), arm.joint_names, most=MOST // len(finite))
     plots = (Plot(f"motion_{i}", name, partial(draw, one)) for i, (name, one) in enumerate(finite, 1))
-    return (Section("The arm in motion", _CAPTION, tabs=tuple(Tab(p.caption, p) for p in plots)),)
+    return (Section("The arm in motion", few + _CAPTION, tabs=tuple(Tab(p.caption, p) for p in plots)),)
 
 
 def moving_arm(

@@ -56,9 +56,9 @@ def test_a_long_log_has_few_moments_and_begins_at_the_largest_difference(model):
     assert abs(arm.errors["shoulder"][arm.start]) == np.abs(arm.errors["shoulder"]).max()
 
 
-def test_a_log_that_diverged_is_not_shown():
+def test_the_worst_log_is_shown_first_and_one_that_diverged_never():
     good = predicted(LOG.angle[:, [1, 2]])
-    lost = predicted(good.response * np.nan)
-    (section,) = motion_section(ARM, {"a.csv": good, "b.csv": lost})
-    assert [tab.name for tab in section.tabs] == ["a.csv"]
+    bad, lost = (predicted(good.response + error) for error in (0.1, np.nan))
+    (section,) = motion_section(ARM, {"a.csv": good, "b.csv": lost, "c.csv": bad})
+    assert [tab.name for tab in section.tabs] == ["c.csv", "a.csv"]
     assert motion_section(ARM, {"b.csv": lost}) == ()

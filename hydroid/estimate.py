@@ -128,6 +128,8 @@ class JointVerdict(Settings):
     """on the logs that it was fitted to"""
     unseen_deg: float | None = None
     """on logs that it was not fitted to; null: there are none"""
+    unseen_logs: int = 0
+    """how many of them drive the joint; if their error is null, its simulation diverged"""
     tolerance_deg: float
     """error up to which it predicts"""
     inside_percent: float | None = None
@@ -137,11 +139,6 @@ class JointVerdict(Settings):
     horizons_deg: dict[str, tuple[float | None, ...]] = {}
     """rms error of the angle's change over 0.5, 1, 2, 5 and 10 s from starts all along the unseen logs, of
     the fit and of the baselines; empty where there are none"""
-
-    @property
-    def tested(self) -> bool:
-        """Whether unseen logs test the joint: if their error is unknown, it diverged."""
-        return self.unseen_deg is not None or self.verdict not in ("not tested", "does not fit")
 
 
 def _finding(value: Any) -> Any:

@@ -155,7 +155,7 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
     from hydroid.fitting.validation import fitted
     from hydroid.fitting.verdict import baselines_of, behind, judge
     from hydroid.reporting.parameters_report import parameter_table, warnings
-    from hydroid.reporting.verdict_table import next_lines, next_steps, verdict_lines
+    from hydroid.reporting.verdict_table import next_lines, next_step, verdict_lines
 
     settings, predictions = fit.problem.settings, fitted(fit)
     baselines = baselines_of(settings, problem.logs)
@@ -168,10 +168,8 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
     lines: list[Table | str] = [*verdict_lines({fit.final: verdict}), *warnings(summary)]
     if folder is not None:
         logs = " ".join(shlex.quote(log.source) for log in problem.logs)
-        lines += [
-            *next_lines(next_steps(settings, verdict, str(folder), logs)[0]),
-            str(folder / "report.html"),
-        ]
+        step = next_step(settings, verdict, str(folder), logs)
+        lines += [*next_lines(step), str(folder / "report.html")]
     details = [parameter_table(settings, summary), *map(str, summary.findings)]
     content = summary.plain() | {"out": folder and str(folder)}
     own = (problem, fit, folder, summary, model, predictions, baselines)

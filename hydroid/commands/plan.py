@@ -86,7 +86,7 @@ def suggest(
         content, findings = advice(problem, uncertainty(problem, model.theta), run, progress)
     verdicts = load_record(finished).verdict if (finished := run_of(model)) else ()
     if bad := tuple(
-        one.name for one in verdicts if one.tested and not one.verdict.endswith(("predicts", "roughly"))
+        one.name for one in verdicts if one.unseen_logs and not one.verdict.endswith(("predicts", "roughly"))
     ):
         findings = (Finding("fails unseen", "warning", bad), *findings)
     note = (

@@ -61,7 +61,7 @@ def validate(
     from hydroid.fitting.validation import predicted
     from hydroid.fitting.verdict import judge
     from hydroid.reporting.predictions import draw, validation_page
-    from hydroid.reporting.verdict_table import next_lines, next_steps, ordered, verdict_lines
+    from hydroid.reporting.verdict_table import next_lines, next_step, ordered, verdict_lines
     from hydroid.run.folder import log_hash
     from hydroid.run.record import fitted_by, keep_validation, run_of
 
@@ -84,7 +84,7 @@ def validate(
     best = next(iter(fits))
     model = models[[*results].index(best)]
     run = run_of(model)
-    steps = next_steps(model.settings, fits[best], str(run))[:1] if run else []
+    steps = [next_step(model.settings, fits[best], str(run))] if run else []
     page = validation_page(every, fits, arm, *steps)
     content = {
         "verdict": [{"fit": name} | one.model_dump() for name in fits for one in fits[name]],

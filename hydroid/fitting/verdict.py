@@ -93,6 +93,7 @@ def _judge(
         verdict=_word(errors, by_rival, tolerance),
         fitted_deg=finite(errors[0]),
         unseen_deg=finite(errors[1]),
+        unseen_logs=len(new),
         tolerance_deg=tolerance,
         inside_percent=100 * float(np.mean(np.concatenate(inside))) if inside else None,
         baselines_deg=by_rival[1] or by_rival[0],

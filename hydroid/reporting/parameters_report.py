@@ -130,7 +130,9 @@ def quantity_section(settings: FitSettings, summary: FitSummary) -> tuple[Sectio
         name = "machine" if joint is None else names[joint - 1]
         if rows:
             cards[f"known_{name}"] = Table(name, ("quantity", "value"), rows)
-    text = "With 95 % intervals, which are right only if the model is. estimate.yaml has all quantities."
+    text = (
+        "With 95 % intervals, which are right only if the model is right. estimate.yaml has all quantities."
+    )
     return (Section("What is known", text, cards=cards),) if cards else ()
 
 

@@ -27,16 +27,24 @@ from hydroid.reporting.parameters_report import (
     warnings,
 )
 from hydroid.reporting.search_report import search_section
-from hydroid.reporting.verdict_table import Verdicts, horizon_section, lead, next_steps, verdict_section
+from hydroid.reporting.verdict_table import (
+    Verdicts,
+    horizon_section,
+    lead,
+    next_step,
+    outside,
+    verdict_sections,
+)
 from hydroid.run.record import Record, load_record
 from hydroid.settings.arm import Arm
 from hydroid.words import number, two_digits
 
+_MATRIX = "Rms error of each joint. Green: within its tolerance; amber: within twice that; red: beyond."
 _KINDS = {True: "unseen", False: "fitted", None: ""}
 _COLUMNS = {
     "fit": "fit",
     "log": "log",
-    "kind": "",
+    "kind": "log is",
     "name": "joint",
     "mae_deg": "mean absolute [{0}]",
     "rms_deg": "rms [{0}]",
@@ -53,6 +61,8 @@ def prediction_sections(predictions: Sequence[Prediction], arm: Arm, fits: Verdi
     The first prediction of a log is the one that moves, and whose errors are shown; they are coloured by the
     tolerances of the first of the fits.
     """
+    if len(fits) == 1:
+        predictions = [replace(one, fit="simulated") for one in predictions]
     by_log: dict[str, list[Prediction]] = {}
     for one in predictions:
         by_log.setdefault(one.log.source, []).append(one)
@@ -85,13 +95,15 @@ def prediction_sections(predictions: Sequence[Prediction], arm: Arm, fits: Verdi
             row |= {key: error and 1e3 * np.radians(error) for key, error in row.items() if "_deg" in key}
     unit = "deg, mm of joints that slide" if arm.slides else "deg"
     columns = {key: name.format(unit) for key, name in _COLUMNS.items()}
+    if len(fits) == 1:
+        del columns["fit"]
     optional = tuple(columns[key] for key in ("mae_deg", "max_deg", "inside_percent", "expected_deg"))
     errors = Table.of("All errors", columns, rows, note, optional)
     return (
         *motion_section(arm, {names[log]: first for log, (first, *_) in by_log.items()}),
         Section(
-            "Errors by log",
-            "Rms error of each joint; choose one to see its response." if len(tabs) > 1 else "",
+            "Errors by log" if len(tabs) > 1 else "Response",
+            _MATRIX if len(tabs) > 1 else "",
             tabs=tuple(tabs),
         ),
         Section(errors.title, tables={"errors": errors}, folded=True),
@@ -123,7 +135,7 @@ def draw_response(
             useless = ", wider than the motion" if np.mean(2 * half) > np.ptp(measured) else ""
             # nor must a band that the parameters leave open
             half = np.fmin(half, 2.0 * np.nanmax(np.abs(residual), initial=1e-6))
-            label = f"95 % band of {name}{useless}"
+            label = f"{name}, 95 % band{useless}"
             middle.insert(0, Mark("band", time, -half, half, color=color, label=label, alpha=0.18, off=i > 0))
     panels = [
         Panel("", f"{place} [{unit}]", tuple(upper), title, 280),
@@ -143,8 +155,8 @@ def draw_response(
 def validation_page(predictions: Sequence[Prediction], fits: Verdicts, arm: Arm, *steps: Finding) -> Page:
     """Return the page of several fits on several logs; its tables are `verdict`, `errors` and `horizons`."""
     ordered = sorted(predictions, key=lambda p: p.unseen is not True)
-    sections = verdict_section(fits, *steps), *prediction_sections(ordered, arm, fits)
-    return Page("validation", "Validation", lead(fits), sections)
+    sections = *verdict_sections(fits, *steps), *prediction_sections(ordered, arm, fits)
+    return Page("validation", "Validation", lead(fits), sections, outside(next(iter(fits.values()))))
 
 
 def draw(run: str | Path, *, figures: bool = False) -> Path:
@@ -163,18 +175,13 @@ def draw(run: str | Path, *, figures: bool = False) -> Path:
 def fit_page(record: Record) -> Page:
     """Return the page of a fit, with the unseen logs that it was validated on."""
     settings, summary, fitted = record.settings, record.summary, record.result.fitted
-    final = str(summary.final)
-    # a validation has the name of the run, a fitted log that of the estimate: here both are the fit
-    predictions = [replace(p, fit=final) for p in (*record.validations.values(), *fitted)]
-    fits = {final: record.verdict}
+    fits = {str(summary.final): record.verdict}
     logs = " ".join(shlex.quote(one.log.source) for one in fitted)
-    step, *more = next_steps(settings, record.verdict, record.folder, logs)
     sections = (
-        verdict_section(fits, step),
-        *prediction_sections(predictions, settings.arm, fits),
+        *verdict_sections(fits, next_step(settings, record.verdict, record.folder, logs)),
+        *prediction_sections([*record.validations.values(), *fitted], settings.arm, fits),
         *quantity_section(settings, summary),
         *unknown_sections(summary),
-        *([Section("To improve the fit", steps=tuple(more))] if more else []),
         parameter_section(settings, summary),
         *speed_section(settings, summary, [p.log for p in fitted]),
         search_section(record),
@@ -182,7 +189,8 @@ def fit_page(record: Record) -> Page:
     in_order = sorted(sections, key=lambda section: section.folded)
     title = f"Fit of {settings.arm.name}, stage {2 if settings.stage == 'hyd' else 1}"
     made_by = {k: str(v) for k, v in record.identity.items() if k in ("hydroid", "mujoco", "numpy", "python")}
-    return Page("report", title, lead(fits), tuple(in_order), warnings(summary), made_by, _data(record))
+    warned = (*outside(record.verdict), *warnings(summary))
+    return Page("report", title, lead(fits), tuple(in_order), warned, made_by, _data(record))
 
 
 def _data(record: Record) -> dict[str, str]:

@@ -16,10 +16,10 @@ from hydroid.settings.fit import FitSettings
 from hydroid.words import listed, two_digits
 
 _SIGNS = {"predicts": "✓", "predicts roughly": "!", "not tested": "?"}  # of verdicts; all others are a ✗
-_NOTE = (
-    "rms errors in deg over the logs that drive the joint. The last three columns are the errors of simple "
-    "models on the {logs} logs: no motion, mean speeds by command, and nine numbers (dead band, exponent, "
-    "speed, lag)."
+_NOTE = "rms errors in deg (unseen logs: {count}). Last three columns: simple models on the {logs} logs."
+_RIVALS = (
+    "Beside the fit stand simple models: no motion, mean speeds by command, and nine numbers (dead band, "
+    "exponent, speed, lag)."
 )
 
 LEFT_OUT = "By joint: the rms error [deg] on parts of the logs, each predicted by a fit without it."
@@ -36,14 +36,14 @@ def verdict_table(fits: Verdicts) -> Table:
         for one in verdicts:
             errors = {"fitted": one.fitted_deg, "unseen": one.unseen_deg} | one.baselines_deg
             row = {name: _shown(error, one.slides) for name, error in errors.items()}
-            row["unseen"] = row["unseen"] or ("diverged" if one.tested else None)
+            row["unseen"] = row["unseen"] or ("diverged" if one.unseen_logs else np.nan)
             verdict = f"{_SIGNS.get(one.verdict, '✗')} {one.verdict}"
             rows.append(row | {"fit": short_name(fit), "joint": one.name, "verdict": verdict})
     if len(fits) == 1:
         del columns["fit"]
-    unseen = any(one.tested for verdicts in fits.values() for one in verdicts)
-    note = _NOTE.format(logs="unseen" if unseen else "fitted")
-    return Table.of("Verdict", columns, rows, note, NAMES[:2])
+    count = max(one.unseen_logs for verdicts in fits.values() for one in verdicts)
+    note = _NOTE.format(count=count, logs="unseen" if count else "fitted")
+    return Table.of("", columns, rows, note, NAMES[:2])
 
 
 def _shown(error: float | None, slides: bool) -> Cell:
@@ -61,15 +61,16 @@ def errors_by_joint(arm: Arm, rows: Sequence[Plain]) -> tuple[dict[str, str], li
     ]
 
 
-def verdict_section(fits: Verdicts, *steps: Finding) -> Section:
-    """Return the section that every page of predictions begins with: the verdicts, and what to do next."""
-    return Section("Verdict", tables={"verdict": verdict_table(fits)}, steps=steps)
+def verdict_sections(fits: Verdicts, *steps: Finding) -> tuple[Section, ...]:
+    """Return the sections that every page of predictions begins with: the verdicts, and what to do next."""
+    verdict = Section("Verdict", _RIVALS, tables={"verdict": verdict_table(fits)})
+    return (verdict, Section("Next", steps=steps)) if steps else (verdict,)
 
 
 def horizon_section(fits: Verdicts) -> tuple[Section, ...]:
     """Return the rms error of each angle's change over some times, of fits and baselines, if known."""
     rows = [
-        {"joint": one.name, "of": short_name(fit) if name == "the fit" else name}
+        {"joint": one.name, "of": short_name(fit) if name == "the fit" and len(fits) > 1 else name}
         | {str(ahead): _shown(e, one.slides) for ahead, e in zip(HORIZONS, errors, strict=True)}
         for fit, verdicts in fits.items()
         for one in verdicts
@@ -80,7 +81,7 @@ def horizon_section(fits: Verdicts) -> tuple[Section, ...]:
         "rms error [deg] of how far the angle turns in this time, from starts every 2 s of the unseen logs. "
         "Each is simulated from 2 s before, at the measured angles."
     )
-    table = Table.of("Error of the motion ahead", columns, rows, note)
+    table = Table.of("Error by prediction time", columns, rows, note)
     return (Section(table.title, tables={"horizons": table}, folded=True),) if rows else ()
 
 
@@ -91,7 +92,7 @@ def ordered(fits: Verdicts) -> Verdicts:
 
 def _error(one: JointVerdict) -> float:
     """Return the error on the unseen logs, or of a joint that they do not test on the fitted ones [deg]."""
-    error = one.unseen_deg if one.tested else one.fitted_deg
+    error = one.unseen_deg if one.unseen_logs else one.fitted_deg
     return np.inf if error is None else error  # it diverged
 
 
@@ -102,7 +103,7 @@ def _size(one: JointVerdict) -> float:
 def verdict_lines(fits: Verdicts) -> list[Table | str]:
     """Return the verdicts as a terminal shows them: the table, and what is worst about the first fit."""
     first = next(iter(fits.values()))
-    return [verdict_table(fits), *filter(None, [worst(first), outside(first)])]
+    return [verdict_table(fits), *filter(None, [worst(first)]), *outside(first)]
 
 
 def next_lines(step: Finding) -> tuple[str, str]:
@@ -118,17 +119,20 @@ def lead(fits: Verdicts) -> str:
     for one in verdicts:
         by_word.setdefault(one.verdict, []).append(one.name)
     said = "; ".join(f"{listed(names)}: {word}" for word, names in by_word.items())
-    return " ".join(filter(None, [f"{of}{said}.", worst(verdicts), outside(verdicts)]))
+    count = max(one.unseen_logs for one in verdicts)
+    over = f", over {count} unseen log{'s' if count > 1 else ''}" if count else ""
+    return f"{of}{said}{over}. {worst(verdicts)}".strip()
 
 
-def outside(verdicts: Sequence[JointVerdict]) -> str:
+def outside(verdicts: Sequence[JointVerdict]) -> tuple[str, ...]:
     """Say of which joints the prediction bands are too narrow; nothing where all hold their samples."""
-    inside = {one.name: one.inside_percent for one in verdicts}
     # a right model's hold somewhat less than 95 % where the start of a log is off
-    missed = listed(
-        [f"{part:.0f} % of {name}" for name, part in inside.items() if part is not None and part < 80]
-    )
-    return f"The 95 % bands are too narrow. Of the unseen samples they hold {missed}." if missed else ""
+    missed = [
+        f"{part:.0f} % of the {one.name}'s"
+        for one in verdicts
+        if (part := one.inside_percent) is not None and part < 80
+    ]
+    return (f"The 95 % bands hold only {listed(missed)} unseen samples.",) if missed else ()
 
 
 def worst(verdicts: Sequence[JointVerdict]) -> str:
@@ -137,22 +141,23 @@ def worst(verdicts: Sequence[JointVerdict]) -> str:
         return ""
     one = max(verdicts, key=_size)
     if not np.isfinite(_error(one)):
-        return f"Worst joint: {one.name}, whose simulation diverges."
+        return f"Worst: {one.name}, whose simulation diverges."
     unit = "" if one.slides else " deg"
     error, tolerance = (f"{shown(_shown(e, one.slides))}{unit}" for e in (_error(one), one.tolerance_deg))
-    return f"Worst joint: {one.name}, with an error of {error}; its tolerance is {tolerance}."
+    return f"Worst: {one.name}, {error}; good is up to {tolerance} (by default 2 % of its travel)."
 
 
-def next_steps(
+def next_step(
     settings: FitSettings, verdicts: Sequence[JointVerdict], folder: str, logs: str = "LOG.csv"
-) -> list[Finding]:
-    """Return what to do after a fit of `logs` in a run folder, the first step first, with their commands."""
-    run, steps = shlex.quote(folder), dict[str, str]()
+) -> Finding:
+    """Return what to do after a fit of `logs` in a run folder, with its command."""
+    run = shlex.quote(folder)
     if settings.stage == "mech":
-        steps["fit the hydraulics"] = f"hydroid fit-hyd {logs} --mech {run}"
+        kind, command = "fit the hydraulics", f"hydroid fit-hyd {logs} --mech {run}"
     elif any(one.verdict == "not tested" for one in verdicts):
-        steps["predict unseen"] = f"hydroid validate OTHER.csv --fit {run}"
+        kind, command = "predict unseen", f"hydroid validate OTHER.csv --fit {run}"
     elif all(one.verdict == "predicts" for one in verdicts):
-        steps["use the machine"] = f"hydroid simulate COMMANDS.csv --fit {run}"
-    steps["look for terms"] = f"hydroid suggest --fit {run}"
-    return [Finding(kind, "note", (), {"command": command}) for kind, command in steps.items()]
+        kind, command = "use the machine", f"hydroid simulate COMMANDS.csv --fit {run}"
+    else:
+        kind, command = "look for terms", f"hydroid suggest --fit {run}"
+    return Finding(kind, "note", (), {"command": command})

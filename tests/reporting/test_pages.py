@@ -19,7 +19,7 @@ from hydroid.fitting.verdict import judge
 from hydroid.reporting.page import Page, Section, Table
 from hydroid.reporting.page_file import html, write_figures, write_page
 from hydroid.reporting.predictions import fit_page, validation_page
-from hydroid.reporting.verdict_table import horizon_section, next_steps, ordered, verdict_table, worst
+from hydroid.reporting.verdict_table import horizon_section, next_step, ordered, verdict_table, worst
 
 HOSTILE = "<b>&_%$.csv"
 
@@ -102,9 +102,8 @@ def test_the_page_loads_nothing_from_elsewhere_and_a_name_is_text(written):
 def test_a_fit_that_did_not_converge_says_so(written):
     _, problem, fit, _ = written
     ending = next(e for e in type(fit.refinement.ending) if not e.converged)
-    ended = {"refined": replace(fit.refinement, ending=ending)}
-    page = fit_page(make_record(problem, replace(fit, refinements=ended)))
-    assert ending.value in page.warnings[0]
+    fit = replace(fit, refinements={"refined": replace(fit.refinement, ending=ending)})
+    assert ending.value in fit_page(make_record(problem, fit)).warnings[0]
 
 
 def test_the_verdict_comes_first_and_is_not_tested_until_a_log_is_unseen():
@@ -142,19 +141,19 @@ def test_errors_of_a_joint_that_slides_are_in_millimetres():
 )
 def test_what_to_do_next_follows_from_the_verdicts(stage, words, command):
     verdicts = [JointVerdict(joint=1, name="boom", verdict=word, tolerance_deg=1) for word in words]
-    assert next_steps(load_settings(f"fit-{stage}"), verdicts, "a run")[0].numbers == {"command": command}
+    assert next_step(load_settings(f"fit-{stage}"), verdicts, "a run").numbers == {"command": command}
 
 
 def test_the_worst_joint_is_that_which_errs_most_for_its_tolerance():
     boom, swing = (
-        JointVerdict(joint=1, name=name, verdict="predicts", unseen_deg=error, tolerance_deg=tolerance)
-        for name, error, tolerance in (("boom", 2.0, 1.0), ("swing", 3.0, 4.0))
+        JointVerdict(joint=1, name=name, verdict="predicts", unseen_deg=e, unseen_logs=1, tolerance_deg=good)
+        for name, e, good in (("boom", 2.0, 1.0), ("swing", 3.0, 4.0))
     )
-    assert worst([swing, boom]) == "Worst joint: boom, with an error of 2 deg; its tolerance is 1 deg."
+    assert worst([swing, boom]).startswith("Worst: boom, 2 deg; good is up to 1 deg ")
     assert not worst([boom])
     diverged = boom.changed({"unseen_deg": None, "fitted_deg": 0.1})
-    assert worst([swing, diverged]) == "Worst joint: boom, whose simulation diverges."
-    assert worst([swing, diverged.changed({"verdict": "not tested"})]).startswith("Worst joint: swing")
+    assert worst([swing, diverged]) == "Worst: boom, whose simulation diverges."
+    assert worst([swing, diverged.changed({"unseen_logs": 0})]).startswith("Worst: swing")
 
 
 def test_a_fit_that_fails_says_so_in_every_place():
@@ -164,7 +163,7 @@ def test_a_fit_that_fails_says_so_in_every_place():
     text = Reader(html(page)).text
     assert "✗ predicts no better than standing still" in text
     assert "✓" not in text
-    assert page.lead == "shoulder: predicts no better than standing still."
+    assert page.lead == "shoulder: predicts no better than standing still, over 1 unseen log."
 
 
 def test_a_validation_of_several_fits_shows_the_best_first_in_shared_charts():
@@ -174,8 +173,8 @@ def test_a_validation_of_several_fits_shows_the_best_first_in_shared_charts():
     fits = ordered({p.fit: judge(settings, [], {}, [p]) for p in predictions})
     assert list(fits) == ["good", "bad"]
     page = validation_page(predictions, fits, settings.arm)
-    assert page.lead == "good is best. shoulder: predicts."
-    (tab,) = next(section for section in page.sections if section.title == "Errors by log").tabs
+    assert page.lead == "good is best. shoulder: predicts, over 1 unseen log."
+    (tab,) = next(section for section in page.sections if section.title == "Response").tabs
     labels = {mark.label for panel in tab.plot.draw().panels for mark in panel.marks}
     assert {label.partition(" (")[0] for label in labels} >= {"good", "bad", "measured"}
 

@@ -115,7 +115,7 @@ def test_a_response_shows_measured_and_simulated_angle_residual_pressures_and_co
     assert mark.y == pytest.approx(simulated)
     assert f"{np.degrees(fit.best.rms):.3g}"[:3] in label
     assert labelled(middle)[label].y == pytest.approx(measured - simulated)
-    band = labelled(middle)["95 % band of refined"]
+    band = labelled(middle)["refined, 95 % band"]
     assert np.all(band.end > 0)
     assert np.array_equal(band.y, -band.end)
     assert np.array_equal(lower.marks[0].y, log.command[:, 1])

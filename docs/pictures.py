@@ -15,7 +15,7 @@ from PIL import Image, ImageDraw, ImageFont
 from screenshots import browser, connected
 
 from hydroid import load_identified, load_settings, read_logs
-from hydroid.viewer.film import Stage
+from hydroid.viewer.film import rendered
 from hydroid.viewer.motion import simulated_motion
 
 HERE = Path(__file__).parent
@@ -42,18 +42,17 @@ def moving(demo: Path) -> None:
         words: simulated_motion(load_identified(demo / name), {"alone": log}) for name, words in FITS.items()
     }
     pictures: list[Image.Image] = []
-    times = np.arange(*SPAN, 1 / RATE)
+    times = np.arange(*SPAN, 1 / RATE).tolist()
     for words, motion in motions.items():
-        with Stage(motion, SIZE) as stage:
-            for k, time in enumerate(times):
-                if len(pictures) <= k:
-                    pictures.append(Image.new("RGB", (len(motions) * SIZE[0], SIZE[1])))
-                left = list(motions).index(words) * SIZE[0]
-                pictures[k].paste(Image.fromarray(stage.picture(float(time))), (left, 0))
-                draw = ImageDraw.Draw(pictures[k])
-                draw.text((left + 10, 8), words, "#101010", ImageFont.load_default(17))
-                error = f"error {motion.error:.2g}° rms, {time:.1f} s"
-                draw.text((left + 10, 30), error, "#101010", ImageFont.load_default(14))
+        left = list(motions).index(words) * SIZE[0]
+        for k, shown in enumerate(rendered(motion, SIZE, ((time, "") for time in times))):
+            if len(pictures) <= k:
+                pictures.append(Image.new("RGB", (len(motions) * SIZE[0], SIZE[1])))
+            pictures[k].paste(Image.fromarray(shown), (left, 0))
+            draw = ImageDraw.Draw(pictures[k])
+            draw.text((left + 10, 8), words, "#101010", ImageFont.load_default(17))
+            error = f"error {motion.error:.2g}° rms, {times[k]:.1f} s"
+            draw.text((left + 10, 30), error, "#101010", ImageFont.load_default(14))
     frames = [one.quantize(COLORS, dither=Image.Dither.NONE) for one in pictures]
     how = {"save_all": True, "append_images": frames[1:], "duration": 1000 // RATE, "loop": 0}
     frames[0].save(HERE / "arm_moving.gif", optimize=True, **how)

@@ -37,7 +37,7 @@ from hydroid.posterior.noise import Noise, prior_weight, problem_noise
 from hydroid.posterior.uncertainty import Uncertainty
 from hydroid.problem.problem import Problem
 from hydroid.progress import Progress, no_progress
-from hydroid.search.descent import Descent
+from hydroid.search.axes import Function
 from hydroid.search.least_squares import least_squares
 from hydroid.settings.search import RefinementSettings
 
@@ -215,20 +215,31 @@ def refitted(problem: Problem, theta: Array, weight: float | None = None) -> Ref
         weight = prior_weight(problem, problem.residuals(theta[None])[0])
     rows = least_squares_rows(problem, theta, weight)
 
-    def fitted(point: Array, kept: slice | Mask = slice(None)) -> Descent:
-        return least_squares(point, lambda points: rows(parameters.from_unit(points))[:, kept], SHORT)
+    def fitted(point: Array, function: Function) -> Array:
+        return least_squares(point, lambda points: function(parameters.from_unit(points)), SHORT).point
 
-    whole = fitted(parameters.to_unit(theta))
-    if not np.isfinite(whole.cost):
+    whole = fitted(parameters.to_unit(theta), rows)
+    best, unseen = parameters.from_unit(whole), np.full(size, np.nan)
+    here = rows(best[None])[0]
+    if not np.isfinite(here).all():
         return Refit(theta)
-    number, unseen = np.zeros(whole.residual.size), np.empty(size)
+    several, number = len(problem.logs) > 1, np.zeros(here.size)
     for c in problem.channels:
         halves = np.arange(len(c.measured)) >= len(c.measured) // 2
-        number[c.rows] = 1 + (c.log % 3 if len(problem.logs) > 1 else halves)
+        number[c.rows] = 1 + (c.log % 3 if several else halves)
     for part in np.unique(number[:size]):
         out = number == part
-        unseen[out[:size]] = rows(parameters.from_unit(fitted(whole.point, ~out).point)[None])[0, out]
-    return Refit.of(problem, parameters.from_unit(whole.point), problem.unfiltered(unseen[None]))
+        if several:  # only the other logs are simulated
+            kept = [log for i, log in enumerate(problem.logs) if 1 + i % 3 != part]
+            others = least_squares_rows(problem.varied(problem.settings, kept), theta, weight)
+        else:
+            others = partial(_some, rows, ~out)
+        unseen[out[:size]] = rows(parameters.from_unit(fitted(whole, others))[None])[0, out]
+    return Refit.of(problem, best, problem.unfiltered(unseen[None]))
+
+
+def _some(rows: Function, kept: Mask, theta: Array) -> Array:
+    return rows(theta)[:, kept]
 
 
 def _tested(term: Term, problem: Problem, known: Uncertainty, fit: Explained) -> list[Candidate]:

@@ -116,7 +116,12 @@ def fit(problem: Problem, watch: Watcher | None = None, checkpoints: Checkpoints
     final = next(iter(estimates))
     start = min(estimates.values(), key=lambda e: e.rms if e.usable else np.inf)
     times.append(time.perf_counter())
-    refinements = dict[str, Descent]()
+    refinements, left_out = dict[str, Descent](), dict[str, float]()
+
+    def error_left_out(own: Problem, one: Estimate) -> float:
+        if one.name not in left_out:
+            left_out[one.name] = refitted(own, one.theta).left_out
+        return left_out[one.name]
 
     def climb(name: str, *, if_nearer: bool) -> None:
         """Refine with the settings of an estimate, from the last one; keep the result as the final one."""
@@ -140,7 +145,7 @@ def fit(problem: Problem, watch: Watcher | None = None, checkpoints: Checkpoints
         refinements[name], new = result, estimates[name]
         nearer = new.rms < (1 - MIN_GAIN) * start.rms
         if nearer and own.settings.terms != last.settings.terms:
-            without, with_it = (refitted(p, e.theta).left_out for p, e in ((last, start), (own, new)))
+            without, with_it = error_left_out(last, start), error_left_out(own, new)
             estimates[name] = new = replace(new, left_out=(without, with_it))
             nearer = with_it < (1 - MIN_GAIN) * without
         if nearer or not if_nearer:

@@ -75,6 +75,7 @@ def at_rest(plugin: Plugin, angle: Array, torque: Array) -> Structs:
     carried = np.where(rests, torque - lever * (c.a.area * pressure_a - c.b.area * pressure_b), 0.0)
     state["contact"], state["stop"] = carried / GIVE, angle + np.sign(carried) * GIVE
     state["line"], state["share"] = c.relief, c.pump_idle
+    state["displacement"] = np.nan
     return state
 
 

@@ -25,6 +25,9 @@ from hydroid.hydraulics.records import LINEAR, NONE, ROTARY
 from hydroid.hydraulics.solenoid import beyond_dead_band, drive, plunger_step, plunger_weight, side_voltage
 from hydroid.hydraulics.valve import notched, port_flow, slot_share
 
+STILL = 1e-15
+"""speed of a plunger before and after a sub-step, below which rounding alone moves it [m/s]"""
+
 
 @compilable
 def begin(c, z, w, angle: float, velocity: float) -> None:
@@ -58,7 +61,7 @@ def _advance(c, side, z, asked: float, step: float, whole: bool) -> float:
 
     `whole`: whether the step is a sub-step, and not a part of one.
     """
-    pilot_steps, keep, weight = side.pilot_steps, side.pilot_keep, side.plunger_weight
+    pilot_steps, keep, weight, driven = side.pilot_steps, side.pilot_keep, side.plunger_weight, z.drive
     if not whole:
         pilot_steps = side.pilot_lag / step
         keep, weight = kept(pilot_steps), plunger_weight(side.plunger_damping, step, c)
@@ -67,8 +70,12 @@ def _advance(c, side, z, asked: float, step: float, whole: bool) -> float:
         beyond, part = beyond_dead_band(z.pilot, asked, pilot_steps, keep, side.dead_band)
         z.pilot = asked + (z.pilot - asked) * keep
         z.drive = drive(side_voltage(beyond, part, side.onset, side.dead_band), c)
-    before = z.stroke
-    z.stroke, z.speed = plunger_step((before, z.speed), z.drive, side.plunger_damping, step, weight, c)
+    before, speed = z.stroke, z.speed
+    if speed == 0.0 and z.drive == driven:
+        return before
+    z.stroke, z.speed = plunger_step((before, speed), z.drive, side.plunger_damping, step, weight, c)
+    if abs(speed) < STILL and abs(z.speed) < STILL:
+        z.speed = 0.0
     return 0.5 * (before + z.stroke)
 
 
@@ -100,7 +107,10 @@ def opened(side, travel: float) -> float:
 @compilable
 def net_opening(c, z, displacement: float) -> float:
     """Mean opening of a sub-step [m²], below 0 towards B, at a spool displacement [m]."""
-    net = opened(c.a, displacement) if displacement > 0.0 else -opened(c.b, -displacement)
+    if z.displacement != displacement:  # else the spool rests, and its power law is not worked out again
+        z.displacement = displacement
+        z.open = opened(c.a, displacement) if displacement > 0.0 else -opened(c.b, -displacement)
+    net = z.open
     left = (z.opening - net) * (1.0 - c.opening_keep)
     z.opening -= left
     return net + left * c.opening_steps

@@ -94,6 +94,7 @@ JOINT_STATE = np.dtype(
             "external hold "  # torque e that is neither oil nor damping; torque that held the start [N·m]
             "angle velocity "  # at the start of the step [rad]; at its end [rad/s]
             "opening "  # of the valve, below 0 towards B [m²]
+            "displacement open "  # of the spool [m], NaN before the first; what it opens without a lag [m²]
             "way predicted torque armature "  # of the look-ahead: turn [rad], velocity v*, torque, h κ
             # contact with what the joint rests on at the start: stiffness, below 0 if from above [N·m/rad],
             # and angle at which it ends [rad]

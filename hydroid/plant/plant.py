@@ -218,7 +218,7 @@ class Plant:
         write_fitted(folder, fitted, ", ".join(self._named), actuators)
 
     def _advance(self, command: Array) -> None:
-        commands, torque, _ = self._course
+        commands, torque, *_ = self._course
         torque[:] = (self._gain * command + self._balance)[self._chain.pushed]
         commands[: -self._steps] = commands[self._steps :]
         commands[-self._steps :] = command[self._chain.columns]

@@ -76,12 +76,14 @@ class Course(NamedTuple):
 
     commands: held during each step [%], after those before the start, shape (past + T steps, J). torque: of
     pushed joints [N·m], shape (T steps, P). taken: flow from the pump into pushed joints [m³/s], shape
-    (T steps,); or it is empty.
+    (T steps,); or it is empty. opening: of the valves in the mean [m²], shape (T steps, J), where they are
+    known before a quasi-static rollout; or it is empty.
     """
 
     commands: Array
     torque: Array
     taken: Array = np.empty(0)
+    opening: Array = np.empty((0, 0))
 
 
 class Record(NamedTuple):
@@ -205,7 +207,7 @@ def write_sample(arm, record, state, k: int) -> None:
 @njit(cache=True, nogil=True, error_model="numpy")
 def roll(arm, plugin: Plugin, state, course, record, source: int = SOURCE) -> None:
     """Roll one candidate out as `SteppedArm.roll` does; `source` is the kernel's, for numba's cache."""
-    commands, torque, taken = course
+    commands, torque, taken, _ = course
     pad, past = make_pad(state.size), commands.shape[0] - torque.shape[0]
     for k in range(torque.shape[0]):
         if taken.size:

@@ -234,5 +234,8 @@ class Chain:
         joints: Records = candidates.joints[:, self._pushed]  # pyright: ignore[reportAssignmentType]
         if not self.joints.size or np.isinf(joints.pump_flow).all():
             return np.empty((len(candidates), 0))
-        each: Records = coefficients(joints)[:, None]  # pyright: ignore[reportAssignmentType]
-        return swallowed(each, motion.angle, motion.velocity).sum(axis=2)
+        first = dict[bytes, int]()  # they are mostly held: candidates alike take the same
+        alike = [first.setdefault(row.tobytes(), len(first)) for row in joints]
+        unlike = joints[np.unique(alike, return_index=True)[1]]
+        each: Records = coefficients(unlike)[:, None]  # pyright: ignore[reportAssignmentType]
+        return swallowed(each, motion.angle, motion.velocity).sum(axis=2)[alike]

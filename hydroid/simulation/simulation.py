@@ -9,7 +9,7 @@ many at a time as there are threads; candidates are independent, and no number o
 
 import os
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -20,7 +20,7 @@ from hydroid.arrays import Array, Index, Structs
 from hydroid.hydraulics.actuator import Observation, observe
 from hydroid.hydraulics.records import JOINT_STATE, has_force_curve
 from hydroid.mjcf import quiet_mujoco
-from hydroid.simulation.quasi_static import roll_quasi_static
+from hydroid.simulation.quasi_static import roll_quasi_static, valve_openings
 from hydroid.simulation.rollout import Course, Record, SteppedArm, compile_rollout, roll
 from hydroid.simulation.scenario import Candidates, Chain, Response, Scenario
 
@@ -82,7 +82,7 @@ class Simulation:
         with quiet_mujoco(), ThreadPoolExecutor(threads) as pool:
             copies = self._copies(candidates, threads)
             free = deque(self._stepped(copies) for _ in range(threads))
-            follow = self._follower(candidates, free[0], observed=pressure is not None)
+            follow = self._follower(candidates, free[0], pool.map, observed=pressure is not None)
             deque(pool.map(simulate, np.array_split(range(rows.size), -(-rows.size // copies))), maxlen=0)
             if copies > 1:  # one that diverges stops those beside it
                 free = deque(self._stepped() for _ in range(threads))
@@ -94,7 +94,7 @@ class Simulation:
         """Simulate one candidate; return what its actuators did, at T samples, shape (T, J) or (T, J, 2)."""
         arm = self._stepped()
         with quiet_mujoco():
-            observation = self._follower(candidates, arm, observed=True)(arm, np.array([0]))[1]
+            observation = self._follower(candidates, arm, map, observed=True)(arm, np.array([0]))[1]
         assert observation is not None
         return observation
 
@@ -117,8 +117,13 @@ class Simulation:
         pushed = np.arange(model.nv) if copies > 1 else chain.pushed
         return SteppedArm(model, chain.columns, pushed, steps, rollout, copies)
 
-    def _follower(self, candidates: Candidates, arm: SteppedArm, *, observed: bool) -> Follow:
-        """Return what simulates some of n candidates; all are balanced here, one by one, on one arm."""
+    def _follower(
+        self, candidates: Candidates, arm: SteppedArm, run: Callable[..., Iterable[None]], *, observed: bool
+    ) -> Follow:
+        """Return what simulates some of n candidates; all are balanced here, one by one, on one arm.
+
+        `run` is `map`, or that of a pool.
+        """
         scenario, chain, n = self.scenario, self._chain, len(candidates)
         values, pose, servo = scenario.values(candidates), scenario.arm.pose, scenario.prescribed
         samples = len(scenario.command) // scenario.settings.steps
@@ -126,7 +131,9 @@ class Simulation:
         balance = np.concatenate([arm.start(values, some, np.tile(pose, arm.copies)) for some in starts])
         balance = balance.reshape(-1, len(pose))[:n]
         plugin, states = chain.start(candidates, pose, balance, scenario.pressure)
-        taken = chain.taken(candidates, servo)
+        taken, openings = chain.taken(candidates, servo), [np.empty((0, 0))] * n
+        if self._quasi_static and not observed:  # what the valves do is seen in their states alone
+            openings = valve_openings(plugin, states, scenario.command[:, chain.columns], run)
         gain = candidates.joints.gain[:, scenario.arm.columns[chain.pushed]]
         served = np.searchsorted(chain.pushed, servo.columns)
 
@@ -142,7 +149,7 @@ class Simulation:
             angle = np.full((1 + samples, start.size), np.nan)
             record = np.zeros((1 + samples if observed else 1, len(state)), JOINT_STATE)
             angle[0], record[0] = start, state
-            course = Course(commands, torque.reshape(len(torque), -1), taken[row])
+            course = Course(commands, torque.reshape(len(torque), -1), taken[row], openings[row])
             arm.roll(one, state, course, Record(angle[1:], record[1:]))
             seen = observe(one.coefficients, record, angle[:, chain.columns]) if observed else None
             return angle.reshape(len(angle), arm.copies, -1), seen

@@ -1,6 +1,7 @@
 """Units as files, settings and data sheets write them: what each measures, and what one of it is in SI."""
 
 import math
+import re
 from dataclasses import dataclass
 
 from hydroid.files import read_table
@@ -27,6 +28,13 @@ UNITS = {
 def unit_of(text: str) -> Unit | None:
     """Return the unit that a text spells, with or without brackets around it; None where it spells none."""
     return UNITS.get(bare(text).lower())
+
+
+def seconds(text: str) -> float | None:
+    """Return the time that a text such as 5min says [s]; None where it says none."""
+    parts = re.fullmatch(r"\s*(\d+\.?\d*)\s*(\w+)\s*", text)
+    unit = unit_of(parts[2]) if parts else None
+    return float(parts[1]) * unit.factor if parts and unit and unit.quantity == "time" else None
 
 
 def bare(text: str) -> str:

@@ -4,6 +4,7 @@ A bar shows it on a terminal, plain lines elsewhere, and nothing in Python or wi
 time is nearly up ends a run as Ctrl-C does: with a checkpoint.
 """
 
+import math
 import signal
 import sys
 import time
@@ -77,10 +78,14 @@ class Progress:
 
 
 class FitProgress(Progress):
-    """Shows the progress of a fit with its settings, as `fitting.fit.Watcher`."""
+    """Shows the progress of a fit with its settings, as `fitting.ladder.Watcher`.
 
-    def __init__(self, settings: "FitSettings") -> None:
+    Its time is up `budget` seconds after it was made; None: never.
+    """
+
+    def __init__(self, settings: "FitSettings", budget: float | None = None) -> None:
         super().__init__()
+        self._end = math.inf if budget is None else time.monotonic() + budget
         search, self._joints = settings.search, settings.arm.joint_names
         names = {"ga": "GA population", "nsga2": "NSGA-II population", "multistart": "multi-start start"}
         self._step = names[search.algorithm]
@@ -93,18 +98,23 @@ class FitProgress(Progress):
         errors.append(min(errors[-1], error))
         return f"error at {100 * errors[-1] / max(errors[0], 1e-12):.0f} % of the start's"
 
-    def generation(self, row: "Array") -> None:
-        """Take a row of `fitting.search.HISTORY`."""
+    def generation(self, row: "Array") -> bool:
+        """Take a row of `fitting.search.HISTORY`; return whether time is up."""
         number, _, simulated, _, best, _ = map(float, row)
         text = f"{self._fallen(self._step, '', best)}, {simulated:.0f} simulations"
         self(self._step, number, self._total, text)
+        return time.monotonic() > self._end
 
-    def refining(self, name: str, simulated: int, rms: float) -> None:
-        """Take the name of a least squares, its number of simulations, and its rms error [rad] so far."""
+    def refining(self, name: str, simulated: int, rms: float) -> bool:
+        """Take the name of a least squares, its number of simulations, and its rms error [rad] so far.
+
+        Returns whether time is up.
+        """
         alone = (f"joint {joint}" for k, joint in enumerate(self._joints, 1) if f" joint {k} " in name)
         what = next(alone, name.replace("refined", "refinement"))
         fallen = self._fallen(what, name.rpartition(" part ")[2], rms)
         self(what, simulated, None, f"{simulated} simulations, {fallen}")
+        return time.monotonic() > self._end
 
 
 def _new_bar() -> Any:

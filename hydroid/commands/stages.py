@@ -28,6 +28,7 @@ from hydroid.progress import NOTE
 from hydroid.quantity_table import MECHANICAL
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.parameters import nominal_value
+from hydroid.units import seconds
 
 _log = logging.getLogger(__name__)
 
@@ -43,6 +44,7 @@ def fit_mech(
     resume: bool = False,
     refinement: bool | None = None,
     threads: int | None = None,
+    budget: str | None = None,
     dask: str | None = None,
     config: "ConfigSource" = "fit-mech",
     set: "SettingChanges" = None,
@@ -79,6 +81,7 @@ def fit_hyd(
     resume: bool = False,
     refinement: bool | None = None,
     threads: int | None = None,
+    budget: str | None = None,
     dask: str | None = None,
     config: "ConfigSource" = "fit-hyd",
     set: "SettingChanges" = None,
@@ -128,8 +131,11 @@ def _fit(stage: str, given: Mapping[str, Any]) -> FitResult:
     if config == f"fit-{stage}":
         what = f"note: the arm is the shipped {settings.arm.name}"
         _log.log(NOTE, f"{what}: for your machine give --config, which `hydroid init` writes")
+    budget = given["budget"] and seconds(given["budget"])
+    if given["budget"] is not None and not budget:
+        raise SettingsError(f"is no time: {given['budget']!r}", "--budget", "such as 90s, 5min or 2h")
     read = read_logs(given["logs"], settings, repair=given["repair"])
-    with open_workers(given["dask"]) as workers, FitProgress(settings) as watcher:
+    with open_workers(given["dask"]) as workers, FitProgress(settings, budget) as watcher:
         return run_fit(
             settings, read, given["out"], resume=given["resume"], progress=watcher, workers=workers
         )

@@ -12,7 +12,7 @@ from hydroid.posterior.linear import least_squares_rows, with_open_start
 from hydroid.posterior.noise import prior_weight
 from hydroid.problem.channels import UNFILTERED
 from hydroid.problem.problem import Problem
-from hydroid.search.descent import Descent, start
+from hydroid.search.descent import Descent, Ending, start
 from hydroid.search.least_squares import step
 from hydroid.settings.search import RefinementSettings
 
@@ -21,8 +21,9 @@ SETTLED = 1e-3
 MAX_NOISES = 8
 """times at most that the noise is estimated: its model may jump to and fro between two orders"""
 
-Refining = Callable[[str, int, float], None]
-"""takes the name of a least squares, its number of simulations, and its rms error [rad] so far"""
+Refining = Callable[[str, int, float], bool | None]
+"""takes the name of a least squares, its number of simulations, and its rms error [rad] so far; returns
+whether its time is up"""
 ROUGH = 0.1
 """gain below which least squares without the prefilter ends"""
 
@@ -48,7 +49,7 @@ def refine(
     problem: Problem,
     theta: Array,
     settings: RefinementSettings,
-    progress: Refining = lambda *_: None,
+    progress: Refining = lambda *_: False,
     checkpoints: Checkpoints | None = None,
     name: str = "refined",
 ) -> Descent:
@@ -73,6 +74,8 @@ def refine(
         first = refine(
             problem.from_afar(filtered=False), theta, rough, progress, checkpoints, f"{name} from afar"
         )
+        if first.ending is Ending.TIME:
+            return first
         theta, simulated = problem.parameters.from_unit(first.point), first.evaluations
     if name in checkpoints:
         now = _Refinement.from_arrays(checkpoints[name])
@@ -81,20 +84,27 @@ def refine(
     else:
         now = _estimated(problem, problem.parameters.to_unit(theta))
         now = replace(now, evaluations=now.evaluations + simulated)
-    residuals = _residuals(problem, now)
+    residuals, moved = _residuals(problem, now), False
     with saving(checkpoints, name) as keep:
-        while not now.ended:
+        while not now.ended and not _shown(problem, now, progress, name):
             if not len(now.jacobian):
                 after = _following(problem, now)
                 residuals = residuals if after is now else _residuals(problem, after)
                 now = after
                 keep(now.arrays)
-            now = step(now, residuals, settings)
-            errors = problem.unfiltered(now.residual[None, : problem.measured.size])
-            progress(name, now.evaluations, problem.rms(errors)[0])
-        keep(now.arrays)
+            now, moved = step(now, residuals, settings), True
+        if moved or now.ended:  # else a start that itself may have been reached too late
+            keep(now.arrays)
+    if not now.ended:  # the checkpoint is where it goes on
+        now = replace(now, ending=Ending.TIME)
     _log.info("refinement of %d parameters: %s", now.point.size, now)
     return now
+
+
+def _shown(problem: Problem, now: _Refinement, progress: Refining, name: str) -> bool:
+    """Show the progress; return whether its time is up."""
+    errors = problem.unfiltered(now.residual[None, : problem.measured.size])
+    return bool(progress(name, now.evaluations, problem.rms(errors)[0]))
 
 
 def _estimated(problem: Problem, unit: Array, row: Array | None = None) -> _Refinement:

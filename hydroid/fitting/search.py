@@ -40,20 +40,27 @@ class Searched:
 
 def search(
     problem: Problem,
-    watch: Callable[[Array], None],
+    watch: Callable[[Array], bool | None],
     progress: Refining,
     checkpoints: Checkpoints,
 ) -> Searched:
     """Search to the last generation, from the seed or from what `checkpoints` holds as "search".
 
-    `watch` takes a row of HISTORY after every generation, but for those that a resumed run repeats;
+    `watch` takes a row of HISTORY after every generation, but for those that a resumed run repeats, and says
+    whether that was the last;
     `progress` watches least squares within multi-start. Raises RunError: the search does not repeat what it
     did before the checkpoint.
     """
-    settings, free = problem.settings.search, int(problem.parameters.free.sum())
+    settings, free, late = problem.settings.search, int(problem.parameters.free.sum()), False
+
+    def refining(name: str, simulated: int, rms: float) -> bool:
+        nonlocal late
+        late = progress(name, simulated, rms) or late
+        return late
+
     memo = Memo(problem, checkpoints.get("search"))
     if settings.algorithm == "multistart":
-        algorithm = Multistart(problem, memo, progress, checkpoints)
+        algorithm = Multistart(problem, memo, refining, checkpoints)
     elif settings.algorithm == "ga":
         algorithm = SimpleGa(settings.ga, free, problem.start)
     else:
@@ -73,7 +80,7 @@ def search(
     generations, rng = 1 + algorithm.settings.generations, np.random.default_rng(settings.seed)
     population, history, evaluations = None, np.empty((0, len(HISTORY))), 0
     with saving(checkpoints, "search") as keep:
-        while population is None or len(history) < generations:
+        while population is None or (len(history) < generations and not late):
             repeats = bool(memo.stored)
             chromosomes = algorithm.ask(population, rng)
             result = memo.evaluate(theta(chromosomes))
@@ -87,6 +94,7 @@ def search(
             counts = [len(history) + 1, evaluations + memo.elsewhere, memo.simulated, memo.infeasible]
             history = np.vstack([history, [*counts, best, median]])
             if not repeats:
-                keep(state)
-                watch(history[-1])
+                if not late:  # else a start may not have been refined to its end
+                    keep(state)
+                late = watch(history[-1]) or late
     return Searched(theta(population.chromosomes), population, algorithm.single, history, memo)

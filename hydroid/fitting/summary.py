@@ -101,6 +101,10 @@ def fit_findings(fit: Fit) -> list[Finding]:
         findings.append(
             Finding("not converged", "warning", (fit.final,), {"ending": fit.refinement.ending.value})
         )
+    low, starts = fit.ends
+    if starts > 1:
+        kind, level = ("one optimum", "note") if low == starts else ("several optima", "warning")
+        findings.append(Finding(kind, level, (), {"low": str(low), "starts": str(starts)}))
     scores = zip(priors.names, priors.scores(fit.best.theta[None])[0].tolist(), strict=True)
     each = zip(fit.problem.parameters.names, fit.uncertainty.status, strict=True)
     vague = {name for name, s in each if s.source is Source.PRIOR or s.flag is Flag.UNIDENTIFIABLE}

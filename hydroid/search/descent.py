@@ -28,6 +28,7 @@ class Ending(Enum):
     EXACT = "the residual is zero up to rounding"
     NO_IMPROVEMENT = "no step improves the fit any further"
     ITERATIONS = "it reached the iteration limit"
+    TIME = "its time was up"
     START_FAILED = "the start could not be simulated"
     JACOBIAN_FAILED = "simulations failed on both sides of the best point"
 

@@ -23,6 +23,7 @@ differ by one parameter, all joints but one.
 # pyright: reportMissingParameterType=false
 # a law takes floats or arrays that broadcast, and compiled code whatever has its fields
 
+from collections import deque
 from collections.abc import Callable, Iterable
 from typing import Any
 
@@ -191,22 +192,20 @@ def valve_openings(
     for fields, names in ((alike, BEHIND_VALVE), (alike["a"], BEHIND_PORT), (alike["b"], BEHIND_PORT)):
         for name in names:
             fields[name] = 0.0
-    steps, past, rows = len(commands), plugin.past, range(len(states))
-    delayed = np.vstack([np.zeros((past, states.shape[1])), commands])
-    curves = {(j, alike[i, j].tobytes()): (i, np.zeros(steps)) for i in rows for j in plugin.order[plugin.idle :]}
+    candidates, joints = alike.shape
+    delayed = np.vstack([np.zeros((plugin.past, joints)), commands])
+    keys = [[(j, alike[i, j].tobytes()) for j in range(joints)] for i in range(candidates)]
+    owners = {key: (i, key[0]) for i, row in enumerate(keys) for key in row}
+    curves = {key: np.zeros(len(commands)) for key in owners}
 
     def open_one(key: tuple[int, bytes]) -> None:
-        j, (i, opening) = key[0], curves[key]
+        i, j = owners[key]
         some, rest = plugin.coefficients[i, j : j + 1], states[i, j : j + 1].copy()
-        _open(some, rest, delayed[:, j], opening, plugin.substeps, plugin.period)
+        _open(some, rest, delayed[:, j], curves[key], plugin.substeps, plugin.period)
 
-    for _ in run(open_one, curves):
-        pass
-    still = np.zeros(steps)
-    return [
-        np.column_stack([curves.get((j, alike[i, j].tobytes()), (i, still))[1] for j in range(states.shape[1])])
-        for i in rows
-    ]
+    driven = set(plugin.order[plugin.idle :].tolist())
+    deque(run(open_one, (key for key in curves if key[0] in driven)), maxlen=0)
+    return [np.column_stack([curves[key] for key in row]) for row in keys]
 
 
 @compilable

@@ -236,6 +236,6 @@ class Chain:
             return np.empty((len(candidates), 0))
         first = dict[bytes, int]()  # they are mostly held: candidates alike take the same
         alike = [first.setdefault(row.tobytes(), len(first)) for row in joints]
-        unlike = joints[np.unique(alike, return_index=True)[1]]
+        unlike: Records = joints[np.unique(alike, return_index=True)[1]]  # pyright: ignore
         each: Records = coefficients(unlike)[:, None]  # pyright: ignore[reportAssignmentType]
         return swallowed(each, motion.angle, motion.velocity).sum(axis=2)[alike]

@@ -5,8 +5,9 @@ import pytest
 from made_logs import noisy, simulate_log, step_log
 from recovery import settings_of
 
-from hydroid.fitting.fit import fit
+from hydroid.fitting.fit import Silent, fit
 from hydroid.problem.problem import Problem
+from hydroid.search.descent import Ending
 from hydroid.settings.search import MultistartSettings, RefinementSettings
 from hydroid.studies import Task, perform
 
@@ -21,9 +22,8 @@ CONFIG = {
 }
 
 
-@pytest.mark.parametrize("name", ["refined", "refined+pump", "dynamic", "dynamic+pump"])
-def test_a_fit_keeps_what_the_logs_ask_for(name):
-    """Soft oil shows in the logs, and a droop shows where two joints move together."""
+def _problem(name, **more):
+    """The fit of a simulated log whose machine is what an estimate of this name has."""
     changes = {
         "outputs": (2, 3),
         "simulation.model": "ladder",
@@ -31,12 +31,19 @@ def test_a_fit_keeps_what_the_logs_ask_for(name):
         "search.multistart": MultistartSettings(starts=1, horizons=()),
         "refinement": RefinementSettings(iterations=40),
     }
-    ladder = settings_of(CONFIG, bulk_modulus=20.0).changed(changes)
+    ladder = settings_of(CONFIG, bulk_modulus=20.0).changed(changes | more)
     machine = ladder.of_estimate(name)
     log = step_log(machine.arm.pose("study"), {2: SHOULDER, 3: ELBOW})
     exact = simulate_log(machine, log, {n: TRUTH[n] for n in CONFIG if n in machine.parameters})
-    log = noisy(exact, 0.02, 1, exact_start=False)
-    found = fit(Problem(ladder, [log]))
+    return Problem(ladder, [noisy(exact, 0.02, 1, exact_start=False)])
+
+
+@pytest.mark.parametrize("name", ["refined", "refined+pump", "dynamic", "dynamic+pump"])
+def test_a_fit_keeps_what_the_logs_ask_for(name):
+    """Soft oil shows in the logs, and a droop shows where two joints move together."""
+    problem = _problem(name)
+    ladder, (log,) = problem.settings, problem.logs
+    found = fit(problem)
     assert found.final == name
     assert np.degrees(found.best.rms) == pytest.approx(0.02, rel=0.1)
     if found.best.left_out:
@@ -44,3 +51,28 @@ def test_a_fit_keeps_what_the_logs_ask_for(name):
     if name == "dynamic+pump":  # a study measures the estimate as it is, though its search has another model
         measures = perform(Task(name, 1, ladder, (log,)))["measures"]
         assert measures["rms error"] == pytest.approx(np.degrees(found.best.rms))
+
+
+class Hurried(Silent):
+    """Says that time is up after so many calls."""
+
+    def __init__(self, calls):
+        self.calls = calls
+
+    def refining(self, name, simulated, rms):
+        self.calls -= 1
+        return self.calls < 0
+
+
+def test_a_fit_without_time_says_so_and_goes_on_to_the_bits_of_one_with_time():
+    problem, stored, calls = _problem("refined+pump", restarts=1), {}, Hurried(10_000)
+    whole = fit(problem, calls)
+    used = 10_000 - calls.calls
+    early = [fit(problem, Hurried(round(part * used)), stored) for part in (0.02, 0.2, 0.3)]
+    assert early[0].refinement.ending is Ending.TIME
+    assert not early[0].refinement.converged
+    assert early[0].best.rms > early[-1].best.rms
+    late = fit(problem, checkpoints=stored)
+    assert late.final == whole.final
+    np.testing.assert_array_equal(late.best.theta, whole.best.theta)
+    assert whole.ends == late.ends == (2, 2)  # one optimum

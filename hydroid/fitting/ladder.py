@@ -1,0 +1,235 @@
+"""The ladder of a fit: refinements one after another, each of a model that has more in it than the last one.
+
+A rung is kept where it errs clearly less: another model on the fitted logs, another term on parts of the logs
+left out. Which rung that is shows long before least squares has converged, so that ends early on the way
+(`FIRM`). What is kept at the end is refined to the tolerance of the settings.
+
+At the end least squares starts anew, two standard deviations away along each of the weakest directions. A
+lower end is kept. How many of the ends are as low says whether there is one optimum.
+"""
+
+import logging
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import Protocol
+
+import numpy as np
+
+from hydroid.advice.growth import MIN_GAIN, refitted
+from hydroid.arrays import Array, record
+from hydroid.fitting.checkpoints import Checkpoints
+from hydroid.fitting.multistart import each_alone
+from hydroid.fitting.refinement import ROUGH, refine
+from hydroid.posterior.linear import estimate_box
+from hydroid.posterior.uncertainty import Uncertainty, uncertainty
+from hydroid.problem.problem import Problem
+from hydroid.search.descent import Descent, Ending
+from hydroid.settings.search import RefinementSettings
+
+_log = logging.getLogger(__name__)
+
+TOO_FAR = 20.0
+"""times the rms error of the last estimate from which the dynamic model is not refined: lags that stand for
+oil in a quasi-static model are too much beside it, and it errs by several times as much at first"""
+STILL_FAR = 2.0  # the same after a rough refinement
+FIRM = 1e-3  # gain below which least squares ends where another rung may follow
+AWAY = 2.0  # standard deviations between the estimate and another start
+FARTHEST = 0.5  # relative change of any parameter to there
+
+
+@record
+class Estimate:
+    """One parameter set with its response.
+
+    theta: shape (P,). segments: objectives by segment, shape (S,). overall: norm over the whole record.
+    rms: of the output error [rad]. responses: simulated outputs [rad], (T, K) a log. left_out: of an estimate
+    with another term, the rms error on parts of the logs left out, without the term and with it [rad].
+    """
+
+    name: str
+    theta: Array
+    segments: Array
+    overall: float
+    rms: float
+    responses: tuple[Array, ...]
+    left_out: tuple[float, float] | None = None
+
+    @property
+    def usable(self) -> bool:
+        """Whether it could be simulated: the mean of several candidates that could need not."""
+        return bool(np.isfinite(self.rms))
+
+
+def measured(problem: Problem, candidates: Mapping[str, Array]) -> dict[str, Estimate]:
+    """Simulate candidates by name, each of shape (P,), and measure them; those that diverged come last."""
+    theta = np.array(list(candidates.values()))
+    responses = problem.responses(theta)
+    errors = problem.errors(responses)
+    norms, rms = problem.norms(errors), problem.rms(errors)
+    estimates: list[Estimate] = []
+    for i, name in enumerate(candidates):
+        angles = tuple(response.angle[i] for response in responses)
+        estimates.append(Estimate(name, theta[i], norms[i, :-1], norms[i, -1], rms[i], angles))
+        if not estimates[-1].usable:
+            _log.warning("the estimate %s diverged when it was simulated; it is not used", name)
+    return {e.name: e for e in sorted(estimates, key=lambda e: not e.usable)}
+
+
+class Watcher(Protocol):
+    """Takes the progress of a fit, and says when its time is up."""
+
+    def generation(self, row: Array) -> bool | None:
+        """Take a row of HISTORY; return whether the search is to end."""
+
+    def refining(self, name: str, simulated: int, rms: float) -> bool | None:
+        """Take the name of a least squares, its number of simulations, and its rms error [rad] so far; return
+        whether it is to end.
+        """
+
+
+class Ladder:
+    """The estimates of a fit while it climbs.
+
+    Attributes:
+        problem: with the settings of the estimate that is kept.
+        kept: that estimate.
+        estimates: all, by name.
+        refinements: by the estimate that each gave.
+        ends: how many of the starts at the end came as low as the lowest, and how many there were.
+    """
+
+    def __init__(
+        self, problem: Problem, estimates: dict[str, Estimate], watch: Watcher, checkpoints: Checkpoints
+    ) -> None:
+        self.problem, self.estimates, self.refinements = problem, estimates, dict[str, Descent]()
+        self.kept = min(estimates.values(), key=lambda e: e.rms if e.usable else np.inf)
+        self.ends = (1, 1)
+        self._watch, self._checkpoints, self._late = watch, checkpoints, False
+        self._left_out = dict[str, float]()
+
+    def climb(self, whole: Problem) -> None:
+        """Refine the estimate with each model and term that the settings of a fit's problem name."""
+        settings, refinement = whole.settings, whole.settings.refinement
+        assert refinement is not None
+        two = settings.stage == "hyd" and settings.simulation.model == "ladder"
+        climbs = two or bool(settings.terms)
+        for model in ("refined", "dynamic")[: 1 + two]:
+            terms = self.kept.name.split("+")[1:] if model == "dynamic" else []
+            self._rung(whole, "+".join([model, *terms]), climbs=climbs, if_nearer=model == "dynamic")
+            for term in settings.terms if self.kept.name == model else ():
+                self._rung(whole, f"{self.kept.name}+{term}", climbs=climbs, if_nearer=True)
+        if climbs:
+            self._keep(self._refined(self.problem, self.kept.theta, refinement, self.kept.name))
+        if settings.joint_refinement:
+            self._rung(whole, self.kept.name.replace("refined", "joint"), climbs=False, if_nearer=False)
+
+    def known(self, theta: Array) -> Uncertainty:
+        """Return how well the logs determine theta, (P,): the estimate that is kept, or one of a search."""
+        problem, descent, slopes = self.problem, self.refinements.get(self.kept.name), None
+        if descent is not None and len(descent.jacobian):  # what least squares ended with
+            parameters, free = problem.parameters, problem.parameters.free
+            change = estimate_box(parameters, theta).scale[free] / parameters.width(theta)[free]
+            slopes = descent.jacobian[: problem.measured.size].T * change[:, None]
+        return uncertainty(problem, theta, slopes)
+
+    def start_anew(self, known: Uncertainty) -> bool:
+        """Refine from further starts along the weakest directions; keep a lower end, and say whether.
+
+        Ends that are as low as the lowest stay among the estimates.
+        """
+        settings, name = self.problem.settings.refinement, self.kept.name
+        assert settings is not None
+        ends = {name: self.refinements[name]}
+        for number, theta in enumerate(_away(known, self.problem.settings.restarts), 1):
+            if self._late:
+                break
+            again = f"{name} again {number}"
+            ends[again] = self._refined(self.problem, theta, _firm(settings), again)
+        lowest = min(ends.values(), key=lambda end: end.cost)
+        as_low = {n: end for n, end in ends.items() if end.cost < (1 + MIN_GAIN) ** 2 * lowest.cost}
+        self.ends = len(as_low), len(ends)
+        for again, end in as_low.items():
+            if again != name:
+                self.estimates |= measured(self.problem, {again: self._theta(self.problem, end)})
+        if lowest.cost > (1 - FIRM) * ends[name].cost:
+            return False
+        theta = self._theta(self.problem, lowest)
+        self._keep(self._refined(self.problem, theta, settings, f"{name} lowest"))
+        return True
+
+    def _rung(self, whole: Problem, name: str, *, climbs: bool, if_nearer: bool) -> None:
+        """Refine with the settings of an estimate, from the one kept; keep the result where it is better.
+
+        climbs: whether it is enough to see that it is better. if_nearer: else it is kept in any case.
+        """
+        last, start, settings = self.problem, self.kept, whole.settings.refinement or RefinementSettings()
+        own = whole.varied(whole.settings.of_estimate(name))
+        theta = own.parameters.started(last.parameters.mapping(start.theta))
+        other_model = own.settings.quasi_static != last.settings.quasi_static
+        if if_nearer and (
+            self._late
+            or last.leaves_noise(start.theta)
+            or (other_model and _far(own, theta, TOO_FAR * start.rms))
+        ):
+            return
+        more = len(own.settings.terms) > len(last.settings.terms)  # other parameters may stand for it
+        if more or other_model:
+            rough = settings.changed({"gain_tolerance": ROUGH})
+            theta = self._theta(own, self._refined(own, theta, rough, f"{name} at first"))
+            if other_model and _far(own, theta, STILL_FAR * start.rms):
+                return
+        settings, step = (_firm(settings), f"{name} on the way") if climbs else (settings, name)
+        if more:
+            theta = each_alone(own, theta, settings, self._watch.refining, self._checkpoints, name)
+        result = self._refined(own, theta, settings, step)
+        if self._late and if_nearer:
+            return
+        new = measured(own, {name: self._theta(own, result)})[name]
+        nearer = new.rms < (1 - MIN_GAIN) * start.rms
+        if nearer and own.settings.terms != last.settings.terms:
+            without, with_it = self._error_left_out(last, start), self._error_left_out(own, new)
+            new = replace(new, left_out=(without, with_it))
+            nearer = with_it < (1 - MIN_GAIN) * without
+        self.estimates[name], self.refinements[name] = new, result
+        if nearer or not if_nearer:
+            self.problem, self.kept = own, new
+
+    def _refined(self, problem: Problem, theta: Array, settings: RefinementSettings, name: str) -> Descent:
+        result = refine(problem, theta, settings, self._watch.refining, self._checkpoints, name)
+        self._late |= result.ending is Ending.TIME
+        return result
+
+    def _keep(self, end: Descent) -> None:
+        """Take an end of least squares for the estimate that is kept."""
+        name, left_out = self.kept.name, self.kept.left_out
+        new = measured(self.problem, {name: self._theta(self.problem, end)})[name]
+        self.kept = self.estimates[name] = replace(new, left_out=left_out)
+        self.refinements[name] = end
+
+    def _theta(self, problem: Problem, end: Descent) -> Array:
+        return problem.parameters.from_unit(end.point)
+
+    def _error_left_out(self, problem: Problem, one: Estimate) -> float:
+        if one.name not in self._left_out:
+            self._left_out[one.name] = refitted(problem, one.theta).left_out
+        return self._left_out[one.name]
+
+
+def _firm(settings: RefinementSettings) -> RefinementSettings:
+    return settings.changed({"gain_tolerance": max(FIRM, settings.gain_tolerance)})
+
+
+def _far(problem: Problem, theta: Array, most: float) -> bool:
+    """Whether the rms error at theta, (P,), is above so many rad, or the simulation diverges."""
+    return not problem.rms(problem.output_errors(theta[None]))[0] < most
+
+
+def _away(known: Uncertainty, count: int) -> Iterator[Array]:
+    """Yield so many starts, (P,), each AWAY from the estimate along one of the weakest directions."""
+    box, root = known.linear.box, known.posterior.root
+    _, values, directions = np.linalg.svd(root)
+    for value, direction in zip(values[::-1][:count], directions[::-1], strict=False):
+        change = AWAY / value * direction
+        change *= min(1.0, FARTHEST / np.abs(change).max())
+        # to the side on which bounds leave more room
+        yield max(box.points(np.array([change, -change])), key=lambda theta: np.linalg.norm(theta - box.at))

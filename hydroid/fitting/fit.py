@@ -2,7 +2,7 @@
 
 import logging
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -25,10 +25,10 @@ class Fit:
 
     problem: with the settings of the estimate to use, which `final` names. estimates: by name, that of the
     search first. front: the non-dominated candidates, shape (n, P), and their objectives. history: shape
-    (G, len(HISTORY)). refinements: by the estimate that each gave. ends: how many of the starts at the end
-    came as low as the lowest, and how many there were. uncertainty, quantities: of the final estimate.
-    seconds: wall-clock time of "search", "refinement" and "uncertainty" [s]; of a resumed fit, since it was
-    resumed.
+    (G, len(HISTORY)). refinements: by the estimate that each gave. ends: costs at which the starts of a
+    multi-start ended, by the joint that was fitted alone (0: all together). uncertainty, quantities: of the
+    final estimate. seconds: wall-clock time of "search", "refinement" and "uncertainty" [s]; of a resumed
+    fit, since it was resumed.
     """
 
     problem: Problem
@@ -37,7 +37,7 @@ class Fit:
     front: tuple[Array, Evaluation]
     history: Array
     refinements: dict[str, Descent]
-    ends: tuple[int, int]
+    ends: Mapping[int, Sequence[float]]
     uncertainty: Uncertainty
     quantities: Quantities
     seconds: Mapping[str, float]
@@ -86,12 +86,10 @@ def fit(problem: Problem, watch: Watcher | None = None, checkpoints: Checkpoints
     times.append(time.perf_counter())
     last = ladder.problem
     about = ladder.known(estimates[final].theta)
-    if settings.refinement is not None and ladder.start_anew(about):
-        about = ladder.known(estimates[final].theta)
     determined, front, history = quantities(last, about), _front(searched), searched.history
     seconds = np.diff([*times, time.perf_counter()]).tolist()
     took: dict[str, float] = dict(zip(("search", "refinement", "uncertainty"), seconds, strict=True))
-    ends = ladder.refinements, ladder.ends
+    ends = ladder.refinements, searched.ends
     return Fit(last, estimates, final, front, history, *ends, about, determined, took)
 
 

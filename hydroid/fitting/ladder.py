@@ -3,13 +3,10 @@
 A rung is kept where it errs clearly less: another model on the fitted logs, another term on parts of the logs
 left out. Which rung that is shows long before least squares has converged, so that ends early on the way
 (`FIRM`). What is kept at the end is refined to the tolerance of the settings.
-
-At the end least squares starts anew, two standard deviations away along each of the weakest directions. A
-lower end is kept. How many of the ends are as low says whether there is one optimum.
 """
 
 import logging
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Protocol
 
@@ -33,8 +30,6 @@ TOO_FAR = 20.0
 oil in a quasi-static model are too much beside it, and it errs by several times as much at first"""
 STILL_FAR = 2.0  # the same after a rough refinement
 FIRM = 1e-3  # gain below which least squares ends where another rung may follow
-AWAY = 2.0  # standard deviations between the estimate and another start
-FARTHEST = 0.5  # relative change of any parameter to there
 
 
 @record
@@ -95,7 +90,6 @@ class Ladder:
         kept: that estimate.
         estimates: all, by name.
         refinements: by the estimate that each gave.
-        ends: how many of the starts at the end came as low as the lowest, and how many there were.
     """
 
     def __init__(
@@ -103,7 +97,6 @@ class Ladder:
     ) -> None:
         self.problem, self.estimates, self.refinements = problem, estimates, dict[str, Descent]()
         self.kept = min(estimates.values(), key=lambda e: e.rms if e.usable else np.inf)
-        self.ends = (1, 1)
         self._watch, self._checkpoints, self._late = watch, checkpoints, False
         self._left_out = dict[str, float]()
 
@@ -131,31 +124,6 @@ class Ladder:
             change = estimate_box(parameters, theta).scale[free] / parameters.width(theta)[free]
             slopes = descent.jacobian[: problem.measured.size].T * change[:, None]
         return uncertainty(problem, theta, slopes)
-
-    def start_anew(self, known: Uncertainty) -> bool:
-        """Refine from further starts along the weakest directions; keep a lower end, and say whether.
-
-        Ends that are as low as the lowest stay among the estimates.
-        """
-        settings, name = self.problem.settings.refinement, self.kept.name
-        assert settings is not None
-        ends = {name: self.refinements[name]}
-        for number, theta in enumerate(_away(known, self.problem.settings.restarts), 1):
-            if self._late:
-                break
-            again = f"{name} again {number}"
-            ends[again] = self._refined(self.problem, theta, _firm(settings), again)
-        lowest = min(ends.values(), key=lambda end: end.cost)
-        as_low = {n: end for n, end in ends.items() if end.cost < (1 + MIN_GAIN) ** 2 * lowest.cost}
-        self.ends = len(as_low), len(ends)
-        for again, end in as_low.items():
-            if again != name:
-                self.estimates |= measured(self.problem, {again: self._theta(self.problem, end)})
-        if lowest.cost > (1 - FIRM) * ends[name].cost:
-            return False
-        theta = self._theta(self.problem, lowest)
-        self._keep(self._refined(self.problem, theta, settings, f"{name} lowest"))
-        return True
 
     def _rung(self, whole: Problem, name: str, *, climbs: bool, if_nearer: bool) -> None:
         """Refine with the settings of an estimate, from the one kept; keep the result where it is better.
@@ -222,14 +190,3 @@ def _firm(settings: RefinementSettings) -> RefinementSettings:
 def _far(problem: Problem, theta: Array, most: float) -> bool:
     """Whether the rms error at theta, (P,), is above so many rad, or the simulation diverges."""
     return not problem.rms(problem.output_errors(theta[None]))[0] < most
-
-
-def _away(known: Uncertainty, count: int) -> Iterator[Array]:
-    """Yield so many starts, (P,), each AWAY from the estimate along one of the weakest directions."""
-    box, root = known.linear.box, known.posterior.root
-    _, values, directions = np.linalg.svd(root)
-    for value, direction in zip(values[::-1][:count], directions[::-1], strict=False):
-        change = AWAY / value * direction
-        change *= min(1.0, FARTHEST / np.abs(change).max())
-        # to the side on which bounds leave more room
-        yield max(box.points(np.array([change, -change])), key=lambda theta: np.linalg.norm(theta - box.at))

@@ -13,6 +13,7 @@ another start's. What the joints share (masses, the pump) stays at the start's v
 together is left to the refinement that follows the search.
 """
 
+from collections import defaultdict
 from operator import itemgetter
 
 import numpy as np
@@ -54,6 +55,8 @@ class Multistart:
         self._best: dict[int, tuple[float, Array]] = {}
         """the best fit of each joint alone, over the starts so far: its cost, and theta"""
         self._rms = np.inf
+        self.ends = defaultdict[int, list[float]](list)
+        """costs at which starts ended, by the joint fitted alone, 0: all together"""
 
     def ask(self, population: Population | None, rng: Generator) -> Genes:
         """The point that the next start reaches, shape (1, P)."""
@@ -66,6 +69,7 @@ class Multistart:
             self._rms = float(np.sqrt(np.mean(rows**2))) if np.isfinite(rows).all() else np.inf
         else:
             cost, theta = self._grown(self._problem, theta, f"start {number + 1}")
+            self.ends[0].append(cost)
             size = self._problem.measured.size + len(self._problem.priors)
             self._rms = float(np.sqrt(2 * cost / size))
         return theta[None]
@@ -96,6 +100,7 @@ class Multistart:
             if not problem.leaves_noise(tried[0][1]):
                 tried.append(self._grown(problem, theta, name))
             result = min(tried, key=COST)
+            self.ends[joint] += map(COST, tried)
             best = self._best[joint] = min(self._best.get(joint, result), result, key=COST)
             _, reached = best if number == self.settings.generations else result
             theta = np.where(problem.parameters.free, reached, theta)

@@ -1,7 +1,7 @@
 """The search over a problem: ask for candidates, simulate them, tell their objectives, store a checkpoint."""
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -29,6 +29,7 @@ class Searched:
         single: whether it minimised one objective, not that of each segment.
         history: shape (generations, len(HISTORY)).
         memo: all candidates simulated.
+        ends: costs at which the starts of a multi-start ended, by the joint that was fitted alone (0: all).
     """
 
     theta: Array
@@ -36,6 +37,7 @@ class Searched:
     single: bool
     history: Array
     memo: Memo
+    ends: Mapping[int, Sequence[float]]
 
 
 def search(
@@ -97,4 +99,5 @@ def search(
                 if not late:  # else a start may not have been refined to its end
                     keep(state)
                 late = watch(history[-1]) or late
-    return Searched(theta(population.chromosomes), population, algorithm.single, history, memo)
+    ends = algorithm.ends if isinstance(algorithm, Multistart) else {}
+    return Searched(theta(population.chromosomes), population, algorithm.single, history, memo, ends)

@@ -17,6 +17,8 @@ from hydroid.problem.problem import Problem
 
 STRAINED_ABOVE = 2.0
 """standard deviations from its prior beyond which an estimate strains it, if the logs determine it"""
+SAME_OPTIMUM = 1.04
+"""times the lowest cost up to which a start has found the same optimum: 2 % of the rms error"""
 _WARNINGS = ("at bound", "effect unknown")
 _NOTES = ("at zero", "no effect", "not identifiable", "prior only", "weakly identifiable")
 """of what is found about single parameters, the most important first"""
@@ -101,10 +103,10 @@ def fit_findings(fit: Fit) -> list[Finding]:
         findings.append(
             Finding("not converged", "warning", (fit.final,), {"ending": fit.refinement.ending.value})
         )
-    low, starts = fit.ends
-    if starts > 1:
-        kind, level = ("one optimum", "note") if low == starts else ("several optima", "warning")
-        findings.append(Finding(kind, level, (), {"low": str(low), "starts": str(starts)}))
+    apart = [joint for joint, ends in fit.ends.items() if max(ends) > SAME_OPTIMUM * min(ends)]
+    if apart:
+        names = [fit.problem.settings.arm.joint_names[joint - 1] for joint in apart if joint]
+        findings.append(Finding("several optima", "note", tuple(names or ["all joints"])))
     scores = zip(priors.names, priors.scores(fit.best.theta[None])[0].tolist(), strict=True)
     each = zip(fit.problem.parameters.names, fit.uncertainty.status, strict=True)
     vague = {name for name, s in each if s.source is Source.PRIOR or s.flag is Flag.UNIDENTIFIABLE}

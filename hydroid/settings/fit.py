@@ -63,9 +63,6 @@ class FitSettings(Settings):
     """the refinement's settings; null: no refinement, as in the article"""
     joint_refinement: bool = False
     """at the end, refine the parameters of both stages together: all that have bounds, fixed ones included"""
-    restarts: Annotated[int, Field(ge=0, le=100)] = 0
-    """number of further starts of the refinement at the end, each two standard deviations away along one of
-    the weakest directions; a lower end is kept"""
     design: DesignSettings = DesignSettings()
 
     @model_validator(mode="before")
@@ -117,12 +114,11 @@ class FitSettings(Settings):
     def of_estimate(self, name: str | None) -> "FitSettings":
         """Return the settings that an estimate of a fit was refined with, and predicts with.
 
-        `name` is that of the estimate, then those of the terms that it has: refined+pump, or one of its other
-        ends: refined+pump again 1; None: no fit's.
+        `name` is that of the estimate, then those of the terms that it has: refined+pump; None: no fit's.
         """
         if name is None:
             return self
-        model, *terms = name.partition(" ")[0].split("+")
+        model, *terms = name.split("+")
         settings = self
         if model == "joint":  # every parameter is free that can be
             free = {n: p.changed({"fixed": None}) for n, p in self.parameters.items() if p.can_be_free}

@@ -22,7 +22,7 @@ CONFIG = {
 }
 
 
-def _problem(name, **more):
+def _problem(name):
     """The fit of a simulated log whose machine is what an estimate of this name has."""
     changes = {
         "outputs": (2, 3),
@@ -31,7 +31,7 @@ def _problem(name, **more):
         "search.multistart": MultistartSettings(starts=1, horizons=()),
         "refinement": RefinementSettings(iterations=40),
     }
-    ladder = settings_of(CONFIG, bulk_modulus=20.0).changed(changes | more)
+    ladder = settings_of(CONFIG, bulk_modulus=20.0).changed(changes)
     machine = ladder.of_estimate(name)
     log = step_log(machine.arm.pose("study"), {2: SHOULDER, 3: ELBOW})
     exact = simulate_log(machine, log, {n: TRUTH[n] for n in CONFIG if n in machine.parameters})
@@ -65,7 +65,7 @@ class Hurried(Silent):
 
 
 def test_a_fit_without_time_says_so_and_goes_on_to_the_bits_of_one_with_time():
-    problem, stored, calls = _problem("refined+pump", restarts=1), {}, Hurried(10_000)
+    problem, stored, calls = _problem("refined+pump"), {}, Hurried(10_000)
     whole = fit(problem, calls)
     used = 10_000 - calls.calls
     early = [fit(problem, Hurried(round(part * used)), stored) for part in (0.02, 0.2, 0.3)]
@@ -75,4 +75,5 @@ def test_a_fit_without_time_says_so_and_goes_on_to_the_bits_of_one_with_time():
     late = fit(problem, checkpoints=stored)
     assert late.final == whole.final
     np.testing.assert_array_equal(late.best.theta, whole.best.theta)
-    assert whole.ends == late.ends == (2, 2)  # one optimum
+    assert whole.ends == late.ends
+    assert [*whole.ends] == [0]  # no joint has parameters of its own

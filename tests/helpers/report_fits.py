@@ -109,6 +109,7 @@ def make_fit(
         ),
         history,
         {"refined": refined} if "refined" in names else {},
+        {},
         uncertain,
         make_quantities(problem),
         {"search": 2.0, "refinement": 1.0, "uncertainty": 0.5},

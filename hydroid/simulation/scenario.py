@@ -8,7 +8,7 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
 from hydroid.arm.locked import LockedArm, lock
-from hydroid.arrays import Array, Index, Mask, Structs, record
+from hydroid.arrays import Array, Index, Ints, Mask, Structs, record
 from hydroid.errors import SettingsError
 from hydroid.hydraulics.actuator import at_rest, make_plugin, swallowed
 from hydroid.hydraulics.kernel import Plugin
@@ -104,6 +104,10 @@ class Response:
     angle: Array
     feasible: Mask
     pressure: Array | None = None
+
+    def __getitem__(self, rows: Ints) -> "Response":
+        pressure = None if self.pressure is None else self.pressure[rows]
+        return Response(self.angle[rows], self.feasible[rows], pressure)
 
 
 class Scenario:

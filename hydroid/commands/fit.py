@@ -131,9 +131,8 @@ def fit(
     names = [Path(log.source).name for log in read]
     if stray := sorted(set(settings.payloads) - set(names)):  # misspelt, it would be left out silently
         raise SettingsError("is none of the logs", f"payloads.{stray[0]}", f"logs: {', '.join(names)}")
-    groups = {OTHER, *map(settings.log.group_of, names)}
-    free = {p.per for p in settings.parameters.values() if p.per is not None and p.fixed is None}
-    if empty := sorted(free - groups):
+    groups = {None, OTHER, *map(settings.log.group_of, names)}
+    if empty := [p.per for p in settings.parameters.values() if p.fixed is None and p.per not in groups]:
         raise SettingsError(
             "none of the logs is in it", f"log.groups.{empty[0]}", f"logs: {', '.join(names)}"
         )

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hydroid.arrays import Array, Ints, Mask, record
+from hydroid.arrays import Array, Mask, record
 from hydroid.errors import SettingsError
 from hydroid.hydraulics.records import Records, nominal_joints
 from hydroid.quantity_table import QUANTITIES, TARGETS
@@ -69,18 +69,6 @@ class Bindings:
                 least = QUANTITIES[row.quantity].lowest
                 target[:, row.places] = np.maximum(target[:, row.places] + value * factor, least * factor)
         return Candidates(joints, mass)
-
-    def distinct(self, theta: Array, log: str) -> tuple[Array, Ints]:
-        """Return those of n candidates, (n, P), that differ in a log, and which of them each one is, (n,).
-
-        Parameters of other groups of logs do not act there.
-        """
-        group = self._group_of(log)
-        acting = sorted({row.column for row in self._rows if row.group in (None, group)})
-        if len(acting) == theta.shape[1]:
-            return theta, np.arange(len(theta))
-        _, first, place = np.unique(theta[:, acting], axis=0, return_index=True, return_inverse=True)
-        return theta[first], place.ravel()
 
     def refuse_idle(self, driven: Mask, outputs: Sequence[int]) -> None:
         """Refuse driven, (J,), or compared joints, 0-based, for which stage 1 has no gain or no damping."""

@@ -200,12 +200,8 @@ class Problem:
 
     def responses(self, theta: Array) -> list[Response]:
         """Simulate theta, shape (n, P); return one response of n candidates per log."""
-        responses = list[Response]()
-        for simulation, log in zip(self._simulations, self.logs, strict=True):
-            some, place = self.bindings.distinct(theta, log.source)
-            response = simulation.simulate(self.bindings.candidates(some, log.source))
-            responses.append(response if some is theta else response[place])
-        return responses
+        pairs = zip(self._simulations, self.logs, strict=True)
+        return [one.simulate(self.bindings.candidates(theta, log.source)) for one, log in pairs]
 
     def unfiltered(self, residuals: Array) -> Array:
         """Return output errors from residuals, shape (n, R)."""

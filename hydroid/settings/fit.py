@@ -15,7 +15,7 @@ from hydroid.quantity_table import MECHANICAL
 from hydroid.settings.arm import Arm, load_arm
 from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.load import JointNumber, Positive, Settings, load, validate
-from hydroid.settings.log import OTHER, LogSettings
+from hydroid.settings.log import LogSettings
 from hydroid.settings.parameters import by_group, expanded, make_parameter
 from hydroid.settings.problem import ObjectiveSettings, ParameterSettings, PriorSettings, SimulationSettings
 from hydroid.settings.search import DesignSettings, RefinementSettings, SearchSettings
@@ -95,8 +95,6 @@ class FitSettings(Settings):
                 raise ValueError(f"parameters.{name}: stage mech has no {own.quantity}; set stage: hyd")
             if self.stage == "hyd" and own.quantity == "gain":
                 raise ValueError(f"parameters.{name}: stage hyd has no gain; the hydraulics take its place")
-            if own.per not in (None, OTHER, *self.log.groups):
-                raise ValueError(f"parameters.{name}: log.groups has no {own.per}")
         self.parameter_set()
         return self
 

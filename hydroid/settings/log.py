@@ -18,6 +18,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, Valida
 from hydroid.errors import SettingsError
 from hydroid.files import Plain
 from hydroid.settings.load import JointNumber, Settings
+from hydroid.words import listed
 
 JOINT = "{joint}"
 OTHER = "other"
@@ -36,7 +37,6 @@ def _one_or_more(given: str | tuple[str, ...]) -> tuple[str, ...]:
 
 
 Name = Annotated[str, Field(min_length=1)]
-Word = Annotated[str, Field(pattern=r"^\w+$")]
 Number = Annotated[float, Field(ge=-1e12, le=1e12)]
 
 
@@ -134,9 +134,11 @@ class LogSettings(Settings):
     faster log are averaged over the period, those of a slower one change on a line from sample to sample"""
     delay_s: Annotated[float, Field(ge=-10, le=10)] = 0.0
     """transport delay: commands act this much later than logged [s]"""
-    groups: dict[Word, Annotated[tuple[Name, ...], BeforeValidator(_one_or_more)]] = {}
-    """logs that share a day, an oil temperature or an operator: a pattern of file names, or several, by a name
-    of your choice, as in {monday: mon_*.csv}. Parameters may have an effect in each (`per: group`)"""
+    groups: dict[
+        Annotated[str, Field(pattern=r"^\w+$")], Annotated[tuple[Name, ...], BeforeValidator(_one_or_more)]
+    ] = {}
+    """logs that share a day, an oil temperature or an operator, by a name of your choice: a pattern of file
+    names, or several, as in {monday: mon_*.csv}. Parameters may have an effect in each (`per: group`)"""
     repair_s: Annotated[float, Field(ge=0, le=10)] = 0.1
     """longest gap that --repair fills [s]"""
 
@@ -160,9 +162,9 @@ class LogSettings(Settings):
         Raises SettingsError: it is in several.
         """
         name = Path(log).name
-        of = [group for group, patterns in self.groups.items() if any(fnmatch(name, p) for p in patterns)]
-        if len(of) > 1:
-            raise SettingsError(f"{name} is in the groups {of[0]} and {of[1]}", "log.groups")
+        of = [group for group, patterns in self.groups.items() for p in patterns if fnmatch(name, p)]
+        if len({*of}) > 1:
+            raise SettingsError(f"{name} is in the groups {listed(of)}", "log.groups")
         return of[0] if of else OTHER
 
     def of_arm(self, side: str) -> "LogSettings":

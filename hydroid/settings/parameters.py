@@ -69,14 +69,13 @@ def by_group(parameters: Mapping[str, Any], groups: Collection[str]) -> Plain:
     """
     result: Plain = {}
     for name, entry in parameters.items():
-        if not (isinstance(entry, dict) and entry.get("per") == GROUP):
+        if not isinstance(entry, dict) or entry.get("per") != GROUP:
             result[name] = result.get(name, {}) | entry if isinstance(entry, dict) else entry
             continue
         if not groups or GROUP in groups:
-            raise ValueError(
-                f"parameters.{name}: per: group needs log.groups: {{name: pattern}}, none of them named group"
-            )
-        for group in dict.fromkeys((*groups, OTHER)):
+            what = "per: group needs log.groups: {name: pattern}, none of them named group"
+            raise ValueError(f"parameters.{name}: {what}")
+        for group in (*groups, OTHER):
             own = f"{name}_{group}"
             result[own] = entry | {"per": group} | result.get(own, parameters.get(own, {}))
     return result

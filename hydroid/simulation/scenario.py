@@ -8,7 +8,7 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
 from hydroid.arm.locked import LockedArm, lock
-from hydroid.arrays import Array, Index, Ints, Mask, Structs, record
+from hydroid.arrays import Array, Index, Mask, Structs, record
 from hydroid.errors import SettingsError
 from hydroid.hydraulics.actuator import at_rest, make_plugin, swallowed
 from hydroid.hydraulics.kernel import Plugin
@@ -92,6 +92,11 @@ class Candidates:
     def __getitem__(self, rows: slice | Index) -> "Candidates":
         return Candidates(self.joints[rows], self.mass[rows])  # pyright: ignore[reportArgumentType]
 
+    def distinct(self) -> tuple[Index, Index]:
+        """Return the rows of those that differ, m of n, and which of these each one is, shape (n,)."""
+        each = [j.tobytes() + m.tobytes() for j, m in zip(self.joints, self.mass, strict=True)]
+        return np.unique(each, return_index=True, return_inverse=True)[1:]
+
 
 @record
 class Response:
@@ -105,7 +110,7 @@ class Response:
     feasible: Mask
     pressure: Array | None = None
 
-    def __getitem__(self, rows: Ints) -> "Response":
+    def __getitem__(self, rows: Index) -> "Response":
         pressure = None if self.pressure is None else self.pressure[rows]
         return Response(self.angle[rows], self.feasible[rows], pressure)
 

@@ -56,6 +56,9 @@ class Simulation:
 
         The first is the start. A candidate without a force-stroke curve, or that diverged, is infeasible.
         """
+        first, place = candidates.distinct()
+        if len(first) < len(place):  # those that differ in other groups of logs alone
+            return self.simulate(candidates[first])[place]
         scenario, n, wanted = self.scenario, len(candidates), self._pressures
         samples = 1 + len(scenario.command) // scenario.settings.steps
         angle = np.full((n, samples, len(scenario.outputs)), np.nan)

@@ -1,16 +1,17 @@
 """Adaptation: a fit moved to a changed machine by a few of its parameters, all others held at its estimate.
 
 Which few is found by trying: the one that lowers the error most on parts of the logs left out is freed, then
-the next, until none lowers it by 5 %. Each joint counts by its error before: what one errs by in degrees must
-not hide that another's is halved. Candidates are what all joints share, such as the pump and the masses, and
-the effects of the logs' groups: what a load, a slower engine or another day changes.
+the next, until none lowers it by 5 % on every part: what helps in one half of a log alone may be chance. Each
+joint counts by its error before: what one errs by in degrees must not hide that another's is halved. Candidates
+are what all joints share, such as the pump and the masses, and the effects of the logs' groups: what a load, a
+slower engine or another day changes.
 """
 
 from collections.abc import Sequence
 
 import numpy as np
 
-from hydroid.advice.growth import MIN_RESIDUAL, Refit, refitted
+from hydroid.advice.growth import MIN_RESIDUAL, Refit, parts, refitted
 from hydroid.arrays import rms
 from hydroid.errors import SettingsError
 from hydroid.files import Plain
@@ -20,9 +21,6 @@ from hydroid.problem.problem import Problem
 from hydroid.progress import Progress, no_progress
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.search import MultistartSettings, RefinementSettings
-
-LEAST = np.degrees(MIN_RESIDUAL)
-"""added to every error: those of a joint at its noise say nothing [deg]"""
 
 
 def adapted(model: IdentifiedModel, free: Sequence[str]) -> FitSettings:
@@ -83,7 +81,7 @@ def steps(
             own = problem.varied(adapted(model, [*taken, trial]))
             # the noise, beside which priors count, is that of the adapted model
             trials[trial] = refitted(own, refitted(own, last.theta).theta)
-        errors = {trial: _share(one, last) for trial, one in trials.items()}
+        errors = {trial: _share(problem, one, last) for trial, one in trials.items()}
         name = min(errors, key=lambda trial: errors[trial], default="")
         if not name or (not free and errors[name] > 0.95):
             return path
@@ -91,9 +89,16 @@ def steps(
         pool.remove(name)
 
 
-def _share(trial: Refit, before: Refit) -> float:
-    """Return the rms over the joints of the error on parts left out, as a part of what it was before."""
+def _share(problem: Problem, trial: Refit, before: Refit) -> float:
+    """Return the error as a part of what it was, an rms over the joints, on the part that gains least."""
     if not np.isfinite([trial.left_out, before.left_out]).all():
         return trial.left_out
-    parts = [(trial.by_joint[name] or 0.0, error or 0.0) for name, error in before.by_joint.items()]
-    return rms(np.array([(after + LEAST) / (error + LEAST) for after, error in parts]))
+    number, shares = parts(problem), list[float]()
+    for part in np.unique(number):
+        rows = [np.flatnonzero(number[c.rows] == part) + c.rows.start for c in problem.channels]
+        after, error = (
+            np.array([rms(one.errors[some]) + MIN_RESIDUAL for some in rows if some.size])
+            for one in (trial, before)
+        )
+        shares.append(rms(after / error))
+    return max(shares)

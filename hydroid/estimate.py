@@ -134,6 +134,8 @@ class JointVerdict(Settings):
     """error up to which it predicts"""
     inside_percent: float | None = None
     """part of the samples of the unseen logs inside the 95 % bands; null: there are none"""
+    expected_deg: float | None = None
+    """what a fit of several logs expects of the unseen ones; null: of one log, or there are none"""
     baselines_deg: dict[str, float] = {}
     """of the baselines on the unseen logs, or on the fitted logs where there are no others"""
     horizons_deg: dict[str, tuple[float | None, ...]] = {}

@@ -47,6 +47,7 @@ class Parameter:
         log: whether it is searched, refined and reported by its logarithm; the lower bound is then above 0.
         start: where a search starts; None: no parameter of the set states a start.
         prior: what is known besides the logs.
+        least: what a relative change of 1 is at least, in the unit.
     """
 
     name: str
@@ -57,6 +58,7 @@ class Parameter:
     log: bool = False
     start: float | None = None
     prior: Prior | None = None
+    least: float = 0.0
 
     def position(self, value: Array | float) -> Array:
         """Return where values lie on the parameter's scale: 0 at the lower bound, 1 at the upper one."""

@@ -1,13 +1,18 @@
 """Adaptation: a fit moved to a changed machine by a few of its parameters, all others held at its estimate.
 
 Which few is found by trying: the one that lowers the error most on parts of the logs left out is freed, then
-the next, until none lowers it by 5 %. Candidates are what all joints share, such as the pump and the
-masses: what a load, a slower engine or another day changes.
+the next, until none lowers it by 5 % on every part: what helps in one half of a log alone may be chance. Each
+joint counts by its error before: what one errs by in degrees must not hide that another's is halved.
+Candidates are what all joints share, such as the pump and the masses, and the effects of the logs' groups:
+what a load, a slower engine or another day changes.
 """
 
 from collections.abc import Sequence
 
-from hydroid.advice.growth import Refit, refitted
+import numpy as np
+
+from hydroid.advice.growth import MIN_RESIDUAL, Refit, parts, refitted
+from hydroid.arrays import rms
 from hydroid.errors import SettingsError
 from hydroid.files import Plain
 from hydroid.identified_model import IdentifiedModel
@@ -56,8 +61,14 @@ def steps(
 
     `free` are those to be freed; without any, those that pay. Errors are those of parts of the logs left out.
     """
-    shared = {n: p for n, p in model.settings.parameters.items() if p.joints is None and p.can_be_free}
-    pool = list(free) or [n for n, p in shared.items() if p.fixed is None or p.term is not None]
+    groups = {model.settings.log.group_of(log.source) for log in logs}
+    pool = list(free) or [
+        name
+        for name, p in model.settings.parameters.items()
+        if (p.joints is None if p.per is None else p.per in groups)
+        and p.can_be_free
+        and (p.fixed is None or p.term is not None)
+    ]
     problem, taken = Problem(adapted(model, pool), logs), list[str]()
     last = Refit.of(problem, model.theta, problem.output_errors(model.theta[None]))
     path = list[Plain]()
@@ -70,8 +81,24 @@ def steps(
             own = problem.varied(adapted(model, [*taken, trial]))
             # the noise, beside which priors count, is that of the adapted model
             trials[trial] = refitted(own, refitted(own, last.theta).theta)
-        name = min(trials, key=lambda name: trials[name].left_out, default="")
-        if not name or (not free and trials[name].left_out > 0.95 * last.left_out):
+        errors = {trial: _share(problem, one, last) for trial, one in trials.items()}
+        name = min(errors, key=lambda trial: errors[trial], default="")
+        if not name or (not free and errors[name] > 0.95):
             return path
         taken, last = [*taken, name], trials[name]
         pool.remove(name)
+
+
+def _share(problem: Problem, trial: Refit, before: Refit) -> float:
+    """Return the error as a part of what it was, an rms over the joints, on the part that gains least."""
+    if not np.isfinite([trial.left_out, before.left_out]).all():
+        return trial.left_out
+    number, shares = parts(problem), list[float]()
+    for part in np.unique(number):
+        rows = [np.flatnonzero(number[c.rows] == part) + c.rows.start for c in problem.channels]
+        after, error = (
+            np.array([rms(one.errors[some]) + MIN_RESIDUAL for some in rows if some.size])
+            for one in (trial, before)
+        )
+        shares.append(rms(after / error))
+    return max(shares)

@@ -169,18 +169,20 @@ class Refit:
         left_out: rms error of the angles on each part of the samples, of refinements without that part [rad];
             infinite where the start cannot be simulated.
         by_joint: the same of each joint by name [deg].
+        errors: the same of all samples, weighted [rad], shape (R,).
     """
 
     theta: Array
     left_out: float = math.inf
     by_joint: Mapping[str, float | None] = field(default_factory=dict[str, float | None])
+    errors: Array = field(default_factory=partial(np.empty, 0))
 
     @classmethod
     def of(cls, problem: Problem, theta: Array, errors: Array) -> "Refit":
         """Judge a refinement by the output errors of samples that it has not seen, shape (1, R)."""
         names, settings = problem.settings.arm.joint_names, problem.settings
         by_joint = {names[j - 1]: finite(np.degrees(problem.rms(errors, [j])[0])) for j in settings.outputs}
-        return cls(theta, problem.rms(errors)[0], by_joint)
+        return cls(theta, problem.rms(errors)[0], by_joint, errors[0])
 
 
 def score_terms(problem: Problem, known: Uncertainty, progress: Progress = no_progress) -> list[Candidate]:
@@ -223,10 +225,7 @@ def refitted(problem: Problem, theta: Array, weight: float | None = None) -> Ref
     here = rows(best[None])[0]
     if not np.isfinite(here).all():
         return Refit(theta)
-    several, number = len(problem.logs) > 1, np.zeros(here.size)
-    for c in problem.channels:
-        halves = np.arange(len(c.measured)) >= len(c.measured) // 2
-        number[c.rows] = 1 + (c.log % 3 if several else halves)
+    several, number = len(problem.logs) > 1, np.append(parts(problem), np.zeros(here.size - size))
     for part in np.unique(number[:size]):
         out = number == part
         if several:  # only the other logs are simulated
@@ -240,6 +239,15 @@ def refitted(problem: Problem, theta: Array, weight: float | None = None) -> Ref
 
 def _some(rows: Function, kept: Mask, theta: Array) -> Array:
     return rows(theta)[:, kept]
+
+
+def parts(problem: Problem) -> Array:
+    """Return which part each sample is in, from 1, shape (R,)."""
+    number = np.empty(problem.measured.size)
+    for c in problem.channels:
+        halves = np.arange(len(c.measured)) >= len(c.measured) // 2
+        number[c.rows] = 1 + (c.log % 3 if len(problem.logs) > 1 else halves)
+    return number
 
 
 def _tested(term: Term, problem: Problem, known: Uncertainty, fit: Explained) -> list[Candidate]:

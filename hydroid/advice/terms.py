@@ -82,7 +82,7 @@ def _split(problem: Problem, theta: Array) -> Iterator[Term]:
     settings = problem.settings
     for parameter, value in zip(problem.parameters.parameters, theta.tolist(), strict=True):
         name, p = parameter.name, settings.parameters[parameter.name]
-        if p.fixed is not None or p.logs is not None:
+        if p.fixed is not None or p.per is not None:
             continue
         sides, joints, parts = TARGETS[p.quantity], _joints(settings, p), dict[str, list[dict[str, Any]]]()
         if len(sides) == 2:
@@ -99,7 +99,7 @@ def _split(problem: Problem, theta: Array) -> Iterator[Term]:
 def _nominal(problem: Problem) -> Iterator[Term]:
     """Yield what no parameter sets: of all joints together and each, of both sides together and each."""
     settings, joints = problem.settings, problem.active_joints
-    always = [p for p in settings.parameters.values() if p.logs is None]
+    always = [p for p in settings.parameters.values() if p.per is None]
     taken = {(t, j) for p in always for t in TARGETS[p.quantity] for j in _joints(settings, p) or (0,)}
     gauged, alone = any(log.pressure is not None for log in problem.logs), len(joints) == 1
     for row in ROWS:

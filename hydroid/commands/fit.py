@@ -14,6 +14,7 @@ from hydroid.estimate import NAME, FitSummary
 from hydroid.files import write_atomic
 from hydroid.identified_model import IdentifiedModel
 from hydroid.settings.fit import FitSettings
+from hydroid.settings.log import OTHER
 
 if TYPE_CHECKING:
     import pandas
@@ -130,6 +131,11 @@ def fit(
     names = [Path(log.source).name for log in read]
     if stray := sorted(set(settings.payloads) - set(names)):  # misspelt, it would be left out silently
         raise SettingsError("is none of the logs", f"payloads.{stray[0]}", f"logs: {', '.join(names)}")
+    groups = {None, OTHER, *map(settings.log.group_of, names)}
+    if empty := [p.per for p in settings.parameters.values() if p.fixed is None and p.per not in groups]:
+        raise SettingsError(
+            "none of the logs is in it", f"log.groups.{empty[0]}", f"logs: {', '.join(names)}"
+        )
     from hydroid.fitting.fit import fit as run_fit
     from hydroid.problem.problem import Problem
     from hydroid.run.folder import RunFolder

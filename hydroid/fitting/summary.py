@@ -8,7 +8,6 @@ import numpy as np
 from hydroid.estimate import FitSummary, NamedEstimate, ParameterEstimate, finite, finite_ends
 from hydroid.findings import Finding
 from hydroid.fitting.fit import Fit
-from hydroid.parameters import ParameterSet
 from hydroid.posterior.by_log import by_log
 from hydroid.posterior.identifiability import identifiability
 from hydroid.posterior.noise import error_level
@@ -79,7 +78,7 @@ def account(problem: Problem, known: Uncertainty) -> FitSummary:
     for channel, noise in zip(problem.channels, known.noise, strict=True):
         if channel.quantity == "angle":
             squares[f"q{channel.joint}"].append(error_level(channel, noise) ** 2)
-    findings = _parameter_findings(parameters, estimate)
+    findings = _parameter_findings(problem, estimate)
     findings += [Finding("logs disagree", "warning", logs.differing)] if logs.differing else []
     combinations = identifiability(problem, known).combinations
     # six of them: the table of directions has all
@@ -123,14 +122,19 @@ def fit_findings(fit: Fit) -> list[Finding]:
     return [*findings, *([Finding("quantities open", "note", tuple(lost))] if lost else [])]
 
 
-def _parameter_findings(parameters: ParameterSet, estimate: Mapping[str, ParameterEstimate]) -> list[Finding]:
-    """What is to be said about what the logs determine; a bound of 0 cannot be widened."""
+def _parameter_findings(problem: Problem, estimate: Mapping[str, ParameterEstimate]) -> list[Finding]:
+    """What is to be said about what the logs determine; a bound of 0 cannot be widened.
+
+    That no log has an effect of other groups is meant to be so.
+    """
     kinds = defaultdict[tuple[str, str], list[str]](list)
-    for parameter in parameters.parameters:
+    for parameter in problem.parameters.parameters:
         one = estimate[parameter.name]
         idle, zero = one.flag == Flag.NO_EFFECT, one.at_bound == "lower" and parameter.lower == 0
         if one.at_bound and not idle:
             kinds["at zero" if zero else "at bound", one.at_bound].append(parameter.name)
+        if idle and problem.settings.parameters[parameter.name].per:
+            continue
         kind = one.source if one.source == Source.PRIOR and not idle else one.flag
         kinds[str(kind), ""].append(parameter.name)
         if one.effect_deg is None and one.flag != Flag.FIXED:  # simulations diverge where it is changed

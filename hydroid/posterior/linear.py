@@ -135,11 +135,12 @@ def linearised(problem: Problem, theta: Array, first: Array | None = None) -> Li
 def estimate_box(parameters: ParameterSet, theta: Array) -> Box:
     """Return theta, (P,), between its bounds, with the scale of relative changes; the free ones vary.
 
-    A relative change of 1 is the value; on a linear scale at least a hundredth of the bounds' width.
+    A relative change of 1 is the value; on a linear scale at least a hundredth of the bounds' width, of an
+    effect of a group its prior's standard deviation.
     Raises SettingsError: a free parameter on a log scale is 0.
     """
     least = np.where(parameters.log, 0.0, 0.01 * (parameters.upper - parameters.lower))
-    scale = np.maximum(np.abs(theta), least)
+    scale = np.maximum(np.maximum(np.abs(theta), least), [p.least for p in parameters.parameters])
     for name in parameters.named(parameters.free & (scale == 0)):
         raise SettingsError(
             f"parameter {name} is 0", hint="it is on a log scale: state a value above 0, or fix it"

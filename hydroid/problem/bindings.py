@@ -1,8 +1,6 @@
 """Where each parameter of a fit enters the model (article section 3, equations (15) and (16))."""
 
 from collections.abc import Sequence
-from fnmatch import fnmatch
-from pathlib import Path
 
 import numpy as np
 
@@ -20,13 +18,13 @@ from hydroid.simulation import Candidates
 class Binding:
     """One column of theta sets one quantity of some joints, or the mass of a link, 0-based.
 
-    With a pattern of logs it is added to what is set otherwise, in these logs alone.
+    With a group of logs it is added to what is set otherwise, in these logs alone.
     """
 
     column: int
     quantity: str
     places: list[int]
-    logs: str | None
+    group: str | None
 
 
 class Bindings:
@@ -38,19 +36,19 @@ class Bindings:
     """
 
     def __init__(self, settings: FitSettings) -> None:
-        self._arm, self._stage = settings.arm, settings.stage
+        self._arm, self._stage, self._group_of = settings.arm, settings.stage, settings.log.group_of
         self._nominal = nominal_joints(settings.arm, settings.hydraulics)
         rows = [
-            Binding(column, quantity, _places(settings.arm, name, p), p.logs)
+            Binding(column, quantity, _places(settings.arm, name, p), p.per)
             for column, (name, p) in enumerate(settings.parameters.items())
             for quantity in TARGETS[p.quantity]
         ]
-        self._rows = sorted(rows, key=lambda row: row.logs is not None)  # what is added comes last
+        self._rows = sorted(rows, key=lambda row: row.group is not None)  # what is added comes last
         names, taken = list(settings.parameters), dict[tuple[str, int, str | None], str]()
         for row in self._rows:
             name = names[row.column]
             for place in row.places:
-                if (other := taken.setdefault((row.quantity, place, row.logs), name)) != name:
+                if (other := taken.setdefault((row.quantity, place, row.group), name)) != name:
                     raise SettingsError(
                         f"{other} and {name} both set the {row.quantity} of the same joint or link",
                         f"parameters.{name}",
@@ -59,14 +57,15 @@ class Bindings:
 
     def candidates(self, theta: Array, log: str = "") -> Candidates:
         """Spread theta, shape (n, P), over joints and links, in SI, as they are in a log of this name."""
+        group = self._group_of(log)
         joints: Records = np.tile(self._nominal, (len(theta), 1)).view(np.recarray)
         mass = np.tile(self._arm.masses, (len(theta), 1))
         for row in self._rows:
             target = mass if row.quantity == "mass" else joints[row.quantity]
             value, factor = theta[:, row.column, None], QUANTITIES[row.quantity].factor
-            if row.logs is None:
+            if row.group is None:
                 target[:, row.places] = value * factor
-            elif fnmatch(Path(log).name, row.logs):
+            elif row.group == group:
                 least = QUANTITIES[row.quantity].lowest
                 target[:, row.places] = np.maximum(target[:, row.places] + value * factor, least * factor)
         return Candidates(joints, mass)

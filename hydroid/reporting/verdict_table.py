@@ -10,6 +10,7 @@ from hydroid.files import Plain
 from hydroid.findings import Finding
 from hydroid.fitting.baselines import NAMES
 from hydroid.fitting.validation import HORIZONS
+from hydroid.fitting.verdict import WORSE
 from hydroid.reporting.page import Cell, Given, Section, Table, short_name, shown
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
@@ -151,13 +152,18 @@ def next_step(
     settings: FitSettings, verdicts: Sequence[JointVerdict], folder: str, logs: str = "LOG.csv"
 ) -> Finding:
     """Return what to do after a fit of `logs` in a run folder, with its command."""
-    run = shlex.quote(folder)
+    run, changed = shlex.quote(folder), list[str]()
+    for one in verdicts:
+        if one.verdict != "predicts" and (one.unseen_deg or 0.0) > WORSE * (one.expected_deg or np.inf):
+            changed.append(one.name)
     if settings.stage == "mech":
         kind, command = "fit the hydraulics", f"hydroid fit-hyd {logs} --mech {run}"
     elif any(one.verdict == "not tested" for one in verdicts):
         kind, command = "predict unseen", f"hydroid validate OTHER.csv --fit {run}"
     elif all(one.verdict == "predicts" for one in verdicts):
         kind, command = "use the machine", f"hydroid simulate COMMANDS.csv --fit {run}"
+    elif changed:
+        kind, command = "machine changed", f"hydroid adapt UNSEEN.csv --fit {run}"
     else:
         kind, command = "look for terms", f"hydroid suggest --fit {run}"
-    return Finding(kind, "note", (), {"command": command})
+    return Finding(kind, "note", tuple(changed), {"command": command})

@@ -16,7 +16,7 @@ from hydroid.settings.arm import Arm, load_arm
 from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.load import JointNumber, Positive, Settings, load, validate
 from hydroid.settings.log import LogSettings
-from hydroid.settings.parameters import expanded, make_parameter
+from hydroid.settings.parameters import by_group, expanded, make_parameter
 from hydroid.settings.problem import ObjectiveSettings, ParameterSettings, PriorSettings, SimulationSettings
 from hydroid.settings.search import DesignSettings, RefinementSettings, SearchSettings
 
@@ -80,7 +80,10 @@ class FitSettings(Settings):
             info.context["arm"] = known
         if isinstance(names, dict):
             compared = values.get("outputs", cls.model_fields["outputs"].default)
-            values = {**values, "parameters": expanded(names, compared, known)}
+            log = values.get("log")
+            groups = log.get("groups") if isinstance(log, dict) else getattr(log, "groups", None)
+            entries = by_group(expanded(names, compared, known), groups if isinstance(groups, dict) else ())
+            values = {**values, "parameters": entries}
         return {**values, "arm": arm}
 
     @model_validator(mode="after")

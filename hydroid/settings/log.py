@@ -9,14 +9,20 @@ log:
 """
 
 from dataclasses import dataclass
+from fnmatch import fnmatch
+from pathlib import Path
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, ValidationInfo
 
+from hydroid.errors import SettingsError
 from hydroid.files import Plain
 from hydroid.settings.load import JointNumber, Settings
+from hydroid.words import listed
 
 JOINT = "{joint}"
+OTHER = "other"
+"""the group of logs that are in no group of `groups`"""
 Kind = Literal["command", "angle", "pressure"]
 
 
@@ -24,6 +30,10 @@ def _nonzero(value: float | None) -> float | None:
     if value == 0:
         raise ValueError("must not be 0")
     return value
+
+
+def _one_or_more(given: str | tuple[str, ...]) -> tuple[str, ...]:
+    return (given,) if isinstance(given, str) else given
 
 
 Name = Annotated[str, Field(min_length=1)]
@@ -42,9 +52,7 @@ class TimeColumn(Settings):
 class Columns(Settings):
     """Columns of one quantity: value = scale · cell + offset. Null: as for all joints, or the default."""
 
-    column: Annotated[
-        tuple[Name, ...] | None, BeforeValidator(lambda given: (given,) if isinstance(given, str) else given)
-    ] = None
+    column: Annotated[tuple[Name, ...] | None, BeforeValidator(_one_or_more)] = None
     """name in the header, with {joint} for the joint's number; or two names: the positive and the negative
     direction of a command, whose values lie in [0, 100] % and are subtracted; chamber A, which pushes to
     positive angles, and chamber B of a pressure. Default: u{joint}_pct, q{joint}_deg, [pA{joint}_bar,
@@ -126,6 +134,11 @@ class LogSettings(Settings):
     faster log are averaged over the period, those of a slower one change on a line from sample to sample"""
     delay_s: Annotated[float, Field(ge=-10, le=10)] = 0.0
     """transport delay: commands act this much later than logged [s]"""
+    groups: dict[
+        Annotated[str, Field(pattern=r"^\w+$")], Annotated[tuple[Name, ...], BeforeValidator(_one_or_more)]
+    ] = {}
+    """logs that share a day, an oil temperature or an operator, by a name of your choice: a pattern of file
+    names, or several, as in {monday: mon_*.csv}. Parameters may have an effect in each (`per: group`)"""
     repair_s: Annotated[float, Field(ge=0, le=10)] = 0.1
     """longest gap that --repair fills [s]"""
 
@@ -143,6 +156,16 @@ class LogSettings(Settings):
             given |= columns.model_dump(exclude_none=True)
         names = tuple(self._prefix + name.replace(JOINT, str(joint)) for name in given.pop("column"))
         return ColumnMap(names, **given)
+
+    def group_of(self, log: str) -> str:
+        """Return the group of a log by its file's name.
+        Raises SettingsError: it is in several.
+        """
+        name = Path(log).name
+        of = [group for group, patterns in self.groups.items() for p in patterns if fnmatch(name, p)]
+        if len({*of}) > 1:
+            raise SettingsError(f"{name} is in the groups {listed(of)}", "log.groups")
+        return of[0] if of else OTHER
 
     def of_arm(self, side: str) -> "LogSettings":
         """Return the columns of one of two arms: their names begin with its own; the time's is common."""

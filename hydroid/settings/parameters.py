@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 from hydroid.files import Plain
@@ -11,8 +11,12 @@ from hydroid.quantity_table import CHOICES, MECHANICAL, TARGETS
 from hydroid.settings.arm import Actuator, Arm
 from hydroid.settings.hydraulics import HydraulicSettings, actuator_values
 from hydroid.settings.linkage import RotaryActuator
+from hydroid.settings.log import OTHER
 from hydroid.settings.problem import ParameterSettings
 from hydroid.words import distinct
+
+GROUP = "group"
+"""what `per` says of a parameter that has an effect in each group"""
 
 
 def expanded(parameters: Mapping[str, Any], compared: Any, arm: Arm | None) -> Plain:
@@ -58,9 +62,28 @@ def expanded(parameters: Mapping[str, Any], compared: Any, arm: Arm | None) -> P
     return result
 
 
+def by_group(parameters: Mapping[str, Any], groups: Collection[str]) -> Plain:
+    """Return the settings of parameters with one entry for each group of `per: group`, and for other logs.
+
+    Raises ValueError: there are no groups.
+    """
+    result: Plain = {}
+    for name, entry in parameters.items():
+        if not isinstance(entry, dict) or entry.get("per") != GROUP:
+            result[name] = result.get(name, {}) | entry if isinstance(entry, dict) else entry
+            continue
+        if not groups or GROUP in groups:
+            what = "per: group needs log.groups: {name: pattern}, none of them named group"
+            raise ValueError(f"parameters.{name}: {what}")
+        for group in (*groups, OTHER):
+            own = f"{name}_{group}"
+            result[own] = entry | {"per": group} | result.get(own, parameters.get(own, {}))
+    return result
+
+
 def nominal_value(arm: Arm, hydraulics: HydraulicSettings, own: ParameterSettings) -> float | None:
     """Return what its settings, `hydraulics` or the arm's file say of a parameter; None: no one value."""
-    if own.nominal is not None or own.logs is not None:
+    if own.nominal is not None or own.per is not None:
         return own.nominal or 0.0
     if own.link is not None:
         return arm.mass_of.get(own.link)
@@ -88,7 +111,8 @@ def make_parameter(
     start = own.start if own.start is not None else nominal
     start = None if start is None else min(max(start, lower), upper)
     on_log = lower > 0 and (log or (prior is not None and prior.log))
-    return Parameter(name, _unit(arm, own), lower, upper, own.fixed, on_log, start, prior)
+    least = (own.per and own.sd) or 0.0
+    return Parameter(name, _unit(arm, own), lower, upper, own.fixed, on_log, start, prior, least)
 
 
 def _prior(own: ParameterSettings, nominal: float | None) -> Prior | None:
@@ -112,7 +136,7 @@ def _prior(own: ParameterSettings, nominal: float | None) -> Prior | None:
 def _default_bounds(own: ParameterSettings, prior: Prior | None) -> tuple[float, float]:
     if prior is None:
         return own.fixed or 0.0, own.fixed or 0.0
-    if own.logs is not None:
+    if own.per is not None:
         return prior.value(-4.0), prior.value(4.0)
     quantity = CHOICES[own.quantity]  # one that must be above 0 is not searched below 1 % of its value
     least = 0.01 * prior.nominal if quantity.positive else quantity.lowest

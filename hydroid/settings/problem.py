@@ -42,9 +42,10 @@ class ParameterSettings(Settings):
     """where the search starts; null: nominal, else the middle of the bounds on the parameter's scale"""
     fixed: float | None = None
     """value at which the parameter is held, in the unit of the quantity; null: it is estimated"""
-    logs: str | None = None
-    """pattern of file names, such as tuesday_*.csv: in these logs the value is added to what the quantity is
-    otherwise, around 0 with standard deviation `sd`. All other logs are predicted without it"""
+    per: str | None = None
+    """group: an effect of each group of `log.groups`, NAME_monday, ..., which is added to the quantity in its
+    logs, around 0 with standard deviation `sd`, and one of all other logs, NAME_other: an unseen day is
+    predicted with the mean, and a wider band. The name of a group: an effect of that one"""
     term: Annotated[str, Field(pattern="^[A-Za-z_]+$")] | None = None
     """name of a term of the model, of one parameter or several: a fit begins without it, adds it after the
     refinement, and keeps it where it lowers the error on parts of the logs left out by 5 %; null: always
@@ -57,7 +58,7 @@ class ParameterSettings(Settings):
             raise ValueError(f"no quantity {self.quantity!r}; did you mean {' or '.join(map(repr, near))}?")
         row, mass = CHOICES[self.quantity], self.quantity == "mass"
         placed = self.joints is not None or self.each
-        least = row.lowest if self.logs is None else -math.inf
+        least = row.lowest if self.per is None else -math.inf
         low, high = self.bounds or (least, math.inf)
         starts = [(n, v) for n, v in (("nominal", self.nominal), ("start", self.start)) if v is not None]
         fixed = () if self.fixed is None else (self.fixed,)
@@ -67,8 +68,8 @@ class ParameterSettings(Settings):
             (row.of_the_pump and placed, f"all joints share the pump: a {self.quantity} has no joints"),
             (mass and placed, "a mass belongs to a link, not to joints"),
             (
-                self.logs is not None and (self.sd is None or mass),
-                "an effect in some logs needs sd: standard deviation, around 0, and is no mass",
+                self.per is not None and (self.sd is None or mass),
+                "an effect per group needs sd: standard deviation, around 0, and is no mass",
             ),
             (
                 self.within is not None and self.sd is not None,

@@ -2,6 +2,7 @@
 
 from copy import copy
 from dataclasses import replace
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -93,6 +94,12 @@ class Candidates:
         return Candidates(self.joints[rows], self.mass[rows])  # pyright: ignore[reportArgumentType]
 
 
+def distinct(*tables: Any) -> tuple[Index, Index]:
+    """Return which of n rows differ in any table, m of them, and which of these each row is, shape (n,)."""
+    each = [b"".join(one.tobytes() for one in row) for row in zip(*tables, strict=True)]
+    return np.unique(each, return_index=True, return_inverse=True)[1:]
+
+
 @record
 class Response:
     """Simulated angles [rad], shape (n, T, K), of the K output joints.
@@ -104,6 +111,10 @@ class Response:
     angle: Array
     feasible: Mask
     pressure: Array | None = None
+
+    def __getitem__(self, rows: Index) -> "Response":
+        pressure = None if self.pressure is None else self.pressure[rows]
+        return Response(self.angle[rows], self.feasible[rows], pressure)
 
 
 class Scenario:
@@ -234,8 +245,6 @@ class Chain:
         joints: Records = candidates.joints[:, self._pushed]  # pyright: ignore[reportAssignmentType]
         if not self.joints.size or np.isinf(joints.pump_flow).all():
             return np.empty((len(candidates), 0))
-        first = dict[bytes, int]()  # they are mostly held: candidates alike take the same
-        alike = [first.setdefault(row.tobytes(), len(first)) for row in joints]
-        unlike: Records = joints[np.unique(alike, return_index=True)[1]]  # pyright: ignore
-        each: Records = coefficients(unlike)[:, None]  # pyright: ignore[reportAssignmentType]
-        return swallowed(each, motion.angle, motion.velocity).sum(axis=2)[alike]
+        first, place = distinct(joints)  # mostly held, so that they are alike
+        each: Records = coefficients(joints[first])[:, None]  # pyright: ignore
+        return swallowed(each, motion.angle, motion.velocity).sum(axis=2)[place]

@@ -22,7 +22,7 @@ from hydroid.hydraulics.records import JOINT_STATE, has_force_curve
 from hydroid.mjcf import quiet_mujoco
 from hydroid.simulation.quasi_static import roll_quasi_static, valve_openings
 from hydroid.simulation.rollout import Course, Record, SteppedArm, compile_rollout, roll
-from hydroid.simulation.scenario import Candidates, Chain, Response, Scenario
+from hydroid.simulation.scenario import Candidates, Chain, Response, Scenario, distinct
 
 Follow = Callable[[SteppedArm, Index], tuple[Array, Observation | None]]
 """simulates some of n candidates, one for each copy of an arm: angles of the moving joints [rad],
@@ -56,6 +56,9 @@ class Simulation:
 
         The first is the start. A candidate without a force-stroke curve, or that diverged, is infeasible.
         """
+        first, place = distinct(candidates.joints, candidates.mass)
+        if len(first) < len(place):  # those that differ in other groups of logs alone
+            return self.simulate(candidates[first])[place]
         scenario, n, wanted = self.scenario, len(candidates), self._pressures
         samples = 1 + len(scenario.command) // scenario.settings.steps
         angle = np.full((n, samples, len(scenario.outputs)), np.nan)

@@ -1,7 +1,8 @@
 """A fit is moved to a changed machine by what changed, and nothing else."""
 
+import numpy as np
 import pytest
-from two_joints import TRUTH, drive, two_joints
+from two_joints import PARAMETERS, PERIOD, TRUTH, drive, two_joints
 
 import hydroid
 from hydroid.advice.adaptation import adapted, steps
@@ -31,6 +32,20 @@ def test_an_unchanged_machine_needs_no_adaptation(tmp_path):
     assert [step["parameter"] for step in steps(model, [drive(settings, 4)])] == [""]
     with pytest.raises(SettingsError, match="no parameter lowers the error"):
         hydroid.adapt(drive(settings, 4), fit=model, out=None)
+
+
+def test_an_effect_of_a_new_day_is_freed_for_one_joint(tmp_path):
+    """The other joint errs by more, and by what nothing here can explain."""
+    day = {"quantity": "dead_band", "joints": [1], "sd": 3, "per": "group"}
+    grouped = {"log": {"period_s": PERIOD, "groups": {"monday": "mon_*"}}}
+    settings = two_joints(tmp_path, parameters=PARAMETERS | {"day": day}, **grouped)
+    model = identified(settings, TRUTH | {"day_monday": 0.5, "day_other": 0.0}, "a fit")
+    log = drive(settings, 3, TRUTH | {"day_monday": 0.0, "day_other": -2.0})
+    log.angle[:, 1] += np.radians(2.0) * np.sin(log.time)
+    first, then, *_ = steps(model, [log])
+    assert then["parameter"] == "day_other"
+    assert then["left_out_deg"]["lift"] < 0.7 * first["left_out_deg"]["lift"]
+    assert then["left_out_deg"]["tilt"] == pytest.approx(first["left_out_deg"]["tilt"], rel=0.05)
 
 
 def test_what_cannot_be_freed_is_refused(tmp_path):

@@ -10,7 +10,8 @@ from hydroid.fitting.baselines import NAMES
 from hydroid.fitting.validation import HORIZONS, Prediction, errors_ahead
 from hydroid.fitting.verdict import behind, judge
 from hydroid.log import Log
-from hydroid.reporting.verdict_table import outside
+from hydroid.posterior.band import Band
+from hydroid.reporting.verdict_table import next_step, outside
 
 SETTINGS = load_settings("fit-mech")
 TIME = np.arange(1200) * 0.01
@@ -91,6 +92,25 @@ def test_what_nine_numbers_fit_better_is_named_and_what_bands_miss():
     assert finding.subjects == ("shoulder",)
     (line,) = outside([verdict(1, 1).changed({"inside_percent": 7.0})])
     assert line == "The 95 % bands hold only 7 % of the shoulder's unseen samples."
+
+
+@pytest.mark.parametrize(
+    ("fitted_logs", "unseen", "expected", "kind"),
+    [
+        (2, 4.5, 2.0, "machine changed"),
+        (2, 4.5, 2.5, "look for terms"),  # bands that wide say so themselves
+        (1, 4.5, 0.2, "look for terms"),  # one log does not tell what unseen ones err by
+        (2, 1.9, 0.2, "use the machine"),
+    ],
+)
+def test_errors_far_beyond_the_expected_say_that_the_machine_has_changed(fitted_logs, unseen, expected, kind):
+    own = [predicted(1.5, LOG)] * fitted_logs
+    band = Band(0.0, np.zeros(len(TIME)), 0.0, 0.0, np.radians(expected))
+    other = replace(predicted(unseen, replace(LOG, source="b.csv")), bands={2: band})
+    rivals = {2: dict(zip(NAMES, (Off(40, 40), Off(8, 8), Off(8, 8)), strict=True))}
+    step = next_step(load_settings("fit-hyd"), judge(SETTINGS, own, rivals, [other]), "run")
+    assert step.kind == kind
+    assert ("shoulder" in str(step)) == (kind == "machine changed")
 
 
 def test_an_error_ahead_begins_anew_at_every_start():

@@ -6,7 +6,6 @@ studies in one folder share the runs that they have in common. Only the process 
 fits run in processes of their own or on Dask's workers, one thread each.
 """
 
-import hashlib
 import json
 import logging
 import math
@@ -18,7 +17,6 @@ from collections.abc import Callable, Generator, Mapping, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -31,7 +29,7 @@ from hydroid.fitting.fit import fit
 from hydroid.log import Log
 from hydroid.problem.problem import Problem
 from hydroid.progress import NOTE, Progress
-from hydroid.run.folder import deciding, model_hash, samples_hash
+from hydroid.run.folder import VERSIONS, deciding, digest, model_hash, samples_hash
 from hydroid.search.pareto import segment_best
 from hydroid.settings.fit import FitSettings, StudySettings, cell_settings
 from hydroid.settings.load import load
@@ -51,12 +49,12 @@ class Task:
     def key(self) -> str:
         """Return the digest of all that decides the run's result."""
         content = {
-            "versions": {name: version(name) for name in ("hydroid", "mujoco", "numpy")},
+            "versions": VERSIONS,
             "settings": deciding(self.settings),
             "model": model_hash(self.settings.arm),
             "logs": [samples_hash(log) for log in self.logs],
         }
-        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:24]
+        return digest(content)[:24]
 
 
 def perform(task: Task) -> Result:

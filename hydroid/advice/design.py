@@ -60,7 +60,7 @@ def sensor_noise(settings: DesignSettings, samples: int, period: float) -> Noise
     """Return the noise of a future log of angles [rad]: white, or a first-order autoregression."""
     level, time = np.radians(settings.noise_deg), settings.noise_correlation_s
     reflection = np.array([-np.exp(-period / time)]) if time > 0 else np.empty(0)
-    return Noise(samples, level, reflection, "settings")
+    return Noise(samples, level, reflection, given=True)
 
 
 class Trial(NamedTuple):

@@ -7,9 +7,10 @@ time is nearly up ends a run as Ctrl-C does: with a checkpoint.
 import signal
 import sys
 import time
+from contextlib import AbstractContextManager
 from contextvars import ContextVar
 from types import FrameType
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -48,14 +49,11 @@ def _stop(number: int, frame: FrameType | None) -> None:
     raise KeyboardInterrupt
 
 
-class Progress:
+class Progress(AbstractContextManager["Progress"]):
     """Shows the progress of a command, as `hydroid.progress.Progress`; use it as a context."""
 
     def __init__(self) -> None:
         self._bar, self._shown = None, time.monotonic()
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         if self._bar is not None:

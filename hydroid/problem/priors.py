@@ -69,7 +69,15 @@ class Priors:
             *(parameters.names[column] for column, _ in self._own),
             *(combination.name for combination in self._combinations),
         )
-        self._refuse_contradictions()
+        if self._combinations:
+            off = np.abs(self.scores(self.project(self.searched.start[None]))[0])
+            worst = np.argmax(off)
+            if off[worst] > 1.5 * REACH:
+                raise SettingsError(
+                    "cannot hold within the bounds together with the other priors",
+                    f"priors.{self.names[worst]}",
+                    "widen the bounds, correct the value, or give it a larger sd",
+                )
 
     def __len__(self) -> int:
         return len(self.names)
@@ -101,18 +109,6 @@ class Priors:
             if np.array_equal(theta, before):
                 break
         return theta
-
-    def _refuse_contradictions(self) -> None:
-        if not self._combinations:
-            return
-        off = np.abs(self.scores(self.project(self.searched.start[None]))[0])
-        worst = np.argmax(off)
-        if off[worst] > 1.5 * REACH:
-            raise SettingsError(
-                "cannot hold within the bounds together with the other priors",
-                f"priors.{self.names[worst]}",
-                "widen the bounds, correct the value, or give it a larger sd",
-            )
 
 
 def _within_reach(parameters: ParameterSet) -> ParameterSet:

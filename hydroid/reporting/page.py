@@ -122,25 +122,16 @@ def shown(cell: Cell) -> str:
 class Plot:
     """A figure: its name on the page, what it shows in words, and the function that makes it.
 
-    That returns a `Chart`, which the page shows with buttons to zoom it if `zoom`, or a `MovingArm`.
+    That returns a `Chart`, which the page shows with buttons to zoom it if `zoom`, or a `MovingArm`. Of
+    several figures of which a reader sees one at a time, `button` chooses it. The button stands in a `row`
+    and a `column`, where these are given; its `state` (`good`, `fair`, `bad`) gives the colour.
     """
 
     name: str
     caption: str
     draw: Callable[[], Any]
     zoom: bool = False
-
-
-@record
-class Tab:
-    """One of several figures of which a reader sees one at a time.
-
-    Its button stands in a `row` and a `column`, where these are given; its `state` (`good`, `fair`, `bad`)
-    gives the colour.
-    """
-
-    name: str
-    plot: Plot
+    button: str = ""
     row: str = ""
     column: str = ""
     state: str = ""
@@ -160,7 +151,7 @@ class Section:
     tables: Mapping[str, Table] = field(default_factory=dict[str, Table])
     cards: Mapping[str, Table] = field(default_factory=dict[str, Table])
     plots: tuple[Plot, ...] = ()
-    tabs: tuple[Tab, ...] = ()
+    tabs: tuple[Plot, ...] = ()
     steps: tuple[Finding, ...] = ()
     folded: bool = False
 
@@ -185,7 +176,7 @@ class Page:
     def plots(self) -> Iterator[Plot]:
         """All figures."""
         for section in self.sections:
-            yield from (*section.plots, *(tab.plot for tab in section.tabs))
+            yield from (*section.plots, *section.tabs)
 
     @property
     def tables(self) -> dict[str, Table]:

@@ -1,6 +1,5 @@
 """Pages of predictions, what models make of logs: of a fit, from what its run stores, and of a validation."""
 
-import shlex
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
@@ -18,7 +17,7 @@ from hydroid.fitting.verdict import rms_deg
 from hydroid.reporting import page_file
 from hydroid.reporting.chart import SERIES, Chart, Mark, Panel, finite
 from hydroid.reporting.outlines import motion_section
-from hydroid.reporting.page import Page, Plot, Section, Tab, Table, log_names, short_name
+from hydroid.reporting.page import Page, Plot, Section, Table, log_names, short_name
 from hydroid.reporting.parameters_report import (
     parameter_section,
     quantity_section,
@@ -69,7 +68,7 @@ def prediction_sections(predictions: Sequence[Prediction], arm: Arm, fits: Verdi
     names = dict(zip(by_log, log_names([first.log for first, *_ in by_log.values()]), strict=True))
     bins = min(1000, max(150, 9000 // sum(len(first.joints) for first, *_ in by_log.values())))
     tolerances = {one.joint: one.tolerance_deg for one in next(iter(fits.values()), ())}
-    tabs: list[Tab] = []
+    tabs: list[Plot] = []
     for log, (first, *others) in by_log.items():
         for joint in first.joints:
             title = f"{arm.joint_names[joint - 1]} in {names[log]}"
@@ -79,11 +78,13 @@ def prediction_sections(predictions: Sequence[Prediction], arm: Arm, fits: Verdi
             drawing = partial(draw_response, title, joint, several, bins, slides=slides)
             error, tolerance = rms_deg([first.error(joint)]), tolerances.get(joint, np.inf)
             state = "good" if error <= tolerance else "fair" if error <= 2 * tolerance else "bad"
-            row = f"{names[log]} {_KINDS[first.unseen]}".strip()
-            plot = Plot(f"response_{len(tabs) + 1}", title, drawing, zoom=True)
             size = f"{two_digits(1e3 * np.radians(error))} mm" if slides else f"{two_digits(error)}°"
-            size = size if np.isfinite(error) else "diverged"
-            tabs.append(Tab(size, plot, row, arm.joint_names[joint - 1], state))
+            place = {
+                "row": f"{names[log]} {_KINDS[first.unseen]}".strip(),
+                "column": arm.joint_names[joint - 1],
+            }
+            button = {"button": size if np.isfinite(error) else "diverged", "state": state}
+            tabs.append(Plot(f"response_{len(tabs) + 1}", title, drawing, zoom=True, **button, **place))
     rows = [
         row | {"fit": short_name(one.fit), "log": names[one.log.source], "kind": _KINDS[one.unseen]}
         for one in predictions
@@ -176,14 +177,14 @@ def fit_page(record: Record) -> Page:
     """Return the page of a fit, with the unseen logs that it was validated on."""
     settings, summary, fitted = record.settings, record.summary, record.result.fitted
     fits = {str(summary.final): record.verdict}
-    logs = " ".join(shlex.quote(one.log.source) for one in fitted)
+    logs = [one.log for one in fitted]
     sections = (
         *verdict_sections(fits, next_step(settings, record.verdict, record.folder, logs)),
         *prediction_sections([*record.validations.values(), *fitted], settings.arm, fits),
         *quantity_section(settings, summary),
         *unknown_sections(summary),
         parameter_section(settings, summary),
-        *speed_section(settings, summary, [p.log for p in fitted]),
+        *speed_section(settings, summary, logs),
         search_section(record),
     )
     in_order = sorted(sections, key=lambda section: section.folded)

@@ -10,6 +10,7 @@ from hydroid.files import Plain
 from hydroid.findings import Finding
 from hydroid.fitting.baselines import NAMES
 from hydroid.fitting.validation import HORIZONS
+from hydroid.log import Log
 from hydroid.reporting.page import Cell, Given, Section, Table, short_name, shown
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
@@ -148,12 +149,13 @@ def worst(verdicts: Sequence[JointVerdict]) -> str:
 
 
 def next_step(
-    settings: FitSettings, verdicts: Sequence[JointVerdict], folder: str, logs: str = "LOG.csv"
+    settings: FitSettings, verdicts: Sequence[JointVerdict], folder: str, logs: Sequence[Log] = ()
 ) -> Finding:
     """Return what to do after a fit of `logs` in a run folder, with its command."""
     run = shlex.quote(folder)
     if settings.stage == "mech":
-        kind, command = "fit the hydraulics", f"hydroid fit-hyd {logs} --mech {run}"
+        files = shlex.join(log.source for log in logs) or "LOG.csv"
+        kind, command = "fit the hydraulics", f"hydroid fit-hyd {files} --mech {run}"
     elif any(one.verdict == "not tested" for one in verdicts):
         kind, command = "predict unseen", f"hydroid validate OTHER.csv --fit {run}"
     elif all(one.verdict == "predicts" for one in verdicts):

@@ -29,10 +29,13 @@ DESCRIPTION = "run.json"
 """name of the file that describes the run: versions, seed, hashes of its logs and files, status, seconds"""
 
 
+VERSIONS = {name: version(name) for name in ("hydroid", "mujoco", "numpy")}
+"""those that a result is of"""
+
+
 def identity(settings: FitSettings, logs: Sequence[Log]) -> Plain:
     """Return versions, the settings that decide, and hashes of the logs and of the arm's model."""
-    versions = {name: version(name) for name in ("hydroid", "mujoco", "numpy")}
-    return versions | {
+    return VERSIONS | {
         "python": platform.python_version(),
         "seed": settings.search.seed,
         "logs": {log.source: log_hash(log) for log in logs},
@@ -89,6 +92,11 @@ def log_hash(log: Log) -> str:
 def samples_hash(log: Log) -> str:
     """Return the hash of a log's samples, wherever they are from."""
     return hashlib.sha256(np.column_stack([log.time, log.command, log.angle]).tobytes()).hexdigest()
+
+
+def digest(content: Plain) -> str:
+    """Return the digest of a mapping, whatever the order of its keys."""
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
 def _file_hash(*files: Path) -> str:
@@ -204,8 +212,7 @@ class RunFolder:
         """
         # what does not change while the run goes on
         fixed = {key: value for key, value in self.identity().items() if key not in ("status", "seconds")}
-        run = hashlib.sha256(json.dumps(fixed, sort_keys=True).encode()).hexdigest()
-        return CheckpointFile(self.path / "checkpoint.npz", run)
+        return CheckpointFile(self.path / "checkpoint.npz", digest(fixed))
 
     def _describe(self, content: Plain) -> None:
         write_atomic(self.path / DESCRIPTION, json.dumps(content, indent=2) + "\n")

@@ -49,6 +49,30 @@ class Population:
         )
 
 
+def crowded_order(objectives: Array) -> Ints:
+    """Return candidates, (n,), from best to worst by their objectives, (n, m); equals keep their order.
+
+    That is the crowded comparison: lower rank first, then more room around them.
+    """
+    rank = ranks(objectives)
+    return np.lexsort((-crowding(objectives, rank), rank))
+
+
+def tournament(objectives: Array, count: int, rng: Generator) -> Ints:
+    """Return winners, (count,), of binary tournaments by the crowded comparison of objectives, (n, m).
+
+    The contestants of each round are a random permutation of the population, so that every candidate
+    competes equally often. No infeasible candidate beats a feasible one.
+    """
+    rank = ranks(objectives)
+    room = crowding(objectives, rank)
+    rounds = -(-2 * count // len(rank))
+    contestants = np.concatenate([rng.permutation(len(rank)) for _ in range(rounds)])[: 2 * count]
+    a, b = contestants[0::2], contestants[1::2]
+    a_wins = (rank[a] < rank[b]) | ((rank[a] == rank[b]) & (room[a] >= room[b]))
+    return np.where(a_wins, a, b)
+
+
 @record
 class SimpleGa:
     """Roulette, crossover, mutation; the best few survive, the children replace the rest.
@@ -88,7 +112,8 @@ class SimpleGa:
         children = crossover(population.chromosomes[parents], self.settings, rng)[:count]
         return mutate(children, self.settings.mutation_rate, self.coding, rng)
 
-    def select(self, objectives: Array, count: int, rng: Generator) -> Ints:
+    @staticmethod
+    def select(objectives: Array, count: int, rng: Generator) -> Ints:
         """Return parents, shape (count,), by the roulette wheel of the objectives of a population."""
         return roulette(_objective(objectives), count, rng)
 
@@ -107,39 +132,12 @@ class Nsga2(SimpleGa):
     """
 
     single, elite = False, 0
-
-    def select(self, objectives: Array, count: int, rng: Generator) -> Ints:
-        """Return parents by the crowded tournament."""
-        return tournament(objectives, count, rng)
+    select = staticmethod(tournament)
 
     def tell(self, population: Population | None, offspring: Population) -> Population:
         """Return the best of parents and children together, in crowded order."""
         everyone = offspring if population is None else population.join(offspring)
         return everyone.take(crowded_order(everyone.objectives)[: self.settings.population])
-
-
-def crowded_order(objectives: Array) -> Ints:
-    """Return candidates, (n,), from best to worst by their objectives, (n, m); equals keep their order.
-
-    That is the crowded comparison: lower rank first, then more room around them.
-    """
-    rank = ranks(objectives)
-    return np.lexsort((-crowding(objectives, rank), rank))
-
-
-def tournament(objectives: Array, count: int, rng: Generator) -> Ints:
-    """Return winners, (count,), of binary tournaments by the crowded comparison of objectives, (n, m).
-
-    The contestants of each round are a random permutation of the population, so that every candidate
-    competes equally often. No infeasible candidate beats a feasible one.
-    """
-    rank = ranks(objectives)
-    room = crowding(objectives, rank)
-    rounds = -(-2 * count // len(rank))
-    contestants = np.concatenate([rng.permutation(len(rank)) for _ in range(rounds)])[: 2 * count]
-    a, b = contestants[0::2], contestants[1::2]
-    a_wins = (rank[a] < rank[b]) | ((rank[a] == rank[b]) & (room[a] >= room[b]))
-    return np.where(a_wins, a, b)
 
 
 def _objective(objectives: Array) -> Array:

@@ -6,7 +6,7 @@ import sys
 import threading
 import time
 import warnings
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -137,17 +137,13 @@ FRAME = 1 / 60  # between two pictures of the viewer [s]
 LATE = 0.1  # a machine too slow by this [s] shows slow motion instead of jumps
 
 
-def play(
-    playback: Playback,
-    viewer: Any,
-    clock: Callable[[], float] = time.perf_counter,
-    sleep: Callable[[float], None] = time.sleep,
-) -> None:
+def play(playback: Playback, viewer: Any) -> None:
     """Show what moves in real time until the window is closed; the viewer's reset starts it again.
 
     `viewer` is a `mujoco.viewer.Handle`, or what behaves like one.
     Raises RunError: the simulation diverged.
     """
+    clock = time.perf_counter
     begun = clock()
     while viewer.is_running():
         frame = clock()
@@ -161,7 +157,7 @@ def play(
         if playback.data.time < before:
             playback.restart()
             begun = clock()
-        sleep(max(0.0, FRAME - (clock() - frame)))
+        time.sleep(max(0.0, FRAME - (clock() - frame)))
 
 
 def show(playback: Playback) -> None:

@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 import hydroid
 from hydroid.commands.app import app
 from hydroid.errors import LogError, ModelError, SettingsError
-from hydroid.project import Project
+from hydroid.project.project import Project
 from hydroid.settings.arm import load_arm
 from hydroid.settings.fit import FitSettings
 

@@ -60,5 +60,5 @@ def test_the_worst_log_is_shown_first_and_one_that_diverged_never():
     good = predicted(LOG.angle[:, [1, 2]])
     bad, lost = (predicted(good.response + error) for error in (0.1, np.nan))
     (section,) = motion_section(ARM, {"a.csv": good, "b.csv": lost, "c.csv": bad})
-    assert [tab.name for tab in section.tabs] == ["c.csv", "a.csv"]
+    assert [tab.button for tab in section.tabs] == ["c.csv", "a.csv"]
     assert motion_section(ARM, {"b.csv": lost}) == ()

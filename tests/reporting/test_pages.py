@@ -175,7 +175,7 @@ def test_a_validation_of_several_fits_shows_the_best_first_in_shared_charts():
     page = validation_page(predictions, fits, settings.arm)
     assert page.lead == "good is best. shoulder: predicts, over 1 unseen log."
     (tab,) = next(section for section in page.sections if section.title == "Response").tabs
-    labels = {mark.label for panel in tab.plot.draw().panels for mark in panel.marks}
+    labels = {mark.label for panel in tab.draw().panels for mark in panel.marks}
     assert {label.partition(" (")[0] for label in labels} >= {"good", "bad", "measured"}
 
 

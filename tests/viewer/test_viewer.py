@@ -1,6 +1,7 @@
 """The arm in motion: what is shown is the plant, at the pace of the clock."""
 
 import io
+import time
 from dataclasses import replace
 from itertools import count
 from typing import Any
@@ -59,7 +60,10 @@ class FakeViewer:
 def played(playback: Any, pictures: int, cost: float = 0.0) -> FakeViewer:
     """Some pictures of a playback; time passes in sleep, and in `cost` seconds of work a look."""
     viewer, looks, slept = FakeViewer(playback, pictures), count(), list[float]()
-    play(playback, viewer, lambda: 100.0 + cost * next(looks) + sum(slept), slept.append)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(time, "perf_counter", lambda: 100.0 + cost * next(looks) + sum(slept))
+        patch.setattr(time, "sleep", slept.append)
+        play(playback, viewer)
     return viewer
 
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import chain
 
-from hydroid.files import read_table
+from hydroid.files import Plain, read_table
 from hydroid.units import UNITS
 
 
@@ -73,12 +73,13 @@ class Quantity:
             )
 
 
+def _quantity(name: str, row: Plain) -> Quantity:
+    values: Plain = {key: tuple(value) if isinstance(value, list) else value for key, value in row.items()}
+    return Quantity(name, **values)
+
+
 _GROUPS = {
-    group: tuple(
-        Quantity(name, **{key: tuple(v) if isinstance(v, list) else v for key, v in row.items()})
-        for name, row in rows.items()
-    )
-    for group, rows in read_table("quantities.yaml").items()
+    group: tuple(map(_quantity, rows, rows.values())) for group, rows in read_table("quantities.yaml").items()
 }
 
 ROWS = tuple(chain(*_GROUPS.values()))  # the one table

@@ -7,10 +7,9 @@ time is nearly up ends a run as Ctrl-C does: with a checkpoint.
 import signal
 import sys
 import time
-from contextlib import AbstractContextManager
 from contextvars import ContextVar
 from types import FrameType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import typer
 
@@ -49,11 +48,14 @@ def _stop(number: int, frame: FrameType | None) -> None:
     raise KeyboardInterrupt
 
 
-class Progress(AbstractContextManager["Progress"]):
+class Progress:
     """Shows the progress of a command, as `hydroid.progress.Progress`; use it as a context."""
 
     def __init__(self) -> None:
         self._bar, self._shown = None, time.monotonic()
+
+    def __enter__(self) -> Self:
+        return self
 
     def __exit__(self, *_: object) -> None:
         if self._bar is not None:

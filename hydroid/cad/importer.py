@@ -8,14 +8,15 @@ import mujoco
 import numpy as np
 
 from hydroid.arrays import Array, record
-from hydroid.cad.chain import choose_chain
-from hydroid.cad.cylinders import take_cylinders
+from hydroid.cad.cylinders import is_part_of_cylinder, take_cylinders
 from hydroid.cad.repair import repair_inertias, weigh
 from hydroid.cad.shapes import convert_meshes, sort_shapes, word
 from hydroid.cad.source import Notes, read_source
+from hydroid.errors import ModelError
 from hydroid.files import fill_template
+from hydroid.log.clues import joint_of
 from hydroid.mjcf import mjcf_text, mujoco_errors
-from hydroid.words import distinct
+from hydroid.words import distinct, listed
 
 
 @record
@@ -52,7 +53,7 @@ def import_arm(
     spec, files, urdf = read_source(path, notes)
     _clear(spec, path)
     cylinders = take_cylinders(spec, notes)
-    choose_chain(spec, str(path), notes, columns, tip)
+    _choose_chain(spec, str(path), notes, columns, tip)
     exact = urdf or all(geom.parent.explicitinertial for geom in spec.geoms if geom.meshname)
     meshes, lost = convert_meshes(spec, files, exact, notes)
     sort_shapes(spec)
@@ -92,6 +93,82 @@ def _clear(spec: mujoco.MjSpec, path: Path) -> None:
         names = joints if one.type == mujoco.mjtEq.mjEQ_JOINT else renamed
         if one.objtype != mujoco.mjtObj.mjOBJ_SITE:
             one.name1, one.name2 = (names.get(name, name) for name in (one.name1, one.name2))
+
+
+def _choose_chain(
+    spec: mujoco.MjSpec, where: str, notes: Notes, columns: Sequence[str], tip: str | None
+) -> None:
+    """Choose the joints from the base to `tip`, or else to the tip that fits best, and delete the others.
+
+    The best tip is the one with the most joints that the columns of a log name, then the one with the most
+    joints, then the first. Rods and tubes of cylinders are no tips. What is left out is held, and its mass
+    belongs to the link that carries it.
+    Raises ModelError: no joint, a body with several, or no such tip.
+    """
+    _hold(spec, notes)
+    chains: dict[str, tuple[str, ...]] = {}
+    for joint in spec.joints:
+        if len(joint.parent.joints) > 1:
+            hint = "put a small body between them: hydroid moves one joint per link"
+            raise ModelError(f"body {joint.parent.name!r} has several joints", where, hint)
+        chains[joint.parent.name] = _path(joint.parent)
+    inner = {name for chain in chains.values() for name in chain[:-1]}
+    tips = {link: chain for link, chain in chains.items() if chain[-1] not in inner}
+    if not tips:
+        raise ModelError("has no joint that hydroid could move", where)
+    if tip is None:
+        wanted = max(tips.values(), key=lambda chain: (_named(spec, chain, columns), len(chain)))
+        why = "the log names most of its joints" if _named(spec, wanted, columns) else "the longest branch"
+    else:
+        link, why = spec.body(tip), "as asked"
+        wanted = () if link is None else _path(link)
+        if not wanted:
+            raise ModelError(f"no joint moves a link {tip!r}", where, f"tips: {', '.join(tips)}")
+    left = [joint for joint in spec.joints if joint.name not in wanted]
+    if left:
+        others = listed([f"--tip {link}" for link, chain in tips.items() if chain != wanted], 6)
+        named = [joint.name for joint in left if _named(spec, [joint.name], columns)]
+        warning = f"; THE LOG NAMES {', '.join(named)}" if named else ""
+        held = listed([joint.name for joint in left], 12)
+        notes.add(
+            f"the arm is {' - '.join(wanted)} ({why}); held at 0, on no way to its end: {held}{warning}. "
+            f"Other ends: {others or 'none'}"
+        )
+    for joint in left:
+        spec.delete(joint)
+
+
+def _hold(spec: mujoco.MjSpec, notes: Notes) -> None:
+    """Delete the joints that hydroid does not move, or that follow others, and say so."""
+    followers = {e.name1: e.name2 for e in spec.equalities if e.type == mujoco.mjtEq.mjEQ_JOINT}
+    for joint in list(spec.joints):
+        if joint.type == mujoco.mjtJoint.mjJNT_FREE:
+            notes.add("free to float in the file: fixed to the world", joint.parent.name)
+        elif joint.name in followers:
+            notes.add("following another joint, which hydroid does not model: held at 0", joint.name)
+        elif joint.type == mujoco.mjtJoint.mjJNT_BALL:
+            notes.add("a ball joint, which hydroid does not model: held at 0", joint.name)
+        elif is_part_of_cylinder(joint):
+            what = "part of a cylinder that the file pins at one end: held. Give both pivots in arm.yaml"
+            notes.add(what, joint.name)
+        else:
+            continue
+        spec.delete(joint)
+    for section in (spec.equalities, spec.actuators, spec.tendons):
+        for part in list(section):
+            spec.delete(part)
+
+
+def _path(body: mujoco.MjsBody | None) -> tuple[str, ...]:
+    return () if body is None else (*_path(body.parent), *(joint.name for joint in body.joints))
+
+
+def _named(spec: mujoco.MjSpec, chain: Sequence[str], columns: Sequence[str]) -> int:
+    """Number of the chain's joints whose name, or whose link's, stands in the name of a column."""
+    names = [joint.name for joint in spec.joints]
+    links = [joint.parent.name for joint in spec.joints]
+    hits = {joint_of(column, of) for column in columns for of in (names, links)} - {None}
+    return sum(names.index(name) + 1 in hits for name in chain)
 
 
 def _in_scene(spec: mujoco.MjSpec, meshes: dict[str, bytes]) -> str:

@@ -14,9 +14,8 @@ from hydroid.cad.shapes import MESHES
 from hydroid.errors import RunError, SettingsError
 from hydroid.files import fill_template, undisturbed, write_atomic
 from hydroid.log import open_table
-from hydroid.project.arm_file import JointSize, arm_text, joint_sizes
-from hydroid.project.fit_files import fit_text
 from hydroid.project.layout import find_layout
+from hydroid.project.texts import JointSize, arm_text, fit_text, joint_sizes
 from hydroid.reporting.figure import arm_picture
 from hydroid.settings.arm import Arm, load_arm
 from hydroid.settings.document import read_yaml

@@ -127,7 +127,7 @@ def find_config(
     """Find a config file by a path, or the name of a shipped config with or without `.yaml`.
 
     A relative path is looked up in `beside` first; `kind`, a fit's config or an arm's file, decides which
-    names the error lists. Raises SettingsError: no such file, with the names of the shipped configs.
+    names the error lists.
     """
     shipped = assets() / "configs"
     folders = [Path(), shipped] if beside is None else [beside, Path(), shipped]

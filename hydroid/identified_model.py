@@ -108,9 +108,7 @@ def start_values(settings: FitSettings) -> IdentifiedModel:
 
 
 def write_settings(folder: Path, settings: FitSettings) -> None:
-    """Write the settings, the arm and its models to a folder, so that it can be read anywhere.
-    Raises RunError: the folder cannot be written, or a mesh cannot be read.
-    """
+    """Write the settings, the arm and its models to a folder, so that it can be read anywhere."""
     from hydroid.mjcf import copy_models  # imports MuJoCo
 
     arm = settings.arm

@@ -140,9 +140,7 @@ class ParameterSet:
         return np.where(self.log, theta * np.log(upper / lower), self.upper - self.lower)
 
     def vector(self, values: Mapping[str, object], source: str) -> Array:
-        """Return theta, shape (P,), from values by name; a fixed parameter may be left out.
-        Raises SettingsError: an unknown or a missing name, or a value that is not a number from 0.
-        """
+        """Return theta, shape (P,), from values by name; a fixed parameter may be left out."""
         unknown = [name for name in values if name not in self.names]
         if unknown:
             raise SettingsError(

@@ -63,7 +63,6 @@ def perform(task: Task) -> Result:
     `measures` are those of docs/studies.md, by name. `history` has generation, simulations and best
     objective; `segment_bests` are the parameters of the best candidate of each segment, as `theta` are those
     of the estimate.
-    Raises RunError: every candidate diverged.
     """
     result = fit(Problem(task.settings, task.logs))
     if not result.best.usable:
@@ -113,10 +112,7 @@ class Row:
 def run_study(
     path: Path, folder: Path, read: Read, executor: Executor, progress: Progress
 ) -> tuple[Row, ...]:
-    """Perform the runs of a study that `folder` does not have yet; return the measures of all, by seed.
-    Raises SettingsError: a key or value of the file that is not allowed, with file and line; LogError: a log
-    cannot be used; RunError: the folder cannot be written, or a process died.
-    """
+    """Perform the runs of a study that `folder` does not have yet; return the measures of all, by seed."""
     study = load(path, StudySettings)
     cells = cell_settings(study, path)
     logs = read([path.parent / name for name in study.logs], next(iter(cells.values())))
@@ -145,7 +141,6 @@ def run_all(tasks: Sequence[Task], folder: Path, executor: Executor, progress: P
     """Return the result of every task, in order; what `folder`/runs has is read, the others are performed.
 
     A run that fails is a result too: {"failed": why}.
-    Raises RunError: a file cannot be written or is damaged, or a process of the executor died.
     """
     files = [folder / "runs" / f"{task.key()}.json" for task in tasks]
     results = {file: _read(file) for file in files if file.is_file()}

@@ -58,9 +58,7 @@ def experiment_samples(settings: FitSettings) -> int:
 
 
 class RandomExperiments:
-    """Draws experiments, and random changes of them, that the settings allow.
-    Raises SettingsError: joints or poses that cannot be used.
-    """
+    """Draws experiments, and random changes of them, that the settings allow."""
 
     def __init__(self, settings: FitSettings, rng: np.random.Generator) -> None:
         limits, arm, period = settings.design, settings.arm, settings.log.period_s

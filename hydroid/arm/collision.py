@@ -51,7 +51,7 @@ class Clearance:
 class CollisionChecker:
     """Distances between the bodies of a compiled model whose joints are all hinges or slides.
 
-    Contacts may be switched off. Raises ModelError: nothing in the model, `source` in messages, can collide.
+    Contacts may be switched off.
     """
 
     def __init__(self, model: mujoco.MjModel, source: str = "the model") -> None:

@@ -18,7 +18,7 @@ SIDES = ("right", "left")
 
 
 def load_model(arm: Arm) -> mujoco.MjSpec:
-    """Read the arm's MJCF, which compiles; raises ModelError: as `read_mjcf`."""
+    """Read the arm's MJCF, which compiles."""
     spec = read_mjcf(arm.model)
     with mujoco_errors(str(arm.model)):
         spec.compile()
@@ -26,9 +26,7 @@ def load_model(arm: Arm) -> mujoco.MjSpec:
 
 
 def add_payload(spec: mujoco.MjSpec, arm: Arm, mass: float) -> mujoco.MjSpec:
-    """Return a copy of the arm's model that carries `mass` [kg] at the site of its payload.
-    Raises SettingsError: the arm's file names no site.
-    """
+    """Return a copy of the arm's model that carries `mass` [kg] at the site of its payload."""
     if arm.payload is None:
         hint = "name the site of the model that holds it in the arm's file, payload: SITE"
         raise SettingsError(f"{arm.name} has no place for a payload", "payloads", hint)
@@ -58,7 +56,7 @@ class Machine:
 
     @cached_property
     def checker(self) -> CollisionChecker:
-        """Which of its bodies meet; raises ModelError: none can."""
+        """Which of its bodies meet."""
         return CollisionChecker(self.model, self.arm.name)
 
     def joined(self, angle: Mapping[str, Array], rest: Array) -> Array:
@@ -70,10 +68,7 @@ class Machine:
 
 
 def load_machine(arm: Arm, *, pair: bool) -> Machine:
-    """Read the model of an arm alone, or that of two of them.
-    Raises SettingsError: a pair that the arm's file does not name; ModelError: as `read_mjcf`, or a pair
-    whose joints are not those of two of the arm.
-    """
+    """Read the model of an arm alone, or that of two of them."""
     if not pair:
         return Machine(arm, load_model(arm).compile(), (ALONE,))
     if arm.pair is None:

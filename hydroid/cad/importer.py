@@ -46,8 +46,6 @@ def import_arm(
         columns: names of a log's columns, which help to choose among branches.
         tip: name of the link at which the arm ends; None: the tip that fits best.
         total_mass: of the links that move [kg]; None: masses are those of the file.
-
-    Raises ModelError: the file cannot be read, or holds no arm.
     """
     notes = Notes()
     spec, files, urdf = read_source(path, notes)
@@ -103,7 +101,6 @@ def _choose_chain(
     The best tip is the one with the most joints that the columns of a log name, then the one with the most
     joints, then the first. Rods and tubes of cylinders are no tips. What is left out is held, and its mass
     belongs to the link that carries it.
-    Raises ModelError: no joint, a body with several, or no such tip.
     """
     _hold(spec, notes)
     chains: dict[str, tuple[str, ...]] = {}

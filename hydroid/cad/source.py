@@ -41,9 +41,7 @@ class Notes:
 
 
 def read_source(path: Path, notes: Notes) -> tuple[mujoco.MjSpec, dict[str, Path], bool]:
-    """Read a URDF or an MJCF: its spec, where each mesh file that it names lies, and whether it is a URDF.
-    Raises ModelError: missing, not XML, of another kind, or refused by MuJoCo.
-    """
+    """Read a URDF or an MJCF: its spec, where each mesh file that it names lies, and whether it is a URDF."""
     where = str(path)
     usd = path.suffix.lower() in (".usd", ".usda", ".usdc", ".usdz")
     root = ElementTree.Element("usd") if usd else _parsed(path)

@@ -82,9 +82,7 @@ COMMAND_LINES: dict[Callable[..., Any], tuple[str, str, list[inspect.Parameter]]
 
 
 def setting_changes(given: SettingChanges, options: Mapping[str, Any] | None = None) -> Plain:
-    """Return settings to replace by dotted key: those of `--set`, and the options that are not None.
-    Raises SettingsError: a text that is no KEY=VALUE.
-    """
+    """Return settings to replace by dotted key: those of `--set`, and the options that are not None."""
     changes = dict(given if isinstance(given, Mapping) else map(parse_override, given or ()))
     return changes | {key: value for key, value in (options or {}).items() if value is not None}
 
@@ -119,7 +117,6 @@ def open_model(
     """Return the model of a result, or read it from a run folder, a saved plant or a YAML file of values.
 
     Where `nominal`, parameters without a value have nominal ones, which only stage 2 has; a note names them.
-    Raises RunError, SettingsError: as of `load_identified`.
     """
     if fit is not None and not isinstance(fit, str | Path):
         return getattr(fit, "model", fit)
@@ -135,9 +132,7 @@ def open_model(
 
 
 def open_values(fit: ModelSource) -> tuple[Plain, FitSummary | None]:
-    """Return the values of an estimate by name, and the fit's own account of them where there is one.
-    Raises RunError, SettingsError: as of `read_estimate`.
-    """
+    """Return the values of an estimate by name, and the fit's own account of them where there is one."""
     if isinstance(fit, str | Path):
         return read_estimate(Path(fit))[1:]
     model = open_model(fit)

@@ -92,8 +92,6 @@ def read_arms(
         arm: right, left or both: the arms of the pair that move; None: the arm stands alone.
         pose: pose of the arm's file in which the arms stand; None: as logged.
         angles: read joint angles over time instead.
-
-    Raises LogError: a fault that keeps the log from being used; SettingsError: no such arm or pose.
     """
     from hydroid.arm.model import ALONE, SIDES
     from hydroid.log import open_table
@@ -116,9 +114,7 @@ def read_arms(
 
 
 def run_logs(folder: Path) -> list[Path]:
-    """Return the logs that a run folder was fitted to.
-    Raises SettingsError: it is no run folder. RunError: a log is not there.
-    """
+    """Return the logs that a run folder was fitted to."""
     if not is_file(folder / "run.json"):
         hint = "name one, as in hydroid suggest LOG.csv --fit RUN, or give a run folder as --fit"
         raise SettingsError("no log is given", hint=hint)
@@ -132,9 +128,7 @@ def run_logs(folder: Path) -> list[Path]:
 
 
 def problem_of(model: IdentifiedModel, logs: LogSources, *, repair: bool = False) -> "Problem":
-    """Return the estimation problem of a model and logs, or those of its run where none is given.
-    Raises RunError: the simulation diverges at the model's parameters.
-    """
+    """Return the estimation problem of a model and logs, or those of its run where none is given."""
     read = read_logs(logs or run_logs(Path(model.source).parent), model.settings, repair=repair)
     from hydroid.problem.problem import Problem
 

@@ -47,8 +47,7 @@ def search(
     """Search to the last generation, from the seed or from what `checkpoints` holds as "search".
 
     `watch` takes a row of HISTORY after every generation, but for those that a resumed run repeats;
-    `progress` watches least squares within multi-start. Raises RunError: the search does not repeat what it
-    did before the checkpoint.
+    `progress` watches least squares within multi-start.
     """
     settings, free = problem.settings.search, int(problem.parameters.free.sum())
     memo = Memo(problem, checkpoints.get("search"))

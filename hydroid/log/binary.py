@@ -56,9 +56,7 @@ class BagTable(Table):
 
 
 def open_bag(path: Path, time: str, period: float) -> BagTable:
-    """Read the channels of a bag; `time` is the name of its time column, `period` that of its rows [s].
-    Raises LogError: it is damaged, has no channel of numbers, or rosbags is not installed.
-    """
+    """Read the channels of a bag; `time` is the name of its time column, `period` that of its rows [s]."""
     channels = dict[str, dict[int, float]]()
     with format_library("rosbags.highlevel", "ros", path, "a bag") as rosbags:
         from rosbags.typesys import Stores, get_typestore
@@ -107,9 +105,7 @@ def _numbers(message: Any, prefix: str) -> Iterator[tuple[str, float]]:
 
 
 def open_mat(path: Path, *, hdf5: bool) -> Table:
-    """Read all variables of a file; `hdf5`: it is of version 7.3.
-    Raises LogError: it is damaged, has no arrays, or needs a package that is not installed.
-    """
+    """Read all variables of a file; `hdf5`: it is of version 7.3."""
     package = "h5py" if hdf5 else "scipy.io"
     with format_library(package, "mat", path, "a MATLAB file") as library:
         if hdf5:
@@ -128,7 +124,7 @@ def open_mat(path: Path, *, hdf5: bool) -> Table:
 
 
 def open_parquet(path: Path) -> Table:
-    """Read all columns of a file; raises LogError: it is damaged, or pyarrow is not installed."""
+    """Read all columns of a file."""
     with format_library("pyarrow.parquet", "parquet", path, "Parquet") as parquet:
         table = parquet.read_table(str(path))
         columns = {name: table[name].to_numpy() for name in table.column_names}

@@ -53,7 +53,7 @@ def guess_columns(
     """Guess which columns are time, commands and angles, of which joints, in which units.
 
     Columns may have the names of the links that the joints move instead; positions of joints (from 1) that
-    slide are in m. Raises LogError: no column looks like a time.
+    slide are in m.
     """
     columns = [*_columns(table)]
     time = max((c for c in columns if c.kind == "time"), key=lambda c: _rises(c.values), default=None)

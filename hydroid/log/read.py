@@ -36,7 +36,6 @@ def open_table(path: Path, settings: LogSettings = DEFAULT) -> Table:
     Args:
         path: the file, or the folder of a ROS 2 bag.
         settings: name of the time column, and period to which the channels of a bag are resampled.
-    Raises LogError: it cannot be read, or needs a package that is not installed.
     """
     try:
         folder = (path / "metadata.yaml").is_file()
@@ -131,7 +130,6 @@ def _match(
 
     Joints that are not `needed` may be absent from a file that has columns of others. A column of a similar
     name speaks against it: it is rather misspelt.
-    Raises LogError: a column is missing, stands there twice, or is asked for twice.
     """
     free = {name.lower(): name for name in sorted({*table.names} - {signal.name for signal in wanted})}
     missing = [signal for signal in wanted if signal.name not in table.names]

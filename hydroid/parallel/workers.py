@@ -41,8 +41,7 @@ class DaskWorkers:
 
         Each worker gets one chunk of the rows. When a worker dies, another one takes its chunk. The target
         can be pickled, and is sent once. The result, (n, columns), is in theta's order; NaN in the row of a
-        candidate that kills its workers. Raises RunError: the scheduler is gone, or a worker has other
-        VERSIONS.
+        candidate that kills its workers.
         """
         result = np.full((len(theta), columns), np.nan)
         with _lost_scheduler(self.client):

@@ -43,7 +43,6 @@ def profile(problem: Problem, uncertainty: Uncertainty, name: str) -> Profile:
 
     With autocorrelated noise the rise of a sum of squares is no likelihood ratio. It is scaled so that its
     curvature is the estimate's variance (L. Pace, A. Salvan, N. Sartori, 2011).
-    Raises SettingsError: no free parameter of that name.
     """
     parameters, linear, theta = problem.parameters, uncertainty.linear, uncertainty.theta
     free = parameters.named(parameters.free)

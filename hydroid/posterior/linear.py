@@ -136,7 +136,6 @@ def estimate_box(parameters: ParameterSet, theta: Array) -> Box:
     """Return theta, (P,), between its bounds, with the scale of relative changes; the free ones vary.
 
     A relative change of 1 is the value; on a linear scale at least a hundredth of the bounds' width.
-    Raises SettingsError: a free parameter on a log scale is 0.
     """
     least = np.where(parameters.log, 0.0, 0.01 * (parameters.upper - parameters.lower))
     scale = np.maximum(np.abs(theta), least)

@@ -50,7 +50,6 @@ class Priors:
     """M priors about P parameters, named `names`; those about fixed parameters only are left out.
 
     Those of single parameters come first. `searched` are the parameters with bounds within REACH of these.
-    Raises SettingsError: a parameter that does not exist, or priors that the bounds contradict.
     """
 
     def __init__(self, settings: Mapping[str, PriorSettings], parameters: ParameterSet) -> None:
@@ -122,9 +121,7 @@ def _within_reach(parameters: ParameterSet) -> ParameterSet:
 
 
 def _combination(name: str, prior: PriorSettings, parameters: ParameterSet) -> _Combination | None:
-    """Return a combination; None where all of its parameters are fixed.
-    Raises SettingsError: a parameter that does not exist, or a divisor that may be 0.
-    """
+    """Return a combination; None where all of its parameters are fixed."""
     names, free = parameters.names, parameters.free
     for parameter in prior.factors:
         if parameter not in names:

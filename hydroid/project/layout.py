@@ -44,8 +44,7 @@ class Layout:
 def find_layout(table: Table, arm: Arm, order: Sequence[str] = ()) -> Layout:
     """Guess the columns of a log, turn commands that act against the angle, and see how fast joints are.
 
-    `order` names the joints as the log counts them; by default they are those of the arm. Raises LogError: no
-    column looks like a time, or no joint has an angle; SettingsError: no joint has a name.
+    `order` names the joints as the log counts them; by default they are those of the arm.
     """
     names = arm.joint_names
     for name in order:

@@ -55,9 +55,6 @@ def write_project(
         logs: the first tells the columns; the last of several is kept to validate on.
         joints: names of the arm's joints as the log counts them; by default in the arm's order.
         options: `tip` and `total_mass` of `import_arm`; `force`: replace the files of an earlier project.
-
-    Raises SettingsError: a file of the project is there already, or no joint has one of the given names;
-    ModelError, LogError: the robot or the first log cannot be used.
     """
     taken = [name for name in FILES if os.path.lexists(folder / name)]
     if not options.pop("force", False) and taken:

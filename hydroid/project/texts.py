@@ -51,7 +51,6 @@ def joint_sizes(arm: Arm, speeds: Mapping[int, float]) -> tuple[JointSize, ...]:
     Args:
         arm: with its model in place.
         speeds: that a log shows, by number of the joint [rad/s, m/s]; 0.5 for the others.
-    Raises ModelError: the arm's model cannot be read.
     """
     model = load_model(arm).compile()
     data = mujoco.MjData(model)

@@ -115,9 +115,7 @@ ACROSS = 0.7
 
 
 def arm_picture(arm: Arm, title: str) -> tuple[bytes, bytes]:
-    """Draw an arm with all joints at 0, or at the ends of their ranges that are nearest to it; PNG and SVG.
-    Raises ModelError: its model cannot be read.
-    """
+    """Draw an arm with all joints at 0, or at the ends of their ranges that are nearest; PNG and SVG."""
     model = load_model(arm).compile()
     data, angles = mujoco.MjData(model), np.clip(0.0, arm.lower, arm.upper)
     data.qpos[:] = angles

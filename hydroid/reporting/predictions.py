@@ -161,8 +161,7 @@ def validation_page(predictions: Sequence[Prediction], fits: Verdicts, arm: Arm,
 def draw(run: str | Path, *, figures: bool = False) -> Path:
     """Draw the report of a finished run in its folder, from what it stores; return the page.
 
-    `figures`: write every chart as PNG and SVG too, to figures/ beside it. Raises RunError: no finished run
-    of this version is there, or the page cannot be written.
+    `figures`: write every chart as PNG and SVG too, to figures/ beside it.
     """
     folder, page = Path(run), fit_page(load_record(run))
     page_file.write_page(page, folder)

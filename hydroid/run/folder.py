@@ -126,10 +126,7 @@ class RunFolder:
 
     @contextmanager
     def owned(self) -> Generator[None]:
-        """Hold the folder against other processes, and write the `hydroid` logger's lines to `run.log`.
-        Raises RunError: another process holds it, it holds other files, or it cannot be written; Stopped: the
-        run was interrupted; says what is kept.
-        """
+        """Hold the folder against other processes, and write the `hydroid` logger's lines to `run.log`."""
         # it is the run's if it is empty, or holds a run's description or at least its lock
         other = self.path.exists() and not (self.exists or (self.path / LOCK).exists())
         if other and (not self.path.is_dir() or any(self.path.iterdir())):
@@ -147,10 +144,7 @@ class RunFolder:
             _log.info("done")
 
     def begin(self, settings: FitSettings, logs: Sequence[Log]) -> CheckpointFile:
-        """Describe a new run, or check that the run here is the same; return its checkpoints.
-        Raises RunError: the run here had other settings, another arm, another log or another version, one of
-        its files was changed, no checkpoint is whole, or the folder cannot be written.
-        """
+        """Describe a new run, or check that the run here is the same; return its checkpoints."""
         own = identity(settings, logs)
         if not self.exists:
             write_settings(self.path, settings)
@@ -166,9 +160,7 @@ class RunFolder:
         return checkpoints
 
     def refuse_changes(self) -> None:
-        """Refuse a run whose settings or model were changed since it began.
-        Raises RunError: a file is gone, or is another.
-        """
+        """Refuse a run whose settings or model were changed since it began."""
         hashes = own_hashes(self.path)
         for name, known in self.identity().get("files", {}).items():
             if hashes.get(name) != known:
@@ -176,7 +168,7 @@ class RunFolder:
                 raise RunError("has changed since the run began", self.path / name, hint)
 
     def identity(self) -> Plain:
-        """Read the run's description; raises RunError: missing or damaged."""
+        """Read the run's description."""
         file = self.path / DESCRIPTION
         try:
             content = json.loads(file.read_text(encoding="utf-8"))
@@ -207,9 +199,7 @@ class RunFolder:
         return f"{self.path} holds {kept}; the same command with --resume continues"
 
     def checkpoints(self) -> CheckpointFile:
-        """Return what the run's search and refinements have stored, by name.
-        Raises RunError: no checkpoint is whole.
-        """
+        """Return what the run's search and refinements have stored, by name."""
         # what does not change while the run goes on
         fixed = {key: value for key, value in self.identity().items() if key not in ("status", "seconds")}
         return CheckpointFile(self.path / "checkpoint.npz", digest(fixed))

@@ -38,7 +38,6 @@ def locked(folder: Path) -> Generator[None]:
     lock on to NFS's server (since 2.6.12) and to Lustre's where it is mounted with `flock`, so that it holds
     between machines; with `localflock`, or NFS's `nolock`, it holds on one machine only. On a file system
     that has no locks there is none, but a warning.
-    Raises RunError: another process holds it, or nothing can be written there.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -69,9 +68,7 @@ def _take(file: IO[bytes], folder: Path) -> None:
 
 @contextmanager
 def run_log(file: Path) -> Generator[None]:
-    """Write what hydroid's loggers say, INFO and above, to a file as well.
-    Raises RunError: it cannot be written.
-    """
+    """Write what hydroid's loggers say, INFO and above, to a file as well."""
     try:
         handler = _File(file, encoding="utf-8")
     except OSError as error:

@@ -139,9 +139,7 @@ def keep_validation(model: IdentifiedModel, predictions: Sequence[Prediction]) -
 
 
 def fitted_by(model: IdentifiedModel) -> tuple[Sequence[Prediction], Baselines, set[str] | None]:
-    """Return what the run of a model made of its logs, the baselines, and the logs' hashes; of no run None.
-    Raises RunError: what the run stored is damaged, or of another version.
-    """
+    """Return what the run of a model made of its logs, the baselines, and the logs' hashes, if there is one."""
     if (folder := run_of(model)) is None:
         return (), {}, None
     result = _read(folder / RESULT, FitResult)
@@ -149,7 +147,7 @@ def fitted_by(model: IdentifiedModel) -> tuple[Sequence[Prediction], Baselines, 
 
 
 def load_record(folder: str | Path) -> Record:
-    """Read a finished run; raises RunError: the folder holds no finished run, or it is damaged."""
+    """Read a finished run."""
     path = Path(folder)
     identity = RunFolder(path).identity()
     summary = load(path / NAME, FitSummary)
@@ -183,7 +181,6 @@ def read_runs(names: Sequence[str], out: str | Path | None) -> tuple[Record, ...
     """Read finished runs that differ in nothing but their seeds, in their order, and leave out the others.
 
     `names` are run folders, or patterns of them; `out` is the folder for what is to be written about them.
-    Raises RunError: no run is left, two differ in more than their seeds or in nothing, or `out` is a run.
     """
     if out is not None and RunFolder(Path(out)).exists:
         raise RunError("is a run itself", out, "name another folder")
@@ -207,7 +204,7 @@ def read_runs(names: Sequence[str], out: str | Path | None) -> tuple[Record, ...
 
 
 def _finished(path: str) -> Record:
-    """Read a finished run; raises HydroidError: it is not finished or is damaged."""
+    """Read a finished run."""
     folder = RunFolder(Path(path))
     if (status := folder.identity().get("status")) != "done":
         raise RunError(f"is not finished ({status})", path, "resume it")

@@ -79,7 +79,7 @@ def _room(front: Array) -> Array:
 def segment_best(objectives: Array) -> Ints:
     """The best candidate of each segment, (S,), by objectives, (n, S): the thin traces of figure 19.
 
-    One may be best in several segments. Raises SettingsError: no candidate is feasible.
+    One may be best in several segments.
     """
     return _ranked(objectives).argmin(axis=0)
 
@@ -88,7 +88,7 @@ def average(points: Array, objectives: Array) -> Array:
     """The article's estimate, (p,): the mean of the best of points, (n, p), of all segments, (n, S).
 
     As a rule no candidate of the set, and inside the bounds where all are. The points' coordinates are linear
-    in the parameters. Raises SettingsError: no candidate is feasible.
+    in the parameters.
     """
     return points[segment_best(objectives)].mean(axis=0)
 
@@ -98,7 +98,6 @@ def utopia(points: Array, objectives: Array) -> Array:
 
     The article's criterion 1 is the sum of squares of F - F⁰. Segments in which the arm moves far would
     decide alone, so each objective is first divided by its range over the set; one without range is left out.
-    Raises SettingsError: no candidate is feasible.
     """
     values = _ranked(objectives)
     usable = objectives[feasible(objectives)]

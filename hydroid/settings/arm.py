@@ -196,18 +196,14 @@ class Arm(Settings):
         return np.array([high for _, high in self.ranges.values()])
 
     def pose(self, name: str) -> Array:
-        """Return a named pose [rad], shape (J,).
-        Raises SettingsError: no such pose, with the names there are.
-        """
+        """Return a named pose [rad], shape (J,)."""
         if name not in self.poses:
             raise SettingsError(f"{self.name} has no pose {name!r}", hint=f"one of: {', '.join(self.poses)}")
         return np.array(self.poses[name])
 
 
 def load_arm(name: str | Path, beside: Path | None = None) -> Arm:
-    """Read an arm's YAML, found as `find_config` does.
-    Raises SettingsError: no such file, or a setting that is not allowed.
-    """
+    """Read an arm's YAML, found as `find_config` does."""
     return load(find_config(name, beside, kind="arm"), Arm)
 
 

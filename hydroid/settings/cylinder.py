@@ -61,8 +61,6 @@ def make_cylinder(
     """Return a cylinder that moves its joint through a range [rad], or along it [m] where the joint `slides`.
 
     `data` has all joints of the arm at 0; a cylinder whose triangle is given, or along its joint, needs none.
-    Raises ValueError: pivots that are not stated or make no triangle, a dead centre in the range, a linkage
-    that does not reach, or a stroke that is too short.
     """
     sides, pivots = settings.triangle, None
     if slides:

@@ -78,9 +78,7 @@ S = TypeVar("S", bound=Settings)
 
 
 def load(path: Path, kind: type[S], overrides: Mapping[str, Any] | None = None) -> S:
-    """Read one YAML file as settings of a kind, with overrides by dotted key.
-    Raises SettingsError: a key or value that is not allowed, with file and line.
-    """
+    """Read one YAML file as settings of a kind, with overrides by dotted key."""
     values, lines = read_yaml(path)
     for key, value in (overrides or {}).items():
         replace_setting(values, key, value)
@@ -121,9 +119,7 @@ def validate(
 
 
 def parse_override(text: str) -> tuple[str, Any]:
-    """Split `key=value`; the value is read as YAML.
-    Raises SettingsError: no `=` or no key, or a value that is not YAML.
-    """
+    """Split `key=value`; the value is read as YAML."""
     key, equals, value = text.partition("=")
     if not equals or not key.strip():
         raise SettingsError("needs key=value", f"--set {text}", "for example --set search.seed=3")
@@ -131,9 +127,7 @@ def parse_override(text: str) -> tuple[str, Any]:
 
 
 def replace_setting(values: Plain, key: str, value: Any) -> None:
-    """Set a value of nested mappings by its dotted key; numbers of joints may be keys.
-    Raises SettingsError: what the key names has no settings below it.
-    """
+    """Set a value of nested mappings by its dotted key; numbers of joints may be keys."""
     *folders, last = key.split(".")
     for folder in folders:
         inner = values.setdefault(folder, {})

@@ -33,9 +33,7 @@ class Motion:
 
 
 def simulated_motion(model: IdentifiedModel, logs: Mapping[str, Log]) -> Motion:
-    """Simulate the commands of logs, by the name of the arm that they move (`Machine.sides`).
-    Raises SettingsError: a log commands nothing; RunError: the simulation diverged.
-    """
+    """Simulate the commands of logs, by the name of the arm that they move (`Machine.sides`)."""
     arm, first = model.settings.arm, next(iter(logs.values()))
     machine = load_machine(arm, pair=ALONE not in logs)
     for log in logs.values():
@@ -80,7 +78,7 @@ class Sliders:
         self.advance(0.0)
 
     def advance(self, until: float) -> None:
-        """Step to the period before `until` [s]; raises RunError: the simulation diverged."""
+        """Step to the period before `until` [s]."""
         plant = self.plant
         while plant.time + plant.period <= until + 1e-9:
             plant.step(plant.command)

@@ -47,11 +47,7 @@ class RunError(HydroidError):
 
 
 class Stopped(KeyboardInterrupt):
-    """A fit or study that Ctrl-C or a signal ended.
-
-    Args:
-        kept: what remains of it, and what continues it; empty: nothing.
-    """
+    """A fit or study that Ctrl-C or a signal ended; `kept`: what remains of it, and what continues it."""
 
     def __init__(self, kept: str) -> None:
         self.kept = kept

@@ -60,9 +60,7 @@ class IdentifiedModel:
 
 
 def identified(settings: FitSettings, values: Mapping[str, Any], source: str) -> IdentifiedModel:
-    """Return the model of some settings at parameters by name; a fixed parameter may be left out.
-    Raises SettingsError: a name that does not exist or is missing, or a value that is not allowed.
-    """
+    """Return the model of some settings at parameters by name; a fixed parameter may be left out."""
     return IdentifiedModel(settings, settings.parameter_set().vector(values, source), source)
 
 

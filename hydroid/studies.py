@@ -138,10 +138,7 @@ def measured(task: Task, result: Result) -> Row:
 
 
 def run_all(tasks: Sequence[Task], folder: Path, executor: Executor, progress: Progress) -> list[Result]:
-    """Return the result of every task, in order; what `folder`/runs has is read, the others are performed.
-
-    A run that fails is a result too: {"failed": why}.
-    """
+    """Return the result of every task, in order; what `folder`/runs has is read, the others are performed."""
     files = [folder / "runs" / f"{task.key()}.json" for task in tasks]
     results = {file: _read(file) for file in files if file.is_file()}
     missing = {file: task for file, task in zip(files, tasks, strict=True) if file not in results}

@@ -187,8 +187,7 @@ def design(
     """Choose start pose, joints and commands of an experiment at an estimate, shape (P,), beside its logs.
 
     Random experiments are drawn and kept within the limits. The best few are then changed at random, and a
-    changed one replaces the worst of them where it is better. The same seed gives the same experiment. Raises
-    SettingsError: joints or poses that cannot be used, or no experiment within the limits was found.
+    changed one replaces the worst of them where it is better. The same seed gives the same experiment.
     """
     effort, parameters = settings.design.effort, settings.parameter_set()
     rng = np.random.default_rng(seed)

@@ -10,8 +10,7 @@ import numpy as np
 from hydroid.arrays import Array, record
 from hydroid.cad.cylinders import is_part_of_cylinder, take_cylinders
 from hydroid.cad.repair import repair_inertias, weigh
-from hydroid.cad.shapes import convert_meshes, sort_shapes, word
-from hydroid.cad.source import Notes, read_source
+from hydroid.cad.source import Notes, convert_meshes, read_source, sort_shapes, word
 from hydroid.errors import ModelError
 from hydroid.files import fill_template
 from hydroid.log.clues import joint_of
@@ -21,13 +20,10 @@ from hydroid.words import distinct, listed
 
 @record
 class ImportedArm:
-    """A serial arm out of a robot's file: its MJCF.
+    """A serial arm out of a robot's file: its MJCF, and its meshes as STL by their path from that.
 
-    Attributes:
-        title: names of the model and of the file.
-        meshes: binary STL files by their path from the model.
-        cylinders: settings of the cylinders that the file models, but for areas, by joint.
-        notes: what was assumed, left out or mended, a line each.
+    `cylinders` are settings of those that the file models, but for areas, by joint; `notes` say what was
+    assumed, left out or mended.
     """
 
     title: str
@@ -40,13 +36,7 @@ class ImportedArm:
 def import_arm(
     path: Path, columns: Sequence[str] = (), tip: str | None = None, total_mass: float | None = None
 ) -> ImportedArm:
-    """Read a URDF or an MJCF through MuJoCo's importer and take the arm out of it.
-
-    Args:
-        columns: names of a log's columns, which help to choose among branches.
-        tip: name of the link at which the arm ends; None: the tip that fits best.
-        total_mass: of the links that move [kg]; None: masses are those of the file.
-    """
+    """Read a URDF or an MJCF through MuJoCo's importer and take the arm out of it (`hydroid.init`)."""
     notes = Notes()
     spec, files, urdf = read_source(path, notes)
     _clear(spec, path)

@@ -8,8 +8,7 @@ import mujoco
 import numpy as np
 
 from hydroid.arrays import Array
-from hydroid.cad.shapes import SHOWN
-from hydroid.cad.source import Notes
+from hydroid.cad.source import SHOWN, Notes
 from hydroid.mjcf import mujoco_errors
 
 MASSLESS = 1e-6  # mass up to which a body counts as a frame without mass [kg]

@@ -68,11 +68,7 @@ class FitResult(Printed):
         return predicted(self.model, read, None)
 
     def validate(self, logs: "LogSources", out: Source | None = None) -> "Result[list[Prediction]]":
-        """Return the verdict on each joint by logs that were not fitted; a page of it is written to `out`.
-
-        Raises:
-            LogError, RunError: as of `hydroid.validate`.
-        """
+        """Return the verdict on each joint by logs that were not fitted; a page of it is written to `out`."""
         from hydroid.commands.validate import validate
 
         return validate(logs, fit=self, out=out)

@@ -86,12 +86,7 @@ def read_arms(
     """Read commands of an arm, or of the arms of a pair that move; return logs by the arm's name.
 
     Columns that begin with `right_` and `left_` are those of the two arms. Without them every arm that moves
-    has the same commands: both move as mirror images.
-
-    Args:
-        arm: right, left or both: the arms of the pair that move; None: the arm stands alone.
-        pose: pose of the arm's file in which the arms stand; None: as logged.
-        angles: read joint angles over time instead.
+    has the same commands: both move as mirror images. `angles`: read joint angles over time instead.
     """
     from hydroid.arm.model import ALONE, SIDES
     from hydroid.log import open_table

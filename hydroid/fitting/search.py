@@ -22,13 +22,9 @@ _log = logging.getLogger(__name__)
 
 @record
 class Searched:
-    """Result of a search.
+    """Result of a search: its last population, theta (n, P), all candidates simulated, and its history.
 
-    Attributes:
-        theta: the last population, shape (n, P), with its objectives in `population`.
-        single: whether it minimised one objective, not that of each segment.
-        history: shape (generations, len(HISTORY)).
-        memo: all candidates simulated.
+    `single`: whether it minimised one objective, not that of each segment.
     """
 
     theta: Array

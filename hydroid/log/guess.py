@@ -23,12 +23,9 @@ PERIODS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2)  # [s], of which a g
 
 
 class ColumnGuess(NamedTuple):
-    """What the columns of a log seem to hold.
+    """What the columns of a log seem to hold: the `log` section of a fit's settings, and the unused columns.
 
-    Attributes:
-        log: a `log` section of a fit's settings.
-        reasons: a line for each column that it uses, for what is uncertain, and for the other columns.
-        unused: the other columns.
+    A reason stands for each column that it uses, for what is uncertain, and for the others.
     """
 
     log: Plain

@@ -33,9 +33,7 @@ Ranges = Mapping[str, tuple[float, float]]
 def open_table(path: Path, settings: LogSettings = DEFAULT) -> Table:
     """Open a log of any format, recognised by its first bytes: CSV, .mat, Parquet, a ROS bag or MCAP.
 
-    Args:
-        path: the file, or the folder of a ROS 2 bag.
-        settings: name of the time column, and period to which the channels of a bag are resampled.
+    The settings name the time column, and the period to which the channels of a bag are resampled.
     """
     try:
         folder = (path / "metadata.yaml").is_file()

@@ -228,7 +228,6 @@ class Plant:
         np.copyto(self._mass, self.data.M)
 
     def _lock(self, pose: Array) -> None:
-        """Build the model with the locked joints in a pose [rad], shape (J,)."""
         settings, candidate = self.identified.settings, self._candidate
         locked = lock(self._spec, settings.arm, self._moving, pose)
         locked.model.opt.timestep = self.timestep

@@ -22,11 +22,9 @@ STEPS = 6  # points on each side before the steps grow: they reach three standar
 
 @record
 class Profile:
-    """What a profile of a parameter shows.
+    """What a profile shows: where the deviance is below THRESHOLD, infinite where it never exceeds it.
 
-    Attributes:
-        interval: where the deviance is below THRESHOLD; infinite on a side where it never exceeds it.
-        lowest: least deviance of all points; clearly below 0 the estimate is no optimum.
+    `lowest` is the least deviance of all points; clearly below 0 the estimate is no optimum.
     """
 
     interval: tuple[float, float]

@@ -31,13 +31,10 @@ MIN_LEVEL = {"angle": np.deg2rad(0.05), "pressure_a": 1e4, "pressure_b": 1e4}
 
 @record
 class Noise:
-    """A stationary AR process, sampled T times.
+    """A stationary AR process, sampled T times, with reflection coefficients k_1..k_p, within (-1, 1).
 
-    Attributes:
-        samples: T.
-        level: standard deviation, in units of the channel's residual [rad].
-        reflection: coefficients k_1..k_p of its Levinson recursion, shape (p,), each within (-1, 1).
-        given: whether the settings give it; else a residual shows it.
+    `level` is its standard deviation, in units of the channel's residual [rad]. A residual shows it, or it is
+    `given` by the settings.
     """
 
     samples: int
@@ -141,7 +138,6 @@ def transformed(rows: Array) -> Array:
 
 
 def _transform_size(samples: int) -> int:
-    """Return a fast length of transforms of twice as many samples."""
     return int(next_fast_len(2 * samples, real=True))  # pyright: ignore[reportArgumentType, reportUnknownArgumentType]
 
 

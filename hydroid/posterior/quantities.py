@@ -54,7 +54,6 @@ def quantities(problem: Problem, uncertainty: Uncertainty) -> Quantities:
 
 
 def _add_joint(result: Quantities, problem: Problem, uncertainty: Uncertainty, joint: int) -> None:
-    """Add the quantities of one joint, numbered from 1."""
     candidates, named = problem.bindings.candidates, problem.settings.arm.joint_names[joint - 1]
     estimate = candidates(uncertainty.theta[None])
     measure = joint_measure(make_bench(problem.settings, problem.logs, joint), estimate)
@@ -165,8 +164,7 @@ reach the second"""
 def speed_tests(
     bench: Bench, estimate: Candidates, sign: float, ending: str, word: str
 ) -> Callable[[Candidates], Measured]:
-    """Return what measures a joint in a direction, planned so that one candidate, the estimate, ends at its
-    angle.
+    """Return what measures a joint in a direction, planned so that the estimate ends at its angle.
 
     `sign` is that of the commands; `ending` and `word` stand at the end of names and labels.
     """

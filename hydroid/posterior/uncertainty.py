@@ -145,10 +145,7 @@ class Uncertainty:
 
 
 def uncertainty(problem: Problem, theta: Array, first: Array | None = None) -> Uncertainty:
-    """Return the uncertainty of theta, shape (P,), for the noise that its residuals show.
-
-    `first` are derivatives to begin with (`linearised`).
-    """
+    """Return the uncertainty of theta, shape (P,), for the noise that its residuals show (`linearised`)."""
     return uncertainty_from(problem, linearised(problem, theta, first))
 
 

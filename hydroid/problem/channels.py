@@ -172,10 +172,7 @@ def segment_objectives(error: Array, measured: Array, bounds: Ints, settings: Ob
 
 
 def segment_bounds(samples: int, segments: int) -> Ints:
-    """Cut a record of so many samples into segments of equal length: [first, end) of each in samples, (S, 2).
-
-    They are increasing and gapless, from 0 to T.
-    """
+    """Cut a record of so many samples into segments of equal length: [first, end) of each, shape (S, 2)."""
     if segments > samples:
         what = f"{segments} segments do not fit into {samples} samples"
         raise SettingsError(what, "objective.segments", "each segment needs a sample of its own")

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from hydroid.cad.importer import ImportedArm, import_arm
-from hydroid.cad.shapes import MESHES
+from hydroid.cad.source import MESHES
 from hydroid.errors import RunError, SettingsError
 from hydroid.files import fill_template, undisturbed, write_atomic
 from hydroid.log import open_table
@@ -33,8 +33,7 @@ FILES = (ARM, MODEL, PICTURE, FIT, STEPS, MESHES)
 class Project:
     """A project that was written: its folder, and the names of its files and folders there.
 
-    `notes` say what the import of the arm assumed, left out or mended; `columns` what each column of the log
-    is taken for, and why; `unused` names the others; `commands` are to be run next, in this order.
+    `notes`: what the import assumed; `columns`: what each of the log is taken for; `unused`: the others.
     """
 
     folder: Path
@@ -48,14 +47,7 @@ class Project:
 def write_project(
     folder: Path, robot: Path | None, logs: Sequence[Path], joints: Sequence[str] = (), **options: Any
 ) -> Project:
-    """Write a project to a folder, new or with other things in it.
-
-    Args:
-        robot: URDF, MJCF or YAML file of the arm; None: a template of boxes.
-        logs: the first tells the columns; the last of several is kept to validate on.
-        joints: names of the arm's joints as the log counts them; by default in the arm's order.
-        options: `tip` and `total_mass` of `import_arm`; `force`: replace the files of an earlier project.
-    """
+    """Write a project to a folder, new or with other things in it (`hydroid.init` says what is given)."""
     taken = [name for name in FILES if os.path.lexists(folder / name)]
     if not options.pop("force", False) and taken:
         hint = "name another folder, or replace the project's files with --force"

@@ -46,11 +46,8 @@ def joint_sizes(arm: Arm, speeds: Mapping[int, float]) -> tuple[JointSize, ...]:
     """Return the size of what moves every joint, (J,): starts and centres of wide priors, not estimates.
 
     The displacement gives the torque at the pump's pressure; the opening gives the speed while the arm is
-    lifted, and both edges lose the same; the damping holds the speed at full command.
-
-    Args:
-        arm: with its model in place.
-        speeds: that a log shows, by number of the joint [rad/s, m/s]; 0.5 for the others.
+    lifted, and both edges lose the same; the damping holds the speed at full command. `speeds` are those that
+    a log shows, by number of the joint [rad/s, m/s]; 0.5 for the others.
     """
     model = load_model(arm).compile()
     data = mujoco.MjData(model)

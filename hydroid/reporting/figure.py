@@ -180,7 +180,6 @@ def _color(joint: int) -> str:
 
 
 def _outline(points: Array) -> Array:
-    """Return the convex outline of points, shape (n, 2)."""
     try:
         return points[ConvexHull(points).vertices]
     except QhullError:  # all on one line

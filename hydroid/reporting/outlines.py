@@ -13,7 +13,7 @@ import trimesh
 
 from hydroid.arm.model import load_model
 from hydroid.arrays import Array, record
-from hydroid.cad.shapes import SHOWN
+from hydroid.cad.source import SHOWN
 from hydroid.fitting.validation import Prediction
 from hydroid.reporting.page import Plot, Section
 from hydroid.settings.arm import Arm

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 from hydroid.arrays import record
 from hydroid.files import csv_text
 from hydroid.findings import Finding
-from hydroid.log import Log
 from hydroid.words import number, numbered, plain
 
 if TYPE_CHECKING:
@@ -184,9 +183,10 @@ class Page:
         return {name: table for s in self.sections for name, table in {**s.tables, **s.cards}.items()}
 
 
-def log_names(logs: Sequence[Log]) -> list[str]:
-    """Return short names of logs, all different."""
-    return numbered(short_name(Path(log.source).name or log.source) for log in logs)
+def log_names(sources: Iterable[str]) -> dict[str, str]:
+    """Return short names of logs, all different, by their sources."""
+    sources = list(sources)
+    return dict(zip(sources, numbered(short_name(Path(s).name or s) for s in sources), strict=True))
 
 
 def short_name(name: str) -> str:

@@ -33,10 +33,7 @@ def parameter_section(settings: FitSettings, summary: FitSummary) -> Section:
 
 
 def parameter_table(settings: FitSettings, summary: FitSummary, profiles: Intervals | None = None) -> Table:
-    """Return one row per parameter: bounds, estimate, intervals, share of the data, flag.
-
-    `profiles` are further intervals by parameter.
-    """
+    """Return one row per parameter: bounds, estimate, intervals, share of the data, flag."""
 
     def row(p: Parameter) -> dict[str, Any]:
         one, given = summary.estimate[p.name], settings.parameters[p.name].bounds

@@ -65,14 +65,14 @@ def prediction_sections(predictions: Sequence[Prediction], arm: Arm, fits: Verdi
     by_log: dict[str, list[Prediction]] = {}
     for one in predictions:
         by_log.setdefault(one.log.source, []).append(one)
-    names = dict(zip(by_log, log_names([first.log for first, *_ in by_log.values()]), strict=True))
+    names = log_names(by_log)
     bins = min(1000, max(150, 9000 // sum(len(first.joints) for first, *_ in by_log.values())))
     tolerances = {one.joint: one.tolerance_deg for one in next(iter(fits.values()), ())}
     tabs: list[Plot] = []
-    for log, (first, *others) in by_log.items():
-        for joint in first.joints:
+    for log, group in by_log.items():
+        for joint in (first := group[0]).joints:
             title = f"{arm.joint_names[joint - 1]} in {names[log]}"
-            several = [p for p in (first, *others) if joint in p.joints]
+            several = [one for one in group if joint in one.joints]
             slides = arm.joints[joint - 1].slides
             # of many logs fewer samples are drawn: the page stays small
             drawing = partial(draw_response, title, joint, several, bins, slides=slides)
@@ -159,10 +159,7 @@ def validation_page(predictions: Sequence[Prediction], fits: Verdicts, arm: Arm,
 
 
 def draw(run: str | Path, *, figures: bool = False) -> Path:
-    """Draw the report of a finished run in its folder, from what it stores; return the page.
-
-    `figures`: write every chart as PNG and SVG too, to figures/ beside it.
-    """
+    """Draw the report of a finished run in its folder, from what it stores; return the page."""
     folder, page = Path(run), fit_page(load_record(run))
     page_file.write_page(page, folder)
     if figures:

@@ -46,9 +46,7 @@ def pack(tree: object, *, compressed: bool = True) -> bytes:
 
 
 def unpack(file: Path) -> Any:
-    """Read a tree that `pack` made, its dataclasses as mappings and its sequences as lists.
-    Raises ValueError: the file is damaged. OSError: it cannot be read.
-    """
+    """Read a tree that `pack` made, its dataclasses as mappings and its sequences as lists."""
     packed = file.read_bytes()
     data, digest = packed[:-32], packed[-32:]
     if hashlib.sha256(data).digest() != digest:

@@ -53,12 +53,8 @@ class Effort:
 class FitResult:
     """The arrays of a fit: what its estimates make of its logs, and how they came to be.
 
-    Attributes:
-        history: of the search, shape (G, len(HISTORY)).
-        front: non-dominated candidates, (n, P), with objectives by segment and overall, (n, S + 1).
-        segments: objectives of each estimate by segment, shape (S,).
-        refinements: what each took.
-        baselines: fitted to the same logs, by joint and name.
+    The history has shape (G, len(HISTORY)); the front is non-dominated candidates, (n, P), with objectives by
+    segment and overall, (n, S + 1); segments are objectives of each estimate by segment, (S,).
     """
 
     fitted: tuple[Prediction, ...]
@@ -71,13 +67,9 @@ class FitResult:
 
 @record
 class Record:
-    """A finished run: its folder, as a command takes it.
+    """A finished run: its folder, as a command takes it, versions and hashes of its logs, what it found.
 
-    Attributes:
-        identity: versions, and hashes of its logs by source.
-        settings: after a joint refinement with every parameter free that was refined.
-        summary: the final estimate, and the others.
-        validations: predictions of unseen logs by name.
+    After a joint refinement every parameter that was refined is free in the settings.
     """
 
     folder: str
@@ -139,7 +131,7 @@ def keep_validation(model: IdentifiedModel, predictions: Sequence[Prediction]) -
 
 
 def fitted_by(model: IdentifiedModel) -> tuple[Sequence[Prediction], Baselines, set[str] | None]:
-    """Return what the run of a model made of its logs, the baselines, and the logs' hashes, if there is one."""
+    """Return what a model's run made of its logs, the baselines, and the logs' hashes, if there is one."""
     if (folder := run_of(model)) is None:
         return (), {}, None
     result = _read(folder / RESULT, FitResult)
@@ -204,7 +196,6 @@ def read_runs(names: Sequence[str], out: str | Path | None) -> tuple[Record, ...
 
 
 def _finished(path: str) -> Record:
-    """Read a finished run."""
     folder = RunFolder(Path(path))
     if (status := folder.identity().get("status")) != "done":
         raise RunError(f"is not finished ({status})", path, "resume it")

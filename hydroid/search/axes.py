@@ -27,14 +27,7 @@ CURVED = 0.3
 
 @record
 class Box:
-    """A point between its bounds, and how it may move.
-
-    Attributes:
-        at: the point, shape (P,).
-        lower, upper: its bounds, shape (P,).
-        scale: what a relative change of 1 is, shape (P,).
-        varied: which p of the P coordinates move, shape (P,).
-    """
+    """A point between its bounds, (P,), what a relative change of 1 is, and which p coordinates move."""
 
     at: Array
     lower: Array
@@ -63,12 +56,10 @@ class Box:
 
 @record
 class Axes:
-    """Steps from a point along p directions of its varied coordinates, all within the bounds.
+    """Steps from a point along p directions of its varied coordinates, one a row, all within the bounds.
 
-    Attributes:
-        directions: relative changes, independent of each other, one a row, shape (p, p).
-        steps: signed lengths along each: to both sides, or one and two steps to one side, shape (p, 2); to
-            one side only, shape (p, 1).
+    `steps` are signed lengths along each: to both sides, or one and two steps to one side, shape (p, 2); to
+    one side only, shape (p, 1).
     """
 
     directions: Array

@@ -23,12 +23,9 @@ from hydroid.settings.search import GeneticSettings
 
 @record
 class Population:
-    """Candidates and their objectives; nothing ever writes into its arrays.
+    """Candidates, (n, length), and objectives to be minimised, (n, m); nothing ever writes into its arrays.
 
-    Attributes:
-        chromosomes: shape (n, length), see `coding`.
-        objectives: to be minimised, shape (n, m). A candidate with an objective that is not finite is
-            infeasible.
+    A candidate with an objective that is not finite is infeasible.
     """
 
     chromosomes: Genes

@@ -77,10 +77,7 @@ def _room(front: Array) -> Array:
 
 
 def segment_best(objectives: Array) -> Ints:
-    """The best candidate of each segment, (S,), by objectives, (n, S): the thin traces of figure 19.
-
-    One may be best in several segments.
-    """
+    """The best candidate of each segment, (S,), by objectives, (n, S): the thin traces of figure 19."""
     return _ranked(objectives).argmin(axis=0)
 
 

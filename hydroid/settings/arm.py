@@ -40,14 +40,10 @@ Beside = Annotated[Path, Strict(False), AfterValidator(_from_folder)]
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint that turns, or slides; what is said of angles then holds for its position [m].
+    """A joint that turns [deg], or `slides` [m]; what is said of angles then holds for its position.
 
-    Attributes:
-        name: of the model's joint.
-        range: smallest and largest angle [deg], or position [m].
-        continuous: whether it turns without stops, and `range` only limits what is shown and tested.
-        actuator: what moves it; None: nothing that stage 2 knows.
-        slides: whether it slides.
+    A continuous one turns without stops: its range limits what is shown and tested. No actuator: nothing that
+    stage 2 knows moves it.
     """
 
     name: str

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,14 +17,10 @@ if TYPE_CHECKING:
 class LinearActuator:
     """A cylinder and the triangle that it spans with its joint, or with the rocker of a four-bar linkage.
 
-    Attributes:
-        settings: areas, valve opening and linkage.
-        triangle: of its pivots, `a` at least `b`.
-        stroke: of the rod [mm].
-        pivots: on the parent and on the moved link, in their frames [m]; None where only distances are given.
+    Of the triangle `a` is at least `b`; the stroke is the rod's [mm]; the pivots are on the parent and on the
+    moved link, in their frames [m], None where only distances are given.
     """
 
-    kind: ClassVar[str] = "linear"
     settings: Cylinder
     triangle: Triangle
     stroke: float

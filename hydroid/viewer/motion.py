@@ -16,13 +16,10 @@ from hydroid.prediction import predict_log
 
 @record
 class Motion:
-    """A machine under the commands of logs.
+    """A machine under the commands of logs: times [s], (T,), and angles of all joints [rad], (T, nq).
 
-    Attributes:
-        time: [s], shape (T,).
-        simulated: angles of all joints of the machine [rad], shape (T, nq).
-        measured: the same as logged; None where the logs hold no motion.
-        error: rms difference of the driven joints that were measured [deg]; NaN: there are none.
+    `measured` is None where the logs hold no motion; `error` is the rms difference of the driven joints that
+    were measured [deg], NaN where there are none.
     """
 
     machine: Machine

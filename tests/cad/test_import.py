@@ -9,7 +9,7 @@ from arms import MODELS, posed
 from robots import LIMIT, compiled, joint, link, write_robot
 
 from hydroid.cad.importer import import_arm
-from hydroid.cad.shapes import SHOWN
+from hydroid.cad.source import SHOWN
 from hydroid.errors import ModelError
 
 

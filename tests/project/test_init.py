@@ -19,6 +19,7 @@ from hydroid.commands.app import app
 from hydroid.errors import LogError, ModelError, SettingsError
 from hydroid.project.project import Project
 from hydroid.settings.arm import load_arm
+from hydroid.settings.cylinder import LinearActuator
 from hydroid.settings.fit import FitSettings
 
 URDF = Path(__file__).parents[2] / "examples" / "urdf"
@@ -142,7 +143,7 @@ def test_an_error_leaves_nothing_behind(tmp_path: Path):
 def test_without_cad_there_is_a_template_that_runs(tmp_path: Path):
     init(tmp_path / "mine")
     arm = load_arm(tmp_path / "mine" / "arm.yaml")
-    assert [joint.actuator.kind for joint in arm.joints] == ["linear", "linear"]
+    assert all(isinstance(joint.actuator, LinearActuator) for joint in arm.joints)
     assert arm.joints[0].actuator.sense == 1
     assert arm.joints[1].actuator.sense == -1  # its cylinder pushes the stick down
     settings = hydroid.load_settings(tmp_path / "mine" / "fit.yaml")

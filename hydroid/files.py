@@ -2,7 +2,6 @@
 
 import csv
 import io
-import logging
 import os
 import signal
 import tempfile
@@ -13,11 +12,10 @@ from pathlib import Path
 from typing import Any, Literal
 
 from hydroid.errors import RunError, SettingsError
+from hydroid.progress import LOGGER
 
 Plain = dict[str, Any]  # a mapping as YAML and JSON hold it
 PART = ".part"  # suffix of a file that is being written
-
-_log = logging.getLogger(__name__)
 
 
 @contextmanager
@@ -74,7 +72,7 @@ def write_atomic(path: Path, content: str | bytes, *, keep: Path | None = None) 
 def remove_parts(folder: Path) -> None:
     """Remove unfinished files that killed processes left; no other process may write to the folder."""
     for part in folder.rglob(f".*{PART}"):
-        _log.info("removed %s, left by a process that was killed while it wrote", part.name)
+        LOGGER.info("removed %s, left by a process that was killed while it wrote", part.name)
         part.unlink(missing_ok=True)
 
 

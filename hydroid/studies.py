@@ -7,7 +7,6 @@ fits run in processes of their own or on Dask's workers, one thread each.
 """
 
 import json
-import logging
 import math
 import multiprocessing
 import os
@@ -28,7 +27,7 @@ from hydroid.files import Plain, write_atomic
 from hydroid.fitting.fit import fit
 from hydroid.log import Log
 from hydroid.problem.problem import Problem
-from hydroid.progress import NOTE, Progress
+from hydroid.progress import LOGGER, NOTE, Progress
 from hydroid.run.folder import VERSIONS, deciding, digest, model_hash, samples_hash
 from hydroid.search.pareto import segment_best
 from hydroid.settings.fit import FitSettings, StudySettings, cell_settings
@@ -96,8 +95,6 @@ def perform(task: Task) -> Result:
 
 Read = Callable[[Sequence[Path], FitSettings], list[Log]]  # reads logs as settings map their columns
 
-_log = logging.getLogger(__name__)
-
 
 @record
 class Row:
@@ -144,7 +141,7 @@ def run_all(tasks: Sequence[Task], folder: Path, executor: Executor, progress: P
     missing = {file: task for file, task in zip(files, tasks, strict=True) if file not in results}
     known, total = len(results), len(results) + len(missing)
     if known and missing:
-        _log.log(NOTE, "%d of %d runs found, goes on", known, total)
+        LOGGER.log(NOTE, "%d of %d runs found, goes on", known, total)
     progress("runs", known, total)
     futures = {executor.submit(perform, task): file for file, task in missing.items()}
     try:
@@ -170,7 +167,7 @@ def _outcome(future: Future[Result], task: Task) -> tuple[Result, bool]:
     except Exception as error:
         lasting = isinstance(error, HydroidError)
         words = str(error) if lasting else f"{type(error).__name__}: {error}"
-    _log.warning("%s, seed %d failed: %s", task.cell, task.seed, words)
+    LOGGER.warning("%s, seed %d failed: %s", task.cell, task.seed, words)
     return {"failed": words}, lasting
 
 

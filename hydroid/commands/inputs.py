@@ -6,7 +6,6 @@ calls it, or the range of a number. What parameters of several commands are stan
 """
 
 import inspect
-import logging
 import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -18,7 +17,7 @@ from hydroid.errors import SettingsError
 from hydroid.estimate import FitSummary, read_estimate
 from hydroid.files import Plain, find_config
 from hydroid.identified_model import IdentifiedModel, load_identified
-from hydroid.progress import NOTE
+from hydroid.progress import LOGGER, NOTE
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load, parse_override
 
@@ -36,7 +35,6 @@ ModelSource: TypeAlias = "str | Path | IdentifiedModel | Any"
 SettingChanges = Mapping[str, Any] | Sequence[str] | None
 """settings to replace: values by dotted key, or texts `KEY=VALUE`"""
 
-_log = logging.getLogger(__name__)
 
 SHARED = """
     logs (LOG): Logs of commands and joint angles: CSV, .mat, Parquet, ROS bags, MCAP.
@@ -127,7 +125,7 @@ def open_model(
         if model.settings.stage != "hyd":
             hint = "give a fit of stage 2 with --fit, or use --config fit-hyd"
             raise SettingsError("stage 1 (mech) does not model the actuators", model.source, hint)
-        _log.log(NOTE, "note: nominal values for %s", ", ".join(model.nominal) if fit else "all parameters")
+        LOGGER.log(NOTE, "note: nominal values for %s", ", ".join(model.nominal) if fit else "all parameters")
     return model
 
 

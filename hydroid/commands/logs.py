@@ -12,15 +12,13 @@ from hydroid.commands.inputs import LogSource, LogSources, as_list
 from hydroid.errors import RunError, SettingsError
 from hydroid.files import is_file
 from hydroid.identified_model import IdentifiedModel
-from hydroid.progress import NOTE
+from hydroid.progress import LOGGER, NOTE
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.log import LogSettings
 
 if TYPE_CHECKING:
     from hydroid.log import Log, LogFinding
     from hydroid.problem.problem import Problem
-
-_log = logging.getLogger(__name__)
 
 
 def read_logs(
@@ -54,7 +52,7 @@ def read_logs(
         pose = np.where(log.measured, log.angle, settings.arm.pose(settings.start_pose))
         read.append(replace(log, angle=pose))
     for level, line in grouped(findings):
-        _log.log(logging.WARNING if level == "warning" else NOTE, "%s: %s", level, line)
+        LOGGER.log(logging.WARNING if level == "warning" else NOTE, "%s: %s", level, line)
     return read
 
 

@@ -1,6 +1,5 @@
 """`hydroid fit-mech`, `hydroid fit-hyd` and `hydroid adapt`: fits, from files to run folders."""
 
-import logging
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -24,12 +23,10 @@ from hydroid.commands.progress import FitProgress, Progress
 from hydroid.errors import SettingsError
 from hydroid.files import Plain
 from hydroid.parallel.cluster import open_workers
-from hydroid.progress import NOTE
+from hydroid.progress import LOGGER, NOTE
 from hydroid.quantity_table import MECHANICAL
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.parameters import nominal_value
-
-_log = logging.getLogger(__name__)
 
 
 @command
@@ -127,7 +124,7 @@ def _fit(stage: str, given: Mapping[str, Any]) -> FitResult:
         settings = load_settings(config, {**changes, **more, **changes})
     if config == f"fit-{stage}":
         what = f"note: the arm is the shipped {settings.arm.name}"
-        _log.log(NOTE, f"{what}: for your machine give --config, which `hydroid init` writes")
+        LOGGER.log(NOTE, f"{what}: for your machine give --config, which `hydroid init` writes")
     read = read_logs(given["logs"], settings, repair=given["repair"])
     with open_workers(given["dask"]) as workers, FitProgress(settings) as watcher:
         return run_fit(
@@ -161,7 +158,7 @@ def held_mechanics(mech: "ModelSource | None", settings: FitSettings, changes: P
         flag = summary and summary.estimate[name].flag
         doubtful = mass and flag not in (None, "identifiable", "fixed")
         if doubtful and nominal and abs(value - nominal) > 0.1 * nominal:
-            _log.warning(
+            LOGGER.warning(
                 f"{name} is held at {value:.3g} kg, which the logs of stage 1 do not determine ({flag}). "
                 f"Expected was {nominal:.3g} kg; to take that: --set parameters.{name}.fixed={nominal:.3g}"
             )

@@ -1,6 +1,5 @@
 """The search over a problem: ask for candidates, simulate them, tell their objectives, store a checkpoint."""
 
-import logging
 from collections.abc import Callable
 
 import numpy as np
@@ -10,14 +9,13 @@ from hydroid.fitting.checkpoints import Arrays, Checkpoints, Memo, saving
 from hydroid.fitting.multistart import Multistart
 from hydroid.fitting.refinement import Refining
 from hydroid.problem.problem import Problem
+from hydroid.progress import LOGGER
 from hydroid.search.chromosomes import Genes
 from hydroid.search.genetic import Nsga2, Population, SimpleGa
 
 HISTORY = ("generation", "evaluations", "simulated", "infeasible", "best", "median")
 """Columns of a run's history; `best` is over the run so far, `median` over the population, both of (18) or
 (19) over the whole record."""
-
-_log = logging.getLogger(__name__)
 
 
 @record
@@ -62,7 +60,7 @@ def search(
     def state() -> Arrays:
         done, _, simulated, diverged, best, _ = history[-1]
         words = "checkpoint: generation %d of %d, %d simulated, %d diverged, best objective %.6g"
-        _log.info(words, done, generations, simulated, diverged, best)
+        LOGGER.info(words, done, generations, simulated, diverged, best)
         return memo.arrays()
 
     generations, rng = 1 + algorithm.settings.generations, np.random.default_rng(settings.seed)

@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import logging
 import platform
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
@@ -20,6 +19,7 @@ from hydroid.files import Plain, is_file, remove_parts, write_atomic
 from hydroid.identified_model import ARM, CONFIG, MODEL, IdentifiedModel, portable, write_settings
 from hydroid.log import Log
 from hydroid.plant import Plant
+from hydroid.progress import LOGGER
 from hydroid.run.archive import CheckpointFile
 from hydroid.run.process import LOCK, locked, run_log
 from hydroid.settings.arm import Arm
@@ -110,9 +110,6 @@ def _flat(values: Any, prefix: str = "") -> Plain:
     return {key: value for flat in inner for key, value in flat.items()}
 
 
-_log = logging.getLogger(__name__)
-
-
 @dataclass(frozen=True)
 class RunFolder:
     """A folder that one fit owns."""
@@ -136,12 +133,12 @@ class RunFolder:
             try:
                 yield
             except KeyboardInterrupt:
-                _log.info("interrupted")
+                LOGGER.info("interrupted")
                 raise Stopped(self.interrupt()) from None
             except Exception as error:
-                _log.error("ended by %s: %s", type(error).__name__, error)
+                LOGGER.error("ended by %s: %s", type(error).__name__, error)
                 raise
-            _log.info("done")
+            LOGGER.info("done")
 
     def begin(self, settings: FitSettings, logs: Sequence[Log]) -> CheckpointFile:
         """Describe a new run, or check that the run here is the same; return its checkpoints."""
@@ -156,7 +153,7 @@ class RunFolder:
             raise RunError(f"the run here {other}", self.path, hint)
         checkpoints = self.checkpoints()
         self.status("running")
-        _log.info("resumed from %s", ", ".join(checkpoints) or "no checkpoint")
+        LOGGER.info("resumed from %s", ", ".join(checkpoints) or "no checkpoint")
         return checkpoints
 
     def refuse_changes(self) -> None:

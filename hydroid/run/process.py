@@ -17,7 +17,7 @@ from typing import IO
 
 from hydroid.errors import RunError
 from hydroid.parallel.workers import VERSIONS
-from hydroid.progress import logging_to
+from hydroid.progress import LOGGER, logging_to
 
 try:
     import fcntl
@@ -25,8 +25,6 @@ except ImportError:  # Windows has none
     fcntl = None
 
 LOCK = ".lock"  # name of the lock's file; it stays, what counts is whether a process holds it
-
-_log = logging.getLogger(__name__)
 
 
 @contextmanager
@@ -60,7 +58,7 @@ def _take(file: IO[bytes], folder: Path) -> None:
             holder = file.read(200).decode(errors="replace").strip() or "another process"
             hint = "wait for it to end, or choose another --out"
             raise RunError(f"is in use by {holder}", folder, hint) from None
-        _log.warning("%s: no lock on this file system (%s); let no two runs use it", folder, error.strerror)
+        LOGGER.warning("%s: no lock on this file system (%s); let no two runs use it", folder, error.strerror)
     else:
         file.truncate(0)
         file.write(f"process {os.getpid()} on {socket.gethostname()}".encode())
@@ -80,8 +78,8 @@ def run_log(file: Path) -> Generator[None]:
 def log_start() -> None:
     """Log what runs, where, with what."""
     versions = ", ".join(map(" ".join, VERSIONS.items()))
-    _log.info("%s, Python %s", versions, platform.python_version())
-    _log.info("process %d on %s: %s", os.getpid(), socket.gethostname(), shlex.join(sys.argv))
+    LOGGER.info("%s, Python %s", versions, platform.python_version())
+    LOGGER.info("process %d on %s: %s", os.getpid(), socket.gethostname(), shlex.join(sys.argv))
 
 
 class _File(logging.FileHandler):

@@ -7,7 +7,6 @@ A validation stores each unseen log as VALIDATIONS/NAME/result.npz in the folder
 """
 
 import glob
-import logging
 import math
 import os
 import re
@@ -27,6 +26,7 @@ from hydroid.fitting.fit import Fit
 from hydroid.fitting.validation import Prediction
 from hydroid.fitting.verdict import Baselines, judge
 from hydroid.identified_model import CONFIG, IdentifiedModel, load_identified
+from hydroid.progress import LOGGER
 from hydroid.run.archive import pack, unpack
 from hydroid.run.folder import RunFolder, difference
 from hydroid.settings.fit import FitSettings
@@ -166,9 +166,6 @@ def _adapter(kind: type[Any]) -> TypeAdapter[Any]:
     return TypeAdapter(one, config=ConfigDict(arbitrary_types_allowed=True))
 
 
-_log = logging.getLogger(__name__)
-
-
 def read_runs(names: Sequence[str], out: str | Path | None) -> tuple[Record, ...]:
     """Read finished runs that differ in nothing but their seeds, in their order, and leave out the others.
 
@@ -182,7 +179,7 @@ def read_runs(names: Sequence[str], out: str | Path | None) -> tuple[Record, ...
         try:
             runs.append(_finished(path))
         except HydroidError as error:
-            _log.warning("left out: %s", error)
+            LOGGER.warning("left out: %s", error)
     if not runs:
         raise RunError("no finished run is there", " ".join(names), "resume those that were stopped")
     runs.sort(key=lambda run: run.seed)

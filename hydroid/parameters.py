@@ -5,15 +5,14 @@ vector theta: one column per parameter, fixed ones included, in the units of the
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
-from hydroid.arrays import Array, Mask
+from hydroid.arrays import Array, Mask, record
 from hydroid.errors import SettingsError
 
 
-@dataclass(frozen=True)
+@record
 class Prior:
     """What is known of one parameter besides the logs: Gaussian, or log-normal where `log`.
 
@@ -36,7 +35,7 @@ class Prior:
         return float(self.nominal * np.exp(change)) if self.log else self.nominal + change
 
 
-@dataclass(frozen=True)
+@record
 class Parameter:
     """One physical parameter.
 
@@ -71,7 +70,7 @@ class Parameter:
         return np.where(np.asarray(position) >= 1.0, high, inner)
 
 
-@dataclass(frozen=True)
+@record
 class ParameterSet:
     """The parameters of a stage in the order of its vector theta, shape (P,)."""
 

@@ -101,8 +101,7 @@ class ExperimentSimulator:
             first = violation(angle, self._settings)
             first = first or self._too_near(angle)
             if first is None:
-                gained, log = self.information(experiment, angle), experiment.log(self._settings)
-                return None if gained is None else Trial(experiment, gained, replace(log, angle=angle))
+                return self._kept(experiment, angle)
             if first.sample == 0:
                 return None  # the start pose itself
             experiment = repaired(experiment, first)
@@ -119,8 +118,8 @@ class ExperimentSimulator:
         turned = np.ptp(angle[max(0, sample - 20) : sample + 1], axis=0)
         return Violation(sample, int(np.argmax(turned)), False)
 
-    def information(self, experiment: Experiment, angle: Array) -> Array | None:
-        """Return the information of an experiment whose angles are known, (T, J); None where it diverges."""
+    def _kept(self, experiment: Experiment, angle: Array) -> Trial | None:
+        """The trial of an experiment whose angles are known, (T, J); None where it diverges beside them."""
 
         def outputs(theta: Array) -> Array:
             return self._simulate(experiment, theta)[:, :, self._outputs].reshape(len(theta), -1)
@@ -129,7 +128,8 @@ class ExperimentSimulator:
         if not np.isfinite(slopes).all():
             return None
         each = np.moveaxis(slopes.reshape(len(slopes), -1, len(self._outputs)), -1, 0)
-        return measured((one, self._noise) for one in each)
+        gained = measured((one, self._noise) for one in each)
+        return Trial(experiment, gained, replace(experiment.log(self._settings), angle=angle))
 
     def _simulate(self, experiment: Experiment, theta: Array) -> Array:
         """All joints' angles [rad] of candidates, (n, P) -> (n, T, J); NaN where one diverged."""

@@ -8,7 +8,7 @@ carry them, and the joint that it moves gets the cylinder. A URDF cannot close l
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import mujoco
@@ -73,8 +73,8 @@ def take_cylinders(spec: mujoco.MjSpec, notes: Notes) -> dict[str, Plain]:
                         place = data.body(body).xmat.reshape(3, 3).T @ (pin.at - data.body(body).xpos)
                         spec.body(body).add_site(name=f"{joint.name}_pivot_{end}", pos=place)
                 notes.add("cylinders of the file give these joints' pivots", joint.name)
-    for joint in list(spec.joints):
-        if any(body in helpers for body in _upwards(joint.parent)):
+    for name in helpers:  # and all that hangs on them
+        for joint in spec.body(name).find_all("joint"):
             spec.delete(joint)
     return found
 
@@ -82,12 +82,6 @@ def take_cylinders(spec: mujoco.MjSpec, notes: Notes) -> dict[str, Plain]:
 def is_part_of_cylinder(joint: mujoco.MjsJoint) -> bool:
     """Return whether the names of a joint and its link tell a cylinder's tube or rod, which moves no link."""
     return all({*re.split(r"[\W_\d]+", name.lower())} & PARTS for name in (joint.name, joint.parent.name))
-
-
-def _upwards(body: Any) -> Iterator[str]:
-    while body is not None:
-        yield body.name
-        body = body.parent
 
 
 def _pins(spec: mujoco.MjSpec, data: mujoco.MjData) -> list[_Pin]:

@@ -83,7 +83,7 @@ def written(report: "Page | Mapping[str, Table]", out: str | Path | None) -> lis
     from hydroid.reporting.page_file import write_page, write_tables
 
     write = write_tables if isinstance(report, Mapping) else write_page
-    return [*map(str, write(report, Path(out))[-1:])]  # pyright: ignore[reportArgumentType]
+    return [str(write(report, Path(out)))]  # pyright: ignore[reportArgumentType]
 
 
 def show(result: Printed, *, as_json: bool, verbose: bool = False) -> None:

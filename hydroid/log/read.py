@@ -1,7 +1,6 @@
 """A log file -> `Log`: open, map, repair, check, resample; and back to CSV, which reads the same."""
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import get_args
@@ -91,8 +90,8 @@ def check_log(
             log = resample(recording, settings, len(ranges))
             findings += check_motion(log, recording.signals, compared, backward, settings.delay_s)
     except LogError as error:
-        fault = log_finding("error", "unreadable", source, what=error.what, hint=error.hint)
-        findings.append(replace(fault, where=error.where))
+        said = {"what": error.what, "hint": error.hint}
+        findings.append(LogFinding("unreadable", "error", (), said, error.where, source))
     return log, by_level(findings)
 
 

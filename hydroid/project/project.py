@@ -5,10 +5,10 @@ import shlex
 import tempfile
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from hydroid.arrays import record
 from hydroid.cad.importer import ImportedArm, import_arm
 from hydroid.cad.source import MESHES
 from hydroid.errors import RunError, SettingsError
@@ -29,7 +29,7 @@ FIT, STEPS = "fit.yaml", "next-steps.md"
 FILES = (ARM, MODEL, PICTURE, FIT, STEPS, MESHES)
 
 
-@dataclass(frozen=True)
+@record
 class Project:
     """A project that was written: its folder, and the names of its files and folders there.
 

@@ -131,11 +131,11 @@ class MovingArm:
     start: int
 
 
-def motion_section(arm: Arm, predictions: Mapping[str, Prediction]) -> tuple[Section, ...]:
+def motion_section(arm: Arm, predictions: Mapping[str, Prediction]) -> Section | None:
     """Return the section with a tab for each of the worst logs, by name; none for what diverged."""
     finite = [item for item in predictions.items() if np.isfinite(item[1].response).all()]
     if not finite:
-        return ()
+        return None
     finite.sort(key=lambda item: -max(one.rms for one in item[1].indices.values()))
     few = f"{LOGS} of {len(finite)} logs, the worst first. " if len(finite) > LOGS else ""
     del finite[LOGS:]
@@ -143,7 +143,7 @@ def motion_section(arm: Arm, predictions: Mapping[str, Prediction]) -> tuple[Sec
     tabs = (
         Plot(f"motion_{i}", name, partial(draw, one), button=name) for i, (name, one) in enumerate(finite, 1)
     )
-    return (Section("The arm in motion", few + _CAPTION, tabs=tuple(tabs)),)
+    return Section("The arm in motion", few + _CAPTION, tabs=tuple(tabs))
 
 
 def moving_arm(

@@ -113,7 +113,7 @@ def direction_table(known: Covariance) -> Table:
     return Table("", header, tuple(rows))
 
 
-def quantity_section(settings: FitSettings, summary: FitSummary) -> tuple[Section, ...]:
+def quantity_section(settings: FitSettings, summary: FitSummary) -> Section | None:
     """Return the section with a card of the best known quantities of each joint; none without any."""
     names, cards = settings.arm.joint_names, dict[str, Table]()
     known = sorted(
@@ -130,15 +130,15 @@ def quantity_section(settings: FitSettings, summary: FitSummary) -> tuple[Sectio
     text = (
         "With 95 % intervals, which are right only if the model is right. estimate.yaml has all quantities."
     )
-    return (Section("What is known", text, cards=cards),) if cards else ()
+    return Section("What is known", text, cards=cards) if cards else None
 
 
-def speed_section(settings: FitSettings, summary: FitSummary, logs: Sequence[Log]) -> tuple[Section, ...]:
+def speed_section(settings: FitSettings, summary: FitSummary, logs: Sequence[Log]) -> Section | None:
     """Return the section with the curves of speed; none where there are none."""
     text = "Speeds in mid travel against command, with 95 % intervals. Grey: commands beyond the logs."
     curves = tuple(summary.curves.values())
     plot = Plot("speed", text, partial(draw_speeds, curves, logs, settings.arm.joint_names))
-    return (Section("Speeds", plots=(plot,), folded=True),) if curves else ()
+    return Section("Speeds", plots=(plot,), folded=True) if curves else None
 
 
 def draw_speeds(curves: Sequence[CurveEstimate], logs: Sequence[Log], joints: Sequence[str]) -> Chart:

@@ -54,7 +54,7 @@ _COLUMNS = {
 }
 
 
-def prediction_sections(predictions: Sequence[Prediction], arm: Arm, fits: Verdicts) -> tuple[Section, ...]:
+def prediction_sections(predictions: Sequence[Prediction], arm: Arm, fits: Verdicts) -> list[Section]:
     """Return the arm in motion, each joint's error in each log with the responses behind it, and all numbers.
 
     The first prediction of a log is the one that moves, and whose errors are shown; they are coloured by the
@@ -98,16 +98,14 @@ def prediction_sections(predictions: Sequence[Prediction], arm: Arm, fits: Verdi
         del columns["fit"]
     optional = tuple(columns[key] for key in ("mae_deg", "max_deg", "inside_percent", "expected_deg"))
     errors = Table.of("All errors", columns, rows, note, optional)
-    return (
-        *motion_section(arm, {names[log]: first for log, (first, *_) in by_log.items()}),
-        Section(
-            "Errors by log" if len(tabs) > 1 else "Response",
-            _MATRIX if len(tabs) > 1 else "",
-            tabs=tuple(tabs),
-        ),
+    title, text = ("Errors by log", _MATRIX) if len(tabs) > 1 else ("Response", "")
+    sections = (
+        motion_section(arm, {names[log]: first for log, (first, *_) in by_log.items()}),
+        Section(title, text, tabs=tuple(tabs)),
         Section(errors.title, tables={"errors": errors}, folded=True),
-        *horizon_section(fits),
+        horizon_section(fits),
     )
+    return [*filter(None, sections)]
 
 
 def draw_response(
@@ -175,13 +173,13 @@ def fit_page(record: Record) -> Page:
     sections = (
         *verdict_sections(fits, next_step(settings, record.verdict, record.folder, logs)),
         *prediction_sections([*record.validations.values(), *fitted], settings.arm, fits),
-        *quantity_section(settings, summary),
+        quantity_section(settings, summary),
         *unknown_sections(summary),
         parameter_section(settings, summary),
-        *speed_section(settings, summary, logs),
+        speed_section(settings, summary, logs),
         search_section(record),
     )
-    in_order = sorted(sections, key=lambda section: section.folded)
+    in_order = sorted(filter(None, sections), key=lambda section: section.folded)
     title = f"Fit of {settings.arm.name}, stage {2 if settings.stage == 'hyd' else 1}"
     made_by = {k: str(v) for k, v in record.identity.items() if k in ("hydroid", "mujoco", "numpy", "python")}
     warned = (*outside(record.verdict), *warnings(summary))

@@ -68,7 +68,7 @@ def verdict_sections(fits: Verdicts, *steps: Finding) -> tuple[Section, ...]:
     return (verdict, Section("Next", steps=steps)) if steps else (verdict,)
 
 
-def horizon_section(fits: Verdicts) -> tuple[Section, ...]:
+def horizon_section(fits: Verdicts) -> Section | None:
     """Return the rms error of each angle's change over some times, of fits and baselines, if known."""
     rows = [
         {"joint": one.name, "of": short_name(fit) if name == "the fit" and len(fits) > 1 else name}
@@ -83,7 +83,7 @@ def horizon_section(fits: Verdicts) -> tuple[Section, ...]:
         "Each is simulated from 2 s before, at the measured angles."
     )
     table = Table.of("Error by prediction time", columns, rows, note)
-    return (Section(table.title, tables={"horizons": table}, folded=True),) if rows else ()
+    return Section(table.title, tables={"horizons": table}, folded=True) if rows else None
 
 
 def ordered(fits: Verdicts) -> Verdicts:

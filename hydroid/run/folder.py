@@ -5,7 +5,6 @@ import json
 import platform
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from hydroid.arm.model import load_model
+from hydroid.arrays import record
 from hydroid.errors import RunError, Stopped
 from hydroid.estimate import write_estimate
 from hydroid.files import Plain, is_file, remove_parts, write_atomic
@@ -110,7 +110,7 @@ def _flat(values: Any, prefix: str = "") -> Plain:
     return {key: value for flat in inner for key, value in flat.items()}
 
 
-@dataclass(frozen=True)
+@record
 class RunFolder:
     """A folder that one fit owns."""
 

@@ -55,25 +55,21 @@ def crowding(objectives: Array, rank: Ints) -> Array:
     The sum over the objectives of the gap between its two neighbours, in parts of the front's range; inf at
     the ends of a front, 0 for the infeasible.
     """
-    room = np.zeros(len(objectives))
+    crowd = np.zeros(objectives.shape)
     usable = feasible(objectives)
-    for front in np.unique(rank[usable]):
-        candidates = (rank == front) & usable
-        room[candidates] = _room(objectives[candidates])
-    return room
-
-
-def _room(front: Array) -> Array:
-    order = np.argsort(front, axis=0, kind="stable")
-    sorted_ = np.take_along_axis(front, order, axis=0)
-    span = sorted_[-1] - sorted_[0]
-    gaps = np.full(front.shape, np.inf)
-    # An objective in which all are equal has no ends and no gaps.
-    gaps[:, span == 0] = 0.0
-    gaps[1:-1] = (sorted_[2:] - sorted_[:-2]) / np.where(span == 0, 1.0, span)
-    room = np.empty_like(gaps)
-    np.put_along_axis(room, order, gaps, axis=0)
-    return room.sum(axis=1)
+    for number in np.unique(rank[usable]):
+        candidates = (rank == number) & usable
+        front = objectives[candidates]
+        order = np.argsort(front, axis=0, kind="stable")
+        sorted_ = np.take_along_axis(front, order, axis=0)
+        span = sorted_[-1] - sorted_[0]
+        gaps = np.full(front.shape, np.inf)
+        # An objective in which all are equal has no ends and no gaps.
+        gaps[:, span == 0] = 0.0
+        gaps[1:-1] = (sorted_[2:] - sorted_[:-2]) / np.where(span == 0, 1.0, span)
+        np.put_along_axis(front, order, gaps, axis=0)
+        crowd[candidates] = front
+    return crowd.sum(axis=1)
 
 
 def segment_best(objectives: Array) -> Ints:

@@ -5,7 +5,7 @@ actuators, in units of a drawing (mm, mm², cm³/rad).
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 import numpy as np
 from pydantic import AfterValidator, Field, Strict, ValidationInfo
 
-from hydroid.arrays import Array
+from hydroid.arrays import Array, record
 from hydroid.errors import ModelError, SettingsError
 from hydroid.files import find_config
 from hydroid.settings.cylinder import LinearActuator, make_cylinder
@@ -38,7 +38,7 @@ Beside = Annotated[Path, Strict(False), AfterValidator(_from_folder)]
 """a path relative to the file that names it"""
 
 
-@dataclass(frozen=True)
+@record
 class Joint:
     """A joint that turns [deg], or `slides` [m]; what is said of angles then holds for its position.
 

@@ -1,19 +1,19 @@
 """A cylinder with the triangle that it spans, from its settings and the pivots that the arm's model shows."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hydroid.arrays import Array
+from hydroid.arrays import Array, record
 from hydroid.settings.linkage import DIGITS, Cylinder, Pivots, Triangle, Vector, four_bar, triangle
 
 if TYPE_CHECKING:
     import mujoco
 
 
-@dataclass(frozen=True)
+@record
 class LinearActuator:
     """A cylinder and the triangle that it spans with its joint, or with the rocker of a four-bar linkage.
 

@@ -126,7 +126,7 @@ def test_errors_of_a_joint_that_slides_are_in_millimetres():
     (one,) = judge(problem.settings, [], {}, [make_prediction(problem.logs[0], error=0.02)])
     slid = one.model_copy(update={"slides": True, "horizons_deg": {"the fit": (1.0, None, 1.0, 1.0, 1.0)}})
     assert "20 mm" in verdict_table({"a": [slid]}).rows[0]
-    (section,) = horizon_section({"a": [slid]})
+    section = horizon_section({"a": [slid]})
     assert section.tables["horizons"].rows[0][2:4] == ("17 mm", None)
 
 

@@ -137,7 +137,7 @@ class Posterior:
 
 def interval(value: Array, half: Array, multiplicative: Mask) -> Array:
     """Return ends, (m, 2), value ± half, or value times and over exp(half / value), from shapes (m,)."""
-    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+    with np.errstate(all="ignore"):
         factor = np.exp(np.where(multiplicative, half / value, 0.0))
     change = np.where(multiplicative, 0.0, half)
     return np.stack([value / factor - change, value * factor + change], axis=1)

@@ -112,7 +112,7 @@ def gain_model(bench: Bench, candidates: Candidates, inertia: Array) -> Measured
     joint = candidates.joints[:, bench.joint - 1]
     gain, damping, friction = joint["gain"], joint["damping"], joint["friction"]
     factor, unit = bench.unit
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(all="ignore"):
         ratio = factor * (gain / damping)
         yield Column("gain", "gain between command and speed, K/D", f"{unit}/s per %"), ratio
         yield Column("time_constant", "time constant, inertia/D", "s"), inertia / damping

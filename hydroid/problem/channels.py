@@ -133,7 +133,7 @@ def norm(error: Array, p: float | str) -> Array:
     """
     # with the last axis contiguous numpy sums row by row; a transposed input would be summed in another order
     size = np.abs(np.ascontiguousarray(error))
-    with np.errstate(over="ignore", invalid="ignore"):
+    with np.errstate(all="ignore"):
         if p == 1:
             value = size.mean(axis=-1)
         elif p == 2:

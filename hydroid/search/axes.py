@@ -142,7 +142,7 @@ def _slopes(function: Function, at: Box, axes: Axes, value: Array) -> tuple[Arra
     steps = axes.steps.T[:, :, None]
     changes = (steps * axes.directions).reshape(-1, axes.directions.shape[1])
     rows = function(at.points(changes)).reshape(*steps.shape[:2], -1)
-    with np.errstate(invalid="ignore", over="ignore"):
+    with np.errstate(all="ignore"):
         near, far = (rows[0] - value) / steps[0], (rows[-1] - value) / steps[-1]
         if len(steps) == 1:
             return near, np.zeros(len(near), dtype=bool)
@@ -156,7 +156,7 @@ def _fitted(directions: Array, wanted: Array, room: Array) -> Axes:
     """Return steps of wanted lengths, (p,), shortened to LARGEST and to the room, (2, p)."""
     share = np.abs(directions)
     wanted = np.minimum(wanted, LARGEST / share.max(axis=1))
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(all="ignore"):
         ahead, behind = (
             np.where(share > 0, np.where(directions > 0, *sides) / share, np.inf).min(axis=1)
             for sides in (room[::-1], room)

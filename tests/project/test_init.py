@@ -152,7 +152,6 @@ def test_without_cad_there_is_a_template_that_runs(tmp_path: Path):
 
 
 def project(place: Path, folder: Path, text: str) -> tuple[Project, FitSettings]:
-    """A project of a changed log, and its settings."""
     (folder / "log.csv").write_text(text)
     made = init(folder / "mine", place / "digger/urdf/digger.urdf", [folder / "log.csv"])
     return made, hydroid.load_settings(folder / "mine" / "fit.yaml")

@@ -25,8 +25,6 @@ HOSTILE = "<b>&_%$.csv"
 
 
 class Reader(HTMLParser):
-    """Collects what a page shows and what it refers to."""
-
     def __init__(self, source: str) -> None:
         super().__init__()
         self.tags: list[str] = []

@@ -36,13 +36,10 @@ def plant(nominal: IdentifiedModel) -> Plant:
 
 @pytest.fixture
 def slide(plant: Plant) -> Sliders:
-    """All joints on sliders, from the study pose."""
     return Sliders(plant)
 
 
 class FakeViewer:
-    """A window that stays open for some pictures."""
-
     def __init__(self, playback: Any, pictures: int) -> None:
         self.playback, self.left = playback, pictures
         self.times = list[float]()

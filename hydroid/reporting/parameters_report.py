@@ -36,12 +36,17 @@ def parameter_table(settings: FitSettings, summary: FitSummary, profiles: Interv
     """Return one row per parameter: bounds, estimate, intervals, share of the data, flag."""
 
     def row(p: Parameter) -> dict[str, Any]:
-        one, given = summary.estimate[p.name], settings.parameters[p.name].bounds
-        low, high = map(Given, given) if given else (p.lower, p.upper)
+        one, own = summary.estimate[p.name], settings.parameters[p.name]
+        low, high = map(Given, own.bounds) if own.bounds else (p.lower, p.upper)
+        what = CHOICES[own.quantity].plain
+        if own.link is not None:
+            what += f" of {own.link}"
+        elif len(settings.outputs) > 1 and len(own.joints or ()) == 1:  # where it acts
+            what += f", {settings.arm.joint_names[own.joints[0] - 1]}"
         ends = *one.interval, *one.interval_by_log, *(profiles or {}).get(p.name, (None, None))
         return {
             "name": p.name,
-            "what": _plain_name(settings, p.name),
+            "what": what,
             "unit": p.unit,
             "value": one.value,
             **({"lower": low, "upper": high} if low < high else {}),
@@ -60,16 +65,6 @@ def parameter_table(settings: FitSettings, summary: FitSummary, profiles: Interv
     optional = ("what", *by_log, "data [%]", "lower", "upper")
     rows = map(row, settings.parameter_set().parameters)
     return Table.of("Parameters", {name: name for name in columns}, rows, note, optional)
-
-
-def _plain_name(settings: FitSettings, parameter: str) -> str:
-    """Say in plain words what a parameter is, and where it acts if several joints are compared."""
-    own = settings.parameters[parameter]
-    plain = CHOICES[own.quantity].plain
-    if own.link is not None:
-        return f"{plain} of {own.link}"
-    joints = [] if len(settings.outputs) == 1 else own.joints or []
-    return f"{plain}, {settings.arm.joint_names[joints[0] - 1]}" if len(joints) == 1 else plain
 
 
 def status(estimate: ParameterEstimate) -> str:
@@ -167,7 +162,17 @@ def merged_tables(runs: Sequence[Record]) -> dict[str, Table]:
     parameters = runs[0].settings.parameter_set().parameters
     units = {f"error of {one.name}": "mm" if one.slides else "deg" for one in runs[0].summary.verdict}
     units |= {p.name: p.unit for p in parameters}
-    columns = np.array([[*_errors(run), *(run.summary.values[p.name] for p in parameters)] for run in runs])
+    factors = [1e3 * np.radians(1.0) if one.slides else 1.0 for one in runs[0].summary.verdict]
+    columns = np.array(
+        [
+            [
+                (one.fitted_deg or 0.0) * factor
+                for one, factor in zip(run.summary.verdict, factors, strict=True)
+            ]
+            + [run.summary.values[p.name] for p in parameters]
+            for run in runs
+        ]
+    )
     best = runs[0].summary.estimate
     spread = np.quantile(columns, [0.5, 0, 0.25, 0.75, 1], axis=0).T.tolist()
     rows = [
@@ -180,11 +185,3 @@ def merged_tables(runs: Sequence[Record]) -> dict[str, Table]:
         "spread": Table(f"{len(runs)} runs", SPREAD, tuple(rows), optional=SPREAD[4:6]),
         "runs": Table("Runs, smallest error first", header, tuple(each), optional=header[:1:-1]),
     }
-
-
-def _errors(run: Record) -> list[float]:
-    """Return the error of each joint on the fitted logs [deg or mm]."""
-    return [
-        (one.fitted_deg or 0.0) * (1e3 * np.radians(1.0) if one.slides else 1.0)
-        for one in run.summary.verdict
-    ]

@@ -62,7 +62,11 @@ def make_cylinder(
     if slides:
         if settings.triangle or settings.four_bar:
             raise ValueError("its joint slides, so it lies along it: give neither triangle nor four_bar")
-        sides = _along(settings.pivots, data, joint)
+        # along the joint b is 0; by default the rod runs out forward
+        given, way = settings.pivots, 1.0
+        if given is not None:
+            way = float(np.subtract(given.child, given.parent) @ data.joint(joint).xaxis)
+        sides = Triangle.model_construct(a=1.0, b=0.0, theta0=90.0 if way > 0 else -90.0)
     elif sides is None:
         sides, pivots = _pinned(settings.pivots, data, joint)
     sides = sides.changed({"a": max(sides.a, sides.b), "b": min(sides.a, sides.b)})
@@ -80,12 +84,6 @@ def make_cylinder(
     if stroke < 0.98 * needed:  # catalogues round: the cylinder then stops first
         raise ValueError(f"a stroke of {stroke:g} mm is too short for the range, which needs {needed:.1f} mm")
     return replace(cylinder, stroke=stroke)
-
-
-def _along(given: Pivots | None, data: Any, joint: str) -> Triangle:
-    """Return the triangle of a cylinder along its joint, b = 0; by default its rod runs out forward."""
-    way = 1.0 if given is None else float(np.subtract(given.child, given.parent) @ data.joint(joint).xaxis)
-    return Triangle.model_construct(a=1.0, b=0.0, theta0=90.0 if way > 0 else -90.0)
 
 
 def _pinned(given: Pivots | None, data: Any, joint: str) -> tuple[Triangle, tuple[Vector, Vector]]:

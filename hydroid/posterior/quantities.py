@@ -34,6 +34,9 @@ Measured: TypeAlias = Iterator[tuple[Column, Array]]
 NaN where one is undefined"""
 
 
+Measure = Callable[[Candidates], list[tuple[Column, Array]]]
+
+
 @record
 class Quantities:
     """What follows from an estimate: single quantities and curves by name.
@@ -54,7 +57,7 @@ def quantities(problem: Problem, uncertainty: Uncertainty) -> Quantities:
         measure = joint_measure(make_bench(problem.settings, problem.logs, joint), estimate)
         columns = [column for column, _ in measure(estimate)]
 
-        def values(theta: Array, measure=measure) -> Array:
+        def values(theta: Array, measure: Measure = measure) -> Array:
             return np.stack([value for _, value in measure(candidates(theta))], axis=1)
 
         parameters = problem.settings.parameters.values()
@@ -87,7 +90,7 @@ def quantities(problem: Problem, uncertainty: Uncertainty) -> Quantities:
     return result
 
 
-def joint_measure(bench: Bench, estimate: Candidates) -> Callable[[Candidates], list[tuple[Column, Array]]]:
+def joint_measure(bench: Bench, estimate: Candidates) -> Measure:
     """Return what computes the quantities of one joint; test movements are planned at the estimate."""
     tests, further = [], gain_model
     if bench.settings.stage == "hyd":

@@ -3,7 +3,7 @@
 import io
 import warnings
 from collections.abc import Generator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 import mujoco
@@ -154,7 +154,10 @@ def _view(axes: Axes, arm: Arm, data: Any, outlines: Sequence[Shape], poses: Arr
     for shape in outlines:
         joint = moved_by[shape.body]
         color, label = ("grey", None) if joint < 0 else (_color(joint), arm.joint_names[joint])
-        axes.fill(*_outline(shape.corners @ onto).T, fc=color, ec=color, alpha=0.45, label=label)
+        outline = shape.corners @ onto
+        with suppress(QhullError):  # all on one line
+            outline = outline[ConvexHull(outline).vertices]
+        axes.fill(*outline.T, fc=color, ec=color, alpha=0.45, label=label)
     for child, joint in zip(model.jnt_bodyid.tolist(), arm.joints, strict=True):
         if isinstance(joint.actuator, LinearActuator) and joint.actuator.pivots is not None:
             bodies = [model.body_parentid[child], child]
@@ -177,10 +180,3 @@ def _view(axes: Axes, arm: Arm, data: Any, outlines: Sequence[Shape], poses: Arr
 
 def _color(joint: int) -> str:
     return SHADES[SERIES[joint % len(SERIES)]]
-
-
-def _outline(points: Array) -> Array:
-    try:
-        return points[ConvexHull(points).vertices]
-    except QhullError:  # all on one line
-        return points

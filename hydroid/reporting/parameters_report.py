@@ -41,7 +41,7 @@ def parameter_table(settings: FitSettings, summary: FitSummary, profiles: Interv
         what = CHOICES[own.quantity].plain
         if own.link is not None:
             what += f" of {own.link}"
-        elif len(settings.outputs) > 1 and len(own.joints or ()) == 1:  # where it acts
+        elif len(settings.outputs) > 1 and own.joints and len(own.joints) == 1:  # where it acts
             what += f", {settings.arm.joint_names[own.joints[0] - 1]}"
         ends = *one.interval, *one.interval_by_log, *(profiles or {}).get(p.name, (None, None))
         return {

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hydroid.arrays import Array, record
+from hydroid.arrays import record
 from hydroid.settings.linkage import DIGITS, Cylinder, Pivots, Triangle, Vector, four_bar, triangle
 
 if TYPE_CHECKING:
@@ -100,11 +100,7 @@ def _pinned(given: Pivots | None, data: Any, joint: str) -> tuple[Triangle, tupl
     bodies = int(data.model.body_parentid[child]), child
     local = [data.xmat[b].reshape(3, 3).T @ (e - data.xpos[b]) for b, e in zip(bodies, ends, strict=True)]
     parent, moved = (tuple(place.round(DIGITS).tolist()) for place in local)
-    return _triangle(ends - at.xanchor, at.xaxis), (parent, moved)
-
-
-def _triangle(ends: Array, axis: Array) -> Triangle:
-    """The triangle of two pivots, (2, 3), seen from the joint at angle 0 [m], and the joint's axis, (3,)."""
+    ends, axis = ends - at.xanchor, at.xaxis
     heights = ends @ axis
     near, far = flat = ends - np.outer(heights, axis)
     a, b = np.linalg.norm(flat, axis=1).tolist()
@@ -118,4 +114,4 @@ def _triangle(ends: Array, axis: Array) -> Triangle:
             "a cylinder must lie across the axis"
         )
     turn = round(math.degrees(math.atan2(float(np.cross(near, far) @ axis), float(near @ far))), DIGITS)
-    return Triangle(a=round(a, DIGITS), b=round(b, DIGITS), theta0=turn)
+    return Triangle(a=round(a, DIGITS), b=round(b, DIGITS), theta0=turn), (parent, moved)

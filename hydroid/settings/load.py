@@ -78,7 +78,7 @@ S = TypeVar("S", bound=Settings)
 
 
 def load(path: Path, kind: type[S], overrides: Mapping[str, Any] | None = None) -> S:
-    """Read one YAML file as settings of a kind, with overrides by dotted key, in which joints have numbers."""
+    """Read one YAML file as settings of a kind, with overrides by dotted key, joints by their numbers."""
     values, lines = read_yaml(path)
     for key, value in (overrides or {}).items():
         (*folders, last), place = key.split("."), values

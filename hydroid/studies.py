@@ -13,7 +13,7 @@ import os
 import signal
 import threading
 from collections.abc import Callable, Generator, Mapping, Sequence
-from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from pathlib import Path
@@ -146,8 +146,17 @@ def run_all(tasks: Sequence[Task], folder: Path, executor: Executor, progress: P
     futures = {executor.submit(perform, task): file for file, task in missing.items()}
     try:
         for done, future in enumerate(as_completed(futures), known + 1):
-            file = futures.pop(future)
-            results[file], lasting = _outcome(future, missing[file])
+            file, lasting = futures.pop(future), True
+            try:
+                results[file] = future.result()
+            except BrokenProcessPool:
+                hint = "the same command goes on from here; with less memory, use fewer processes"
+                raise RunError("a process of the study was killed", hint=hint) from None
+            except Exception as error:
+                lasting = isinstance(error, HydroidError)  # what is no fault of the input may pass
+                words = str(error) if lasting else f"{type(error).__name__}: {error}"
+                LOGGER.warning("%s, seed %d failed: %s", missing[file].cell, missing[file].seed, words)
+                results[file] = {"failed": words}
             if lasting:
                 write_atomic(file, json.dumps(results[file], indent=1, allow_nan=False) + "\n")
             progress("runs", done, total)
@@ -155,20 +164,6 @@ def run_all(tasks: Sequence[Task], folder: Path, executor: Executor, progress: P
         for future in futures:
             future.cancel()
     return [results[file] for file in files]
-
-
-def _outcome(future: Future[Result], task: Task) -> tuple[Result, bool]:
-    """Return what a run came to, and whether it lasts: an error that is no fault of the input may pass."""
-    try:
-        return future.result(), True
-    except BrokenProcessPool:
-        hint = "the same command goes on from here; with less memory, use fewer processes"
-        raise RunError("a process of the study was killed", hint=hint) from None
-    except Exception as error:
-        lasting = isinstance(error, HydroidError)
-        words = str(error) if lasting else f"{type(error).__name__}: {error}"
-    LOGGER.warning("%s, seed %d failed: %s", task.cell, task.seed, words)
-    return {"failed": words}, lasting
 
 
 def _read(file: Path) -> Result:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from hydroid.estimate import Covariance, CurveEstimate, FitSummary, ParameterEstimate
+from hydroid.estimate import CurveEstimate, FitSummary, ParameterEstimate
 from hydroid.log import Log
 from hydroid.parameters import Parameter
 from hydroid.posterior.uncertainty import Flag, Source
@@ -90,22 +90,18 @@ def unknown_sections(summary: FitSummary) -> tuple[Section, ...]:
     none = "" if points else "The logs determine every free parameter."
     sections = [Section("What is not known", none, points[:6])]
     if known is not None and known.parameters:
-        tables = {"directions": direction_table(known)}
+        # every direction, best determined first, with its standard deviation and its largest parts
+        _, singular, axes = np.linalg.svd(known.root)
+        rows: list[tuple[float, str]] = []
+        for value, axis in zip(singular.tolist(), axes, strict=True):
+            order = np.argsort(-np.abs(axis), kind="stable")
+            shares = np.sign(axis[order[0]]) * axis
+            parts = (f"{known.parameters[i]} {shares[i]:+.2f}" for i in order if abs(shares[i]) >= 0.1)
+            rows.append((100 / value if value > 0 else np.inf, ", ".join(parts).replace("-", "−")))
+        header = "standard deviation [%]", "parameters that change together, in proportion to their values"
+        tables = {"directions": Table("", header, tuple(rows))}
         sections.append(Section("Directions", points=points[6:], tables=tables, folded=True))
     return tuple(sections)
-
-
-def direction_table(known: Covariance) -> Table:
-    """Return every direction with its standard deviation and its largest parts, best determined first."""
-    _, singular, axes = np.linalg.svd(known.root)
-    rows: list[tuple[float, str]] = []
-    for value, axis in zip(singular.tolist(), axes, strict=True):
-        order = np.argsort(-np.abs(axis), kind="stable")
-        shares = np.sign(axis[order[0]]) * axis
-        parts = (f"{known.parameters[i]} {shares[i]:+.2f}" for i in order if abs(shares[i]) >= 0.1)
-        rows.append((100 / value if value > 0 else np.inf, ", ".join(parts).replace("-", "−")))
-    header = ("standard deviation [%]", "parameters that change together, in proportion to their values")
-    return Table("", header, tuple(rows))
 
 
 def quantity_section(settings: FitSettings, summary: FitSummary) -> Section | None:

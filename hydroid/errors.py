@@ -19,17 +19,15 @@ class HydroidError(Exception):
     def __init__(self, what: str, where: object = "", hint: str = "") -> None:
         self.what, self.where, self.hint = what, str(where), hint
         text = f"{where}: {what}" if self.where else what
-        super().__init__(_one_line(f"{text}; {hint}" if hint else text))
+        text = f"{text}; {hint}" if hint else text
+        # control characters may come from a file
+        plain = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+        half = LONGEST // 2
+        super().__init__(plain if len(plain) <= LONGEST else f"{plain[:half]} ... {plain[-half:]}")
 
     def __reduce__(self) -> tuple[object, ...]:
         """Keep the three parts when an error crosses a process boundary."""
         return type(self), (self.what, self.where, self.hint)
-
-
-def _one_line(text: str) -> str:
-    """Escape control characters, which may come from a file, and shorten the text."""
-    plain = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
-    return plain if len(plain) <= LONGEST else f"{plain[: LONGEST // 2]} ... {plain[-LONGEST // 2 :]}"
 
 
 class LogError(HydroidError):
@@ -49,11 +47,7 @@ class RunError(HydroidError):
 
 
 class Stopped(KeyboardInterrupt):
-    """A fit or study that Ctrl-C or a signal ended.
-
-    Args:
-        kept: what remains of it, and what continues it; empty: nothing.
-    """
+    """A fit or study that Ctrl-C or a signal ended; `kept`: what remains of it, and what continues it."""
 
     def __init__(self, kept: str) -> None:
         self.kept = kept

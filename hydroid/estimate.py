@@ -202,7 +202,7 @@ class FitSummary(Settings):
 
 
 def write_estimate(folder: Path, summary: FitSummary) -> None:
-    """Write `estimate.yaml`; raises RunError: the folder cannot be written."""
+    """Write `estimate.yaml`."""
     one_line_a_list: Any = {"default_flow_style": None, "width": 110}
     text = yaml.safe_dump(summary.plain(), sort_keys=False, allow_unicode=True, **one_line_a_list)
     write_atomic(folder / NAME, text)
@@ -212,8 +212,7 @@ def read_estimate(source: Path) -> tuple[Path, Plain, FitSummary | None]:
     """Read parameter values by name: of a folder, an `estimate.yaml`, or a YAML file of `K: 0.2` lines.
 
     Returned are the file, its values, unchecked where they are not an estimate's, and the estimate where
-    there is one. Raises RunError: the folder holds none; SettingsError: the file cannot be read, or holds no
-    values by name.
+    there is one.
     """
     file = source / NAME if source.is_dir() else source
     if source.is_dir() and not is_file(file):

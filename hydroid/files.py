@@ -2,7 +2,6 @@
 
 import csv
 import io
-import logging
 import os
 import signal
 import tempfile
@@ -16,8 +15,6 @@ from hydroid.errors import RunError, SettingsError
 
 Plain = dict[str, Any]  # a mapping as YAML and JSON hold it
 PART = ".part"  # suffix of a file that is being written
-
-_log = logging.getLogger(__name__)
 
 
 @contextmanager
@@ -71,13 +68,6 @@ def write_atomic(path: Path, content: str | bytes, *, keep: Path | None = None) 
             os.unlink(temporary)
 
 
-def remove_parts(folder: Path) -> None:
-    """Remove unfinished files that killed processes left; no other process may write to the folder."""
-    for part in folder.rglob(f".*{PART}"):
-        _log.info("removed %s, left by a process that was killed while it wrote", part.name)
-        part.unlink(missing_ok=True)
-
-
 is_file = os.path.isfile  # Path's own raises for a name that no file can have
 
 
@@ -127,7 +117,7 @@ def find_config(
     """Find a config file by a path, or the name of a shipped config with or without `.yaml`.
 
     A relative path is looked up in `beside` first; `kind`, a fit's config or an arm's file, decides which
-    names the error lists. Raises SettingsError: no such file, with the names of the shipped configs.
+    names the error lists.
     """
     shipped = assets() / "configs"
     folders = [Path(), shipped] if beside is None else [beside, Path(), shipped]

@@ -60,9 +60,7 @@ class IdentifiedModel:
 
 
 def identified(settings: FitSettings, values: Mapping[str, Any], source: str) -> IdentifiedModel:
-    """Return the model of some settings at parameters by name; a fixed parameter may be left out.
-    Raises SettingsError: a name that does not exist or is missing, or a value that is not allowed.
-    """
+    """Return the model of some settings at parameters by name; a fixed parameter may be left out."""
     return IdentifiedModel(settings, settings.parameter_set().vector(values, source), source)
 
 
@@ -108,9 +106,7 @@ def start_values(settings: FitSettings) -> IdentifiedModel:
 
 
 def write_settings(folder: Path, settings: FitSettings) -> None:
-    """Write the settings, the arm and its models to a folder, so that it can be read anywhere.
-    Raises RunError: the folder cannot be written, or a mesh cannot be read.
-    """
+    """Write the settings, the arm and its models to a folder, so that it can be read anywhere."""
     from hydroid.mjcf import copy_models  # imports MuJoCo
 
     arm = settings.arm

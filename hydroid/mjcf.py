@@ -12,10 +12,7 @@ from hydroid.files import is_file, write_atomic
 
 
 def read_mjcf(path: Path) -> mujoco.MjSpec:
-    """Read an MJCF whose joints turn or slide, each alone on its body.
-    Raises ModelError: missing or refused by MuJoCo; no joint, another kind of joint, a joint or its body
-    without a name; an equality constraint.
-    """
+    """Read an MJCF whose joints turn or slide, each alone on its body."""
     where = str(path)
     if not is_file(path):
         raise ModelError("no such model", where)
@@ -35,9 +32,7 @@ def read_mjcf(path: Path) -> mujoco.MjSpec:
 
 
 def copy_models(models: Mapping[str, Path], folder: Path) -> None:
-    """Write MJCFs by their new names, with their meshes, to a folder that stands alone.
-    Raises RunError: a mesh cannot be read, or the folder cannot be written.
-    """
+    """Write MJCFs by their new names, with their meshes, to a folder that stands alone."""
     kept: dict[str, bytes] = {}
     for name, path in models.items():
         spec, home = read_mjcf(path), path.resolve().parent

@@ -5,15 +5,14 @@ vector theta: one column per parameter, fixed ones included, in the units of the
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
-from hydroid.arrays import Array, Mask
+from hydroid.arrays import Array, Mask, record
 from hydroid.errors import SettingsError
 
 
-@dataclass(frozen=True)
+@record
 class Prior:
     """What is known of one parameter besides the logs: Gaussian, or log-normal where `log`.
 
@@ -36,7 +35,7 @@ class Prior:
         return float(self.nominal * np.exp(change)) if self.log else self.nominal + change
 
 
-@dataclass(frozen=True)
+@record
 class Parameter:
     """One physical parameter.
 
@@ -73,7 +72,7 @@ class Parameter:
         return np.where(np.asarray(position) >= 1.0, high, inner)
 
 
-@dataclass(frozen=True)
+@record
 class ParameterSet:
     """The parameters of a stage in the order of its vector theta, shape (P,)."""
 
@@ -142,30 +141,24 @@ class ParameterSet:
         return np.where(self.log, theta * np.log(upper / lower), self.upper - self.lower)
 
     def vector(self, values: Mapping[str, object], source: str) -> Array:
-        """Return theta, shape (P,), from values by name; a fixed parameter may be left out.
-        Raises SettingsError: an unknown or a missing name, or a value that is not a number from 0.
-        """
+        """Return theta, shape (P,), from values by name; a fixed parameter may be left out."""
         unknown = [name for name in values if name not in self.names]
         if unknown:
             raise SettingsError(
                 f"unknown parameter {unknown[0]!r}", source, f"known: {', '.join(self.names)}"
             )
-        return np.array([_number(p, values.get(p.name, p.fixed), source) for p in self.parameters])
+        theta = list[float]()
+        for p in self.parameters:
+            if (value := values.get(p.name, p.fixed)) is None:
+                raise SettingsError(f"parameter {p.name!r} is missing", source)
+            # most quantities cannot be negative; the comparison is False for NaN, and squares stay finite
+            least = min(p.lower, 0.0)
+            if isinstance(value, bool) or not isinstance(value, int | float) or not least <= value < 1e100:
+                hint = f"a number from {least:g}, in {p.unit}"
+                raise SettingsError(f"parameter {p.name!r} is {value!r}", source, hint)
+            theta.append(float(value))
+        return np.array(theta)
 
     def mapping(self, theta: Array) -> dict[str, float]:
         """Return values by name from theta, shape (P,)."""
         return dict(zip(self.names, theta.tolist(), strict=True))
-
-
-def _number(parameter: Parameter, value: object, source: str) -> float:
-    if value is None:
-        raise SettingsError(f"parameter {parameter.name!r} is missing", source)
-    # most quantities cannot be negative; the comparison is False for NaN, and squares stay finite
-    least = min(parameter.lower, 0.0)
-    if isinstance(value, bool) or not isinstance(value, int | float) or not least <= value < 1e100:
-        raise SettingsError(
-            f"parameter {parameter.name!r} is {value!r}",
-            source,
-            f"a number from {least:g}, in {parameter.unit}",
-        )
-    return float(value)

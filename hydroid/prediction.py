@@ -25,7 +25,6 @@ def predict_log(model: IdentifiedModel, log: Log) -> Log:
 
     Locked joints stay where they start; prescribed joints keep their logged motion. Stage 2 also gives the
     chamber pressures of driven joints for which `log.pressure` maps columns.
-    Raises RunError: the simulation diverged.
     """
     settings = model.settings
     passive = settings.simulation.other_joints == "passive"

@@ -6,6 +6,7 @@ from contextlib import contextmanager
 
 NOTE = logging.INFO + 5  # level of a log line that a user sees though nothing is wrong
 logging.addLevelName(NOTE, "NOTE")
+LOGGER = logging.getLogger("hydroid")
 
 Progress = Callable[[str, int, int], None]
 """called with what is being done, how much of it is done, and how much there is"""
@@ -20,13 +21,12 @@ def logging_to(handler: logging.Handler, form: str = "") -> Generator[None]:
     """Let a handler take the lines of hydroid's loggers, INFO and above, in a form or with their times."""
     form = form or "%(asctime)s %(levelname)-7s %(message)s"
     handler.setFormatter(logging.Formatter(form, datefmt="%Y-%m-%dT%H:%M:%S%z"))
-    logger = logging.getLogger("hydroid")
-    level = logger.level
-    logger.addHandler(handler)
-    logger.setLevel(logging.INFO)
+    level = LOGGER.level
+    LOGGER.addHandler(handler)
+    LOGGER.setLevel(logging.INFO)
     try:
         yield
     finally:
-        logger.setLevel(level)
-        logger.removeHandler(handler)
+        LOGGER.setLevel(level)
+        LOGGER.removeHandler(handler)
         handler.close()

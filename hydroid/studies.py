@@ -6,19 +6,16 @@ studies in one folder share the runs that they have in common. Only the process 
 fits run in processes of their own or on Dask's workers, one thread each.
 """
 
-import hashlib
 import json
-import logging
 import math
 import multiprocessing
 import os
 import signal
 import threading
 from collections.abc import Callable, Generator, Mapping, Sequence
-from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -30,8 +27,8 @@ from hydroid.files import Plain, write_atomic
 from hydroid.fitting.fit import fit
 from hydroid.log import Log
 from hydroid.problem.problem import Problem
-from hydroid.progress import NOTE, Progress
-from hydroid.run.folder import deciding, model_hash, samples_hash
+from hydroid.progress import LOGGER, NOTE, Progress
+from hydroid.run.folder import VERSIONS, deciding, digest, model_hash, samples_hash
 from hydroid.search.pareto import segment_best
 from hydroid.settings.fit import FitSettings, StudySettings, cell_settings
 from hydroid.settings.load import load
@@ -51,12 +48,12 @@ class Task:
     def key(self) -> str:
         """Return the digest of all that decides the run's result."""
         content = {
-            "versions": {name: version(name) for name in ("hydroid", "mujoco", "numpy")},
+            "versions": VERSIONS,
             "settings": deciding(self.settings),
             "model": model_hash(self.settings.arm),
             "logs": [samples_hash(log) for log in self.logs],
         }
-        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:24]
+        return digest(content)[:24]
 
 
 def perform(task: Task) -> Result:
@@ -65,7 +62,6 @@ def perform(task: Task) -> Result:
     `measures` are those of docs/studies.md, by name. `history` has generation, simulations and best
     objective; `segment_bests` are the parameters of the best candidate of each segment, as `theta` are those
     of the estimate.
-    Raises RunError: every candidate diverged.
     """
     result = fit(Problem(task.settings, task.logs))
     if not result.best.usable:
@@ -99,8 +95,6 @@ def perform(task: Task) -> Result:
 
 Read = Callable[[Sequence[Path], FitSettings], list[Log]]  # reads logs as settings map their columns
 
-_log = logging.getLogger(__name__)
-
 
 @record
 class Row:
@@ -115,10 +109,7 @@ class Row:
 def run_study(
     path: Path, folder: Path, read: Read, executor: Executor, progress: Progress
 ) -> tuple[Row, ...]:
-    """Perform the runs of a study that `folder` does not have yet; return the measures of all, by seed.
-    Raises SettingsError: a key or value of the file that is not allowed, with file and line; LogError: a log
-    cannot be used; RunError: the folder cannot be written, or a process died.
-    """
+    """Perform the runs of a study that `folder` does not have yet; return the measures of all, by seed."""
     study = load(path, StudySettings)
     cells = cell_settings(study, path)
     logs = read([path.parent / name for name in study.logs], next(iter(cells.values())))
@@ -144,23 +135,28 @@ def measured(task: Task, result: Result) -> Row:
 
 
 def run_all(tasks: Sequence[Task], folder: Path, executor: Executor, progress: Progress) -> list[Result]:
-    """Return the result of every task, in order; what `folder`/runs has is read, the others are performed.
-
-    A run that fails is a result too: {"failed": why}.
-    Raises RunError: a file cannot be written or is damaged, or a process of the executor died.
-    """
+    """Return the result of every task, in order; what `folder`/runs has is read, the others are performed."""
     files = [folder / "runs" / f"{task.key()}.json" for task in tasks]
     results = {file: _read(file) for file in files if file.is_file()}
     missing = {file: task for file, task in zip(files, tasks, strict=True) if file not in results}
     known, total = len(results), len(results) + len(missing)
     if known and missing:
-        _log.log(NOTE, "%d of %d runs found, goes on", known, total)
+        LOGGER.log(NOTE, "%d of %d runs found, goes on", known, total)
     progress("runs", known, total)
     futures = {executor.submit(perform, task): file for file, task in missing.items()}
     try:
         for done, future in enumerate(as_completed(futures), known + 1):
-            file = futures.pop(future)
-            results[file], lasting = _outcome(future, missing[file])
+            file, lasting = futures.pop(future), True
+            try:
+                results[file] = future.result()
+            except BrokenProcessPool:
+                hint = "the same command goes on from here; with less memory, use fewer processes"
+                raise RunError("a process of the study was killed", hint=hint) from None
+            except Exception as error:
+                lasting = isinstance(error, HydroidError)  # what is no fault of the input may pass
+                words = str(error) if lasting else f"{type(error).__name__}: {error}"
+                LOGGER.warning("%s, seed %d failed: %s", missing[file].cell, missing[file].seed, words)
+                results[file] = {"failed": words}
             if lasting:
                 write_atomic(file, json.dumps(results[file], indent=1, allow_nan=False) + "\n")
             progress("runs", done, total)
@@ -168,20 +164,6 @@ def run_all(tasks: Sequence[Task], folder: Path, executor: Executor, progress: P
         for future in futures:
             future.cancel()
     return [results[file] for file in files]
-
-
-def _outcome(future: Future[Result], task: Task) -> tuple[Result, bool]:
-    """Return what a run came to, and whether it lasts: an error that is no fault of the input may pass."""
-    try:
-        return future.result(), True
-    except BrokenProcessPool:
-        hint = "the same command goes on from here; with less memory, use fewer processes"
-        raise RunError("a process of the study was killed", hint=hint) from None
-    except Exception as error:
-        lasting = isinstance(error, HydroidError)
-        words = str(error) if lasting else f"{type(error).__name__}: {error}"
-    _log.warning("%s, seed %d failed: %s", task.cell, task.seed, words)
-    return {"failed": words}, lasting
 
 
 def _read(file: Path) -> Result:

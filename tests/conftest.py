@@ -57,7 +57,6 @@ def candidates(arm: Arm, n: int, seed: int = 0, hydraulics: HydraulicSettings | 
 
 
 def scattered(arm: Arm, n: int, **hydraulics: float) -> Candidates:
-    """Random arms whose areas, currents and calibration differ too."""
     rng, everyone = np.random.default_rng(0), candidates(arm, n, hydraulics=HydraulicSettings(**hydraulics))
     for name in ("area_a", "area_b", "current_max", "onset_a", "onset_b", "force_1"):
         everyone.joints[name] *= rng.uniform(0.7, 1.4, (n, 1))

@@ -24,7 +24,6 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
 
 @pytest.fixture
 def gym_env(monkeypatch: pytest.MonkeyPatch):
-    """The module of the environment."""
     pytest.importorskip("gymnasium")
     monkeypatch.syspath_prepend(str(EXAMPLES))
     import gym_env  # pyright: ignore[reportMissingImports]

@@ -21,7 +21,6 @@ def nominal(source: Path | None = None, **overrides: object):
 
 
 def run_folder(folder: Path, final: str) -> Path:
-    """A folder as a fit of stage 2 leaves it."""
     fixed = {f"parameters.{name}.fixed": value for name, value in TRUTH.items() if name != "K"}
     settings = load_identified(None, "fit-hyd", fixed, nominal=True).settings
     write_settings(folder, settings)

@@ -25,7 +25,6 @@ from hydroid.studies import Row, make_tasks, run_study
 
 
 def content(**changes: Any) -> dict[str, Any]:
-    """A study's file as plain values."""
     study: dict[str, Any] = {
         "title": "Two norms",
         "base": "article-mech",
@@ -38,7 +37,6 @@ def content(**changes: Any) -> dict[str, Any]:
 
 
 def written(folder: Path, **changes: Any) -> Path:
-    """The file and its log, in a folder."""
     head(folder / "short.csv", 301)
     file = folder / "small.yaml"
     file.write_text(yaml.safe_dump(content(**changes), sort_keys=False))
@@ -46,7 +44,6 @@ def written(folder: Path, **changes: Any) -> Path:
 
 
 def run(file: Path, out: Path) -> tuple[Row, ...]:
-    """Run a study in this process."""
     with ThreadPoolExecutor(1) as executor:
         return run_study(file, out, read_logs, executor, no_progress)
 

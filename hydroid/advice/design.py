@@ -60,7 +60,7 @@ def sensor_noise(settings: DesignSettings, samples: int, period: float) -> Noise
     """Return the noise of a future log of angles [rad]: white, or a first-order autoregression."""
     level, time = np.radians(settings.noise_deg), settings.noise_correlation_s
     reflection = np.array([-np.exp(-period / time)]) if time > 0 else np.empty(0)
-    return Noise(samples, level, reflection, "settings")
+    return Noise(samples, level, reflection, given=True)
 
 
 class Trial(NamedTuple):
@@ -98,29 +98,22 @@ class ExperimentSimulator:
             (angle,) = self._simulate(experiment, self._box.at[None])
             if not np.isfinite(angle).all():
                 return None
-            first = violation(angle, self._settings)
-            first = first or self._too_near(angle)
+            first, machine = violation(angle, self._settings), self._machine
+            if first is None and machine is not None:
+                motion = machine.joined({machine.sides[0]: angle}, self._pose)
+                if (near := machine.checker.first_below(motion, self._margin or 0.0)) is not None:
+                    # the joint that turned most lately is the cause; those far out count as the others do
+                    turned = np.ptp(angle[max(0, near - 20) : near + 1], axis=0)
+                    first = Violation(near, int(np.argmax(turned)), False)
             if first is None:
-                gained, log = self.information(experiment, angle), experiment.log(self._settings)
-                return None if gained is None else Trial(experiment, gained, replace(log, angle=angle))
+                return self._kept(experiment, angle)
             if first.sample == 0:
                 return None  # the start pose itself
             experiment = repaired(experiment, first)
         return None
 
-    def _too_near(self, angle: Array) -> Violation | None:
-        """Where a motion [rad], shape (T, J), first brings bodies nearer to each other than the margin."""
-        if (machine := self._machine) is None:
-            return None
-        motion = machine.joined({machine.sides[0]: angle}, self._pose)
-        if (sample := machine.checker.first_below(motion, self._margin or 0.0)) is None:
-            return None
-        # the cause is the joint that turned most lately; joints far out on the arm count as the others do
-        turned = np.ptp(angle[max(0, sample - 20) : sample + 1], axis=0)
-        return Violation(sample, int(np.argmax(turned)), False)
-
-    def information(self, experiment: Experiment, angle: Array) -> Array | None:
-        """Return the information of an experiment whose angles are known, (T, J); None where it diverges."""
+    def _kept(self, experiment: Experiment, angle: Array) -> Trial | None:
+        """The trial of an experiment whose angles are known, (T, J); None where it diverges beside them."""
 
         def outputs(theta: Array) -> Array:
             return self._simulate(experiment, theta)[:, :, self._outputs].reshape(len(theta), -1)
@@ -129,7 +122,8 @@ class ExperimentSimulator:
         if not np.isfinite(slopes).all():
             return None
         each = np.moveaxis(slopes.reshape(len(slopes), -1, len(self._outputs)), -1, 0)
-        return measured((one, self._noise) for one in each)
+        gained = measured((one, self._noise) for one in each)
+        return Trial(experiment, gained, replace(experiment.log(self._settings), angle=angle))
 
     def _simulate(self, experiment: Experiment, theta: Array) -> Array:
         """All joints' angles [rad] of candidates, (n, P) -> (n, T, J); NaN where one diverged."""
@@ -187,8 +181,7 @@ def design(
     """Choose start pose, joints and commands of an experiment at an estimate, shape (P,), beside its logs.
 
     Random experiments are drawn and kept within the limits. The best few are then changed at random, and a
-    changed one replaces the worst of them where it is better. The same seed gives the same experiment. Raises
-    SettingsError: joints or poses that cannot be used, or no experiment within the limits was found.
+    changed one replaces the worst of them where it is better. The same seed gives the same experiment.
     """
     effort, parameters = settings.design.effort, settings.parameter_set()
     rng = np.random.default_rng(seed)

@@ -58,14 +58,17 @@ def experiment_samples(settings: FitSettings) -> int:
 
 
 class RandomExperiments:
-    """Draws experiments, and random changes of them, that the settings allow.
-    Raises SettingsError: joints or poses that cannot be used.
-    """
+    """Draws experiments, and random changes of them, that the settings allow."""
 
     def __init__(self, settings: FitSettings, rng: np.random.Generator) -> None:
         limits, arm, period = settings.design, settings.arm, settings.log.period_s
         self._rng, self._limit, self._any_pose = rng, limits.command_pct, limits.poses == "any"
-        self._joints, self._poses = _driven_joints(settings), _start_poses(settings)
+        count, joints = len(arm.joints), sorted(limits.joints or settings.outputs)
+        if joints[-1] > count:
+            raise SettingsError(f"the arm has joints 1 to {count}", "design.joints")
+        driven = np.isin(np.arange(count) + 1, joints)
+        Bindings(settings).refuse_idle(driven, [j - 1 for j in settings.outputs])
+        self._joints, self._poses = np.flatnonzero(driven).tolist(), _start_poses(settings)
         lower, upper = np.array([joint.limits for joint in arm.joints]).T
         inward = np.minimum(np.radians(limits.margin_deg), 0.5 * (upper - lower))
         self._lower, self._upper = lower + inward, upper - inward
@@ -116,16 +119,6 @@ class RandomExperiments:
             return self._pose()
         step = self._rng.normal(0.0, 0.1, len(pose)) * (self._upper - self._lower)
         return np.clip(pose + step, self._lower, self._upper)
-
-
-def _driven_joints(settings: FitSettings) -> list[int]:
-    """Joints that may be driven, 0-based; refuse one that the arm lacks, or that stage 1 has no gain for."""
-    count, joints = len(settings.arm.joints), sorted(settings.design.joints or settings.outputs)
-    if joints[-1] > count:
-        raise SettingsError(f"the arm has joints 1 to {count}", "design.joints")
-    driven = np.isin(np.arange(count) + 1, joints)
-    Bindings(settings).refuse_idle(driven, [j - 1 for j in settings.outputs])
-    return np.flatnonzero(driven).tolist()
 
 
 def _start_poses(settings: FitSettings) -> Array:

@@ -153,7 +153,7 @@ def freeing_command(problem: Problem, entries: Mapping[str, Any], run: str) -> s
     for name, entry in entries.items():
         line = yaml.safe_dump(entry, default_flow_style=True, sort_keys=False, width=math.inf).strip()
         changes += f"--set {shlex.quote(f'parameters.{name}={line}')} "
-    given = " ".join(shlex.quote(log.source) for log in problem.logs)
+    given = shlex.join(log.source for log in problem.logs)
     config, own, out = (shlex.quote(path) for path in (f"{run}/config.yaml", run, f"{run}-{[*entries][-1]}"))
     return (
         f"hydroid fit-{problem.settings.stage} {given} --config {config} --start {own} {changes}--out {out}"

@@ -22,12 +22,9 @@ from hydroid.settings.problem import ParameterSettings
 
 @record
 class Term:
-    """One more free parameter.
+    """One more free parameter: the settings' entries that add it, its own and that of what it is split from.
 
-    Attributes:
-        name: of it.
-        entries: of the settings' parameters that add it: its own, and that of what it is split from.
-        value: that it has now; inf of a limit that is switched off.
+    `value` is what it has now; inf of a limit that is switched off.
     """
 
     name: str

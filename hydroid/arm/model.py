@@ -1,4 +1,10 @@
-"""An arm's compiled model: with a payload where a log has one, or beside its mirror image on one carrier."""
+"""An arm's compiled model: with a payload where a log has one, or beside its mirror image on one carrier.
+
+Which of its bodies meet along a trajectory, and how near they come otherwise: bodies collide with the shapes
+that the MJCF makes collide; a mesh counts as its convex hull. Distances are MuJoCo's (`mj_geomDistance`). As
+in MuJoCo a body is not held against the one that it hangs on, nor against one that the model excludes;
+`hydroid init` excludes bodies that touch in the pose `home`.
+"""
 
 from collections.abc import Mapping
 from functools import cached_property
@@ -6,7 +12,6 @@ from functools import cached_property
 import mujoco
 import numpy as np
 
-from hydroid.arm.collision import CollisionChecker
 from hydroid.arrays import Array, record
 from hydroid.errors import ModelError, SettingsError
 from hydroid.mjcf import mujoco_errors, read_mjcf
@@ -18,7 +23,7 @@ SIDES = ("right", "left")
 
 
 def load_model(arm: Arm) -> mujoco.MjSpec:
-    """Read the arm's MJCF, which compiles; raises ModelError: as `read_mjcf`."""
+    """Read the arm's MJCF, which compiles."""
     spec = read_mjcf(arm.model)
     with mujoco_errors(str(arm.model)):
         spec.compile()
@@ -26,9 +31,7 @@ def load_model(arm: Arm) -> mujoco.MjSpec:
 
 
 def add_payload(spec: mujoco.MjSpec, arm: Arm, mass: float) -> mujoco.MjSpec:
-    """Return a copy of the arm's model that carries `mass` [kg] at the site of its payload.
-    Raises SettingsError: the arm's file names no site.
-    """
+    """Return a copy of the arm's model that carries `mass` [kg] at the site of its payload."""
     if arm.payload is None:
         hint = "name the site of the model that holds it in the arm's file, payload: SITE"
         raise SettingsError(f"{arm.name} has no place for a payload", "payloads", hint)
@@ -42,14 +45,104 @@ def add_payload(spec: mujoco.MjSpec, arm: Arm, mass: float) -> mujoco.MjSpec:
     return loaded
 
 
+FARTHEST = 100.0  # distance beyond which MuJoCo need not look [m]
+
+
+@record
+class Meeting:
+    """Two bodies inside each other, from one sample to another; at most by a depth, reached at a time."""
+
+    bodies: list[str]
+    from_s: float
+    to_s: float
+    depth_m: float
+    deepest_at_s: float
+
+
+@record
+class Clearance:
+    """The smallest distance of any two bodies [m], (T,), along a trajectory; negative inside each other.
+
+    `nearest` names the two bodies of each sample, `meetings` stand in the order of their beginnings;
+    `excluded` are pairs that the model excludes, `checked` is the number of the others.
+    """
+
+    time: Array
+    distance: Array
+    nearest: tuple[tuple[str, str], ...]
+    meetings: tuple[Meeting, ...]
+    checked: int
+    excluded: tuple[tuple[str, str], ...]
+
+
+class CollisionChecker:
+    """Distances between the bodies of a compiled model whose joints are all hinges or slides."""
+
+    def __init__(self, model: mujoco.MjModel, source: str = "the model") -> None:
+        self._model, self._data = model, mujoco.MjData(model)
+        self._pairs = _pairs(model)
+        if not self._pairs:
+            hint = "give bodies geoms with contype and conaffinity 1"
+            raise ModelError("no two of its bodies can collide", source, hint)
+        self.names = [(_name(model, first), _name(model, second)) for first, second in self._pairs]
+        """of the bodies of each pair of shapes"""
+
+    def clearance(self, time: Array, angle: Array) -> Clearance:
+        """Return how near bodies come along a trajectory: time [s], (T,), and angles of all joints [rad]."""
+        distance = np.stack([self._distances(pose, FARTHEST) for pose in angle])
+        depths: dict[tuple[str, str], Array] = {}
+        for pair in np.flatnonzero(distance.min(axis=0) < 0):
+            inside = np.maximum(-distance[:, pair], 0.0)
+            depths[self.names[pair]] = np.maximum(depths.get(self.names[pair], 0.0), inside)
+        meetings = list[Meeting]()
+        for names, depth in depths.items():
+            samples = np.flatnonzero(depth)
+            for run in np.split(samples, np.flatnonzero(np.diff(samples) > 1) + 1):
+                begins, ends, worst = run[0], run[-1], run[np.argmax(depth[run])]
+                numbers = map(float, (time[begins], time[ends], depth[worst], time[worst]))
+                meetings.append(Meeting([*names], *numbers))
+        meetings.sort(key=lambda meeting: meeting.from_s)
+        nearest = tuple(self.names[pair] for pair in distance.argmin(axis=1))
+        checked = len({*map(frozenset, self.names)})
+        pairs = [(s >> 16, s & 0xFFFF) for s in self._model.exclude_signature.tolist()]
+        excluded = tuple((self._model.body(a).name, self._model.body(b).name) for a, b in pairs)
+        return Clearance(time, distance.min(axis=1), nearest, tuple(meetings), checked, excluded)
+
+    def first_below(self, angle: Array, margin: float) -> int | None:
+        """Return the first sample of a motion [rad], (T, nq), with two bodies nearer than a margin [m]."""
+        near = (k for k, pose in enumerate(angle) if self._distances(pose, margin).min() < margin)
+        return next(near, None)
+
+    def _distances(self, pose: Array, within: float) -> Array:
+        """Distances of all pairs of shapes in a pose [m], shape (P,); farther than `within` they are that."""
+        self._data.qpos[:] = pose
+        mujoco.mj_kinematics(self._model, self._data)
+        here = self._model, self._data
+        return np.array([mujoco.mj_geomDistance(*here, *pair, within, None) for pair in self._pairs])
+
+
+def _name(model: mujoco.MjModel, geom: int) -> str:
+    """A body's name; of what stands in the world the shape's, such as the floor's."""
+    body = int(model.geom_bodyid[geom])
+    return model.body(body).name if body else model.geom(geom).name or "world"
+
+
+def _pairs(model: mujoco.MjModel) -> list[list[int]]:
+    g, h = np.triu_indices(model.ngeom, 1)
+    kinds, masks, bodies = model.geom_contype, model.geom_conaffinity, model.geom_bodyid
+    weld, parent = model.body_weldid, model.body_weldid[model.body_parentid[model.body_weldid]]
+    a, b = bodies[g], bodies[h]
+    jointed = (weld[a] * weld[b] > 0) & ((weld[a] == parent[b]) | (weld[b] == parent[a]))
+    meant = (kinds[g] & masks[h] | kinds[h] & masks[g]) != 0
+    excluded = np.isin((np.minimum(a, b) << 16) + np.maximum(a, b), model.exclude_signature)
+    return np.stack([g, h], axis=1)[meant & (weld[a] != weld[b]) & ~jointed & ~excluded].tolist()
+
+
 @record
 class Machine:
     """A whole machine, all joints free, to be put into poses.
 
-    Attributes:
-        arm: the settings of each of its arms.
-        model: compiled; its joints are those of `sides`, arm by arm.
-        sides: names of its arms, `ALONE` or right and left.
+    Its `sides` name its arms, `ALONE` or right and left; the compiled model's joints are theirs, arm by arm.
     """
 
     arm: Arm
@@ -58,22 +151,17 @@ class Machine:
 
     @cached_property
     def checker(self) -> CollisionChecker:
-        """Which of its bodies meet; raises ModelError: none can."""
+        """Which of its bodies meet."""
         return CollisionChecker(self.model, self.arm.name)
 
     def joined(self, angle: Mapping[str, Array], rest: Array) -> Array:
-        """Return the angles of all joints [rad], (T, nq), of arms that move, (T, J) by name; others rest,
-        (J,).
-        """
+        """Return all joints' angles [rad], (T, nq), of arms that move, (T, J) by name; others rest, (J,)."""
         still = np.tile(rest, (max(map(len, angle.values())), 1))
         return np.hstack([angle.get(side, still) for side in self.sides])
 
 
 def load_machine(arm: Arm, *, pair: bool) -> Machine:
-    """Read the model of an arm alone, or that of two of them.
-    Raises SettingsError: a pair that the arm's file does not name; ModelError: as `read_mjcf`, or a pair
-    whose joints are not those of two of the arm.
-    """
+    """Read the model of an arm alone, or that of two of them."""
     if not pair:
         return Machine(arm, load_model(arm).compile(), (ALONE,))
     if arm.pair is None:

@@ -8,7 +8,7 @@ carry them, and the joint that it moves gets the cylinder. A URDF cannot close l
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import mujoco
@@ -73,8 +73,8 @@ def take_cylinders(spec: mujoco.MjSpec, notes: Notes) -> dict[str, Plain]:
                         place = data.body(body).xmat.reshape(3, 3).T @ (pin.at - data.body(body).xpos)
                         spec.body(body).add_site(name=f"{joint.name}_pivot_{end}", pos=place)
                 notes.add("cylinders of the file give these joints' pivots", joint.name)
-    for joint in list(spec.joints):
-        if any(body in helpers for body in _upwards(joint.parent)):
+    for name in helpers:  # and all that hangs on them
+        for joint in spec.body(name).find_all("joint"):
             spec.delete(joint)
     return found
 
@@ -82,12 +82,6 @@ def take_cylinders(spec: mujoco.MjSpec, notes: Notes) -> dict[str, Plain]:
 def is_part_of_cylinder(joint: mujoco.MjsJoint) -> bool:
     """Return whether the names of a joint and its link tell a cylinder's tube or rod, which moves no link."""
     return all({*re.split(r"[\W_\d]+", name.lower())} & PARTS for name in (joint.name, joint.parent.name))
-
-
-def _upwards(body: Any) -> Iterator[str]:
-    while body is not None:
-        yield body.name
-        body = body.parent
 
 
 def _pins(spec: mujoco.MjSpec, data: mujoco.MjData) -> list[_Pin]:
@@ -139,20 +133,16 @@ def _joint(pins: Sequence[_Pin], first: str, second: str) -> Any:
     return next(between, None)
 
 
-def _planar(joint: Any, point: Array) -> complex:
-    """Return where a point lies from a joint's axis, in a plane across it [m]."""
-    axis, away = joint.xaxis, point - joint.xanchor
-    x = np.cross([0.0, 1.0, 0.0] if abs(axis[1]) < 0.9 else [1.0, 0.0, 0.0], axis)
-    x /= np.linalg.norm(x)
-    return complex(away @ x, away @ np.cross(axis, x))
-
-
 def _four_bar(joint: Any, pins: Sequence[_Pin]) -> Plain | None:
     """Return the settings of a cylinder that turns a joint by a rocker and a coupler, as the file stands.
 
     The pins are those of rocker and link, rocker and coupler, coupler and child, of the tube, of the rod.
     """
-    ground, pin, child, foot, eye = (_planar(joint, one.at) for one in pins)
+    axis = joint.xaxis
+    x = np.cross([0.0, 1.0, 0.0] if abs(axis[1]) < 0.9 else [1.0, 0.0, 0.0], axis)
+    x /= np.linalg.norm(x)
+    y, away = np.cross(axis, x), [one.at - joint.xanchor for one in pins]  # in a plane across the axis [m]
+    ground, pin, child, foot, eye = (complex(one @ x, one @ y) for one in away)
     turn = abs(ground) / ground  # the rocker's pivot lies at (ground, 0)
     side = "left" if ((pin - ground) * np.conj(child - ground)).imag > 0 else "right"
     sides = {"ground": ground, "rocker": pin - ground, "coupler": child - pin, "child": child}

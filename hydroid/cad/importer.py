@@ -8,25 +8,22 @@ import mujoco
 import numpy as np
 
 from hydroid.arrays import Array, record
-from hydroid.cad.chain import choose_chain
-from hydroid.cad.cylinders import take_cylinders
+from hydroid.cad.cylinders import is_part_of_cylinder, take_cylinders
 from hydroid.cad.repair import repair_inertias, weigh
-from hydroid.cad.shapes import convert_meshes, sort_shapes, word
-from hydroid.cad.source import Notes, read_source
+from hydroid.cad.source import Notes, convert_meshes, read_source, sort_shapes, word
+from hydroid.errors import ModelError
 from hydroid.files import fill_template
+from hydroid.log.clues import joint_of
 from hydroid.mjcf import mjcf_text, mujoco_errors
-from hydroid.words import distinct
+from hydroid.words import distinct, listed
 
 
 @record
 class ImportedArm:
-    """A serial arm out of a robot's file: its MJCF.
+    """A serial arm out of a robot's file: its MJCF, and its meshes as STL by their path from that.
 
-    Attributes:
-        title: names of the model and of the file.
-        meshes: binary STL files by their path from the model.
-        cylinders: settings of the cylinders that the file models, but for areas, by joint.
-        notes: what was assumed, left out or mended, a line each.
+    `cylinders` are settings of those that the file models, but for areas, by joint; `notes` say what was
+    assumed, left out or mended.
     """
 
     title: str
@@ -39,20 +36,12 @@ class ImportedArm:
 def import_arm(
     path: Path, columns: Sequence[str] = (), tip: str | None = None, total_mass: float | None = None
 ) -> ImportedArm:
-    """Read a URDF or an MJCF through MuJoCo's importer and take the arm out of it.
-
-    Args:
-        columns: names of a log's columns, which help to choose among branches.
-        tip: name of the link at which the arm ends; None: the tip that fits best.
-        total_mass: of the links that move [kg]; None: masses are those of the file.
-
-    Raises ModelError: the file cannot be read, or holds no arm.
-    """
+    """Read a URDF or an MJCF through MuJoCo's importer and take the arm out of it (`hydroid.init`)."""
     notes = Notes()
     spec, files, urdf = read_source(path, notes)
     _clear(spec, path)
     cylinders = take_cylinders(spec, notes)
-    choose_chain(spec, str(path), notes, columns, tip)
+    _choose_chain(spec, str(path), notes, columns, tip)
     exact = urdf or all(geom.parent.explicitinertial for geom in spec.geoms if geom.meshname)
     meshes, lost = convert_meshes(spec, files, exact, notes)
     sort_shapes(spec)
@@ -68,7 +57,18 @@ def import_arm(
             notes.add("without limits: moving without stops, unless you give a range in arm.xml", joint.name)
     kept = {joint.name: own for joint in spec.joints if (own := cylinders.get(joint.name))}
     title = f"{spec.modelname}, from {path.name}"
-    return ImportedArm(title, _in_scene(spec, meshes), meshes, kept, tuple(notes.lines()))
+    # with light, floor and cameras, and the pose nearest to 0 as `home`
+    scene = fill_template("cad/scene.xml")  # `arrange` puts its lights and cameras around the arm
+    text = mjcf_text(spec).replace("<worldbody>", scene + "<worldbody>", 1)
+    with mujoco_errors(spec.modelname):
+        whole = mujoco.MjSpec.from_string(text, assets=meshes)
+        model = whole.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    low, high = np.where(model.jnt_limited, model.jnt_range.T, 0.0)
+    whole.add_key(name="home", qpos=np.clip(0.0, low, high))
+    arrange(whole, data.xanchor[0], data.xanchor[-1])
+    return ImportedArm(title, mjcf_text(whole), meshes, kept, tuple(notes.lines()))
 
 
 def _clear(spec: mujoco.MjSpec, path: Path) -> None:
@@ -94,19 +94,79 @@ def _clear(spec: mujoco.MjSpec, path: Path) -> None:
             one.name1, one.name2 = (names.get(name, name) for name in (one.name1, one.name2))
 
 
-def _in_scene(spec: mujoco.MjSpec, meshes: dict[str, bytes]) -> str:
-    """Return the arm's MJCF with light, floor and cameras, and the pose nearest to 0 as `home`."""
-    scene = fill_template("cad/scene.xml")  # `arrange` puts its lights and cameras around the arm
-    text = mjcf_text(spec).replace("<worldbody>", scene + "<worldbody>", 1)
-    with mujoco_errors(spec.modelname):
-        whole = mujoco.MjSpec.from_string(text, assets=meshes)
-        model = whole.compile()
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    low, high = np.where(model.jnt_limited, model.jnt_range.T, 0.0)
-    whole.add_key(name="home", qpos=np.clip(0.0, low, high))
-    arrange(whole, data.xanchor[0], data.xanchor[-1])
-    return mjcf_text(whole)
+def _choose_chain(
+    spec: mujoco.MjSpec, where: str, notes: Notes, columns: Sequence[str], tip: str | None
+) -> None:
+    """Choose the joints from the base to `tip`, or else to the tip that fits best, and delete the others.
+
+    The best tip is the one with the most joints that the columns of a log name, then the one with the most
+    joints, then the first. Rods and tubes of cylinders are no tips. What is left out is held, and its mass
+    belongs to the link that carries it.
+    """
+    _hold(spec, notes)
+    chains: dict[str, tuple[str, ...]] = {}
+    for joint in spec.joints:
+        if len(joint.parent.joints) > 1:
+            hint = "put a small body between them: hydroid moves one joint per link"
+            raise ModelError(f"body {joint.parent.name!r} has several joints", where, hint)
+        chains[joint.parent.name] = _path(joint.parent)
+    inner = {name for chain in chains.values() for name in chain[:-1]}
+    tips = {link: chain for link, chain in chains.items() if chain[-1] not in inner}
+    if not tips:
+        raise ModelError("has no joint that hydroid could move", where)
+    if tip is None:
+        wanted = max(tips.values(), key=lambda chain: (_named(spec, chain, columns), len(chain)))
+        why = "the log names most of its joints" if _named(spec, wanted, columns) else "the longest branch"
+    else:
+        link, why = spec.body(tip), "as asked"
+        wanted = () if link is None else _path(link)
+        if not wanted:
+            raise ModelError(f"no joint moves a link {tip!r}", where, f"tips: {', '.join(tips)}")
+    left = [joint for joint in spec.joints if joint.name not in wanted]
+    if left:
+        others = listed([f"--tip {link}" for link, chain in tips.items() if chain != wanted], 6)
+        named = [joint.name for joint in left if _named(spec, [joint.name], columns)]
+        warning = f"; THE LOG NAMES {', '.join(named)}" if named else ""
+        held = listed([joint.name for joint in left], 12)
+        notes.add(
+            f"the arm is {' - '.join(wanted)} ({why}); held at 0, on no way to its end: {held}{warning}. "
+            f"Other ends: {others or 'none'}"
+        )
+    for joint in left:
+        spec.delete(joint)
+
+
+def _hold(spec: mujoco.MjSpec, notes: Notes) -> None:
+    """Delete the joints that hydroid does not move, or that follow others, and say so."""
+    followers = {e.name1: e.name2 for e in spec.equalities if e.type == mujoco.mjtEq.mjEQ_JOINT}
+    for joint in list(spec.joints):
+        if joint.type == mujoco.mjtJoint.mjJNT_FREE:
+            notes.add("free to float in the file: fixed to the world", joint.parent.name)
+        elif joint.name in followers:
+            notes.add("following another joint, which hydroid does not model: held at 0", joint.name)
+        elif joint.type == mujoco.mjtJoint.mjJNT_BALL:
+            notes.add("a ball joint, which hydroid does not model: held at 0", joint.name)
+        elif is_part_of_cylinder(joint):
+            what = "part of a cylinder that the file pins at one end: held. Give both pivots in arm.yaml"
+            notes.add(what, joint.name)
+        else:
+            continue
+        spec.delete(joint)
+    for section in (spec.equalities, spec.actuators, spec.tendons):
+        for part in list(section):
+            spec.delete(part)
+
+
+def _path(body: mujoco.MjsBody | None) -> tuple[str, ...]:
+    return () if body is None else (*_path(body.parent), *(joint.name for joint in body.joints))
+
+
+def _named(spec: mujoco.MjSpec, chain: Sequence[str], columns: Sequence[str]) -> int:
+    """Number of the chain's joints whose name, or whose link's, stands in the name of a column."""
+    names = [joint.name for joint in spec.joints]
+    links = [joint.parent.name for joint in spec.joints]
+    hits = {joint_of(column, of) for column in columns for of in (names, links)} - {None}
+    return sum(names.index(name) + 1 in hits for name in chain)
 
 
 def arrange(spec: mujoco.MjSpec, base: Array, tip: Array) -> None:

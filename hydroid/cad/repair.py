@@ -8,8 +8,7 @@ import mujoco
 import numpy as np
 
 from hydroid.arrays import Array
-from hydroid.cad.shapes import SHOWN
-from hydroid.cad.source import Notes
+from hydroid.cad.source import SHOWN, Notes
 from hydroid.mjcf import mujoco_errors
 
 MASSLESS = 1e-6  # mass up to which a body counts as a frame without mass [kg]
@@ -37,7 +36,6 @@ def repair_inertias(spec: mujoco.MjSpec, urdf: bool, notes: Notes) -> None:
     """Give every body a mass and an inertia that a rigid body can have; one without a mass is a mere frame.
 
     What the file says is kept where it is possible, else the mass with the inertia of the shape's hull.
-    Raises ModelError: MuJoCo refuses the file for another reason.
     """
     faults = {body.name: _stated_fault(body, urdf) for body in spec.bodies[1:]}
     model, hulls = compiled(spec), hull_model(spec)

@@ -28,14 +28,7 @@ if TYPE_CHECKING:
 
 
 class LogCheck(NamedTuple):
-    """One file.
-
-    Attributes:
-        path: the file.
-        log: None if it is unusable.
-        findings: all of them, errors first.
-        moved_deg: range over which each driven joint moved, by its name.
-    """
+    """One file; its log is None if unusable, findings are errors first, travel is by the joints' names."""
 
     path: Path
     log: "Log | None"

@@ -77,15 +77,13 @@ class Result(Printed, Generic[T_co]):
 
 
 def written(report: "Page | Mapping[str, Table]", out: str | Path | None) -> list[str]:
-    """Write a report, or tables by name, to a folder, if there is one; return the file that is written last.
-    Raises RunError: the folder cannot be written.
-    """
+    """Write a report, or tables by name, to a folder, if there is one; return the last file."""
     if out is None:
         return []
     from hydroid.reporting.page_file import write_page, write_tables
 
     write = write_tables if isinstance(report, Mapping) else write_page
-    return [*map(str, write(report, Path(out))[-1:])]  # pyright: ignore[reportArgumentType]
+    return [str(write(report, Path(out)))]  # pyright: ignore[reportArgumentType]
 
 
 def show(result: Printed, *, as_json: bool, verbose: bool = False) -> None:

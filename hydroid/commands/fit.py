@@ -1,6 +1,5 @@
 """Fit one problem, with settings and logs that are read: `hydroid.fit`."""
 
-import shlex
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -70,11 +69,7 @@ class FitResult(Printed):
         return predicted(self.model, read, None)
 
     def validate(self, logs: "LogSources", out: Source | None = None) -> "Result[list[Prediction]]":
-        """Return the verdict on each joint by logs that were not fitted; a page of it is written to `out`.
-
-        Raises:
-            LogError, RunError: as of `hydroid.validate`.
-        """
+        """Return the verdict on each joint by logs that were not fitted; a page of it is written to `out`."""
         from hydroid.commands.validate import validate
 
         return validate(logs, fit=self, out=out)
@@ -173,8 +168,7 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
     model = IdentifiedModel(settings, fit.best.theta, source, summary)
     lines: list[Table | str] = [*verdict_lines({fit.final: verdict}), *warnings(summary)]
     if folder is not None:
-        logs = " ".join(shlex.quote(log.source) for log in problem.logs)
-        step = next_step(settings, verdict, str(folder), logs)
+        step = next_step(settings, verdict, str(folder), problem.logs)
         lines += [*next_lines(step), str(folder / "report.html")]
     details = [parameter_table(settings, summary), *map(str, summary.findings)]
     content = summary.plain() | {"out": folder and str(folder)}

@@ -10,7 +10,7 @@ from hydroid.errors import SettingsError
 from hydroid.files import is_file
 
 if TYPE_CHECKING:
-    from hydroid.project import Project
+    from hydroid.project.project import Project
 
 
 @command
@@ -55,7 +55,7 @@ def init(
     for path in (*logs, *robots):
         if not (is_file(path) or is_file(path / "metadata.yaml")):  # a ROS 2 bag is a folder
             raise SettingsError("no such file", path)
-    from hydroid.project import write_project
+    from hydroid.project.project import write_project
 
     project = write_project(
         Path(folder),

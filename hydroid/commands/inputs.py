@@ -6,7 +6,6 @@ calls it, or the range of a number. What parameters of several commands are stan
 """
 
 import inspect
-import logging
 import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -18,7 +17,7 @@ from hydroid.errors import SettingsError
 from hydroid.estimate import FitSummary, read_estimate
 from hydroid.files import Plain, find_config
 from hydroid.identified_model import IdentifiedModel, load_identified
-from hydroid.progress import NOTE
+from hydroid.progress import LOGGER, NOTE
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load, parse_override
 
@@ -36,7 +35,6 @@ ModelSource: TypeAlias = "str | Path | IdentifiedModel | Any"
 SettingChanges = Mapping[str, Any] | Sequence[str] | None
 """settings to replace: values by dotted key, or texts `KEY=VALUE`"""
 
-_log = logging.getLogger(__name__)
 
 SHARED = """
     logs (LOG): Logs of commands and joint angles: CSV, .mat, Parquet, ROS bags, MCAP.
@@ -84,9 +82,7 @@ COMMAND_LINES: dict[Callable[..., Any], tuple[str, str, list[inspect.Parameter]]
 
 
 def setting_changes(given: SettingChanges, options: Mapping[str, Any] | None = None) -> Plain:
-    """Return settings to replace by dotted key: those of `--set`, and the options that are not None.
-    Raises SettingsError: a text that is no KEY=VALUE.
-    """
+    """Return settings to replace by dotted key: those of `--set`, and the options that are not None."""
     changes = dict(given if isinstance(given, Mapping) else map(parse_override, given or ()))
     return changes | {key: value for key, value in (options or {}).items() if value is not None}
 
@@ -121,7 +117,6 @@ def open_model(
     """Return the model of a result, or read it from a run folder, a saved plant or a YAML file of values.
 
     Where `nominal`, parameters without a value have nominal ones, which only stage 2 has; a note names them.
-    Raises RunError, SettingsError: as of `load_identified`.
     """
     if fit is not None and not isinstance(fit, str | Path):
         return getattr(fit, "model", fit)
@@ -132,14 +127,12 @@ def open_model(
         if model.settings.stage != "hyd":
             hint = "give a fit of stage 2 with --fit, or use --config fit-hyd"
             raise SettingsError("stage 1 (mech) does not model the actuators", model.source, hint)
-        _log.log(NOTE, "note: nominal values for %s", ", ".join(model.nominal) if fit else "all parameters")
+        LOGGER.log(NOTE, "note: nominal values for %s", ", ".join(model.nominal) if fit else "all parameters")
     return model
 
 
 def open_values(fit: ModelSource) -> tuple[Plain, FitSummary | None]:
-    """Return the values of an estimate by name, and the fit's own account of them where there is one.
-    Raises RunError, SettingsError: as of `read_estimate`.
-    """
+    """Return the values of an estimate by name, and the fit's own account of them where there is one."""
     if isinstance(fit, str | Path):
         return read_estimate(Path(fit))[1:]
     model = open_model(fit)

@@ -12,15 +12,13 @@ from hydroid.commands.inputs import LogSource, LogSources, as_list
 from hydroid.errors import RunError, SettingsError
 from hydroid.files import is_file
 from hydroid.identified_model import IdentifiedModel
-from hydroid.progress import NOTE
+from hydroid.progress import LOGGER, NOTE
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.log import LogSettings
 
 if TYPE_CHECKING:
     from hydroid.log import Log, LogFinding
     from hydroid.problem.problem import Problem
-
-_log = logging.getLogger(__name__)
 
 
 def read_logs(
@@ -54,7 +52,7 @@ def read_logs(
         pose = np.where(log.measured, log.angle, settings.arm.pose(settings.start_pose))
         read.append(replace(log, angle=pose))
     for level, line in grouped(findings):
-        _log.log(logging.WARNING if level == "warning" else NOTE, "%s: %s", level, line)
+        LOGGER.log(logging.WARNING if level == "warning" else NOTE, "%s: %s", level, line)
     return read
 
 
@@ -86,14 +84,7 @@ def read_arms(
     """Read commands of an arm, or of the arms of a pair that move; return logs by the arm's name.
 
     Columns that begin with `right_` and `left_` are those of the two arms. Without them every arm that moves
-    has the same commands: both move as mirror images.
-
-    Args:
-        arm: right, left or both: the arms of the pair that move; None: the arm stands alone.
-        pose: pose of the arm's file in which the arms stand; None: as logged.
-        angles: read joint angles over time instead.
-
-    Raises LogError: a fault that keeps the log from being used; SettingsError: no such arm or pose.
+    has the same commands: both move as mirror images. `angles`: read joint angles over time instead.
     """
     from hydroid.arm.model import ALONE, SIDES
     from hydroid.log import open_table
@@ -116,9 +107,7 @@ def read_arms(
 
 
 def run_logs(folder: Path) -> list[Path]:
-    """Return the logs that a run folder was fitted to.
-    Raises SettingsError: it is no run folder. RunError: a log is not there.
-    """
+    """Return the logs that a run folder was fitted to."""
     if not is_file(folder / "run.json"):
         hint = "name one, as in hydroid suggest LOG.csv --fit RUN, or give a run folder as --fit"
         raise SettingsError("no log is given", hint=hint)
@@ -132,9 +121,7 @@ def run_logs(folder: Path) -> list[Path]:
 
 
 def problem_of(model: IdentifiedModel, logs: LogSources, *, repair: bool = False) -> "Problem":
-    """Return the estimation problem of a model and logs, or those of its run where none is given.
-    Raises RunError: the simulation diverges at the model's parameters.
-    """
+    """Return the estimation problem of a model and logs, or those of its run where none is given."""
     read = read_logs(logs or run_logs(Path(model.source).parent), model.settings, repair=repair)
     from hydroid.problem.problem import Problem
 

@@ -1,6 +1,5 @@
 """`hydroid fit-mech`, `hydroid fit-hyd` and `hydroid adapt`: fits, from files to run folders."""
 
-import logging
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -24,13 +23,11 @@ from hydroid.commands.progress import FitProgress, Progress
 from hydroid.errors import SettingsError
 from hydroid.files import Plain
 from hydroid.parallel.cluster import open_workers
-from hydroid.progress import NOTE
+from hydroid.progress import LOGGER, NOTE
 from hydroid.quantity_table import MECHANICAL
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.parameters import nominal_value
 from hydroid.units import seconds
-
-_log = logging.getLogger(__name__)
 
 
 @command
@@ -130,7 +127,7 @@ def _fit(stage: str, given: Mapping[str, Any]) -> FitResult:
         settings = load_settings(config, {**changes, **more, **changes})
     if config == f"fit-{stage}":
         what = f"note: the arm is the shipped {settings.arm.name}"
-        _log.log(NOTE, f"{what}: for your machine give --config, which `hydroid init` writes")
+        LOGGER.log(NOTE, f"{what}: for your machine give --config, which `hydroid init` writes")
     budget = given["budget"] and seconds(given["budget"])
     if given["budget"] is not None and not budget:
         raise SettingsError(f"is no time: {given['budget']!r}", "--budget", "such as 90s, 5min or 2h")
@@ -167,7 +164,7 @@ def held_mechanics(mech: "ModelSource | None", settings: FitSettings, changes: P
         flag = summary and summary.estimate[name].flag
         doubtful = mass and flag not in (None, "identifiable", "fixed")
         if doubtful and nominal and abs(value - nominal) > 0.1 * nominal:
-            _log.warning(
+            LOGGER.warning(
                 f"{name} is held at {value:.3g} kg, which the logs of stage 1 do not determine ({flag}). "
                 f"Expected was {nominal:.3g} kg; to take that: --set parameters.{name}.fixed={nominal:.3g}"
             )

@@ -67,8 +67,8 @@ def validate(
 
     stated = {} if tolerance is None else {"tolerance_deg": tolerance}
     results, verdicts = Plain(), Plain()
-    names = numbered(model.name for model in models)
-    for one, name, model, own in zip(given, names, models, read, strict=True):
+    named = dict(zip(numbered(model.name for model in models), models, strict=True))
+    for one, own, (name, model) in zip(given, read, named.items(), strict=True):
         fitted, baselines, hashes = fitted_by(model)
         if not isinstance(one, str | Path | IdentifiedModel):
             fitted, baselines, hashes = one.predictions, one.baselines, {*map(log_hash, one.problem.logs)}
@@ -82,9 +82,8 @@ def validate(
     fits, arm = ordered(verdicts), models[0].settings.arm
     every = [prediction for name in fits for prediction in results[name]]
     best = next(iter(fits))
-    model = models[[*results].index(best)]
-    run = run_of(model)
-    steps = [next_step(model.settings, fits[best], str(run))] if run else []
+    run = run_of(named[best])
+    steps = [next_step(named[best].settings, fits[best], str(run))] if run else []
     page = validation_page(every, fits, arm, *steps)
     content = {
         "verdict": [{"fit": name} | one.model_dump() for name in fits for one in fits[name]],

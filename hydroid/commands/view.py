@@ -25,7 +25,7 @@ from hydroid.files import is_file, write_atomic
 from hydroid.viewer import choose_platform
 
 if TYPE_CHECKING:
-    from hydroid.arm.collision import Clearance
+    from hydroid.arm.model import Clearance
     from hydroid.log import Log
     from hydroid.settings.fit import FitSettings
 

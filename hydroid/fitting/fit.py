@@ -1,6 +1,5 @@
 """A fit: search, the estimates taken from it, refinement, and the uncertainty of the last estimate."""
 
-import logging
 import time
 from collections.abc import Mapping, Sequence
 
@@ -13,10 +12,9 @@ from hydroid.fitting.search import Searched, search
 from hydroid.posterior.quantities import Quantities, quantities
 from hydroid.posterior.uncertainty import Uncertainty
 from hydroid.problem.problem import Evaluation, Problem
+from hydroid.progress import LOGGER
 from hydroid.search.descent import Descent
 from hydroid.search.pareto import average, non_dominated, segment_best, utopia
-
-_log = logging.getLogger(__name__)
 
 
 @record
@@ -82,7 +80,7 @@ def fit(problem: Problem, watch: Watcher | None = None, checkpoints: Checkpoints
         ending = ladder.refinements[final].ending
         if not ending.converged:
             words = "The least-squares refinement did not converge: %s. '%s' need not be an optimum."
-            _log.warning(words, ending.value, final)
+            LOGGER.warning(words, ending.value, final)
     times.append(time.perf_counter())
     last = ladder.problem
     about = ladder.known(estimates[final].theta)

@@ -5,7 +5,6 @@ left out. Which rung that is shows long before least squares has converged, so t
 (`FIRM`). What is kept at the end is refined to the tolerance of the settings.
 """
 
-import logging
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Protocol
@@ -20,10 +19,9 @@ from hydroid.fitting.refinement import ROUGH, refine
 from hydroid.posterior.linear import estimate_box
 from hydroid.posterior.uncertainty import Uncertainty, uncertainty
 from hydroid.problem.problem import Problem
+from hydroid.progress import LOGGER
 from hydroid.search.descent import Descent, Ending
 from hydroid.settings.search import RefinementSettings
-
-_log = logging.getLogger(__name__)
 
 TOO_FAR = 20.0
 """times the rms error of the last estimate from which the dynamic model is not refined: lags that stand for
@@ -66,7 +64,7 @@ def measured(problem: Problem, candidates: Mapping[str, Array]) -> dict[str, Est
         angles = tuple(response.angle[i] for response in responses)
         estimates.append(Estimate(name, theta[i], norms[i, :-1], norms[i, -1], rms[i], angles))
         if not estimates[-1].usable:
-            _log.warning("the estimate %s diverged when it was simulated; it is not used", name)
+            LOGGER.warning("the estimate %s diverged when it was simulated; it is not used", name)
     return {e.name: e for e in sorted(estimates, key=lambda e: not e.usable)}
 
 

@@ -1,6 +1,5 @@
 """Refinement of an estimate: least squares over all channels, with the priors as further measurements."""
 
-import logging
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -12,6 +11,7 @@ from hydroid.posterior.linear import least_squares_rows, with_open_start
 from hydroid.posterior.noise import prior_weight
 from hydroid.problem.channels import UNFILTERED
 from hydroid.problem.problem import Problem
+from hydroid.progress import LOGGER
 from hydroid.search.descent import Descent, Ending, start
 from hydroid.search.least_squares import step
 from hydroid.settings.search import RefinementSettings
@@ -26,8 +26,6 @@ Refining = Callable[[str, int, float], bool | None]
 whether its time is up"""
 ROUGH = 0.1
 """gain below which least squares without the prefilter ends"""
-
-_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -97,7 +95,7 @@ def refine(
             keep(now.arrays)
     if not now.ended:  # the checkpoint is where it goes on
         now = replace(now, ending=Ending.TIME)
-    _log.info("refinement of %d parameters: %s", now.point.size, now)
+    LOGGER.info("refinement of %d parameters: %s", now.point.size, now)
     return now
 
 

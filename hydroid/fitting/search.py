@@ -1,6 +1,5 @@
 """The search over a problem: ask for candidates, simulate them, tell their objectives, store a checkpoint."""
 
-import logging
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
@@ -10,6 +9,7 @@ from hydroid.fitting.checkpoints import Arrays, Checkpoints, Memo, saving
 from hydroid.fitting.multistart import Multistart
 from hydroid.fitting.refinement import Refining
 from hydroid.problem.problem import Problem
+from hydroid.progress import LOGGER
 from hydroid.search.chromosomes import Genes
 from hydroid.search.genetic import Nsga2, Population, SimpleGa
 
@@ -17,19 +17,13 @@ HISTORY = ("generation", "evaluations", "simulated", "infeasible", "best", "medi
 """Columns of a run's history; `best` is over the run so far, `median` over the population, both of (18) or
 (19) over the whole record."""
 
-_log = logging.getLogger(__name__)
-
 
 @record
 class Searched:
-    """Result of a search.
+    """Result of a search: its last population, theta (n, P), all candidates simulated, and its history.
 
-    Attributes:
-        theta: the last population, shape (n, P), with its objectives in `population`.
-        single: whether it minimised one objective, not that of each segment.
-        history: shape (generations, len(HISTORY)).
-        memo: all candidates simulated.
-        ends: costs at which the starts of a multi-start ended, by the joint that was fitted alone (0: all).
+    `single`: whether it minimised one objective, not that of each segment. `ends`: costs at which the starts
+    of a multi-start ended, by the joint that was fitted alone (0: all together).
     """
 
     theta: Array
@@ -49,9 +43,8 @@ def search(
     """Search to the last generation, from the seed or from what `checkpoints` holds as "search".
 
     `watch` takes a row of HISTORY after every generation, but for those that a resumed run repeats, and says
-    whether that was the last;
-    `progress` watches least squares within multi-start. Raises RunError: the search does not repeat what it
-    did before the checkpoint.
+    whether that was the last; `progress` watches least squares within multi-start. Raises RunError: the
+    search does not repeat what it did before the checkpoint.
     """
     settings, free, late = problem.settings.search, int(problem.parameters.free.sum()), False
 
@@ -76,7 +69,7 @@ def search(
     def state() -> Arrays:
         done, _, simulated, diverged, best, _ = history[-1]
         words = "checkpoint: generation %d of %d, %d simulated, %d diverged, best objective %.6g"
-        _log.info(words, done, generations, simulated, diverged, best)
+        LOGGER.info(words, done, generations, simulated, diverged, best)
         return memo.arrays()
 
     generations, rng = 1 + algorithm.settings.generations, np.random.default_rng(settings.seed)

@@ -1,6 +1,5 @@
 """How well a model predicts a log: its response with a band, and the article's error indices (table 9)."""
 
-import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
 from functools import partial
@@ -16,8 +15,7 @@ from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
 from hydroid.posterior.band import Band, fitted_bands, prediction_bands
 from hydroid.prediction import predict
-
-_log = logging.getLogger(__name__)
+from hydroid.progress import LOGGER
 
 HORIZONS = (0.5, 1.0, 2.0, 5.0, 10.0)
 """over which a predicted change of an angle is compared [s]"""
@@ -98,7 +96,7 @@ def predicted(model: IdentifiedModel, log: Log, unseen: bool | None) -> Predicti
     if np.isfinite(response).all():
         bands = prediction_bands(model, log, response)
     else:
-        _log.warning("warning: %s predicts no joint in %s: its simulation diverged", model.name, log.source)
+        LOGGER.warning("warning: %s predicts no joint in %s: its simulation diverged", model.name, log.source)
 
     def errors(part: Log) -> Array:
         return part.angle[:, [j - 1 for j in joints]] - predict(model, part, joints)

@@ -21,7 +21,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hydroid.arrays import Array
 from hydroid.errors import LogError
 from hydroid.log.repair import hold
 from hydroid.log.table import Recording, Signal, Table, format_library
@@ -49,16 +48,22 @@ class BagTable(Table):
         columns = {time: grid}
         for name, times in at.items():
             values = np.array([self.channels[name][key] for key in times.tolist()])
-            columns[name] = _resampled((times - start) / 1e9, values, grid, held=held[name])
+            seconds = (times - start) / 1e9
+            if held[name] or len(times) == 1:
+                columns[name] = hold(seconds, values[:, None], grid, grid[1])[:, 0]
+                continue
+            after = np.searchsorted(seconds, grid - 1e-9).clip(1, len(seconds) - 1)
+            # a hole is longer than 0.1 s, or than three usual steps of the topic if these are longer
+            far = np.diff(seconds)[after - 1] > max(0.1, 3 * np.median(np.diff(seconds)))
+            between = (grid > seconds[after - 1] + 1e-9) & (grid < seconds[after] - 1e-9)
+            columns[name] = np.where(far & between, np.nan, np.interp(grid, seconds, values))
         topics = ", ".join(sorted({name.partition(".")[0] for name in held}))
         remarks = (f"{topics}: resampled to {self.period:g} s",)
         return Table(source=self.source, names=self.names, columns=columns, remarks=remarks).read(signals)
 
 
 def open_bag(path: Path, time: str, period: float) -> BagTable:
-    """Read the channels of a bag; `time` is the name of its time column, `period` that of its rows [s].
-    Raises LogError: it is damaged, has no channel of numbers, or rosbags is not installed.
-    """
+    """Read the channels of a bag; `time` is the name of its time column, `period` that of its rows [s]."""
     channels = dict[str, dict[int, float]]()
     with format_library("rosbags.highlevel", "ros", path, "a bag") as rosbags:
         from rosbags.typesys import Stores, get_typestore
@@ -76,17 +81,6 @@ def open_bag(path: Path, time: str, period: float) -> BagTable:
     if not channels:
         raise LogError("holds no channel of numbers", path)
     return BagTable(source=str(path), names=(time, *channels), channels=channels, period=period)
-
-
-def _resampled(at: Array, values: Array, grid: Array, *, held: bool) -> Array:
-    """Return values at other times [s]; NaN between messages that are too far apart."""
-    if held or len(at) == 1:
-        return hold(at, values[:, None], grid, grid[1])[:, 0]
-    after = np.searchsorted(at, grid - 1e-9).clip(1, len(at) - 1)
-    # a hole is longer than 0.1 s, or than three usual steps of the topic if these are longer
-    far = np.diff(at)[after - 1] > max(0.1, 3 * np.median(np.diff(at)))
-    between = (grid > at[after - 1] + 1e-9) & (grid < at[after] - 1e-9)
-    return np.where(far & between, np.nan, np.interp(grid, at, values))
 
 
 def _numbers(message: Any, prefix: str) -> Iterator[tuple[str, float]]:
@@ -107,9 +101,7 @@ def _numbers(message: Any, prefix: str) -> Iterator[tuple[str, float]]:
 
 
 def open_mat(path: Path, *, hdf5: bool) -> Table:
-    """Read all variables of a file; `hdf5`: it is of version 7.3.
-    Raises LogError: it is damaged, has no arrays, or needs a package that is not installed.
-    """
+    """Read all variables of a file; `hdf5`: it is of version 7.3."""
     package = "h5py" if hdf5 else "scipy.io"
     with format_library(package, "mat", path, "a MATLAB file") as library:
         if hdf5:
@@ -128,7 +120,7 @@ def open_mat(path: Path, *, hdf5: bool) -> Table:
 
 
 def open_parquet(path: Path) -> Table:
-    """Read all columns of a file; raises LogError: it is damaged, or pyarrow is not installed."""
+    """Read all columns of a file."""
     with format_library("pyarrow.parquet", "parquet", path, "Parquet") as parquet:
         table = parquet.read_table(str(path))
         columns = {name: table[name].to_numpy() for name in table.column_names}

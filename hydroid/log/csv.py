@@ -27,7 +27,7 @@ IS_CSV = "a log is a CSV file with a header, one row a sample, or .mat, Parquet,
 
 
 def open_csv(path: Path, data: bytes) -> Table:
-    """Find the table in a file's bytes; raises LogError: it is not text, or has no header."""
+    """Find the table in a file's bytes."""
     lines = _decode(path, data).replace("\r\n", "\n").replace("\r", "\n").split("\n")
     content = [k for k, line in enumerate(lines) if _is_content(line)]
     if not content:

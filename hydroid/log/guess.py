@@ -23,12 +23,9 @@ PERIODS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2)  # [s], of which a g
 
 
 class ColumnGuess(NamedTuple):
-    """What the columns of a log seem to hold.
+    """What the columns of a log seem to hold: the `log` section of a fit's settings, and the unused columns.
 
-    Attributes:
-        log: a `log` section of a fit's settings.
-        reasons: a line for each column that it uses, for what is uncertain, and for the other columns.
-        unused: the other columns.
+    A reason stands for each column that it uses, for what is uncertain, and for the others.
     """
 
     log: Plain
@@ -53,7 +50,7 @@ def guess_columns(
     """Guess which columns are time, commands and angles, of which joints, in which units.
 
     Columns may have the names of the links that the joints move instead; positions of joints (from 1) that
-    slide are in m. Raises LogError: no column looks like a time.
+    slide are in m.
     """
     columns = [*_columns(table)]
     time = max((c for c in columns if c.kind == "time"), key=lambda c: _rises(c.values), default=None)

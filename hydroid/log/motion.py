@@ -136,7 +136,7 @@ class JointMotion:
 def _correlations(leading: Array, following: Array, most: int) -> Array:
     """Return the size of the correlation of a signal with an earlier one, by lag below `most` samples."""
     n = len(leading)
-    with np.errstate(invalid="ignore", divide="ignore"):
+    with np.errstate(all="ignore"):
         pairs = ((leading[: n - lag], following[lag:]) for lag in range(min(most, n // 2)))
         return np.nan_to_num(np.abs([np.corrcoef(*pair)[0, 1] for pair in pairs]))
 

@@ -1,14 +1,12 @@
 """A log file -> `Log`: open, map, repair, check, resample; and back to CSV, which reads the same."""
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import get_args
 
 import numpy as np
 
-from hydroid.arrays import Array
 from hydroid.errors import LogError
 from hydroid.files import csv_text, write_atomic
 from hydroid.log.binary import open_bag, open_mat, open_parquet
@@ -33,10 +31,7 @@ Ranges = Mapping[str, tuple[float, float]]
 def open_table(path: Path, settings: LogSettings = DEFAULT) -> Table:
     """Open a log of any format, recognised by its first bytes: CSV, .mat, Parquet, a ROS bag or MCAP.
 
-    Args:
-        path: the file, or the folder of a ROS 2 bag.
-        settings: name of the time column, and period to which the channels of a bag are resampled.
-    Raises LogError: it cannot be read, or needs a package that is not installed.
+    The settings name the time column, and the period to which the channels of a bag are resampled.
     """
     try:
         folder = (path / "metadata.yaml").is_file()
@@ -94,8 +89,8 @@ def check_log(
             log = resample(recording, settings, len(ranges))
             findings += check_motion(log, recording.signals, compared, backward, settings.delay_s)
     except LogError as error:
-        fault = log_finding("error", "unreadable", source, what=error.what, hint=error.hint)
-        findings.append(replace(fault, where=error.where))
+        said = {"what": error.what, "hint": error.hint}
+        findings.append(LogFinding("unreadable", "error", (), said, error.where, source))
     return log, by_level(findings)
 
 
@@ -131,7 +126,6 @@ def _match(
 
     Joints that are not `needed` may be absent from a file that has columns of others. A column of a similar
     name speaks against it: it is rather misspelt.
-    Raises LogError: a column is missing, stands there twice, or is asked for twice.
     """
     free = {name.lower(): name for name in sorted({*table.names} - {signal.name for signal in wanted})}
     missing = [signal for signal in wanted if signal.name not in table.names]
@@ -199,15 +193,11 @@ def write_logs(path: Path, logs: Sequence[tuple[Log, LogSettings]], *, exact: bo
                 if log.pressure is None:
                     continue
                 values = log.pressure[:, joint, signal.part]
-            columns[signal.name] = _cells(signal, values, exact)
+            # ten digits, or the shortest of more that are read as these values
+            wanted = (values - signal.offset) / signal.gain
+            cells = np.array([f"{cell:.10g}" for cell in wanted], dtype=object)
+            for digits in (15, 16, 17) if exact else ():
+                wrong = np.flatnonzero(cells.astype(float) * signal.gain + signal.offset != values)
+                cells[wrong] = [f"{cell:.{digits}g}" for cell in wanted[wrong]]
+            columns[signal.name] = cells.tolist()
     write_atomic(path, csv_text([columns, *zip(*columns.values(), strict=True)]))
-
-
-def _cells(signal: Signal, values: Array, exact: bool) -> list[str]:
-    """Return cells of ten digits, or the shortest of more that are read as these values."""
-    wanted = (values - signal.offset) / signal.gain
-    cells = np.array([f"{cell:.10g}" for cell in wanted], dtype=object)
-    for digits in (15, 16, 17) if exact else ():
-        wrong = np.flatnonzero(cells.astype(float) * signal.gain + signal.offset != values)
-        cells[wrong] = [f"{cell:.{digits}g}" for cell in wanted[wrong]]
-    return cells.tolist()

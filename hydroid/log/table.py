@@ -69,9 +69,7 @@ class Table:
     lines: Ints | None = None
 
     def read(self, signals: Sequence[Signal]) -> "Recording":
-        """Read the columns of signals; a number that is too large counts as none.
-        Raises LogError: columns that cannot be read together.
-        """
+        """Read the columns of signals; a number that is too large counts as none."""
         first = signals[0].name
         values = np.empty((len(self.columns[first]), len(signals)))
         for signal, column in zip(signals, values.T, strict=True):
@@ -168,9 +166,7 @@ def _as_numbers(cells: NDArray[Any]) -> tuple[Array, bool]:
 
 @contextmanager
 def format_library(package: str, extra: str, path: Path, kind: str) -> Generator[Any]:
-    """Yield a library that reads a format; what it raises on damaged bytes, errors of any kind, is one line.
-    Raises LogError: it is not installed, or cannot read the file.
-    """
+    """Yield a library that reads a format; whatever it raises on damaged bytes becomes a `LogError`."""
     try:
         library = import_module(package)
     except ImportError:

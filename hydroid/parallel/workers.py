@@ -3,9 +3,9 @@
 import logging
 import pickle
 import threading
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import CancelledError
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from functools import lru_cache
 from importlib.metadata import version
 from itertools import pairwise
@@ -41,11 +41,10 @@ class DaskWorkers:
 
         Each worker gets one chunk of the rows. When a worker dies, another one takes its chunk. The target
         can be pickled, and is sent once. The result, (n, columns), is in theta's order; NaN in the row of a
-        candidate that kills its workers. Raises RunError: the scheduler is gone, or a worker has other
-        VERSIONS.
+        candidate that kills its workers.
         """
         result = np.full((len(theta), columns), np.nan)
-        with _lost_scheduler(self.client):
+        try:
             if target not in self._sent:  # a task and no data: what a dead worker held is computed again
                 self._sent[target] = self.client.submit(bytes, pickle.dumps(target), pure=False)
             edges = np.linspace(0, len(theta), min(self.count, len(theta)) + 1).astype(int).tolist()
@@ -63,6 +62,12 @@ class DaskWorkers:
                     _log.warning("a candidate has killed worker after worker and counts as infeasible")
                 else:
                     result[i] = rows[0]
+        except Exception as error:  # many errors follow the loss of a scheduler
+            if not isinstance(error, OSError | CancelledError) and self.client.status == "running":
+                raise
+            words = " ".join(str(error).split()) or type(error).__name__
+            hint = "start it again, and continue with --resume"
+            raise RunError(f"the Dask scheduler is gone ({words})", hint=hint) from None
         return result
 
     def _map(self, target: object, method: str, chunks: Sequence[Array]) -> list[Array | None]:
@@ -115,16 +120,3 @@ def _apply(pickled: bytes, versions: dict[str, str], method: str, theta: Array) 
 @lru_cache(maxsize=8)
 def _loaded(pickled: bytes) -> Any:
     return pickle.loads(pickled)
-
-
-@contextmanager
-def _lost_scheduler(client: Any) -> Generator[None]:
-    """Turn the many errors that follow the loss of a scheduler into one."""
-    try:
-        yield
-    except Exception as error:
-        if not isinstance(error, OSError | CancelledError) and client.status == "running":
-            raise
-        words = " ".join(str(error).split()) or type(error).__name__
-        hint = "start it again, and continue with --resume"
-        raise RunError(f"the Dask scheduler is gone ({words})", hint=hint) from None

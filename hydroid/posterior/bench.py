@@ -111,7 +111,7 @@ class Movement:
         k, from_rest = over.argmax(axis=1), np.pad(speeds, ((0, 0), (1, 0)))
         times = np.append(0.0, np.arange(self.samples) + 0.5)  # a speed is that between two samples
         before, after = from_rest[row, k], from_rest[row, k + 1]
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(all="ignore"):
             time = times[k] + (times[k + 1] - times[k]) * (level - before) / (after - before)
         return np.where(over.any(axis=1), self.bench.period * time, np.nan)
 

@@ -83,7 +83,7 @@ def by_log(problem: Problem, uncertainty: Uncertainty) -> ByLog:
     mean, square = np.trace(expected, axis1=1, axis2=2), np.sum(expected**2, axis=(1, 2))
     # what the priors say is no less certain where the logs differ
     noise = np.sum(rows @ pooled * rows, axis=1) / uncertainty.posterior.deviations**2
-    with np.errstate(invalid="ignore", divide="ignore"):  # 0 / 0 of a parameter without effect: not known
+    with np.errstate(all="ignore"):  # 0 / 0 of a parameter without effect: not known
         freedom, ratio = mean**2 / square, np.sum((steps @ rows.T) ** 2, axis=0) / mean
         widened = np.sqrt(1 - noise + noise * ratio)
     # a parameter that owes a tenth of its deviation to what one log alone has is unknown by log

@@ -22,11 +22,9 @@ STEPS = 6  # points on each side before the steps grow: they reach three standar
 
 @record
 class Profile:
-    """What a profile of a parameter shows.
+    """What a profile shows: where the deviance is below THRESHOLD, infinite where it never exceeds it.
 
-    Attributes:
-        interval: where the deviance is below THRESHOLD; infinite on a side where it never exceeds it.
-        lowest: least deviance of all points; clearly below 0 the estimate is no optimum.
+    `lowest` is the least deviance of all points; clearly below 0 the estimate is no optimum.
     """
 
     interval: tuple[float, float]
@@ -43,7 +41,6 @@ def profile(problem: Problem, uncertainty: Uncertainty, name: str) -> Profile:
 
     With autocorrelated noise the rise of a sum of squares is no likelihood ratio. It is scaled so that its
     curvature is the estimate's variance (L. Pace, A. Salvan, N. Sartori, 2011).
-    Raises SettingsError: no free parameter of that name.
     """
     parameters, linear, theta = problem.parameters, uncertainty.linear, uncertainty.theta
     free = parameters.named(parameters.free)
@@ -96,20 +93,15 @@ class Identifiability:
     """The directions that are determined, and those that are not.
 
     Attributes:
-        names: of the p parameters that vary.
-        alone: those of them that are not determined to WEAK_ABOVE, whatever the others are.
+        alone: parameters that are not determined to WEAK_ABOVE, whatever the others are.
         combinations: of the other parameters that are not determined either, the least determined first: the
             relative changes, the largest +1, of those that take a tenth of it or more.
+        rank: number of independent combinations that are determined.
     """
 
-    names: tuple[str, ...]
     alone: tuple[str, ...]
     combinations: tuple[dict[str, float], ...]
-
-    @property
-    def rank(self) -> int:
-        """Number of independent combinations that are determined."""
-        return len(self.names) - len(self.alone) - len(self.combinations)
+    rank: int
 
 
 def identifiability(problem: Problem, uncertainty: Uncertainty) -> Identifiability:
@@ -123,4 +115,5 @@ def identifiability(problem: Problem, uncertainty: Uncertainty) -> Identifiabili
         changes = axis / axis[np.argmax(np.abs(axis))]
         order = [i for i in np.argsort(-np.abs(changes), kind="stable") if abs(changes[i]) >= 0.1]
         combinations.append({str(names[~alone][i]): float(changes[i]) for i in order})
-    return Identifiability(tuple(names.tolist()), tuple(names[alone].tolist()), tuple(combinations))
+    rank = int(np.sum(~alone)) - len(combinations)
+    return Identifiability(tuple(names[alone].tolist()), tuple(combinations), rank)

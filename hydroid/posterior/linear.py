@@ -171,10 +171,7 @@ def with_open_start(problem: Problem, theta: Array) -> Problem:
 
 
 def least_squares_rows(problem: Problem, at: Array, prior_weight: float) -> Function:
-    """Return what least squares minimises: candidates, (n, P), to residuals and weighed scores, (n, R + M).
-
-    The start angles are open as at an estimate, shape (P,).
-    """
+    """Return the rows that least squares minimises, (n, R + M), by (n, P); starts are open as at one."""
     opened = with_open_start(problem, at)
 
     def rows(theta: Array) -> Array:

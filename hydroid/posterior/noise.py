@@ -12,7 +12,6 @@ normal, with a variance from the process's own information (P. Whittle, 1953): s
 
 from dataclasses import replace
 from functools import cached_property, reduce
-from typing import Literal
 
 import numpy as np
 from scipy.fft import next_fast_len
@@ -32,19 +31,16 @@ MIN_LEVEL = {"angle": np.deg2rad(0.05), "pressure_a": 1e4, "pressure_b": 1e4}
 
 @record
 class Noise:
-    """A stationary AR process, sampled T times.
+    """A stationary AR process, sampled T times, with reflection coefficients k_1..k_p, within (-1, 1).
 
-    Attributes:
-        samples: T.
-        level: standard deviation, in units of the channel's residual [rad].
-        reflection: coefficients k_1..k_p of its Levinson recursion, shape (p,), each within (-1, 1).
-        source: of the level; "smallest" is MIN_LEVEL, as the residual shows less.
+    `level` is its standard deviation, in units of the channel's residual [rad]. A residual shows it, or it is
+    `given` by the settings.
     """
 
     samples: int
     level: float
     reflection: Array
-    source: Literal["residual", "settings", "smallest"] = "residual"
+    given: bool = False
 
     @cached_property
     def autocovariance(self) -> Array:
@@ -114,13 +110,13 @@ def channel_noise(channel: Channel, residual: Array, objective: ObjectiveSetting
     """
     given, samples = objective.noise_of(channel.joint), len(residual)
     if given is not None and channel.quantity == "angle":
-        return Noise(samples, np.deg2rad(given) * channel.weight, np.empty(0), "settings")
+        return Noise(samples, np.deg2rad(given) * channel.weight, np.empty(0), given=True)
     lacking = samples * (MIN_LEVEL[channel.quantity] * channel.weight) ** 2 - residual @ residual
     if lacking <= 0:
         return fit_noise(residual)
     impulse = np.zeros(samples)  # its products are those expected of white noise
     impulse[samples // 2] = np.sqrt(lacking)
-    return replace(fit_noise(np.vstack([residual, channel.filtered(impulse)])), source="smallest")
+    return fit_noise(np.vstack([residual, channel.filtered(impulse)]))
 
 
 def error_level(channel: Channel, noise: Noise) -> float:
@@ -142,7 +138,6 @@ def transformed(rows: Array) -> Array:
 
 
 def _transform_size(samples: int) -> int:
-    """Return a fast length of transforms of twice as many samples."""
     return int(next_fast_len(2 * samples, real=True))  # pyright: ignore[reportArgumentType, reportUnknownArgumentType]
 
 
@@ -151,7 +146,7 @@ def neighbours(noise: Noise) -> list[Noise]:
 
     A process that the settings give is not uncertain.
     """
-    if noise.source == "settings":
+    if noise.given:
         return []
     samples, order, place = noise.samples, len(noise.reflection), np.arctanh(noise.reflection)
     innovation = noise.level**2 * np.prod(1 - noise.reflection**2)
@@ -210,7 +205,7 @@ def unbiased(noise: Noise, effects: Array, spread: Array) -> Noise:
     are raised by the difference to S, in a few rounds because S is not known beforehand. A noise that the
     settings give is whole.
     """
-    if noise.source == "settings":
+    if noise.given:
         return noise
     samples, order, spread_out = noise.samples, len(noise.reflection), spread @ effects
     left, whole = noise.autocovariance[: order + 1], noise

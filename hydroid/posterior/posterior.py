@@ -32,13 +32,10 @@ STEP = 0.1  # step of the differences in standard deviations: wide enough for th
 
 @record
 class Known:
-    """Some quantities at an estimate.
+    """Some quantities at an estimate, shape (m,), NaN where one does not exist.
 
-    Attributes:
-        value: shape (m,); NaN where it does not exist.
-        sd: standard deviation, shape (m,): infinite where not determined, NaN where unknown.
-        interval: of 95 %, shape (m, 2); infinite where not determined.
-        given: quantities that no parameter changes, shape (m,).
+    `sd` is infinite where not determined, NaN where unknown; `interval` is of 95 %, (m, 2); no parameter
+    changes those that are `given`.
     """
 
     value: Array
@@ -51,10 +48,7 @@ class Known:
 class Posterior:
     """What is known of p parameters that vary together at an estimate.
 
-    Attributes:
-        box: the estimate, its bounds, the scale of relative changes, and which of the P parameters vary.
-        root: G, upper triangular and regular, shape (p, p).
-        quantile: half a 95 % interval, in standard deviations.
+    `root` is G, upper triangular and regular, (p, p); `quantile` half a 95 % interval in standard deviations.
     """
 
     box: Box
@@ -143,7 +137,7 @@ class Posterior:
 
 def interval(value: Array, half: Array, multiplicative: Mask) -> Array:
     """Return ends, (m, 2), value ± half, or value times and over exp(half / value), from shapes (m,)."""
-    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+    with np.errstate(all="ignore"):
         factor = np.exp(np.where(multiplicative, half / value, 0.0))
     change = np.where(multiplicative, 0.0, half)
     return np.stack([value / factor - change, value * factor + change], axis=1)

@@ -133,7 +133,7 @@ def norm(error: Array, p: float | str) -> Array:
     """
     # with the last axis contiguous numpy sums row by row; a transposed input would be summed in another order
     size = np.abs(np.ascontiguousarray(error))
-    with np.errstate(over="ignore", invalid="ignore"):
+    with np.errstate(all="ignore"):
         if p == 1:
             value = size.mean(axis=-1)
         elif p == 2:
@@ -144,9 +144,7 @@ def norm(error: Array, p: float | str) -> Array:
 
 
 def overall_objective(error: Array, measured: Array, settings: ObjectiveSettings) -> Array:
-    """Return the norm (18) of each candidate's error, (n, T) -> (n,); where relative, (19).
-    Raises SettingsError: relative, and the measured output, shape (T,), is zero throughout.
-    """
+    """Return the norm (18) of each candidate's error, (n, T) -> (n,); where relative, (19)."""
     value = norm(error, settings.norm)
     if not settings.relative:
         return value
@@ -165,7 +163,7 @@ def segment_objectives(error: Array, measured: Array, bounds: Ints, settings: Ob
 
     A candidate whose error, (n, T), is not finite anywhere has inf in all segments: the first segments of a
     simulation that diverged later count for nothing. `bounds` are [first, end) of each segment in samples,
-    (S, 2). Raises SettingsError: relative, and the measured output, (T,), is zero throughout a segment.
+    (S, 2).
     """
     columns = [overall_objective(error[:, a:b], measured[a:b], settings) for a, b in bounds]
     objectives = np.stack(columns, axis=1)
@@ -174,10 +172,7 @@ def segment_objectives(error: Array, measured: Array, bounds: Ints, settings: Ob
 
 
 def segment_bounds(samples: int, segments: int) -> Ints:
-    """Cut a record of so many samples into segments of equal length: [first, end) of each in samples, (S, 2).
-
-    They are increasing and gapless, from 0 to T. Raises SettingsError: more segments than samples.
-    """
+    """Cut a record of so many samples into segments of equal length: [first, end) of each, shape (S, 2)."""
     if segments > samples:
         what = f"{segments} segments do not fit into {samples} samples"
         raise SettingsError(what, "objective.segments", "each segment needs a sample of its own")

@@ -21,13 +21,9 @@ STEP = np.radians(0.05)  # of the differences by a start angle
 
 @record
 class StartSlopes:
-    """What the start angles of one log do to its residuals.
+    """What the start angles of some joints of one log do to its residuals, a part of the row of all.
 
-    Attributes:
-        log: index of the log.
-        rows: the log's residuals in a row of all.
-        joints: numbered from 1.
-        slopes: derivatives of these residuals by each start angle [rad/rad], shape (k, rows).
+    `slopes` are derivatives of these by each start angle [rad/rad], shape (k, rows).
     """
 
     log: int

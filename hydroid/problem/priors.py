@@ -50,11 +50,15 @@ class Priors:
     """M priors about P parameters, named `names`; those about fixed parameters only are left out.
 
     Those of single parameters come first. `searched` are the parameters with bounds within REACH of these.
-    Raises SettingsError: a parameter that does not exist, or priors that the bounds contradict.
     """
 
     def __init__(self, settings: Mapping[str, PriorSettings], parameters: ParameterSet) -> None:
-        self.searched = _within_reach(parameters)
+        narrowed = list(parameters.parameters)
+        for column, p in enumerate(narrowed):
+            if p.prior is not None and p.fixed is None:
+                low, high = max(p.lower, p.prior.value(-REACH)), min(p.upper, p.prior.value(REACH))
+                narrowed[column] = replace(p, lower=low, upper=high)
+        self.searched = ParameterSet(tuple(narrowed))
         self._own = [
             (column, p.prior)
             for column, p in enumerate(parameters.parameters)
@@ -69,7 +73,15 @@ class Priors:
             *(parameters.names[column] for column, _ in self._own),
             *(combination.name for combination in self._combinations),
         )
-        self._refuse_contradictions()
+        if self._combinations:
+            off = np.abs(self.scores(self.project(self.searched.start[None]))[0])
+            worst = np.argmax(off)
+            if off[worst] > 1.5 * REACH:
+                raise SettingsError(
+                    "cannot hold within the bounds together with the other priors",
+                    f"priors.{self.names[worst]}",
+                    "widen the bounds, correct the value, or give it a larger sd",
+                )
 
     def __len__(self) -> int:
         return len(self.names)
@@ -102,33 +114,9 @@ class Priors:
                 break
         return theta
 
-    def _refuse_contradictions(self) -> None:
-        if not self._combinations:
-            return
-        off = np.abs(self.scores(self.project(self.searched.start[None]))[0])
-        worst = np.argmax(off)
-        if off[worst] > 1.5 * REACH:
-            raise SettingsError(
-                "cannot hold within the bounds together with the other priors",
-                f"priors.{self.names[worst]}",
-                "widen the bounds, correct the value, or give it a larger sd",
-            )
-
-
-def _within_reach(parameters: ParameterSet) -> ParameterSet:
-    """Return the parameters with bounds no further than REACH standard deviations from their priors."""
-    narrowed = list(parameters.parameters)
-    for column, p in enumerate(narrowed):
-        if p.prior is not None and p.fixed is None:
-            low, high = max(p.lower, p.prior.value(-REACH)), min(p.upper, p.prior.value(REACH))
-            narrowed[column] = replace(p, lower=low, upper=high)
-    return ParameterSet(tuple(narrowed))
-
 
 def _combination(name: str, prior: PriorSettings, parameters: ParameterSet) -> _Combination | None:
-    """Return a combination; None where all of its parameters are fixed.
-    Raises SettingsError: a parameter that does not exist, or a divisor that may be 0.
-    """
+    """Return a combination; None where all of its parameters are fixed."""
     names, free = parameters.names, parameters.free
     for parameter in prior.factors:
         if parameter not in names:

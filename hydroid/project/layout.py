@@ -23,14 +23,10 @@ REVERSED = (
 
 @record
 class Layout:
-    """The columns of a log, and what its numbers say.
+    """The columns of a log, as the `log` section of a fit's settings, and what its numbers say.
 
-    Attributes:
-        section: the `log` section of a fit's settings.
-        outputs: joints with a command and an angle, numbered from 1.
-        reasons: a line for each column that is not `unused`, and for what was found in the numbers.
-        motions: how the measured joints move, by number.
-        followed: whether a joint without a command moves.
+    `outputs` are joints with a command and an angle, `motions` how the measured ones move, by number from 1;
+    `reasons` have a line for each column that is not `unused`; `followed`: a joint without a command moves.
     """
 
     section: Plain
@@ -42,11 +38,7 @@ class Layout:
 
 
 def find_layout(table: Table, arm: Arm, order: Sequence[str] = ()) -> Layout:
-    """Guess the columns of a log, turn commands that act against the angle, and see how fast joints are.
-
-    `order` names the joints as the log counts them; by default they are those of the arm. Raises LogError: no
-    column looks like a time, or no joint has an angle; SettingsError: no joint has a name.
-    """
+    """Guess the columns of a log, turn commands that act against the angle, and see how fast joints are."""
     names = arm.joint_names
     for name in order:
         if name not in names:

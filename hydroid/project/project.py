@@ -5,18 +5,17 @@ import shlex
 import tempfile
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from hydroid.arrays import record
 from hydroid.cad.importer import ImportedArm, import_arm
-from hydroid.cad.shapes import MESHES
+from hydroid.cad.source import MESHES
 from hydroid.errors import RunError, SettingsError
 from hydroid.files import fill_template, undisturbed, write_atomic
 from hydroid.log import open_table
-from hydroid.project.arm_file import JointSize, arm_text, joint_sizes
-from hydroid.project.fit_files import fit_text
 from hydroid.project.layout import find_layout
+from hydroid.project.texts import JointSize, arm_text, fit_text, joint_sizes
 from hydroid.reporting.figure import arm_picture
 from hydroid.settings.arm import Arm, load_arm
 from hydroid.settings.document import read_yaml
@@ -30,12 +29,11 @@ FIT, STEPS = "fit.yaml", "next-steps.md"
 FILES = (ARM, MODEL, PICTURE, FIT, STEPS, MESHES)
 
 
-@dataclass(frozen=True)
+@record
 class Project:
     """A project that was written: its folder, and the names of its files and folders there.
 
-    `notes` say what the import of the arm assumed, left out or mended; `columns` what each column of the log
-    is taken for, and why; `unused` names the others; `commands` are to be run next, in this order.
+    `notes`: what the import assumed; `columns`: what each of the log is taken for; `unused`: the others.
     """
 
     folder: Path
@@ -49,17 +47,7 @@ class Project:
 def write_project(
     folder: Path, robot: Path | None, logs: Sequence[Path], joints: Sequence[str] = (), **options: Any
 ) -> Project:
-    """Write a project to a folder, new or with other things in it.
-
-    Args:
-        robot: URDF, MJCF or YAML file of the arm; None: a template of boxes.
-        logs: the first tells the columns; the last of several is kept to validate on.
-        joints: names of the arm's joints as the log counts them; by default in the arm's order.
-        options: `tip` and `total_mass` of `import_arm`; `force`: replace the files of an earlier project.
-
-    Raises SettingsError: a file of the project is there already, or no joint has one of the given names;
-    ModelError, LogError: the robot or the first log cannot be used.
-    """
+    """Write a project to a folder, new or with other things in it (`hydroid.init` says what is given)."""
     taken = [name for name in FILES if os.path.lexists(folder / name)]
     if not options.pop("force", False) and taken:
         hint = "name another folder, or replace the project's files with --force"
@@ -81,7 +69,17 @@ def write_project(
         write_atomic(stage / FIT, fit_text(arm, layout, sizes, str(folder / FIT), reference))
         # what is written can be read
         validate(read_yaml(stage / FIT)[0] | {"arm": arm}, FitSettings, FIT)
-        steps = next_steps(folder, logs)
+        # of several logs the last is kept to validate on, of one none is
+        names = [shlex.quote(str(log)) for log in logs or ("LOG.csv", "OTHER.csv")]
+        fitted, other = " ".join(names[:-1] or names), names[-1] if names[1:] else "OTHER.csv"
+        home = shlex.quote(str(folder))
+        config, run = f"--config {home}/fit.yaml", f"{home}/runs/fit"
+        steps = (
+            f"hydroid check {' '.join(names)} {config}",
+            f"hydroid fit-hyd {fitted} {config} --out {run}",
+            f"hydroid validate {other} --fit {run} --out {home}/runs/validation",
+            f"hydroid suggest {fitted} --fit {run} --out {home}/runs/suggestions",
+        )
         notes, reasons = [*imported.notes] if imported else [], layout.reasons if layout else ()
         guessed = [joint.name for joint in arm.joints if isinstance(joint.actuator, RotaryActuator)]
         if imported and guessed:
@@ -91,20 +89,6 @@ def write_project(
         write_atomic(stage / STEPS, fill_template("project/next-steps.md.j2", name=arm.name, **said))
         written = _move(stage, folder)
     return Project(folder, written, tuple(notes), reasons, layout.unused if layout else (), steps)
-
-
-def next_steps(folder: Path, logs: Sequence[Path]) -> tuple[str, ...]:
-    """Return the commands to run; of several logs the last is kept to validate on, of one none is."""
-    names = [shlex.quote(str(log)) for log in logs or ("LOG.csv", "OTHER.csv")]
-    fitted, other = " ".join(names[:-1] or names), names[-1] if names[1:] else "OTHER.csv"
-    home = shlex.quote(str(folder))
-    config, run = f"--config {home}/fit.yaml", f"{home}/runs/fit"
-    return (
-        f"hydroid check {' '.join(names)} {config}",
-        f"hydroid fit-hyd {fitted} {config} --out {run}",
-        f"hydroid validate {other} --fit {run} --out {home}/runs/validation",
-        f"hydroid suggest {fitted} --fit {run} --out {home}/runs/suggestions",
-    )
 
 
 def _write_arm(

@@ -13,9 +13,9 @@ import trimesh
 
 from hydroid.arm.model import load_model
 from hydroid.arrays import Array, record
-from hydroid.cad.shapes import SHOWN
+from hydroid.cad.source import SHOWN
 from hydroid.fitting.validation import Prediction
-from hydroid.reporting.page import Plot, Section, Tab
+from hydroid.reporting.page import Plot, Section
 from hydroid.settings.arm import Arm
 
 
@@ -131,17 +131,19 @@ class MovingArm:
     start: int
 
 
-def motion_section(arm: Arm, predictions: Mapping[str, Prediction]) -> tuple[Section, ...]:
+def motion_section(arm: Arm, predictions: Mapping[str, Prediction]) -> Section | None:
     """Return the section with a tab for each of the worst logs, by name; none for what diverged."""
     finite = [item for item in predictions.items() if np.isfinite(item[1].response).all()]
     if not finite:
-        return ()
+        return None
     finite.sort(key=lambda item: -max(one.rms for one in item[1].indices.values()))
     few = f"{LOGS} of {len(finite)} logs, the worst first. " if len(finite) > LOGS else ""
     del finite[LOGS:]
     draw = partial(moving_arm, load_model(arm).compile(), arm.joint_names, most=MOST // len(finite))
-    plots = (Plot(f"motion_{i}", name, partial(draw, one)) for i, (name, one) in enumerate(finite, 1))
-    return (Section("The arm in motion", few + _CAPTION, tabs=tuple(Tab(p.caption, p) for p in plots)),)
+    tabs = (
+        Plot(f"motion_{i}", name, partial(draw, one), button=name) for i, (name, one) in enumerate(finite, 1)
+    )
+    return Section("The arm in motion", few + _CAPTION, tabs=tuple(tabs))
 
 
 def moving_arm(

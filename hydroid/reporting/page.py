@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 from hydroid.arrays import record
 from hydroid.files import csv_text
 from hydroid.findings import Finding
-from hydroid.log import Log
 from hydroid.words import number, numbered, plain
 
 if TYPE_CHECKING:
@@ -122,25 +121,16 @@ def shown(cell: Cell) -> str:
 class Plot:
     """A figure: its name on the page, what it shows in words, and the function that makes it.
 
-    That returns a `Chart`, which the page shows with buttons to zoom it if `zoom`, or a `MovingArm`.
+    That returns a `Chart`, which the page shows with buttons to zoom it if `zoom`, or a `MovingArm`. Of
+    several figures of which a reader sees one at a time, `button` chooses it. The button stands in a `row`
+    and a `column`, where these are given; its `state` (`good`, `fair`, `bad`) gives the colour.
     """
 
     name: str
     caption: str
     draw: Callable[[], Any]
     zoom: bool = False
-
-
-@record
-class Tab:
-    """One of several figures of which a reader sees one at a time.
-
-    Its button stands in a `row` and a `column`, where these are given; its `state` (`good`, `fair`, `bad`)
-    gives the colour.
-    """
-
-    name: str
-    plot: Plot
+    button: str = ""
     row: str = ""
     column: str = ""
     state: str = ""
@@ -160,7 +150,7 @@ class Section:
     tables: Mapping[str, Table] = field(default_factory=dict[str, Table])
     cards: Mapping[str, Table] = field(default_factory=dict[str, Table])
     plots: tuple[Plot, ...] = ()
-    tabs: tuple[Tab, ...] = ()
+    tabs: tuple[Plot, ...] = ()
     steps: tuple[Finding, ...] = ()
     folded: bool = False
 
@@ -185,7 +175,7 @@ class Page:
     def plots(self) -> Iterator[Plot]:
         """All figures."""
         for section in self.sections:
-            yield from (*section.plots, *(tab.plot for tab in section.tabs))
+            yield from (*section.plots, *section.tabs)
 
     @property
     def tables(self) -> dict[str, Table]:
@@ -193,9 +183,10 @@ class Page:
         return {name: table for s in self.sections for name, table in {**s.tables, **s.cards}.items()}
 
 
-def log_names(logs: Sequence[Log]) -> list[str]:
-    """Return short names of logs, all different."""
-    return numbered(short_name(Path(log.source).name or log.source) for log in logs)
+def log_names(sources: Iterable[str]) -> dict[str, str]:
+    """Return short names of logs, all different, by their sources."""
+    sources = list(sources)
+    return dict(zip(sources, numbered(short_name(Path(s).name or s) for s in sources), strict=True))
 
 
 def short_name(name: str) -> str:

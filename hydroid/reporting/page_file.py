@@ -20,17 +20,17 @@ from hydroid.reporting.chart import Chart
 from hydroid.reporting.page import Page, Table
 
 
-def write_page(page: Page, out: Path) -> list[Path]:
+def write_page(page: Page, out: Path) -> Path:
     """Write a report to the folder `out`: its tables as CSV, its data, and last the page."""
     return write_tables(page.tables, out, **page.data, **{f"{page.name}.html": html(page)})
 
 
-def write_tables(tables: Mapping[str, Table], out: Path, **more: str) -> list[Path]:
-    """Write tables by name as CSV, to tables/ in the folder `out`, and more files by name."""
+def write_tables(tables: Mapping[str, Table], out: Path, **more: str) -> Path:
+    """Write tables as CSV, to tables/ in the folder `out`, and more files by name; return the last."""
     content = {f"tables/{name}.csv": table.csv() for name, table in tables.items()} | more
     for name, text in content.items():
         write_atomic(out / name, text)
-    return [out / name for name in content]
+    return out / [*content][-1]
 
 
 def write_figures(page: Page, out: Path) -> list[Path]:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from hydroid.estimate import Covariance, CurveEstimate, FitSummary, ParameterEstimate
+from hydroid.estimate import CurveEstimate, FitSummary, ParameterEstimate
 from hydroid.log import Log
 from hydroid.parameters import Parameter
 from hydroid.posterior.uncertainty import Flag, Source
@@ -33,18 +33,20 @@ def parameter_section(settings: FitSettings, summary: FitSummary) -> Section:
 
 
 def parameter_table(settings: FitSettings, summary: FitSummary, profiles: Intervals | None = None) -> Table:
-    """Return one row per parameter: bounds, estimate, intervals, share of the data, flag.
-
-    `profiles` are further intervals by parameter.
-    """
+    """Return one row per parameter: bounds, estimate, intervals, share of the data, flag."""
 
     def row(p: Parameter) -> dict[str, Any]:
-        one, given = summary.estimate[p.name], settings.parameters[p.name].bounds
-        low, high = map(Given, given) if given else (p.lower, p.upper)
+        one, own = summary.estimate[p.name], settings.parameters[p.name]
+        low, high = map(Given, own.bounds) if own.bounds else (p.lower, p.upper)
+        what = CHOICES[own.quantity].plain
+        if own.link is not None:
+            what += f" of {own.link}"
+        elif len(settings.outputs) > 1 and own.joints and len(own.joints) == 1:  # where it acts
+            what += f", {settings.arm.joint_names[own.joints[0] - 1]}"
         ends = *one.interval, *one.interval_by_log, *(profiles or {}).get(p.name, (None, None))
         return {
             "name": p.name,
-            "what": _plain_name(settings, p.name),
+            "what": what,
             "unit": p.unit,
             "value": one.value,
             **({"lower": low, "upper": high} if low < high else {}),
@@ -63,16 +65,6 @@ def parameter_table(settings: FitSettings, summary: FitSummary, profiles: Interv
     optional = ("what", *by_log, "data [%]", "lower", "upper")
     rows = map(row, settings.parameter_set().parameters)
     return Table.of("Parameters", {name: name for name in columns}, rows, note, optional)
-
-
-def _plain_name(settings: FitSettings, parameter: str) -> str:
-    """Say in plain words what a parameter is, and where it acts if several joints are compared."""
-    own = settings.parameters[parameter]
-    plain = CHOICES[own.quantity].plain
-    if own.link is not None:
-        return f"{plain} of {own.link}"
-    joints = [] if len(settings.outputs) == 1 else own.joints or []
-    return f"{plain}, {settings.arm.joint_names[joints[0] - 1]}" if len(joints) == 1 else plain
 
 
 def status(estimate: ParameterEstimate) -> str:
@@ -98,25 +90,21 @@ def unknown_sections(summary: FitSummary) -> tuple[Section, ...]:
     none = "" if points else "The logs determine every free parameter."
     sections = [Section("What is not known", none, points[:6])]
     if known is not None and known.parameters:
-        tables = {"directions": direction_table(known)}
+        # every direction, best determined first, with its standard deviation and its largest parts
+        _, singular, axes = np.linalg.svd(known.root)
+        rows: list[tuple[float, str]] = []
+        for value, axis in zip(singular.tolist(), axes, strict=True):
+            order = np.argsort(-np.abs(axis), kind="stable")
+            shares = np.sign(axis[order[0]]) * axis
+            parts = (f"{known.parameters[i]} {shares[i]:+.2f}" for i in order if abs(shares[i]) >= 0.1)
+            rows.append((100 / value if value > 0 else np.inf, ", ".join(parts).replace("-", "−")))
+        header = "standard deviation [%]", "parameters that change together, in proportion to their values"
+        tables = {"directions": Table("", header, tuple(rows))}
         sections.append(Section("Directions", points=points[6:], tables=tables, folded=True))
     return tuple(sections)
 
 
-def direction_table(known: Covariance) -> Table:
-    """Return every direction with its standard deviation and its largest parts, best determined first."""
-    _, singular, axes = np.linalg.svd(known.root)
-    rows: list[tuple[float, str]] = []
-    for value, axis in zip(singular.tolist(), axes, strict=True):
-        order = np.argsort(-np.abs(axis), kind="stable")
-        shares = np.sign(axis[order[0]]) * axis
-        parts = (f"{known.parameters[i]} {shares[i]:+.2f}" for i in order if abs(shares[i]) >= 0.1)
-        rows.append((100 / value if value > 0 else np.inf, ", ".join(parts).replace("-", "−")))
-    header = ("standard deviation [%]", "parameters that change together, in proportion to their values")
-    return Table("", header, tuple(rows))
-
-
-def quantity_section(settings: FitSettings, summary: FitSummary) -> tuple[Section, ...]:
+def quantity_section(settings: FitSettings, summary: FitSummary) -> Section | None:
     """Return the section with a card of the best known quantities of each joint; none without any."""
     names, cards = settings.arm.joint_names, dict[str, Table]()
     known = sorted(
@@ -133,15 +121,15 @@ def quantity_section(settings: FitSettings, summary: FitSummary) -> tuple[Sectio
     text = (
         "With 95 % intervals, which are right only if the model is right. estimate.yaml has all quantities."
     )
-    return (Section("What is known", text, cards=cards),) if cards else ()
+    return Section("What is known", text, cards=cards) if cards else None
 
 
-def speed_section(settings: FitSettings, summary: FitSummary, logs: Sequence[Log]) -> tuple[Section, ...]:
+def speed_section(settings: FitSettings, summary: FitSummary, logs: Sequence[Log]) -> Section | None:
     """Return the section with the curves of speed; none where there are none."""
     text = "Speeds in mid travel against command, with 95 % intervals. Grey: commands beyond the logs."
     curves = tuple(summary.curves.values())
     plot = Plot("speed", text, partial(draw_speeds, curves, logs, settings.arm.joint_names))
-    return (Section("Speeds", plots=(plot,), folded=True),) if curves else ()
+    return Section("Speeds", plots=(plot,), folded=True) if curves else None
 
 
 def draw_speeds(curves: Sequence[CurveEstimate], logs: Sequence[Log], joints: Sequence[str]) -> Chart:
@@ -170,7 +158,17 @@ def merged_tables(runs: Sequence[Record]) -> dict[str, Table]:
     parameters = runs[0].settings.parameter_set().parameters
     units = {f"error of {one.name}": "mm" if one.slides else "deg" for one in runs[0].summary.verdict}
     units |= {p.name: p.unit for p in parameters}
-    columns = np.array([[*_errors(run), *(run.summary.values[p.name] for p in parameters)] for run in runs])
+    factors = [1e3 * np.radians(1.0) if one.slides else 1.0 for one in runs[0].summary.verdict]
+    columns = np.array(
+        [
+            [
+                (one.fitted_deg or 0.0) * factor
+                for one, factor in zip(run.summary.verdict, factors, strict=True)
+            ]
+            + [run.summary.values[p.name] for p in parameters]
+            for run in runs
+        ]
+    )
     best = runs[0].summary.estimate
     spread = np.quantile(columns, [0.5, 0, 0.25, 0.75, 1], axis=0).T.tolist()
     rows = [
@@ -183,11 +181,3 @@ def merged_tables(runs: Sequence[Record]) -> dict[str, Table]:
         "spread": Table(f"{len(runs)} runs", SPREAD, tuple(rows), optional=SPREAD[4:6]),
         "runs": Table("Runs, smallest error first", header, tuple(each), optional=header[:1:-1]),
     }
-
-
-def _errors(run: Record) -> list[float]:
-    """Return the error of each joint on the fitted logs [deg or mm]."""
-    return [
-        (one.fitted_deg or 0.0) * (1e3 * np.radians(1.0) if one.slides else 1.0)
-        for one in run.summary.verdict
-    ]

@@ -1,6 +1,5 @@
 """Pages of predictions, what models make of logs: of a fit, from what its run stores, and of a validation."""
 
-import shlex
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
@@ -18,7 +17,7 @@ from hydroid.fitting.verdict import rms_deg
 from hydroid.reporting import page_file
 from hydroid.reporting.chart import SERIES, Chart, Mark, Panel, finite
 from hydroid.reporting.outlines import motion_section
-from hydroid.reporting.page import Page, Plot, Section, Tab, Table, log_names, short_name
+from hydroid.reporting.page import Page, Plot, Section, Table, log_names, short_name
 from hydroid.reporting.parameters_report import (
     parameter_section,
     quantity_section,
@@ -55,7 +54,7 @@ _COLUMNS = {
 }
 
 
-def prediction_sections(predictions: Sequence[Prediction], arm: Arm, fits: Verdicts) -> tuple[Section, ...]:
+def prediction_sections(predictions: Sequence[Prediction], arm: Arm, fits: Verdicts) -> list[Section]:
     """Return the arm in motion, each joint's error in each log with the responses behind it, and all numbers.
 
     The first prediction of a log is the one that moves, and whose errors are shown; they are coloured by the
@@ -66,24 +65,24 @@ def prediction_sections(predictions: Sequence[Prediction], arm: Arm, fits: Verdi
     by_log: dict[str, list[Prediction]] = {}
     for one in predictions:
         by_log.setdefault(one.log.source, []).append(one)
-    names = dict(zip(by_log, log_names([first.log for first, *_ in by_log.values()]), strict=True))
+    names = log_names(by_log)
     bins = min(1000, max(150, 9000 // sum(len(first.joints) for first, *_ in by_log.values())))
     tolerances = {one.joint: one.tolerance_deg for one in next(iter(fits.values()), ())}
-    tabs: list[Tab] = []
-    for log, (first, *others) in by_log.items():
-        for joint in first.joints:
+    tabs: list[Plot] = []
+    for log, group in by_log.items():
+        for joint in (first := group[0]).joints:
             title = f"{arm.joint_names[joint - 1]} in {names[log]}"
-            several = [p for p in (first, *others) if joint in p.joints]
+            several = [one for one in group if joint in one.joints]
             slides = arm.joints[joint - 1].slides
             # of many logs fewer samples are drawn: the page stays small
             drawing = partial(draw_response, title, joint, several, bins, slides=slides)
             error, tolerance = rms_deg([first.error(joint)]), tolerances.get(joint, np.inf)
             state = "good" if error <= tolerance else "fair" if error <= 2 * tolerance else "bad"
-            row = f"{names[log]} {_KINDS[first.unseen]}".strip()
-            plot = Plot(f"response_{len(tabs) + 1}", title, drawing, zoom=True)
             size = f"{two_digits(1e3 * np.radians(error))} mm" if slides else f"{two_digits(error)}°"
             size = size if np.isfinite(error) else "diverged"
-            tabs.append(Tab(size, plot, row, arm.joint_names[joint - 1], state))
+            row, column = f"{names[log]} {_KINDS[first.unseen]}".strip(), arm.joint_names[joint - 1]
+            name = f"response_{len(tabs) + 1}"
+            tabs.append(Plot(name, title, drawing, True, size, row, column, state))
     rows = [
         row | {"fit": short_name(one.fit), "log": names[one.log.source], "kind": _KINDS[one.unseen]}
         for one in predictions
@@ -99,16 +98,14 @@ def prediction_sections(predictions: Sequence[Prediction], arm: Arm, fits: Verdi
         del columns["fit"]
     optional = tuple(columns[key] for key in ("mae_deg", "max_deg", "inside_percent", "expected_deg"))
     errors = Table.of("All errors", columns, rows, note, optional)
-    return (
-        *motion_section(arm, {names[log]: first for log, (first, *_) in by_log.items()}),
-        Section(
-            "Errors by log" if len(tabs) > 1 else "Response",
-            _MATRIX if len(tabs) > 1 else "",
-            tabs=tuple(tabs),
-        ),
+    title, text = ("Errors by log", _MATRIX) if len(tabs) > 1 else ("Response", "")
+    sections = (
+        motion_section(arm, {names[log]: first for log, (first, *_) in by_log.items()}),
+        Section(title, text, tabs=tuple(tabs)),
         Section(errors.title, tables={"errors": errors}, folded=True),
-        *horizon_section(fits),
+        horizon_section(fits),
     )
+    return [*filter(None, sections)]
 
 
 def draw_response(
@@ -160,11 +157,7 @@ def validation_page(predictions: Sequence[Prediction], fits: Verdicts, arm: Arm,
 
 
 def draw(run: str | Path, *, figures: bool = False) -> Path:
-    """Draw the report of a finished run in its folder, from what it stores; return the page.
-
-    `figures`: write every chart as PNG and SVG too, to figures/ beside it. Raises RunError: no finished run
-    of this version is there, or the page cannot be written.
-    """
+    """Draw the report of a finished run in its folder, from what it stores; return the page."""
     folder, page = Path(run), fit_page(load_record(run))
     page_file.write_page(page, folder)
     if figures:
@@ -176,17 +169,17 @@ def fit_page(record: Record) -> Page:
     """Return the page of a fit, with the unseen logs that it was validated on."""
     settings, summary, fitted = record.settings, record.summary, record.result.fitted
     fits = {str(summary.final): record.verdict}
-    logs = " ".join(shlex.quote(one.log.source) for one in fitted)
+    logs = [one.log for one in fitted]
     sections = (
         *verdict_sections(fits, next_step(settings, record.verdict, record.folder, logs)),
         *prediction_sections([*record.validations.values(), *fitted], settings.arm, fits),
-        *quantity_section(settings, summary),
+        quantity_section(settings, summary),
         *unknown_sections(summary),
         parameter_section(settings, summary),
-        *speed_section(settings, summary, [p.log for p in fitted]),
+        speed_section(settings, summary, logs),
         search_section(record),
     )
-    in_order = sorted(sections, key=lambda section: section.folded)
+    in_order = sorted(filter(None, sections), key=lambda section: section.folded)
     title = f"Fit of {settings.arm.name}, stage {2 if settings.stage == 'hyd' else 1}"
     made_by = {k: str(v) for k, v in record.identity.items() if k in ("hydroid", "mujoco", "numpy", "python")}
     warned = (*outside(record.verdict), *warnings(summary))

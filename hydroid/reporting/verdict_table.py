@@ -11,6 +11,7 @@ from hydroid.findings import Finding
 from hydroid.fitting.baselines import NAMES
 from hydroid.fitting.validation import HORIZONS
 from hydroid.fitting.verdict import WORSE
+from hydroid.log import Log
 from hydroid.reporting.page import Cell, Given, Section, Table, short_name, shown
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
@@ -68,7 +69,7 @@ def verdict_sections(fits: Verdicts, *steps: Finding) -> tuple[Section, ...]:
     return (verdict, Section("Next", steps=steps)) if steps else (verdict,)
 
 
-def horizon_section(fits: Verdicts) -> tuple[Section, ...]:
+def horizon_section(fits: Verdicts) -> Section | None:
     """Return the rms error of each angle's change over some times, of fits and baselines, if known."""
     rows = [
         {"joint": one.name, "of": short_name(fit) if name == "the fit" and len(fits) > 1 else name}
@@ -83,7 +84,7 @@ def horizon_section(fits: Verdicts) -> tuple[Section, ...]:
         "Each is simulated from 2 s before, at the measured angles."
     )
     table = Table.of("Error by prediction time", columns, rows, note)
-    return (Section(table.title, tables={"horizons": table}, folded=True),) if rows else ()
+    return Section(table.title, tables={"horizons": table}, folded=True) if rows else None
 
 
 def ordered(fits: Verdicts) -> Verdicts:
@@ -149,7 +150,7 @@ def worst(verdicts: Sequence[JointVerdict]) -> str:
 
 
 def next_step(
-    settings: FitSettings, verdicts: Sequence[JointVerdict], folder: str, logs: str = "LOG.csv"
+    settings: FitSettings, verdicts: Sequence[JointVerdict], folder: str, logs: Sequence[Log] = ()
 ) -> Finding:
     """Return what to do after a fit of `logs` in a run folder, with its command."""
     run, changed = shlex.quote(folder), list[str]()
@@ -157,7 +158,8 @@ def next_step(
         if one.verdict != "predicts" and (one.unseen_deg or 0.0) > WORSE * (one.expected_deg or np.inf):
             changed.append(one.name)
     if settings.stage == "mech":
-        kind, command = "fit the hydraulics", f"hydroid fit-hyd {logs} --mech {run}"
+        files = shlex.join(log.source for log in logs) or "LOG.csv"
+        kind, command = "fit the hydraulics", f"hydroid fit-hyd {files} --mech {run}"
     elif any(one.verdict == "not tested" for one in verdicts):
         kind, command = "predict unseen", f"hydroid validate OTHER.csv --fit {run}"
     elif all(one.verdict == "predicts" for one in verdicts):

@@ -6,7 +6,6 @@ Every file is checked before it is believed.
 import hashlib
 import io
 import json
-import logging
 from collections import UserDict
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
@@ -18,6 +17,7 @@ import numpy as np
 from hydroid.errors import RunError
 from hydroid.files import undisturbed, write_atomic
 from hydroid.fitting.checkpoints import Arrays
+from hydroid.progress import LOGGER
 
 
 def pack(tree: object, *, compressed: bool = True) -> bytes:
@@ -46,9 +46,7 @@ def pack(tree: object, *, compressed: bool = True) -> bytes:
 
 
 def unpack(file: Path) -> Any:
-    """Read a tree that `pack` made, its dataclasses as mappings and its sequences as lists.
-    Raises ValueError: the file is damaged. OSError: it cannot be read.
-    """
+    """Read a tree that `pack` made, its dataclasses as mappings and its sequences as lists."""
     packed = file.read_bytes()
     data, digest = packed[:-32], packed[-32:]
     if hashlib.sha256(data).digest() != digest:
@@ -63,9 +61,6 @@ def unpack(file: Path) -> Any:
         return [filled(one) for one in value] if isinstance(value, list) else value
 
     return filled(json.loads(arrays["content"].tobytes()))
-
-
-_log = logging.getLogger(__name__)
 
 
 class CheckpointFile(UserDict[str, Arrays]):
@@ -101,7 +96,7 @@ class CheckpointFile(UserDict[str, Arrays]):
                 hint = "remove the run's checkpoints to begin again from the seed"
                 raise RunError(f"is damaged ({type(error).__name__})", file, hint) from None
             earlier = self._read(*before)
-            _log.warning("%s: is damaged; going on from the checkpoint before it", file)
+            LOGGER.warning("%s: is damaged; going on from the checkpoint before it", file)
             file.replace(file.with_suffix(f".damaged{file.suffix}"))
             return earlier
         if content["run"] != self._run:

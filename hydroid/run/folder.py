@@ -2,11 +2,9 @@
 
 import hashlib
 import json
-import logging
 import platform
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -14,12 +12,14 @@ from typing import Any
 import numpy as np
 
 from hydroid.arm.model import load_model
+from hydroid.arrays import record
 from hydroid.errors import RunError, Stopped
 from hydroid.estimate import write_estimate
-from hydroid.files import Plain, is_file, remove_parts, write_atomic
+from hydroid.files import PART, Plain, is_file, write_atomic
 from hydroid.identified_model import ARM, CONFIG, MODEL, IdentifiedModel, portable, write_settings
 from hydroid.log import Log
 from hydroid.plant import Plant
+from hydroid.progress import LOGGER
 from hydroid.run.archive import CheckpointFile
 from hydroid.run.process import LOCK, locked, run_log
 from hydroid.settings.arm import Arm
@@ -29,10 +29,13 @@ DESCRIPTION = "run.json"
 """name of the file that describes the run: versions, seed, hashes of its logs and files, status, seconds"""
 
 
+VERSIONS = {name: version(name) for name in ("hydroid", "mujoco", "numpy")}
+"""those that a result is of"""
+
+
 def identity(settings: FitSettings, logs: Sequence[Log]) -> Plain:
     """Return versions, the settings that decide, and hashes of the logs and of the arm's model."""
-    versions = {name: version(name) for name in ("hydroid", "mujoco", "numpy")}
-    return versions | {
+    return VERSIONS | {
         "python": platform.python_version(),
         "seed": settings.search.seed,
         "logs": {log.source: log_hash(log) for log in logs},
@@ -91,6 +94,11 @@ def samples_hash(log: Log) -> str:
     return hashlib.sha256(np.column_stack([log.time, log.command, log.angle]).tobytes()).hexdigest()
 
 
+def digest(content: Plain) -> str:
+    """Return the digest of a mapping, whatever the order of its keys."""
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
 def _file_hash(*files: Path) -> str:
     return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
 
@@ -102,10 +110,7 @@ def _flat(values: Any, prefix: str = "") -> Plain:
     return {key: value for flat in inner for key, value in flat.items()}
 
 
-_log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True)
+@record
 class RunFolder:
     """A folder that one fit owns."""
 
@@ -118,31 +123,27 @@ class RunFolder:
 
     @contextmanager
     def owned(self) -> Generator[None]:
-        """Hold the folder against other processes, and write the `hydroid` logger's lines to `run.log`.
-        Raises RunError: another process holds it, it holds other files, or it cannot be written; Stopped: the
-        run was interrupted; says what is kept.
-        """
+        """Hold the folder against other processes, and write the `hydroid` logger's lines to `run.log`."""
         # it is the run's if it is empty, or holds a run's description or at least its lock
         other = self.path.exists() and not (self.exists or (self.path / LOCK).exists())
         if other and (not self.path.is_dir() or any(self.path.iterdir())):
             raise RunError("exists and holds no run", self.path, "choose another folder with --out")
         with locked(self.path), run_log(self.path / "run.log"):
-            remove_parts(self.path)
+            for part in self.path.rglob(f".*{PART}"):  # nobody else writes here
+                LOGGER.info("removed %s, left by a process that was killed while it wrote", part.name)
+                part.unlink(missing_ok=True)
             try:
                 yield
             except KeyboardInterrupt:
-                _log.info("interrupted")
+                LOGGER.info("interrupted")
                 raise Stopped(self.interrupt()) from None
             except Exception as error:
-                _log.error("ended by %s: %s", type(error).__name__, error)
+                LOGGER.error("ended by %s: %s", type(error).__name__, error)
                 raise
-            _log.info("done")
+            LOGGER.info("done")
 
     def begin(self, settings: FitSettings, logs: Sequence[Log]) -> CheckpointFile:
-        """Describe a new run, or check that the run here is the same; return its checkpoints.
-        Raises RunError: the run here had other settings, another arm, another log or another version, one of
-        its files was changed, no checkpoint is whole, or the folder cannot be written.
-        """
+        """Describe a new run, or check that the run here is the same; return its checkpoints."""
         own = identity(settings, logs)
         if not self.exists:
             write_settings(self.path, settings)
@@ -154,13 +155,11 @@ class RunFolder:
             raise RunError(f"the run here {other}", self.path, hint)
         checkpoints = self.checkpoints()
         self.status("running")
-        _log.info("resumed from %s", ", ".join(checkpoints) or "no checkpoint")
+        LOGGER.info("resumed from %s", ", ".join(checkpoints) or "no checkpoint")
         return checkpoints
 
     def refuse_changes(self) -> None:
-        """Refuse a run whose settings or model were changed since it began.
-        Raises RunError: a file is gone, or is another.
-        """
+        """Refuse a run whose settings or model were changed since it began."""
         hashes = own_hashes(self.path)
         for name, known in self.identity().get("files", {}).items():
             if hashes.get(name) != known:
@@ -168,7 +167,7 @@ class RunFolder:
                 raise RunError("has changed since the run began", self.path / name, hint)
 
     def identity(self) -> Plain:
-        """Read the run's description; raises RunError: missing or damaged."""
+        """Read the run's description."""
         file = self.path / DESCRIPTION
         try:
             content = json.loads(file.read_text(encoding="utf-8"))
@@ -199,13 +198,10 @@ class RunFolder:
         return f"{self.path} holds {kept}; the same command with --resume continues"
 
     def checkpoints(self) -> CheckpointFile:
-        """Return what the run's search and refinements have stored, by name.
-        Raises RunError: no checkpoint is whole.
-        """
+        """Return what the run's search and refinements have stored, by name."""
         # what does not change while the run goes on
         fixed = {key: value for key, value in self.identity().items() if key not in ("status", "seconds")}
-        run = hashlib.sha256(json.dumps(fixed, sort_keys=True).encode()).hexdigest()
-        return CheckpointFile(self.path / "checkpoint.npz", run)
+        return CheckpointFile(self.path / "checkpoint.npz", digest(fixed))
 
     def _describe(self, content: Plain) -> None:
         write_atomic(self.path / DESCRIPTION, json.dumps(content, indent=2) + "\n")

@@ -13,11 +13,10 @@ import sys
 from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO
 
 from hydroid.errors import RunError
 from hydroid.parallel.workers import VERSIONS
-from hydroid.progress import logging_to
+from hydroid.progress import LOGGER, logging_to
 
 try:
     import fcntl
@@ -25,8 +24,6 @@ except ImportError:  # Windows has none
     fcntl = None
 
 LOCK = ".lock"  # name of the lock's file; it stays, what counts is whether a process holds it
-
-_log = logging.getLogger(__name__)
 
 
 @contextmanager
@@ -38,40 +35,33 @@ def locked(folder: Path) -> Generator[None]:
     lock on to NFS's server (since 2.6.12) and to Lustre's where it is mounted with `flock`, so that it holds
     between machines; with `localflock`, or NFS's `nolock`, it holds on one machine only. On a file system
     that has no locks there is none, but a warning.
-    Raises RunError: another process holds it, or nothing can be written there.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
         file = (folder / LOCK).open("a+b", buffering=0)  # for writing: NFS grants no exclusive lock otherwise
-        _take(file, folder)
+        if fcntl is not None:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError as error:
+                if error.errno in (errno.EWOULDBLOCK, errno.EACCES):
+                    file.seek(0)
+                    holder = file.read(200).decode(errors="replace").strip() or "another process"
+                    hint = "wait for it to end, or choose another --out"
+                    raise RunError(f"is in use by {holder}", folder, hint) from None
+                words = "%s: no lock on this file system (%s); let no two runs use it"
+                LOGGER.warning(words, folder, error.strerror)
+            else:
+                file.truncate(0)
+                file.write(f"process {os.getpid()} on {socket.gethostname()}".encode())
     except OSError as error:
         raise RunError(f"cannot be written ({error.strerror})", folder) from None
     with file:  # to close it ends the lock
         yield
 
 
-def _take(file: IO[bytes], folder: Path) -> None:
-    if fcntl is None:
-        return
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError as error:
-        if error.errno in (errno.EWOULDBLOCK, errno.EACCES):
-            file.seek(0)
-            holder = file.read(200).decode(errors="replace").strip() or "another process"
-            hint = "wait for it to end, or choose another --out"
-            raise RunError(f"is in use by {holder}", folder, hint) from None
-        _log.warning("%s: no lock on this file system (%s); let no two runs use it", folder, error.strerror)
-    else:
-        file.truncate(0)
-        file.write(f"process {os.getpid()} on {socket.gethostname()}".encode())
-
-
 @contextmanager
 def run_log(file: Path) -> Generator[None]:
-    """Write what hydroid's loggers say, INFO and above, to a file as well.
-    Raises RunError: it cannot be written.
-    """
+    """Write what hydroid's loggers say, INFO and above, to a file as well."""
     try:
         handler = _File(file, encoding="utf-8")
     except OSError as error:
@@ -83,8 +73,8 @@ def run_log(file: Path) -> Generator[None]:
 def log_start() -> None:
     """Log what runs, where, with what."""
     versions = ", ".join(map(" ".join, VERSIONS.items()))
-    _log.info("%s, Python %s", versions, platform.python_version())
-    _log.info("process %d on %s: %s", os.getpid(), socket.gethostname(), shlex.join(sys.argv))
+    LOGGER.info("%s, Python %s", versions, platform.python_version())
+    LOGGER.info("process %d on %s: %s", os.getpid(), socket.gethostname(), shlex.join(sys.argv))
 
 
 class _File(logging.FileHandler):

@@ -7,7 +7,6 @@ A validation stores each unseen log as VALIDATIONS/NAME/result.npz in the folder
 """
 
 import glob
-import logging
 import math
 import os
 import re
@@ -27,6 +26,7 @@ from hydroid.fitting.fit import Fit
 from hydroid.fitting.validation import Prediction
 from hydroid.fitting.verdict import Baselines, judge
 from hydroid.identified_model import CONFIG, IdentifiedModel, load_identified
+from hydroid.progress import LOGGER
 from hydroid.run.archive import pack, unpack
 from hydroid.run.folder import RunFolder, difference
 from hydroid.settings.fit import FitSettings
@@ -53,12 +53,8 @@ class Effort:
 class FitResult:
     """The arrays of a fit: what its estimates make of its logs, and how they came to be.
 
-    Attributes:
-        history: of the search, shape (G, len(HISTORY)).
-        front: non-dominated candidates, (n, P), with objectives by segment and overall, (n, S + 1).
-        segments: objectives of each estimate by segment, shape (S,).
-        refinements: what each took.
-        baselines: fitted to the same logs, by joint and name.
+    The history has shape (G, len(HISTORY)); the front is non-dominated candidates, (n, P), with objectives by
+    segment and overall, (n, S + 1); segments are objectives of each estimate by segment, (S,).
     """
 
     fitted: tuple[Prediction, ...]
@@ -71,13 +67,9 @@ class FitResult:
 
 @record
 class Record:
-    """A finished run: its folder, as a command takes it.
+    """A finished run: its folder, as a command takes it, versions and hashes of its logs, what it found.
 
-    Attributes:
-        identity: versions, and hashes of its logs by source.
-        settings: after a joint refinement with every parameter free that was refined.
-        summary: the final estimate, and the others.
-        validations: predictions of unseen logs by name.
+    After a joint refinement every parameter that was refined is free in the settings.
     """
 
     folder: str
@@ -139,9 +131,7 @@ def keep_validation(model: IdentifiedModel, predictions: Sequence[Prediction]) -
 
 
 def fitted_by(model: IdentifiedModel) -> tuple[Sequence[Prediction], Baselines, set[str] | None]:
-    """Return what the run of a model made of its logs, the baselines, and the logs' hashes; of no run None.
-    Raises RunError: what the run stored is damaged, or of another version.
-    """
+    """Return what a model's run made of its logs, the baselines, and the logs' hashes, if there is one."""
     if (folder := run_of(model)) is None:
         return (), {}, None
     result = _read(folder / RESULT, FitResult)
@@ -149,7 +139,7 @@ def fitted_by(model: IdentifiedModel) -> tuple[Sequence[Prediction], Baselines, 
 
 
 def load_record(folder: str | Path) -> Record:
-    """Read a finished run; raises RunError: the folder holds no finished run, or it is damaged."""
+    """Read a finished run."""
     path = Path(folder)
     identity = RunFolder(path).identity()
     summary = load(path / NAME, FitSummary)
@@ -176,14 +166,10 @@ def _adapter(kind: type[Any]) -> TypeAdapter[Any]:
     return TypeAdapter(one, config=ConfigDict(arbitrary_types_allowed=True))
 
 
-_log = logging.getLogger(__name__)
-
-
 def read_runs(names: Sequence[str], out: str | Path | None) -> tuple[Record, ...]:
     """Read finished runs that differ in nothing but their seeds, in their order, and leave out the others.
 
     `names` are run folders, or patterns of them; `out` is the folder for what is to be written about them.
-    Raises RunError: no run is left, two differ in more than their seeds or in nothing, or `out` is a run.
     """
     if out is not None and RunFolder(Path(out)).exists:
         raise RunError("is a run itself", out, "name another folder")
@@ -191,9 +177,16 @@ def read_runs(names: Sequence[str], out: str | Path | None) -> tuple[Record, ...
     groups = ([name] if os.path.exists(name) else glob.glob(name) or [name] for name in names)
     for path in sorted({path for group in groups for path in group}):
         try:
-            runs.append(_finished(path))
+            folder = RunFolder(Path(path))
+            if (status := folder.identity().get("status")) != "done":
+                raise RunError(f"is not finished ({status})", path, "resume it")
+            folder.refuse_changes()
+            record = load_record(path)
+            if record.summary.rms_deg is None:
+                raise RunError("has no final estimate that could be simulated", path)
+            runs.append(record)
         except HydroidError as error:
-            _log.warning("left out: %s", error)
+            LOGGER.warning("left out: %s", error)
     if not runs:
         raise RunError("no finished run is there", " ".join(names), "resume those that were stopped")
     runs.sort(key=lambda run: run.seed)
@@ -204,15 +197,3 @@ def read_runs(names: Sequence[str], out: str | Path | None) -> tuple[Record, ...
         if other:
             raise RunError(other, run.folder, "leave it out, or merge it apart")
     return tuple(runs)
-
-
-def _finished(path: str) -> Record:
-    """Read a finished run; raises HydroidError: it is not finished or is damaged."""
-    folder = RunFolder(Path(path))
-    if (status := folder.identity().get("status")) != "done":
-        raise RunError(f"is not finished ({status})", path, "resume it")
-    folder.refuse_changes()
-    record = load_record(path)
-    if record.summary.rms_deg is None:
-        raise RunError("has no final estimate that could be simulated", path)
-    return record

@@ -27,14 +27,7 @@ CURVED = 0.3
 
 @record
 class Box:
-    """A point between its bounds, and how it may move.
-
-    Attributes:
-        at: the point, shape (P,).
-        lower, upper: its bounds, shape (P,).
-        scale: what a relative change of 1 is, shape (P,).
-        varied: which p of the P coordinates move, shape (P,).
-    """
+    """A point between its bounds, (P,), what a relative change of 1 is, and which p coordinates move."""
 
     at: Array
     lower: Array
@@ -63,12 +56,10 @@ class Box:
 
 @record
 class Axes:
-    """Steps from a point along p directions of its varied coordinates, all within the bounds.
+    """Steps from a point along p directions of its varied coordinates, one a row, all within the bounds.
 
-    Attributes:
-        directions: relative changes, independent of each other, one a row, shape (p, p).
-        steps: signed lengths along each: to both sides, or one and two steps to one side, shape (p, 2); to
-            one side only, shape (p, 1).
+    `steps` are signed lengths along each: to both sides, or one and two steps to one side, shape (p, 2); to
+    one side only, shape (p, 1).
     """
 
     directions: Array
@@ -151,7 +142,7 @@ def _slopes(function: Function, at: Box, axes: Axes, value: Array) -> tuple[Arra
     steps = axes.steps.T[:, :, None]
     changes = (steps * axes.directions).reshape(-1, axes.directions.shape[1])
     rows = function(at.points(changes)).reshape(*steps.shape[:2], -1)
-    with np.errstate(invalid="ignore", over="ignore"):
+    with np.errstate(all="ignore"):
         near, far = (rows[0] - value) / steps[0], (rows[-1] - value) / steps[-1]
         if len(steps) == 1:
             return near, np.zeros(len(near), dtype=bool)
@@ -165,7 +156,7 @@ def _fitted(directions: Array, wanted: Array, room: Array) -> Axes:
     """Return steps of wanted lengths, (p,), shortened to LARGEST and to the room, (2, p)."""
     share = np.abs(directions)
     wanted = np.minimum(wanted, LARGEST / share.max(axis=1))
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(all="ignore"):
         ahead, behind = (
             np.where(share > 0, np.where(directions > 0, *sides) / share, np.inf).min(axis=1)
             for sides in (room[::-1], room)

@@ -108,7 +108,7 @@ def start(point: Array, residual: Array) -> Descent:
 
 def costs(rows: Array) -> Array:
     """Half the sum of squares of each row; inf where it is not finite."""
-    with np.errstate(over="ignore", invalid="ignore"):
+    with np.errstate(all="ignore"):
         costs = 0.5 * np.sum(rows**2, axis=1)
     return np.where(np.isfinite(costs), costs, np.inf)
 
@@ -174,7 +174,7 @@ def derivatives(residuals: Function, point: Array, row: Array) -> Array:
         steps = np.where(point + abs(width) <= 1.0, width, -width)[which]
         points = np.tile(point, (len(which), 1))
         points[np.arange(len(which)), which] += steps
-        with np.errstate(invalid="ignore", over="ignore"):
+        with np.errstate(all="ignore"):
             return (residuals(np.clip(points, 0.0, 1.0)) - row) / steps[:, None]
 
     columns = quotients(np.arange(point.size), WIDTH)

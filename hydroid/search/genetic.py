@@ -23,12 +23,9 @@ from hydroid.settings.search import GeneticSettings
 
 @record
 class Population:
-    """Candidates and their objectives; nothing ever writes into its arrays.
+    """Candidates, (n, length), and objectives to be minimised, (n, m); nothing ever writes into its arrays.
 
-    Attributes:
-        chromosomes: shape (n, length), see `coding`.
-        objectives: to be minimised, shape (n, m). A candidate with an objective that is not finite is
-            infeasible.
+    A candidate with an objective that is not finite is infeasible.
     """
 
     chromosomes: Genes
@@ -47,6 +44,30 @@ class Population:
             np.concatenate([self.chromosomes, other.chromosomes]),
             np.concatenate([self.objectives, other.objectives]),
         )
+
+
+def crowded_order(objectives: Array) -> Ints:
+    """Return candidates, (n,), from best to worst by their objectives, (n, m); equals keep their order.
+
+    That is the crowded comparison: lower rank first, then more room around them.
+    """
+    rank = ranks(objectives)
+    return np.lexsort((-crowding(objectives, rank), rank))
+
+
+def tournament(objectives: Array, count: int, rng: Generator) -> Ints:
+    """Return winners, (count,), of binary tournaments by the crowded comparison of objectives, (n, m).
+
+    The contestants of each round are a random permutation of the population, so that every candidate
+    competes equally often. No infeasible candidate beats a feasible one.
+    """
+    rank = ranks(objectives)
+    room = crowding(objectives, rank)
+    rounds = -(-2 * count // len(rank))
+    contestants = np.concatenate([rng.permutation(len(rank)) for _ in range(rounds)])[: 2 * count]
+    a, b = contestants[0::2], contestants[1::2]
+    a_wins = (rank[a] < rank[b]) | ((rank[a] == rank[b]) & (room[a] >= room[b]))
+    return np.where(a_wins, a, b)
 
 
 @record
@@ -88,7 +109,8 @@ class SimpleGa:
         children = crossover(population.chromosomes[parents], self.settings, rng)[:count]
         return mutate(children, self.settings.mutation_rate, self.coding, rng)
 
-    def select(self, objectives: Array, count: int, rng: Generator) -> Ints:
+    @staticmethod
+    def select(objectives: Array, count: int, rng: Generator) -> Ints:
         """Return parents, shape (count,), by the roulette wheel of the objectives of a population."""
         return roulette(_objective(objectives), count, rng)
 
@@ -107,39 +129,12 @@ class Nsga2(SimpleGa):
     """
 
     single, elite = False, 0
-
-    def select(self, objectives: Array, count: int, rng: Generator) -> Ints:
-        """Return parents by the crowded tournament."""
-        return tournament(objectives, count, rng)
+    select = staticmethod(tournament)
 
     def tell(self, population: Population | None, offspring: Population) -> Population:
         """Return the best of parents and children together, in crowded order."""
         everyone = offspring if population is None else population.join(offspring)
         return everyone.take(crowded_order(everyone.objectives)[: self.settings.population])
-
-
-def crowded_order(objectives: Array) -> Ints:
-    """Return candidates, (n,), from best to worst by their objectives, (n, m); equals keep their order.
-
-    That is the crowded comparison: lower rank first, then more room around them.
-    """
-    rank = ranks(objectives)
-    return np.lexsort((-crowding(objectives, rank), rank))
-
-
-def tournament(objectives: Array, count: int, rng: Generator) -> Ints:
-    """Return winners, (count,), of binary tournaments by the crowded comparison of objectives, (n, m).
-
-    The contestants of each round are a random permutation of the population, so that every candidate
-    competes equally often. No infeasible candidate beats a feasible one.
-    """
-    rank = ranks(objectives)
-    room = crowding(objectives, rank)
-    rounds = -(-2 * count // len(rank))
-    contestants = np.concatenate([rng.permutation(len(rank)) for _ in range(rounds)])[: 2 * count]
-    a, b = contestants[0::2], contestants[1::2]
-    a_wins = (rank[a] < rank[b]) | ((rank[a] == rank[b]) & (room[a] >= room[b]))
-    return np.where(a_wins, a, b)
 
 
 def _objective(objectives: Array) -> Array:

@@ -107,8 +107,12 @@ def _advance(now: State, residuals: Function, settings: RefinementSettings) -> S
     rows = residuals(points)
     cost = costs(rows)
     best = np.argmin(cost)
-    if not cost[best] < now.cost:
-        return _damped(now, model, settings)
+    if not cost[best] < now.cost:  # a new Jacobian, or a shorter step
+        if not now.fresh:
+            return replace(now, jacobian=no_jacobian(now.point))
+        after = replace(now, damping=now.damping * 2 * now.growth, growth=2 * now.growth)
+        promises = model.gain(model.step(after.damping)) >= settings.gain_tolerance * now.cost
+        return after if promises else _no_step(now)
     ratio = (now.cost - cost[best]) / promised if promised > 0 else 0.0
     after = _moved(now, points[best], rows[best], ratio, settings)
     if after.ended:
@@ -149,15 +153,6 @@ def _moved(now: State, point: Array, row: Array, ratio: float, settings: Refinem
         iterations=now.iterations + 1,
         ending=ending,
     )
-
-
-def _damped(now: State, model: LinearModel, settings: RefinementSettings) -> State:
-    """After a step that did not help: a new Jacobian, or a shorter step."""
-    if not now.fresh:
-        return replace(now, jacobian=no_jacobian(now.point))
-    after = replace(now, damping=now.damping * 2 * now.growth, growth=2 * now.growth)
-    promises = model.gain(model.step(after.damping)) >= settings.gain_tolerance * now.cost
-    return after if promises else _no_step(now)
 
 
 def _no_step(now: State) -> State:

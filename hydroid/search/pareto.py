@@ -55,32 +55,25 @@ def crowding(objectives: Array, rank: Ints) -> Array:
     The sum over the objectives of the gap between its two neighbours, in parts of the front's range; inf at
     the ends of a front, 0 for the infeasible.
     """
-    room = np.zeros(len(objectives))
+    crowd = np.zeros(objectives.shape)
     usable = feasible(objectives)
-    for front in np.unique(rank[usable]):
-        candidates = (rank == front) & usable
-        room[candidates] = _room(objectives[candidates])
-    return room
-
-
-def _room(front: Array) -> Array:
-    order = np.argsort(front, axis=0, kind="stable")
-    sorted_ = np.take_along_axis(front, order, axis=0)
-    span = sorted_[-1] - sorted_[0]
-    gaps = np.full(front.shape, np.inf)
-    # An objective in which all are equal has no ends and no gaps.
-    gaps[:, span == 0] = 0.0
-    gaps[1:-1] = (sorted_[2:] - sorted_[:-2]) / np.where(span == 0, 1.0, span)
-    room = np.empty_like(gaps)
-    np.put_along_axis(room, order, gaps, axis=0)
-    return room.sum(axis=1)
+    for number in np.unique(rank[usable]):
+        candidates = (rank == number) & usable
+        front = objectives[candidates]
+        order = np.argsort(front, axis=0, kind="stable")
+        sorted_ = np.take_along_axis(front, order, axis=0)
+        span = sorted_[-1] - sorted_[0]
+        gaps = np.full(front.shape, np.inf)
+        # An objective in which all are equal has no ends and no gaps.
+        gaps[:, span == 0] = 0.0
+        gaps[1:-1] = (sorted_[2:] - sorted_[:-2]) / np.where(span == 0, 1.0, span)
+        np.put_along_axis(front, order, gaps, axis=0)
+        crowd[candidates] = front
+    return crowd.sum(axis=1)
 
 
 def segment_best(objectives: Array) -> Ints:
-    """The best candidate of each segment, (S,), by objectives, (n, S): the thin traces of figure 19.
-
-    One may be best in several segments. Raises SettingsError: no candidate is feasible.
-    """
+    """The best candidate of each segment, (S,), by objectives, (n, S): the thin traces of figure 19."""
     return _ranked(objectives).argmin(axis=0)
 
 
@@ -88,7 +81,7 @@ def average(points: Array, objectives: Array) -> Array:
     """The article's estimate, (p,): the mean of the best of points, (n, p), of all segments, (n, S).
 
     As a rule no candidate of the set, and inside the bounds where all are. The points' coordinates are linear
-    in the parameters. Raises SettingsError: no candidate is feasible.
+    in the parameters.
     """
     return points[segment_best(objectives)].mean(axis=0)
 
@@ -98,7 +91,6 @@ def utopia(points: Array, objectives: Array) -> Array:
 
     The article's criterion 1 is the sum of squares of F - F⁰. Segments in which the arm moves far would
     decide alone, so each objective is first divided by its range over the set; one without range is left out.
-    Raises SettingsError: no candidate is feasible.
     """
     values = _ranked(objectives)
     usable = objectives[feasible(objectives)]

@@ -5,7 +5,7 @@ actuators, in units of a drawing (mm, mm², cm³/rad).
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 import numpy as np
 from pydantic import AfterValidator, Field, Strict, ValidationInfo
 
-from hydroid.arrays import Array
+from hydroid.arrays import Array, record
 from hydroid.errors import ModelError, SettingsError
 from hydroid.files import find_config
 from hydroid.settings.cylinder import LinearActuator, make_cylinder
@@ -38,16 +38,12 @@ Beside = Annotated[Path, Strict(False), AfterValidator(_from_folder)]
 """a path relative to the file that names it"""
 
 
-@dataclass(frozen=True)
+@record
 class Joint:
-    """A joint that turns, or slides; what is said of angles then holds for its position [m].
+    """A joint that turns [deg], or `slides` [m]; what is said of angles then holds for its position.
 
-    Attributes:
-        name: of the model's joint.
-        range: smallest and largest angle [deg], or position [m].
-        continuous: whether it turns without stops, and `range` only limits what is shown and tested.
-        actuator: what moves it; None: nothing that stage 2 knows.
-        slides: whether it slides.
+    A continuous one turns without stops: its range limits what is shown and tested. No actuator: nothing that
+    stage 2 knows moves it.
     """
 
     name: str
@@ -106,7 +102,25 @@ class Arm(Settings):
                 raise SettingsError(f"actuators.{name}: no such joint", self.where, hint)
         if self.payload is not None and self.payload not in [model.site(s).name for s in range(model.nsite)]:
             raise SettingsError(f"payload: the model has no site {self.payload!r}", self.where)
-        return tuple(self._joint(name) for name in names)
+        joints = list[Joint]()
+        for name in names:
+            joint, actuator = model.joint(name), self.actuators.get(name)
+            limited, slides = bool(joint.limited[0]), int(joint.type[0]) == SLIDE
+            # sliders and tests take a joint without limits once round
+            low, high = (-1.0, 1.0) if slides else (-180.0, 180.0)
+            if limited:
+                low, high = (joint.range if slides else np.degrees(joint.range)).round(DIGITS).tolist()
+            bare = Joint(name, (low, high), not limited, None, slides)
+            if isinstance(actuator, Cylinder):
+                try:
+                    if not limited:
+                        raise ValueError("a joint without limits needs a rotary actuator")
+                    zero = _at_zero(self.model)
+                    actuator = make_cylinder(actuator, bare.limits, zero, name, slides=slides)
+                except ValueError as error:
+                    raise SettingsError(f"actuators.{name}: {error}", self.where) from None
+            joints.append(replace(bare, actuator=actuator))
+        return tuple(joints)
 
     @cached_property
     def mass_of(self) -> dict[str, float]:
@@ -134,24 +148,6 @@ class Arm(Settings):
     @property
     def _model(self) -> Any:
         return _at_zero(self.model).model
-
-    def _joint(self, name: str) -> "Joint":
-        joint, actuator = self._model.joint(name), self.actuators.get(name)
-        limited, slides = bool(joint.limited[0]), int(joint.type[0]) == SLIDE
-        # sliders and tests take a joint without limits once round
-        low, high = (-1.0, 1.0) if slides else (-180.0, 180.0)
-        if limited:
-            low, high = (joint.range if slides else np.degrees(joint.range)).round(DIGITS).tolist()
-        bare = Joint(name, (low, high), not limited, None, slides)
-        if isinstance(actuator, Cylinder):
-            try:
-                if not limited:
-                    raise ValueError("a joint without limits needs a rotary actuator")
-                zero = _at_zero(self.model)
-                actuator = make_cylinder(actuator, bare.limits, zero, name, slides=slides)
-            except ValueError as error:
-                raise SettingsError(f"actuators.{name}: {error}", self.where) from None
-        return replace(bare, actuator=actuator)
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -196,18 +192,14 @@ class Arm(Settings):
         return np.array([high for _, high in self.ranges.values()])
 
     def pose(self, name: str) -> Array:
-        """Return a named pose [rad], shape (J,).
-        Raises SettingsError: no such pose, with the names there are.
-        """
+        """Return a named pose [rad], shape (J,)."""
         if name not in self.poses:
             raise SettingsError(f"{self.name} has no pose {name!r}", hint=f"one of: {', '.join(self.poses)}")
         return np.array(self.poses[name])
 
 
 def load_arm(name: str | Path, beside: Path | None = None) -> Arm:
-    """Read an arm's YAML, found as `find_config` does.
-    Raises SettingsError: no such file, or a setting that is not allowed.
-    """
+    """Read an arm's YAML, found as `find_config` does."""
     return load(find_config(name, beside, kind="arm"), Arm)
 
 

@@ -1,30 +1,26 @@
 """A cylinder with the triangle that it spans, from its settings and the pivots that the arm's model shows."""
 
 import math
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, ClassVar
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hydroid.arrays import Array
+from hydroid.arrays import record
 from hydroid.settings.linkage import DIGITS, Cylinder, Pivots, Triangle, Vector, four_bar, triangle
 
 if TYPE_CHECKING:
     import mujoco
 
 
-@dataclass(frozen=True)
+@record
 class LinearActuator:
     """A cylinder and the triangle that it spans with its joint, or with the rocker of a four-bar linkage.
 
-    Attributes:
-        settings: areas, valve opening and linkage.
-        triangle: of its pivots, `a` at least `b`.
-        stroke: of the rod [mm].
-        pivots: on the parent and on the moved link, in their frames [m]; None where only distances are given.
+    Of the triangle `a` is at least `b`; the stroke is the rod's [mm]; the pivots are on the parent and on the
+    moved link, in their frames [m], None where only distances are given.
     """
 
-    kind: ClassVar[str] = "linear"
     settings: Cylinder
     triangle: Triangle
     stroke: float
@@ -61,14 +57,16 @@ def make_cylinder(
     """Return a cylinder that moves its joint through a range [rad], or along it [m] where the joint `slides`.
 
     `data` has all joints of the arm at 0; a cylinder whose triangle is given, or along its joint, needs none.
-    Raises ValueError: pivots that are not stated or make no triangle, a dead centre in the range, a linkage
-    that does not reach, or a stroke that is too short.
     """
     sides, pivots = settings.triangle, None
     if slides:
         if settings.triangle or settings.four_bar:
             raise ValueError("its joint slides, so it lies along it: give neither triangle nor four_bar")
-        sides = _along(settings.pivots, data, joint)
+        # along the joint b is 0; by default the rod runs out forward
+        given, way = settings.pivots, 1.0
+        if given is not None and data is not None:
+            way = float(np.subtract(given.child, given.parent) @ data.joint(joint).xaxis)
+        sides = Triangle.model_construct(a=1.0, b=0.0, theta0=90.0 if way > 0 else -90.0)
     elif sides is None:
         sides, pivots = _pinned(settings.pivots, data, joint)
     sides = sides.changed({"a": max(sides.a, sides.b), "b": min(sides.a, sides.b)})
@@ -88,12 +86,6 @@ def make_cylinder(
     return replace(cylinder, stroke=stroke)
 
 
-def _along(given: Pivots | None, data: Any, joint: str) -> Triangle:
-    """Return the triangle of a cylinder along its joint, b = 0; by default its rod runs out forward."""
-    way = 1.0 if given is None else float(np.subtract(given.child, given.parent) @ data.joint(joint).xaxis)
-    return Triangle.model_construct(a=1.0, b=0.0, theta0=90.0 if way > 0 else -90.0)
-
-
 def _pinned(given: Pivots | None, data: Any, joint: str) -> tuple[Triangle, tuple[Vector, Vector]]:
     """The triangle of a cylinder's pivots, and these in the frames of parent and moved body [m]."""
     if given is not None:
@@ -108,11 +100,7 @@ def _pinned(given: Pivots | None, data: Any, joint: str) -> tuple[Triangle, tupl
     bodies = int(data.model.body_parentid[child]), child
     local = [data.xmat[b].reshape(3, 3).T @ (e - data.xpos[b]) for b, e in zip(bodies, ends, strict=True)]
     parent, moved = (tuple(place.round(DIGITS).tolist()) for place in local)
-    return _triangle(ends - at.xanchor, at.xaxis), (parent, moved)
-
-
-def _triangle(ends: Array, axis: Array) -> Triangle:
-    """The triangle of two pivots, (2, 3), seen from the joint at angle 0 [m], and the joint's axis, (3,)."""
+    ends, axis = ends - at.xanchor, at.xaxis
     heights = ends @ axis
     near, far = flat = ends - np.outer(heights, axis)
     a, b = np.linalg.norm(flat, axis=1).tolist()
@@ -126,4 +114,4 @@ def _triangle(ends: Array, axis: Array) -> Triangle:
             "a cylinder must lie across the axis"
         )
     turn = round(math.degrees(math.atan2(float(np.cross(near, far) @ axis), float(near @ far))), DIGITS)
-    return Triangle(a=round(a, DIGITS), b=round(b, DIGITS), theta0=turn)
+    return Triangle(a=round(a, DIGITS), b=round(b, DIGITS), theta0=turn), (parent, moved)

@@ -27,9 +27,7 @@ _NUMBER = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)(e[-+]?[0-9]+)?|[-+]?\.i
 
 
 def read_yaml(path: Path) -> tuple[dict[str, Any], Lines]:
-    """Read a file that holds one mapping.
-    Raises SettingsError: unreadable, not UTF-8, too large, not a mapping, or as `read_document`.
-    """
+    """Read a file that holds one mapping."""
     most = 2**18
     try:
         with path.open("rb") as file:
@@ -47,9 +45,7 @@ def read_yaml(path: Path) -> tuple[dict[str, Any], Lines]:
 
 
 def read_document(text: str, source: str) -> tuple[Any, Lines]:
-    """Read one YAML document.
-    Raises SettingsError: not YAML, a key that occurs twice or is not plain text, another type, or too much.
-    """
+    """Read one YAML document."""
     lines: Lines = {}
     try:
         node = yaml.compose(text, Loader=yaml.BaseLoader)  # every scalar is text

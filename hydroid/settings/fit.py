@@ -195,9 +195,7 @@ class StudySettings(Settings):
 
 
 def cell_settings(study: StudySettings, path: Path, extra: Changes | None = None) -> dict[str, FitSettings]:
-    """Return the settings of a fit of every cell, with `extra` ones replaced, by the cell's name.
-    Raises SettingsError: a setting that does not exist or is not allowed, with the study's file.
-    """
+    """Return the settings of a fit of every cell, with `extra` ones replaced, by the cell's name."""
     config = find_config(study.base, path.parent)
     try:
         return {

@@ -78,12 +78,15 @@ S = TypeVar("S", bound=Settings)
 
 
 def load(path: Path, kind: type[S], overrides: Mapping[str, Any] | None = None) -> S:
-    """Read one YAML file as settings of a kind, with overrides by dotted key.
-    Raises SettingsError: a key or value that is not allowed, with file and line.
-    """
+    """Read one YAML file as settings of a kind, with overrides by dotted key, joints by their numbers."""
     values, lines = read_yaml(path)
     for key, value in (overrides or {}).items():
-        replace_setting(values, key, value)
+        (*folders, last), place = key.split("."), values
+        for folder in folders:
+            place = place.setdefault(folder, {})
+            if not isinstance(place, dict):
+                raise SettingsError(f"{folder} has no settings below it", f"--set {key}")
+        place[last] = value
     return validate(values, kind, str(path), lines, sorted(overrides or ()), path.parent)
 
 
@@ -113,7 +116,10 @@ def validate(
             name, where = key[len(at) + 1 :], f"--set {at}"
         else:
             named = fault["type"] in ("extra_forbidden", "missing")  # the problem names the setting
-            name, where = "" if named else _shown(key)[1:-1], source + _line(key, lines or {})
+            parts = tuple(key.split("."))
+            begins = (parts[:end] for end in range(len(parts), 0, -1))
+            line = next((f", line {lines[part]}" for part in begins if lines and part in lines), "")
+            name, where = "" if named else _shown(key)[1:-1], f"{source}{line}"
         found.setdefault(where, f"{name}: {problem}" if name else problem)
     (where, what), *others = found.items()
     also = listed([f"{place.removeprefix(f'{source}, ')}: {other}" for place, other in others], 3)
@@ -121,32 +127,11 @@ def validate(
 
 
 def parse_override(text: str) -> tuple[str, Any]:
-    """Split `key=value`; the value is read as YAML.
-    Raises SettingsError: no `=` or no key, or a value that is not YAML.
-    """
+    """Split `key=value`; the value is read as YAML."""
     key, equals, value = text.partition("=")
     if not equals or not key.strip():
         raise SettingsError("needs key=value", f"--set {text}", "for example --set search.seed=3")
     return key.strip(), read_document(value, f"--set {text}")[0]
-
-
-def replace_setting(values: Plain, key: str, value: Any) -> None:
-    """Set a value of nested mappings by its dotted key; numbers of joints may be keys.
-    Raises SettingsError: what the key names has no settings below it.
-    """
-    *folders, last = key.split(".")
-    for folder in folders:
-        inner = values.setdefault(folder, {})
-        if not isinstance(inner, dict):
-            raise SettingsError(f"{folder} has no settings below it", f"--set {key}")
-        values = inner
-    values[last] = value
-
-
-def _line(key: str, lines: Lines) -> str:
-    parts = tuple(key.split("."))
-    place = next((lines[parts[:end]] for end in range(len(parts), 0, -1) if parts[:end] in lines), None)
-    return f", line {place}" if place else ""
 
 
 def _explained(fault: Any, kind: type[Settings]) -> tuple[str, str]:

@@ -6,7 +6,7 @@ import sys
 import threading
 import time
 import warnings
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -28,9 +28,7 @@ AZIMUTH, ELEVATION = 125.0, -18.0  # where a camera looks to at first [deg]
 
 
 def rendered(motion: Motion, size: tuple[int, int], frames: Iterable[tuple[float, str]]) -> Iterator[Picture]:
-    """Yield a machine at times [s], each with a text above it, in a size [px]: RGB, shape (height, width, 3).
-    Raises RunError: this machine cannot render.
-    """
+    """Yield a machine at times [s], a text above each, in a size [px]: RGB, shape (height, width, 3)."""
     replay, (width, height), camera = Replay(motion), size, mujoco.MjvCamera()
     look = replay.model.vis
     look.global_.offwidth, look.global_.offheight = width, height
@@ -57,9 +55,7 @@ def rendered(motion: Motion, size: tuple[int, int], frames: Iterable[tuple[float
 def render_motion(
     motion: Motion, kind: str, span: tuple[float, float], progress: Progress = no_progress
 ) -> bytes:
-    """Return the content of a film of a motion in a span [s], or of a picture of its beginning (.png).
-    Raises SettingsError: a span without time; RunError: this machine cannot render, or cannot write films.
-    """
+    """Return the content of a film of a motion in a span [s], or of a picture of its beginning (.png)."""
     begin, end = max(span[0], 0.0), min(span[1], motion.time[-1])
     if not begin < end:
         what = f"{span[0]:g}:{span[1]:g} s holds nothing of a motion of {motion.time[-1]:g} s"
@@ -78,7 +74,7 @@ def render_motion(
 
 
 def check_kind(file: Path) -> str:
-    """Return the ending of a file that `render_motion` writes; raises SettingsError: another one."""
+    """Return the ending of a file that `render_motion` writes."""
     kind = file.suffix.lower()
     if kind not in KINDS:
         raise SettingsError("is no film or picture", file, f"end it in {', '.join(KINDS)}")
@@ -137,17 +133,12 @@ FRAME = 1 / 60  # between two pictures of the viewer [s]
 LATE = 0.1  # a machine too slow by this [s] shows slow motion instead of jumps
 
 
-def play(
-    playback: Playback,
-    viewer: Any,
-    clock: Callable[[], float] = time.perf_counter,
-    sleep: Callable[[float], None] = time.sleep,
-) -> None:
+def play(playback: Playback, viewer: Any) -> None:
     """Show what moves in real time until the window is closed; the viewer's reset starts it again.
 
     `viewer` is a `mujoco.viewer.Handle`, or what behaves like one.
-    Raises RunError: the simulation diverged.
     """
+    clock = time.perf_counter
     begun = clock()
     while viewer.is_running():
         frame = clock()
@@ -161,13 +152,11 @@ def play(
         if playback.data.time < before:
             playback.restart()
             begun = clock()
-        sleep(max(0.0, FRAME - (clock() - frame)))
+        time.sleep(max(0.0, FRAME - (clock() - frame)))
 
 
 def show(playback: Playback) -> None:
-    """Show a playback in MuJoCo's viewer until its window is closed.
-    Raises RunError: no window can be opened, or the simulation diverged.
-    """
+    """Show a playback in MuJoCo's viewer until its window is closed."""
     others = set(threading.enumerate())
     try:
         import glfw  # the window library, which a cluster may lack

@@ -16,13 +16,10 @@ from hydroid.prediction import predict_log
 
 @record
 class Motion:
-    """A machine under the commands of logs.
+    """A machine under the commands of logs: times [s], (T,), and angles of all joints [rad], (T, nq).
 
-    Attributes:
-        time: [s], shape (T,).
-        simulated: angles of all joints of the machine [rad], shape (T, nq).
-        measured: the same as logged; None where the logs hold no motion.
-        error: rms difference of the driven joints that were measured [deg]; NaN: there are none.
+    `measured` is None where the logs hold no motion; `error` is the rms difference of the driven joints that
+    were measured [deg], NaN where there are none.
     """
 
     machine: Machine
@@ -33,9 +30,7 @@ class Motion:
 
 
 def simulated_motion(model: IdentifiedModel, logs: Mapping[str, Log]) -> Motion:
-    """Simulate the commands of logs, by the name of the arm that they move (`Machine.sides`).
-    Raises SettingsError: a log commands nothing; RunError: the simulation diverged.
-    """
+    """Simulate the commands of logs, by the name of the arm that they move (`Machine.sides`)."""
     arm, first = model.settings.arm, next(iter(logs.values()))
     machine = load_machine(arm, pair=ALONE not in logs)
     for log in logs.values():
@@ -80,7 +75,7 @@ class Sliders:
         self.advance(0.0)
 
     def advance(self, until: float) -> None:
-        """Step to the period before `until` [s]; raises RunError: the simulation diverged."""
+        """Step to the period before `until` [s]."""
         plant = self.plant
         while plant.time + plant.period <= until + 1e-9:
             plant.step(plant.command)

@@ -17,7 +17,7 @@ def fitted(rng, noise: np.ndarray, slopes: np.ndarray, known: float | None = Non
     residual = noise - effects.T @ (effects @ noise)
 
     def noise_of(row: np.ndarray) -> list[Noise]:
-        white = Noise(len(row), known or 0.0, np.empty(0), "settings")
+        white = Noise(len(row), known or 0.0, np.empty(0), given=True)
         return [white if known else fit_noise(row)]
 
     return Explained(effects, residual, noise_of, [slice(0, len(noise))], 1.0)
@@ -38,7 +38,7 @@ def test_the_statistic_of_a_linear_problem_is_that_of_regression():
 
 def test_correlated_noise_widens_the_statistic_as_its_covariance_says():
     rng = np.random.default_rng(2)
-    process = Noise(SAMPLES, 1.0, np.array([-0.9]), "settings")
+    process = Noise(SAMPLES, 1.0, np.array([-0.9]), given=True)
     slopes, noise = np.ones((1, SAMPLES)), ar1(rng, SAMPLES, 0.9, 1.0)
     change = np.sin(np.arange(SAMPLES) / 50)
     explained = fitted(rng, noise, slopes)

@@ -24,7 +24,6 @@ LEVELS = [0.0, 60.0, -40.0, 80.0, -70.0, 30.0, -20.0, 50.0]
 
 
 def make_settings(**hydraulics: float) -> FitSettings:
-    """Stage 2 of the shoulder, areas and damping free."""
     settings = load_settings("fit-hyd", {f"hydraulics.{name}": v for name, v in hydraulics.items()})
     quantities = {"A_A": "area_a", "A_B": "area_b", "D": "damping"}
     free = {
@@ -45,7 +44,6 @@ def at_truth(truth: FitSettings, model: FitSettings) -> tuple[Problem, Uncertain
 
 @pytest.fixture(scope="module")
 def late() -> tuple[Problem, Uncertainty]:
-    """A model without the delay that its log has."""
     return at_truth(make_settings(delay=0.03), make_settings())
 
 

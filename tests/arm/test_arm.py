@@ -9,10 +9,11 @@ from hypothesis import given, strategies as st
 from hydroid.arm.model import add_payload, load_model
 from hydroid.errors import HydroidError
 from hydroid.settings.arm import load_arm
+from hydroid.settings.cylinder import LinearActuator
 from hydroid.settings.linkage import triangle
 
 SHIPPED = load_arm("hydrolek")
-LINEAR = [joint for joint in SHIPPED.joints if joint.actuator.kind == "linear"]
+LINEAR = [joint for joint in SHIPPED.joints if isinstance(joint.actuator, LinearActuator)]
 
 
 def test_the_shipped_arm_is_the_articles():

@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 from arms import MODELS, posed
 
-from hydroid.arm.collision import CollisionChecker
-from hydroid.arm.model import Machine, load_machine
+from hydroid.arm.model import CollisionChecker, Machine, load_machine
 from hydroid.errors import ModelError
 from hydroid.settings.arm import Arm
 

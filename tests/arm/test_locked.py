@@ -16,7 +16,6 @@ J, L = len(ARM.joint_names), len(ARM.link_names)
 
 
 def locked_arm(spec, arm, moving, pose):
-    """The arm with all joints locked but these, by name."""
     return lock(spec, arm, np.isin(arm.joint_names, moving), pose)
 
 

@@ -9,12 +9,11 @@ from arms import MODELS, posed
 from robots import LIMIT, compiled, joint, link, write_robot
 
 from hydroid.cad.importer import import_arm
-from hydroid.cad.shapes import SHOWN
+from hydroid.cad.source import SHOWN
 from hydroid.errors import ModelError
 
 
 def said(arm, start):
-    """The one note that begins like this."""
     (line,) = [note for note in arm.notes if note.startswith(start)]
     assert "\n" not in line
     return line
@@ -31,7 +30,6 @@ def extents(model, body):
 
 
 def tensor(model, body):
-    """Inertia about the centre of mass in the body's frame [kg·m²]."""
     turn = np.empty(9)
     mujoco.mju_quat2Mat(turn, model.body(body).iquat)
     axes = turn.reshape(3, 3)
@@ -39,7 +37,6 @@ def tensor(model, body):
 
 
 def of_box(name, mass):
-    """Inertia of a link's box about its centre [kg·m²]."""
     square = np.array(robots.SIZES[name]) ** 2
     return np.diag(square.sum() - square) * mass / 12
 

@@ -27,13 +27,11 @@ def runs(array, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[Path]:
 
 
 def change(file: Path, **values: object) -> None:
-    """Change entries of a YAML or JSON file."""
     content = yaml.safe_load(file.read_text()) | values
     file.write_text(json.dumps(content) if file.suffix == ".json" else yaml.safe_dump(content))
 
 
 def collected(caplog: pytest.LogCaptureFixture, *names: object) -> tuple[list[int], list[str]]:
-    """Return the seeds that were taken, and the warnings."""
     caplog.clear()
     study = hydroid.report([str(name) for name in names], merge=True, out="out")
     return [run.seed for run in study.result], caplog.messages

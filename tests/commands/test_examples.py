@@ -27,7 +27,6 @@ QUICK = SMALL | {"refinement": None, "joint_refinement": False, "design": {"effo
 
 
 def example(name: str) -> str:
-    """Return the indented code of a docstring."""
     lines = (inspect.getdoc(getattr(hydroid, name)) or "").splitlines()
     end = next((i for i, line in enumerate(lines) if line.strip() in ("Args:", "Raises:")), len(lines))
     return textwrap.dedent("\n".join(line for line in lines[1:end] if line.startswith(" " * 4)))
@@ -35,7 +34,6 @@ def example(name: str) -> str:
 
 @pytest.fixture(scope="module")
 def folder(array, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Logs and runs as the examples name them."""
     folder = tmp_path_factory.mktemp("examples")
     for name in ("a.csv", "b.csv", "commands.csv"):
         (folder / name).symlink_to(array[0] / "a.csv")

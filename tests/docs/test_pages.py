@@ -22,8 +22,6 @@ each_page = pytest.mark.parametrize("page", [ROOT / "README.md", *PAGES], ids=la
 
 
 class Block(NamedTuple):
-    """A fenced block: its language, its text, and where it begins."""
-
     language: str
     text: str
     where: str

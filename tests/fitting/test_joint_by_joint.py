@@ -16,7 +16,6 @@ LEVELS = {2: [60.0, -80.0, 70.0, 0.0], 3: [-70.0, 80.0, 0.0, -60.0, 90.0]}
 
 
 def make(noise_deg: float = 0.0, **changes) -> Problem:
-    """Steps on joints 2 and 3 in stage 2."""
     rows = {
         f"{name}_{j}": {"quantity": quantity, "joints": [j], "bounds": bounds}
         for name, quantity, bounds in (("open", "opening", [0.1, 1.0]), ("overlap", "overlap", [0.0, 0.8]))

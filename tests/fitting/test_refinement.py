@@ -15,8 +15,6 @@ SHORT = RefinementSettings(iterations=6)
 
 
 class Counted(Problem):
-    """Counts the candidates that it simulates."""
-
     simulated = 0
 
     def residuals(self, theta):

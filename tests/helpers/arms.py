@@ -19,14 +19,12 @@ PARENT, CHILD = [4.2, 0.05, 2.4], [6.5, 0.05, 2.5]
 
 
 def write_arm(folder: Path, model: str = BOOM, **settings: Any) -> Arm:
-    """Write arm.xml and arm.yaml, and read them."""
     (folder / "arm.xml").write_text(model)
     (folder / "arm.yaml").write_text(yaml.safe_dump({"model": "arm.xml"} | settings))
     return load_arm(folder / "arm.yaml")
 
 
 def posed(model: mujoco.MjModel, pose: Any) -> mujoco.MjData:
-    """The model at rest in a pose, and what follows from it."""
     data = mujoco.MjData(model)
     data.qpos[:] = pose
     mujoco.mj_forward(model, data)

@@ -10,8 +10,6 @@ from hydroid.commands.app import main
 
 
 class Ended(NamedTuple):
-    """How a command ended."""
-
     code: int
     out: str
     err: str

@@ -49,7 +49,6 @@ def damage(rng: Random, data: bytes) -> bytes:
 
 
 def edit(rng: Random, data: bytes) -> bytes:
-    """Flip bits, cut or insert bytes, change a word, or move a line."""
     at, token = rng.randrange(len(data) + 1), rng.choice(TOKENS).encode("utf-8", "surrogatepass")
     words = [*re.finditer(rb"[A-Za-z0-9_.+-]+", data[:100_000])]
     lines = data.split(b"\n")
@@ -183,13 +182,11 @@ def _cells(data: bytes) -> tuple[list[str], np.ndarray]:
 
 @cache
 def configs() -> tuple[bytes, ...]:
-    """Shipped settings, and one that uses what they leave out."""
     shipped = [(ROOT / "configs" / f"{name}.yaml").read_bytes() for name in ("fit-mech", "fit-hyd")]
     return (*shipped, (MODELS / "settings.yaml").read_bytes())
 
 
 def overrides() -> tuple[bytes, ...]:
-    """Settings as --set has them, with values of all kinds."""
     keys = ("search.seed", "outputs", "parameters.K.bounds", "log.joints.4.command", "objective.segments")
     values = [*TOKENS, "3", "[2,3]", "{times: [1,2]}"]
     return tuple(f"{key}={value}".encode("utf-8", "surrogatepass") for key in keys for value in values)
@@ -197,19 +194,16 @@ def overrides() -> tuple[bytes, ...]:
 
 @cache
 def rod() -> bytes:
-    """The mesh of the arm of two boxes."""
     content = trimesh.creation.box((0.5, 0.06, 0.04)).export(file_type="stl")
     assert isinstance(content, bytes)
     return content
 
 
 def two(kind: str) -> bytes:
-    """A file of the arm of two boxes."""
     return (MODELS / f"two.{kind}").read_bytes()
 
 
 def start(room: Path, data: bytes) -> Sequence[str]:
-    """Return the command that starts a project with the room's arm."""
     for name, content in {"rod.stl": rod(), "arm.yaml": two("yaml"), "arm.xml": two("xml")}.items():
         if not (room / "arm" / name).exists():
             (room / "arm" / name).write_bytes(content)
@@ -218,13 +212,11 @@ def start(room: Path, data: bytes) -> Sequence[str]:
 
 
 def models() -> tuple[bytes, ...]:
-    """The shipped MJCF, its meshes by their full path."""
     text = (ROOT / "models" / "hydrolek.xml").read_text()
     return (text.replace('meshdir="../meshes"', f'meshdir="{ROOT / "meshes"}"').encode(),)
 
 
 def simulate(room: Path, data: bytes) -> Sequence[str]:
-    """Return the command that simulates with the room's values and model, where it has them."""
     (room / "log.csv").write_bytes(logs()[0])
     values = room / "values.yaml"
     given = values if values.exists() else TRUTH
@@ -239,7 +231,6 @@ def simulate(room: Path, data: bytes) -> Sequence[str]:
 
 @cache
 def finished(folder: Path) -> Path:
-    """Return a finished run in a folder, fitted once."""
     log = folder / "log.csv"
     log.write_bytes(logs()[0])
     assert run(("fit-mech", str(log), "--out", str(folder / "run"), *TINY)) is None
@@ -270,7 +261,6 @@ def run_kinds(folder: Path) -> Iterator[Kind]:
 
 
 def check(room: Path, *how: str) -> Sequence[str]:
-    """Return the command that checks a log with other settings."""
     (room / "log.csv").write_bytes(logs()[0])
     return ("check", str(room / "log.csv"), *how)
 

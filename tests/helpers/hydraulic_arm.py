@@ -14,7 +14,6 @@ from hydroid.simulation.scenario import Scenario
 
 
 def nominal(arm: Arm, settings: HydraulicSettings, n: int = 1) -> Records:
-    """All joints of the arm with dampers and springs, once a candidate."""
     joints = np.tile(nominal_joints(arm, settings), (n, 1)).view(np.recarray)
     joints["damping"], joints["stiffness"] = 231.8, 53.4
     return joints

@@ -51,7 +51,6 @@ def parameters(settings: HydraulicSettings, **values: ArrayLike) -> Records:
 
 
 def rotary(joints: Records) -> Records:
-    """Joints under rotary actuators whose range is from -1 to 1 rad."""
     turned = joints.copy()
     turned.kind, turned.middle, turned.half = ROTARY, 0.0, 1.0
     return turned

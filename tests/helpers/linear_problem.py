@@ -50,13 +50,11 @@ class Linear:
 
 
 def slow(count, samples=1000, seed=0):
-    """Slow signals as regressors, like an arm's responses."""
     rng = np.random.default_rng(seed)
     return np.cumsum(rng.normal(size=(count, samples)), axis=1) / np.sqrt(samples)
 
 
 def ar1(rng, samples, phi, level):
-    """A stationary first-order process."""
     steps = rng.normal(0, level * np.sqrt(1 - phi**2), samples)
     steps[0] = rng.normal(0, level)
     return lfilter([1.0], [1.0, -phi], steps)

@@ -26,7 +26,6 @@ def cells(rows: int = 80, period: float = 0.01) -> np.ndarray:
 
 
 def lines(values: np.ndarray) -> list[list[str]]:
-    """Header and cells as text."""
     return [list(NAMES), *([format(x, ".10g") for x in row] for row in values)]
 
 
@@ -36,7 +35,6 @@ def save(path: Path, rows: list[list[str]], separator: str = ",") -> Path:
 
 
 def head(path: Path, samples: int) -> Path:
-    """Write the first samples of a virtual rig's log to a file."""
     rows = (RIG / "rig_shoulder_1.csv").read_text().splitlines()
     path.write_text("\n".join(rows[: samples + 1]) + "\n")
     return path
@@ -53,7 +51,6 @@ def read(
 
 
 def assert_same(log: Log, other: Log) -> None:
-    """Every bit of time, commands and angles."""
     np.testing.assert_array_equal(log.time, other.time)
     np.testing.assert_array_equal(log.command, other.command)
     np.testing.assert_array_equal(log.angle, other.angle)
@@ -62,7 +59,6 @@ def assert_same(log: Log, other: Log) -> None:
 def faults(
     path: Path, settings: LogSettings = SETTINGS, ranges: Ranges = RANGES, **options: Any
 ) -> list[LogFinding]:
-    """Errors only."""
     log, findings = check_log(path, settings, ranges, **options)
     errors = [finding for finding in findings if finding.level == "error"]
     assert (log is None) == bool(errors)

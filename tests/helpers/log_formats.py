@@ -28,7 +28,6 @@ def write_mat73(path: Path, columns: Columns) -> Path:
 
 
 def matlab(group, name: str, value) -> None:
-    """Put an array or a struct (dict) into a v7.3 file."""
     if isinstance(value, dict):
         inner = group.create_group(name)
         inner.attrs["MATLAB_class"] = np.bytes_("struct")
@@ -70,14 +69,12 @@ class BagWriter:
         self.writer.close()
 
     def write(self, topic: str, at: float, message) -> None:
-        """Record a message at a time [s]."""
         if topic not in self.topics:
             self.topics[topic] = self.writer.add_connection(topic, message.__msgtype__, typestore=self.store)
         pack = self.store.serialize_ros1 if self.one else self.store.serialize_cdr
         self.writer.write(self.topics[topic], round(at * 1e9), pack(message, message.__msgtype__))
 
     def joints(self, stamp: float, names: list[str], position: np.ndarray):
-        """A message of joint angles [rad] with a stamp [s]."""
         types = self.store.types
         time = types["builtin_interfaces/msg/Time"](*divmod(round(stamp * 1e9), 10**9))
         more = {"seq": 0} if self.one else {}
@@ -87,7 +84,6 @@ class BagWriter:
         return kind(header=header, name=names, position=position, velocity=nothing, effort=nothing)
 
     def array(self, values: np.ndarray):
-        """A message of numbers, without a stamp."""
         types = self.store.types
         layout = types["std_msgs/msg/MultiArrayLayout"](dim=[], data_offset=0)
         return types["std_msgs/msg/Float64MultiArray"](layout=layout, data=values)

@@ -52,7 +52,6 @@ def simulate_log(settings: FitSettings, log: Log, truth: Mapping[str, float]) ->
 
 
 def stepped(settings: FitSettings, truth: Mapping[str, float], levels: Levels, dwell: float = 1.0) -> Log:
-    """What the arm of the parameters by name does from its study pose."""
     return simulate_log(settings, step_log(settings.arm.pose("study"), levels, dwell), truth)
 
 

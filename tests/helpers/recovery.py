@@ -32,7 +32,6 @@ def settings_of(parameters: Mapping[str, Mapping[str, object]], **hydraulics: fl
 def recover(
     settings: FitSettings, logs: Sequence[Log], truth: Mapping[str, float], start: Mapping[str, float]
 ) -> Uncertainty:
-    """Fit logs that the settings simulate with `truth`, noise added, from another start."""
     rng = np.random.default_rng(0)
     # the start pose is known here; its noise is another test's subject
     problem = Problem(settings, [noisy(simulate_log(settings, log, truth), NOISE_DEG, rng) for log in logs])

@@ -140,7 +140,6 @@ def make_quantities(problem: Problem) -> Quantities:
 def make_record(
     problem: Problem, fit: Fit, unseen: Mapping[str, Prediction] | None = None, folder: str = "RUN"
 ) -> Record:
-    """What the run of a fit stores, with predictions of unseen logs by name."""
     logs = {log.source: "f" * 64 for log in problem.logs}
     identity = {"hydroid": "0", "mujoco": "4", "logs": logs}
     predictions, baselines = fitted(fit), baselines_of(problem.settings, problem.logs)

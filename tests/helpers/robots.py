@@ -36,7 +36,6 @@ def body(
 
 
 def link(name: str, mass: float | None = None, mesh: str = "", **changes: object) -> str:
-    """A link of the small arm."""
     shape = f'<mesh filename="{mesh or f"package://digger/meshes/{name}.stl"}"/>'
     return body(name, SIZES[name], MASSES[name] if mass is None else mass, shape, **changes)
 
@@ -77,6 +76,5 @@ def write_robot(folder: Path, scale: float = 1.0, **parts: str) -> Path:
 
 
 def compiled(arm: ImportedArm) -> tuple[mujoco.MjModel, mujoco.MjData]:
-    """An imported arm in MuJoCo, joints at 0."""
     model = mujoco.MjSpec.from_string(arm.mjcf, assets=arm.meshes).compile()
     return model, posed(model, 0.0)

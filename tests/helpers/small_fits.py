@@ -54,11 +54,9 @@ class Study:
         self.problem = Problem(self.settings, [self.log])
 
     def fit(self) -> Fit:
-        """A fit that stores nothing."""
         return fit(self.problem)
 
     def fit_in(self, folder: RunFolder, watcher: Watcher) -> Fit:
-        """A fit in a folder, continued where the folder has a checkpoint."""
         checkpoints = folder.begin(self.settings, read_logs([self.path], self.settings))
         result = fit(self.problem, watcher, checkpoints)
         settings, summary = self.settings.of_estimate(result.final), summarise(self.problem, result)

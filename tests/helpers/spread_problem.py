@@ -14,7 +14,6 @@ PASSIVE = {"outputs": [2, 3], "simulation.other_joints": "passive", "objective.s
 
 
 def arguments(config: str = "article-mech", **changes: Any) -> tuple[FitSettings, list[Log]]:
-    """Settings and logs of a problem with two outputs and two logs."""
     settings = load_settings(config, (PASSIVE if config == "article-mech" else {}) | changes)
     pose = settings.arm.pose("study")
     return settings, [step_log(pose, [60.0, -80.0]), step_log(pose, {3: [30.0]})]
@@ -31,7 +30,6 @@ def random_candidates(problem: Problem, n: int) -> np.ndarray:
 
 
 def assert_same(spread: Problem, plain: Problem, theta: np.ndarray) -> None:
-    """Every bit of objectives and residuals."""
     ours, theirs = spread.evaluate(theta), plain.evaluate(theta)
     np.testing.assert_array_equal(ours.segments, theirs.segments)
     np.testing.assert_array_equal(ours.overall, theirs.overall)

@@ -19,7 +19,6 @@ TRUTH = OPENINGS | {"M_boom": 1300.0, "M_bar": 110.0, "flow": 120.0, "droop": 60
 
 
 def two_joints(folder: Path, model: str = BOOM, **settings) -> FitSettings:
-    """Settings of a fit of both joints."""
     sizes = {"lift": (8000, 20), "tilt": (400, 3)}
     actuators = {
         n: {"kind": "rotary", "displacement": size, "max_opening": area} for n, (size, area) in sizes.items()

@@ -15,8 +15,6 @@ DEADLY = 1e-3
 
 
 class Rows:
-    """Methods that take rows to rows."""
-
     def squares(self, theta: np.ndarray) -> np.ndarray:
         return theta**2
 

@@ -46,14 +46,12 @@ class World:
 
 
 def named(*joints: str, pattern: str = "{}_cmd_V {}_deg") -> dict[str, tuple[str, str]]:
-    """Columns that have the joints' names, in m of a telescope."""
     command, angle = pattern.split()
     units = {"telescope": angle.replace("deg", "m")}
     return {joint: (command.format(joint), units.get(joint, angle).format(joint)) for joint in joints}
 
 
 def urdf(world: World, folder: Path) -> Path:
-    """Write the URDF of an arm, and its meshes in mm where it has some."""
     text = '<link name="base"/>'
     for name, parent, child, kind, at, limits in world.parts:
         length = SIZES.get(child, 0.6)

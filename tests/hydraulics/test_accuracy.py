@@ -13,7 +13,6 @@ SETTINGS = HydraulicSettings()
 
 
 def errors(p: Records, command: np.ndarray, exact: np.ndarray, **steps: int) -> np.ndarray:
-    """Error of every candidate [deg], (n, T + 1)."""
     return np.degrees(simulate(p, command, SETTINGS, steps.get("steps", 1)) - exact)
 
 

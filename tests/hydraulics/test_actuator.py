@@ -35,12 +35,10 @@ Seen = list[tuple[Observation, np.ndarray]]
 
 
 def cylinder(angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Travel and moment arm at angles of any shape."""
     return triangle(angle, A, B, THETA0, SHORTEST)[:2]
 
 
 def weight(angle: float) -> float:
-    """Torque of gravity and spring on the pendulum [N·m]."""
     return MASS * GRAVITY * CENTRE * cos(angle + TILT) + STIFFNESS * (angle - START)
 
 

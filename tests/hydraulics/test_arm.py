@@ -43,7 +43,6 @@ def test_seven_joints_at_once_are_stable_for_random_parameters(arm: Arm):
 
 
 def test_seven_joints_converge_with_mujocos_step(arm: Arm):
-    """Against the same arm at sixteen steps a sample, all joints driven."""
     p, command = nominal(arm, SETTINGS), commands(200, ALL, seed=3)
     exact = DrivenArm(arm, p, command, SETTINGS, steps=16).run()
     error = [abs(DrivenArm(arm, p, command, SETTINGS, k).run() - exact).max() for k in (1, 2, 4)]

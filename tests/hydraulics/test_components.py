@@ -20,6 +20,7 @@ from hydroid.hydraulics.solenoid import (
 )
 from hydroid.hydraulics.valve import notched, port_flow
 from hydroid.settings.arm import Arm
+from hydroid.settings.cylinder import LinearActuator
 from hydroid.settings.hydraulics import HydraulicSettings
 
 ARTICLE = (8.0, 0.7, 0.8e-3, 12e-3, 0.9)
@@ -130,7 +131,7 @@ def test_the_flow_into_a_chamber_has_the_slopes_that_it_states(compensation: flo
 def test_linkages_are_those_of_the_arms_cylinders(arm: Arm):
     moved = coefficients(nominal_joints(arm, HydraulicSettings())[None].view(np.recarray))[0]
     for joint, c in zip(arm.joints, moved, strict=True):
-        if joint.actuator.kind != "linear":
+        if not isinstance(joint.actuator, LinearActuator):
             continue
         q = np.radians(np.linspace(*joint.range, 9))
         x, r, _ = triangle(q, c.pivot_distance_1, c.pivot_distance_2, c.theta0, c.shortest)

@@ -59,7 +59,6 @@ BARS = {"ground": 0.35, "rocker": 0.45, "coupler": 0.4, "child": 0.35, "phase_de
 
 
 def bucket(arm: Arm, **bars: float) -> Arm:
-    """The shoulder moved by a four-bar linkage."""
     sides = Triangle(a=0.8, b=0.45, theta0=10.0)
     return with_cylinder(arm, triangle=sides, four_bar=FourBar.model_validate(BARS | bars), stroke=560.0)
 

@@ -21,7 +21,6 @@ UNLIKE = {
 
 
 def wheel(arm: Arm, values: dict[str, float], command: np.ndarray) -> np.ndarray:
-    """Angles [rad], (T,), of a lone wheel under a rotary actuator."""
     p = changed(nominal_joints(arm, SETTINGS)[None, [3]].view(np.recarray), damping=5.0, **values)
     return simulate(rotary(p), command, SETTINGS, start=0.0, model=lone_wheel(0.05))[0]
 

@@ -24,17 +24,14 @@ def test_a_shipped_log_reads_fast_and_without_a_finding(name: str) -> None:
 
 
 def cell(row: int, column: int, text: str):
-    """A file with another text in one cell."""
     return lambda rows: rows[row].__setitem__(column, text)
 
 
 def values(change):
-    """A file of other numbers."""
     return lambda rows: rows.__setitem__(slice(None), lines(change(cells())))
 
 
 def clock(stamp):
-    """A file whose rows have other times."""
     return lambda rows: [row.__setitem__(0, stamp(k)) for k, row in enumerate(rows[1:])]
 
 

@@ -49,7 +49,6 @@ def rig(name: str = "rig_all_joints_1", rows: int = 4000) -> Table:
 
 
 def of(prefix: str, change: Callable[[np.ndarray], np.ndarray], table: Table | None = None) -> list[Table]:
-    """The rig's log with the columns changed whose names begin with `prefix`."""
     table = rig() if table is None else table
     return [{name: change(values) if name.startswith(prefix) else values for name, values in table.items()}]
 
@@ -94,7 +93,6 @@ def misspelt() -> list[Table]:
 
 
 def early(seconds: float) -> list[Table]:
-    """A boom whose angles are logged too early."""
     return of(
         "q", lambda q: np.r_[q[round(100 * seconds) :], np.full(round(100 * seconds), q[-1])], boom([60, -60])
     )
@@ -154,7 +152,6 @@ WRONG = (
 
 
 def save(wrong: Wrong, folder: Path) -> list[Path]:
-    """Write the logs of one way to be wrong."""
     paths: list[Path] = []
     for k, table in enumerate(wrong.make(), 1):
         paths.append(folder / f"log{k}.csv")

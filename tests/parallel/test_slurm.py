@@ -54,7 +54,6 @@ def submit(script: str, *arguments: object, options: tuple[str, ...] = ()) -> st
 
 
 def jobs(job: str) -> list[dict[str, str]]:
-    """What Slurm says about a job, or about each element of an array."""
     lines = run("scontrol", "--oneliner", "show", "job", job).splitlines()
     return [dict(word.split("=", 1) for word in line.split() if "=" in word) for line in lines]
 
@@ -67,7 +66,6 @@ def wait_for(condition: Callable[[], object], seconds: float = 150) -> None:
 
 
 def told() -> str:
-    """What the jobs have printed."""
     return "\n".join(f"{file.name}: {file.read_text()}" for file in sorted(Path().glob("slurm-*.out")))
 
 

@@ -42,7 +42,6 @@ def log_of(settings: FitSettings, joints: list[int], seconds: float = 4.0) -> Lo
 
 
 def response(fitted: IdentifiedModel, log: Log, joints: list[int]) -> Response:
-    """What the population simulation gives, pressures too where the stage has them."""
     settings, columns = fitted.settings, [j - 1 for j in joints]
     pressures = columns if settings.stage == "hyd" else []
     simulation = make_simulation(load_model(settings.arm), log, columns, settings, pressures)

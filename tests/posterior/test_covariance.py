@@ -44,7 +44,7 @@ def test_the_sandwich_is_right_where_weights_and_noise_do_not_match():
     bread = np.linalg.inv(columns * weight**2 @ columns.T)
     expected = bread @ (columns * weight**4 * scatter**2 @ columns.T) @ bread
     at = linearised(problem, THETA)
-    noise = tuple(Noise(500, w * s, np.empty(0), "settings") for w, s in zip(weights, levels, strict=True))
+    noise = tuple(Noise(500, w * s, np.empty(0), given=True) for w, s in zip(weights, levels, strict=True))
     found = uncertainty_from(problem, at, noise)
     np.testing.assert_allclose(found.standard_deviation, np.sqrt(np.diag(expected)), rtol=1e-6)
 
@@ -144,15 +144,14 @@ def test_noise_is_taken_from_settings_residual_or_floor():
     (channel,) = problem.channels
     how, rng = problem.settings.objective, np.random.default_rng(6)
     residual = rng.normal(0, 0.3 * DEG, 1000)
-    assert channel_noise(channel, residual, how).source == "residual"
     quiet = channel_noise(channel, 1e-6 * residual, how)
-    assert (quiet.source, quiet.level) == ("smallest", pytest.approx(MIN_LEVEL["angle"]))
+    assert quiet.level == pytest.approx(MIN_LEVEL["angle"])
     assert quiet.correlation_time == 0
     # a slow residual just below the smallest level stays slow
     slow_residual = ar1(rng, 1000, AR1, 0.04 * DEG)
     assert channel_noise(channel, slow_residual, how).correlation_time > 5
     given = channel_noise(channel, residual, how.model_copy(update={"noise_deg": {2: 0.7}}))
-    assert (given.source, given.level) == ("settings", pytest.approx(0.7 * DEG))
+    assert (given.given, given.level) == (True, pytest.approx(0.7 * DEG))
     stated = how.model_copy(update={"noise_deg": 0.7})
     weighted = channel_noise(replace(channel, weight=3.0), residual, stated)
     assert weighted.level == pytest.approx(2.1 * DEG)

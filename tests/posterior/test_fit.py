@@ -21,7 +21,6 @@ HELD = ("I_max", "I_min", "A", "C")
 
 @pytest.fixture(scope="module")
 def fitted(tmp_path_factory: pytest.TempPathFactory) -> FitResult:
-    """A small fit of stage 2 to six simulated seconds with noise."""
     held = {f"parameters.{name}.fixed": HYDRAULIC[name] for name in HELD}
     settings = load_settings("article-hyd", SMALL | held)
     truth = {name: HYDRAULIC[name] for name in settings.parameters if name in HYDRAULIC}

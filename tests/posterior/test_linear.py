@@ -17,7 +17,6 @@ THETA, NOISE = np.array(list(TRUTH.values())), np.radians(0.1)
 
 @pytest.fixture(scope="module")
 def problem(study_log: Log) -> Problem:
-    """Noise-free data at the truth."""
     settings = load_settings("article-mech", {"simulation.other_joints": "locked"})
     return Problem(settings, [simulate_log(settings, study_log, TRUTH)])
 

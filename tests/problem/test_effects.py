@@ -32,7 +32,6 @@ def of_days(folder, log: object = None, **own: object) -> FitSettings:
 
 
 def shifted(folder, shift: float) -> FitSettings:
-    """An arm without groups whose first joint has another dead band."""
     band = {"quantity": "dead_band", "joints": [1], "fixed": 20 + shift}
     return two_joints(folder, parameters=PARAMETERS | {"band": band})
 

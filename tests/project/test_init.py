@@ -17,8 +17,9 @@ from typer.testing import CliRunner
 import hydroid
 from hydroid.commands.app import app
 from hydroid.errors import LogError, ModelError, SettingsError
-from hydroid.project import Project
+from hydroid.project.project import Project
 from hydroid.settings.arm import load_arm
+from hydroid.settings.cylinder import LinearActuator
 from hydroid.settings.fit import FitSettings
 
 URDF = Path(__file__).parents[2] / "examples" / "urdf"
@@ -142,7 +143,7 @@ def test_an_error_leaves_nothing_behind(tmp_path: Path):
 def test_without_cad_there_is_a_template_that_runs(tmp_path: Path):
     init(tmp_path / "mine")
     arm = load_arm(tmp_path / "mine" / "arm.yaml")
-    assert [joint.actuator.kind for joint in arm.joints] == ["linear", "linear"]
+    assert all(isinstance(joint.actuator, LinearActuator) for joint in arm.joints)
     assert arm.joints[0].actuator.sense == 1
     assert arm.joints[1].actuator.sense == -1  # its cylinder pushes the stick down
     settings = hydroid.load_settings(tmp_path / "mine" / "fit.yaml")
@@ -151,7 +152,6 @@ def test_without_cad_there_is_a_template_that_runs(tmp_path: Path):
 
 
 def project(place: Path, folder: Path, text: str) -> tuple[Project, FitSettings]:
-    """A project of a changed log, and its settings."""
     (folder / "log.csv").write_text(text)
     made = init(folder / "mine", place / "digger/urdf/digger.urdf", [folder / "log.csv"])
     return made, hydroid.load_settings(folder / "mine" / "fit.yaml")

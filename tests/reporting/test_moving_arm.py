@@ -59,6 +59,6 @@ def test_a_long_log_has_few_moments_and_begins_at_the_largest_difference(model):
 def test_the_worst_log_is_shown_first_and_one_that_diverged_never():
     good = predicted(LOG.angle[:, [1, 2]])
     bad, lost = (predicted(good.response + error) for error in (0.1, np.nan))
-    (section,) = motion_section(ARM, {"a.csv": good, "b.csv": lost, "c.csv": bad})
-    assert [tab.name for tab in section.tabs] == ["c.csv", "a.csv"]
-    assert motion_section(ARM, {"b.csv": lost}) == ()
+    section = motion_section(ARM, {"a.csv": good, "b.csv": lost, "c.csv": bad})
+    assert [tab.button for tab in section.tabs] == ["c.csv", "a.csv"]
+    assert motion_section(ARM, {"b.csv": lost}) is None

@@ -25,8 +25,6 @@ HOSTILE = "<b>&_%$.csv"
 
 
 class Reader(HTMLParser):
-    """Collects what a page shows and what it refers to."""
-
     def __init__(self, source: str) -> None:
         super().__init__()
         self.tags: list[str] = []
@@ -126,7 +124,7 @@ def test_errors_of_a_joint_that_slides_are_in_millimetres():
     (one,) = judge(problem.settings, [], {}, [make_prediction(problem.logs[0], error=0.02)])
     slid = one.model_copy(update={"slides": True, "horizons_deg": {"the fit": (1.0, None, 1.0, 1.0, 1.0)}})
     assert "20 mm" in verdict_table({"a": [slid]}).rows[0]
-    (section,) = horizon_section({"a": [slid]})
+    section = horizon_section({"a": [slid]})
     assert section.tables["horizons"].rows[0][2:4] == ("17 mm", None)
 
 
@@ -175,7 +173,7 @@ def test_a_validation_of_several_fits_shows_the_best_first_in_shared_charts():
     page = validation_page(predictions, fits, settings.arm)
     assert page.lead == "good is best. shoulder: predicts, over 1 unseen log."
     (tab,) = next(section for section in page.sections if section.title == "Response").tabs
-    labels = {mark.label for panel in tab.plot.draw().panels for mark in panel.marks}
+    labels = {mark.label for panel in tab.draw().panels for mark in panel.marks}
     assert {label.partition(" (")[0] for label in labels} >= {"good", "bad", "measured"}
 
 

@@ -25,7 +25,6 @@ SETTINGS = load_settings("article-mech", SMALL | {"refinement": None})
 
 @pytest.fixture(scope="module")
 def path(tmp_path_factory) -> Path:
-    """The log of a small fit."""
     path = tmp_path_factory.mktemp("log") / "log.csv"
     write_log(path, stepped(SETTINGS, TRUTH, [60.0, -80.0]), SETTINGS.log)
     return path
@@ -54,7 +53,6 @@ def stored(number: int) -> dict[str, np.ndarray]:
 
 
 def same(folder: RunFolder, number: int) -> bool:
-    """Whether a folder's checkpoint is the one of that number."""
     found, arrays = folder.checkpoints()["search"], stored(number)
     return found.keys() == arrays.keys() and all(np.array_equal(found[n], arrays[n]) for n in arrays)
 

@@ -11,7 +11,6 @@ from hydroid.settings.search import GeneticSettings
 
 
 def evaluate(algorithm, chromosomes, function):
-    """Evaluated chromosomes that no one may write into."""
     objectives = np.asarray(function(algorithm.decode(chromosomes)), dtype=float)
     for array in (chromosomes, objectives):
         array.flags.writeable = False

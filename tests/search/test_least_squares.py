@@ -10,13 +10,11 @@ SETTINGS = RefinementSettings()
 
 
 def rosenbrock(points):
-    """Rosenbrock's valley, its bottom at (0.75, 0.75)."""
     x, y = (4 * points - 2).T
     return np.stack((10 * (y - x**2), 1 - x), axis=1)
 
 
 def linear(singular, truth, rows=400, offset=0.0, seed=0):
-    """Residuals linear in the parameters, with these singular values."""
     rng = np.random.default_rng(seed)
     left = np.linalg.qr(rng.normal(size=(rows, len(singular))))[0]
     right = np.linalg.qr(rng.normal(size=(len(singular), len(singular))))[0]

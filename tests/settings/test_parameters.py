@@ -11,7 +11,6 @@ from hydroid.parameters import Parameter, ParameterSet
 
 
 def parameter(config: str = "fit-hyd", name: str = "A_A", **entry) -> Parameter:
-    """One parameter of a shipped config with other settings."""
     changes = {f"parameters.{name}": entry}
     found = load_settings(config, changes).parameter_set()
     return found.parameters[found.names.index(name)]

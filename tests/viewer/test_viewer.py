@@ -1,6 +1,7 @@
 """The arm in motion: what is shown is the plant, at the pace of the clock."""
 
 import io
+import time
 from dataclasses import replace
 from itertools import count
 from typing import Any
@@ -35,13 +36,10 @@ def plant(nominal: IdentifiedModel) -> Plant:
 
 @pytest.fixture
 def slide(plant: Plant) -> Sliders:
-    """All joints on sliders, from the study pose."""
     return Sliders(plant)
 
 
 class FakeViewer:
-    """A window that stays open for some pictures."""
-
     def __init__(self, playback: Any, pictures: int) -> None:
         self.playback, self.left = playback, pictures
         self.times = list[float]()
@@ -59,7 +57,10 @@ class FakeViewer:
 def played(playback: Any, pictures: int, cost: float = 0.0) -> FakeViewer:
     """Some pictures of a playback; time passes in sleep, and in `cost` seconds of work a look."""
     viewer, looks, slept = FakeViewer(playback, pictures), count(), list[float]()
-    play(playback, viewer, lambda: 100.0 + cost * next(looks) + sum(slept), slept.append)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(time, "perf_counter", lambda: 100.0 + cost * next(looks) + sum(slept))
+        patch.setattr(time, "sleep", slept.append)
+        play(playback, viewer)
     return viewer
 
 

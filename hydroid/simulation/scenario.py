@@ -92,11 +92,6 @@ class Candidates:
     def __getitem__(self, rows: slice | Index) -> "Candidates":
         return Candidates(self.joints[rows], self.mass[rows])  # pyright: ignore[reportArgumentType]
 
-    def distinct(self) -> tuple[Index, Index]:
-        """Return the rows of those that differ, m of n, and which of these each one is, shape (n,)."""
-        each = [j.tobytes() + m.tobytes() for j, m in zip(self.joints, self.mass, strict=True)]
-        return np.unique(each, return_index=True, return_inverse=True)[1:]
-
 
 @record
 class Response:
@@ -109,10 +104,6 @@ class Response:
     angle: Array
     feasible: Mask
     pressure: Array | None = None
-
-    def __getitem__(self, rows: Index) -> "Response":
-        pressure = None if self.pressure is None else self.pressure[rows]
-        return Response(self.angle[rows], self.feasible[rows], pressure)
 
 
 class Scenario:

@@ -98,12 +98,10 @@ def quantities(given: Any) -> None:
     def values(theta: np.ndarray) -> np.ndarray:
         return np.stack([value for _, value in measure(candidates(theta))], axis=1)
 
-    def said() -> Iterator[Said]:
-        for one in fits(settings, HYDRAULIC, lambda rng: [noisy(clean, seed=rng)], given.fits):
-            found = one.posterior.propagate(values, positive)
-            yield found.value, found.sd, found.interval
-
-    report(f"quantities, logs of {given.seconds:g} s", labels, np.array([v[0] for v in actual]), said())
+    made = fits(settings, HYDRAULIC, lambda rng: [noisy(clean, seed=rng)], given.fits)
+    found = (one.posterior.propagate(values, positive) for one in made)
+    said = ((one.value, one.sd, one.interval) for one in found)
+    report(f"quantities, logs of {given.seconds:g} s", labels, np.array([v[0] for v in actual]), said)
 
 
 def own_arm(given: Any) -> None:
@@ -114,11 +112,8 @@ def own_arm(given: Any) -> None:
         hydroid.init(machine, arm=folder / "robot.urdf")
         hydroid.init(mine, arm=folder / "robot.urdf", log=sorted(folder.glob("log_*.csv")))
         settings, truth, seeds = load_settings(mine / "fit.yaml"), example["machine"](machine), count(1000)
-
-        def logs(_: Any) -> list[Log]:
-            return [example["recorded"](truth, next(seeds)) for _ in range(2)]
-
-        made = fits(settings, truth.values, logs, given.fits)
+        drawn = partial(example["recorded"], truth)
+        made = fits(settings, truth.values, lambda _: [drawn(next(seeds)), drawn(next(seeds))], given.fits)
         true = settings.parameter_set().vector(truth.values, "truth")
         names = np.array(settings.parameter_set().names)[true > 0]
         report("own arm", names, true[true > 0], parameters(made, true > 0))
@@ -170,8 +165,8 @@ def left_out(given: Any) -> None:
             problem = Problem(model.settings, [*logs[:i], *logs[i + 1 :]])
             band = predicted(problem, refined(problem, model.theta), log)
             errors = f"{np.degrees(band.expected):.3f} | {np.degrees(band.error):.3f}"
-            ratio = f"{band.error / band.expected:.1f}"
-            row(Path(log.source).stem, errors, ratio, f"{100 * band.inside:.0f} %")
+            shares = f"{band.error / band.expected:.1f} | {100 * band.inside:.0f} %"
+            row(Path(log.source).stem, errors, shares)
 
 
 if __name__ == "__main__":

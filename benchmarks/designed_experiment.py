@@ -22,7 +22,6 @@ from hydroid.settings.search import RefinementSettings
 
 TOTAL, TOTAL_SD, NOISE_DEG, SEED = 42.5, 0.5, 0.1, 1
 OFF = {"rest": {"rest_s": 0.0}, "slew": {"slew_pct_s": None}, "clearance": {"clearance_m": None}}
-"""settings that switch a limit off"""
 THETA = np.array([*TRUTH.values()])
 
 
@@ -74,12 +73,12 @@ def study(given: Any) -> None:
 
     designed, drawn = best.best.experiment, weakest([predicted(e) for e in randoms])
     middle = np.argsort(drawn[:, -1])[(len(drawn) - 1) // 2]  # the better of the two in the middle
-    pair = randoms[middle], designed
-    at_random, as_designed = (weakest(refitted(settings, response(e), given.fits)) for e in pair)
+    two = (refitted(settings, response(e), given.fits) for e in (randoms[middle], designed))
+    at_random, as_designed = map(weakest, two)
     typical, best_sd = np.median(drawn, axis=0), weakest(predicted(designed))
     columns = (100 * sd for sd in (typical, drawn[middle], at_random, best_sd, as_designed))
-    print(f"standard deviations [%], {given.duration:g} s, {NOISE_DEG} deg of noise")
-    print(f"weakest parameter of the best random one: {100 * drawn[:, -1].min():.3g}")
+    title = f"standard deviations [%], {given.duration:g} s, {NOISE_DEG} deg of noise"
+    print(f"{title}; weakest parameter of the best random one: {100 * drawn[:, -1].min():.3g}")
     table(
         "parameter | random, median of predicted | median random one, predicted | refitted "
         "| designed, predicted | refitted | ratio predicted | ratio refitted",

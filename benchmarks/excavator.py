@@ -2,20 +2,25 @@
 
 Nothing in the shipped fit is random: seed 1 is the shipped start, and every other seed moves all start values
 by half a standard deviation of their priors. --folder: one that has the authors' other logs as well, which
-are predicted, too; --more fits those of the same morning. Prints mean absolute errors over whole logs [deg].
+are predicted, too, those of other days also with a few parameters adapted to the first one; --more fits those
+of the same morning. Prints mean absolute errors over whole logs [deg].
 """
 
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 from common import EXAMPLES, Clock, options, row, table
 
 import hydroid
+from hydroid.errors import SettingsError
+from hydroid.fitting.baselines import NAMES
 from hydroid.prediction import predict
 
 FOLDER = EXAMPLES / "excavator"
 KINDS = ("fit", "more", "check", "later", "heavy")  # the last: of the next day, with a loaded bucket
 JOINTS = {2: "boom", 3: "arm", 4: "bucket", 1: "swing"}
+FREED = {"later": (None, "day_A,day_B"), "heavy": (None, "P_flow,M_bucket", "P_flow,day_A,day_B")}
 
 
 def starts(seed: int) -> dict[str, object]:
@@ -33,16 +38,28 @@ def study(seed: int, folder: Path, fitted: tuple[str, ...]) -> None:
     settings = hydroid.load_settings(FOLDER / "fit.yaml", starts(seed))
     files = {kind: sorted(folder.glob(f"{kind}_*.csv")) for kind in KINDS}
     logs = {kind: hydroid.read_logs(files[kind], settings) for kind in KINDS if files[kind]}
-    together = [log for kind in fitted for log in logs[kind]]
-    clock, result, joints = Clock(), hydroid.fit(settings, together), settings.outputs
-    outputs, ended = result.problem.outputs, result.fit.refinement
-    assert ended is not None
-    simulations = int(result.fit.history[-1, 2]) + ended.evaluations
-    for kind, those in logs.items():
-        error = [np.abs(log.angle[:, outputs] - predict(result.model, log, joints)) for log in those]
-        mean = dict(zip(joints, np.degrees(np.concatenate(error).mean(axis=0)), strict=True))
-        errors = (f"{mean[joint]:.2f}" for joint in JOINTS)
-        row(seed, f"{kind}_*", *errors, simulations, ended.ending.value, clock)
+    clock, result = Clock(), hydroid.fit(settings, [log for kind in fitted for log in logs[kind]])
+    ended, simulations = result.fit.refinement, int(result.fit.history[-1, 2])
+    simulations += ended.evaluations if ended else 0
+
+    def judged(name: str, those: list[hydroid.Log], model: hydroid.IdentifiedModel | None, *end: object):
+        """Without a model by the tables of speeds of the fitted logs."""
+        errors = [result.baselines[joint][NAMES[1]].errors(those) for joint in JOINTS]
+        if model is not None:
+            every = [log.angle[:, [1, 2, 3, 0]] - predict(model, log, [*JOINTS]) for log in those]
+            errors = np.concatenate(every).T
+        row(seed, name, *(f"{np.degrees(np.abs(one).mean()):.2f}" for one in errors), *end)
+
+    for kind, (first, *others) in logs.items():
+        judged(f"{kind}_*", [first, *others], result.model, simulations, result.summary.ending, clock)
+        if kind in FREED:
+            judged(f"{kind}_02 and on", others, result.model)
+            judged("the same, a table of speeds", others, None)
+        for free in FREED.get(kind, ()):
+            with suppress(SettingsError):  # nothing is freed
+                adapted = hydroid.adapt(first, fit=result, free=free)
+                freed = ", ".join(step["parameter"] for step in adapted.content["steps"][1:])
+                judged(f"the same, {freed} adapted{'' if free else ' (its choice)'}", others, adapted.model)
 
 
 if __name__ == "__main__":

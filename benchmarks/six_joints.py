@@ -27,19 +27,17 @@ SETTINGS = {
     "search.algorithm": "multistart",
     "search.multistart": {"starts": 1, "horizons": [5.0, 20.0], "iterations": 30, "gain_tolerance": 1e-3},
     "refinement": {"iterations": 40, "gain_tolerance": 1e-4},
-    "joint_refinement": False,
 }
 
 if __name__ == "__main__":
     settings = hydroid.load_settings("fit-hyd", SETTINGS)
     logs = [log.first(options(__doc__, seconds=1e9).seconds) for log in hydroid.read_logs([LOG], settings)]
     clock, result = Clock(), hydroid.fit(settings, logs)
-    fit = result.fit
+    fit, count = result.fit, len(result.problem.parameters.names)
     assert fit.refinement is not None
-    print(f"{len(result.problem.parameters.names)} parameters, {logs[0].duration:g} s of log")
-    print(f"{clock}, {int(fit.history[-1, 2]) + fit.refinement.evaluations} simulations")
+    simulations, ending = int(fit.history[-1, 2]) + fit.refinement.evaluations, fit.refinement.ending.value
+    print(f"{count} parameters, {logs[0].duration:g} s of log, {clock}, {simulations} simulations: {ending}")
     for estimate in fit.estimates.values():
         print(f"{estimate.name}: rms {np.rad2deg(estimate.rms):.3f} deg")
-    print(f"converged: {fit.refinement.converged} ({fit.refinement.ending.value})")
     error = np.rad2deg(np.abs(logs[0].angle[:, :6] - fit.best.responses[0]).mean(axis=0))
     print("mean absolute [deg], joints 1 to 6:", *(f"{e:.3f}" for e in error))

@@ -1,12 +1,9 @@
 """Forty machines that hydroid has not seen, through the commands that `hydroid init` prints.
 
-    python benchmarks/strangers.py [--machines 40] [--first 0] [--seed 1]
-    python benchmarks/strangers.py --worlds --machines 12    # the arms of tests/helpers/worlds.py
-
 Every machine is random (`Machine`). Its equations and integrator are those of this file: nothing of hydroid
 simulates it. It is recorded three times as with sticks, with jitter; two logs are fitted, and the third is
 predicted. Good is an rms error on every joint of at most twice the noise plus 2 % of its travel. A joint that
-is not good must be named by the verdict.
+is not good must be named by the verdict. --worlds --machines 12: the arms of tests/helpers/worlds.py.
 """
 
 import shutil
@@ -18,13 +15,12 @@ import numpy as np
 from common import Clock, options, row, table
 from numba import njit
 from numpy.random import Generator
-from numpy.typing import NDArray
 from robots import LIMIT, body, joint
 from worlds import NOISE_DEG, NOISE_M, WORLDS, write_log
 
 import hydroid
+from hydroid.arrays import Array
 
-Array = NDArray[np.float64]
 STEP = 0.002
 """of the integration [s]"""
 GRAVITY = 9.81
@@ -253,8 +249,7 @@ def world(number: int, folder: Path) -> tuple[str, Path, list[Path], Array]:
 if __name__ == "__main__":
     given = options(__doc__, machines=40, first=0, seed=1, worlds=False, folder="build/strangers")
     shutil.rmtree(given.folder, ignore_errors=True)
-    good, silent = 0, 0
-    make = world if given.worlds else partial(stranger, given.seed)
+    good, silent, make = 0, 0, world if given.worlds else partial(stranger, given.seed)
     table("machine | joints | unseen rms [deg] | good at most | named joints | time")
     for number in range(given.first, given.first + given.machines):
         folder = Path(given.folder) / f"{number:02d}"

@@ -1,8 +1,8 @@
 """The size and shape of the code, beside what it may be at most.
 
-Tokens are names, operators, numbers and strings: comments and the packing of lines do not count, nor do
-docstrings among the statements. A function's arguments are all but `self` and `cls`; a command's are its
-options, and are not counted. Constants are names in capitals at the top level of a file.
+Tokens are names, operators, numbers and strings: comments and the packing of lines do not count. A function's
+arguments are all but `self` and `cls`; a command's are its options, and are not counted. Constants are names
+in capitals at the top level of a file.
 """
 
 import ast
@@ -79,26 +79,22 @@ def measures() -> dict[str, float]:
     trees = {path: ast.parse(path.read_text()) for path in sorted((ROOT / "hydroid").rglob("*.py"))}
     sizes = [len(path.read_text().splitlines()) for path in trees]
     nodes = [(path, node) for path, tree in trees.items() for node in ast.walk(tree)]
-    strings = sum(isinstance(n, ast.Expr) and isinstance(n.value, ast.Constant) for _, n in nodes)
-    functions = [(p, f) for p, f in nodes if isinstance(f, ast.FunctionDef | ast.AsyncFunctionDef)]
+    defined = [(p, f) for p, f in nodes if isinstance(f, ast.FunctionDef | ast.AsyncFunctionDef)]
     free = ROOT / "hydroid" / "commands"
     targets = re.findall(r"^([a-z][a-z-]*):(?!=)", (ROOT / "Makefile").read_text(), re.MULTILINE)
     return {
         "files": len(trees),
         "lines": sum(sizes),
         "tokens": sum(map(tokens, trees)),
-        "statements": sum(isinstance(node, ast.stmt) for _, node in nodes) - strings,
         "constants": sum(map(constants, trees.values())),
         "settings": settings(FitSettings, set()),
         "commands": len(COMMANDS),
         "make targets": len(set(targets)),
-        "functions with more than 6 arguments": sum(
-            arguments(f) > 6 for p, f in functions if p.parent != free
-        ),
+        "functions with more than 6 arguments": sum(arguments(f) > 6 for p, f in defined if p.parent != free),
         "import cycles": cycles(trees),
         "median file": statistics.median(sizes),
         "largest file": max(sizes),
-        "largest function": max((f.end_lineno or f.lineno) - f.lineno + 1 for _, f in functions),
+        "largest function": max((f.end_lineno or f.lineno) - f.lineno + 1 for _, f in defined),
         "lines of tests": lines("tests"),
         "lines of benchmarks": lines("benchmarks"),
     }

@@ -29,9 +29,7 @@ def make_problem(config: str, joints: list[int], other_joints: str) -> Problem:
     """A problem whose data are commands of some joints, and stage 1's response to them at the truth."""
     settings = load_settings(config, {"simulation.other_joints": other_joints})
     log = pseudo_random_log(settings.arm.pose("study"), joints, duration=75.01)
-    if config == "article-mech":
-        log = simulate_log(settings, log, TRUTH)
-    return Problem(settings, [log])
+    return Problem(settings, [simulate_log(settings, log, TRUTH) if config == "article-mech" else log])
 
 
 def population(problem: Problem) -> np.ndarray:

@@ -1,8 +1,8 @@
 """Adaptation: a fit moved to a changed machine by a few of its parameters, all others held at its estimate.
 
 Which few is found by trying: the one that lowers the error most on parts of the logs left out is freed, then
-the next, until none lowers it by 5 % on every part: what helps in one half of a log alone may be chance. Each
-joint counts by its error before: what one errs by in degrees must not hide that another's is halved.
+the next, until none lowers it by 5 % on every part: what helps in one half of a log alone may be chance.
+Each joint counts by its error before: what one errs by in degrees must not hide that another's is halved.
 Candidates are what all joints share, such as the pump and the masses, and the effects of the logs' groups:
 what a load, a slower engine or another day changes.
 """

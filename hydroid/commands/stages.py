@@ -196,8 +196,8 @@ def adapt(
 
     Args:
         logs (LOG): The new logs.
-        free (NAME,NAME): Parameters to be freed [default: masses and pump, one after the other, as long as
-            the error on parts of the logs left out falls].
+        free (NAME,NAME): Parameters to be freed [default: masses, pump and effects of the logs' groups, one
+            after the other, as long as the error falls on every part of the logs left out].
         out (DIR): Run folder [default of the command line: runs/adapt].
 
     Raises:

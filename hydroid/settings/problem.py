@@ -45,7 +45,7 @@ class ParameterSettings(Settings):
     per: str | None = None
     """group: an effect of each group of `log.groups`, NAME_monday, ..., which is added to the quantity in its
     logs, around 0 with standard deviation `sd`, and one of all other logs, NAME_other: an unseen day is
-    predicted with the mean, and a wider band. The name of a group: an effect of that one"""
+    predicted with the mean, and a wider band. The name of a group, or other: an effect of that one"""
     term: Annotated[str, Field(pattern="^[A-Za-z_]+$")] | None = None
     """name of a term of the model, of one parameter or several: a fit begins without it, adds it after the
     refinement, and keeps it where it lowers the error on parts of the logs left out by 5 %; null: always

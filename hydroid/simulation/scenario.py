@@ -112,10 +112,6 @@ class Response:
     feasible: Mask
     pressure: Array | None = None
 
-    def __getitem__(self, rows: Index) -> "Response":
-        pressure = None if self.pressure is None else self.pressure[rows]
-        return Response(self.angle[rows], self.feasible[rows], pressure)
-
 
 class Scenario:
     """A log made ready for simulation: its commands drive, from the pose in which it rests before them.

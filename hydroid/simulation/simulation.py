@@ -56,15 +56,14 @@ class Simulation:
 
         The first is the start. A candidate without a force-stroke curve, or that diverged, is infeasible.
         """
-        first, place = distinct(candidates.joints, candidates.mass)
-        if len(first) < len(place):  # those that differ in other groups of logs alone
-            return self.simulate(candidates[first])[place]
         scenario, n, wanted = self.scenario, len(candidates), self._pressures
         samples = 1 + len(scenario.command) // scenario.settings.steps
         angle = np.full((n, samples, len(scenario.outputs)), np.nan)
         pressure = np.full((n, samples, len(wanted), 2), np.nan) if wanted.size else None
         exists = has_force_curve(candidates.joints[:, self.joints])
-        rows = np.flatnonzero(exists)
+        # those that differ in effects of other groups of logs are simulated once
+        first, place = distinct(candidates.joints, candidates.mass)
+        rows = np.intersect1d(np.flatnonzero(exists), first)
         threads = min(scenario.settings.threads or os.cpu_count() or 1, rows.size)
         if not threads:
             return Response(angle, exists, pressure)
@@ -91,6 +90,8 @@ class Simulation:
                 free = deque(self._stepped() for _ in range(threads))
                 left = np.flatnonzero(np.isnan(angle[rows, -1]).any(axis=1))
                 deque(pool.map(simulate, left[:, None]), maxlen=0)
+        if len(first) < n:
+            angle, pressure = angle[first[place]], None if pressure is None else pressure[first[place]]
         return Response(angle, np.all(np.isfinite(angle), axis=(1, 2)), pressure)
 
     def trace(self, candidates: Candidates) -> Observation:

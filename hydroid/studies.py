@@ -114,28 +114,6 @@ def run_study(
     cells = cell_settings(study, path)
     logs = read([path.parent / name for name in study.logs], next(iter(cells.values())))
     tasks = make_tasks(cells, study.seeds, logs)
-    return tuple(map(measured, tasks, run_all(tasks, folder, executor, progress)))
-
-
-def make_tasks(cells: Mapping[str, FitSettings], seeds: int, logs: Sequence[Log]) -> list[Task]:
-    """Return all runs of a study, seed by seed, with one thread: the runs are what is shared out."""
-    return [
-        Task(name, seed, settings.changed({"search.seed": seed, "simulation.threads": 1}), tuple(logs))
-        for seed in range(1, seeds + 1)
-        for name, settings in cells.items()
-    ]
-
-
-def measured(task: Task, result: Result) -> Row:
-    """Return the measures of one run (docs/studies.md)."""
-    if "failed" in result:
-        return Row(task.cell, task.seed, {}, result["failed"])
-    values = result["measures"] | {f"value {name}": value for name, value in result["theta"].items()}
-    return Row(task.cell, task.seed, {name: float(value) for name, value in values.items()})
-
-
-def run_all(tasks: Sequence[Task], folder: Path, executor: Executor, progress: Progress) -> list[Result]:
-    """Return the result of every task, in order; what `folder`/runs has is read, the others are performed."""
     files = [folder / "runs" / f"{task.key()}.json" for task in tasks]
     results = {file: _read(file) for file in files if file.is_file()}
     missing = {file: task for file, task in zip(files, tasks, strict=True) if file not in results}
@@ -163,7 +141,24 @@ def run_all(tasks: Sequence[Task], folder: Path, executor: Executor, progress: P
     finally:
         for future in futures:
             future.cancel()
-    return [results[file] for file in files]
+    return tuple(measured(task, results[file]) for task, file in zip(tasks, files, strict=True))
+
+
+def make_tasks(cells: Mapping[str, FitSettings], seeds: int, logs: Sequence[Log]) -> list[Task]:
+    """Return all runs of a study, seed by seed, with one thread: the runs are what is shared out."""
+    return [
+        Task(name, seed, settings.changed({"search.seed": seed, "simulation.threads": 1}), tuple(logs))
+        for seed in range(1, seeds + 1)
+        for name, settings in cells.items()
+    ]
+
+
+def measured(task: Task, result: Result) -> Row:
+    """Return the measures of one run (docs/studies.md)."""
+    if "failed" in result:
+        return Row(task.cell, task.seed, {}, result["failed"])
+    values = result["measures"] | {f"value {name}": value for name, value in result["theta"].items()}
+    return Row(task.cell, task.seed, {name: float(value) for name, value in values.items()})
 
 
 def _read(file: Path) -> Result:

@@ -1,12 +1,11 @@
 """What the logs determine: parameters, directions of the posterior, quantities; what a reader must know."""
 
 from collections.abc import Mapping, Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
 
-from hydroid.estimate import CurveEstimate, FitSummary, ParameterEstimate
+from hydroid.estimate import FitSummary, ParameterEstimate
 from hydroid.log import Log
 from hydroid.parameters import Parameter
 from hydroid.posterior.uncertainty import Flag, Source
@@ -125,31 +124,29 @@ def quantity_section(settings: FitSettings, summary: FitSummary) -> Section | No
 
 
 def speed_section(settings: FitSettings, summary: FitSummary, logs: Sequence[Log]) -> Section | None:
-    """Return the section with the curves of speed; none where there are none."""
+    """Return the section with each joint's speed against command, with its band, where there is one."""
+    curves, names = summary.curves.values(), settings.arm.joint_names
+
+    def draw() -> Chart:
+        panels: list[Panel] = []
+        for curve in curves:
+            rows = np.column_stack([curve.at, curve.value, np.array(curve.interval, dtype=float)])
+            commands = np.concatenate([log.command[:, curve.joint - 1] for log in logs])
+            low, high = [-105.0, commands.max(initial=0.0)], [commands.min(initial=0.0), 105.0]
+            marks = [Mark("spans", np.array(low), end=np.array(high), color="pale", alpha=0.4)]
+            for sign, color in (1, "blue"), (-1, "orange"):  # with the dead band between them
+                x, y, low, high = rows[sign * rows[:, 0] > 0].T
+                marks += [
+                    Mark("band", x, low, high, color=color, alpha=0.25),
+                    Mark("line", x, y, color=color),
+                    Mark("points", x, y, color=color, width=5),
+                ]
+            title = f"{names[curve.joint - 1]}: {curve.label}"
+            panels.append(Panel(curve.along, f"speed [{curve.unit}]", tuple(marks), title, 250))
+        return Chart(tuple(panels))
+
     text = "Speeds in mid travel against command, with 95 % intervals. Grey: commands beyond the logs."
-    curves = tuple(summary.curves.values())
-    plot = Plot("speed", text, partial(draw_speeds, curves, logs, settings.arm.joint_names))
-    return Section("Speeds", plots=(plot,), folded=True) if curves else None
-
-
-def draw_speeds(curves: Sequence[CurveEstimate], logs: Sequence[Log], joints: Sequence[str]) -> Chart:
-    """Draw each joint's speed against command, with its band."""
-    panels: list[Panel] = []
-    for curve in curves:
-        rows = np.column_stack([curve.at, curve.value, np.array(curve.interval, dtype=float)])
-        commands = np.concatenate([log.command[:, curve.joint - 1] for log in logs])
-        low, high = [-105.0, commands.max(initial=0.0)], [commands.min(initial=0.0), 105.0]
-        marks = [Mark("spans", np.array(low), end=np.array(high), color="pale", alpha=0.4)]
-        for sign, color in (1, "blue"), (-1, "orange"):  # with the dead band between them
-            x, y, low, high = rows[sign * rows[:, 0] > 0].T
-            marks += [
-                Mark("band", x, low, high, color=color, alpha=0.25),
-                Mark("line", x, y, color=color),
-                Mark("points", x, y, color=color, width=5),
-            ]
-        title = f"{joints[curve.joint - 1]}: {curve.label}"
-        panels.append(Panel(curve.along, f"speed [{curve.unit}]", tuple(marks), title, 250))
-    return Chart(tuple(panels))
+    return Section("Speeds", plots=(Plot("speed", text, draw),), folded=True) if curves else None
 
 
 def merged_tables(runs: Sequence[Record]) -> dict[str, Table]:

@@ -140,7 +140,11 @@ def _explained(fault: Any, kind: type[Settings]) -> tuple[str, str]:
     if fault["type"] == "missing":
         return key, f"setting {key!r} is missing"
     if fault["type"] == "extra_forbidden":
-        allowed = _allowed(kind, fault["loc"][:-1])
+        inner: Any = kind
+        for part in fault["loc"][:-1]:
+            field = getattr(inner, "model_fields", {}).get(str(part))
+            inner = field and field.annotation
+        allowed = [*getattr(inner, "model_fields", ())]
         near = difflib.get_close_matches(str(fault["loc"][-1]), allowed, n=1)
         choice = f"; did you mean {near[0]!r}?" if near else f"; allowed here: {', '.join(allowed)}"
         return key, f"unknown setting {_shown(key)}{choice if allowed else ''}"
@@ -160,13 +164,3 @@ def _shown(value: object) -> str:
     else:
         text = {"None": "null", "True": "true", "False": "false"}.get(repr(value), repr(value))
     return text if len(text) <= 60 else f"{text[:56]}...{text[-1]}"
-
-
-def _allowed(kind: type[Settings], loc: tuple[Any, ...]) -> list[str]:
-    for part in loc:
-        field = kind.model_fields.get(str(part))
-        inner = field.annotation if field else None
-        if not (isinstance(inner, type) and issubclass(inner, Settings)):
-            return []
-        kind = inner
-    return [*kind.model_fields]

@@ -11,7 +11,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hydroid.advice.growth import MIN_RESIDUAL, Refit, parts, refitted
+from hydroid.advice.growth import MIN_RESIDUAL
+from hydroid.advice.left_out import Refit, parts, refitted
 from hydroid.arrays import rms
 from hydroid.errors import SettingsError
 from hydroid.files import Plain

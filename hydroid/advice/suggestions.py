@@ -11,7 +11,8 @@ import yaml
 from hydroid.advice.assumptions import assumption_findings, doubts
 from hydroid.advice.design import ExperimentSimulator, forecast
 from hydroid.advice.experiment import RandomExperiments
-from hydroid.advice.growth import MIN_GAIN, Candidate, promising, refitted, score_terms
+from hydroid.advice.growth import MIN_GAIN, Candidate, promising, score_terms
+from hydroid.advice.left_out import refitted
 from hydroid.arrays import Array
 from hydroid.errors import SettingsError
 from hydroid.estimate import finite

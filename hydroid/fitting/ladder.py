@@ -11,7 +11,8 @@ from typing import Protocol
 
 import numpy as np
 
-from hydroid.advice.growth import MIN_GAIN, refitted
+from hydroid.advice.growth import MIN_GAIN
+from hydroid.advice.left_out import refitted
 from hydroid.arrays import Array, record
 from hydroid.fitting.checkpoints import Checkpoints
 from hydroid.fitting.multistart import each_alone

@@ -117,6 +117,15 @@ def net_opening(c, z, displacement: float) -> float:
 
 
 @compilable
+def mean_opening(c, z, w, substeps: int, step: float) -> float:
+    """Advance the plungers over so many sub-steps; the mean opening [m²], below 0 towards B."""
+    net = 0.0
+    for i in range(substeps):
+        net += net_opening(c, z, move_spool(c, z, w, i, step))
+    return net / substeps
+
+
+@compilable
 def _fill(c, w, supply: float, pump_area: float, tank_area: float) -> None:
     # oil that cavitates pushes with vapour pressure, whatever volume is missing, and does not resist
     w.filled = 1.0 if w.pressure > 0.0 else 0.0

@@ -14,29 +14,22 @@ share the pump's line, whose pressure P satisfies one equation, Σ Q_i(P) = Q_P(
 Commands, delays, coils and plungers are those of the dynamic rollout, law by law. Steps are long: what is
 integrated is the angle alone, with load and lever arm taken at the middle of the step. Joints without an
 actuator stand still. Leakage is left out, so nothing sags.
-
-What a valve opens follows from its command alone, whatever the arm does. So the openings of a population are
-computed first, once for all candidates whose valve is the same (`valve_openings`): of two candidates that
-differ by one parameter, all joints but one.
 """
 
 # pyright: reportMissingParameterType=false
 # a law takes floats or arrays that broadcast, and compiled code whatever has its fields
 
-from collections import deque
-from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
 from numba import njit, types
 
-from hydroid.arrays import Array, Structs
 from hydroid.hydraulics.cylinder import bent, rod, volume
 from hydroid.hydraulics.elementwise import compilable
-from hydroid.hydraulics.joint import command, move_spool, net_opening
+from hydroid.hydraulics.joint import command, mean_opening
 from hydroid.hydraulics.kernel import SOURCE, Plugin, make_pad
 from hydroid.hydraulics.pump import begin_line, come_up, delivery
-from hydroid.hydraulics.records import LINEAR, SCRATCH
+from hydroid.hydraulics.records import LINEAR
 from hydroid.hydraulics.valve import MARGIN
 from hydroid.simulation.rollout import mujoco_function, write_sample
 
@@ -46,12 +39,6 @@ _rne = mujoco_function("mj_rne", types.intp, types.intp, types.int32, types.intp
 
 ITERATIONS = 30  # for the line's pressure at most; three to five suffice
 LEAST_LEVER = 1e-6  # moment arm below which a cylinder stands at its dead centre [m]
-BEHIND_VALVE = (
-    *("damping", "stiffness", "friction", "dry_friction", "lever_slope", "lever_bend", "compensation"),
-    *("pump_flow", "pump_droop", "supply_pressure", "relief"),
-)
-BEHIND_PORT = "area", "draw", "return_"
-"""what a valve's opening does not depend on, of a joint and of its sides; the others are taken to matter"""
 SETTLED = 1e-9  # part of the pump's flow, or of its pressure, that may be left when they end
 
 
@@ -162,53 +149,6 @@ def store_oil(c, z, w, speed: float, angle: float) -> None:
 
 
 @compilable
-def meter(c, z, w, substeps: int, step: float) -> None:
-    """Advance the plungers over a step; w.travel becomes the mean opening [m²], below 0 towards B."""
-    net = 0.0
-    for i in range(substeps):
-        net += net_opening(c, z, move_spool(c, z, w, i, step))
-    w.travel = net / substeps
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _open(some, rest, commands, opening, substeps: int, period: float, source: int = SOURCE) -> None:
-    """Write the mean opening of a valve in each step, (steps,), from its state at rest; all records (1,)."""
-    c, z, w, past = some[0], rest[0], np.zeros(1, SCRATCH)[0], commands.size - opening.size
-    for k in range(opening.size):
-        command(z, w, commands[past + k - c.a.late], commands[past + k - c.b.late])
-        meter(c, z, w, substeps, period / substeps)
-        opening[k] = w.travel
-
-
-def valve_openings(
-    plugin: Plugin, states: Structs, commands: Array, run: Callable[..., Iterable[None]]
-) -> list[Array]:
-    """Return the mean opening of n candidates' valves in each step [m²], shape (steps, J) each.
-
-    `states` are those of the start, shape (n, J), and `commands` the steps' [%], shape (steps, J). `run` is
-    `map`, or that of a pool. No bit depends on the other candidates.
-    """
-    alike = plugin.coefficients.copy()
-    for fields, names in ((alike, BEHIND_VALVE), (alike["a"], BEHIND_PORT), (alike["b"], BEHIND_PORT)):
-        for name in names:
-            fields[name] = 0.0
-    candidates, joints = alike.shape
-    delayed = np.vstack([np.zeros((plugin.past, joints)), commands])
-    keys = [[(j, alike[i, j].tobytes()) for j in range(joints)] for i in range(candidates)]
-    owners = {key: (i, key[0]) for i, row in enumerate(keys) for key in row}
-    curves = {key: np.zeros(len(commands)) for key in owners}
-
-    def open_one(key: tuple[int, bytes]) -> None:
-        i, j = owners[key]
-        some, rest = plugin.coefficients[i, j : j + 1], states[i, j : j + 1].copy()
-        _open(some, rest, delayed[:, j], curves[key], plugin.substeps, plugin.period)
-
-    driven = set(plugin.order[plugin.idle :].tolist())
-    deque(run(open_one, (key for key in curves if key[0] in driven)), maxlen=0)
-    return [np.column_stack([curves[key] for key in row]) for row in keys]
-
-
-@compilable
 def weigh(c, w, angle: float, torque: float) -> None:
     """Lever and load of a joint that a torque [N·m] must hold at an angle [rad]."""
     w.arm = linkage(c, angle)[1]
@@ -254,7 +194,7 @@ def roll_quasi_static(arm, plugin: Plugin, state, course, record, source: int = 
                 pad.joints[j].travel = opening[k, j]
             else:
                 command(z, pad.joints[j], commands[now - c.a.late, j], commands[now - c.b.late, j])
-                meter(c, z, pad.joints[j], substeps, period / substeps)
+                pad.joints[j].travel = mean_opening(c, z, pad.joints[j], substeps, period / substeps)
             demanded |= commands[now, j] != 0.0
         _kinematics(arm.model, arm.data)
         _com_pos(arm.model, arm.data)

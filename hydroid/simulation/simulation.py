@@ -20,7 +20,8 @@ from hydroid.arrays import Array, Index, Structs
 from hydroid.hydraulics.actuator import Observation, observe
 from hydroid.hydraulics.records import JOINT_STATE, has_force_curve
 from hydroid.mjcf import quiet_mujoco
-from hydroid.simulation.quasi_static import roll_quasi_static, valve_openings
+from hydroid.simulation.openings import valve_openings
+from hydroid.simulation.quasi_static import roll_quasi_static
 from hydroid.simulation.rollout import Course, Record, SteppedArm, compile_rollout, roll
 from hydroid.simulation.scenario import Candidates, Chain, Response, Scenario, distinct
 

@@ -7,7 +7,8 @@ import pytest
 from made_logs import noisy, stepped
 
 from hydroid import load_settings
-from hydroid.advice.growth import promising, refitted, score_terms
+from hydroid.advice.growth import promising, score_terms
+from hydroid.advice.left_out import refitted
 from hydroid.advice.suggestions import advice, next_actions
 from hydroid.advice.terms import terms
 from hydroid.log import Log

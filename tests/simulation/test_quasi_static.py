@@ -6,7 +6,9 @@ import pytest
 from conftest import candidates
 from made_logs import at_rest
 
+from hydroid.hydraulics.records import JOINT, nominal_joints
 from hydroid.hydraulics.valve import DENSITY
+from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.problem import SimulationSettings
 from hydroid.simulation import Simulation
 from hydroid.simulation.scenario import Scenario
@@ -145,3 +147,24 @@ def test_pressures_carry_the_load_and_a_closed_valve_holds_it(simulated, arm, sp
 def test_a_load_beyond_the_supply_is_held_and_never_sinks(simulated):
     angle, _, _ = simulated({SHOULDER: 80}, supply_pressure=6e5)
     assert np.ptp(angle) == 0.0
+
+
+def test_valves_that_open_once_for_all_open_as_each_alone(spec, arm):
+    """Of candidates that differ in one quantity each, none gets the opening of another's valve."""
+    command = np.zeros((60, len(arm.joints)))
+    command[5:30, [SHOULDER, ROLL]], command[30:, [SHOULDER, ROLL]] = (70, -55), (-40, 80)
+    log = at_rest(arm.pose("study"), command, 0.02)
+    names = [name for name in JOINT.names if JOINT[name].kind == "f" and name not in ("sense", "stroke")]
+    everyone = candidates(arm, len(names))
+    everyone.mass[:] = arm.masses
+    everyone.joints[:] = nominal_joints(arm, HydraulicSettings(pump_flow=4.0, dead_band_a=10, dead_band_b=10))
+    for row, name in enumerate(names):
+        value = everyone.joints[name][row]
+        everyone.joints[name][row] = np.where(np.isfinite(value), 1.01 * value, value)
+    simulation = Simulation(
+        Scenario(spec, arm, log, [SHOULDER, ROLL], SimulationSettings(model="quasi-static")), 10
+    )
+    together = simulation.simulate(everyone).angle
+    alone = [simulation.simulate(everyone[row : row + 1]).angle[0] for row in range(len(names))]
+    np.testing.assert_array_equal(together, alone)
+    assert len(np.unique(together[:, -1, 0])) > 25

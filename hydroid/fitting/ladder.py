@@ -28,6 +28,9 @@ TOO_FAR = 20.0
 """times the rms error of the last estimate from which the dynamic model is not refined: lags that stand for
 oil in a quasi-static model are too much beside it, and it errs by several times as much at first"""
 STILL_FAR = 2.0  # the same after a rough refinement
+CLEAR = 0.5
+"""part of the rms error up to which a term is kept, whatever errors left out say: these are those of fewer
+logs, of which one alone may leave so much open that it predicts nothing, with the term or without"""
 FIRM = 1e-3  # gain below which least squares ends where another rung may follow
 
 
@@ -156,7 +159,7 @@ class Ladder:
         if nearer and own.settings.terms != last.settings.terms:
             without, with_it = self._error_left_out(last, start), self._error_left_out(own, new)
             new = replace(new, left_out=(without, with_it))
-            nearer = with_it < (1 - MIN_GAIN) * without
+            nearer = with_it < (1 - MIN_GAIN) * without or new.rms < CLEAR * start.rms
         self.estimates[name], self.refinements[name] = new, result
         if nearer or not if_nearer:
             self.problem, self.kept = own, new

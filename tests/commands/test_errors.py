@@ -23,6 +23,7 @@ WRONG = [
     ("fit-mech {log} --config nonsense", "settings", "nonsense"),
     ("fit-mech {log} --set search.seed=x", "settings", "--set search.seed"),
     ("fit-mech {log} --algorithm pso", "settings", "hydroid: --algorithm: must be 'ga', 'nsga2'"),
+    ("fit-mech {log} --budget soon", "settings", "--budget: is no time: 'soon'; such as 90s, 5min or 2h"),
     ("fit-mech {log} --out .", "run", "holds no run"),
     ("fit-mech {log} --set outputs=[9]", "log", "no joint 9; the arm has joints 1 to 7"),
     ("fit-mech {log} --config fit-hyd", "settings", "use hydroid fit-hyd"),

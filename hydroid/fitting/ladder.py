@@ -1,8 +1,8 @@
 """The ladder of a fit: refinements one after another, each of a model that has more in it than the last one.
 
 A rung is kept where it errs clearly less: another model on the fitted logs, another term on parts of the logs
-left out. Which rung that is shows long before least squares has converged, so that ends early on the way
-(`FIRM`). What is kept at the end is refined to the tolerance of the settings.
+left out, or by half on the fitted ones. Which rung that is shows long before least squares has converged, so
+that ends early on the way (`FIRM`). What is kept at the end is refined to the tolerance of the settings.
 """
 
 from collections.abc import Mapping

@@ -56,49 +56,42 @@ def judge(
     to the same logs; none: a joint is compared with standing still. Of the predictions `unseen`, those of
     logs that the fit has seen test nothing.
     """
-    return tuple(
-        _judge(settings, fitted, unseen, baselines.get(j) or {NAMES[0]: Baseline(j, ANYWHERE)})
-        for j in settings.outputs
-    )
-
-
-def _judge(
-    settings: FitSettings,
-    fitted: Sequence[Prediction],
-    unseen: Sequence[Prediction],
-    rivals: Mapping[str, Baseline],
-) -> JointVerdict:
-    joint = rivals[NAMES[0]].joint
-    new = [p for p in unseen if p.log.driven[joint - 1] and p.unseen is not False]
-    own = [p for p in fitted if p.log.driven[joint - 1]]
-    stated = settings.tolerance_deg
-    stated = stated.get(joint) if isinstance(stated, dict) else stated
-    travel = max((np.ptp(p.log.angle[:, joint - 1]) for p in new or own), default=0.0)
-    tolerance = stated or float(np.degrees(SHARE * travel))
-    errors = [rms_deg(p.error(joint) for p in some) if some else None for some in (own, new)]
-    by_rival = [
-        {name: rms_deg(one.errors([p.log]) for p in some) for name, one in rivals.items()} if some else {}
-        for some in (own, new)
-    ]
-    inside = [np.full(len(p.log.time), p.bands[joint].inside) for p in new if joint in p.bands]
-    ahead: dict[str, list[Array]] = {}
-    if new and all(len(p.ahead) for p in new):
-        ahead["the fit"] = [p.ahead[..., p.joints.index(joint)] for p in new]
-        for name, one in rivals.items():
-            ahead[name] = [errors_ahead(p.log, lambda part, one=one: one.errors([part])) for p in new]
-    return JointVerdict(
-        joint=joint,
-        name=settings.arm.joint_names[joint - 1],
-        slides=settings.arm.joints[joint - 1].slides,
-        verdict=_word(errors, by_rival, tolerance),
-        fitted_deg=finite(errors[0]),
-        unseen_deg=finite(errors[1]),
-        unseen_logs=len(new),
-        tolerance_deg=tolerance,
-        inside_percent=100 * float(np.mean(np.concatenate(inside))) if inside else None,
-        baselines_deg=by_rival[1] or by_rival[0],
-        horizons_deg={name: _rms_ahead(np.concatenate(rows)) for name, rows in ahead.items()},
-    )
+    verdicts = list[JointVerdict]()
+    for joint in settings.outputs:
+        rivals = baselines.get(joint) or {NAMES[0]: Baseline(joint, ANYWHERE)}
+        new = [p for p in unseen if p.log.driven[joint - 1] and p.unseen is not False]
+        own = [p for p in fitted if p.log.driven[joint - 1]]
+        stated = settings.tolerance_deg
+        stated = stated.get(joint) if isinstance(stated, dict) else stated
+        travel = max((np.ptp(p.log.angle[:, joint - 1]) for p in new or own), default=0.0)
+        tolerance = stated or float(np.degrees(SHARE * travel))
+        errors = [rms_deg(p.error(joint) for p in some) if some else None for some in (own, new)]
+        by_rival = [
+            {name: rms_deg(one.errors([p.log]) for p in some) for name, one in rivals.items()} if some else {}
+            for some in (own, new)
+        ]
+        inside = [np.full(len(p.log.time), p.bands[joint].inside) for p in new if joint in p.bands]
+        ahead: dict[str, list[Array]] = {}
+        if new and all(len(p.ahead) for p in new):
+            ahead["the fit"] = [p.ahead[..., p.joints.index(joint)] for p in new]
+            for name, one in rivals.items():
+                ahead[name] = [errors_ahead(p.log, lambda part, one=one: one.errors([part])) for p in new]
+        verdicts.append(
+            JointVerdict(
+                joint=joint,
+                name=settings.arm.joint_names[joint - 1],
+                slides=settings.arm.joints[joint - 1].slides,
+                verdict=_word(errors, by_rival, tolerance),
+                fitted_deg=finite(errors[0]),
+                unseen_deg=finite(errors[1]),
+                unseen_logs=len(new),
+                tolerance_deg=tolerance,
+                inside_percent=100 * float(np.mean(np.concatenate(inside))) if inside else None,
+                baselines_deg=by_rival[1] or by_rival[0],
+                horizons_deg={name: _rms_ahead(np.concatenate(rows)) for name, rows in ahead.items()},
+            )
+        )
+    return tuple(verdicts)
 
 
 def _word(errors: Sequence[float | None], rivals: Sequence[Mapping[str, float]], tolerance: float) -> str:

@@ -34,6 +34,9 @@ Measured: TypeAlias = Iterator[tuple[Column, Array]]
 NaN where one is undefined"""
 
 
+Measure = Callable[[Candidates], list[tuple[Column, Array]]]
+
+
 @record
 class Quantities:
     """What follows from an estimate: single quantities and curves by name.
@@ -47,45 +50,47 @@ class Quantities:
 
 def quantities(problem: Problem, uncertainty: Uncertainty) -> Quantities:
     """Return the quantities of every compared joint at a fit's estimate."""
-    result = Quantities({}, {})
+    result, candidates = Quantities({}, {}), problem.bindings.candidates
+    estimate = candidates(uncertainty.theta[None])
     for joint in problem.settings.outputs:
-        _add_joint(result, problem, uncertainty, joint)
+        named = problem.settings.arm.joint_names[joint - 1]
+        measure = joint_measure(make_bench(problem.settings, problem.logs, joint), estimate)
+        columns = [column for column, _ in measure(estimate)]
+
+        def values(theta: Array, measure: Measure = measure) -> Array:
+            return np.stack([value for _, value in measure(candidates(theta))], axis=1)
+
+        parameters = problem.settings.parameters.values()
+        concerned = np.array([p.joints is None or joint in p.joints for p in parameters])
+        positive = np.array([column.positive for column in columns])
+        known = uncertainty.posterior.propagate(values, positive, concerned)
+        curve, given, unit = list[tuple[float, float, Interval]](), True, ""
+        for i in np.flatnonzero(np.isfinite(known.value)).tolist():
+            (name, label, unit_, _, command), value = columns[i], float(known.value[i])
+            interval = finite_ends(known.interval[i])
+            if command is not None:
+                curve.append((command, value, interval))
+                given, unit = given and known.given[i], unit_
+            elif not known.given[i]:
+                sd = finite(known.sd[i])
+                result.scalars[f"{named}_{name}"] = QuantityEstimate(
+                    label=label, joint=joint, value=value, unit=unit_, sd=sd, interval=interval
+                )
+        if not given:
+            at, value, interval = zip(*sorted(curve), strict=True)
+            result.curves[f"{named}_speed"] = CurveEstimate(
+                label="speed",
+                joint=joint,
+                unit=unit,
+                along="command [%]",
+                at=at,
+                value=value,
+                interval=interval,
+            )
     return result
 
 
-def _add_joint(result: Quantities, problem: Problem, uncertainty: Uncertainty, joint: int) -> None:
-    candidates, named = problem.bindings.candidates, problem.settings.arm.joint_names[joint - 1]
-    estimate = candidates(uncertainty.theta[None])
-    measure = joint_measure(make_bench(problem.settings, problem.logs, joint), estimate)
-    columns = [column for column, _ in measure(estimate)]
-
-    def values(theta: Array) -> Array:
-        return np.stack([value for _, value in measure(candidates(theta))], axis=1)
-
-    parameters = problem.settings.parameters.values()
-    concerned = np.array([p.joints is None or joint in p.joints for p in parameters])
-    positive = np.array([column.positive for column in columns])
-    known = uncertainty.posterior.propagate(values, positive, concerned)
-    curve, given, unit = list[tuple[float, float, Interval]](), True, ""
-    for i in np.flatnonzero(np.isfinite(known.value)).tolist():
-        (name, label, unit_, _, command), value = columns[i], float(known.value[i])
-        interval = finite_ends(known.interval[i])
-        if command is not None:
-            curve.append((command, value, interval))
-            given, unit = given and known.given[i], unit_
-        elif not known.given[i]:
-            sd = finite(known.sd[i])
-            result.scalars[f"{named}_{name}"] = QuantityEstimate(
-                label=label, joint=joint, value=value, unit=unit_, sd=sd, interval=interval
-            )
-    if not given:
-        at, value, interval = zip(*sorted(curve), strict=True)
-        result.curves[f"{named}_speed"] = CurveEstimate(
-            label="speed", joint=joint, unit=unit, along="command [%]", at=at, value=value, interval=interval
-        )
-
-
-def joint_measure(bench: Bench, estimate: Candidates) -> Callable[[Candidates], list[tuple[Column, Array]]]:
+def joint_measure(bench: Bench, estimate: Candidates) -> Measure:
     """Return what computes the quantities of one joint; test movements are planned at the estimate."""
     tests, further = [], gain_model
     if bench.settings.stage == "hyd":

@@ -3,7 +3,7 @@
 import io
 import warnings
 from collections.abc import Generator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 import mujoco
@@ -16,7 +16,7 @@ from scipy.spatial import ConvexHull, QhullError
 from hydroid.arm.model import load_model
 from hydroid.arrays import Array
 from hydroid.files import Plain
-from hydroid.reporting.chart import SERIES, Chart, Mark
+from hydroid.reporting.chart import SERIES, Chart
 from hydroid.reporting.outlines import Shape, body_poses, placed, shapes, sight
 from hydroid.settings.arm import Arm
 from hydroid.settings.cylinder import LinearActuator
@@ -72,8 +72,24 @@ def figure(chart: Chart) -> Figure:
     axes = drawing.subplots(len(heights), squeeze=False, sharex=chart.linked, height_ratios=heights).ravel()
     for one, panel in zip(axes, chart.thinned().panels, strict=True):
         for mark in panel.marks:
-            if not mark.off:
-                _draw(one, mark)
+            if mark.off:
+                continue
+            x, y, end = mark.x, mark.y, mark.end
+            look: Plain = {"color": SHADES[mark.color], "alpha": mark.alpha, "label": mark.label or None}
+            match mark.kind:
+                case "line" | "step":
+                    drawn = "default" if mark.kind == "line" else "steps-post"
+                    one.plot(x, y, lw=mark.width, drawstyle=drawn, **look)
+                case "points":
+                    one.plot(x, y, "o", ms=mark.width, zorder=3, **look)
+                case "band":
+                    one.fill_between(x, y, end, lw=0, **look)
+                case "spans":
+                    for low, high in zip(x, end, strict=True):
+                        one.axvspan(low, high, lw=0, zorder=0, **look)
+                case "rule":
+                    for value in y:
+                        one.axhline(value, lw=mark.width, **look)
         one.set(title=panel.title, xlabel=panel.x, ylabel=panel.y, ylim=panel.y_limits)
         one.set_yscale("log" if panel.log_y else "linear")
     legend(drawing)
@@ -87,25 +103,6 @@ def legend(drawing: Figure) -> None:
         columns = int(15 * drawing.get_figwidth() / (8 + max(len(str(label)) for label in labels)))
         where: Any = "outside lower center"
         drawing.legend(handles=list(labels.values()), loc=where, ncols=max(1, min(3, columns)))
-
-
-def _draw(axes: Axes, mark: Mark) -> None:
-    x, y, end = mark.x, mark.y, mark.end
-    look: Plain = {"color": SHADES[mark.color], "alpha": mark.alpha, "label": mark.label or None}
-    match mark.kind:
-        case "line" | "step":
-            drawn = "default" if mark.kind == "line" else "steps-post"
-            axes.plot(x, y, lw=mark.width, drawstyle=drawn, **look)
-        case "points":
-            axes.plot(x, y, "o", ms=mark.width, zorder=3, **look)
-        case "band":
-            axes.fill_between(x, y, end, lw=0, **look)
-        case "spans":
-            for low, high in zip(x, end, strict=True):
-                axes.axvspan(low, high, lw=0, zorder=0, **look)
-        case "rule":
-            for value in y:
-                axes.axhline(value, lw=mark.width, **look)
 
 
 VIEWS = {"from the right (-y)": (0.0, "z [m]"), "from above": (-90.0, "y [m]")}
@@ -154,7 +151,10 @@ def _view(axes: Axes, arm: Arm, data: Any, outlines: Sequence[Shape], poses: Arr
     for shape in outlines:
         joint = moved_by[shape.body]
         color, label = ("grey", None) if joint < 0 else (_color(joint), arm.joint_names[joint])
-        axes.fill(*_outline(shape.corners @ onto).T, fc=color, ec=color, alpha=0.45, label=label)
+        outline = shape.corners @ onto
+        with suppress(QhullError):  # all on one line
+            outline = outline[ConvexHull(outline).vertices]
+        axes.fill(*outline.T, fc=color, ec=color, alpha=0.45, label=label)
     for child, joint in zip(model.jnt_bodyid.tolist(), arm.joints, strict=True):
         if isinstance(joint.actuator, LinearActuator) and joint.actuator.pivots is not None:
             bodies = [model.body_parentid[child], child]
@@ -177,10 +177,3 @@ def _view(axes: Axes, arm: Arm, data: Any, outlines: Sequence[Shape], poses: Arr
 
 def _color(joint: int) -> str:
     return SHADES[SERIES[joint % len(SERIES)]]
-
-
-def _outline(points: Array) -> Array:
-    try:
-        return points[ConvexHull(points).vertices]
-    except QhullError:  # all on one line
-        return points

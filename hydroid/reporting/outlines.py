@@ -171,17 +171,7 @@ def moving_arm(
         corners = (world - pose[:, 3]) @ pose[:, :3]
         drawn.append((float((world @ view[2]).mean()), Shape(parts.index(roots[shape.body]), corners)))
     outlines = [shape for _, shape in sorted(drawn, key=lambda one: -one[0])]  # the farthest first
-    size, fitted = _fitted(outlines, view[:2] @ poses[:, :, parts])
-    slides = {names[joint]: model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE for joint in compared}
-    factors = [1e3 if each else np.degrees(1.0) for each in slides.values()]
-    errors = dict(zip(slides, (factors * error[moments][:, compared]).T, strict=True))
-    units = {name: " mm" if each else "°" for name, each in slides.items()}
-    worst = int(np.abs([*errors.values()]).max(axis=0).argmax())
-    return MovingArm(size, outlines, log.time[moments], fitted, errors, units, worst)
-
-
-def _fitted(outlines: Sequence[Shape], seen: Array) -> tuple[tuple[int, int], dict[str, list[Array]]]:
-    """Return the picture's size, and poses (2, F, parts, 2, 4) in its units, with the arm always inside."""
+    seen = view[:2] @ poses[:, :, parts]  # in units of the picture, with the arm always inside
     corners = np.concatenate([shape.placed(seen).reshape(-1, 2) for shape in outlines])
     low, high = corners.min(axis=0), corners.max(axis=0)
     scale = (_SIZE - 2 * _MARGIN) / max(high - low)
@@ -190,4 +180,10 @@ def _fitted(outlines: Sequence[Shape], seen: Array) -> tuple[tuple[int, int], di
     flipped[..., 3] += _MARGIN + scale * np.array([-low[0], high[1]])
     arms = flipped.reshape(*seen.shape[:3], 8).swapaxes(1, 2)
     fitted = [[part if np.ptp(part, axis=0).any() else part[:1] for part in arm] for arm in arms]
-    return (width, height), dict(zip(("measured", "simulated"), fitted, strict=True))
+    lying = {"measured": fitted[0], "simulated": fitted[1]}
+    slides = {names[joint]: model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE for joint in compared}
+    factors = [1e3 if each else np.degrees(1.0) for each in slides.values()]
+    errors = dict(zip(slides, (factors * error[moments][:, compared]).T, strict=True))
+    units = {name: " mm" if each else "°" for name, each in slides.items()}
+    worst = int(np.abs([*errors.values()]).max(axis=0).argmax())
+    return MovingArm((width, height), outlines, log.time[moments], lying, errors, units, worst)

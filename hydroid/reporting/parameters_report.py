@@ -1,12 +1,11 @@
 """What the logs determine: parameters, directions of the posterior, quantities; what a reader must know."""
 
 from collections.abc import Mapping, Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
 
-from hydroid.estimate import Covariance, CurveEstimate, FitSummary, ParameterEstimate
+from hydroid.estimate import FitSummary, ParameterEstimate
 from hydroid.log import Log
 from hydroid.parameters import Parameter
 from hydroid.posterior.uncertainty import Flag, Source
@@ -36,12 +35,17 @@ def parameter_table(settings: FitSettings, summary: FitSummary, profiles: Interv
     """Return one row per parameter: bounds, estimate, intervals, share of the data, flag."""
 
     def row(p: Parameter) -> dict[str, Any]:
-        one, given = summary.estimate[p.name], settings.parameters[p.name].bounds
-        low, high = map(Given, given) if given else (p.lower, p.upper)
+        one, own = summary.estimate[p.name], settings.parameters[p.name]
+        low, high = map(Given, own.bounds) if own.bounds else (p.lower, p.upper)
+        what = CHOICES[own.quantity].plain
+        if own.link is not None:
+            what += f" of {own.link}"
+        elif len(settings.outputs) > 1 and own.joints and len(own.joints) == 1:  # where it acts
+            what += f", {settings.arm.joint_names[own.joints[0] - 1]}"
         ends = *one.interval, *one.interval_by_log, *(profiles or {}).get(p.name, (None, None))
         return {
             "name": p.name,
-            "what": _plain_name(settings, p.name),
+            "what": what,
             "unit": p.unit,
             "value": one.value,
             **({"lower": low, "upper": high} if low < high else {}),
@@ -60,16 +64,6 @@ def parameter_table(settings: FitSettings, summary: FitSummary, profiles: Interv
     optional = ("what", *by_log, "data [%]", "lower", "upper")
     rows = map(row, settings.parameter_set().parameters)
     return Table.of("Parameters", {name: name for name in columns}, rows, note, optional)
-
-
-def _plain_name(settings: FitSettings, parameter: str) -> str:
-    """Say in plain words what a parameter is, and where it acts if several joints are compared."""
-    own = settings.parameters[parameter]
-    plain = CHOICES[own.quantity].plain
-    if own.link is not None:
-        return f"{plain} of {own.link}"
-    joints = [] if len(settings.outputs) == 1 else own.joints or []
-    return f"{plain}, {settings.arm.joint_names[joints[0] - 1]}" if len(joints) == 1 else plain
 
 
 def status(estimate: ParameterEstimate) -> str:
@@ -95,22 +89,18 @@ def unknown_sections(summary: FitSummary) -> tuple[Section, ...]:
     none = "" if points else "The logs determine every free parameter."
     sections = [Section("What is not known", none, points[:6])]
     if known is not None and known.parameters:
-        tables = {"directions": direction_table(known)}
+        # every direction, best determined first, with its standard deviation and its largest parts
+        _, singular, axes = np.linalg.svd(known.root)
+        rows: list[tuple[float, str]] = []
+        for value, axis in zip(singular.tolist(), axes, strict=True):
+            order = np.argsort(-np.abs(axis), kind="stable")
+            shares = np.sign(axis[order[0]]) * axis
+            parts = (f"{known.parameters[i]} {shares[i]:+.2f}" for i in order if abs(shares[i]) >= 0.1)
+            rows.append((100 / value if value > 0 else np.inf, ", ".join(parts).replace("-", "−")))
+        header = "standard deviation [%]", "parameters that change together, in proportion to their values"
+        tables = {"directions": Table("", header, tuple(rows))}
         sections.append(Section("Directions", points=points[6:], tables=tables, folded=True))
     return tuple(sections)
-
-
-def direction_table(known: Covariance) -> Table:
-    """Return every direction with its standard deviation and its largest parts, best determined first."""
-    _, singular, axes = np.linalg.svd(known.root)
-    rows: list[tuple[float, str]] = []
-    for value, axis in zip(singular.tolist(), axes, strict=True):
-        order = np.argsort(-np.abs(axis), kind="stable")
-        shares = np.sign(axis[order[0]]) * axis
-        parts = (f"{known.parameters[i]} {shares[i]:+.2f}" for i in order if abs(shares[i]) >= 0.1)
-        rows.append((100 / value if value > 0 else np.inf, ", ".join(parts).replace("-", "−")))
-    header = ("standard deviation [%]", "parameters that change together, in proportion to their values")
-    return Table("", header, tuple(rows))
 
 
 def quantity_section(settings: FitSettings, summary: FitSummary) -> Section | None:
@@ -134,31 +124,29 @@ def quantity_section(settings: FitSettings, summary: FitSummary) -> Section | No
 
 
 def speed_section(settings: FitSettings, summary: FitSummary, logs: Sequence[Log]) -> Section | None:
-    """Return the section with the curves of speed; none where there are none."""
+    """Return the section with each joint's speed against command, with its band, where there is one."""
+    curves, names = summary.curves.values(), settings.arm.joint_names
+
+    def draw() -> Chart:
+        panels: list[Panel] = []
+        for curve in curves:
+            rows = np.column_stack([curve.at, curve.value, np.array(curve.interval, dtype=float)])
+            commands = np.concatenate([log.command[:, curve.joint - 1] for log in logs])
+            low, high = [-105.0, commands.max(initial=0.0)], [commands.min(initial=0.0), 105.0]
+            marks = [Mark("spans", np.array(low), end=np.array(high), color="pale", alpha=0.4)]
+            for sign, color in (1, "blue"), (-1, "orange"):  # with the dead band between them
+                x, y, low, high = rows[sign * rows[:, 0] > 0].T
+                marks += [
+                    Mark("band", x, low, high, color=color, alpha=0.25),
+                    Mark("line", x, y, color=color),
+                    Mark("points", x, y, color=color, width=5),
+                ]
+            title = f"{names[curve.joint - 1]}: {curve.label}"
+            panels.append(Panel(curve.along, f"speed [{curve.unit}]", tuple(marks), title, 250))
+        return Chart(tuple(panels))
+
     text = "Speeds in mid travel against command, with 95 % intervals. Grey: commands beyond the logs."
-    curves = tuple(summary.curves.values())
-    plot = Plot("speed", text, partial(draw_speeds, curves, logs, settings.arm.joint_names))
-    return Section("Speeds", plots=(plot,), folded=True) if curves else None
-
-
-def draw_speeds(curves: Sequence[CurveEstimate], logs: Sequence[Log], joints: Sequence[str]) -> Chart:
-    """Draw each joint's speed against command, with its band."""
-    panels: list[Panel] = []
-    for curve in curves:
-        rows = np.column_stack([curve.at, curve.value, np.array(curve.interval, dtype=float)])
-        commands = np.concatenate([log.command[:, curve.joint - 1] for log in logs])
-        low, high = [-105.0, commands.max(initial=0.0)], [commands.min(initial=0.0), 105.0]
-        marks = [Mark("spans", np.array(low), end=np.array(high), color="pale", alpha=0.4)]
-        for sign, color in (1, "blue"), (-1, "orange"):  # with the dead band between them
-            x, y, low, high = rows[sign * rows[:, 0] > 0].T
-            marks += [
-                Mark("band", x, low, high, color=color, alpha=0.25),
-                Mark("line", x, y, color=color),
-                Mark("points", x, y, color=color, width=5),
-            ]
-        title = f"{joints[curve.joint - 1]}: {curve.label}"
-        panels.append(Panel(curve.along, f"speed [{curve.unit}]", tuple(marks), title, 250))
-    return Chart(tuple(panels))
+    return Section("Speeds", plots=(Plot("speed", text, draw),), folded=True) if curves else None
 
 
 def merged_tables(runs: Sequence[Record]) -> dict[str, Table]:
@@ -167,7 +155,17 @@ def merged_tables(runs: Sequence[Record]) -> dict[str, Table]:
     parameters = runs[0].settings.parameter_set().parameters
     units = {f"error of {one.name}": "mm" if one.slides else "deg" for one in runs[0].summary.verdict}
     units |= {p.name: p.unit for p in parameters}
-    columns = np.array([[*_errors(run), *(run.summary.values[p.name] for p in parameters)] for run in runs])
+    factors = [1e3 * np.radians(1.0) if one.slides else 1.0 for one in runs[0].summary.verdict]
+    columns = np.array(
+        [
+            [
+                (one.fitted_deg or 0.0) * factor
+                for one, factor in zip(run.summary.verdict, factors, strict=True)
+            ]
+            + [run.summary.values[p.name] for p in parameters]
+            for run in runs
+        ]
+    )
     best = runs[0].summary.estimate
     spread = np.quantile(columns, [0.5, 0, 0.25, 0.75, 1], axis=0).T.tolist()
     rows = [
@@ -180,11 +178,3 @@ def merged_tables(runs: Sequence[Record]) -> dict[str, Table]:
         "spread": Table(f"{len(runs)} runs", SPREAD, tuple(rows), optional=SPREAD[4:6]),
         "runs": Table("Runs, smallest error first", header, tuple(each), optional=header[:1:-1]),
     }
-
-
-def _errors(run: Record) -> list[float]:
-    """Return the error of each joint on the fitted logs [deg or mm]."""
-    return [
-        (one.fitted_deg or 0.0) * (1e3 * np.radians(1.0) if one.slides else 1.0)
-        for one in run.summary.verdict
-    ]

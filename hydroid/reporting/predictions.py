@@ -183,17 +183,13 @@ def fit_page(record: Record) -> Page:
     title = f"Fit of {settings.arm.name}, stage {2 if settings.stage == 'hyd' else 1}"
     made_by = {k: str(v) for k, v in record.identity.items() if k in ("hydroid", "mujoco", "numpy", "python")}
     warned = (*outside(record.verdict), *warnings(summary))
-    return Page("report", title, lead(fits), tuple(in_order), warned, made_by, _data(record))
-
-
-def _data(record: Record) -> dict[str, str]:
-    """Return the history and the Pareto set with every bit, in the search's units: rad unless relative."""
-    result = record.result
-    theta, objectives = result.front
-    unit = "" if record.settings.objective.relative else "_rad"
+    # the history and the Pareto set with every bit, in the search's units: rad unless relative
+    theta, objectives = record.result.front
+    unit = "" if settings.objective.relative else "_rad"
     segments = (f"segment_{s}{unit}" for s in range(1, objectives.shape[1]))
-    header = (*next(iter(record.summary.estimates.values())).values, *segments, f"overall{unit}")
-    return {
-        "history.csv": csv_text([HISTORY, *result.history.tolist()]),
+    header = (*next(iter(summary.estimates.values())).values, *segments, f"overall{unit}")
+    data = {
+        "history.csv": csv_text([HISTORY, *record.result.history.tolist()]),
         "pareto.csv": csv_text([header, *np.column_stack([theta, objectives]).tolist()]),
     }
+    return Page("report", title, lead(fits), tuple(in_order), warned, made_by, data)

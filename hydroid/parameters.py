@@ -145,22 +145,18 @@ class ParameterSet:
             raise SettingsError(
                 f"unknown parameter {unknown[0]!r}", source, f"known: {', '.join(self.names)}"
             )
-        return np.array([_number(p, values.get(p.name, p.fixed), source) for p in self.parameters])
+        theta = list[float]()
+        for p in self.parameters:
+            if (value := values.get(p.name, p.fixed)) is None:
+                raise SettingsError(f"parameter {p.name!r} is missing", source)
+            # most quantities cannot be negative; the comparison is False for NaN, and squares stay finite
+            least = min(p.lower, 0.0)
+            if isinstance(value, bool) or not isinstance(value, int | float) or not least <= value < 1e100:
+                hint = f"a number from {least:g}, in {p.unit}"
+                raise SettingsError(f"parameter {p.name!r} is {value!r}", source, hint)
+            theta.append(float(value))
+        return np.array(theta)
 
     def mapping(self, theta: Array) -> dict[str, float]:
         """Return values by name from theta, shape (P,)."""
         return dict(zip(self.names, theta.tolist(), strict=True))
-
-
-def _number(parameter: Parameter, value: object, source: str) -> float:
-    if value is None:
-        raise SettingsError(f"parameter {parameter.name!r} is missing", source)
-    # most quantities cannot be negative; the comparison is False for NaN, and squares stay finite
-    least = min(parameter.lower, 0.0)
-    if isinstance(value, bool) or not isinstance(value, int | float) or not least <= value < 1e100:
-        raise SettingsError(
-            f"parameter {parameter.name!r} is {value!r}",
-            source,
-            f"a number from {least:g}, in {parameter.unit}",
-        )
-    return float(value)

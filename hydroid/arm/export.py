@@ -64,8 +64,16 @@ def locked_spec(
     compiler.settotalmass, compiler.fusestatic = -1.0, False
     source.option.timestep = model.opt.timestep
     source.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
-    for j, name in enumerate(locked.joints):
-        _set_joint(source.joint(name), model, j, degrees=bool(compiler.degree))
+    for j, joint in enumerate(map(source.joint, locked.joints)):
+        body, k, slack = joint.parent, int(model.jnt_bodyid[j]), float(model.qpos_spring[j])
+        body.explicitinertial, body.mass, body.ipos = True, model.body_mass[k], model.body_ipos[k]
+        body.iquat, body.ialt.type = model.body_iquat[k], mujoco.mjtOrientation.mjORIENTATION_QUAT
+        body.inertia, body.fullinertia = model.body_inertia[k], [np.nan, 0, 0, 0, 0, 0]
+        joint.damping, joint.stiffness = [model.dof_damping[j], 0, 0], [model.jnt_stiffness[j], 0, 0]
+        joint.frictionloss, joint.armature = model.dof_frictionloss[j], model.dof_armature[j]
+        joint.actfrclimited = mujoco.mjtLimited.mjLIMITED_FALSE  # a URDF's effort is of another motor
+        turns = joint.type == mujoco.mjtJoint.mjJNT_HINGE
+        joint.springref = math.degrees(slack) if compiler.degree and turns else slack
     if motors is not None:
         for name, gain, bias in zip(locked.joints, *np.asarray(motors), strict=True):
             source.add_actuator(
@@ -80,18 +88,6 @@ def locked_spec(
             )
     source.add_key(name="start", qpos=model.qpos_spring)
     return source
-
-
-def _set_joint(joint: mujoco.MjsJoint, model: mujoco.MjModel, j: int, *, degrees: bool) -> None:
-    body, k, slack = joint.parent, int(model.jnt_bodyid[j]), float(model.qpos_spring[j])
-    body.explicitinertial, body.mass, body.ipos = True, model.body_mass[k], model.body_ipos[k]
-    body.iquat, body.ialt.type = model.body_iquat[k], mujoco.mjtOrientation.mjORIENTATION_QUAT
-    body.inertia, body.fullinertia = model.body_inertia[k], [np.nan, 0, 0, 0, 0, 0]
-    joint.damping, joint.stiffness = [model.dof_damping[j], 0, 0], [model.jnt_stiffness[j], 0, 0]
-    joint.frictionloss, joint.armature = model.dof_frictionloss[j], model.dof_armature[j]
-    joint.actfrclimited = mujoco.mjtLimited.mjLIMITED_FALSE  # a URDF's effort is of another motor
-    turns = joint.type == mujoco.mjtJoint.mjJNT_HINGE
-    joint.springref = math.degrees(slack) if degrees and turns else slack
 
 
 def _draw_tendons(spec: mujoco.MjSpec) -> None:

@@ -6,7 +6,7 @@ in MuJoCo a body is not held against the one that it hangs on, nor against one t
 `hydroid init` excludes bodies that touch in the pose `home`.
 """
 
-from collections.abc import Generator, Mapping
+from collections.abc import Mapping
 from functools import cached_property
 
 import mujoco
@@ -94,7 +94,13 @@ class CollisionChecker:
         for pair in np.flatnonzero(distance.min(axis=0) < 0):
             inside = np.maximum(-distance[:, pair], 0.0)
             depths[self.names[pair]] = np.maximum(depths.get(self.names[pair], 0.0), inside)
-        meetings = [meeting for names, depth in depths.items() for meeting in _meetings(names, time, depth)]
+        meetings = list[Meeting]()
+        for names, depth in depths.items():
+            samples = np.flatnonzero(depth)
+            for run in np.split(samples, np.flatnonzero(np.diff(samples) > 1) + 1):
+                begins, ends, worst = run[0], run[-1], run[np.argmax(depth[run])]
+                numbers = map(float, (time[begins], time[ends], depth[worst], time[worst]))
+                meetings.append(Meeting([*names], *numbers))
         meetings.sort(key=lambda meeting: meeting.from_s)
         nearest = tuple(self.names[pair] for pair in distance.argmin(axis=1))
         checked = len({*map(frozenset, self.names)})
@@ -130,14 +136,6 @@ def _pairs(model: mujoco.MjModel) -> list[list[int]]:
     meant = (kinds[g] & masks[h] | kinds[h] & masks[g]) != 0
     excluded = np.isin((np.minimum(a, b) << 16) + np.maximum(a, b), model.exclude_signature)
     return np.stack([g, h], axis=1)[meant & (weld[a] != weld[b]) & ~jointed & ~excluded].tolist()
-
-
-def _meetings(names: tuple[str, str], time: Array, depth: Array) -> Generator[Meeting]:
-    """Yield every time that two bodies met from how deep they were inside each other [m], shape (T,)."""
-    samples = np.flatnonzero(depth)
-    for run in np.split(samples, np.flatnonzero(np.diff(samples) > 1) + 1):
-        begins, ends, worst = run[0], run[-1], run[np.argmax(depth[run])]
-        yield Meeting([*names], *map(float, (time[begins], time[ends], depth[worst], time[worst])))
 
 
 @record

@@ -133,20 +133,16 @@ def _joint(pins: Sequence[_Pin], first: str, second: str) -> Any:
     return next(between, None)
 
 
-def _planar(joint: Any, point: Array) -> complex:
-    """Return where a point lies from a joint's axis, in a plane across it [m]."""
-    axis, away = joint.xaxis, point - joint.xanchor
-    x = np.cross([0.0, 1.0, 0.0] if abs(axis[1]) < 0.9 else [1.0, 0.0, 0.0], axis)
-    x /= np.linalg.norm(x)
-    return complex(away @ x, away @ np.cross(axis, x))
-
-
 def _four_bar(joint: Any, pins: Sequence[_Pin]) -> Plain | None:
     """Return the settings of a cylinder that turns a joint by a rocker and a coupler, as the file stands.
 
     The pins are those of rocker and link, rocker and coupler, coupler and child, of the tube, of the rod.
     """
-    ground, pin, child, foot, eye = (_planar(joint, one.at) for one in pins)
+    axis = joint.xaxis
+    x = np.cross([0.0, 1.0, 0.0] if abs(axis[1]) < 0.9 else [1.0, 0.0, 0.0], axis)
+    x /= np.linalg.norm(x)
+    y, away = np.cross(axis, x), [one.at - joint.xanchor for one in pins]  # in a plane across the axis [m]
+    ground, pin, child, foot, eye = (complex(one @ x, one @ y) for one in away)
     turn = abs(ground) / ground  # the rocker's pivot lies at (ground, 0)
     side = "left" if ((pin - ground) * np.conj(child - ground)).imag > 0 else "right"
     sides = {"ground": ground, "rocker": pin - ground, "coupler": child - pin, "child": child}

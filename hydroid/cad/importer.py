@@ -57,7 +57,18 @@ def import_arm(
             notes.add("without limits: moving without stops, unless you give a range in arm.xml", joint.name)
     kept = {joint.name: own for joint in spec.joints if (own := cylinders.get(joint.name))}
     title = f"{spec.modelname}, from {path.name}"
-    return ImportedArm(title, _in_scene(spec, meshes), meshes, kept, tuple(notes.lines()))
+    # with light, floor and cameras, and the pose nearest to 0 as `home`
+    scene = fill_template("cad/scene.xml")  # `arrange` puts its lights and cameras around the arm
+    text = mjcf_text(spec).replace("<worldbody>", scene + "<worldbody>", 1)
+    with mujoco_errors(spec.modelname):
+        whole = mujoco.MjSpec.from_string(text, assets=meshes)
+        model = whole.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    low, high = np.where(model.jnt_limited, model.jnt_range.T, 0.0)
+    whole.add_key(name="home", qpos=np.clip(0.0, low, high))
+    arrange(whole, data.xanchor[0], data.xanchor[-1])
+    return ImportedArm(title, mjcf_text(whole), meshes, kept, tuple(notes.lines()))
 
 
 def _clear(spec: mujoco.MjSpec, path: Path) -> None:
@@ -156,21 +167,6 @@ def _named(spec: mujoco.MjSpec, chain: Sequence[str], columns: Sequence[str]) ->
     links = [joint.parent.name for joint in spec.joints]
     hits = {joint_of(column, of) for column in columns for of in (names, links)} - {None}
     return sum(names.index(name) + 1 in hits for name in chain)
-
-
-def _in_scene(spec: mujoco.MjSpec, meshes: dict[str, bytes]) -> str:
-    """Return the arm's MJCF with light, floor and cameras, and the pose nearest to 0 as `home`."""
-    scene = fill_template("cad/scene.xml")  # `arrange` puts its lights and cameras around the arm
-    text = mjcf_text(spec).replace("<worldbody>", scene + "<worldbody>", 1)
-    with mujoco_errors(spec.modelname):
-        whole = mujoco.MjSpec.from_string(text, assets=meshes)
-        model = whole.compile()
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    low, high = np.where(model.jnt_limited, model.jnt_range.T, 0.0)
-    whole.add_key(name="home", qpos=np.clip(0.0, low, high))
-    arrange(whole, data.xanchor[0], data.xanchor[-1])
-    return mjcf_text(whole)
 
 
 def arrange(spec: mujoco.MjSpec, base: Array, tip: Array) -> None:

@@ -1,7 +1,7 @@
 """A URDF or MJCF file -> MuJoCo's spec of it, with its meshes of any format as STL files in m."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from itertools import chain, islice
 from pathlib import Path
@@ -68,7 +68,22 @@ def read_source(path: Path, notes: Notes) -> tuple[mujoco.MjSpec, dict[str, Path
     if not urdf:
         files = {mesh.file: mesh.file for mesh in spec.meshes if mesh.file}
         folder /= spec.meshdir
-    return spec, _found(files, folder, notes), urdf
+    # from the folder and its parents, with and without a package's name, or by name
+    below = {path.name.lower(): path for path in islice(folder.rglob("*"), 20_000)} if files else {}
+    found = dict[str, Path]()
+    for name, given in files.items():
+        rest = Path(given.rpartition("://")[2].replace("\\", "/").lstrip("/"))
+        tails = (Path(given), rest, Path(*rest.parts[1:]))
+        tried = (place / tail for place in (folder, *islice(folder.parents, 4)) for tail in tails)
+        alike = [below[rest.name.lower()]] if rest.name.lower() in below else []
+        if place := next((path for path in chain(tried, alike) if is_file(path)), None):
+            found[name] = place
+        else:
+            what = (
+                f"not found from {folder} and its parents, nor by name below it: these shapes are not shown"
+            )
+            notes.add(what, f"mesh {given}")
+    return spec, found, urdf
 
 
 def _parsed(path: Path) -> ElementTree.Element:
@@ -110,25 +125,6 @@ def _prepare_mjcf(root: ElementTree.Element, folder: Path) -> None:
                 parent.remove(part)
             elif part.tag == "material":
                 part.attrib.pop("texture", None)
-
-
-def _found(files: Mapping[str, str], folder: Path, notes: Notes) -> dict[str, Path]:
-    """Look for meshes from the folder and its parents, with and without a package's name, or by name."""
-    below = {path.name.lower(): path for path in islice(folder.rglob("*"), 20_000)} if files else {}
-    found = dict[str, Path]()
-    for name, given in files.items():
-        rest = Path(given.rpartition("://")[2].replace("\\", "/").lstrip("/"))
-        tails = (Path(given), rest, Path(*rest.parts[1:]))
-        tried = (place / tail for place in (folder, *islice(folder.parents, 4)) for tail in tails)
-        alike = [below[rest.name.lower()]] if rest.name.lower() in below else []
-        if place := next((path for path in chain(tried, alike) if is_file(path)), None):
-            found[name] = place
-        else:
-            what = (
-                f"not found from {folder} and its parents, nor by name below it: these shapes are not shown"
-            )
-            notes.add(what, f"mesh {given}")
-    return found
 
 
 def convert_meshes(

@@ -120,7 +120,7 @@ def run_logs(folder: Path) -> list[Path]:
     return logs
 
 
-def problem_of(model: IdentifiedModel, logs: LogSources, *, repair: bool = False) -> "Problem":
+def problem_of(model: IdentifiedModel, logs: LogSources, *, repair: bool) -> "Problem":
     """Return the estimation problem of a model and logs, or those of its run where none is given."""
     read = read_logs(logs or run_logs(Path(model.source).parent), model.settings, repair=repair)
     from hydroid.problem.problem import Problem

@@ -9,7 +9,7 @@ import sys
 import time
 from contextvars import ContextVar
 from types import FrameType
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Self
 
 import typer
 
@@ -69,7 +69,14 @@ class Progress:
             return
         line = f"{what}:" if total is None else f"{what} {done:.0f} of {total:.0f}"
         if sys.stderr.isatty():
-            self._bar = self._bar or _new_bar()
+            if self._bar is None:
+                from rich.console import Console
+                from rich.progress import Progress as Bar, TextColumn
+
+                columns = *Bar.get_default_columns(), TextColumn("{task.fields[text]}")
+                self._bar = Bar(*columns, console=Console(stderr=True), transient=True)
+                self._bar.add_task("", total=None, text="")
+                self._bar.start()
             self._bar.update(self._bar.task_ids[0], completed=done, total=total, description=line, text=text)
         elif time.monotonic() - self._shown > 30.0:  # seconds between plain lines
             self._shown = time.monotonic()
@@ -105,14 +112,3 @@ class FitProgress(Progress):
         what = next(alone, name.replace("refined", "refinement"))
         fallen = self._fallen(what, name.rpartition(" part ")[2], rms)
         self(what, simulated, None, f"{simulated} simulations, {fallen}")
-
-
-def _new_bar() -> Any:
-    from rich.console import Console
-    from rich.progress import Progress as Bar, TextColumn
-
-    text = TextColumn("{task.fields[text]}")
-    bar = Bar(*Bar.get_default_columns(), text, console=Console(stderr=True), transient=True)
-    bar.add_task("", total=None, text="")
-    bar.start()
-    return bar

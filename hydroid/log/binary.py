@@ -21,7 +21,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hydroid.arrays import Array
 from hydroid.errors import LogError
 from hydroid.log.repair import hold
 from hydroid.log.table import Recording, Signal, Table, format_library
@@ -49,7 +48,15 @@ class BagTable(Table):
         columns = {time: grid}
         for name, times in at.items():
             values = np.array([self.channels[name][key] for key in times.tolist()])
-            columns[name] = _resampled((times - start) / 1e9, values, grid, held=held[name])
+            seconds = (times - start) / 1e9
+            if held[name] or len(times) == 1:
+                columns[name] = hold(seconds, values[:, None], grid, grid[1])[:, 0]
+                continue
+            after = np.searchsorted(seconds, grid - 1e-9).clip(1, len(seconds) - 1)
+            # a hole is longer than 0.1 s, or than three usual steps of the topic if these are longer
+            far = np.diff(seconds)[after - 1] > max(0.1, 3 * np.median(np.diff(seconds)))
+            between = (grid > seconds[after - 1] + 1e-9) & (grid < seconds[after] - 1e-9)
+            columns[name] = np.where(far & between, np.nan, np.interp(grid, seconds, values))
         topics = ", ".join(sorted({name.partition(".")[0] for name in held}))
         remarks = (f"{topics}: resampled to {self.period:g} s",)
         return Table(source=self.source, names=self.names, columns=columns, remarks=remarks).read(signals)
@@ -74,17 +81,6 @@ def open_bag(path: Path, time: str, period: float) -> BagTable:
     if not channels:
         raise LogError("holds no channel of numbers", path)
     return BagTable(source=str(path), names=(time, *channels), channels=channels, period=period)
-
-
-def _resampled(at: Array, values: Array, grid: Array, *, held: bool) -> Array:
-    """Return values at other times [s]; NaN between messages that are too far apart."""
-    if held or len(at) == 1:
-        return hold(at, values[:, None], grid, grid[1])[:, 0]
-    after = np.searchsorted(at, grid - 1e-9).clip(1, len(at) - 1)
-    # a hole is longer than 0.1 s, or than three usual steps of the topic if these are longer
-    far = np.diff(at)[after - 1] > max(0.1, 3 * np.median(np.diff(at)))
-    between = (grid > at[after - 1] + 1e-9) & (grid < at[after] - 1e-9)
-    return np.where(far & between, np.nan, np.interp(grid, at, values))
 
 
 def _numbers(message: Any, prefix: str) -> Iterator[tuple[str, float]]:

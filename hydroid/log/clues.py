@@ -62,7 +62,7 @@ def words(name: str) -> list[str]:
     return [word.lower() for word in re.findall(r"[A-Z]?[a-zäöüß]+|[A-Z]+(?![a-z])|\d+", name)]
 
 
-def column_unit(name: str, given: str = "") -> Unit | None:
+def column_unit(name: str, given: str) -> Unit | None:
     """Return the unit that the file gives, or the one in or at the end of the name; None: there is none."""
     inside = re.search(r"[\[(<]([^\])>]*)[\])>]\s*$", name)
     units = map(unit_of, (given, inside[1] if inside else "", re.split(r"[_ .]", name)[-1]))

@@ -7,7 +7,6 @@ from typing import get_args
 
 import numpy as np
 
-from hydroid.arrays import Array
 from hydroid.errors import LogError
 from hydroid.files import csv_text, write_atomic
 from hydroid.log.binary import open_bag, open_mat, open_parquet
@@ -194,15 +193,11 @@ def write_logs(path: Path, logs: Sequence[tuple[Log, LogSettings]], *, exact: bo
                 if log.pressure is None:
                     continue
                 values = log.pressure[:, joint, signal.part]
-            columns[signal.name] = _cells(signal, values, exact)
+            # ten digits, or the shortest of more that are read as these values
+            wanted = (values - signal.offset) / signal.gain
+            cells = np.array([f"{cell:.10g}" for cell in wanted], dtype=object)
+            for digits in (15, 16, 17) if exact else ():
+                wrong = np.flatnonzero(cells.astype(float) * signal.gain + signal.offset != values)
+                cells[wrong] = [f"{cell:.{digits}g}" for cell in wanted[wrong]]
+            columns[signal.name] = cells.tolist()
     write_atomic(path, csv_text([columns, *zip(*columns.values(), strict=True)]))
-
-
-def _cells(signal: Signal, values: Array, exact: bool) -> list[str]:
-    """Return cells of ten digits, or the shortest of more that are read as these values."""
-    wanted = (values - signal.offset) / signal.gain
-    cells = np.array([f"{cell:.10g}" for cell in wanted], dtype=object)
-    for digits in (15, 16, 17) if exact else ():
-        wrong = np.flatnonzero(cells.astype(float) * signal.gain + signal.offset != values)
-        cells[wrong] = [f"{cell:.{digits}g}" for cell in wanted[wrong]]
-    return cells.tolist()

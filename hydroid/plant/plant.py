@@ -179,8 +179,15 @@ class Plant:
         if given[~self._active].any():
             raise ValueError(f"only {', '.join(self._named)} take commands: name the others in joints=")
         self.data.ctrl[:] = given[self._columns].clip(-100.0, 100.0)
+        commands, torque, _ = self._course
+        torque[:] = (self._gain * self.data.ctrl + self._balance)[self._chain.pushed]
+        commands[: -self._steps] = commands[self._steps :]
+        commands[-self._steps :] = self.data.ctrl[self._chain.columns]
+        # M of the step before: refreshing positions in between must not change a bit
+        np.copyto(self.data.M, self._mass)
         with quiet_mujoco():
-            self._advance(self.data.ctrl)
+            self._arm.roll(self._plugin, self._state, self._course, self._record)
+        np.copyto(self._mass, self.data.M)
         self._taken += self._steps
         if not self._arm.healthy:
             raise RunError(f"the simulation diverged before {self.time:.2f} s", self.identified.source)
@@ -216,16 +223,6 @@ class Plant:
                 actuators[joint] = {name: float(values[name] / q.factor) for name, q in hydraulic.items()}
         fitted = locked_spec(spec, self._locked, model, motors)
         write_fitted(folder, fitted, ", ".join(self._named), actuators)
-
-    def _advance(self, command: Array) -> None:
-        commands, torque, _ = self._course
-        torque[:] = (self._gain * command + self._balance)[self._chain.pushed]
-        commands[: -self._steps] = commands[self._steps :]
-        commands[-self._steps :] = command[self._chain.columns]
-        # M of the step before: refreshing positions in between must not change a bit
-        np.copyto(self.data.M, self._mass)
-        self._arm.roll(self._plugin, self._state, self._course, self._record)
-        np.copyto(self._mass, self.data.M)
 
     def _lock(self, pose: Array) -> None:
         settings, candidate = self.identified.settings, self._candidate

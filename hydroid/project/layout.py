@@ -37,7 +37,7 @@ class Layout:
     followed: bool
 
 
-def find_layout(table: Table, arm: Arm, order: Sequence[str] = ()) -> Layout:
+def find_layout(table: Table, arm: Arm, order: Sequence[str]) -> Layout:
     """Guess the columns of a log, turn commands that act against the angle, and see how fast joints are."""
     names = arm.joint_names
     for name in order:

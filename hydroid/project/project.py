@@ -69,7 +69,17 @@ def write_project(
         write_atomic(stage / FIT, fit_text(arm, layout, sizes, str(folder / FIT), reference))
         # what is written can be read
         validate(read_yaml(stage / FIT)[0] | {"arm": arm}, FitSettings, FIT)
-        steps = next_steps(folder, logs)
+        # of several logs the last is kept to validate on, of one none is
+        names = [shlex.quote(str(log)) for log in logs or ("LOG.csv", "OTHER.csv")]
+        fitted, other = " ".join(names[:-1] or names), names[-1] if names[1:] else "OTHER.csv"
+        home = shlex.quote(str(folder))
+        config, run = f"--config {home}/fit.yaml", f"{home}/runs/fit"
+        steps = (
+            f"hydroid check {' '.join(names)} {config}",
+            f"hydroid fit-hyd {fitted} {config} --out {run}",
+            f"hydroid validate {other} --fit {run} --out {home}/runs/validation",
+            f"hydroid suggest {fitted} --fit {run} --out {home}/runs/suggestions",
+        )
         notes, reasons = [*imported.notes] if imported else [], layout.reasons if layout else ()
         guessed = [joint.name for joint in arm.joints if isinstance(joint.actuator, RotaryActuator)]
         if imported and guessed:
@@ -79,20 +89,6 @@ def write_project(
         write_atomic(stage / STEPS, fill_template("project/next-steps.md.j2", name=arm.name, **said))
         written = _move(stage, folder)
     return Project(folder, written, tuple(notes), reasons, layout.unused if layout else (), steps)
-
-
-def next_steps(folder: Path, logs: Sequence[Path]) -> tuple[str, ...]:
-    """Return the commands to run; of several logs the last is kept to validate on, of one none is."""
-    names = [shlex.quote(str(log)) for log in logs or ("LOG.csv", "OTHER.csv")]
-    fitted, other = " ".join(names[:-1] or names), names[-1] if names[1:] else "OTHER.csv"
-    home = shlex.quote(str(folder))
-    config, run = f"--config {home}/fit.yaml", f"{home}/runs/fit"
-    return (
-        f"hydroid check {' '.join(names)} {config}",
-        f"hydroid fit-hyd {fitted} {config} --out {run}",
-        f"hydroid validate {other} --fit {run} --out {home}/runs/validation",
-        f"hydroid suggest {fitted} --fit {run} --out {home}/runs/suggestions",
-    )
 
 
 def _write_arm(

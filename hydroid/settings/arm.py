@@ -102,7 +102,25 @@ class Arm(Settings):
                 raise SettingsError(f"actuators.{name}: no such joint", self.where, hint)
         if self.payload is not None and self.payload not in [model.site(s).name for s in range(model.nsite)]:
             raise SettingsError(f"payload: the model has no site {self.payload!r}", self.where)
-        return tuple(self._joint(name) for name in names)
+        joints = list[Joint]()
+        for name in names:
+            joint, actuator = model.joint(name), self.actuators.get(name)
+            limited, slides = bool(joint.limited[0]), int(joint.type[0]) == SLIDE
+            # sliders and tests take a joint without limits once round
+            low, high = (-1.0, 1.0) if slides else (-180.0, 180.0)
+            if limited:
+                low, high = (joint.range if slides else np.degrees(joint.range)).round(DIGITS).tolist()
+            bare = Joint(name, (low, high), not limited, None, slides)
+            if isinstance(actuator, Cylinder):
+                try:
+                    if not limited:
+                        raise ValueError("a joint without limits needs a rotary actuator")
+                    zero = _at_zero(self.model)
+                    actuator = make_cylinder(actuator, bare.limits, zero, name, slides=slides)
+                except ValueError as error:
+                    raise SettingsError(f"actuators.{name}: {error}", self.where) from None
+            joints.append(replace(bare, actuator=actuator))
+        return tuple(joints)
 
     @cached_property
     def mass_of(self) -> dict[str, float]:
@@ -130,24 +148,6 @@ class Arm(Settings):
     @property
     def _model(self) -> Any:
         return _at_zero(self.model).model
-
-    def _joint(self, name: str) -> "Joint":
-        joint, actuator = self._model.joint(name), self.actuators.get(name)
-        limited, slides = bool(joint.limited[0]), int(joint.type[0]) == SLIDE
-        # sliders and tests take a joint without limits once round
-        low, high = (-1.0, 1.0) if slides else (-180.0, 180.0)
-        if limited:
-            low, high = (joint.range if slides else np.degrees(joint.range)).round(DIGITS).tolist()
-        bare = Joint(name, (low, high), not limited, None, slides)
-        if isinstance(actuator, Cylinder):
-            try:
-                if not limited:
-                    raise ValueError("a joint without limits needs a rotary actuator")
-                zero = _at_zero(self.model)
-                actuator = make_cylinder(actuator, bare.limits, zero, name, slides=slides)
-            except ValueError as error:
-                raise SettingsError(f"actuators.{name}: {error}", self.where) from None
-        return replace(bare, actuator=actuator)
 
     @property
     def joint_names(self) -> tuple[str, ...]:

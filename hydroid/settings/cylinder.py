@@ -2,15 +2,12 @@
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from hydroid.arrays import Array, record
+from hydroid.arrays import record
 from hydroid.settings.linkage import DIGITS, Cylinder, Pivots, Triangle, Vector, four_bar, triangle
-
-if TYPE_CHECKING:
-    import mujoco
 
 
 @record
@@ -49,20 +46,25 @@ class LinearActuator:
 def make_cylinder(
     settings: Cylinder,
     limits: tuple[float, float],
-    data: "mujoco.MjData | None" = None,
+    data: Any = None,
     joint: str = "",
     *,
     slides: bool = False,
 ) -> LinearActuator:
     """Return a cylinder that moves its joint through a range [rad], or along it [m] where the joint `slides`.
 
-    `data` has all joints of the arm at 0; a cylinder whose triangle is given, or along its joint, needs none.
+    MuJoCo's `data` has all joints of the arm at 0; a cylinder whose triangle is given, or that lies along its
+    joint, needs none.
     """
     sides, pivots = settings.triangle, None
     if slides:
         if settings.triangle or settings.four_bar:
             raise ValueError("its joint slides, so it lies along it: give neither triangle nor four_bar")
-        sides = _along(settings.pivots, data, joint)
+        # along the joint b is 0; by default the rod runs out forward
+        given, way = settings.pivots, 1.0
+        if given is not None:
+            way = float(np.subtract(given.child, given.parent) @ data.joint(joint).xaxis)
+        sides = Triangle.model_construct(a=1.0, b=0.0, theta0=90.0 if way > 0 else -90.0)
     elif sides is None:
         sides, pivots = _pinned(settings.pivots, data, joint)
     sides = sides.changed({"a": max(sides.a, sides.b), "b": min(sides.a, sides.b)})
@@ -82,12 +84,6 @@ def make_cylinder(
     return replace(cylinder, stroke=stroke)
 
 
-def _along(given: Pivots | None, data: Any, joint: str) -> Triangle:
-    """Return the triangle of a cylinder along its joint, b = 0; by default its rod runs out forward."""
-    way = 1.0 if given is None else float(np.subtract(given.child, given.parent) @ data.joint(joint).xaxis)
-    return Triangle.model_construct(a=1.0, b=0.0, theta0=90.0 if way > 0 else -90.0)
-
-
 def _pinned(given: Pivots | None, data: Any, joint: str) -> tuple[Triangle, tuple[Vector, Vector]]:
     """The triangle of a cylinder's pivots, and these in the frames of parent and moved body [m]."""
     if given is not None:
@@ -102,11 +98,7 @@ def _pinned(given: Pivots | None, data: Any, joint: str) -> tuple[Triangle, tupl
     bodies = int(data.model.body_parentid[child]), child
     local = [data.xmat[b].reshape(3, 3).T @ (e - data.xpos[b]) for b, e in zip(bodies, ends, strict=True)]
     parent, moved = (tuple(place.round(DIGITS).tolist()) for place in local)
-    return _triangle(ends - at.xanchor, at.xaxis), (parent, moved)
-
-
-def _triangle(ends: Array, axis: Array) -> Triangle:
-    """The triangle of two pivots, (2, 3), seen from the joint at angle 0 [m], and the joint's axis, (3,)."""
+    ends, axis = ends - at.xanchor, at.xaxis
     heights = ends @ axis
     near, far = flat = ends - np.outer(heights, axis)
     a, b = np.linalg.norm(flat, axis=1).tolist()
@@ -120,4 +112,4 @@ def _triangle(ends: Array, axis: Array) -> Triangle:
             "a cylinder must lie across the axis"
         )
     turn = round(math.degrees(math.atan2(float(np.cross(near, far) @ axis), float(near @ far))), DIGITS)
-    return Triangle(a=round(a, DIGITS), b=round(b, DIGITS), theta0=turn)
+    return Triangle(a=round(a, DIGITS), b=round(b, DIGITS), theta0=turn), (parent, moved)

@@ -78,10 +78,15 @@ S = TypeVar("S", bound=Settings)
 
 
 def load(path: Path, kind: type[S], overrides: Mapping[str, Any] | None = None) -> S:
-    """Read one YAML file as settings of a kind, with overrides by dotted key."""
+    """Read one YAML file as settings of a kind, with overrides by dotted key, joints by their numbers."""
     values, lines = read_yaml(path)
     for key, value in (overrides or {}).items():
-        replace_setting(values, key, value)
+        (*folders, last), place = key.split("."), values
+        for folder in folders:
+            place = place.setdefault(folder, {})
+            if not isinstance(place, dict):
+                raise SettingsError(f"{folder} has no settings below it", f"--set {key}")
+        place[last] = value
     return validate(values, kind, str(path), lines, sorted(overrides or ()), path.parent)
 
 
@@ -111,7 +116,10 @@ def validate(
             name, where = key[len(at) + 1 :], f"--set {at}"
         else:
             named = fault["type"] in ("extra_forbidden", "missing")  # the problem names the setting
-            name, where = "" if named else _shown(key)[1:-1], source + _line(key, lines or {})
+            parts = tuple(key.split("."))
+            begins = (parts[:end] for end in range(len(parts), 0, -1))
+            line = next((f", line {lines[part]}" for part in begins if lines and part in lines), "")
+            name, where = "" if named else _shown(key)[1:-1], f"{source}{line}"
         found.setdefault(where, f"{name}: {problem}" if name else problem)
     (where, what), *others = found.items()
     also = listed([f"{place.removeprefix(f'{source}, ')}: {other}" for place, other in others], 3)
@@ -126,30 +134,17 @@ def parse_override(text: str) -> tuple[str, Any]:
     return key.strip(), read_document(value, f"--set {text}")[0]
 
 
-def replace_setting(values: Plain, key: str, value: Any) -> None:
-    """Set a value of nested mappings by its dotted key; numbers of joints may be keys."""
-    *folders, last = key.split(".")
-    for folder in folders:
-        inner = values.setdefault(folder, {})
-        if not isinstance(inner, dict):
-            raise SettingsError(f"{folder} has no settings below it", f"--set {key}")
-        values = inner
-    values[last] = value
-
-
-def _line(key: str, lines: Lines) -> str:
-    parts = tuple(key.split("."))
-    place = next((lines[parts[:end]] for end in range(len(parts), 0, -1) if parts[:end] in lines), None)
-    return f", line {place}" if place else ""
-
-
 def _explained(fault: Any, kind: type[Settings]) -> tuple[str, str]:
     """The dotted key of a setting, and what is wrong with it, from one of pydantic's faults."""
     key = ".".join(str(part) for part in fault["loc"]).removesuffix(".[key]")
     if fault["type"] == "missing":
         return key, f"setting {key!r} is missing"
     if fault["type"] == "extra_forbidden":
-        allowed = _allowed(kind, fault["loc"][:-1])
+        inner: Any = kind
+        for part in fault["loc"][:-1]:
+            field = getattr(inner, "model_fields", {}).get(str(part))
+            inner = field and field.annotation
+        allowed = [*getattr(inner, "model_fields", ())]
         near = difflib.get_close_matches(str(fault["loc"][-1]), allowed, n=1)
         choice = f"; did you mean {near[0]!r}?" if near else f"; allowed here: {', '.join(allowed)}"
         return key, f"unknown setting {_shown(key)}{choice if allowed else ''}"
@@ -169,13 +164,3 @@ def _shown(value: object) -> str:
     else:
         text = {"None": "null", "True": "true", "False": "false"}.get(repr(value), repr(value))
     return text if len(text) <= 60 else f"{text[:56]}...{text[-1]}"
-
-
-def _allowed(kind: type[Settings], loc: tuple[Any, ...]) -> list[str]:
-    for part in loc:
-        field = kind.model_fields.get(str(part))
-        inner = field.annotation if field else None
-        if not (isinstance(inner, type) and issubclass(inner, Settings)):
-            return []
-        kind = inner
-    return [*kind.model_fields]

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any, Literal
 
 from hydroid.errors import RunError, SettingsError
-from hydroid.progress import LOGGER
 
 Plain = dict[str, Any]  # a mapping as YAML and JSON hold it
 PART = ".part"  # suffix of a file that is being written
@@ -67,13 +66,6 @@ def write_atomic(path: Path, content: str | bytes, *, keep: Path | None = None) 
     finally:
         if temporary and os.path.exists(temporary):
             os.unlink(temporary)
-
-
-def remove_parts(folder: Path) -> None:
-    """Remove unfinished files that killed processes left; no other process may write to the folder."""
-    for part in folder.rglob(f".*{PART}"):
-        LOGGER.info("removed %s, left by a process that was killed while it wrote", part.name)
-        part.unlink(missing_ok=True)
 
 
 is_file = os.path.isfile  # Path's own raises for a name that no file can have

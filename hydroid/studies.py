@@ -13,7 +13,7 @@ import os
 import signal
 import threading
 from collections.abc import Callable, Generator, Mapping, Sequence
-from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from pathlib import Path
@@ -114,7 +114,34 @@ def run_study(
     cells = cell_settings(study, path)
     logs = read([path.parent / name for name in study.logs], next(iter(cells.values())))
     tasks = make_tasks(cells, study.seeds, logs)
-    return tuple(map(measured, tasks, run_all(tasks, folder, executor, progress)))
+    files = [folder / "runs" / f"{task.key()}.json" for task in tasks]
+    results = {file: _read(file) for file in files if file.is_file()}
+    missing = {file: task for file, task in zip(files, tasks, strict=True) if file not in results}
+    known, total = len(results), len(results) + len(missing)
+    if known and missing:
+        LOGGER.log(NOTE, "%d of %d runs found, goes on", known, total)
+    progress("runs", known, total)
+    futures = {executor.submit(perform, task): file for file, task in missing.items()}
+    try:
+        for done, future in enumerate(as_completed(futures), known + 1):
+            file, lasting = futures.pop(future), True
+            try:
+                results[file] = future.result()
+            except BrokenProcessPool:
+                hint = "the same command goes on from here; with less memory, use fewer processes"
+                raise RunError("a process of the study was killed", hint=hint) from None
+            except Exception as error:
+                lasting = isinstance(error, HydroidError)  # what is no fault of the input may pass
+                words = str(error) if lasting else f"{type(error).__name__}: {error}"
+                LOGGER.warning("%s, seed %d failed: %s", missing[file].cell, missing[file].seed, words)
+                results[file] = {"failed": words}
+            if lasting:
+                write_atomic(file, json.dumps(results[file], indent=1, allow_nan=False) + "\n")
+            progress("runs", done, total)
+    finally:
+        for future in futures:
+            future.cancel()
+    return tuple(measured(task, results[file]) for task, file in zip(tasks, files, strict=True))
 
 
 def make_tasks(cells: Mapping[str, FitSettings], seeds: int, logs: Sequence[Log]) -> list[Task]:
@@ -132,43 +159,6 @@ def measured(task: Task, result: Result) -> Row:
         return Row(task.cell, task.seed, {}, result["failed"])
     values = result["measures"] | {f"value {name}": value for name, value in result["theta"].items()}
     return Row(task.cell, task.seed, {name: float(value) for name, value in values.items()})
-
-
-def run_all(tasks: Sequence[Task], folder: Path, executor: Executor, progress: Progress) -> list[Result]:
-    """Return the result of every task, in order; what `folder`/runs has is read, the others are performed."""
-    files = [folder / "runs" / f"{task.key()}.json" for task in tasks]
-    results = {file: _read(file) for file in files if file.is_file()}
-    missing = {file: task for file, task in zip(files, tasks, strict=True) if file not in results}
-    known, total = len(results), len(results) + len(missing)
-    if known and missing:
-        LOGGER.log(NOTE, "%d of %d runs found, goes on", known, total)
-    progress("runs", known, total)
-    futures = {executor.submit(perform, task): file for file, task in missing.items()}
-    try:
-        for done, future in enumerate(as_completed(futures), known + 1):
-            file = futures.pop(future)
-            results[file], lasting = _outcome(future, missing[file])
-            if lasting:
-                write_atomic(file, json.dumps(results[file], indent=1, allow_nan=False) + "\n")
-            progress("runs", done, total)
-    finally:
-        for future in futures:
-            future.cancel()
-    return [results[file] for file in files]
-
-
-def _outcome(future: Future[Result], task: Task) -> tuple[Result, bool]:
-    """Return what a run came to, and whether it lasts: an error that is no fault of the input may pass."""
-    try:
-        return future.result(), True
-    except BrokenProcessPool:
-        hint = "the same command goes on from here; with less memory, use fewer processes"
-        raise RunError("a process of the study was killed", hint=hint) from None
-    except Exception as error:
-        lasting = isinstance(error, HydroidError)
-        words = str(error) if lasting else f"{type(error).__name__}: {error}"
-    LOGGER.warning("%s, seed %d failed: %s", task.cell, task.seed, words)
-    return {"failed": words}, lasting
 
 
 def _read(file: Path) -> Result:

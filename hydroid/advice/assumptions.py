@@ -75,10 +75,17 @@ def doubts(settings: FitSettings, logs: Sequence[Log]) -> dict[int, float]:
         if settings.stage == "hyd" and joint + 1 in settings.outputs:
             laws |= _law(settings, motion, joint)
     model, numbers = load_model(settings.arm).compile(), np.arange(len(settings.arm.joints))
+    data = mujoco.MjData(model)
 
     def left(turned: int | None = None) -> list[Array]:
         signs = np.where(numbers == turned, -1.0, 1.0)
-        loads = signs * _loads(model, signs * motion.angle)
+        poses, loads = signs * motion.angle, np.empty_like(motion.angle)
+        for pose, load in zip(poses, loads, strict=True):  # what holds the arm
+            data.qpos[:] = pose
+            mujoco.mj_kinematics(model, data)
+            mujoco.mj_comPos(model, data)
+            mujoco.mj_rne(model, data, 0, load)
+        loads *= signs
         return [law(loads[:, joint]) for joint, law in laws.items()]
 
     before, found = left(), dict[int, float]()
@@ -159,14 +166,3 @@ def _law(settings: FitSettings, motion: _Motion, joint: int) -> dict[int, Callab
         return rest - max(effect @ rest, 0.0) / max(effect @ effect, TINY) * effect
 
     return {joint: left}
-
-
-def _loads(model: mujoco.MjModel, poses: Array) -> Array:
-    """Torques or forces of all joints that hold an arm in poses, shape (n, J)."""
-    data, loads = mujoco.MjData(model), np.empty_like(poses)
-    for pose, load in zip(poses, loads, strict=True):
-        data.qpos[:] = pose
-        mujoco.mj_kinematics(model, data)
-        mujoco.mj_comPos(model, data)
-        mujoco.mj_rne(model, data, 0, load)
-    return loads

@@ -98,25 +98,19 @@ class ExperimentSimulator:
             (angle,) = self._simulate(experiment, self._box.at[None])
             if not np.isfinite(angle).all():
                 return None
-            first = violation(angle, self._settings)
-            first = first or self._too_near(angle)
+            first, machine = violation(angle, self._settings), self._machine
+            if first is None and machine is not None:
+                motion = machine.joined({machine.sides[0]: angle}, self._pose)
+                if (near := machine.checker.first_below(motion, self._margin or 0.0)) is not None:
+                    # the joint that turned most lately is the cause; those far out count as the others do
+                    turned = np.ptp(angle[max(0, near - 20) : near + 1], axis=0)
+                    first = Violation(near, int(np.argmax(turned)), False)
             if first is None:
                 return self._kept(experiment, angle)
             if first.sample == 0:
                 return None  # the start pose itself
             experiment = repaired(experiment, first)
         return None
-
-    def _too_near(self, angle: Array) -> Violation | None:
-        """Where a motion [rad], shape (T, J), first brings bodies nearer to each other than the margin."""
-        if (machine := self._machine) is None:
-            return None
-        motion = machine.joined({machine.sides[0]: angle}, self._pose)
-        if (sample := machine.checker.first_below(motion, self._margin or 0.0)) is None:
-            return None
-        # the cause is the joint that turned most lately; joints far out on the arm count as the others do
-        turned = np.ptp(angle[max(0, sample - 20) : sample + 1], axis=0)
-        return Violation(sample, int(np.argmax(turned)), False)
 
     def _kept(self, experiment: Experiment, angle: Array) -> Trial | None:
         """The trial of an experiment whose angles are known, (T, J); None where it diverges beside them."""

@@ -63,7 +63,26 @@ class RandomExperiments:
     def __init__(self, settings: FitSettings, rng: np.random.Generator) -> None:
         limits, arm, period = settings.design, settings.arm, settings.log.period_s
         self._rng, self._limit, self._any_pose = rng, limits.command_pct, limits.poses == "any"
-        self._joints, self._poses = _driven_joints(settings), _start_poses(settings)
+        count, joints = len(arm.joints), sorted(limits.joints or settings.outputs)
+        if joints[-1] > count:
+            raise SettingsError(f"the arm has joints 1 to {count}", "design.joints")
+        driven = np.isin(np.arange(count) + 1, joints)
+        Bindings(settings).refuse_idle(driven, [j - 1 for j in settings.outputs])
+        self._joints = np.flatnonzero(driven).tolist()
+        # named poses in which the joints that move are within their limits
+        names = tuple(arm.poses) if limits.poses is None or limits.poses == "any" else limits.poses
+        poses = np.array([arm.pose(name) for name in names])
+        moving = [j - 1 for j in {*(limits.joints or ()), *settings.outputs}]
+        margin = np.radians(limits.margin_deg)
+        inside = (poses >= arm.lower + margin) & (poses <= arm.upper - margin)
+        poses = poses[inside[:, moving].all(axis=1)]
+        if not len(poses) and limits.poses != "any":
+            raise SettingsError(
+                f"no pose of {', '.join(names)} is {limits.margin_deg:g} deg inside the ranges of what moves",
+                "design.poses",
+                "add one to the arm's file, reduce design.margin_deg, or set design.poses=any",
+            )
+        self._poses = poses
         lower, upper = np.array([joint.limits for joint in arm.joints]).T
         inward = np.minimum(np.radians(limits.margin_deg), 0.5 * (upper - lower))
         self._lower, self._upper = lower + inward, upper - inward
@@ -114,34 +133,6 @@ class RandomExperiments:
             return self._pose()
         step = self._rng.normal(0.0, 0.1, len(pose)) * (self._upper - self._lower)
         return np.clip(pose + step, self._lower, self._upper)
-
-
-def _driven_joints(settings: FitSettings) -> list[int]:
-    """Joints that may be driven, 0-based; refuse one that the arm lacks, or that stage 1 has no gain for."""
-    count, joints = len(settings.arm.joints), sorted(settings.design.joints or settings.outputs)
-    if joints[-1] > count:
-        raise SettingsError(f"the arm has joints 1 to {count}", "design.joints")
-    driven = np.isin(np.arange(count) + 1, joints)
-    Bindings(settings).refuse_idle(driven, [j - 1 for j in settings.outputs])
-    return np.flatnonzero(driven).tolist()
-
-
-def _start_poses(settings: FitSettings) -> Array:
-    """Named start poses [rad], shape (N, J), in which the joints that move are within their limits."""
-    design, arm = settings.design, settings.arm
-    names = tuple(arm.poses) if design.poses is None or design.poses == "any" else design.poses
-    poses = np.array([arm.pose(name) for name in names])
-    moving = [j - 1 for j in {*(design.joints or ()), *settings.outputs}]
-    margin = np.radians(design.margin_deg)
-    inside = (poses >= arm.lower + margin) & (poses <= arm.upper - margin)
-    poses = poses[inside[:, moving].all(axis=1)]
-    if not len(poses) and design.poses != "any":
-        raise SettingsError(
-            f"no pose of {', '.join(names)} is {design.margin_deg:g} deg inside the ranges of what moves",
-            "design.poses",
-            "add one to the arm's file, reduce design.margin_deg, or set design.poses=any",
-        )
-    return poses
 
 
 class Violation(NamedTuple):

@@ -99,7 +99,26 @@ def fit_baselines(logs: Sequence[Log], joint: int, limits: Array) -> dict[str, B
     delays = np.arange(0, LONGEST_DELAY, max(0.02, measured[0].period))
     tables = (_mean_speeds(measured, still, delay) for delay in delays)
     table = min(tables, key=lambda model: np.mean(model.errors(measured) ** 2))
-    return dict(zip(NAMES, (still, table, _nine_numbers(measured, table)), strict=True))
+    # of the fits that start at the table of speeds with different exponents the best
+    lower = [0, 0, 0.3, 0.3, -np.inf, -np.inf, 0, 0, 0]
+    upper = [90, 90, 5, 5, np.inf, np.inf, 1.5, 1.5, LONGEST_DELAY]
+    scale = [10, 10, 0.5, 0.5, 0.2, 0.2, 0.1, 0.1, 0.1]
+
+    def made(x: Array) -> Baseline:
+        return replace(table, table=None, delay=float(x[8]), numbers=x[:8].reshape(4, 2))
+
+    def fit(start: Array, evaluations: int) -> OptimizeResult:
+        return least_squares(
+            lambda x: made(x).errors(measured),
+            start,
+            bounds=(lower, upper),
+            x_scale=scale,
+            max_nfev=evaluations,
+        )
+
+    best = min((fit(start, 10) for start in _starts(table)), key=lambda ended: ended.cost)
+    numbers = made(fit(best.x, 40).x)
+    return dict(zip(NAMES, (still, table, numbers), strict=True))
 
 
 def _mean_speeds(logs: Sequence[Log], still: Baseline, delay: float) -> Baseline:
@@ -118,24 +137,6 @@ def _mean_speeds(logs: Sequence[Log], still: Baseline, delay: float) -> Baseline
     filled = (bins == number for number in np.unique(bins))
     rows = sorted([(0.0, 0.0), *((command[one].mean(), speed[one].mean()) for one in filled)])
     return replace(still, delay=delay, table=np.array(rows))
-
-
-def _nine_numbers(logs: Sequence[Log], table: Baseline) -> Baseline:
-    """Return the best of the fits that start at the table of speeds with different exponents."""
-    lower = [0, 0, 0.3, 0.3, -np.inf, -np.inf, 0, 0, 0]
-    upper = [90, 90, 5, 5, np.inf, np.inf, 1.5, 1.5, LONGEST_DELAY]
-    scale = [10, 10, 0.5, 0.5, 0.2, 0.2, 0.1, 0.1, 0.1]
-
-    def made(x: Array) -> Baseline:
-        return replace(table, table=None, delay=float(x[8]), numbers=x[:8].reshape(4, 2))
-
-    def fit(start: Array, evaluations: int) -> OptimizeResult:
-        return least_squares(
-            lambda x: made(x).errors(logs), start, bounds=(lower, upper), x_scale=scale, max_nfev=evaluations
-        )
-
-    best = min((fit(start, 10) for start in _starts(table)), key=lambda ended: ended.cost)
-    return made(fit(best.x, 40).x)
 
 
 def _starts(table: Baseline) -> Iterator[Array]:

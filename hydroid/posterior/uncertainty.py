@@ -160,7 +160,11 @@ def uncertainty_from(problem: Problem, whole: Linear, noise: Sequence[Noise] = (
     edge = held_by_bound(room, white)
     held = edge & (white <= UNIDENTIFIABLE_ABOVE)
     linear = whole.of(~held | held.all())
-    noise = noise or _noise(problem, linear)
+    if not noise:  # that before the fit absorbed a part of it
+        shown = problem_noise(problem, linear.residual)
+        spread = linear.prior_scatter + linear.scatters(problem.channels, shown).sum(axis=0)
+        pairs = zip(problem.channels, shown, strict=True)
+        noise = [unbiased(one, linear.effects[:, channel.rows], spread) for channel, one in pairs]
     scatters = linear.scatters(problem.channels, noise)
     size = np.linalg.norm(linear.changes, axis=0)  # D V' is (V D^-1)^-1
     half = np.linalg.cholesky(scatters.sum(axis=0) + linear.prior_scatter)
@@ -223,11 +227,3 @@ def _widths(problem: Problem, linear: Linear, noise: Sequence[Noise], variance: 
             square += (waves**2 @ (other.power - power) / STEP) ** 2
     # where the logarithm of a variance is known to 5 or worse, nothing is, and no interval is of use
     return np.array([quantile(spread) for spread in np.minimum(np.sqrt(square) / variance, 5.0)])
-
-
-def _noise(problem: Problem, linear: Linear) -> list[Noise]:
-    """Return each channel's noise before the fit absorbed a part of it."""
-    noise = problem_noise(problem, linear.residual)
-    spread = linear.prior_scatter + linear.scatters(problem.channels, noise).sum(axis=0)
-    pairs = zip(problem.channels, noise, strict=True)
-    return [unbiased(one, linear.effects[:, channel.rows], spread) for channel, one in pairs]

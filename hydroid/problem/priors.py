@@ -53,7 +53,12 @@ class Priors:
     """
 
     def __init__(self, settings: Mapping[str, PriorSettings], parameters: ParameterSet) -> None:
-        self.searched = _within_reach(parameters)
+        narrowed = list(parameters.parameters)
+        for column, p in enumerate(narrowed):
+            if p.prior is not None and p.fixed is None:
+                low, high = max(p.lower, p.prior.value(-REACH)), min(p.upper, p.prior.value(REACH))
+                narrowed[column] = replace(p, lower=low, upper=high)
+        self.searched = ParameterSet(tuple(narrowed))
         self._own = [
             (column, p.prior)
             for column, p in enumerate(parameters.parameters)
@@ -108,16 +113,6 @@ class Priors:
             if np.array_equal(theta, before):
                 break
         return theta
-
-
-def _within_reach(parameters: ParameterSet) -> ParameterSet:
-    """Return the parameters with bounds no further than REACH standard deviations from their priors."""
-    narrowed = list(parameters.parameters)
-    for column, p in enumerate(narrowed):
-        if p.prior is not None and p.fixed is None:
-            low, high = max(p.lower, p.prior.value(-REACH)), min(p.upper, p.prior.value(REACH))
-            narrowed[column] = replace(p, lower=low, upper=high)
-    return ParameterSet(tuple(narrowed))
 
 
 def _combination(name: str, prior: PriorSettings, parameters: ParameterSet) -> _Combination | None:

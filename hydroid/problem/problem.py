@@ -21,7 +21,6 @@ from hydroid.parallel.workers import DaskWorkers
 from hydroid.problem.bindings import Bindings
 from hydroid.problem.channels import (
     UNFILTERED,
-    Channel,
     compared_pressures,
     make_channels,
     overall_objective,
@@ -101,7 +100,12 @@ class Problem:
         ]
         self.channels = make_channels(logs, settings)
         self.measured = np.concatenate([c.weight * c.measured for c in self.channels])
-        self.bounds: Ints = np.concatenate([self._segments(c) for c in self.channels])
+        many = settings.objective.segments  # of an angle; a pressure is one objective, however long
+        counts = [many if c.quantity == "angle" else 1 for c in self.channels]
+        pairs = zip(self.channels, counts, strict=True)
+        self.bounds: Ints = np.concatenate(
+            [c.rows.start + segment_bounds(len(c.measured), n) for c, n in pairs]
+        )
 
     @property
     def active_joints(self) -> tuple[int, ...]:
@@ -220,13 +224,6 @@ class Problem:
     def _on_worker(self) -> "Problem":
         threads = {"simulation.threads": self.settings.simulation.threads or 1}
         return Problem(self.settings.changed(threads), self.logs)
-
-    def _segments(self, channel: Channel) -> Ints:
-        """Samples of each objective: an angle's segments; a pressure is one objective, however long."""
-        if channel.quantity != "angle":
-            return np.array([[channel.rows.start, channel.rows.stop]])
-        bounds = segment_bounds(len(channel.measured), self.settings.objective.segments)
-        return bounds + channel.rows.start
 
 
 def make_simulation(

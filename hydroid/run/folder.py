@@ -15,7 +15,7 @@ from hydroid.arm.model import load_model
 from hydroid.arrays import record
 from hydroid.errors import RunError, Stopped
 from hydroid.estimate import write_estimate
-from hydroid.files import Plain, is_file, remove_parts, write_atomic
+from hydroid.files import PART, Plain, is_file, write_atomic
 from hydroid.identified_model import ARM, CONFIG, MODEL, IdentifiedModel, portable, write_settings
 from hydroid.log import Log
 from hydroid.plant import Plant
@@ -129,7 +129,9 @@ class RunFolder:
         if other and (not self.path.is_dir() or any(self.path.iterdir())):
             raise RunError("exists and holds no run", self.path, "choose another folder with --out")
         with locked(self.path), run_log(self.path / "run.log"):
-            remove_parts(self.path)
+            for part in self.path.rglob(f".*{PART}"):  # nobody else writes here
+                LOGGER.info("removed %s, left by a process that was killed while it wrote", part.name)
+                part.unlink(missing_ok=True)
             try:
                 yield
             except KeyboardInterrupt:

@@ -13,7 +13,6 @@ import sys
 from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO
 
 from hydroid.errors import RunError
 from hydroid.parallel.workers import VERSIONS
@@ -40,28 +39,24 @@ def locked(folder: Path) -> Generator[None]:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         file = (folder / LOCK).open("a+b", buffering=0)  # for writing: NFS grants no exclusive lock otherwise
-        _take(file, folder)
+        if fcntl is not None:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError as error:
+                if error.errno in (errno.EWOULDBLOCK, errno.EACCES):
+                    file.seek(0)
+                    holder = file.read(200).decode(errors="replace").strip() or "another process"
+                    hint = "wait for it to end, or choose another --out"
+                    raise RunError(f"is in use by {holder}", folder, hint) from None
+                words = "%s: no lock on this file system (%s); let no two runs use it"
+                LOGGER.warning(words, folder, error.strerror)
+            else:
+                file.truncate(0)
+                file.write(f"process {os.getpid()} on {socket.gethostname()}".encode())
     except OSError as error:
         raise RunError(f"cannot be written ({error.strerror})", folder) from None
     with file:  # to close it ends the lock
         yield
-
-
-def _take(file: IO[bytes], folder: Path) -> None:
-    if fcntl is None:
-        return
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError as error:
-        if error.errno in (errno.EWOULDBLOCK, errno.EACCES):
-            file.seek(0)
-            holder = file.read(200).decode(errors="replace").strip() or "another process"
-            hint = "wait for it to end, or choose another --out"
-            raise RunError(f"is in use by {holder}", folder, hint) from None
-        LOGGER.warning("%s: no lock on this file system (%s); let no two runs use it", folder, error.strerror)
-    else:
-        file.truncate(0)
-        file.write(f"process {os.getpid()} on {socket.gethostname()}".encode())
 
 
 @contextmanager

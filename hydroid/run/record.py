@@ -177,7 +177,14 @@ def read_runs(names: Sequence[str], out: str | Path | None) -> tuple[Record, ...
     groups = ([name] if os.path.exists(name) else glob.glob(name) or [name] for name in names)
     for path in sorted({path for group in groups for path in group}):
         try:
-            runs.append(_finished(path))
+            folder = RunFolder(Path(path))
+            if (status := folder.identity().get("status")) != "done":
+                raise RunError(f"is not finished ({status})", path, "resume it")
+            folder.refuse_changes()
+            record = load_record(path)
+            if record.summary.rms_deg is None:
+                raise RunError("has no final estimate that could be simulated", path)
+            runs.append(record)
         except HydroidError as error:
             LOGGER.warning("left out: %s", error)
     if not runs:
@@ -190,14 +197,3 @@ def read_runs(names: Sequence[str], out: str | Path | None) -> tuple[Record, ...
         if other:
             raise RunError(other, run.folder, "leave it out, or merge it apart")
     return tuple(runs)
-
-
-def _finished(path: str) -> Record:
-    folder = RunFolder(Path(path))
-    if (status := folder.identity().get("status")) != "done":
-        raise RunError(f"is not finished ({status})", path, "resume it")
-    folder.refuse_changes()
-    record = load_record(path)
-    if record.summary.rms_deg is None:
-        raise RunError("has no final estimate that could be simulated", path)
-    return record

@@ -99,16 +99,27 @@ def _advance(now: State, residuals: Function, settings: RefinementSettings) -> S
     model = LinearModel(now)
     steps = [model.step(now.damping)]
     promised = model.gain(steps[0])
-    if now.fresh and np.linalg.norm(steps[0]) > SHORTEST:
-        steps += _corrected(model, steps[0], now.damping, residuals)
+    if now.fresh and np.linalg.norm(s := steps[0]) > SHORTEST:
+        # the same step corrected for the curvature along it, where that can be measured
+        origin, probe = model.reach(np.zeros_like(s)), model.reach(PROBE * s)
+        slope = (residuals(probe[None])[0] - now.residual) / PROBE
+        curvature = 2 / PROBE * (slope - now.jacobian @ ((probe - origin) / PROBE))
+        if np.isfinite(curvature).all():
+            corrected = model.step(now.damping, now.residual + 0.5 * curvature)
+            change, length = (np.linalg.norm(model.scale * each) for each in (corrected - s, s))
+            steps += [corrected] if change < CURVED * length else []
     points = np.array([model.reach(s) for s in steps])
     if np.linalg.norm(points[0] - now.point) <= SHORTEST * np.linalg.norm(now.point):
         return _no_step(now)
     rows = residuals(points)
     cost = costs(rows)
     best = np.argmin(cost)
-    if not cost[best] < now.cost:
-        return _damped(now, model, settings)
+    if not cost[best] < now.cost:  # a new Jacobian, or a shorter step
+        if not now.fresh:
+            return replace(now, jacobian=no_jacobian(now.point))
+        after = replace(now, damping=now.damping * 2 * now.growth, growth=2 * now.growth)
+        promises = model.gain(model.step(after.damping)) >= settings.gain_tolerance * now.cost
+        return after if promises else _no_step(now)
     ratio = (now.cost - cost[best]) / promised if promised > 0 else 0.0
     after = _moved(now, points[best], rows[best], ratio, settings)
     if after.ended:
@@ -151,29 +162,8 @@ def _moved(now: State, point: Array, row: Array, ratio: float, settings: Refinem
     )
 
 
-def _damped(now: State, model: LinearModel, settings: RefinementSettings) -> State:
-    """After a step that did not help: a new Jacobian, or a shorter step."""
-    if not now.fresh:
-        return replace(now, jacobian=no_jacobian(now.point))
-    after = replace(now, damping=now.damping * 2 * now.growth, growth=2 * now.growth)
-    promises = model.gain(model.step(after.damping)) >= settings.gain_tolerance * now.cost
-    return after if promises else _no_step(now)
-
-
 def _no_step(now: State) -> State:
     """Where no step is left: end, or take a Jacobian that was updated anew."""
     if now.fresh:
         return replace(now, ending=Ending.NO_IMPROVEMENT)
     return replace(now, jacobian=no_jacobian(now.point), damping=DAMPING, growth=2.0)
-
-
-def _corrected(model: LinearModel, s: Array, damping: float, residuals: Function) -> list[Array]:
-    """The same step corrected for the curvature along it; none where that cannot be measured."""
-    origin, probe = model.reach(np.zeros_like(s)), model.reach(PROBE * s)
-    slope = (residuals(probe[None])[0] - model.at.residual) / PROBE
-    curvature = 2 / PROBE * (slope - model.at.jacobian @ ((probe - origin) / PROBE))
-    if not np.isfinite(curvature).all():
-        return []
-    corrected = model.step(damping, model.at.residual + 0.5 * curvature)
-    change, length = (np.linalg.norm(model.scale * each) for each in (corrected - s, s))
-    return [corrected] if change < CURVED * length else []

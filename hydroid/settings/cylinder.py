@@ -2,15 +2,12 @@
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from hydroid.arrays import record
 from hydroid.settings.linkage import DIGITS, Cylinder, Pivots, Triangle, Vector, four_bar, triangle
-
-if TYPE_CHECKING:
-    import mujoco
 
 
 @record
@@ -49,14 +46,15 @@ class LinearActuator:
 def make_cylinder(
     settings: Cylinder,
     limits: tuple[float, float],
-    data: "mujoco.MjData | None" = None,
+    data: Any = None,
     joint: str = "",
     *,
     slides: bool = False,
 ) -> LinearActuator:
     """Return a cylinder that moves its joint through a range [rad], or along it [m] where the joint `slides`.
 
-    `data` has all joints of the arm at 0; a cylinder whose triangle is given, or along its joint, needs none.
+    MuJoCo's `data` has all joints of the arm at 0; a cylinder whose triangle is given, or that lies along its
+    joint, needs none.
     """
     sides, pivots = settings.triangle, None
     if slides:

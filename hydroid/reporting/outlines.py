@@ -180,7 +180,7 @@ def moving_arm(
     flipped[..., 3] += _MARGIN + scale * np.array([-low[0], high[1]])
     arms = flipped.reshape(*seen.shape[:3], 8).swapaxes(1, 2)
     fitted = [[part if np.ptp(part, axis=0).any() else part[:1] for part in arm] for arm in arms]
-    lying = dict(zip(("measured", "simulated"), fitted, strict=True))
+    lying = {"measured": fitted[0], "simulated": fitted[1]}
     slides = {names[joint]: model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE for joint in compared}
     factors = [1e3 if each else np.degrees(1.0) for each in slides.values()]
     errors = dict(zip(slides, (factors * error[moments][:, compared]).T, strict=True))

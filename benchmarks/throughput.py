@@ -1,8 +1,8 @@
 """What a simulation costs, and what hydroid adds to it: ratios inside one run.
 
 A population (70 candidates, 7,500 steps, objectives included) against `mujoco.batch.Batch.rollout` alone
-on the same model and candidates, set up beforehand; `locked` against `passive`; both stages; and how fast a
-plant steps, as a multiple of real time.
+on the same model and candidates, set up beforehand; `locked` against `passive`; both stages; how fast a plant
+steps, as a multiple of real time; and the excavator's derivatives in both models of stage 2.
 """
 
 import time
@@ -11,11 +11,11 @@ from functools import partial
 
 import mujoco
 import numpy as np
-from common import pseudo_random_log, row, table
+from common import EXAMPLES, pseudo_random_log, row, table
 from made_logs import TRUTH, simulate_log
 from mujoco.batch import Batch
 
-from hydroid import load_settings
+from hydroid import load_settings, read_logs
 from hydroid.arm.locked import lock
 from hydroid.arm.model import load_model
 from hydroid.plant import load_plant
@@ -77,6 +77,18 @@ def in_turn(calls: dict[str, Callable[[], object]]) -> dict[str, np.ndarray]:
     return {name: np.array(times[1:]) for name, times in rounds.items()}
 
 
+def derivatives(model: str) -> Callable[[], object]:
+    """Return the excavator's simulations of one Jacobian: candidates that differ in one parameter each."""
+    folder, steps = EXAMPLES / "excavator", {"simulation.model": model, "simulation.steps_per_sample": 5}
+    settings = load_settings(
+        folder / "fit.yaml", steps if model == "dynamic" else {"simulation.model": model}
+    )
+    problem = Problem(settings, read_logs(sorted(folder.glob("fit_0[12].csv")), settings))
+    theta = np.tile(problem.parameters.start, (int(problem.parameters.free.sum()), 1))
+    theta[range(len(theta)), np.flatnonzero(problem.parameters.free)] += 1e-6
+    return partial(problem.output_errors, theta)
+
+
 def plant_steps(joints: list[int], steps: int = 2000) -> tuple[float, float]:
     """Return the seconds that a step of a plant with hydraulics on some joints takes, and its period."""
     plant = load_plant("article-hyd", overrides={"start_pose": "study"}, joints=joints)
@@ -103,6 +115,10 @@ if __name__ == "__main__":
     table("evaluation of the seven-joint model | seconds | against Batch.rollout alone")
     for name in problems:
         row(f"{name} | {np.median(took[name]):.3f} | {np.median(took[name] / took['passive, bare']):.2f}")
+    took = in_turn({model: derivatives(model) for model in ("dynamic", "quasi-static")})
+    table("a Jacobian of the excavator | seconds | times as fast")
+    for name, seconds in took.items():
+        row(f"{name} | {np.median(seconds):.3f} | {np.median(took['dynamic'] / seconds):.1f}")
     table("joints with hydraulics | step [µs] | times real time")
     for some in ([2], ALL):
         step, period = plant_steps(some)

@@ -24,10 +24,9 @@ from hydroid.progress import LOGGER
 from hydroid.search.descent import Descent, Ending
 from hydroid.settings.search import RefinementSettings
 
-TOO_FAR = 20.0
-"""times the rms error of the last estimate from which the dynamic model is not refined: lags that stand for
-oil in a quasi-static model are too much beside it, and it errs by several times as much at first"""
-STILL_FAR = 2.0  # the same after a rough refinement
+FAR = 2.0
+"""times the rms error of the last estimate at which the dynamic model is given up after a rough refinement:
+lags that stand for oil in a quasi-static model are too much beside it, and it errs by more at first"""
 CLEAR = 0.5
 """part of the rms error up to which a term is kept, whatever errors left out say: these are those of fewer
 logs, of which one alone may leave so much open that it predicts nothing, with the term or without"""
@@ -114,7 +113,10 @@ class Ladder:
             for term in settings.terms if self.kept.name == model else ():
                 self._rung(whole, f"{self.kept.name}+{term}", climbs=climbs, if_nearer=True)
         if climbs:
-            self._keep(self._refined(self.problem, self.kept.theta, refinement, self.kept.name))
+            name, left_out = self.kept.name, self.kept.left_out
+            last = self._refined(self.problem, self.kept.theta, refinement, name)
+            kept = replace(self._measured(self.problem, last, name), left_out=left_out)
+            self.kept = self.estimates[name] = kept
         if settings.joint_refinement:
             self._rung(whole, self.kept.name.replace("refined", "joint"), climbs=False, if_nearer=False)
 
@@ -136,17 +138,14 @@ class Ladder:
         own = whole.varied(whole.settings.of_estimate(name))
         theta = own.parameters.started(last.parameters.mapping(start.theta))
         other_model = own.settings.quasi_static != last.settings.quasi_static
-        if if_nearer and (
-            self._late
-            or last.leaves_noise(start.theta)
-            or (other_model and _far(own, theta, TOO_FAR * start.rms))
-        ):
+        if if_nearer and (self._late or last.leaves_noise(start.theta)):
             return
         more = len(own.settings.terms) > len(last.settings.terms)  # other parameters may stand for it
         if more or other_model:
             rough = settings.changed({"gain_tolerance": ROUGH})
-            theta = self._theta(own, self._refined(own, theta, rough, f"{name} at first"))
-            if other_model and _far(own, theta, STILL_FAR * start.rms):
+            first = self._refined(own, theta, rough, f"{name} at first")
+            theta = own.parameters.from_unit(first.point)
+            if other_model and not own.rms(own.output_errors(theta[None]))[0] < FAR * start.rms:
                 return
         settings, step = (_firm(settings), f"{name} on the way") if climbs else (settings, name)
         if more:
@@ -154,13 +153,12 @@ class Ladder:
         result = self._refined(own, theta, settings, step)
         if self._late and if_nearer:
             return
-        new = measured(own, {name: self._theta(own, result)})[name]
+        new = self._measured(own, result, name)
         nearer = new.rms < (1 - MIN_GAIN) * start.rms
         if nearer and own.settings.terms != last.settings.terms:
             without, with_it = self._error_left_out(last, start), self._error_left_out(own, new)
-            new = replace(new, left_out=(without, with_it))
+            self.estimates[name] = new = replace(new, left_out=(without, with_it))
             nearer = with_it < (1 - MIN_GAIN) * without or new.rms < CLEAR * start.rms
-        self.estimates[name], self.refinements[name] = new, result
         if nearer or not if_nearer:
             self.problem, self.kept = own, new
 
@@ -169,15 +167,11 @@ class Ladder:
         self._late |= result.ending is Ending.TIME
         return result
 
-    def _keep(self, end: Descent) -> None:
-        """Take an end of least squares for the estimate that is kept."""
-        name, left_out = self.kept.name, self.kept.left_out
-        new = measured(self.problem, {name: self._theta(self.problem, end)})[name]
-        self.kept = self.estimates[name] = replace(new, left_out=left_out)
+    def _measured(self, problem: Problem, end: Descent, name: str) -> Estimate:
+        """Measure an end of least squares, and list it."""
+        self.estimates |= measured(problem, {name: problem.parameters.from_unit(end.point)})
         self.refinements[name] = end
-
-    def _theta(self, problem: Problem, end: Descent) -> Array:
-        return problem.parameters.from_unit(end.point)
+        return self.estimates[name]
 
     def _error_left_out(self, problem: Problem, one: Estimate) -> float:
         if one.name not in self._left_out:
@@ -187,8 +181,3 @@ class Ladder:
 
 def _firm(settings: RefinementSettings) -> RefinementSettings:
     return settings.changed({"gain_tolerance": max(FIRM, settings.gain_tolerance)})
-
-
-def _far(problem: Problem, theta: Array, most: float) -> bool:
-    """Whether the rms error at theta, (P,), is above so many rad, or the simulation diverges."""
-    return not problem.rms(problem.output_errors(theta[None]))[0] < most

@@ -13,6 +13,7 @@ from hydroid.posterior.identifiability import identifiability
 from hydroid.posterior.noise import error_level
 from hydroid.posterior.uncertainty import Flag, Source, Uncertainty
 from hydroid.problem.problem import Problem
+from hydroid.search.descent import Ending
 
 STRAINED_ABOVE = 2.0
 """standard deviations from its prior beyond which an estimate strains it, if the logs determine it"""
@@ -99,9 +100,9 @@ def fit_findings(fit: Fit) -> list[Finding]:
     if fit.refinement is None:
         findings.append(Finding("not refined", "warning"))
     elif not fit.refinement.converged:
-        findings.append(
-            Finding("not converged", "warning", (fit.final,), {"ending": fit.refinement.ending.value})
-        )
+        ending = fit.refinement.ending
+        kind = "time up" if ending is Ending.TIME else "not converged"
+        findings.append(Finding(kind, "warning", (fit.final,), {"ending": ending.value}))
     apart = [joint for joint, ends in fit.ends.items() if max(ends) > SAME_OPTIMUM * min(ends)]
     if apart:
         names = [fit.problem.settings.arm.joint_names[joint - 1] for joint in apart if joint]

@@ -54,8 +54,9 @@ def _time(recording: Recording, settings: LogSettings, repaired: float) -> Itera
             step = f"{np.nanmin(steps):.4g} to {np.nanmax(steps):.4g}" if uneven else f"{period:.4g}"
             yield recording.finding("note", "resampled", (), signal, step=step, period=settings.period_s)
         return
-    unit = likely_time_unit(period / signal.gain)
-    remedy = f"if its unit is {unit}, set log.time.unit: {unit}" if unit else "check log.time.unit"
+    unit, remedy = likely_time_unit(period / signal.gain), "check log.time.unit and log.period_s"
+    if unit and UNITS[unit].factor != signal.gain:
+        remedy = f"if its unit is {unit}, set log.time.unit: {unit}"
     numbers = {"duration": duration, "samples": float(len(known)), "period": period, "slowest": slowest}
     if len(rows):
         before, after = recording.time[rows[0] - 1 : rows[0] + 1]

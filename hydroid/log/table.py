@@ -54,7 +54,7 @@ class Table:
     Attributes:
         names: of the columns, in order; "" for one without.
         columns: their cells by name, shape (R,): numbers, times or text.
-        header: line of the names [1-based]; None where the format stores them.
+        header: line of the names [1-based], in a format whose rows are lines; None elsewhere.
         units: that the file gives to columns, by name.
         remarks: what the reader skipped and what it took parts of the file for.
         lines: of the rows [1-based], shape (R,); None: 1, 2, ...

@@ -147,7 +147,7 @@ def _slopes(function: Function, at: Box, axes: Axes, value: Array) -> tuple[Arra
         if len(steps) == 1:
             return near, np.zeros(len(near), dtype=bool)
         both = (near * steps[1] - far * steps[0]) / (steps[1] - steps[0])
-    curved = np.linalg.norm(near - both, axis=1) > np.linalg.norm(both, axis=1)
+        curved = np.linalg.norm(near - both, axis=1) > np.linalg.norm(both, axis=1)
     slopes = np.where(np.isfinite(both), both, np.where(np.isfinite(near), near, far))
     return slopes, curved
 

@@ -39,7 +39,7 @@ def predict_log(model: IdentifiedModel, log: Log) -> Log:
         raise RunError("the simulation diverged with these parameters", model.source)
     angle[:, [j - 1 for j in moving]] = response.angle[0]
     pressure = None
-    if response.pressure is not None:
+    if measured:
         pressure = np.zeros((*angle.shape, 2))  # the pressures of an idle cylinder are not simulated
         pressure[:, measured] = response.pressure[0]
     return replace(log, angle=angle, pressure=pressure)

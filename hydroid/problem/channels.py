@@ -71,7 +71,6 @@ class Channel:
         if self.quantity == "angle":
             simulated = response.angle[:, :, self.column]
         else:
-            assert response.pressure is not None
             simulated = response.pressure[:, :, self.column, "ab".index(self.quantity[-1])]
         return self.weight * (self.measured - simulated)
 

@@ -105,12 +105,12 @@ class Response:
     """Simulated angles [rad], shape (n, T, K), of the K output joints.
 
     A candidate that diverged has `feasible` False, shape (n,), and NaN throughout. `pressure` [Pa], shape
-    (n, T, L, 2), are those of chambers A and B of L joints, where they were asked for.
+    (n, T, L, 2), are those of chambers A and B of the L joints that were asked for.
     """
 
     angle: Array
     feasible: Mask
-    pressure: Array | None = None
+    pressure: Array
 
 
 class Scenario:

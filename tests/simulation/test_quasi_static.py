@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from conftest import candidates
 from made_logs import at_rest
+from observation import trace
 
 from hydroid.hydraulics.records import JOINT, nominal_joints
 from hydroid.hydraulics.valve import DENSITY
@@ -32,8 +33,8 @@ def simulated(spec, arm):
         for name, value in values.items():
             (one.mass if name == "mass" else one.joints[name])[:] = value
         settings = SimulationSettings(model=model)
-        simulation = Simulation(Scenario(spec, arm, log, sorted(commands), settings), 10)
-        return simulation.simulate(one).angle[0], simulation.trace(one), one.joints[0]
+        scenario = Scenario(spec, arm, log, sorted(commands), settings)
+        return Simulation(scenario, 10).simulate(one).angle[0], trace(scenario, 10, one), one.joints[0]
 
     return run
 

@@ -11,8 +11,10 @@ import pytest
 from arms import posed, with_masses
 from conftest import candidates, replaced, scattered, simulation
 from made_logs import step_log
+from observation import trace
 from scipy.integrate import solve_ivp
 
+from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.simulation import Candidates
 from hydroid.simulation.simulation import reading
 
@@ -159,13 +161,13 @@ def test_the_trace_explains_the_motion(spec, arm, study_log):
     one = scattered(arm, 1, leakage=0.0, bulk_modulus=8e5)
     run = simulation(spec, arm, study_log, kind="hyd")
     angle = run.simulate(one).angle[0, :, 0]
-    trace = run.trace(one)
+    seen = trace(run.scenario, HydraulicSettings().substeps, one)
     assert list(run.joints) == [1]
-    assert trace.pressure.shape == (len(study_log.time), 1, 2)
-    assert trace.pressure.min() >= 0
+    assert seen.pressure.shape == (len(study_log.time), 1, 2)
+    assert seen.pressure.min() >= 0
     cylinder = arm.joints[1].actuator
     way = cylinder.length(angle) - cylinder.length(angle[:1])
-    oil = np.cumsum(trace.flow[:, 0, 0]) * study_log.period / one.joints.area_a[0, 1]
+    oil = np.cumsum(seen.flow[:, 0, 0]) * study_log.period / one.joints.area_a[0, 1]
     assert np.ptp(way) > 2e-3
     np.testing.assert_allclose(oil, way, atol=0.03 * np.ptp(way))
 

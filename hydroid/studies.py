@@ -72,7 +72,7 @@ def perform(task: Task) -> Result:
     angles = np.degrees(
         np.concatenate([error[c.rows] / c.weight for c in problem.channels if c.quantity == "angle"])
     )
-    front, evaluation = result.front
+    front, values = result.front
     unit = 1.0 if task.settings.objective.relative else 180 / math.pi
     refined = sum(r.evaluations for r in result.refinements.values())
     measures = {
@@ -84,7 +84,7 @@ def perform(task: Task) -> Result:
         "diverged": int(result.history[-1, 3]),
         "seconds": round(sum(result.seconds.values()), 3),
     }
-    bests = front[segment_best(evaluation.segments)]
+    bests = front[segment_best(values[:, :-1])]
     return {
         "measures": measures,
         "theta": problem.parameters.mapping(result.best.theta),

@@ -37,7 +37,7 @@ def test_the_truth_leaves_no_residual_in_any_channel(hydraulic):
     rows = problem.residuals(truth[None])
     assert rows.shape == (1, 3 * len(log.time))
     assert np.abs(rows).max() < 1e-12
-    assert problem.evaluate(truth[None]).segments.shape == (1, 3 + 2)
+    assert problem.evaluate(truth[None]).shape == (1, 3 + 2 + 1)
 
 
 def test_a_pressure_error_counts_its_weight(hydraulic):

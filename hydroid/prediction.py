@@ -35,7 +35,7 @@ def predict_log(model: IdentifiedModel, log: Log) -> Log:
     gauged = [j for j in range(log.joints) if log.driven[j] and settings.log.columns("pressure", j + 1)]
     measured = gauged if settings.stage == "hyd" else []
     response = _respond(model, log, moving, measured)
-    if not response.feasible[0]:
+    if not np.isfinite(response.angle).all():
         raise RunError("the simulation diverged with these parameters", model.source)
     angle[:, [j - 1 for j in moving]] = response.angle[0]
     pressure = None

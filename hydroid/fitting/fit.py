@@ -22,7 +22,7 @@ class Fit:
     """The estimates of a fit, and what is known of the one to use.
 
     problem: with the settings of the estimate to use, which `final` names. estimates: by name, that of the
-    search first. front: the non-dominated candidates, shape (n, P), and their objectives, (n, S + 1). history: shape
+    search first. front: the non-dominated candidates, (n, P), and their objectives, (n, S + 1). history:
     (G, len(HISTORY)). refinements: by the estimate that each gave. ends: costs at which the starts of a
     multi-start ended, by the joint that was fitted alone (0: all together). uncertainty, quantities: of the
     final estimate. seconds: wall-clock time of "search", "refinement" and "uncertainty" [s]; of a resumed
@@ -84,11 +84,21 @@ def fit(problem: Problem, watch: Watcher | None = None, checkpoints: Checkpoints
     times.append(time.perf_counter())
     last = ladder.problem
     about = ladder.known(estimates[final].theta)
-    determined, front, history = quantities(last, about), _front(searched), searched.history
+    determined = quantities(last, about)
     seconds = np.diff([*times, time.perf_counter()]).tolist()
     took: dict[str, float] = dict(zip(("search", "refinement", "uncertainty"), seconds, strict=True))
-    ends = ladder.refinements, searched.ends
-    return Fit(last, estimates, final, front, history, *ends, about, determined, took)
+    return Fit(
+        last,
+        estimates,
+        final,
+        _front(searched),
+        searched.history,
+        ladder.refinements,
+        searched.ends,
+        about,
+        determined,
+        took,
+    )
 
 
 def _candidates(problem: Problem, searched: Searched) -> dict[str, Array]:

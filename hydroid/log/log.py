@@ -69,9 +69,10 @@ class Log:
         return self._mean_at_rest(self.angle)
 
     @property
-    def start_pressure(self) -> Array | None:
+    def start_pressure(self) -> Array:
         """Chamber pressures before the first command, as `start` [Pa], shape (J, 2), NaN where unmeasured."""
-        return None if self.pressure is None else self._mean_at_rest(self.pressure)
+        unknown = np.full((self.joints, 2), np.nan)
+        return unknown if self.pressure is None else self._mean_at_rest(self.pressure)
 
     @property
     def start_samples(self) -> Array:

@@ -194,14 +194,18 @@ class Problem:
         """Return output errors from residuals, shape (n, R)."""
         return np.concatenate([c.unfiltered(residuals[:, c.rows]) for c in self.channels], axis=1)
 
-    def rms(self, errors: Array, joints: Collection[int] = ()) -> Array:
-        """Rms of output errors, (n, R), of the angles of joints (from 1), or all, unweighted [rad], (n,)."""
+    def angles(self, errors: Array, joints: Collection[int] = ()) -> Array:
+        """Return the output errors, of (n, R), of the angles of joints (from 1), or all, unweighted [rad]."""
         angles = [
             errors[:, c.rows] / c.weight
             for c in self.channels
             if c.quantity == "angle" and (not joints or c.joint in joints)
         ]
-        return rms(np.concatenate(angles, axis=1), axis=1)
+        return np.concatenate(angles, axis=1)
+
+    def rms(self, errors: Array, joints: Collection[int] = ()) -> Array:
+        """Return the rms of the same, shape (n,)."""
+        return rms(self.angles(errors, joints), axis=1)
 
     @cached_property
     def _on_worker(self) -> "Problem":

@@ -55,19 +55,19 @@ class Simulation:
     def simulate(self, candidates: Candidates) -> Response:
         """Return what n candidates' sensors read, and the pressures asked for, at the log's samples.
 
-        The first is the start. A candidate without a force-stroke curve, or that diverged, is infeasible.
+        The first is the start. One without a force-stroke curve, or that diverged, has NaN throughout.
         """
         scenario, n, wanted = self.scenario, len(candidates), self._pressures
         samples = 1 + len(scenario.command) // scenario.settings.steps
         angle = np.full((n, samples, len(scenario.outputs)), np.nan)
         pressure = np.full((n, samples, len(wanted), 2), np.nan)
-        exists = has_force_curve(candidates.joints[:, self.joints])
         # those that differ in effects of other groups of logs are simulated once
         first, place = distinct(candidates.joints, candidates.mass)
+        exists = has_force_curve(candidates.joints[:, self.joints])
         rows = np.intersect1d(np.flatnonzero(exists), first)
         threads = min(scenario.settings.threads or os.cpu_count() or 1, rows.size)
         if not threads:
-            return Response(angle, exists, pressure)
+            return Response(angle, pressure)
         candidates = candidates[rows]
         sensors = candidates.joints[:, scenario.arm.columns[scenario.outputs]]
 
@@ -93,7 +93,7 @@ class Simulation:
                 deque(pool.map(simulate, left[:, None]), maxlen=0)
         if len(first) < n:
             angle, pressure = angle[first[place]], pressure[first[place]]
-        return Response(angle, np.all(np.isfinite(angle), axis=(1, 2)), pressure)
+        return Response(angle, pressure)
 
     def _copies(self, candidates: Candidates, threads: int) -> int:
         """How many arms can be stepped at once without changing a bit of any.

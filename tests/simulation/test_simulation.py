@@ -27,7 +27,7 @@ def test_without_commands_and_leakage_the_arm_stands_for_a_minute(spec, arm, kin
     log = step_log(arm.pose("study"), [0.0], dwell=60.0)
     everyone = scattered(arm, 3, leakage=0.0)
     response = simulation(spec, arm, log, range(7), kind, other_joints=other).simulate(everyone)
-    assert response.feasible.all()
+    assert np.isfinite(response.angle).all()
     # gravity's gradient is a spring that may be unstable; rounding must not have grown to anything
     assert np.abs(response.angle - arm.pose("study")).max() < drift
 
@@ -138,7 +138,7 @@ def test_candidates_at_their_stops_or_diverging_change_no_bit_of_those_beside_th
     gain[7] = 1e12
     run = simulation(spec, arm, study_log, other_joints=other).simulate
     together = run(some)
-    assert together.feasible.tolist() == [True] * 7 + [False]
+    assert np.isfinite(together.angle).all(axis=(1, 2)).tolist() == [True] * 7 + [False]
     beyond = (together.angle > arm.upper[1]) | (together.angle < arm.lower[1])
     assert beyond.any(axis=(1, 2)).sum() > 1
     alone = [run(some[k : k + 1]).angle for k in range(8)]

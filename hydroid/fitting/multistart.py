@@ -193,7 +193,7 @@ def by_numbers(problem: Problem, joint: int, theta: Array) -> Array:
     No load slows it, its actuator is strong enough for any, and its lever is the same everywhere.
     """
     settings = problem.settings
-    ends = np.array([*settings.arm.ranges.values()][joint - 1])
+    ends = [*settings.arm.ranges.values()][joint - 1]
     found = fit_baselines(problem.logs, joint, ends).get(NAMES[-1])
     if found is None:
         return theta

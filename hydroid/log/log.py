@@ -86,10 +86,6 @@ class Log:
             correlation = np.where(square > 0, np.sum(off[1:] * off[:-1], axis=0) / square, 0.0).clip(0, 1)
         return len(resting) * (1 - correlation) / (1 + correlation)
 
-    def moved(self, joint: int, angle: float) -> "Log":
-        """Return the recording with all angles of one joint (number, from 1) turned by an angle [rad]."""
-        return replace(self, angle=self.angle + angle * (np.arange(self.joints) == joint - 1))
-
     def driving(self, joint: int) -> "Log":
         """Return the recording without the commands of all joints but this one (number, from 1)."""
         return replace(self, command=self.command * (np.arange(self.joints) == joint - 1), rest=self._rest)

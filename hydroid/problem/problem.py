@@ -177,7 +177,7 @@ class Problem:
 
     def errors(self, responses: Sequence[Response]) -> Array:
         """Return the weighted output errors of n candidates' responses to all logs [rad], shape (n, R)."""
-        return np.concatenate([channel.error(responses) for channel in self.channels], axis=1)
+        return np.concatenate([c.error(responses[c.log]) for c in self.channels], axis=1)
 
     def leaves_noise(self, theta: Array) -> bool:
         """Whether errors at an estimate, (P,), change between samples as white noise does."""

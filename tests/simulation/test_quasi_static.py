@@ -155,7 +155,9 @@ def test_valves_that_open_once_for_all_open_as_each_alone(spec, arm):
     command = np.zeros((60, len(arm.joints)))
     command[5:30, [SHOULDER, ROLL]], command[30:, [SHOULDER, ROLL]] = (70, -55), (-40, 80)
     log = at_rest(arm.pose("study"), command, 0.02)
-    names = [name for name in JOINT.names if JOINT[name].kind == "f" and name not in ("sense", "stroke")]
+    names = [
+        name for name in JOINT.names or () if JOINT[name].kind == "f" and name not in ("sense", "stroke")
+    ]
     everyone = candidates(arm, len(names))
     everyone.mass[:] = arm.masses
     everyone.joints[:] = nominal_joints(arm, HydraulicSettings(pump_flow=4.0, dead_band_a=10, dead_band_b=10))

@@ -7,6 +7,7 @@ docs/measured.md says what is simulated and when a term is named. Stage 2 of the
 import numpy as np
 from common import known, options, row, table, true_log
 from made_logs import at_rest, noisy, simulate_log
+from observation import trace
 
 from hydroid import load_settings
 from hydroid.advice.suggestions import advice
@@ -46,7 +47,8 @@ def make_log(term: str, seconds: float, seed: int) -> Log:
 def largest_flow(truth: FitSettings, log: Log) -> float:
     """Flow from the pump that the true arm exceeds for 1 % of a log [L/min]."""
     simulation, stage = make_simulation(load_model(truth.arm), log, [1], truth), Bindings(truth)
-    flow = simulation.trace(stage.candidates(truth.parameter_set().vector(TRUTH, "truth")[None])).flow[:, 0]
+    one = stage.candidates(truth.parameter_set().vector(TRUTH, "truth")[None])
+    flow = trace(simulation.scenario, truth.substeps, one).flow[:, 0]
     return 6e4 * float(np.quantile(np.maximum(flow[:, 0], -flow[:, 1]), 0.99))
 
 

@@ -60,7 +60,10 @@ class IdentifiedModel:
 
 
 def identified(settings: FitSettings, values: Mapping[str, Any], source: str) -> IdentifiedModel:
-    """Return the model of some settings at parameters by name; a fixed parameter may be left out."""
+    """Return the model of some settings at parameters by name; a fixed parameter may be left out.
+
+    Raises SettingsError: a name that does not exist or is missing, or a value that is not allowed.
+    """
     return IdentifiedModel(settings, settings.parameter_set().vector(values, source), source)
 
 

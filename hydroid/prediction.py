@@ -17,7 +17,7 @@ from hydroid.simulation import Response
 
 def predict(model: IdentifiedModel, log: Log, joints: Sequence[int]) -> Array:
     """Return angles [rad] of joints, numbered from 1, for a log's commands, (T, K); NaN if it diverged."""
-    return _respond(model, log, joints).angle[0]
+    return _respond(model, log, [j - 1 for j in joints]).angle[0]
 
 
 def predict_log(model: IdentifiedModel, log: Log) -> Log:
@@ -28,28 +28,25 @@ def predict_log(model: IdentifiedModel, log: Log) -> Log:
     """
     settings = model.settings
     passive = settings.simulation.other_joints == "passive"
-    moving = [j + 1 for j in range(log.joints) if passive or log.driven[j]]
+    moving = [j for j in range(log.joints) if passive or log.driven[j]]
     angle = log.angle.copy()
     if settings.simulation.other_joints == "locked":
         angle[:] = log.start
-    gauged = [j for j in range(log.joints) if log.driven[j] and settings.log.columns("pressure", j + 1)]
-    measured = gauged if settings.stage == "hyd" else []
+    hydraulic = log.driven & (settings.stage == "hyd")
+    measured = [j for j in np.flatnonzero(hydraulic).tolist() if settings.log.columns("pressure", j + 1)]
     response = _respond(model, log, moving, measured)
-    if not response.feasible[0]:
+    if not np.isfinite(response.angle).all():
         raise RunError("the simulation diverged with these parameters", model.source)
-    angle[:, [j - 1 for j in moving]] = response.angle[0]
+    angle[:, moving] = response.angle[0]
     pressure = None
-    if response.pressure is not None:
+    if measured:
         pressure = np.zeros((*angle.shape, 2))  # the pressures of an idle cylinder are not simulated
         pressure[:, measured] = response.pressure[0]
     return replace(log, angle=angle, pressure=pressure)
 
 
-def _respond(
-    model: IdentifiedModel, log: Log, joints: Sequence[int], pressures: Sequence[int] = ()
-) -> Response:
-    """Simulate the angles of `joints`, 1-based, and the pressures of some joints, 0-based."""
+def _respond(model: IdentifiedModel, log: Log, outputs: list[int], pressures: Sequence[int] = ()) -> Response:
+    """Simulate the angles of `outputs` and the pressures of some joints, 0-based."""
     settings, bindings = model.settings, Bindings(model.settings)
-    spec, outputs = load_model(settings.arm), [j - 1 for j in joints]
-    simulation = make_simulation(spec, log, outputs, settings, pressures)
+    simulation = make_simulation(load_model(settings.arm), log, outputs, settings, pressures)
     return simulation.simulate(bindings.candidates(model.theta[None], log.source))

@@ -68,11 +68,8 @@ def perform(task: Task) -> Result:
         raise RunError("the estimate diverged when it was simulated")
     # the estimate may have terms, or a model, that the search had not
     problem, searched = result.problem, task.settings.of_estimate("best").parameter_set()
-    error = problem.output_errors(result.best.theta[None])[0]
-    angles = np.degrees(
-        np.concatenate([error[c.rows] / c.weight for c in problem.channels if c.quantity == "angle"])
-    )
-    front, evaluation = result.front
+    angles = np.degrees(problem.angles(problem.output_errors(result.best.theta[None]))[0])
+    front, values = result.front
     unit = 1.0 if task.settings.objective.relative else 180 / math.pi
     refined = sum(r.evaluations for r in result.refinements.values())
     measures = {
@@ -84,7 +81,7 @@ def perform(task: Task) -> Result:
         "diverged": int(result.history[-1, 3]),
         "seconds": round(sum(result.seconds.values()), 3),
     }
-    bests = front[segment_best(evaluation.segments)]
+    bests = front[segment_best(values[:, :-1])]
     return {
         "measures": measures,
         "theta": problem.parameters.mapping(result.best.theta),

@@ -107,7 +107,7 @@ def _surface(drawing: Drawing, plan: Plan, runs: Runs, figure: Figure) -> None:
     first, second = np.meshgrid(*(p.at(np.linspace(0, 1, count)) for p in chosen), indexing="ij")
     points = np.tile(problem.parameters.vector(plan.truth(1), "truth"), (count**2, 1))
     points[:, at] = np.stack([first, second], axis=-1).reshape(-1, 2)
-    error = np.degrees(problem.evaluate(points).overall.reshape(count, count))
+    error = np.degrees(problem.evaluate(points)[:, -1].reshape(count, count))
     axes, shown = drawing.add_subplot(projection="3d"), np.where(np.isfinite(error), error, np.nan)
     minima = int((shown == minimum_filter(error, 3, mode="nearest")).sum())
     axes.set_title(f"{minima} minima on {count} x {count} points", fontsize=9)

@@ -71,7 +71,7 @@ def steps(
         and (p.fixed is None or p.term is not None)
     ]
     problem, taken = Problem(adapted(model, pool), logs), list[str]()
-    last = Refit.of(problem, model.theta, problem.output_errors(model.theta[None]))
+    last = Refit(problem, model.theta, problem.output_errors(model.theta[None]))
     path = list[Plain]()
     name = ""
     while True:
@@ -82,7 +82,7 @@ def steps(
             own = problem.varied(adapted(model, [*taken, trial]))
             # the noise, beside which priors count, is that of the adapted model
             trials[trial] = refitted(own, refitted(own, last.theta).theta)
-        errors = {trial: _share(problem, one, last) for trial, one in trials.items()}
+        errors = {trial: _share(one, last) for trial, one in trials.items()}
         name = min(errors, key=lambda trial: errors[trial], default="")
         if not name or (not free and errors[name] > 0.95):
             return path
@@ -90,15 +90,15 @@ def steps(
         pool.remove(name)
 
 
-def _share(problem: Problem, trial: Refit, before: Refit) -> float:
+def _share(trial: Refit, before: Refit) -> float:
     """Return the error as a part of what it was, an rms over the joints, on the part that gains least."""
     if not np.isfinite([trial.left_out, before.left_out]).all():
         return trial.left_out
-    number, shares = parts(problem), list[float]()
+    number, shares = parts(trial.problem), list[float]()
     for part in np.unique(number):
-        rows = [np.flatnonzero(number[c.rows] == part) + c.rows.start for c in problem.channels]
+        rows = [np.flatnonzero(number[c.rows] == part) + c.rows.start for c in trial.problem.channels]
         after, error = (
-            np.array([rms(one.errors[some]) + MIN_RESIDUAL for some in rows if some.size])
+            np.array([rms(one.errors[0, some]) + MIN_RESIDUAL for some in rows if some.size])
             for one in (trial, before)
         )
         shares.append(rms(after / error))

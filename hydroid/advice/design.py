@@ -126,15 +126,13 @@ class ExperimentSimulator:
         return Trial(experiment, gained, replace(experiment.log(self._settings), angle=angle))
 
     def _simulate(self, experiment: Experiment, theta: Array) -> Array:
-        """All joints' angles [rad] of candidates, (n, P) -> (n, T, J); NaN where one diverged."""
+        """All joints' angles [rad] of candidates, (n, P) -> (n, T, J); NaN of what moves if one diverged."""
         log = experiment.log(self._settings)
         passive = self._settings.simulation.other_joints == "passive"
         moving = np.flatnonzero(log.driven | passive | np.isin(np.arange(log.joints), self._outputs))
         simulation = make_simulation(self._spec, log, moving.tolist(), self._settings)
-        response = simulation.simulate(self._bindings.candidates(theta))
         angle = np.tile(log.angle, (len(theta), 1, 1))
-        angle[:, :, moving] = response.angle
-        angle[~response.feasible] = np.nan
+        angle[:, :, moving] = simulation.simulate(self._bindings.candidates(theta)).angle
         return angle
 
 

@@ -84,7 +84,7 @@ class RandomExperiments:
             )
         self._poses = poses
         lower, upper = np.array([joint.limits for joint in arm.joints]).T
-        inward = np.minimum(np.radians(limits.margin_deg), 0.5 * (upper - lower))
+        inward = np.minimum(margin, 0.5 * (upper - lower))
         self._lower, self._upper = lower + inward, upper - inward
         self._samples, self._rest = experiment_samples(settings), round(limits.rest_s / period)
         self._shortest, self._longest = (max(1, round(t / period)) for t in limits.dwell_s)

@@ -3,11 +3,6 @@
 A term that only follows the noise loses there.
 """
 
-import math
-from collections.abc import Mapping
-from dataclasses import field
-from functools import partial
-
 import numpy as np
 
 from hydroid.arrays import Array, Mask, record
@@ -27,24 +22,27 @@ class Refit:
     """What a short refinement leads to.
 
     Attributes:
+        problem: what was refined.
         theta: shape (P,).
-        left_out: rms error of the angles on each part of the samples, of refinements without that part [rad];
-            infinite where the start cannot be simulated.
-        by_joint: the same of each joint by name [deg].
-        errors: the same of all samples, weighted [rad], shape (R,).
+        errors: weighted output errors on each part of the samples, of refinements without that part [rad],
+            shape (1, R); infinite where the start cannot be simulated.
     """
 
+    problem: Problem
     theta: Array
-    left_out: float = math.inf
-    by_joint: Mapping[str, float | None] = field(default_factory=dict[str, float | None])
-    errors: Array = field(default_factory=partial(np.empty, 0))
+    errors: Array
 
-    @classmethod
-    def of(cls, problem: Problem, theta: Array, errors: Array) -> "Refit":
-        """Judge a refinement by the output errors of samples that it has not seen, shape (1, R)."""
-        names, settings = problem.settings.arm.joint_names, problem.settings
-        by_joint = {names[j - 1]: finite(np.degrees(problem.rms(errors, [j])[0])) for j in settings.outputs}
-        return cls(theta, problem.rms(errors)[0], by_joint, errors[0])
+    @property
+    def left_out(self) -> float:
+        """Rms error of the angles [rad]."""
+        return self.problem.rms(self.errors)[0]
+
+    @property
+    def by_joint(self) -> dict[str, float | None]:
+        """Rms error of each compared joint by name [deg]."""
+        rms, settings = self.problem.rms, self.problem.settings
+        names = settings.arm.joint_names
+        return {names[j - 1]: finite(np.degrees(rms(self.errors, [j])[0])) for j in settings.outputs}
 
 
 def refitted(problem: Problem, theta: Array, weight: float | None = None) -> Refit:
@@ -58,28 +56,27 @@ def refitted(problem: Problem, theta: Array, weight: float | None = None) -> Ref
         weight = prior_weight(problem, problem.residuals(theta[None])[0])
     rows = least_squares_rows(problem, theta, weight)
 
-    def fitted(point: Array, function: Function) -> Array:
-        return least_squares(point, lambda points: function(parameters.from_unit(points)), SHORT).point
+    def fitted(point: Array, function: Function, kept: Mask | slice = slice(None)) -> Array:
+        return least_squares(
+            point, lambda points: function(parameters.from_unit(points))[:, kept], SHORT
+        ).point
 
     whole = fitted(parameters.to_unit(theta), rows)
     best, unseen = parameters.from_unit(whole), np.full(size, np.nan)
     here = rows(best[None])[0]
     if not np.isfinite(here).all():
-        return Refit(theta)
+        return Refit(problem, theta, np.full((1, size), np.inf))
     several, number = len(problem.logs) > 1, np.append(parts(problem), np.zeros(here.size - size))
     for part in np.unique(number[:size]):
         out = number == part
         if several:  # only the other logs are simulated
             kept = [log for i, log in enumerate(problem.logs) if 1 + i % 3 != part]
-            others = least_squares_rows(problem.varied(problem.settings, kept), theta, weight)
+            others = problem.varied(problem.settings, kept)
+            point = fitted(whole, least_squares_rows(others, theta, weight))
         else:
-            others = partial(_some, rows, ~out)
-        unseen[out[:size]] = rows(parameters.from_unit(fitted(whole, others))[None])[0, out]
-    return Refit.of(problem, best, problem.unfiltered(unseen[None]))
-
-
-def _some(rows: Function, kept: Mask, theta: Array) -> Array:
-    return rows(theta)[:, kept]
+            point = fitted(whole, rows, ~out)
+        unseen[out[:size]] = rows(parameters.from_unit(point)[None])[0, out]
+    return Refit(problem, best, problem.unfiltered(unseen[None]))
 
 
 def parts(problem: Problem) -> Array:

@@ -69,7 +69,11 @@ class FitResult(Printed):
         return predicted(self.model, read, None)
 
     def validate(self, logs: "LogSources", out: Source | None = None) -> "Result[list[Prediction]]":
-        """Return the verdict on each joint by logs that were not fitted; a page of it is written to `out`."""
+        """Return the verdict on each joint by logs that were not fitted; a page of it is written to `out`.
+
+        Raises:
+            LogError, RunError: as of `hydroid.validate`.
+        """
         from hydroid.commands.validate import validate
 
         return validate(logs, fit=self, out=out)

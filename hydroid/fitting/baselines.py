@@ -86,14 +86,13 @@ def _follow(
     return angles
 
 
-def fit_baselines(logs: Sequence[Log], joint: int, limits: Array) -> dict[str, Baseline]:
+def fit_baselines(logs: Sequence[Log], joint: int, limits: tuple[float, float]) -> dict[str, Baseline]:
     """Fit the baselines of a joint (number, from 1) to the logs that measure it; `limits` is its range [rad].
 
     They are by name, the simplest first. A joint that is never driven has only that.
     """
-    limits = np.asarray(limits, float)
     measured = [log for log in logs if log.measured[joint - 1]]
-    still = Baseline(joint, limits)
+    still = Baseline(joint, np.asarray(limits, float))
     if not any(log.driven[joint - 1] for log in measured):
         return {NAMES[0]: still}
     delays = np.arange(0, LONGEST_DELAY, max(0.02, measured[0].period))

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from hydroid.errors import RunError
 from hydroid.parameters import Array
-from hydroid.problem.problem import Evaluation, Problem
+from hydroid.problem.problem import Problem
 
 SAVE_EVERY = 5.0
 """seconds between checkpoints: a lost one costs no more, and writing it is noise beside the work"""
@@ -74,8 +74,8 @@ class Memo:
         """The candidate with the lowest overall objective, shape (P,)."""
         return np.frombuffer(min(self._values, key=lambda key: self._values[key][-1]))
 
-    def evaluate(self, theta: Array) -> Evaluation:
-        """Evaluate theta, shape (n, P), simulating what is new in it.
+    def evaluate(self, theta: Array) -> Array:
+        """Evaluate theta as `Problem.evaluate` does, simulating what is new in it.
         Raises RunError: a resumed search does not repeat itself.
         """
         new = {row.tobytes(): row for row in theta if row.tobytes() not in self._values}
@@ -87,13 +87,13 @@ class Memo:
                 hint="use the versions that the run began with, or begin another with --out",
             )
         if unknown:
-            rows = self.problem.evaluate(np.array([new[key] for key in unknown])).values
+            rows = self.problem.evaluate(np.array([new[key] for key in unknown]))
             # a candidate with one infinite objective is infeasible: none of its objectives may win
             rows[~np.isfinite(rows).all(axis=1)] = np.inf
             values |= zip(unknown, rows, strict=True)
         self.infeasible += sum(not np.isfinite(row[-1]) for row in values.values())
         self._values.update((key, values[key]) for key in new)
-        return Evaluation(np.array([self._values[row.tobytes()] for row in theta]))
+        return np.array([self._values[row.tobytes()] for row in theta])
 
     def arrays(self) -> Arrays:
         """Return all candidates and their objectives, overall last: shapes (m, P) and (m, S + 1)."""

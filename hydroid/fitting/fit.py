@@ -11,7 +11,7 @@ from hydroid.fitting.ladder import Estimate, Ladder, Watcher, measured
 from hydroid.fitting.search import Searched, search
 from hydroid.posterior.quantities import Quantities, quantities
 from hydroid.posterior.uncertainty import Uncertainty
-from hydroid.problem.problem import Evaluation, Problem
+from hydroid.problem.problem import Problem
 from hydroid.progress import LOGGER
 from hydroid.search.descent import Descent
 from hydroid.search.pareto import average, non_dominated, segment_best, utopia
@@ -22,7 +22,7 @@ class Fit:
     """The estimates of a fit, and what is known of the one to use.
 
     problem: with the settings of the estimate to use, which `final` names. estimates: by name, that of the
-    search first. front: the non-dominated candidates, shape (n, P), and their objectives. history: shape
+    search first. front: the non-dominated candidates, (n, P), and their objectives, (n, S + 1). history:
     (G, len(HISTORY)). refinements: by the estimate that each gave. ends: costs at which the starts of a
     multi-start ended, by the joint that was fitted alone (0: all together). uncertainty, quantities: of the
     final estimate. seconds: wall-clock time of "search", "refinement" and "uncertainty" [s]; of a resumed
@@ -32,7 +32,7 @@ class Fit:
     problem: Problem
     estimates: dict[str, Estimate]
     final: str
-    front: tuple[Array, Evaluation]
+    front: tuple[Array, Array]
     history: Array
     refinements: dict[str, Descent]
     ends: Mapping[int, Sequence[float]]
@@ -84,11 +84,21 @@ def fit(problem: Problem, watch: Watcher | None = None, checkpoints: Checkpoints
     times.append(time.perf_counter())
     last = ladder.problem
     about = ladder.known(estimates[final].theta)
-    determined, front, history = quantities(last, about), _front(searched), searched.history
+    determined = quantities(last, about)
     seconds = np.diff([*times, time.perf_counter()]).tolist()
     took: dict[str, float] = dict(zip(("search", "refinement", "uncertainty"), seconds, strict=True))
-    ends = ladder.refinements, searched.ends
-    return Fit(last, estimates, final, front, history, *ends, about, determined, took)
+    return Fit(
+        last,
+        estimates,
+        final,
+        _front(searched),
+        searched.history,
+        ladder.refinements,
+        searched.ends,
+        about,
+        determined,
+        took,
+    )
 
 
 def _candidates(problem: Problem, searched: Searched) -> dict[str, Array]:
@@ -96,7 +106,7 @@ def _candidates(problem: Problem, searched: Searched) -> dict[str, Array]:
     theta, memo = searched.theta, searched.memo
     if searched.single:
         return {"best": theta[segment_best(searched.population.objectives)[0]]}
-    segments = memo.evaluate(theta).segments
+    segments = memo.evaluate(theta)[:, :-1]
     candidates = {
         "average": average(theta, segments),
         "utopia": utopia(theta, segments),
@@ -106,9 +116,9 @@ def _candidates(problem: Problem, searched: Searched) -> dict[str, Array]:
     return {first: candidates[first]} | candidates
 
 
-def _front(searched: Searched) -> tuple[Array, Evaluation]:
+def _front(searched: Searched) -> tuple[Array, Array]:
     """The different non-dominated candidates of the last population."""
-    _, first = np.unique(searched.theta, axis=0, return_index=True)
-    theta = searched.theta[np.sort(first)]
-    theta = theta[non_dominated(searched.memo.evaluate(theta).segments)]
-    return theta, searched.memo.evaluate(theta)
+    theta = searched.theta[np.sort(np.unique(searched.theta, axis=0, return_index=True)[1])]
+    values = searched.memo.evaluate(theta)
+    best = non_dominated(values[:, :-1])
+    return theta[best], values[best]

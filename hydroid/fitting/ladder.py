@@ -147,7 +147,9 @@ class Ladder:
             theta = own.parameters.from_unit(first.point)
             if other_model and not own.rms(own.output_errors(theta[None]))[0] < FAR * start.rms:
                 return
-        settings, step = (_firm(settings), f"{name} on the way") if climbs else (settings, name)
+        step = f"{name} on the way" if climbs else name
+        if climbs:
+            settings = settings.changed({"gain_tolerance": max(FIRM, settings.gain_tolerance)})
         if more:
             theta = each_alone(own, theta, settings, self._watch.refining, self._checkpoints, name)
         result = self._refined(own, theta, settings, step)
@@ -177,7 +179,3 @@ class Ladder:
         if one.name not in self._left_out:
             self._left_out[one.name] = refitted(problem, one.theta).left_out
         return self._left_out[one.name]
-
-
-def _firm(settings: RefinementSettings) -> RefinementSettings:
-    return settings.changed({"gain_tolerance": max(FIRM, settings.gain_tolerance)})

@@ -19,6 +19,7 @@ from operator import itemgetter
 import numpy as np
 from numpy.random import Generator
 
+from hydroid.arrays import rms
 from hydroid.fitting.baselines import NAMES, fit_baselines
 from hydroid.fitting.checkpoints import Checkpoints, Memo
 from hydroid.fitting.refinement import Refining, refine
@@ -66,12 +67,12 @@ class Multistart:
             theta = self._joint_by_joint(joints, number, theta)
             self._memo.elsewhere += 1
             rows = self._problem.residuals(theta[None])
-            self._rms = float(np.sqrt(np.mean(rows**2))) if np.isfinite(rows).all() else np.inf
+            self._rms = rms(rows) if np.isfinite(rows).all() else np.inf
         else:
             cost, theta = self._grown(self._problem, theta, f"start {number + 1}")
             self.ends[0].append(cost)
             size = self._problem.measured.size + len(self._problem.priors)
-            self._rms = float(np.sqrt(2 * cost / size))
+            self._rms = np.sqrt(2 * cost / size)
         return theta[None]
 
     def tell(self, population: Population | None, offspring: Population) -> Population:
@@ -192,7 +193,7 @@ def by_numbers(problem: Problem, joint: int, theta: Array) -> Array:
     No load slows it, its actuator is strong enough for any, and its lever is the same everywhere.
     """
     settings = problem.settings
-    ends = np.array([*settings.arm.ranges.values()][joint - 1])
+    ends = [*settings.arm.ranges.values()][joint - 1]
     found = fit_baselines(problem.logs, joint, ends).get(NAMES[-1])
     if found is None:
         return theta

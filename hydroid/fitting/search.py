@@ -80,11 +80,11 @@ def search(
             chromosomes = algorithm.ask(population, rng)
             result = memo.evaluate(theta(chromosomes))
             evaluations += len(chromosomes)
-            objectives = result.overall[:, None] if algorithm.single else result.segments
+            objectives = result[:, -1:] if algorithm.single else result[:, :-1]
             population = algorithm.tell(population, Population(chromosomes, objectives))
-            overall = memo.evaluate(theta(population.chromosomes)).overall
+            overall = memo.evaluate(theta(population.chromosomes))[:, -1]
             finite = overall[np.isfinite(overall)]
-            best = min(history[-1, 4] if len(history) else np.inf, result.overall.min())
+            best = min(history[-1, 4] if len(history) else np.inf, result[:, -1].min())
             median = np.median(finite) if finite.size else np.inf
             counts = [len(history) + 1, evaluations + memo.elsewhere, memo.simulated, memo.infeasible]
             history = np.vstack([history, [*counts, best, median]])

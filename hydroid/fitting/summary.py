@@ -19,8 +19,8 @@ STRAINED_ABOVE = 2.0
 """standard deviations from its prior beyond which an estimate strains it, if the logs determine it"""
 SAME_OPTIMUM = 1.04
 """times the lowest cost up to which a start has found the same optimum: 2 % of the rms error"""
-_WARNINGS = ("at bound", "effect unknown")
-_NOTES = ("at zero", "no effect", "not identifiable", "prior only", "weakly identifiable")
+_WARNINGS = "at bound", "effect unknown"
+_KINDS = (*_WARNINGS, "at zero", "no effect", "not identifiable", "prior only", "weakly identifiable")
 """of what is found about single parameters, the most important first"""
 
 
@@ -144,7 +144,7 @@ def _parameter_findings(problem: Problem, estimate: Mapping[str, ParameterEstima
         Finding(
             kind, "warning" if kind in _WARNINGS else "note", tuple(names), {"side": side} if side else {}
         )
-        for kind in (*_WARNINGS, *_NOTES)
+        for kind in _KINDS
         for (own, side), names in kinds.items()
         if own == kind
     ]

@@ -40,8 +40,8 @@ Baselines = Mapping[int, Mapping[str, Baseline]]
 
 def baselines_of(settings: FitSettings, logs: Sequence[Log]) -> Baselines:
     """Fit the baselines of all compared joints to logs."""
-    limits = np.stack([settings.arm.lower, settings.arm.upper], axis=1)
-    return {joint: fit_baselines(logs, joint, limits[joint - 1]) for joint in settings.outputs}
+    ranges = [*settings.arm.ranges.values()]
+    return {joint: fit_baselines(logs, joint, ranges[joint - 1]) for joint in settings.outputs}
 
 
 def judge(

@@ -1,4 +1,4 @@
-"""The actuators of a population beside MuJoCo: how they start, and what can be measured on them.
+"""The actuators of a population beside MuJoCo: how they start, and the pressures in their chambers.
 
 `make_plugin` lays out what compiled code reads, and `at_rest` the state that it changes; then
 `hydroid.simulation.rollout` repeats, for one candidate at a time,
@@ -13,29 +13,13 @@ must be 0.
 
 import numpy as np
 
-from hydroid.arrays import Array, Index, Structs, record
+from hydroid.arrays import Array, Index, Structs
 from hydroid.hydraulics.cylinder import GIVE, fills, holding_pressures, rod_motion
 from hydroid.hydraulics.kernel import Plugin
 from hydroid.hydraulics.records import JOINT_STATE, NONE, Records, coefficients
 from hydroid.hydraulics.solenoid import drive, resting_stroke
 
 START_PRESSURE = 50e5  # in chamber B at the start where neither settings nor log say [Pa]; ours
-
-
-@record
-class Observation:
-    """What can be measured on actuators; flows are means over the last step. Joints without one have zeros.
-
-    pressure [Pa], shape (n, J, 2): chambers A and B. flow [m³/s], shape (n, J, 2): into A and out of B.
-    spool [m], shape (n, J). force [N], shape (n, J): A_A p_A − A_B p_B; of a rotary actuator a torque [N·m].
-    line [Pa], shape (n, J): pressure of the pump's line, the same at all joints.
-    """
-
-    pressure: Array
-    flow: Array
-    spool: Array
-    force: Array
-    line: Array
 
 
 def make_plugin(joints: Records, entries: Index, period: float, substeps: int) -> Plugin:
@@ -79,20 +63,17 @@ def at_rest(plugin: Plugin, angle: Array, torque: Array) -> Structs:
     return state
 
 
-def observe(coefficients: Structs, state: Structs, angle: Array) -> Observation:
-    """Return pressures, flows, spool and force at `angle` [rad], shape (n, J), of COEFFICIENTS and states.
+def pressures(coefficients: Structs, state: Structs, angle: Array) -> Array:
+    """Return the pressures of chambers A and B [Pa], shape (n, J, 2), 0 of a joint without actuator.
 
-    With the coefficients of one candidate, shape (J,), n may as well be the samples of its record.
+    They are those of COEFFICIENTS and states at `angle` [rad], shape (n, J). With the coefficients of one
+    candidate, shape (J,), n may as well be the samples of its record.
     """
     c: Records = coefficients.view(np.recarray)
-    z: Records = state.view(np.recarray)
-    pressure = [
-        np.where(c.kind != NONE, np.maximum(side.oil - c.bulk_modulus * fill, 0.0), 0.0)
-        for side, fill in zip((z.a, z.b), fills(angle, c), strict=True)
+    oil = [
+        state[side]["oil"] - c.bulk_modulus * fill for side, fill in zip("ab", fills(angle, c), strict=True)
     ]
-    force = c.a.area * pressure[0] - c.b.area * pressure[1]
-    flow = np.stack([z.a.flow, -z.b.flow], axis=-1)
-    return Observation(np.stack(pressure, axis=-1), flow, z.a.stroke - z.b.stroke, force, z.line.copy())
+    return np.where((c.kind != NONE)[..., None], np.maximum(np.stack(oil, axis=-1), 0.0), 0.0)
 
 
 def swallowed(c: Records, angle: Array, velocity: Array) -> Array:

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from hydroid.arrays import Array
-from hydroid.hydraulics.elementwise import compilable, select
+from hydroid.hydraulics.elementwise import compilable
 from hydroid.hydraulics.records import LINEAR, ROTARY
 from hydroid.settings import linkage
 
@@ -102,7 +102,7 @@ def stop_damping(travel, speed, stroke, penetration) -> Any:
     F_c opposes the motion at both ends; the article's sign at the lower one would push the rod out of the
     barrel. Travel x and stroke S [m], speed ẋ [m/s], K_p [N·s/m²].
     """
-    beyond = select(speed > 0.0, travel - stroke, select(speed < 0.0, -travel, 0.0))
+    beyond = travel - stroke if speed > 0.0 else -travel if speed < 0.0 else 0.0
     return penetration * np.maximum(beyond, 0.0)
 
 
@@ -118,7 +118,7 @@ def contact_torque(depth, contact) -> Any:
 
     The stiffness `contact` [N·m/rad] is below 0, and so is the angle, if it holds the joint from above.
     """
-    return np.abs(contact) * select(depth * contact > 0.0, depth, 0.0)
+    return np.abs(contact) * depth if depth * contact > 0.0 else 0.0
 
 
 def holding_pressures(force, area_a, area_b, supply, tank, level) -> tuple[Any, Any]:

@@ -1,7 +1,8 @@
-"""Functions written once for numpy arrays and for the scalars of a compiled loop.
+"""Functions written once for Python and for a compiled loop.
 
-A component's law is a plain Python function of floats or of arrays that broadcast (population axis
-first). Marked `compilable`, the very same function is compiled into the kernel.
+A component's law is a plain Python function of floats; one that no branch depends on takes arrays that
+broadcast, too (population axis first). Marked `compilable`, the very same function is compiled into the
+kernel.
 """
 
 # pyright: reportMissingParameterType=false
@@ -19,11 +20,6 @@ F = TypeVar("F", bound=Callable[..., Any])
 def compilable(function: F) -> F:
     """Let compiled code call `function`; for Python it stays what it is."""
     return register_jitable(function)
-
-
-def select(condition, yes, no) -> Any:
-    """Return `yes` where `condition` holds, else `no`."""
-    return np.where(condition, yes, no)
 
 
 def implicit_weight(speed) -> Any:
@@ -45,13 +41,5 @@ def kept(steps) -> Any:
 def _compiled_weight(speed) -> Any:  # pyright: ignore[reportUnusedFunction]
     def scalar(speed) -> Any:
         return 0.5 if speed <= 2.0 else 1.0 - 1.0 / speed
-
-    return scalar
-
-
-@overload(select)
-def _compiled_select(condition, yes, no) -> Any:  # pyright: ignore[reportUnusedFunction]
-    def scalar(condition, yes, no) -> Any:
-        return yes if condition else no
 
     return scalar

@@ -139,12 +139,9 @@ def meter(c, w, area: float, supply: float) -> None:
 
     `area` is the net opening [m²].
     """
-    if area > 0.0:
-        _fill(c, w.a, supply, c.leakage + area, c.leakage)
-        _fill(c, w.b, supply, c.leakage, c.leakage + area * c.b.return_)
-    else:
-        _fill(c, w.a, supply, c.leakage, c.leakage - area * c.a.return_)
-        _fill(c, w.b, supply, c.leakage - area, c.leakage)
+    a, b = np.maximum(area, 0.0), np.maximum(-area, 0.0)
+    _fill(c, w.a, supply, c.leakage + a, c.leakage + b * c.a.return_)
+    _fill(c, w.b, supply, c.leakage + b, c.leakage + a * c.b.return_)
 
 
 @compilable

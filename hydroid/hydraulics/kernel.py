@@ -119,29 +119,6 @@ def make_pad(joints: int) -> Pad:
 
 
 @compilable
-def couple(pad: Pad, order, idle: int, step: float) -> None:
-    """Add the pump's line to the system of the velocities."""
-    line = pad.line[0]
-    for a in range(idle, order.size):
-        u = pad.joints[order[a]]
-        pad.gain[a] += step * u.weight * u.thrust * line.change
-        for b in range(a, order.size):
-            w = pad.joints[order[b]]
-            pad.matrix[a, b] += step * line.softness * u.weight * u.pull * w.weight * w.pull
-
-
-@compilable
-def release(pad: Pad, order, idle: int, step: float) -> None:
-    """Let the line's pressure follow from the velocities, and all actuators take their part of it."""
-    line = pad.line[0]
-    for a in range(idle, order.size):
-        w = pad.joints[order[a]]
-        line.change -= line.softness * w.sweep * w.weight * pad.gain[a]
-    for a in range(idle, order.size):
-        fill(line, pad.joints[order[a]], step)
-
-
-@compilable
 def look_ahead(plugin: Plugin, state, commands, now: int, arm, pad: Pad) -> None:
     """Look ahead over one step of one candidate; writes torques and armatures of its `arm` in MuJoCo.
 
@@ -199,11 +176,20 @@ def look_ahead(plugin: Plugin, state, commands, now: int, arm, pad: Pad) -> None
                     matrix[a, b] = common[a, b]
         if shared:
             open_line(line, some, step)
-            couple(pad, order, idle, step)
+            for a in range(idle, joints):  # the line joins the system of the velocities
+                u = work[order[a]]
+                gain[a] += step * u.weight * u.thrust * line.change
+                for b in range(a, joints):
+                    w = work[order[b]]
+                    matrix[a, b] += step * line.softness * u.weight * u.pull * w.weight * w.pull
         eliminate(matrix, idle, joints)
         substitute(matrix, gain)
         if shared:
-            release(pad, order, idle, step)
+            for a in range(idle, joints):  # its pressure follows from them
+                w = work[order[a]]
+                line.change -= line.softness * w.sweep * w.weight * gain[a]
+            for a in range(idle, joints):
+                fill(line, work[order[a]], step)
             close_line(line, some)
         for a in range(joints):
             j = order[a]

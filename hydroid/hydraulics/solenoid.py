@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from hydroid.hydraulics.elementwise import compilable, implicit_weight, select
+from hydroid.hydraulics.elementwise import compilable, implicit_weight
 
 FULL_SCALE = 10.0  # voltage at full command, and from which the current is I_max [V], equation (4)
 
@@ -135,5 +135,4 @@ def plunger_step(motion, drive, damping, step, weight, c) -> Any:
     gain = step * net / (c.plunger_mass + weight * step * drag)
     after = stroke + step * (speed + weight * gain)
     speed = speed + gain
-    seated = after <= 0.0
-    return select(seated, 0.0, after), select(seated, np.maximum(speed, 0.0), speed)
+    return (0.0, np.maximum(speed, 0.0)) if after <= 0.0 else (after, speed)

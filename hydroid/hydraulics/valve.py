@@ -33,7 +33,7 @@ from typing import Any
 
 import numpy as np
 
-from hydroid.hydraulics.elementwise import compilable, select
+from hydroid.hydraulics.elementwise import compilable
 
 DENSITY = 860.0  # ρ of the oil [kg/m³]; ours
 
@@ -83,18 +83,15 @@ def port_flow(pressure, supply, pump_area, tank_area, c) -> Any:
     `supply` pressure [Pa], and its rise with that pressure.
     """
     drop, kept, fed = supply - pressure, 1.0, 1.0
-    if c.compensation > 0.0:
-        beyond = drop > MARGIN * supply
-        drop = drop - c.compensation * np.maximum(drop - MARGIN * supply, 0.0)
-        kept = select(beyond, 1.0 - c.compensation, 1.0)
-        fed = select(beyond, 1.0 - c.compensation * (1.0 - MARGIN), 1.0)
+    if c.compensation > 0.0 and drop > MARGIN * supply:
+        drop = drop - c.compensation * (drop - MARGIN * supply)
+        kept, fed = 1.0 - c.compensation, 1.0 - c.compensation * (1.0 - MARGIN)
     into, into_slope = root(drop, c.transition_pressure)
     out, out_slope = root(pressure - c.tank_pressure, c.transition_pressure)
     pumped = c.conductance * pump_area * into
     pumped_slope = c.conductance * pump_area * into_slope
-    limited = (pumped >= c.flow_limit) | (pumped < c.backflow)
-    pumped = np.maximum(np.minimum(pumped, c.flow_limit), c.backflow)
-    pumped_slope = select(limited, 0.0, pumped_slope)
-    filling = select(pressure < c.tank_pressure, c.anticavitation, 0.0)
+    if pumped >= c.flow_limit or pumped < c.backflow:
+        pumped, pumped_slope = np.maximum(np.minimum(pumped, c.flow_limit), c.backflow), 0.0
+    filling = c.anticavitation if pressure < c.tank_pressure else 0.0
     drained = c.conductance * (tank_area + filling)
     return pumped - drained * out, kept * pumped_slope + drained * out_slope, pumped, fed * pumped_slope

@@ -69,9 +69,10 @@ class Log:
         return self._mean_at_rest(self.angle)
 
     @property
-    def start_pressure(self) -> Array | None:
+    def start_pressure(self) -> Array:
         """Chamber pressures before the first command, as `start` [Pa], shape (J, 2), NaN where unmeasured."""
-        return None if self.pressure is None else self._mean_at_rest(self.pressure)
+        unknown = np.full((self.joints, 2), np.nan)
+        return unknown if self.pressure is None else self._mean_at_rest(self.pressure)
 
     @property
     def start_samples(self) -> Array:
@@ -84,10 +85,6 @@ class Log:
         with np.errstate(invalid="ignore"):
             correlation = np.where(square > 0, np.sum(off[1:] * off[:-1], axis=0) / square, 0.0).clip(0, 1)
         return len(resting) * (1 - correlation) / (1 + correlation)
-
-    def moved(self, joint: int, angle: float) -> "Log":
-        """Return the recording with all angles of one joint (number, from 1) turned by an angle [rad]."""
-        return replace(self, angle=self.angle + angle * (np.arange(self.joints) == joint - 1))
 
     def driving(self, joint: int) -> "Log":
         """Return the recording without the commands of all joints but this one (number, from 1)."""

@@ -14,7 +14,7 @@ from hydroid.arm.model import add_payload, load_model
 from hydroid.arrays import Array
 from hydroid.errors import RunError, SettingsError
 from hydroid.estimate import write_estimate
-from hydroid.hydraulics.actuator import observe
+from hydroid.hydraulics.actuator import pressures
 from hydroid.hydraulics.records import JOINT_STATE, has_force_curve
 from hydroid.identified_model import IdentifiedModel, write_settings
 from hydroid.mjcf import quiet_mujoco, read_mjcf
@@ -115,7 +115,7 @@ class Plant:
     def pressure(self) -> Array:
         """Pressures of chambers A and B [Pa], shape (J, 2); NaN where a joint has no hydraulics."""
         pressure, angle = np.full((len(self._pose), 2), np.nan), self.data.qpos[self._chain.columns]
-        pressure[self._chain.joints] = observe(self._plugin.coefficients, self._state, angle).pressure
+        pressure[self._chain.joints] = pressures(self._plugin.coefficients, self._state, angle)
         pressure[~self._active] = np.nan
         return pressure
 

@@ -133,10 +133,9 @@ def oil(bench: Bench, candidates: Candidates, inertia: Array) -> Measured:
     The oil is a spring of stiffness r² β (A_A²/V_A + A_B²/V_B) at the joint. Leakage and the seals' friction
     are left out of the damping.
     """
-    c, arm = actuator(bench, candidates)
+    c, travel, arm = actuator(bench, candidates)
     volumes = c.dead_volume, c.dead_volume
     if c.kind[0] == LINEAR:
-        travel = rod_motion(np.full(len(c), bench.angle), c)[0]
         volumes = volume(travel, c.a.area, c.dead_volume), volume(c.stroke - travel, c.b.area, c.dead_volume)
     stiffness = arm**2 * c.bulk_modulus * (c.a.area**2 / volumes[0] + c.b.area**2 / volumes[1])
     frequency = np.sqrt(stiffness / inertia) / (2.0 * np.pi)
@@ -147,15 +146,16 @@ def oil(bench: Bench, candidates: Candidates, inertia: Array) -> Measured:
     yield Column("area_ratio", "ratio of areas, A/B", ""), c.a.area / c.b.area
 
 
-def actuator(bench: Bench, candidates: Candidates) -> tuple[Records, Array]:
-    """Return n candidates' COEFFICIENTS of the joint, (n,), and their moment arm at its angle [m], (n,).
+def actuator(bench: Bench, candidates: Candidates) -> tuple[Records, Array, Array]:
+    """Return n candidates' COEFFICIENTS of the joint, and travel and moment arm [m] at its angle, (n,) each.
 
-    Of a rotary actuator, whose areas are displacements, the moment arm is 1.
+    Of a rotary actuator, whose areas are displacements, the travel is the angle and the moment arm is 1.
     """
     j = bench.joint - 1
     joints: Records = candidates.joints[:, [j]]  # pyright: ignore[reportAssignmentType]
     c: Records = coefficients(joints)[:, 0]  # pyright: ignore[reportAssignmentType]
-    return c, rod_motion(np.full(len(c), bench.angle), c)[1]
+    travel, arm, _ = rod_motion(np.full(len(c), bench.angle), c)
+    return c, travel, arm
 
 
 COMMANDS = (5.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0, 100.0)  # of the curve of speed [%]
@@ -206,7 +206,7 @@ def speed_tests(
             with np.errstate(all="ignore"):  # a joint that hardly moves has no dead band
                 part = (MOVES * speed[100.0] + sign * rest.speed(candidates) - slow) / (fast - slow)
             rows.append(("dead_band", "dead band", "%", below + part * (above - below)))
-        c, arm = actuator(bench, candidates)
+        c, _, arm = actuator(bench, candidates)
         flow = 6e4 * (c.a if sign > 0 else c.b).area * np.abs(arm) * np.radians(speed[100.0])
         rows.append(("full_flow", "flow at 100 % command", "L/min", flow))
         for name, label, own_unit, value in rows:

@@ -21,7 +21,7 @@ so that an error which comes and goes within seconds counts twice as much as one
 the settings say that the noise is white.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import field
 from typing import Literal
 
@@ -65,13 +65,11 @@ class Channel:
     rows: slice
     prefilter: Array = field(default_factory=lambda: UNFILTERED)
 
-    def error(self, responses: Sequence[Response] | Mapping[int, Response]) -> Array:
-        """Return the weighted output error y - y_hat of (17) [rad], shape (n, T)."""
-        response = responses[self.log]
+    def error(self, response: Response) -> Array:
+        """Return the weighted output error y - y_hat of (17) in its log's response [rad], shape (n, T)."""
         if self.quantity == "angle":
             simulated = response.angle[:, :, self.column]
         else:
-            assert response.pressure is not None
             simulated = response.pressure[:, :, self.column, "ab".index(self.quantity[-1])]
         return self.weight * (self.measured - simulated)
 

@@ -9,6 +9,8 @@ G. H. Golub and V. Pereyra, 1973), which is to whiten the residuals for a start 
 is computed from such residuals, intervals too, holds for any start angle that the prior allows.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from hydroid.arm.model import load_model
@@ -57,9 +59,10 @@ def start_slopes(problem: Problem, theta: Array) -> list[StartSlopes]:
         rows = slice(channels[0].rows.start, channels[-1].rows.stop)
         moved: list[Array] = []
         for joint in joints:
-            start = log.moved(joint, STEP)
+            start = log.angle + STEP * (np.arange(log.joints) == joint - 1)
+            start = replace(log, angle=start)
             simulation = make_simulation(spec, start, problem.outputs, problem.settings, pressures)
-            response = {i: simulation.simulate(candidates)}
+            response = simulation.simulate(candidates)
             moved.append(np.concatenate([c.filtered(c.error(response))[0] for c in channels]))
         if moved:
             slope = (np.array(moved) - base[rows]) / STEP

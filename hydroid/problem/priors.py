@@ -12,7 +12,7 @@ import numpy as np
 
 from hydroid.arrays import Array, record
 from hydroid.errors import SettingsError
-from hydroid.parameters import ParameterSet
+from hydroid.parameters import ParameterSet, Prior
 from hydroid.settings.problem import PriorSettings
 
 REACH = 2.0  # standard deviations that a candidate of a search may be away from a prior
@@ -53,24 +53,20 @@ class Priors:
     """
 
     def __init__(self, settings: Mapping[str, PriorSettings], parameters: ParameterSet) -> None:
-        narrowed = list(parameters.parameters)
-        for column, p in enumerate(narrowed):
+        self._own, narrowed = dict[int, Prior](), list(parameters.parameters)
+        for column, p in enumerate(parameters.parameters):
             if p.prior is not None and p.fixed is None:
+                self._own[column] = p.prior
                 low, high = max(p.lower, p.prior.value(-REACH)), min(p.upper, p.prior.value(REACH))
                 narrowed[column] = replace(p, lower=low, upper=high)
         self.searched = ParameterSet(tuple(narrowed))
-        self._own = [
-            (column, p.prior)
-            for column, p in enumerate(parameters.parameters)
-            if p.fixed is None and p.prior is not None
-        ]
         self._combinations = [
             combination
             for name, prior in settings.items()
             if (combination := _combination(name, prior, self.searched)) is not None
         ]
         self.names = (
-            *(parameters.names[column] for column, _ in self._own),
+            *(parameters.names[column] for column in self._own),
             *(combination.name for combination in self._combinations),
         )
         if self._combinations:
@@ -88,7 +84,7 @@ class Priors:
 
     def scores(self, theta: Array) -> Array:
         """Return the distance from each prior's value in standard deviations; (n, P) -> (n, M)."""
-        own = [prior.score(theta[:, column]) for column, prior in self._own]
+        own = [prior.score(theta[:, column]) for column, prior in self._own.items()]
         return np.array(
             [*own, *(c.excess(theta) / c.tolerance(theta) for c in self._combinations)]
         ).T.reshape(len(theta), len(self))

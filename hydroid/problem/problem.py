@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 
 from hydroid.arm.model import add_payload, load_model
-from hydroid.arrays import Array, Ints, record, rms
+from hydroid.arrays import Array, Ints, rms
 from hydroid.errors import SettingsError
 from hydroid.log import Log
 from hydroid.parallel.workers import DaskWorkers
@@ -40,26 +40,6 @@ WHITE = 1.6
 
 OpenStart = Callable[[Array], None]
 """takes what one log's open start angles can explain out of residuals, shape (n, R)"""
-
-
-@record
-class Evaluation:
-    """Objectives of n candidates [rad or relative]: by segment, and overall last, shape (n, S + 1).
-
-    A candidate whose simulation diverged has inf throughout.
-    """
-
-    values: Array
-
-    @property
-    def segments(self) -> Array:
-        """Shape (n, S)."""
-        return self.values[:, :-1]
-
-    @property
-    def overall(self) -> Array:
-        """Shape (n,)."""
-        return self.values[:, -1]
 
 
 class Problem:
@@ -153,17 +133,20 @@ class Problem:
         stated = any(p.start is not None and p.fixed is None for p in searched.parameters)
         return searched.to_unit(searched.start) if stated else None
 
-    def evaluate(self, theta: Array) -> Evaluation:
-        """Evaluate theta, shape (n, P); memory does not grow with n beyond the result."""
+    def evaluate(self, theta: Array) -> Array:
+        """Return the objectives of theta, (n, P), by segment and overall last, shape (n, S + 1).
+
+        They are in rad, or relative; inf throughout where a simulation diverged. Memory does not grow with n
+        beyond the result.
+        """
         if self._spread is None:
-            values = self.objectives(theta)
-        else:
-            values = self._spread(self._on_worker, "objectives", theta, len(self.bounds) + 1)
-            values[np.isnan(values)] = np.inf
-        return Evaluation(values)
+            return self.objectives(theta)
+        values = self._spread(self._on_worker, "objectives", theta, len(self.bounds) + 1)
+        values[np.isnan(values)] = np.inf
+        return values
 
     def objectives(self, theta: Array) -> Array:
-        """Objectives of theta, shape (n, P), simulated in this process: shape (n, S + 1), overall last."""
+        """Evaluate theta, shape (n, P), in this process."""
         size = max(1, CHUNK // len(self.measured))
         parts = (self.norms(self.output_errors(theta[at : at + size])) for at in range(0, len(theta), size))
         return np.vstack([*parts])
@@ -194,7 +177,7 @@ class Problem:
 
     def errors(self, responses: Sequence[Response]) -> Array:
         """Return the weighted output errors of n candidates' responses to all logs [rad], shape (n, R)."""
-        return np.concatenate([channel.error(responses) for channel in self.channels], axis=1)
+        return np.concatenate([c.error(responses[c.log]) for c in self.channels], axis=1)
 
     def leaves_noise(self, theta: Array) -> bool:
         """Whether errors at an estimate, (P,), change between samples as white noise does."""
@@ -211,14 +194,18 @@ class Problem:
         """Return output errors from residuals, shape (n, R)."""
         return np.concatenate([c.unfiltered(residuals[:, c.rows]) for c in self.channels], axis=1)
 
-    def rms(self, errors: Array, joints: Collection[int] = ()) -> Array:
-        """Rms of output errors, (n, R), of the angles of joints (from 1), or all, unweighted [rad], (n,)."""
+    def angles(self, errors: Array, joints: Collection[int] = ()) -> Array:
+        """Return the output errors, of (n, R), of the angles of joints (from 1), or all, unweighted [rad]."""
         angles = [
             errors[:, c.rows] / c.weight
             for c in self.channels
             if c.quantity == "angle" and (not joints or c.joint in joints)
         ]
-        return rms(np.concatenate(angles, axis=1), axis=1)
+        return np.concatenate(angles, axis=1)
+
+    def rms(self, errors: Array, joints: Collection[int] = ()) -> Array:
+        """Return the rms of the same, shape (n,)."""
+        return rms(self.angles(errors, joints), axis=1)
 
     @cached_property
     def _on_worker(self) -> "Problem":

@@ -97,11 +97,10 @@ class Record:
 
 def fit_result(fit: Fit, fitted: tuple[Prediction, ...], baselines: Baselines) -> FitResult:
     """Return what a run stores beside its summary."""
-    theta, evaluation = fit.front
     return FitResult(
         fitted,
         fit.history,
-        (theta, evaluation.values),
+        fit.front,
         {name: estimate.segments for name, estimate in fit.estimates.items()},
         tuple(Effort(n, r.iterations, r.evaluations, r.ending.value) for n, r in fit.refinements.items()),
         baselines,

@@ -103,10 +103,7 @@ def make_parameter(
     Raises ValueError: a prior without a nominal value, or one that does not fit, with the parameter's name.
     """
     nominal = nominal_value(arm, hydraulics, own)
-    try:
-        prior = _prior(own, nominal)
-    except ValueError as error:
-        raise ValueError(f"parameters.{name}: {error}") from None
+    prior = _prior(name, own, nominal)
     lower, upper = own.bounds or _default_bounds(own, prior)
     start = own.start if own.start is not None else nominal
     start = None if start is None else min(max(start, lower), upper)
@@ -115,21 +112,23 @@ def make_parameter(
     return Parameter(name, _unit(arm, own), lower, upper, own.fixed, on_log, start, prior, least)
 
 
-def _prior(own: ParameterSettings, nominal: float | None) -> Prior | None:
+def _prior(name: str, own: ParameterSettings, nominal: float | None) -> Prior | None:
     if not own.has_prior:
         return None
     if nominal is None:
         word = "within" if own.sd is None else "sd"
         raise ValueError(
-            f"{word}: needs a nominal value; the settings and the arm's file have none for this "
-            f"{own.quantity}, so add nominal: VALUE, or give bounds: in place of {word}:"
+            f"parameters.{name}: {word}: needs a nominal value; the settings and the arm's file have none "
+            f"for this {own.quantity}, so add nominal: VALUE, or give bounds: in place of {word}:"
         )
     if own.bounds is not None and not own.bounds[0] <= nominal <= own.bounds[1]:
-        raise ValueError(f"the nominal value {nominal:g} {own.unit} lies outside the bounds")
+        raise ValueError(
+            f"parameters.{name}: the nominal value {nominal:g} {own.unit} lies outside the bounds"
+        )
     if own.sd is not None:
         return Prior(nominal, own.sd)
     if nominal <= 0:
-        raise ValueError("within: factor needs a nominal value above 0; give sd: instead")
+        raise ValueError(f"parameters.{name}: within: factor needs a nominal value above 0; give sd: instead")
     return Prior(nominal, math.log(own.within or 1.0) / 1.96, log=True)  # 95 % lie within
 
 

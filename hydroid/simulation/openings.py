@@ -42,7 +42,7 @@ def valve_openings(
     """Return the mean opening of n candidates' valves in each step [m²], shape (steps, J) each.
 
     `states` are those of the start, shape (n, J), and `commands` the steps' [%], shape (steps, J). `run` is
-    `map`, or that of a pool. No bit depends on the other candidates.
+    that of a pool. No bit depends on the other candidates.
     """
     alike = plugin.coefficients.copy()
     for fields, names in ((alike, BEHIND_VALVE), (alike["a"], BEHIND_PORT), (alike["b"], BEHIND_PORT)):

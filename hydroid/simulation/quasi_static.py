@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from numba import njit, types
 
-from hydroid.hydraulics.cylinder import bent, rod, volume
+from hydroid.hydraulics.cylinder import bent, filling, rod
 from hydroid.hydraulics.elementwise import compilable
 from hydroid.hydraulics.joint import command, mean_opening
 from hydroid.hydraulics.kernel import SOURCE, Plugin, make_pad
@@ -141,8 +141,7 @@ def store_oil(c, z, w, speed: float, angle: float) -> None:
     out = linkage(c, angle)[0]
     fill_a, fill_b = out * a / c.dead_volume, -out * b / c.dead_volume
     if c.kind == LINEAR:
-        fill_a = np.log(volume(out, a, c.dead_volume) / c.dead_volume)
-        fill_b = np.log(volume(c.stroke - out, b, c.dead_volume) / c.dead_volume)
+        fill_a, fill_b = filling(out, a, c.dead_volume), filling(c.stroke - out, b, c.dead_volume)
     z.a.oil = max(pressure_a, 0.0) + c.bulk_modulus * fill_a
     z.b.oil = max(pressure_b, 0.0) + c.bulk_modulus * fill_b
     z.a.flow, z.b.flow = sign * a * speed, -sign * b * speed

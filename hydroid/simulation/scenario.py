@@ -102,15 +102,14 @@ def distinct(*tables: Any) -> tuple[Index, Index]:
 
 @record
 class Response:
-    """Simulated angles [rad], shape (n, T, K), of the K output joints.
+    """Simulated angles [rad], shape (n, T, K), of the K output joints; NaN throughout where one diverged.
 
-    A candidate that diverged has `feasible` False, shape (n,), and NaN throughout. `pressure` [Pa], shape
-    (n, T, L, 2), are those of chambers A and B of L joints, where they were asked for.
+    `pressure` [Pa], shape
+    (n, T, L, 2), are those of chambers A and B of the L joints that were asked for.
     """
 
     angle: Array
-    feasible: Mask
-    pressure: Array | None = None
+    pressure: Array
 
 
 class Scenario:
@@ -142,8 +141,7 @@ class Scenario:
         self.arm.model.qpos_spring[:] = self.arm.pose
         self.outputs = np.searchsorted(self.arm.columns, outputs)
         self.command = np.repeat(log.command[:-1, moving], settings.steps, axis=0)
-        start = log.start_pressure
-        self.pressure = np.full((len(self.arm.columns), 2), np.nan) if start is None else start[moving]
+        self.pressure = log.start_pressure[moving]
         self.period = log.period
         follows = np.flatnonzero(~self.active & (settings.other_joints == "measured"))
         columns = np.searchsorted(self.arm.columns, follows)

@@ -17,7 +17,7 @@ from scipy.signal import lfilter
 
 from hydroid.arm.locked import repeat
 from hydroid.arrays import Array, Index, Structs
-from hydroid.hydraulics.actuator import Observation, observe
+from hydroid.hydraulics.actuator import pressures
 from hydroid.hydraulics.records import JOINT_STATE, has_force_curve
 from hydroid.mjcf import quiet_mujoco
 from hydroid.simulation.openings import valve_openings
@@ -25,9 +25,9 @@ from hydroid.simulation.quasi_static import roll_quasi_static
 from hydroid.simulation.rollout import Course, Record, SteppedArm, compile_rollout, roll
 from hydroid.simulation.scenario import Candidates, Chain, Response, Scenario, distinct
 
-Follow = Callable[[SteppedArm, Index], tuple[Array, Observation | None]]
+Follow = Callable[[SteppedArm, Index], tuple[Array, Array | None]]
 """simulates some of n candidates, one for each copy of an arm: angles of the moving joints [rad],
-(1 + T, copies, V), and what the actuators of a single one do"""
+(1 + T, copies, V), and the chamber pressures of a single one [Pa], (1 + T, J, 2), where they are wanted"""
 TOGETHER = 56
 """joints of all arms stepped at once: MuJoCo computes with sparse matrices from 60"""
 
@@ -40,7 +40,7 @@ class Simulation:
         pressures: active joints whose chamber pressures are wanted in the response, 0-based.
 
     Attributes:
-        joints: those that a trace describes, among the arm's, 0-based.
+        joints: those with hydraulics, and those they couple with, among the arm's, 0-based.
     """
 
     def __init__(self, scenario: Scenario, substeps: int | None, pressures: Sequence[int] = ()) -> None:
@@ -55,53 +55,45 @@ class Simulation:
     def simulate(self, candidates: Candidates) -> Response:
         """Return what n candidates' sensors read, and the pressures asked for, at the log's samples.
 
-        The first is the start. A candidate without a force-stroke curve, or that diverged, is infeasible.
+        The first is the start. One without a force-stroke curve, or that diverged, has NaN throughout.
         """
         scenario, n, wanted = self.scenario, len(candidates), self._pressures
         samples = 1 + len(scenario.command) // scenario.settings.steps
         angle = np.full((n, samples, len(scenario.outputs)), np.nan)
-        pressure = np.full((n, samples, len(wanted), 2), np.nan) if wanted.size else None
-        exists = has_force_curve(candidates.joints[:, self.joints])
+        pressure = np.full((n, samples, len(wanted), 2), np.nan)
         # those that differ in effects of other groups of logs are simulated once
         first, place = distinct(candidates.joints, candidates.mass)
+        exists = has_force_curve(candidates.joints[:, self.joints])
         rows = np.intersect1d(np.flatnonzero(exists), first)
         threads = min(scenario.settings.threads or os.cpu_count() or 1, rows.size)
         if not threads:
-            return Response(angle, exists, pressure)
+            return Response(angle, pressure)
         candidates = candidates[rows]
         sensors = candidates.joints[:, scenario.arm.columns[scenario.outputs]]
 
         def simulate(some: Index) -> None:
             arm = free.pop()
-            followed, actuators = follow(arm, np.resize(some, arm.copies))
+            followed, chambers = follow(arm, np.resize(some, arm.copies))
             if arm.healthy:
                 for place, seen in zip(some, followed[:, :, scenario.outputs].swapaxes(0, 1), strict=False):
                     read = reading(seen, sensors[place], scenario.period) if self.joints.size else seen
                     angle[rows[place]] = read
-                if pressure is not None and actuators is not None:
-                    pressure[rows[some[0]]] = actuators.pressure[:, wanted]
+                if chambers is not None:
+                    pressure[rows[some[0]]] = chambers[:, wanted]
             free.append(arm)
 
         with quiet_mujoco(), ThreadPoolExecutor(threads) as pool:
             copies = self._copies(candidates, threads)
             free = deque(self._stepped(copies) for _ in range(threads))
-            follow = self._follower(candidates, free[0], pool.map, observed=pressure is not None)
+            follow = self._follower(candidates, free[0], pool.map)
             deque(pool.map(simulate, np.array_split(range(rows.size), -(-rows.size // copies))), maxlen=0)
             if copies > 1:  # one that diverges stops those beside it
                 free = deque(self._stepped() for _ in range(threads))
                 left = np.flatnonzero(np.isnan(angle[rows, -1]).any(axis=1))
                 deque(pool.map(simulate, left[:, None]), maxlen=0)
         if len(first) < n:
-            angle, pressure = angle[first[place]], None if pressure is None else pressure[first[place]]
-        return Response(angle, np.all(np.isfinite(angle), axis=(1, 2)), pressure)
-
-    def trace(self, candidates: Candidates) -> Observation:
-        """Simulate one candidate; return what its actuators did, at T samples, shape (T, J) or (T, J, 2)."""
-        arm = self._stepped()
-        with quiet_mujoco():
-            observation = self._follower(candidates, arm, map, observed=True)(arm, np.array([0]))[1]
-        assert observation is not None
-        return observation
+            angle, pressure = angle[first[place]], pressure[first[place]]
+        return Response(angle, pressure)
 
     def _copies(self, candidates: Candidates, threads: int) -> int:
         """How many arms can be stepped at once without changing a bit of any.
@@ -123,13 +115,13 @@ class Simulation:
         return SteppedArm(model, chain.columns, pushed, steps, rollout, copies)
 
     def _follower(
-        self, candidates: Candidates, arm: SteppedArm, run: Callable[..., Iterable[None]], *, observed: bool
+        self, candidates: Candidates, arm: SteppedArm, run: Callable[..., Iterable[None]]
     ) -> Follow:
         """Return what simulates some of n candidates; all are balanced here, one by one, on one arm.
 
-        `run` is `map`, or that of a pool.
+        `run` is that of a pool.
         """
-        scenario, chain, n = self.scenario, self._chain, len(candidates)
+        scenario, chain, n, observed = self.scenario, self._chain, len(candidates), self._pressures.size
         values, pose, servo = scenario.values(candidates), scenario.arm.pose, scenario.prescribed
         samples = len(scenario.command) // scenario.settings.steps
         starts = [np.resize(range(first, n), arm.copies) for first in range(0, n, arm.copies)]
@@ -142,7 +134,7 @@ class Simulation:
         gain = candidates.joints.gain[:, scenario.arm.columns[chain.pushed]]
         served = np.searchsorted(chain.pushed, servo.columns)
 
-        def follow(arm: SteppedArm, some: Index) -> tuple[Array, Observation | None]:
+        def follow(arm: SteppedArm, some: Index) -> tuple[Array, Array | None]:
             start, row = np.tile(pose, arm.copies), some[0]
             arm.start(values, some, start)
             torque = gain[some] * scenario.command[:, None, chain.pushed] + balance[some][:, chain.pushed]
@@ -156,7 +148,7 @@ class Simulation:
             angle[0], record[0] = start, state
             course = Course(commands, torque.reshape(len(torque), -1), taken[row], openings[row])
             arm.roll(one, state, course, Record(angle[1:], record[1:]))
-            seen = observe(one.coefficients, record, angle[:, chain.columns]) if observed else None
+            seen = pressures(one.coefficients, record, angle[:, chain.columns]) if observed else None
             return angle.reshape(len(angle), arm.copies, -1), seen
 
         return follow

@@ -2,9 +2,9 @@
 
 import numpy as np
 from made_logs import at_rest
+from observation import Observation, trace
 
 from hydroid.arm.model import load_model
-from hydroid.hydraulics.actuator import Observation
 from hydroid.hydraulics.records import Records, nominal_joints
 from hydroid.settings.arm import Arm
 from hydroid.settings.hydraulics import HydraulicSettings
@@ -27,13 +27,13 @@ class DrivenArm:
         log = at_rest(pose, np.concatenate([command, np.zeros((1, command.shape[1]))]))
         chosen = SimulationSettings(steps_per_sample=steps)
         scenario = Scenario(load_model(arm), arm, log, list(range(len(pose))), chosen)
-        self._simulation = Simulation(scenario, settings.substeps)
+        self._scenario, self._substeps = scenario, settings.substeps
         self._candidates = Candidates(joints, np.tile(arm.masses, (len(joints), 1)))
 
     def run(self) -> np.ndarray:
         """Angles [rad], (n, T + 1, J); NaN of a candidate that diverged."""
-        return self._simulation.simulate(self._candidates).angle
+        return Simulation(self._scenario, self._substeps).simulate(self._candidates).angle
 
     def trace(self) -> Observation:
         """What the actuators of the only candidate did, (T + 1, J)."""
-        return self._simulation.trace(self._candidates)
+        return trace(self._scenario, self._substeps, self._candidates)

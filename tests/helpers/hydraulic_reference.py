@@ -10,9 +10,9 @@ from math import cos, inf, log, radians, sin, sqrt
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
+from observation import observe as observed
 from scipy.integrate import Radau
 
-from hydroid.hydraulics import actuator
 from hydroid.hydraulics.actuator import at_rest, make_plugin
 from hydroid.hydraulics.records import JOINT, JOINT_STATE, LINEAR, ROTARY, Records
 from hydroid.mjcf import quiet_mujoco
@@ -125,7 +125,7 @@ def simulate(p, command, settings, steps=1, observe=None, start=START, model=Non
             arm.roll(one, state[i], course, Record(angle[i, 1:], states[i]))
     if observe is not None:
         for t in range(samples):
-            seen = actuator.observe(plugin.coefficients, states[:, t], angle[:, t + 1])
+            seen = observed(plugin.coefficients, states[:, t], angle[:, t + 1])
             observe.append((seen, states[:, t]["velocity"]))
     return angle[:, :, 0]
 

@@ -16,7 +16,7 @@ from hydroid.posterior.linear import Linear, estimate_box
 from hydroid.posterior.noise import problem_noise
 from hydroid.posterior.quantities import Quantities
 from hydroid.posterior.uncertainty import Uncertainty, uncertainty_from
-from hydroid.problem.problem import Evaluation, Problem
+from hydroid.problem.problem import Problem
 from hydroid.run.record import Record, fit_result
 from hydroid.search.descent import Descent, Ending
 from hydroid.settings.fit import FitSettings
@@ -105,7 +105,7 @@ def make_fit(
         final,
         (
             parameters.from_unit(rng.uniform(0, 1, (front, free))),
-            Evaluation(np.column_stack([segments, segments.max(axis=1, initial=0)])),
+            np.column_stack([segments, segments.max(axis=1, initial=0)]),
         ),
         history,
         {"refined": refined} if "refined" in names else {},

@@ -23,8 +23,8 @@ from hydraulic_reference import (
     simulate,
     wheel,
 )
+from observation import Observation
 
-from hydroid.hydraulics.actuator import Observation
 from hydroid.hydraulics.cylinder import triangle
 from hydroid.hydraulics.solenoid import force_curve
 from hydroid.settings.hydraulics import HydraulicSettings

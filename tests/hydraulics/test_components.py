@@ -140,8 +140,8 @@ def test_linkages_are_those_of_the_arms_cylinders(arm: Arm):
 
 
 def test_stops_oppose_motion_into_them_only():
-    travel, speed = np.array([-1e-3, -1e-3, 0.05, 0.136, 0.136]), np.array([-0.1, 0.1, 1.0, 0.1, -0.1])
-    damping = stop_damping(travel, speed, 0.135, 1e10)
+    motions = (-1e-3, -0.1), (-1e-3, 0.1), (0.05, 1.0), (0.136, 0.1), (0.136, -0.1)
+    damping = [stop_damping(travel, speed, 0.135, 1e10) for travel, speed in motions]
     np.testing.assert_allclose(damping, [1e7, 0, 0, 1e7, 0], rtol=1e-9)
 
 

@@ -80,10 +80,9 @@ def test_only_the_candidate_that_kills_is_infeasible(two: DaskWorkers, tmp_path:
 
     memo = Memo(Problem(*arguments(), spread))
     result = memo.evaluate(theta)
-    assert np.isinf(result.overall[3])
-    assert np.isinf(result.segments[3]).all()
+    assert np.isinf(result[3]).all()
     assert memo.infeasible == 1
-    np.testing.assert_array_equal(result.segments[others], healthy.segments[others])
+    np.testing.assert_array_equal(result[others], healthy[others])
     assert len((tmp_path / "deaths").read_text()) == 4  # two tries in its chunk, two alone
     residuals = memo.problem.residuals(theta[2:5])
     assert np.isnan(residuals[1]).all()

@@ -81,7 +81,7 @@ def test_a_symmetric_actuator_without_gravity_moves_alike_both_ways():
 def test_the_dead_band_is_the_command_that_moves_the_spool_over_its_overlap():
     changes = {"hydraulics.overlap_a": 0.5, "hydraulics.overlap_b": 0.3, "hydraulics.leakage": 0.0}
     bench, estimate = shoulder_bench(model(**changes))
-    found, (c, _) = measured(bench, estimate), actuator(bench, estimate)
+    found, (c, *_) = measured(bench, estimate), actuator(bench, estimate)
 
     def spool(command: float, onset: float) -> float:
         current = coil_current(side_voltage(command, 1.0, onset), c.current_max[0], c.current_min[0])

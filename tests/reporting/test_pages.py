@@ -78,9 +78,8 @@ def test_history_and_front_come_back_to_the_last_bit(written):
     assert np.array_equal(np.array(rows, dtype=float), fit.history)
     with (path / "pareto.csv").open(newline="") as file:
         header, *rows = csv.reader(file)
-    theta, evaluation = fit.front
     assert header == [*problem.parameters.names, *(f"segment_{s}_rad" for s in range(1, 5)), "overall_rad"]
-    expected = np.column_stack([theta, evaluation.segments, evaluation.overall])
+    expected = np.column_stack(fit.front)
     assert np.array_equal(np.array(rows, dtype=float), expected)
 
 

@@ -24,10 +24,8 @@ def _styled():
 
 
 def drawn_front(problem, fit) -> Chart:
-    evaluation = fit.front[1]
-    objectives = np.column_stack([evaluation.segments, evaluation.overall])
     segments = {name: fit.estimates[name].segments for name in (fit.final, *fit.estimates)}
-    return pareto(objectives, segments, problem.settings.objective)
+    return pareto(fit.front[1], segments, problem.settings.objective)
 
 
 def draw_all(problem, fit) -> list[Chart]:
@@ -92,7 +90,7 @@ def test_any_fit_can_be_drawn(shape: str):
 def test_what_is_not_finite_is_left_out():
     problem = make_problem()
     fit = make_fit(problem)
-    fit.history[:3, 4:] = fit.front[1].segments[0] = np.inf
+    fit.history[:3, 4:] = fit.front[1][0, :-1] = np.inf
     for drawn in draw_all(problem, fit):
         check(drawn)
     for history in (np.full((2, 6), np.inf), np.empty((0, 6))):

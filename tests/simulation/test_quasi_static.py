@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from conftest import candidates
 from made_logs import at_rest
+from observation import trace
 
 from hydroid.hydraulics.records import JOINT, nominal_joints
 from hydroid.hydraulics.valve import DENSITY
@@ -32,8 +33,8 @@ def simulated(spec, arm):
         for name, value in values.items():
             (one.mass if name == "mass" else one.joints[name])[:] = value
         settings = SimulationSettings(model=model)
-        simulation = Simulation(Scenario(spec, arm, log, sorted(commands), settings), 10)
-        return simulation.simulate(one).angle[0], simulation.trace(one), one.joints[0]
+        scenario = Scenario(spec, arm, log, sorted(commands), settings)
+        return Simulation(scenario, 10).simulate(one).angle[0], trace(scenario, 10, one), one.joints[0]
 
     return run
 
@@ -154,7 +155,9 @@ def test_valves_that_open_once_for_all_open_as_each_alone(spec, arm):
     command = np.zeros((60, len(arm.joints)))
     command[5:30, [SHOULDER, ROLL]], command[30:, [SHOULDER, ROLL]] = (70, -55), (-40, 80)
     log = at_rest(arm.pose("study"), command, 0.02)
-    names = [name for name in JOINT.names if JOINT[name].kind == "f" and name not in ("sense", "stroke")]
+    names = [
+        name for name in JOINT.names or () if JOINT[name].kind == "f" and name not in ("sense", "stroke")
+    ]
     everyone = candidates(arm, len(names))
     everyone.mass[:] = arm.masses
     everyone.joints[:] = nominal_joints(arm, HydraulicSettings(pump_flow=4.0, dead_band_a=10, dead_band_b=10))

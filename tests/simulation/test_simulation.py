@@ -11,8 +11,10 @@ import pytest
 from arms import posed, with_masses
 from conftest import candidates, replaced, scattered, simulation
 from made_logs import step_log
+from observation import trace
 from scipy.integrate import solve_ivp
 
+from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.simulation import Candidates
 from hydroid.simulation.simulation import reading
 
@@ -25,7 +27,7 @@ def test_without_commands_and_leakage_the_arm_stands_for_a_minute(spec, arm, kin
     log = step_log(arm.pose("study"), [0.0], dwell=60.0)
     everyone = scattered(arm, 3, leakage=0.0)
     response = simulation(spec, arm, log, range(7), kind, other_joints=other).simulate(everyone)
-    assert response.feasible.all()
+    assert np.isfinite(response.angle).all()
     # gravity's gradient is a spring that may be unstable; rounding must not have grown to anything
     assert np.abs(response.angle - arm.pose("study")).max() < drift
 
@@ -136,7 +138,7 @@ def test_candidates_at_their_stops_or_diverging_change_no_bit_of_those_beside_th
     gain[7] = 1e12
     run = simulation(spec, arm, study_log, other_joints=other).simulate
     together = run(some)
-    assert together.feasible.tolist() == [True] * 7 + [False]
+    assert np.isfinite(together.angle).all(axis=(1, 2)).tolist() == [True] * 7 + [False]
     beyond = (together.angle > arm.upper[1]) | (together.angle < arm.lower[1])
     assert beyond.any(axis=(1, 2)).sum() > 1
     alone = [run(some[k : k + 1]).angle for k in range(8)]
@@ -159,13 +161,13 @@ def test_the_trace_explains_the_motion(spec, arm, study_log):
     one = scattered(arm, 1, leakage=0.0, bulk_modulus=8e5)
     run = simulation(spec, arm, study_log, kind="hyd")
     angle = run.simulate(one).angle[0, :, 0]
-    trace = run.trace(one)
+    seen = trace(run.scenario, HydraulicSettings().substeps, one)
     assert list(run.joints) == [1]
-    assert trace.pressure.shape == (len(study_log.time), 1, 2)
-    assert trace.pressure.min() >= 0
+    assert seen.pressure.shape == (len(study_log.time), 1, 2)
+    assert seen.pressure.min() >= 0
     cylinder = arm.joints[1].actuator
     way = cylinder.length(angle) - cylinder.length(angle[:1])
-    oil = np.cumsum(trace.flow[:, 0, 0]) * study_log.period / one.joints.area_a[0, 1]
+    oil = np.cumsum(seen.flow[:, 0, 0]) * study_log.period / one.joints.area_a[0, 1]
     assert np.ptp(way) > 2e-3
     np.testing.assert_allclose(oil, way, atol=0.03 * np.ptp(way))
 

@@ -70,8 +70,8 @@ def refitted(problem: Problem, theta: Array, weight: float | None = None) -> Ref
     for part in np.unique(number[:size]):
         out = number == part
         if several:  # only the other logs are simulated
-            kept = [log for i, log in enumerate(problem.logs) if 1 + i % 3 != part]
-            others = problem.varied(problem.settings, kept)
+            kept = sorted({c.log for c in problem.channels if not out[c.rows.start]})
+            others = problem.varied(problem.settings, [problem.logs[i] for i in kept])
             point = fitted(whole, least_squares_rows(others, theta, weight))
         else:
             point = fitted(whole, rows, ~out)

@@ -51,11 +51,11 @@ def valve_openings(
     candidates, joints = alike.shape
     delayed = np.vstack([np.zeros((plugin.past, joints)), commands])
     keys = [[(j, alike[i, j].tobytes()) for j in range(joints)] for i in range(candidates)]
-    owners = {key: (i, key[0]) for i, row in enumerate(keys) for key in row}
+    owners = {key: i for i, row in enumerate(keys) for key in row}
     curves = {key: np.zeros(len(commands)) for key in owners}
 
     def open_one(key: tuple[int, bytes]) -> None:
-        i, j = owners[key]
+        i, j = owners[key], key[0]
         valve = plugin._replace(coefficients=plugin.coefficients[i, j : j + 1])
         _open(valve, states[i, j : j + 1].copy(), delayed[:, j], curves[key])
 

@@ -104,9 +104,12 @@ def resample(recording: Recording, settings: LogSettings, joints: int) -> Log:
 def hold(time: Array, command: Array, at: Array, period: float) -> Array:
     """Return the command for a period from each time in `at` [s]; 0 before the first, shape (len(at), J).
 
-    It is the last one at or before that time, or where several fit into a period their mean over it.
+    Each sample holds until the next one. Of samples on the periods' own grid it is the last one at or before
+    that time; of others, of a faster log or one with jitter, the mean over the period: the last one would be
+    too old by up to a period.
     """
-    if period > 1.2 * sample_period(time):  # jitter alone does not make a log a faster one
+    places = time / period
+    if (np.abs(places - np.rint(places)) > 1e-6).any():
         steps = np.diff(time, prepend=time[0])[:, None]
         areas = np.cumsum(steps * np.roll(command, 1, axis=0), axis=0)
 

@@ -165,7 +165,7 @@ def test_a_joint_that_is_not_compared_may_be_absent(tmp_path: Path) -> None:
 
 
 def test_a_jittering_clock_needs_no_repair_and_shifts_nothing(tmp_path: Path) -> None:
-    """A log of 20 Hz with steps of 0.02 to 0.08 s: angles are interpolated, commands held."""
+    """A log of 20 Hz with steps of 0.02 to 0.08 s: an integrating joint goes where the held commands take it."""
     rng = np.random.default_rng(0)
     time = 0.05 * np.arange(200) + rng.uniform(-0.016, 0.016, 200) - 0.0001
     command, angle = 60 * np.sign(np.sin(time)), 10 + 9 * np.sin(time)
@@ -174,6 +174,9 @@ def test_a_jittering_clock_needs_no_repair_and_shifts_nothing(tmp_path: Path) ->
     assert np.diff(values[:, 0]).max() > 1.5 * 0.05
     log, _ = read(path, LogSettings(period_s=0.05))
     np.testing.assert_allclose(np.rad2deg(log.angle[:, 0]), 10 + 9 * np.sin(log.time + time[0]), atol=0.01)
+    travel = np.append(0, np.cumsum(np.diff(values[:, 0]) * values[:-1, 1]))
+    there = np.interp(log.time + 0.05, values[:, 0], travel)[:-2]
+    np.testing.assert_allclose(0.05 * np.cumsum(log.command[:-2, 0]), there, atol=1e-9)
     gap = save(tmp_path / "gap.csv", lines(np.delete(values, np.s_[50:52], axis=0)))
     assert "--repair" in str(faults(gap, LogSettings(period_s=0.05))[0])
     assert len(read(gap, LogSettings(period_s=0.05, repair_s=0.2), repair=True)[0].time) == len(log.time)

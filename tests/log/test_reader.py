@@ -165,7 +165,7 @@ def test_a_joint_that_is_not_compared_may_be_absent(tmp_path: Path) -> None:
 
 
 def test_a_jittering_clock_needs_no_repair_and_shifts_nothing(tmp_path: Path) -> None:
-    """A log of 20 Hz with steps of 0.02 to 0.08 s: an integrating joint goes where the held commands take it."""
+    """At 20 Hz, steps of 0.02 to 0.08 s: an integrating joint goes where the held commands take it."""
     rng = np.random.default_rng(0)
     time = 0.05 * np.arange(200) + rng.uniform(-0.016, 0.016, 200) - 0.0001
     command, angle = 60 * np.sign(np.sin(time)), 10 + 9 * np.sin(time)

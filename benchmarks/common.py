@@ -54,9 +54,16 @@ class Clock:
     def __init__(self) -> None:
         self._begun = time.perf_counter(), time.process_time()
 
+    @property
+    def seconds(self) -> tuple[float, float]:
+        return time.perf_counter() - self._begun[0], time.process_time() - self._begun[1]
+
     def __str__(self) -> str:
-        wall, cpu = time.perf_counter() - self._begun[0], time.process_time() - self._begun[1]
-        return f"{wall:.0f} s, {cpu:.0f} s of CPU"
+        return duration(*self.seconds)
+
+
+def duration(wall: float, cpu: float) -> str:
+    return f"{wall:.0f} s, {cpu:.0f} s of CPU"
 
 
 def pseudo_random_log(

@@ -23,6 +23,7 @@ from hydroid.settings.search import RefinementSettings
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES = ROOT / "examples"
+SPENT = "{:.0f} s, {:.0f} s of CPU"
 
 
 def options(text: str | None, **defaults: Any) -> Any:
@@ -59,11 +60,7 @@ class Clock:
         return time.perf_counter() - self._begun[0], time.process_time() - self._begun[1]
 
     def __str__(self) -> str:
-        return duration(*self.seconds)
-
-
-def duration(wall: float, cpu: float) -> str:
-    return f"{wall:.0f} s, {cpu:.0f} s of CPU"
+        return SPENT.format(*self.seconds)
 
 
 def pseudo_random_log(

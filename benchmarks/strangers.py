@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from common import Clock, duration, options, row, table
+from common import SPENT, Clock, options, row, table
 from numba import njit
 from numpy.random import Generator
 from robots import LIMIT, body, joint
@@ -242,20 +242,19 @@ class Ending:
 
     errors: unseen rms errors of each of RUNGS [deg], (4, J). blamed: joints that the verdict does not call
     predicted, from 1. kept: name of the estimate. terms: as `Machine.terms`; the larger lag counts. seconds:
-    wall and CPU time; NaN where nobody noted that.
+    wall and CPU time; where nobody noted them the wall time of the fit, without `init` and `validate`.
     """
 
     def __init__(self, folder: Path) -> None:
         record, noted = load_record(folder / "mine" / "runs" / "fit"), folder / "seconds.txt"
-        page = folder / "mine" / "runs" / "validation" / "validation.html"
         rows = [one.baselines_deg | {RUNGS[-1]: one.unseen_deg} for one in record.verdict]
         self.errors = np.array([[one.get(rung) for one in rows] for rung in RUNGS], float)
         self.blamed = [one.joint for one in record.verdict if one.verdict != "predicts"]
         self.kept, values = str(record.summary.final), record.summary.values
         early = [values.get(f"pilot_{v.name}", 0) > values.get(f"lag_{v.name}", 0) for v in record.verdict]
         self.terms = np.array(["pump" in self.kept, not record.settings.quasi_static, *early])
-        begun, ended = (max(f.stat().st_mtime for f in some) for some in (folder.glob("log_*"), [page]))
-        self.seconds = np.loadtxt(noted) if noted.exists() else np.array([ended - begun, np.nan])
+        known = [sum(record.identity["seconds"].values()), np.nan]
+        self.seconds = np.loadtxt(noted) if noted.exists() else np.array(known)
 
 
 def stranger(seed: int, number: int, folder: Path, *, stored: bool) -> tuple[str, Array, Any]:
@@ -287,7 +286,11 @@ def brief(terms: Any) -> str:
     return f"{'pump ' if pump else ''}{'oil ' if oil else ''}{''.join('e' if one else '-' for one in early)}"
 
 
-def study(given: Any) -> None:
+if __name__ == "__main__":
+    numbers = {"machines": 40, "first": 0, "seed": 1}
+    given = options(__doc__, **numbers, worlds=False, stored=False, folder="build/strangers")
+    if not given.stored:
+        shutil.rmtree(given.folder, ignore_errors=True)
     make = world if given.worlds else partial(stranger, given.seed)
     good, silent, terms, times = np.zeros(len(RUNGS), int), 0, list[Any](), list[Array]()
     table(f"machine | {' | '.join(RUNGS)} | good at most | named joints | kept | terms: true, kept | time")
@@ -304,7 +307,8 @@ def study(given: Any) -> None:
         good, silent = good + within.all(axis=1), silent + bool({*missed.tolist()} - {*end.blamed})
         terms, times = terms + [np.array(both)] * bool(both), [*times, end.seconds]
         figures = (" ".join(f"{x:.2f}" for x in one) for one in (*end.errors, most))
-        row(name, *figures, end.blamed or "", end.kept, ", ".join(map(brief, both)), duration(*end.seconds))
+        cells = (*figures, end.blamed or "", end.kept, ", ".join(map(brief, both)))
+        row(name, *cells, SPENT.format(*end.seconds))
     print()
     for what, part in TERMS.items() if terms else ():
         true, kept = np.hstack([one[:, part] for one in terms])
@@ -312,13 +316,5 @@ def study(given: Any) -> None:
         print(f"{what}: {found} found, {missed} missed, {added} added where there is none ({len(true)})")
     rungs = ", ".join(f"{rung} {count}" for rung, count in zip(RUNGS, good, strict=True))
     print(f"{silent} with a missed joint that the verdict does not name")
-    middle = duration(*np.median(times, axis=0)) if times else ""
+    middle = SPENT.format(*np.median(times, axis=0)) if times else ""
     print(f"good of {given.machines}: {rungs}; median time {middle}")
-
-
-if __name__ == "__main__":
-    numbers = {"machines": 40, "first": 0, "seed": 1}
-    given = options(__doc__, **numbers, worlds=False, stored=False, folder="build/strangers")
-    if not given.stored:
-        shutil.rmtree(given.folder, ignore_errors=True)
-    study(given)

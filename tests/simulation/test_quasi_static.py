@@ -1,8 +1,8 @@
 """The quasi-static rollout: closed forms, its limit of the dynamic one, the pump's balance, static loads."""
 
-import mujoco
 import numpy as np
 import pytest
+from arms import posed
 from conftest import candidates
 from made_logs import at_rest
 from observation import trace
@@ -134,12 +134,7 @@ def test_what_is_not_drawn_from_the_pump_does_not_load_it(simulated, model):
 def test_pressures_carry_the_load_and_a_closed_valve_holds_it(simulated, arm, spec):
     angle, trace, _ = simulated({SHOULDER: 0})
     np.testing.assert_array_equal(angle, np.broadcast_to(angle[0], angle.shape))
-    model = spec.compile()
-    data = mujoco.MjData(model)
-    for name, q in zip(arm.joint_names, arm.pose("study"), strict=True):
-        data.joint(name).qpos[0] = q
-    mujoco.mj_forward(model, data)
-    held = data.joint(arm.joint_names[SHOULDER]).qfrc_bias[0]
+    held = posed(spec.compile(), arm.pose("study")).qfrc_bias[SHOULDER]
     length, q = arm.joints[SHOULDER].actuator.length, arm.pose("study")[SHOULDER]
     lever = (length(q + 1e-4) - length(q - 1e-4)) / 2e-4
     assert trace.force[-1, 0] * lever == pytest.approx(held, rel=1e-3)

@@ -79,27 +79,19 @@ def without(*rows: int) -> list[Table]:
     return of("", lambda values: np.delete(values, rows))
 
 
-def wrapped(table: Table) -> Table:
-    return {**table, "q6_deg": (table["q6_deg"] + 280) % 360 - 180}
-
-
 def exchanged() -> list[Table]:
     table = rig("rig_shoulder_1")
     return [{**table, "q2_deg": table["q1_deg"]}]
 
 
-def misspelt() -> list[Table]:
-    return [{name.replace("u2", "U2"): values for name, values in rig().items()}]
+def renamed(old: str, new: str) -> list[Table]:
+    return [{name.replace(old, new): values for name, values in rig().items()}]
 
 
 def early(seconds: float) -> list[Table]:
     return of(
         "q", lambda q: np.r_[q[round(100 * seconds) :], np.full(round(100 * seconds), q[-1])], boom([60, -60])
     )
-
-
-def in_rad() -> list[Table]:
-    return [{name.replace("q2_deg", "q2 [rad]"): values for name, values in rig().items()}]
 
 
 def pushed() -> list[Table]:
@@ -124,7 +116,7 @@ WRONG = (
     Wrong(
         "a unit in a name that the settings contradict",
         "warning: the file says",
-        in_rad,
+        lambda: renamed("q2_deg", "q2 [rad]"),
         {"joints": {2: {"angle": {"column": "q2 [rad]"}}}},
     ),
     Wrong("time in ms, read as s", "error: set log.time.unit: ms", lambda: of("time", lambda t: 1000 * t)),
@@ -144,8 +136,12 @@ WRONG = (
     ),
     Wrong("a dead sensor", "warning: never changes", lambda: of("q2", lambda q: np.full_like(q, q[0]))),
     Wrong("the angle of another joint", "warning: strong commands hardly move joint shoulder", exchanged),
-    Wrong("an encoder that wraps", "note: wraps by 360 deg and was joined", lambda: [wrapped(rig())]),
-    Wrong("a misspelt column", "error: did you mean 'U2_pct'?", misspelt),
+    Wrong(
+        "an encoder that wraps",
+        "note: wraps by 360 deg and was joined",
+        lambda: of("q6", lambda q: (q + 280) % 360 - 180),
+    ),
+    Wrong("a misspelt column", "error: did you mean 'U2_pct'?", lambda: renamed("u2", "U2")),
     Wrong("a joint that is pushed against its stop", "note: against the end of its travel", pushed),
     Wrong("no rest before the first command", "note: begins with", lambda: of("", lambda v: v[100:])),
 )

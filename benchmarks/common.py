@@ -12,14 +12,13 @@ import numpy as np
 sys.path.append(str(Path(__file__).parents[1] / "tests" / "helpers"))
 
 from made_logs import at_rest, simulate_log
+from recovery import refined
 
 from hydroid.errors import RunError
-from hydroid.fitting.refinement import refine
 from hydroid.log import Log
 from hydroid.posterior.uncertainty import Uncertainty, uncertainty
 from hydroid.problem.problem import Problem
 from hydroid.settings.fit import FitSettings
-from hydroid.settings.search import RefinementSettings
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES = ROOT / "examples"
@@ -117,12 +116,6 @@ def true_log(
     pose, joints = arm.pose("study") if pose is None else pose, list(settings.outputs)
     drive = pseudo_random_log(pose, joints, seconds, settings.log.period_s, seed, inside)
     return simulate_log(settings, drive, truth)
-
-
-def refined(problem: Problem, start: np.ndarray, how: RefinementSettings | None = None) -> np.ndarray:
-    """Return where the refinement of an estimate ends, by default as the settings say, shape (P,)."""
-    result = refine(problem, start, how or problem.settings.refinement or RefinementSettings())
-    return problem.parameters.from_unit(result.point)
 
 
 def known(problem: Problem, truth: Mapping[str, float], rng: np.random.Generator) -> Uncertainty:

@@ -9,8 +9,9 @@ designed experiment, and of the random one with the median weakest parameter.
 from typing import Any
 
 import numpy as np
-from common import Clock, options, refined, table
+from common import Clock, options, table
 from made_logs import TRUTH, noisy, simulate_log
+from recovery import refined
 
 from hydroid import load_settings
 from hydroid.advice.design import design

@@ -12,12 +12,9 @@ import numpy as np
 sys.path.append(str(Path(__file__).parents[1] / "tests" / "helpers"))
 
 from made_logs import at_rest, simulate_log
-from recovery import refined
 
 from hydroid.errors import RunError
 from hydroid.log import Log
-from hydroid.posterior.uncertainty import Uncertainty, uncertainty
-from hydroid.problem.problem import Problem
 from hydroid.settings.fit import FitSettings
 
 ROOT = Path(__file__).parents[1]
@@ -116,10 +113,3 @@ def true_log(
     pose, joints = arm.pose("study") if pose is None else pose, list(settings.outputs)
     drive = pseudo_random_log(pose, joints, seconds, settings.log.period_s, seed, inside)
     return simulate_log(settings, drive, truth)
-
-
-def known(problem: Problem, truth: Mapping[str, float], rng: np.random.Generator) -> Uncertainty:
-    """Return what a refinement knows that starts with free parameters moved by up to 5 % from the truth."""
-    true = problem.parameters.vector(truth, "truth")
-    start = true * np.where(problem.parameters.free, rng.uniform(0.95, 1.05, len(true)), 1.0)
-    return uncertainty(problem, refined(problem, start))

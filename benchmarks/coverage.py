@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from common import EXAMPLES, Clock, known, options, row, table, true_log
+from common import EXAMPLES, Clock, options, row, table, true_log
 from made_logs import FAST, HYDRAULIC, fast_arm, noisy, stepped
-from recovery import bands_in, model_of, refined
+from recovery import bands_in, known, model_of, refined
 
 import hydroid
 from hydroid import load_settings
@@ -60,9 +60,7 @@ def report(title: str, names: Sequence[str] | np.ndarray, truth: np.ndarray, sai
 
 
 def parameters(made: Iterator[Uncertainty], chosen: np.ndarray) -> Iterator[Said]:
-    """Yield what fits say of some parameters, shape (P,)."""
-    for one in made:
-        yield one.theta[chosen], one.standard_deviation[chosen], one.interval[chosen]
+    return ((one.theta[chosen], one.standard_deviation[chosen], one.interval[chosen]) for one in made)
 
 
 def intervals(given: Any, *, start: bool = False) -> None:

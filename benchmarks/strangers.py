@@ -3,8 +3,8 @@
 Every machine is random (`Machine`). Its equations and integrator are those of this file: nothing of hydroid
 simulates it. It is recorded three times as with sticks, with jitter; two logs are fitted, and the third is
 predicted. Good is an rms error on every joint of at most twice the noise plus 2 % of its travel. A joint that
-is not good must be named by the verdict, whose baselines stand beside the fit. Terms are a pump, oil, and the
-joints (e) whose lag is before the dead band. --worlds --machines 12: the arms of tests/helpers/worlds.py.
+is not good must be named by the verdict, whose baselines stand beside the fit. Terms (y) are a pump, oil, and
+of each joint a lag before the dead band. --worlds --machines 12: the arms of tests/helpers/worlds.py.
 --stored runs nothing, and prints the rows of what lies in --folder, of the same --seed.
 """
 
@@ -281,11 +281,6 @@ def world(number: int, folder: Path, *, stored: bool) -> tuple[str, Array, Any]:
     return name, 2 * np.array(noise), None
 
 
-def brief(terms: Any) -> str:
-    pump, oil, *early = terms
-    return f"{'pump ' if pump else ''}{'oil ' if oil else ''}{''.join('e' if one else '-' for one in early)}"
-
-
 if __name__ == "__main__":
     numbers = {"machines": 40, "first": 0, "seed": 1}
     given = options(__doc__, **numbers, worlds=False, stored=False, folder="build/strangers")
@@ -293,7 +288,7 @@ if __name__ == "__main__":
         shutil.rmtree(given.folder, ignore_errors=True)
     make = world if given.worlds else partial(stranger, given.seed)
     good, silent, terms, times = np.zeros(len(RUNGS), int), 0, list[Any](), list[Array]()
-    table(f"machine | {' | '.join(RUNGS)} | good at most | named joints | kept | terms: true, kept | time")
+    table(f"machine | {' | '.join(RUNGS)} | good at most | named joints | kept | terms, true and kept | time")
     for number in range(given.first, given.first + given.machines):
         folder = Path(given.folder) / f"{number:02d}"
         try:
@@ -307,7 +302,8 @@ if __name__ == "__main__":
         good, silent = good + within.all(axis=1), silent + bool({*missed.tolist()} - {*end.blamed})
         terms, times = terms + [np.array(both)] * bool(both), [*times, end.seconds]
         figures = (" ".join(f"{x:.2f}" for x in one) for one in (*end.errors, most))
-        cells = (*figures, end.blamed or "", end.kept, ", ".join(map(brief, both)))
+        shown = ["".join(np.where(one, "y", "-")) for one in both]
+        cells = (*figures, end.blamed or "", end.kept, ", ".join(shown))
         row(name, *cells, SPENT.format(*end.seconds))
     print()
     for what, part in TERMS.items() if terms else ():

@@ -68,10 +68,8 @@ def head(
     says = "ulti-objective GA: lower parameter error than simple GA"
     narrow, wide = (next(v for v in made[n] if says in v.claim.says) for n in ("mechanical", "wide"))
     known = {n: verdict(KNOWN, log_ratios(KNOWN, runs[n]), 0.05, None) for n in ("mechanical", "wide")}
-    hydraulic = [
-        of_cell(runs["hydraulic"], cell, "simulations") for cell in ("multi-start", "multi-objective")
-    ]
-    least, multi = (median(each.values() or [np.nan]) for each in hydraulic)
+    cells = (of_cell(runs["hydraulic"], cell, "simulations") for cell in ("multi-start", "multi-objective"))
+    least, multi = (median(each.values() or [np.nan]) for each in cells)
     searches = [(n, r) for n in ("mechanical", "hydraulic") for r in runs[n] if "generations" in r]
     return {
         **{f"{name}_median": Medians(made) for name, made in runs.items()},

@@ -41,9 +41,16 @@ def recover(
 
 
 def refined(problem: Problem, start: np.ndarray, how: RefinementSettings | None = None) -> np.ndarray:
-    """Return where the refinement of an estimate ends, by default as the settings say, shape (P,)."""
+    """Where the refinement of an estimate ends, by default as the settings say, shape (P,)."""
     result = refine(problem, start, how or problem.settings.refinement or RefinementSettings())
     return problem.parameters.from_unit(result.point)
+
+
+def known(problem: Problem, truth: Mapping[str, float], rng: np.random.Generator) -> Uncertainty:
+    """What a refinement knows that starts with free parameters moved by up to 5 % from the truth."""
+    true = problem.parameters.vector(truth, "truth")
+    start = true * np.where(problem.parameters.free, rng.uniform(0.95, 1.05, len(true)), 1.0)
+    return uncertainty(problem, refined(problem, start))
 
 
 def model_of(problem: Problem, theta: np.ndarray) -> IdentifiedModel:

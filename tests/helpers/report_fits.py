@@ -70,9 +70,8 @@ def make_fit(
             size * np.sin(log.time * rng.uniform(2, 9))[:, None] * np.ones(len(problem.outputs))
             for log in problem.logs
         ]
-        responses = tuple(
-            log.angle[:, problem.outputs] - wave for log, wave in zip(problem.logs, waves, strict=True)
-        )
+        pairs = zip(problem.logs, waves, strict=True)
+        responses = tuple(log.angle[:, problem.outputs] - wave for log, wave in pairs)
         error = np.concatenate([wave.T.ravel() for wave in waves])[None]
         norms = problem.norms(error)[0]
         estimates[name] = Estimate(

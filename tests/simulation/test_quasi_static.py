@@ -150,18 +150,15 @@ def test_valves_that_open_once_for_all_open_as_each_alone(spec, arm):
     command = np.zeros((60, len(arm.joints)))
     command[5:30, [SHOULDER, ROLL]], command[30:, [SHOULDER, ROLL]] = (70, -55), (-40, 80)
     log = at_rest(arm.pose("study"), command, 0.02)
-    names = [
-        name for name in JOINT.names or () if JOINT[name].kind == "f" and name not in ("sense", "stroke")
-    ]
+    names = [n for n in JOINT.names or () if JOINT[n].kind == "f" and n not in ("sense", "stroke")]
     everyone = candidates(arm, len(names))
     everyone.mass[:] = arm.masses
     everyone.joints[:] = nominal_joints(arm, HydraulicSettings(pump_flow=4.0, dead_band_a=10, dead_band_b=10))
     for row, name in enumerate(names):
         value = everyone.joints[name][row]
         everyone.joints[name][row] = np.where(np.isfinite(value), 1.01 * value, value)
-    simulation = Simulation(
-        Scenario(spec, arm, log, [SHOULDER, ROLL], SimulationSettings(model="quasi-static")), 10
-    )
+    settings = SimulationSettings(model="quasi-static")
+    simulation = Simulation(Scenario(spec, arm, log, [SHOULDER, ROLL], settings), 10)
     together = simulation.simulate(everyone).angle
     alone = [simulation.simulate(everyone[row : row + 1]).angle[0] for row in range(len(names))]
     np.testing.assert_array_equal(together, alone)

@@ -126,9 +126,7 @@ def test_dry_friction_holds_the_arm_against_small_commands(spec, arm):
 
 
 @pytest.mark.parametrize("other", ["locked", "passive"])
-def test_candidates_at_their_stops_or_diverging_change_no_bit_of_those_beside_them(
-    spec, arm, study_log, other
-):
+def test_candidates_at_their_stops_or_diverging_change_no_bit_of_others(spec, arm, study_log, other):
     some = candidates(arm, 8)
     gain, friction = some.joints["gain"], some.joints["friction"]
     gain[2:6] *= 40.0
@@ -147,9 +145,8 @@ def test_passive_joints_that_hardly_move_leave_the_shoulder_as_locked_ones(spec,
     everyone, shoulder = scattered(arm, 2), np.arange(7) == 1
     held = {"stiffness": 1e5, "damping": 1e4}
     stiff = {k: np.where(shoulder, everyone.joints[k], value) for k, value in held.items()}
-    locked, passive = (
-        simulation(spec, arm, study_log, kind="hyd", other_joints=other) for other in ("locked", "passive")
-    )
+    others = ("locked", "passive")
+    locked, passive = (simulation(spec, arm, study_log, kind="hyd", other_joints=o) for o in others)
     found = passive.simulate(replaced(everyone, **stiff)).angle
     np.testing.assert_allclose(found, locked.simulate(everyone).angle, atol=np.deg2rad(0.1))
 

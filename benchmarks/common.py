@@ -14,15 +14,12 @@ sys.path.append(str(Path(__file__).parents[1] / "tests" / "helpers"))
 from made_logs import at_rest, simulate_log
 
 from hydroid.errors import RunError
-from hydroid.fitting.refinement import refine
 from hydroid.log import Log
-from hydroid.posterior.uncertainty import Uncertainty, uncertainty
-from hydroid.problem.problem import Problem
 from hydroid.settings.fit import FitSettings
-from hydroid.settings.search import RefinementSettings
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES = ROOT / "examples"
+SPENT = "{:.0f} s, {:.0f} s of CPU"
 
 
 def options(text: str | None, **defaults: Any) -> Any:
@@ -54,9 +51,12 @@ class Clock:
     def __init__(self) -> None:
         self._begun = time.perf_counter(), time.process_time()
 
+    @property
+    def seconds(self) -> tuple[float, float]:
+        return time.perf_counter() - self._begun[0], time.process_time() - self._begun[1]
+
     def __str__(self) -> str:
-        wall, cpu = time.perf_counter() - self._begun[0], time.process_time() - self._begun[1]
-        return f"{wall:.0f} s, {cpu:.0f} s of CPU"
+        return SPENT.format(*self.seconds)
 
 
 def pseudo_random_log(
@@ -113,16 +113,3 @@ def true_log(
     pose, joints = arm.pose("study") if pose is None else pose, list(settings.outputs)
     drive = pseudo_random_log(pose, joints, seconds, settings.log.period_s, seed, inside)
     return simulate_log(settings, drive, truth)
-
-
-def refined(problem: Problem, start: np.ndarray, how: RefinementSettings | None = None) -> np.ndarray:
-    """Return where the refinement of an estimate ends, by default as the settings say, shape (P,)."""
-    result = refine(problem, start, how or problem.settings.refinement or RefinementSettings())
-    return problem.parameters.from_unit(result.point)
-
-
-def known(problem: Problem, truth: Mapping[str, float], rng: np.random.Generator) -> Uncertainty:
-    """Return what a refinement knows that starts with free parameters moved by up to 5 % from the truth."""
-    true = problem.parameters.vector(truth, "truth")
-    start = true * np.where(problem.parameters.free, rng.uniform(0.95, 1.05, len(true)), 1.0)
-    return uncertainty(problem, refined(problem, start))

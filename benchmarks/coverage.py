@@ -15,19 +15,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from common import EXAMPLES, Clock, known, options, refined, row, table, true_log
+from common import EXAMPLES, Clock, options, row, table, true_log
 from made_logs import FAST, HYDRAULIC, fast_arm, noisy, stepped
+from recovery import bands_in, known, model_of, refined
 
 import hydroid
 from hydroid import load_settings
-from hydroid.fitting.summary import account
-from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
-from hydroid.posterior.band import Band, prediction_bands
 from hydroid.posterior.bench import make_bench
 from hydroid.posterior.quantities import joint_measure
-from hydroid.posterior.uncertainty import Uncertainty, uncertainty
-from hydroid.prediction import predict
+from hydroid.posterior.uncertainty import Uncertainty
 from hydroid.problem.problem import Problem
 from hydroid.settings.fit import FitSettings
 
@@ -63,9 +60,7 @@ def report(title: str, names: Sequence[str] | np.ndarray, truth: np.ndarray, sai
 
 
 def parameters(made: Iterator[Uncertainty], chosen: np.ndarray) -> Iterator[Said]:
-    """Yield what fits say of some parameters, shape (P,)."""
-    for one in made:
-        yield one.theta[chosen], one.standard_deviation[chosen], one.interval[chosen]
+    return ((one.theta[chosen], one.standard_deviation[chosen], one.interval[chosen]) for one in made)
 
 
 def intervals(given: Any, *, start: bool = False) -> None:
@@ -119,12 +114,6 @@ def own_arm(given: Any) -> None:
         report("own arm", names, true[true > 0], parameters(made, true > 0))
 
 
-def predicted(problem: Problem, theta: np.ndarray, log: Log) -> Band:
-    """Return the shoulder's band in another log."""
-    model = IdentifiedModel(problem.settings, theta, "fit", account(problem, uncertainty(problem, theta)))
-    return prediction_bands(model, log, predict(model, log, problem.settings.outputs))[2]
-
-
 def bands(given: Any) -> None:
     settings = fast_arm([2], "K", "D", "S", free_start=True)
 
@@ -138,7 +127,7 @@ def bands(given: Any) -> None:
             rng = np.random.default_rng(seed)
             problem = Problem(settings, [steps(FAST, rng)])
             theta = refined(problem, problem.parameters.vector(FAST, "truth"))
-            found.append(predicted(problem, theta, steps(wrong, rng)))
+            found.append(bands_in(model_of(problem, theta), steps(wrong, rng))[2])
         low, middle, high = np.quantile([100 * band.inside for band in found], [0.0, 0.5, 1.0])
         named = sum(band.inside < 0.8 for band in found)
         row(f"S {percent} % wrong", f"{middle:.0f} % ({low:.0f} to {high:.0f})", f"{named} of {given.fits}")
@@ -163,7 +152,7 @@ def left_out(given: Any) -> None:
         table("left out | expected [deg] | actual [deg] | actual / expected | inside the band")
         for i, log in enumerate(logs):
             problem = Problem(model.settings, [*logs[:i], *logs[i + 1 :]])
-            band = predicted(problem, refined(problem, model.theta), log)
+            band = bands_in(model_of(problem, refined(problem, model.theta)), log)[2]
             errors = f"{np.degrees(band.expected):.3f} | {np.degrees(band.error):.3f}"
             shares = f"{band.error / band.expected:.1f} | {100 * band.inside:.0f} %"
             row(Path(log.source).stem, errors, shares)

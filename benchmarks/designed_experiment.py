@@ -9,8 +9,9 @@ designed experiment, and of the random one with the median weakest parameter.
 from typing import Any
 
 import numpy as np
-from common import Clock, options, refined, table
+from common import Clock, options, table
 from made_logs import TRUTH, noisy, simulate_log
+from recovery import refined
 
 from hydroid import load_settings
 from hydroid.advice.design import design
@@ -57,7 +58,9 @@ def weakest(sds: Any) -> np.ndarray:
     return np.append(sds, np.max(sds, axis=-1, keepdims=True), axis=-1)
 
 
-def study(given: Any) -> None:
+if __name__ == "__main__":
+    chosen = {"random": 20, "effort": 220, "fits": 50, "duration": 30.0, "seed": SEED}
+    given = options(__doc__, **chosen, without="")
     settings, clock = make_settings(given), Clock()
     estimate = THETA * np.exp(np.random.default_rng(SEED).uniform(np.log(0.8), np.log(1.25), len(THETA)))
     best = design(settings, estimate, [], given.seed)
@@ -85,8 +88,3 @@ def study(given: Any) -> None:
         "{} | {:.3g} | {:.3g} | {:.3g} | {:.3g} | {:.3g} | {:.1f} | {:.1f}",
         *([*TRUTH, "weakest"], *columns, typical / best_sd, at_random / as_designed),
     )
-
-
-if __name__ == "__main__":
-    chosen = {"random": 20, "effort": 220, "fits": 50, "duration": 30.0, "seed": SEED}
-    study(options(__doc__, **chosen, without=""))

@@ -13,8 +13,8 @@ from hydroid.settings.hydraulics import HydraulicSettings
 STEPS = [(1, 1), (1, 2), (1, 3), (1, 4), (1, 5), (1, 10), (2, 4), (4, 4)]
 """MuJoCo's steps in a sample, and sub-steps of the oil in each"""
 
-
-def accuracy(sets: int) -> None:
+if __name__ == "__main__":
+    sets = options(__doc__, sets=24).sets
     rng, clock = np.random.default_rng(1), Clock()
     command = pulses(rng, 3000)
     candidates = parameters(HydraulicSettings(), **draw(rng, sets))
@@ -35,7 +35,3 @@ def accuracy(sets: int) -> None:
         "{} | {} | {:.4f} | {:.4f} | {:.4f} | {:.4f} | {:.4f}",
         *(*np.transpose(STEPS), *np.transpose(errors)),
     )
-
-
-if __name__ == "__main__":
-    accuracy(options(__doc__, sets=24).sets)

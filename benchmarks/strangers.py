@@ -3,7 +3,9 @@
 Every machine is random (`Machine`). Its equations and integrator are those of this file: nothing of hydroid
 simulates it. It is recorded three times as with sticks, with jitter; two logs are fitted, and the third is
 predicted. Good is an rms error on every joint of at most twice the noise plus 2 % of its travel. A joint that
-is not good must be named by the verdict. --worlds --machines 12: the arms of tests/helpers/worlds.py.
+is not good must be named by the verdict, whose baselines stand beside the fit. Terms (y) are a pump, oil, and
+of each joint a lag before the dead band. --worlds --machines 12: the arms of tests/helpers/worlds.py.
+--stored runs nothing, and prints the rows of what lies in --folder, of the same --seed.
 """
 
 import shutil
@@ -12,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from common import Clock, options, row, table
+from common import SPENT, Clock, options, row, table
 from numba import njit
 from numpy.random import Generator
 from robots import LIMIT, body, joint
@@ -20,11 +22,15 @@ from worlds import NOISE_DEG, NOISE_M, WORLDS, write_log
 
 import hydroid
 from hydroid.arrays import Array
+from hydroid.fitting.baselines import NAMES as BASELINES
+from hydroid.run.record import load_record
 
 STEP = 0.002
 """of the integration [s]"""
 GRAVITY = 9.81
 NAMES = ("swing", "boom", "arm", "bucket", "wrist", "tool")
+RUNGS = (*BASELINES, "the fit")
+TERMS = {"pump": slice(1), "oil": slice(1, 2), "early lags": slice(2, None)}  # in `Machine.terms`
 
 
 class Machine:
@@ -72,6 +78,11 @@ class Machine:
         self.ratio = rng.uniform(0.1, 0.6, joints)
         self.noise = np.radians(10 ** rng.uniform(np.log10(0.02), np.log10(0.2)))
         self.rate = float(rng.choice([10, 20, 50, 100]))
+
+    @property
+    def terms(self) -> Any:
+        """Whether a shared pump, oil, and each joint's lag before its dead band show, (2 + J,)."""
+        return np.array([self.droop > 0, self.stiff.any(), *self.early])
 
     def simulate(self, command: Array, start: Array) -> Array:
         """Angles [rad], (T, J), under commands of STEP [s] and %, (T, J)."""
@@ -217,50 +228,89 @@ def urdf(m: Machine, turned: int | None = None) -> str:
     return f"{text}</robot>\n"
 
 
-def run_commands(folder: Path, robot: Path, logs: list[Path]) -> tuple[list[float], list[int], Clock]:
-    """Run what `hydroid init` prints; return rms errors on the unseen log [deg] and the joints that the
-    verdict names as not predicted, from 1, and the time that it took."""
-    mine, clock = folder / "mine", Clock()
+def run_commands(folder: Path, robot: Path) -> None:
+    """Run what `hydroid init` prints, the last log unseen, and note wall and CPU time [s]."""
+    mine, clock, logs = folder / "mine", Clock(), sorted(folder.glob("log_*.csv"))
     hydroid.init(mine, arm=robot, log=[*logs])
     hydroid.fit_hyd(logs[:-1], config=mine / "fit.yaml", out=mine / "runs" / "fit")
-    judged = hydroid.validate(logs[-1:], fit=mine / "runs" / "fit", out=mine / "runs" / "validation").plain()
-    errors = [row["rms_deg"] for row in judged["results"]]
-    return errors, [one["joint"] for one in judged["verdict"] if one["verdict"] != "predicts"], clock
+    hydroid.validate(logs[-1:], fit=mine / "runs" / "fit", out=mine / "runs" / "validation")
+    np.savetxt(folder / "seconds.txt", clock.seconds)
 
 
-def stranger(seed: int, number: int, folder: Path) -> tuple[str, Path, list[Path], Array]:
-    """Make a random machine: its name, its URDF and logs, and the errors that are good [deg], (J,)."""
+class Ending:
+    """What the commands left in a machine's folder.
+
+    errors: unseen rms errors of each of RUNGS [deg], (4, J). blamed: joints that the verdict does not call
+    predicted, from 1. kept: name of the estimate. terms: as `Machine.terms`; the larger lag counts. seconds:
+    wall and CPU time; where nobody noted them the wall time of the fit, without `init` and `validate`.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        record, noted = load_record(folder / "mine" / "runs" / "fit"), folder / "seconds.txt"
+        rows = [one.baselines_deg | {RUNGS[-1]: one.unseen_deg} for one in record.verdict]
+        self.errors = np.array([[one.get(rung) for one in rows] for rung in RUNGS], float)
+        self.blamed = [one.joint for one in record.verdict if one.verdict != "predicts"]
+        self.kept, values = str(record.summary.final), record.summary.values
+        early = [values.get(f"pilot_{v.name}", 0) > values.get(f"lag_{v.name}", 0) for v in record.verdict]
+        self.terms = np.array(["pump" in self.kept, not record.settings.quasi_static, *early])
+        known = [sum(record.identity["seconds"].values()), np.nan]
+        self.seconds = np.loadtxt(noted) if noted.exists() else np.array(known)
+
+
+def stranger(seed: int, number: int, folder: Path, *, stored: bool) -> tuple[str, Array, Any]:
+    """Run a random machine: its name, the errors that are good [deg], (J,), and its terms."""
     rng = np.random.default_rng([seed, number])
     machine = Machine(rng, number)
-    logs = write_machine(folder, machine, rng)
-    travel = np.ptp(np.loadtxt(logs[-1], delimiter=",", skiprows=1)[:, -machine.joints :], axis=0)
-    return str(number), folder / "robot.urdf", logs, 2 * np.degrees(machine.noise) + 0.02 * travel
+    if not stored:
+        write_machine(folder, machine, rng)
+        run_commands(folder, folder / "robot.urdf")
+    assert (folder / "robot.urdf").read_text() == urdf(machine), "it is of another --seed"
+    travel = np.ptp(np.loadtxt(folder / "log_3.csv", delimiter=",", skiprows=1)[:, -machine.joints :], axis=0)
+    return str(number), 2 * np.degrees(machine.noise) + 0.02 * travel, machine.terms
 
 
-def world(number: int, folder: Path) -> tuple[str, Path, list[Path], Array]:
-    """Make one of the twelve arms as the world has them; errors are good up to twice the noise."""
+def world(number: int, folder: Path, *, stored: bool) -> tuple[str, Array, Any]:
+    """Run one of the twelve arms as the world has them; errors are good up to twice the noise."""
     name, one = [*WORLDS.items()][number]
-    folder.mkdir(parents=True)
-    logs = [write_log(one, folder / f"log_{k}.csv", 60.0, k) for k in (1, 2)]
+    if not stored:
+        folder.mkdir(parents=True)
+        for k in (1, 2):
+            write_log(one, folder / f"log_{k}.csv", 60.0, k)
+        run_commands(folder, one.write(one, folder))
     noise = [np.degrees(NOISE_M) if j == "telescope" else NOISE_DEG for j in one.joints]
-    return name, one.write(one, folder), logs, 2 * np.array(noise)
+    return name, 2 * np.array(noise), None
 
 
 if __name__ == "__main__":
-    given = options(__doc__, machines=40, first=0, seed=1, worlds=False, folder="build/strangers")
-    shutil.rmtree(given.folder, ignore_errors=True)
-    good, silent, make = 0, 0, world if given.worlds else partial(stranger, given.seed)
-    table("machine | joints | unseen rms [deg] | good at most | named joints | time")
+    numbers = {"machines": 40, "first": 0, "seed": 1}
+    given = options(__doc__, **numbers, worlds=False, stored=False, folder="build/strangers")
+    if not given.stored:
+        shutil.rmtree(given.folder, ignore_errors=True)
+    make = world if given.worlds else partial(stranger, given.seed)
+    good, silent, terms, times = np.zeros(len(RUNGS), int), 0, list[Any](), list[Array]()
+    table(f"machine | {' | '.join(RUNGS)} | good at most | named joints | kept | terms, true and kept | time")
     for number in range(given.first, given.first + given.machines):
         folder = Path(given.folder) / f"{number:02d}"
-        name, robot, logs, most = make(number, folder)
         try:
-            errors, blamed, clock = run_commands(folder, robot, logs)
-        except hydroid.HydroidError as error:
-            row(name, len(most), f"refused: {error}", "", "", "")
+            name, most, true = make(number, folder, stored=given.stored)
+            end = Ending(folder)
+        except (hydroid.HydroidError, FileNotFoundError) as error:
+            row(number, f"refused: {error}", *[""] * (len(RUNGS) + 4))
             continue
-        missed = {j for j, (error, limit) in enumerate(zip(errors, most, strict=True), 1) if error > limit}
-        good, silent = good + (not missed), silent + bool(missed - set(blamed))
-        figures = (" ".join(f"{x:.2f}" for x in values) for values in (errors, most))
-        row(name, len(most), *figures, blamed or "", clock)
-    print(f"\n{good} of {given.machines} good; {silent} with a missed joint that the verdict does not name")
+        within = end.errors <= most  # not where it is NaN: it diverged
+        missed, both = 1 + np.flatnonzero(~within[-1]), [] if true is None else [true, end.terms]
+        good, silent = good + within.all(axis=1), silent + bool({*missed.tolist()} - {*end.blamed})
+        terms, times = terms + [np.array(both)] * bool(both), [*times, end.seconds]
+        figures = (" ".join(f"{x:.2f}" for x in one) for one in (*end.errors, most))
+        shown = ["".join(np.where(one, "y", "-")) for one in both]
+        cells = (*figures, end.blamed or "", end.kept, ", ".join(shown))
+        row(name, *cells, SPENT.format(*end.seconds))
+    print()
+    for what, part in TERMS.items() if terms else ():
+        true, kept = np.hstack([one[:, part] for one in terms])
+        found, missed, added = np.sum([true & kept, true & ~kept, kept & ~true], axis=1)
+        print(f"{what}: {found} found, {missed} missed, {added} added where there is none ({len(true)})")
+    rungs = ", ".join(f"{rung} {count}" for rung, count in zip(RUNGS, good, strict=True))
+    print(f"{silent} with a missed joint that the verdict does not name")
+    middle = SPENT.format(*np.median(times, axis=0)) if times else ""
+    print(f"good of {given.machines}: {rungs}; median time {middle}")

@@ -5,9 +5,10 @@ docs/measured.md says what is simulated and when a term is named. Stage 2 of the
 """
 
 import numpy as np
-from common import known, options, row, table, true_log
+from common import options, row, table, true_log
 from made_logs import at_rest, noisy, simulate_log
 from observation import trace
+from recovery import known
 
 from hydroid import load_settings
 from hydroid.advice.suggestions import advice
@@ -36,7 +37,6 @@ def make_log(term: str, seconds: float, seed: int) -> Log:
     truth = make_settings() if term == "flow_limit" else make_settings(term, TERMS[term])
     pose = truth.arm.pose("study").copy()
     pose[1:3] = np.radians([rng.uniform(0, 40), rng.uniform(-100, -40)])
-
     drive = true_log(truth, TRUTH, seconds, seed, pose).command
     log = at_rest(pose, np.concatenate([np.zeros_like(drive[:rest]), drive[:-rest]]))
     if term == "flow_limit":

@@ -79,10 +79,8 @@ def in_turn(calls: dict[str, Callable[[], object]]) -> dict[str, np.ndarray]:
 
 def derivatives(model: str) -> Callable[[], object]:
     """Return the excavator's simulations of one Jacobian: candidates that differ in one parameter each."""
-    folder, steps = EXAMPLES / "excavator", {"simulation.model": model, "simulation.steps_per_sample": 5}
-    settings = load_settings(
-        folder / "fit.yaml", steps if model == "dynamic" else {"simulation.model": model}
-    )
+    folder, steps = EXAMPLES / "excavator", {"simulation.steps_per_sample": 5} if model == "dynamic" else {}
+    settings = load_settings(folder / "fit.yaml", {"simulation.model": model} | steps)
     problem = Problem(settings, read_logs(sorted(folder.glob("fit_0[12].csv")), settings))
     theta = np.tile(problem.parameters.start, (int(problem.parameters.free.sum()), 1))
     theta[range(len(theta)), np.flatnonzero(problem.parameters.free)] += 1e-6

@@ -30,6 +30,12 @@ settings.register_profile("hydroid", deadline=None)
 settings.load_profile("hydroid")
 
 
+@pytest.fixture
+def no_report(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures take longest."""
+    monkeypatch.setattr("hydroid.reporting.page_file.write_page", lambda *_: [])
+
+
 @pytest.fixture(scope="session")
 def arm() -> Arm:
     return load_arm("hydrolek")

@@ -122,10 +122,7 @@ def test_a_run_that_fails_is_shown_and_the_others_count(tmp_path: Path, monkeypa
     ("change", "message"),
     [
         ({"axes": {"norm": {"a": {"objective.nrm": 1}}}}, r"small.yaml: .*objective.nrm.*'norm'"),
-        (
-            {"set": {"search.ga.population": 1}},
-            r"small.yaml: search.ga.population: .*than or equal to 4",
-        ),
+        ({"set": {"search.ga.population": 1}}, r"small.yaml: search.ga.population: .*than or equal to 4"),
         ({"axes": {"objective.norm": []}}, r"small.yaml, line \d+: axes.objective.norm"),
         ({"sedes": 3}, r"unknown setting 'sedes'; did you mean 'seeds'"),
         ({"base": "nowhere"}, r"nowhere: no such config; give a YAML file or one of: .*article-mech"),

@@ -123,8 +123,8 @@ def printed_ratio(claim: Claim, tables: Sequence[Table]) -> float | None:
     """Return the ratio of the values that the article prints; None where it does not print both."""
     asked = (claim.lower, claim.column), (claim.than, claim.to or claim.column)
     for table in tables:
-        if all(cell in table.article and column in table.columns for cell, column in asked):
-            upper, lower = (table.article[cell][table.columns.index(column)] for cell, column in asked)
-            if upper is not None and lower is not None:
-                return upper / lower
+        rows = {cell: dict(zip(table.columns, values, strict=True)) for cell, values in table.article.items()}
+        upper, lower = (rows.get(cell, {}).get(column) for cell, column in asked)
+        if upper is not None and lower is not None:
+            return upper / lower
     return None

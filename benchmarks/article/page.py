@@ -68,10 +68,8 @@ def head(
     says = "ulti-objective GA: lower parameter error than simple GA"
     narrow, wide = (next(v for v in made[n] if says in v.claim.says) for n in ("mechanical", "wide"))
     known = {n: verdict(KNOWN, log_ratios(KNOWN, runs[n]), 0.05, None) for n in ("mechanical", "wide")}
-    hydraulic = [
-        of_cell(runs["hydraulic"], cell, "simulations") for cell in ("multi-start", "multi-objective")
-    ]
-    least, multi = (median(each.values() or [np.nan]) for each in hydraulic)
+    cells = (of_cell(runs["hydraulic"], cell, "simulations") for cell in ("multi-start", "multi-objective"))
+    least, multi = (median(each.values() or [np.nan]) for each in cells)
     searches = [(n, r) for n in ("mechanical", "hydraulic") for r in runs[n] if "generations" in r]
     return {
         **{f"{name}_median": Medians(made) for name, made in runs.items()},
@@ -148,7 +146,7 @@ def study_table(shown: Table, runs: Runs, cells: Sequence[str]) -> str:
     lines: list[list[str]] = []
     without_search = () if shown.cells == (RECORDS,) else (BLIND, CENTRE)
     for cell in dict.fromkeys((*(shown.cells or cells), *shown.article, *without_search)):
-        columns = [values_of(runs, cell, column) for column in shown.columns]
+        columns = [of_cell(runs, cell, column).values() for column in shown.columns]
         most = max(map(len, columns))
         texts = [two_digits(median(v)) if v and len(v) >= min(FEW, most) else "" for v in columns]
         printed = shown.article.get(cell, [None] * len(columns))
@@ -156,16 +154,6 @@ def study_table(shown: Table, runs: Runs, cells: Sequence[str]) -> str:
         if any(texts):
             lines.append([cell, str(most or ""), *texts])
     return table(shown.title, ("", "runs", *shown.columns), lines)
-
-
-def values_of(runs: Runs, cell: str, column: str) -> list[float]:
-    """Return a measure of a cell's runs, or the ratio of two, `A / B`, in the runs that have both."""
-    above, _, below = column.partition(" / ")
-    upper = of_cell(runs, cell, above)
-    if not below:
-        return [*upper.values()]
-    lower = of_cell(runs, cell, below)
-    return [value / lower[seed] for seed, value in upper.items() if seed in lower]
 
 
 if __name__ == "__main__":

@@ -10,7 +10,6 @@ import time
 from collections.abc import Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from claims import Outcome, verdicts
@@ -28,24 +27,6 @@ Key = tuple[str, str, int]
 """study, cell, seed"""
 ATTEMPT = 6
 """number of seeds after which a claim's spread can be guessed"""
-
-
-def main(given: Any) -> None:
-    results = ROOT / ("runs/article-quick/results" if given.quick else "docs/reproduction")
-    results.mkdir(parents=True, exist_ok=True)
-    studies, runs = load_studies(), dict[str, Runs]()
-    plans = {name: Plan(name, studies[name], quick=given.quick) for name in given.studies}
-    for name, plan in plans.items():
-        runs[name] = with_what_needs_no_search(plan, read_runs(results / f"{name}_runs.csv"))
-    work(plans, runs, results, given.processes, 60 * given.minutes)
-    for name, plan in plans.items():
-        if runs[name]:
-            write(results, name, runs[name])
-        for figure in plan.study.figures:
-            draw(plan, runs[name], figure, results / figure.file)
-    target = results.with_suffix(".md")
-    target.write_text(page(results, quick=given.quick), encoding="utf-8")
-    print(target)
 
 
 def work(
@@ -120,4 +101,19 @@ def with_what_needs_no_search(plan: Plan, runs: Runs) -> Runs:
 
 if __name__ == "__main__":
     limits = {"minutes": float("inf"), "processes": os.cpu_count() or 1}
-    main(options(__doc__, studies=[*load_studies()], quick=False, **limits))
+    given = options(__doc__, studies=[*load_studies()], quick=False, **limits)
+    results = ROOT / ("runs/article-quick/results" if given.quick else "docs/reproduction")
+    results.mkdir(parents=True, exist_ok=True)
+    studies, runs = load_studies(), dict[str, Runs]()
+    plans = {name: Plan(name, studies[name], quick=given.quick) for name in given.studies}
+    for name, plan in plans.items():
+        runs[name] = with_what_needs_no_search(plan, read_runs(results / f"{name}_runs.csv"))
+    work(plans, runs, results, given.processes, 60 * given.minutes)
+    for name, plan in plans.items():
+        if runs[name]:
+            write(results, name, runs[name])
+        for figure in plan.study.figures:
+            draw(plan, runs[name], figure, results / figure.file)
+    target = results.with_suffix(".md")
+    target.write_text(page(results, quick=given.quick), encoding="utf-8")
+    print(target)

@@ -193,6 +193,10 @@ def read_runs(file: Path) -> Runs:
 
 
 def of_cell(runs: Runs, cell: str, column: str) -> dict[int, float]:
-    """Return a measure of the runs of a cell that have it, by seed."""
+    """Return a measure, or the ratio `A / B` of two, of the runs of a cell that have it, by seed."""
+    above, _, below = column.partition(" / ")
+    if below:
+        upper, lower = of_cell(runs, cell, above), of_cell(runs, cell, below)
+        return {seed: value / lower[seed] for seed, value in upper.items() if seed in lower}
     found = {run["seed"]: run.get(column, np.nan) for run in runs if run["cell"] == cell}
     return {seed: value for seed, value in found.items() if np.isfinite(value)}

@@ -16,9 +16,8 @@ from hydroid.settings.search import DesignSettings
 
 THETA = np.array(list(TRUTH.values()))
 DESIGN = {"duration_s": 6, "effort": 24, "dwell_s": [0.5, 2], "poses": "any"}
-TWO = {"outputs": [2, 3], "simulation.other_joints": "locked"} | {
-    f"parameters.{name}.fixed": TRUTH[name] for name in ("M1", "M4", "M5")
-}
+TWO: dict[str, object] = {f"parameters.{name}.fixed": TRUTH[name] for name in ("M1", "M4", "M5")}
+TWO |= {"outputs": [2, 3], "simulation.other_joints": "locked"}
 
 
 def configured(**changes: object) -> FitSettings:

@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 import pytest
-from arms import BOOM, CHILD, CYLINDER, PARENT, posed, write_arm
+from arms import BOOM, CHILD, CYLINDER, FOUR_BAR, PARENT, posed, write_arm
 from hypothesis import given, strategies as st
 
 from hydroid.arm.model import add_payload, load_model
@@ -143,7 +143,6 @@ def cylinder(**changes) -> dict[str, object]:
     return {"actuators": {"tilt": CYLINDER | {"pivots": ends} | changes}}
 
 
-FOUR_BAR = {"ground": 0.35, "rocker": 0.45, "coupler": 0.4, "child": 0.35, "phase_deg": 69.0, "side": "right"}
 SAME = "", ""
 WRONG = [
     (SAME, {"actuators": {"knee": CYLINDER}}, "knee: no such joint; the model's joints: lift, tilt"),

@@ -80,12 +80,10 @@ def test_a_buckets_linkage_moves_as_its_bars_do(arm):
 
     def rod_length(angle: float, near: float = 0.0) -> float:
         """Length of the cylinder where rocker and coupler meet, solved numerically."""
-        child = BUCKET + turned(CHILD - BUCKET, angle)
+        child, coupler = BUCKET + turned(CHILD - BUCKET, angle), np.linalg.norm(PIN - CHILD)
 
         def open_by(turn):
-            return np.linalg.norm(GROUND + turned(PIN - GROUND, turn[0]) - child) - np.linalg.norm(
-                PIN - CHILD
-            )
+            return np.linalg.norm(GROUND + turned(PIN - GROUND, turn[0]) - child) - coupler
 
         turn = least_squares(open_by, [angle], xtol=1e-14, ftol=1e-14, gtol=1e-14).x[0]
         return float(np.linalg.norm(GROUND + turned(PIN - GROUND, turn) - TAIL))

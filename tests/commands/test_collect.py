@@ -52,20 +52,14 @@ def test_the_best_run_is_the_first_of_the_table_of_runs(array, runs):
 
 def test_runs_that_cannot_be_used_are_named_and_left_out(runs, caplog, tmp_path: Path):
     change(Path("seed-1/run.json"), status="interrupted")
-    assert collected(caplog, "seed-*") == (
-        [2, 3],
-        ["left out: seed-1: is not finished (interrupted); resume it"],
-    )
+    expected = ["left out: seed-1: is not finished (interrupted); resume it"]
+    assert collected(caplog, "seed-*") == ([2, 3], expected)
     (tmp_path / "seed-4").mkdir()
     Path("seed-2/estimate.yaml").write_text("parameters: {K: 0.2}\n")
     seeds, warnings = collected(caplog, "seed-*", "nowhere")
     assert seeds == [3]
-    assert [line.split(":")[1].split(",")[0].strip() for line in warnings] == [
-        "nowhere/run.json",
-        "seed-1",
-        "seed-2/estimate.yaml",
-        "seed-4/run.json",
-    ]
+    named = [line.split(":")[1].split(",")[0].strip() for line in warnings]
+    assert named == ["nowhere/run.json", "seed-1", "seed-2/estimate.yaml", "seed-4/run.json"]
     with pytest.raises(RunError, match="no finished run is there"):
         collected(caplog, "seed-1", "seed-2", "seed-4")
     with pytest.raises(RunError, match="is a run itself"):

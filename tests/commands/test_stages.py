@@ -93,9 +93,8 @@ def test_a_log_that_diverges_is_named_and_judged_with_the_others(
 def test_values_that_diverge_are_judged(short: Path, hydroid_cli: Run):
     Path("values.yaml").write_text(yaml.safe_dump(VALUES | {"K": 1e9}))
     passive = "--set=simulation.other_joints=passive"
-    (judged,) = json.loads(hydroid_cli("validate", short, "--fit=values.yaml", passive, "--json").out)[
-        "verdict"
-    ]
+    done = hydroid_cli("validate", short, "--fit=values.yaml", passive, "--json")
+    (judged,) = json.loads(done.out)["verdict"]
     assert judged["verdict"] == "predicts no better than standing still"
 
 
@@ -151,9 +150,7 @@ def test_analyse_tells_what_a_log_determines(short: Path, hydroid_cli: Run, tmp_
         assert (tmp_path / "told" / "tables" / f"{name}.csv").stat().st_size > 0
 
 
-def test_a_term_to_free_is_said_with_its_command(
-    short: Path, hydroid_cli: Run, monkeypatch: pytest.MonkeyPatch
-):
+def test_a_term_to_free_has_its_command(short: Path, hydroid_cli: Run, monkeypatch: pytest.MonkeyPatch):
     numbers = {"part": 50.0, "command": "hydroid fit-hyd a.csv"}
     said = {"tested": 1, "left_out_deg": {"shoulder": 2.0}, "terms": [], "actions": []}
     advised = said, [Finding("term missing", "warning", ("delay", "shoulder"), numbers)]

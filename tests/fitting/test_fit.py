@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 from made_logs import TRUTH
-from small_fits import Study, Watcher
+from small_fits import Watcher, study
 
 from hydroid import load_settings
 from hydroid.errors import RunError, SettingsError
@@ -10,12 +10,10 @@ from hydroid.fitting.fit import fit
 from hydroid.fitting.search import search
 from hydroid.fitting.validation import error_indices
 from hydroid.problem.problem import Problem
-from hydroid.run.folder import RunFolder
 
 
-def test_truth_has_no_error_and_evaluation_does_not_depend_on_the_chunk(tmp_path, monkeypatch):
-    study = Study(tmp_path)
-    problem = study.problem
+def test_truth_has_no_error_and_evaluation_does_not_depend_on_the_chunk(monkeypatch):
+    problem = study()
     truth = problem.parameters.vector(TRUTH, "truth")
     theta = np.vstack([truth, problem.parameters.from_unit(np.random.default_rng(0).random((9, 9)))])
     values = problem.evaluate(theta)
@@ -27,23 +25,23 @@ def test_truth_has_no_error_and_evaluation_does_not_depend_on_the_chunk(tmp_path
     np.testing.assert_array_equal(problem.evaluate(theta), values)
 
 
-def test_several_logs_and_outputs_are_one_long_error(tmp_path):
-    study = Study(tmp_path, outputs=[2, 3])
-    log = study.log
+def test_several_logs_and_outputs_are_one_long_error():
+    one = study(outputs=[2, 3])
+    (log,) = one.logs
     short = log.first(1.99)
-    problem = Problem(study.settings, [log, short])
+    problem = Problem(one.settings, [log, short])
     truth = problem.parameters.vector(TRUTH, "truth")[None]
     residuals = problem.residuals(truth * 1.1)
     assert residuals.shape == (1, 2 * (500 + 200))
     assert problem.bounds.shape == (2 * 2 * 3, 2)
     assert (np.diff(problem.bounds, axis=1) > 0).all()
-    alone = Problem(study.settings, [short]).residuals(truth * 1.1)
+    alone = Problem(one.settings, [short]).residuals(truth * 1.1)
     np.testing.assert_array_equal(residuals[:, 1000:], alone)
     np.testing.assert_allclose(problem.residuals(truth), 0, atol=1e-12)
 
 
-def test_identical_sets_are_simulated_once(tmp_path):
-    memo = Memo(Study(tmp_path).problem)
+def test_identical_sets_are_simulated_once():
+    memo = Memo(study())
     theta = np.repeat(memo.problem.parameters.from_unit(np.random.default_rng(0).random((2, 9))), 3, axis=0)
     result = memo.evaluate(theta)
     assert memo.simulated == 2
@@ -54,12 +52,12 @@ def test_identical_sets_are_simulated_once(tmp_path):
 
 
 @pytest.mark.parametrize("algorithm", ["ga", "nsga2"])
-def test_a_fit_recovers_what_the_data_tell_and_names_what_they_do_not(tmp_path, algorithm):
-    study = Study(tmp_path, **{"search.algorithm": algorithm})
-    result = study.fit()
-    names = np.array(study.problem.parameters.names)
+def test_a_fit_recovers_what_the_data_tell_and_names_what_they_do_not(algorithm):
+    problem = study(**{"search.algorithm": algorithm})
+    result = fit(problem)
+    names = np.array(problem.parameters.names)
     assert list(names[result.uncertainty.sensitivity == 0]) == ["M1"]
-    truth = study.problem.parameters.vector(TRUTH, "truth")
+    truth = problem.parameters.vector(TRUTH, "truth")
     assert result.best.rms < np.deg2rad(1e-3)
     # five seconds do not determine all nine, but the ratios K : D : S are strong
     ratio = (result.best.theta / truth)[:3]
@@ -73,9 +71,9 @@ def test_a_fit_recovers_what_the_data_tell_and_names_what_they_do_not(tmp_path, 
 
 
 @pytest.mark.parametrize(("algorithm", "stop"), [("ga", 1), ("nsga2", 6)])
-def test_a_resumed_search_ends_as_the_uninterrupted_one(tmp_path, algorithm, stop):
+def test_a_resumed_search_ends_as_the_uninterrupted_one(algorithm, stop):
     """A search is repeated, and what it had simulated is not simulated again."""
-    problem = Study(tmp_path, **{"search.algorithm": algorithm}).problem
+    problem = study(**{"search.algorithm": algorithm})
     whole = search(problem, lambda row: None, lambda n, rms: None, {})
     stopped, rest, stored = Watcher(stop_at=stop), Watcher(), {}
     with pytest.raises(KeyboardInterrupt):
@@ -86,30 +84,28 @@ def test_a_resumed_search_ends_as_the_uninterrupted_one(tmp_path, algorithm, sto
     np.testing.assert_array_equal(parts.theta, whole.theta)
 
 
-def test_a_fit_resumed_in_its_folder_ends_as_the_uninterrupted_one(tmp_path):
-    study = Study(tmp_path, refinement={"iterations": 2})
-    whole = study.fit_in(RunFolder(tmp_path / "whole"), Watcher())
-    folder = RunFolder(tmp_path / "parts")
+def test_a_resumed_fit_ends_as_the_uninterrupted_one():
+    problem, stored = study(refinement={"iterations": 2}), {}
+    whole = fit(problem)
     with pytest.raises(KeyboardInterrupt):
-        study.fit_in(folder, Watcher(stop_at=7))
-    study.fit_in(folder, Watcher())
-    assert (tmp_path / "whole/estimate.yaml").read_bytes() == (folder.path / "estimate.yaml").read_bytes()
-    assert whole.estimates.keys() == {"average", "utopia", "best", "refined"}
+        fit(problem, Watcher(stop_at=7), stored)
+    parts = fit(problem, Watcher(), stored)
+    assert whole.estimates.keys() == parts.estimates.keys() == {"average", "utopia", "best", "refined"}
+    for name, one in whole.estimates.items():
+        np.testing.assert_array_equal(parts.estimates[name].theta, one.theta)
     assert whole.estimates["best"].overall == whole.history[-1, 4]  # the best of all that was simulated
 
 
-def test_a_search_that_does_not_repeat_itself_is_found_out(tmp_path):
-    study = Study(tmp_path, refinement=None)
-    folder = RunFolder(tmp_path / "run")
+def test_a_search_that_does_not_repeat_itself_is_found_out():
+    problem, stored = study(refinement=None), {}
     with pytest.raises(KeyboardInterrupt):
-        study.fit_in(folder, Watcher(stop_at=4))
-    checkpoints = folder.checkpoints()
+        fit(problem, Watcher(stop_at=4), stored)
     # another version would ask for candidates that are not stored: here, because one is lost
-    checkpoints["search"] = {n: np.delete(a, 20, axis=0) for n, a in checkpoints["search"].items()}
-    before = (folder.path / "checkpoint.npz").read_bytes()
+    stored["search"] = {n: np.delete(a, 20, axis=0) for n, a in stored["search"].items()}
+    before = dict(stored)
     with pytest.raises(RunError, match="does not repeat"):
-        fit(study.problem, checkpoints=checkpoints)
-    assert (folder.path / "checkpoint.npz").read_bytes() == before
+        fit(problem, checkpoints=stored)
+    assert stored == before
 
 
 @pytest.mark.parametrize(

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from recovery import refined
 from small_fits import Watcher, steps_of
 
 from hydroid import load_settings
-from hydroid.fitting.refinement import refine
 from hydroid.fitting.search import search
 from hydroid.problem.problem import Problem
 
@@ -73,8 +73,7 @@ def test_a_resumed_search_ends_bit_for_bit_and_gains_no_more_on_noise_than_its_p
     np.testing.assert_array_equal(again.history, whole.history)
     np.testing.assert_array_equal(again.theta, whole.theta)
     # least squares: the estimate fits better than the truth, and by no more than seven parameters can
-    assert problem.settings.refinement is not None
-    point = refine(problem, whole.theta[0], problem.settings.refinement).point
-    both = np.stack([problem.parameters.from_unit(point), problem.parameters.vector(TRUTH, "truth")])
+    best = refined(problem, whole.theta[0])
+    both = np.stack([best, problem.parameters.vector(TRUTH, "truth")])
     best, true = np.sum(problem.residuals(both) ** 2, axis=1) / np.deg2rad(0.02) ** 2
     assert 0 < true - best < 24.3  # chi-square of 7 degrees of freedom, 0.999

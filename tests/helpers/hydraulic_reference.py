@@ -4,16 +4,18 @@ The plain side shares no code with hydroid: it integrates plungers, oil and arm 
 rtol 1e-7 or less, restarted at every change of the command.
 """
 
+from dataclasses import fields as fields_of
 from itertools import pairwise
 from math import cos, inf, log, radians, sin, sqrt
 
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
-from observation import observe as observed
+from observation import Observation, observe as observed
 from scipy.integrate import Radau
 
 from hydroid.hydraulics.actuator import at_rest, make_plugin
+from hydroid.hydraulics.cylinder import triangle
 from hydroid.hydraulics.records import JOINT, JOINT_STATE, LINEAR, ROTARY, Records
 from hydroid.mjcf import quiet_mujoco
 from hydroid.quantity_table import QUANTITIES, TARGETS
@@ -128,6 +130,19 @@ def simulate(p, command, settings, steps=1, observe=None, start=START, model=Non
             seen = observed(plugin.coefficients, states[:, t], angle[:, t + 1])
             observe.append((seen, states[:, t]["velocity"]))
     return angle[:, :, 0]
+
+
+def watched(p: Records, command: np.ndarray, settings: HydraulicSettings, **how):
+    """The first candidate of `simulate`: angles [rad], (T + 1,), and after each sample what it did."""
+    seen: list = []
+    angle = simulate(p, command, settings, observe=seen, **how)[0]
+    fields = {f.name: np.array([getattr(o, f.name)[0, 0] for o, _ in seen]) for f in fields_of(Observation)}
+    return angle, Observation(**fields), np.array([v[0, 0] for _, v in seen])
+
+
+def cylinder(angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The rod's way [m] and its moment arm [m]."""
+    return triangle(angle, A, B, THETA0, SHORTEST)[:2]
 
 
 def reference(p: Records, command: np.ndarray, rtol: float = 1e-7) -> tuple[np.ndarray, np.ndarray]:

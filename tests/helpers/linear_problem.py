@@ -16,9 +16,7 @@ AR1 = np.exp(-0.01 / 0.15)  # correlation time 0.15 s at 100 Hz
 class Linear:
     """A problem whose residuals are linear in its parameters: y - X theta, channel after channel."""
 
-    def __init__(
-        self, columns, measured, theta, *, fixed=(), known=None, unit=1.0, weights=(1.0,), **objective
-    ):
+    def __init__(self, columns, measured, theta, *, fixed=(), known=None, unit=1.0, weights=(1.0,), **more):
         self.columns, self.measured, self.simulated = columns, measured, 0
         self.leaves_start_open = self.afar = False
         names = "abcdefgh"[: len(theta)]
@@ -30,7 +28,7 @@ class Linear:
         )
         self.unit = unit
         one = ParameterSettings(quantity="gain", bounds=(0.1, 1.0))
-        how = {"segments": 1} | objective
+        how = {"segments": 1} | more
         self.settings = FitSettings(parameters=dict.fromkeys(names, one), objective=how)
         statements = {k: PriorSettings(**v) for k, v in (known or {}).items()}
         self.priors = Priors(statements, self.parameters)

@@ -70,9 +70,8 @@ def make_fit(
             size * np.sin(log.time * rng.uniform(2, 9))[:, None] * np.ones(len(problem.outputs))
             for log in problem.logs
         ]
-        responses = tuple(
-            log.angle[:, problem.outputs] - wave for log, wave in zip(problem.logs, waves, strict=True)
-        )
+        pairs = zip(problem.logs, waves, strict=True)
+        responses = tuple(log.angle[:, problem.outputs] - wave for log, wave in pairs)
         error = np.concatenate([wave.T.ravel() for wave in waves])[None]
         norms = problem.norms(error)[0]
         estimates[name] = Estimate(
@@ -89,24 +88,14 @@ def make_fit(
     evaluations = np.arange(1, 8) * 20.0
     best = np.minimum.accumulate(rng.uniform(0.02, 0.3, 7))
     history = np.column_stack([np.arange(1, 8), evaluations, evaluations - 3, [2.0] * 7, best, best * 1.5])
-    refined = Descent(
-        np.full(free, 0.5),
-        np.empty(0),
-        0.1,
-        1.0,
-        np.empty((0, free)),
-        evaluations=40,
-        iterations=5,
-        ending=Ending.GAIN,
-    )
+    ended: dict[str, Any] = {"evaluations": 40, "iterations": 5, "ending": Ending.GAIN}
+    refined = Descent(np.full(free, 0.5), np.empty(0), 0.1, 1.0, np.empty((0, free)), **ended)
+    sets = parameters.from_unit(rng.uniform(0, 1, (front, free)))
     return Fit(
         problem,
         estimates,
         final,
-        (
-            parameters.from_unit(rng.uniform(0, 1, (front, free))),
-            np.column_stack([segments, segments.max(axis=1, initial=0)]),
-        ),
+        (sets, np.column_stack([segments, segments.max(axis=1, initial=0)])),
         history,
         {"refined": refined} if "refined" in names else {},
         {},

@@ -1,18 +1,13 @@
-"""Small fits for tests: the article's true values, a watcher, and fits of a simulated log in folders."""
+"""Small problems for tests of fits: the article's true values, and a watcher."""
 
 from collections.abc import Mapping
-from pathlib import Path
 
 import numpy as np
 from made_logs import TRUTH, at_rest, noisy, simulate_log, stepped
 
-from hydroid import load_settings, read_logs
-from hydroid.fitting.fit import Fit, fit
-from hydroid.fitting.summary import summarise
-from hydroid.identified_model import IdentifiedModel
-from hydroid.log import Log, write_log
+from hydroid import load_settings
+from hydroid.log import Log
 from hydroid.problem.problem import Problem
-from hydroid.run.folder import RunFolder
 from hydroid.settings.fit import FitSettings
 
 
@@ -41,24 +36,9 @@ class Watcher:
             raise KeyboardInterrupt
 
 
-class Study:
+def study(**changes) -> Problem:
     """The article's stage 1 on five simulated seconds, three segments, and small populations."""
-
-    def __init__(self, folder: Path, **changes) -> None:
-        sizes = {"ga": 10, "nsga2": 8}
-        small = {f"search.{a}": {"population": n, "generations": 6} for a, n in sizes.items()}
-        self.settings = load_settings("article-mech", small | {"objective.segments": 3} | changes)
-        self.log = stepped(self.settings, TRUTH, [60.0, -80.0, 30.0, 0.0, -40.0])
-        self.path = folder / "log.csv"
-        write_log(self.path, self.log, self.settings.log)
-        self.problem = Problem(self.settings, [self.log])
-
-    def fit(self) -> Fit:
-        return fit(self.problem)
-
-    def fit_in(self, folder: RunFolder, watcher: Watcher) -> Fit:
-        checkpoints = folder.begin(self.settings, read_logs([self.path], self.settings))
-        result = fit(self.problem, watcher, checkpoints)
-        settings, summary = self.settings.of_estimate(result.final), summarise(self.problem, result)
-        folder.write_estimate(IdentifiedModel(settings, result.best.theta, "", summary), self.log)
-        return result
+    sizes = {"ga": 10, "nsga2": 8}
+    small = {f"search.{a}": {"population": n, "generations": 6} for a, n in sizes.items()}
+    settings = load_settings("article-mech", small | {"objective.segments": 3} | changes)
+    return Problem(settings, [stepped(settings, TRUTH, [60.0, -80.0, 30.0, 0.0, -40.0])])

@@ -20,9 +20,7 @@ TRUTH = OPENINGS | {"M_boom": 1300.0, "M_bar": 110.0, "flow": 120.0, "droop": 60
 
 def two_joints(folder: Path, model: str = BOOM, **settings) -> FitSettings:
     sizes = {"lift": (8000, 20), "tilt": (400, 3)}
-    actuators = {
-        n: {"kind": "rotary", "displacement": size, "max_opening": area} for n, (size, area) in sizes.items()
-    }
+    actuators = {n: {"kind": "rotary", "displacement": d, "max_opening": a} for n, (d, a) in sizes.items()}
     write_arm(folder, model, actuators=actuators)
     (folder / "fit.yaml").write_text(yaml.safe_dump(FIT | settings))
     return hydroid.load_settings(folder / "fit.yaml")

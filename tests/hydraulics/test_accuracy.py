@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hydraulic_reference import draw, parameters, pulses, reference, simulate
+from hydraulic_reference import draw, parameters, pulses, reference, simulate, watched
 
 from hydroid.hydraulics.records import Records
 from hydroid.settings.hydraulics import HydraulicSettings
@@ -29,9 +29,7 @@ def test_default_settings_hold_the_bound_over_the_search_space():
 def test_pressures_follow_the_reference_and_refinement_is_first_order_or_better():
     command, p = pulses(np.random.default_rng(23), 200), parameters(SETTINGS)
     exact, pressure = reference(p, command)
-    seen: list = []
-    simulate(p, command, SETTINGS, observe=seen)
-    found = np.array([o.pressure[0, 0] for o, _ in seen])
+    found = watched(p, command, SETTINGS)[1].pressure
     assert np.sqrt(((found - pressure[1:]) ** 2).mean()) < 0.5e5
     sizes = [np.sqrt((errors(p, command, exact, steps=k) ** 2).mean()) for k in (1, 2, 4, 8)]
     assert all(b < 0.6 * a for a, b in pairwise(sizes)), sizes

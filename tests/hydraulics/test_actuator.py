@@ -9,33 +9,24 @@ from hydraulic_reference import (
     DAMPING,
     GRAVITY,
     MASS,
-    SHORTEST,
     START,
     STIFFNESS,
     STROKE,
-    THETA0,
     TILT,
-    A,
-    B,
+    cylinder,
     parameters,
     pulses,
     rotary,
     simulate,
+    watched,
     wheel,
 )
-from observation import Observation
 
-from hydroid.hydraulics.cylinder import triangle
 from hydroid.hydraulics.solenoid import force_curve
 from hydroid.settings.hydraulics import HydraulicSettings
 
 SETTINGS = HydraulicSettings()
 TIGHT = HydraulicSettings(leakage=0.0)
-Seen = list[tuple[Observation, np.ndarray]]
-
-
-def cylinder(angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    return triangle(angle, A, B, THETA0, SHORTEST)[:2]
 
 
 def weight(angle: float) -> float:
@@ -46,9 +37,8 @@ def test_shut_chambers_keep_their_oil_through_any_motion_and_cavitation():
     """A wheel far too heavy for them swings on its spring; pressures are never below vapour pressure."""
     heavy = wheel(1e5)
     heavy.jnt_stiffness[:], heavy.qpos_spring[:] = 1e6, START
-    seen: Seen = []
-    angle = simulate(parameters(TIGHT), np.zeros(400), TIGHT, observe=seen, model=heavy, velocity=0.5)[0]
-    pressure = np.array([o.pressure[0, 0] for o, _ in seen])
+    angle, seen, _ = watched(parameters(TIGHT), np.zeros(400), TIGHT, model=heavy, velocity=0.5)
+    pressure = seen.pressure
     assert np.ptp(angle) > 0.3
     assert pressure.min() == 0.0
     assert pressure.max() > 100e5
@@ -62,15 +52,13 @@ def test_shut_chambers_keep_their_oil_through_any_motion_and_cavitation():
 def test_oil_volume_is_conserved_under_flow():
     """What flows in is swept volume plus compression: mass ρ V with ρ ~ exp(p/β) grows by ρ Q."""
     command = pulses(np.random.default_rng(4), 400)
-    seen: Seen = []
     fine = HydraulicSettings(substeps=20)
-    angle = simulate(parameters(fine), command, fine, observe=seen)[0]
+    angle, seen, _ = watched(parameters(fine), command, fine)
     beta = 8e8
     for chamber, sign in ((0, 1.0), (1, -1.0)):
         travel = cylinder(angle)[0]
         volume = 30e-6 + (1e-3 * travel if chamber == 0 else 0.75e-3 * (STROKE - travel))
-        pressure = np.array([o.pressure[0, 0, chamber] for o, _ in seen])
-        flow = sign * np.array([o.flow[0, 0, chamber] for o, _ in seen])
+        pressure, flow = seen.pressure[:, chamber], sign * seen.flow[:, chamber]
         density = np.exp(pressure / beta)
         gained = density[-1] * volume[-1] - density[0] * volume[1]
         came = 0.01 * (density * flow)[1:].sum()
@@ -80,43 +68,36 @@ def test_oil_volume_is_conserved_under_flow():
 
 @pytest.mark.parametrize("command", [70.0, -70.0])
 def test_terminal_speed_is_flow_over_area(command: float):
-    seen: Seen = []
-    angle = simulate(parameters(SETTINGS), np.full(60, command), SETTINGS, observe=seen)[0]
-    measured, velocity = seen[-1]
-    rod_speed = cylinder(angle[-1])[1] * velocity[0, 0]
-    chambers = measured.flow[0, 0] / np.array([1e-3, 0.75e-3])
+    angle, seen, velocity = watched(parameters(SETTINGS), np.full(60, command), SETTINGS)
+    rod_speed = cylinder(angle[-1])[1] * velocity[-1]
+    chambers = seen.flow[-1] / np.array([1e-3, 0.75e-3])
     np.testing.assert_allclose(chambers, rod_speed, rtol=0.02)
     # and the flow is that of equations (7), (8) at the pressures seen
-    opening = 0.4e-6 * abs(measured.spool[0, 0]) / 2e-3
-    pa, pb = measured.pressure[0, 0]
+    opening = 0.4e-6 * abs(seen.spool[-1]) / 2e-3
+    pa, pb = seen.pressure[-1]
     drops = (150e5 - pa, pb - 5e5) if command > 0 else (pa - 5e5, 150e5 - pb)
     wanted = np.sign(command) * 0.7 * opening * np.sqrt(2 * np.array(drops) / 860)
-    np.testing.assert_allclose(measured.flow[0, 0], wanted, rtol=0.01)
+    np.testing.assert_allclose(seen.flow[-1], wanted, rtol=0.01)
 
 
 def test_a_flow_limit_caps_speed():
-    seen: Seen = []
-    p = parameters(SETTINGS, flow_limit=0.6)
-    simulate(p, np.full(80, 100.0), SETTINGS, observe=seen)
-    flow = np.array([o.flow[0, 0, 0] for o, _ in seen])
+    flow = watched(parameters(SETTINGS, flow_limit=0.6), np.full(80, 100.0), SETTINGS)[1].flow[:, 0]
     assert flow.max() <= 0.6e-3 / 60 * (1 + 1e-9)
     assert flow[-1] == pytest.approx(0.6e-3 / 60, rel=0.02)
 
 
 def test_the_end_stop_obeys_equation_9_and_does_not_chatter():
-    seen: Seen = []
-    angle = simulate(parameters(SETTINGS), np.full(400, -100.0), SETTINGS, observe=seen)[0]
+    angle, seen, speed = watched(parameters(SETTINGS), np.full(400, -100.0), SETTINGS)
     travel, arm = cylinder(angle)
     touched = int(np.argmax(travel[1:] < 0))
     assert 0 < touched < 300
     assert (travel[1 + touched :] < 0).all()
     assert travel.min() > -5e-3
-    speed = np.array([v[0, 0] for _, v in seen])
     assert (speed[touched + 5 :] < 0).all()
     for k in (touched + 20, -1):
         stop = 1e10 * travel[k + (k >= 0)] * arm[k + (k >= 0)] * speed[k]
         rest = (weight(angle[k + (k >= 0)]) + DAMPING * speed[k]) / arm[k + (k >= 0)]
-        assert stop == pytest.approx(rest - seen[k][0].force[0, 0], rel=0.02)
+        assert stop == pytest.approx(rest - seen.force[k], rel=0.02)
         assert stop > 5e3
 
 
@@ -124,14 +105,12 @@ def test_a_load_sinks_on_the_oil_that_leaves():
     """With a wide A→T edge the pump cannot fill B: a check valve does, and only A carries the load."""
     ends, fine = [], HydraulicSettings(substeps=10)
     for edges in ({}, {"return_a": 6.0, "anticavitation": 5.0}, {"return_a": 6.0}):
-        seen: Seen = []
-        simulate(parameters(fine, **edges), np.full(60, -50.0), fine, observe=seen)
-        ends.append(seen[-1][0])
-    alike, filled, starved = (1e-5 * end.pressure[0, 0] for end in ends)
+        ends.append(watched(parameters(fine, **edges), np.full(60, -50.0), fine)[1])
+    alike, filled, starved = (1e-5 * end.pressure[-1] for end in ends)
     assert alike.min() > 30  # equal edges press both chambers
     assert 0 < filled[1] < 5.0  # below the tank's pressure, and no vapour
     assert filled[0] < alike[0]
-    assert (ends[1].flow[0, 0] < 0).all()
+    assert (ends[1].flow[-1] < 0).all()
     assert starved[1] == 0.0
 
 
@@ -172,12 +151,10 @@ def test_delay_shifts_the_response():
 
 def test_a_rotary_actuator_turns_by_flow_over_displacement():
     p = rotary(parameters(TIGHT, area_a=10.0, area_b=10.0, dead_volume=50.0, damping=5.0))
-    seen: Seen = []
     command = np.repeat([60.0, 0.0], 100)
-    angle = simulate(p, command, TIGHT, observe=seen, start=0.0, model=wheel(0.05))[0]
+    angle, seen, speed = watched(p, command, TIGHT, start=0.0, model=wheel(0.05))
     assert angle[-1] > 1.0
-    pressed = seen[-1][0].pressure[0, 0, 0] - 50e5
-    flowed = 0.01 * sum(o.flow[0, 0, 0] for o, _ in seen)
+    pressed, flowed = seen.pressure[-1, 0] - 50e5, 0.01 * seen.flow[:, 0].sum()
     # swept volume plus compression of a chamber of constant volume, to the last digits
     assert flowed == pytest.approx(10e-6 * angle[-1] + 50e-6 * pressed / 8e8, rel=1e-9)
-    assert abs(seen[-1][1]).max() < 1e-6
+    assert abs(speed[-1]) < 1e-6

@@ -4,35 +4,24 @@ import numpy as np
 from hydraulic_arm import DrivenArm, nominal
 from hydraulic_reference import TEN, draw, pulses
 
-from hydroid.hydraulics.records import Records
 from hydroid.settings.arm import Arm
 from hydroid.settings.hydraulics import HydraulicSettings
 
-ALL = list(range(7))
 SETTINGS = HydraulicSettings()
 
 
-def candidates(arm: Arm, n: int) -> Records:
-    """Every actuator has its own feasible set from the whole search space, 0.25 to 2.5 times nominal."""
-    joints = nominal(arm, SETTINGS, n)
-    for name, values in draw(np.random.default_rng(0), joints.size).items():
-        joints[name] *= np.reshape(values / TEN[name], joints.shape)
-    return joints
-
-
-def commands(samples: int, joints: list[int], seed: int = 1) -> np.ndarray:
+def commands(samples: int, seed: int) -> np.ndarray:
     rng = np.random.default_rng(seed)
-    command = np.zeros((samples, 7))
-    for j in joints:
-        command[:, j] = pulses(rng, samples)
-    return command
+    return np.stack([pulses(rng, samples) for _ in range(7)], axis=1)
 
 
 def test_seven_joints_at_once_are_stable_for_random_parameters(arm: Arm):
-    """100 candidates; joint stops included."""
-    command = commands(500, ALL)
+    """100 candidates of the whole search space, 0.25 to 2.5 times nominal; joint stops included."""
+    joints, command = nominal(arm, SETTINGS, 100), commands(500, 1)
+    for name, values in draw(np.random.default_rng(0), joints.size).items():
+        joints[name] *= np.reshape(values / TEN[name], joints.shape)
     command[-150:] = 0.0
-    angle = DrivenArm(arm, candidates(arm, 100), command, SETTINGS).run()
+    angle = DrivenArm(arm, joints, command, SETTINGS).run()
     velocity = np.diff(angle, axis=1) / 0.01
     speed = abs(velocity)
     assert np.isfinite(angle).all()
@@ -43,7 +32,7 @@ def test_seven_joints_at_once_are_stable_for_random_parameters(arm: Arm):
 
 
 def test_seven_joints_converge_with_mujocos_step(arm: Arm):
-    p, command = nominal(arm, SETTINGS), commands(200, ALL, seed=3)
+    p, command = nominal(arm, SETTINGS), commands(200, 3)
     exact = DrivenArm(arm, p, command, SETTINGS, steps=16).run()
     error = [abs(DrivenArm(arm, p, command, SETTINGS, k).run() - exact).max() for k in (1, 2, 4)]
     assert np.degrees(error[0]) < 0.5

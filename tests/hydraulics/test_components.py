@@ -31,9 +31,8 @@ def plunger(gap: float, mass: float = 0.05) -> SimpleNamespace:
 
 
 def test_nothing_passes_the_dead_band_and_the_full_command_stays_full():
-    passed = np.array(
-        [beyond_dead_band(u, u, 0.0, 0.0, 40.0) for u in (-50.0, 39.9, 40.0, 40.0 + 1e-9, 70.0, 100.0)]
-    )
+    commands = (-50.0, 39.9, 40.0, 40.0 + 1e-9, 70.0, 100.0)
+    passed = np.array([beyond_dead_band(u, u, 0.0, 0.0, 40.0) for u in commands])
     np.testing.assert_allclose(side_voltage(*passed.T, 1.4, 40.0), [0, 0, 0, 1.4, 5.7, 10], atol=1e-9)
 
 
@@ -121,9 +120,8 @@ def test_the_flow_into_a_chamber_has_the_slopes_that_it_states(compensation: flo
     _, fall, pumped, give = flow(pressure, 150e5)
     steeper = (flow(pressure + 1e3, 150e5) - flow(pressure - 1e3, 150e5)) / 2e3
     assert -steeper[0] == pytest.approx(fall, rel=1e-5)
-    assert (flow(pressure, 150e5 + 1e3) - flow(pressure, 150e5 - 1e3))[2] / 2e3 == pytest.approx(
-        give, rel=1e-5
-    )
+    stronger = (flow(pressure, 150e5 + 1e3) - flow(pressure, 150e5 - 1e3)) / 2e3
+    assert stronger[2] == pytest.approx(give, rel=1e-5)
     if compensation == 1.0 and pressure < 0.75 * 150e5:
         assert pumped == pytest.approx(0.03 * 2e-6 * np.sqrt(0.25 * 150e5), rel=1e-4)
 

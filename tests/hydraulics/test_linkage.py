@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from arms import FOUR_BAR
 from hydraulic_reference import changed, simulate, wheel
 
 from hydroid.hydraulics.records import Records, nominal_joints
@@ -54,13 +55,9 @@ def test_a_cylinder_that_extends_to_negative_angles_mirrors_the_motion(arm: Arm)
     np.testing.assert_allclose(there, -here, atol=1e-12)
 
 
-BARS = {"ground": 0.35, "rocker": 0.45, "coupler": 0.4, "child": 0.35, "phase_deg": 69.0, "side": "right"}
-"""a bucket's linkage; ours"""
-
-
 def bucket(arm: Arm, **bars: float) -> Arm:
     sides = Triangle(a=0.8, b=0.45, theta0=10.0)
-    return with_cylinder(arm, triangle=sides, four_bar=FourBar.model_validate(BARS | bars), stroke=560.0)
+    return with_cylinder(arm, triangle=sides, four_bar=FourBar.model_validate(FOUR_BAR | bars), stroke=560.0)
 
 
 def test_the_coupler_of_a_four_bar_linkage_keeps_its_length(arm: Arm):

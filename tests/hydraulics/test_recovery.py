@@ -1,7 +1,6 @@
 """Every term is estimated from simulated logs: the truth lies within the interval."""
 
 from collections.abc import Mapping, Sequence
-from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +11,7 @@ from recovery import STOPPED, assert_recovered, recover, settings_of
 DUTIES = [60, -40, 90, -80, 40, 0, -30, 70, -60, 30]
 ROTARY = 4
 """the roll: a rotary actuator turns it"""
-NOTHING: Mapping[str, float] = MappingProxyType({})
+NOTHING: Mapping[str, float] = {}
 
 
 class Case(NamedTuple):

@@ -4,12 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hydraulic_reference import SHORTEST, START, THETA0, A, B, parameters, simulate
+from hydraulic_reference import START, cylinder, parameters, simulate, watched
 from made_logs import step_log
 from recovery import STOPPED, settings_of
 
 from hydroid.arm.model import load_model
-from hydroid.hydraulics.cylinder import triangle
 from hydroid.problem.bindings import Bindings
 from hydroid.problem.problem import make_simulation
 from hydroid.settings.hydraulics import HydraulicSettings
@@ -26,13 +25,10 @@ def test_a_joint_stands_on_its_stop_whatever_is_trapped(trapped: float):
 
 def test_the_oil_must_first_be_pressed():
     """The flow of the valve compresses the trapped oil until it carries the load: V Δp / β."""
-    seen: list = []
-    p = parameters(TIGHT, trapped_pressure=5.0)
-    angle = simulate(p, np.full(200, 30.0), TIGHT, observe=seen)[0]
+    angle, seen, _ = watched(parameters(TIGHT, trapped_pressure=5.0), np.full(200, 30.0), TIGHT)
     moved = int(np.argmax(angle - START > np.radians(0.1)))
-    pressure = np.array([o.pressure[0, 0, 0] for o, _ in seen])[:moved]
-    flow = np.array([o.flow[0, 0, 0] for o, _ in seen])[:moved]
-    ends = triangle(angle[[0, moved]], A, B, THETA0, SHORTEST)[0]
+    pressure, flow = seen.pressure[:moved, 0], seen.flow[:moved, 0]
+    ends = cylinder(angle[[0, moved]])[0]
     compressed = (30e-6 + 1e-3 * ends[0]) * (pressure[-1] - 5e5) / 8e8
     swept = 1e-3 * (ends[1] - ends[0])
     assert 0.01 * flow.sum() == pytest.approx(compressed + swept, rel=0.05)

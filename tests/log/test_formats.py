@@ -86,11 +86,6 @@ def truncated(path: Path) -> Path:
     return path
 
 
-def workbook(folder: Path) -> Path:
-    (folder / "a.xlsx").write_bytes(b"PK\3\4\0\0")
-    return folder / "a.xlsx"
-
-
 MATLAB = "cannot be read as a MATLAB file"
 BAD = {
     "truncated mat": (lambda p: truncated(write_mat(p / "log.mat", COLUMNS)), MATLAB),
@@ -110,7 +105,7 @@ BAD = {
         lambda p: write_mat(p / "log.mat", {**COLUMNS, "q2_deg": T[:40]}),
         "column q2_deg: holds 40 values, but column time_s holds 80",
     ),
-    "workbook": (workbook, "save the sheet as CSV"),
+    "workbook": (lambda p: save(p / "a.xlsx", [["PK\3\4\0\0"]]), "save the sheet as CSV"),
 }
 
 

@@ -59,9 +59,8 @@ def test_a_current_loop_for_each_direction_is_its_range(tmp_path: Path) -> None:
     found = guess(tmp_path, ["t", "u2_up_mA", "u2_down_mA", "q2_deg"], T, up, down, SWEEP)
     command = found.log["joints"][2]["command"]
     assert command == {"column": ["u2_up_mA", "u2_down_mA"], "scale": 6.25, "offset": -25.0}
-    log, _ = read(
-        tmp_path / "log.csv", LogSettings.model_validate(found.log), dict.fromkeys("12", (-9.0, 9.0))
-    )
+    settings = LogSettings.model_validate(found.log)
+    log, _ = read(tmp_path / "log.csv", settings, dict.fromkeys("12", (-9.0, 9.0)))
     np.testing.assert_allclose(log.command[:, 1], STEPS, atol=1e-9)
 
 

@@ -68,9 +68,7 @@ def boom(duties: list[float], *, stop: float = 60.0, seconds: float = 4.0) -> Ta
             angle, speed = float(np.clip(angle, -10, stop)), 0.0
         angles.append(angle)
     table = rig(rows=len(command) - 100)
-    still = {
-        n: np.full(len(command), v[0]) * (not n.startswith("u")) for n, v in table.items() if n != "time_s"
-    }
+    still = {n: np.full(len(command), v[0]) * (n[0] != "u") for n, v in table.items() if n != "time_s"}
     moving = np.array(angles) + 0.02 * noise.normal(size=len(command))
     return {"time_s": period * np.arange(len(command)), **still, "u2_pct": command, "q2_deg": moving}
 
@@ -79,27 +77,22 @@ def without(*rows: int) -> list[Table]:
     return of("", lambda values: np.delete(values, rows))
 
 
-def wrapped(table: Table) -> Table:
-    return {**table, "q6_deg": (table["q6_deg"] + 280) % 360 - 180}
-
-
 def exchanged() -> list[Table]:
     table = rig("rig_shoulder_1")
     return [{**table, "q2_deg": table["q1_deg"]}]
 
 
-def misspelt() -> list[Table]:
-    return [{name.replace("u2", "U2"): values for name, values in rig().items()}]
+def renamed(old: str, new: str) -> list[Table]:
+    return [{name.replace(old, new): values for name, values in rig().items()}]
 
 
 def early(seconds: float) -> list[Table]:
-    return of(
-        "q", lambda q: np.r_[q[round(100 * seconds) :], np.full(round(100 * seconds), q[-1])], boom([60, -60])
-    )
+    samples = round(100 * seconds)
+    return of("q", lambda q: np.r_[q[samples:], np.full(samples, q[-1])], boom([60, -60]))
 
 
-def in_rad() -> list[Table]:
-    return [{name.replace("q2_deg", "q2 [rad]"): values for name, values in rig().items()}]
+def holed(angle: np.ndarray) -> np.ndarray:
+    return np.where(np.arange(len(angle)) == 700, np.nan, angle)
 
 
 def pushed() -> list[Table]:
@@ -107,7 +100,6 @@ def pushed() -> list[Table]:
 
 
 ROWS = np.insert(np.arange(4100), 900, 900)
-HOLE = np.arange(4100) == 700
 JITTER = 0.004 * np.sin(np.arange(4100))
 
 
@@ -118,34 +110,28 @@ WRONG = (
     Wrong("commands in 4 to 20 mA", "warning: offset: -150", lambda: of("u2", lambda u: 12 + 0.08 * u)),
     Wrong("a joystick of 0 to 5 V", "warning: offset: -100", lambda: of("u2", lambda u: 2.5 + 0.025 * u)),
     Wrong("angles in rad, read as deg", "warning: set log.angle.unit: rad", lambda: of("q", np.deg2rad)),
-    Wrong(
-        "angles in deg, read as rad", "error: angle.unit: deg", lambda: [rig()], {"angle": {"unit": "rad"}}
-    ),
+    Wrong("angles in deg, read as rad", "error: unit: deg", lambda: [rig()], {"angle": {"unit": "rad"}}),
     Wrong(
         "a unit in a name that the settings contradict",
         "warning: the file says",
-        in_rad,
+        lambda: renamed("q2_deg", "q2 [rad]"),
         {"joints": {2: {"angle": {"column": "q2 [rad]"}}}},
     ),
     Wrong("time in ms, read as s", "error: set log.time.unit: ms", lambda: of("time", lambda t: 1000 * t)),
     Wrong("a clock in days, read as s", "error: unit: day", lambda: of("time", lambda t: t / 86400)),
     Wrong("an angle that counts the other way", "error: angle.scale: -1", lambda: of("q3", np.negative)),
-    Wrong(
-        "a command wired the other way", "warning: moves against its command", lambda: of("u2", np.negative)
-    ),
+    Wrong("a command wired the other way", "warning: moves against", lambda: of("u2", np.negative)),
     Wrong("clocks that differ by 0.3 s", "warning: as no machine does", lambda: early(0.3)),
     Wrong("commands that are all 0", "warning: no joint is driven", lambda: of("u", np.zeros_like)),
     Wrong("a clock that jitters", "note: is resampled", lambda: of("time", lambda t: t + JITTER)),
     Wrong("0.4 s without a sample", "error: cut the log into two", lambda: without(*range(900, 940))),
     Wrong("a dropped sample", "error: --repair fills gaps up to 0.1 s", lambda: without(900)),
     Wrong("a sample that stands twice", "error: does not increase", lambda: of("", lambda v: v[ROWS])),
-    Wrong(
-        "a cell that holds no number", "error: 'nan'", lambda: of("q2", lambda q: np.where(HOLE, np.nan, q))
-    ),
+    Wrong("a cell that holds no number", "error: 'nan'", lambda: of("q2", holed)),
     Wrong("a dead sensor", "warning: never changes", lambda: of("q2", lambda q: np.full_like(q, q[0]))),
     Wrong("the angle of another joint", "warning: strong commands hardly move joint shoulder", exchanged),
-    Wrong("an encoder that wraps", "note: wraps by 360 deg and was joined", lambda: [wrapped(rig())]),
-    Wrong("a misspelt column", "error: did you mean 'U2_pct'?", misspelt),
+    Wrong("an encoder that wraps", "note: wraps by 360", lambda: of("q6", lambda q: (q + 280) % 360 - 180)),
+    Wrong("a misspelt column", "error: did you mean 'U2_pct'?", lambda: renamed("u2", "U2")),
     Wrong("a joint that is pushed against its stop", "note: against the end of its travel", pushed),
     Wrong("no rest before the first command", "note: begins with", lambda: of("", lambda v: v[100:])),
 )

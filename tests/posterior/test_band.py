@@ -5,14 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from made_logs import FAST, fast_arm, noisy, stepped
+from recovery import bands_in, model_of, refined
 
 import hydroid
-from hydroid.fitting.refinement import refine
-from hydroid.fitting.summary import account
-from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
-from hydroid.posterior.band import prediction_bands, start_effects
-from hydroid.posterior.uncertainty import uncertainty
+from hydroid.posterior.band import start_effects
 from hydroid.prediction import predict
 from hydroid.problem.problem import Problem
 from hydroid.settings.search import RefinementSettings
@@ -34,8 +31,7 @@ def fitted():
 def test_a_band_holds_what_the_model_explains(fitted, factor, limits):
     settings, model = fitted
     log = driven(settings, [-30.0, 50.0, 20.0, -70.0], 2, FAST | {"S": factor * FAST["S"]})
-    response = predict(model, log, settings.outputs)
-    band = prediction_bands(model, log, response)[2]
+    band = bands_in(model, log)[2]
     assert np.degrees(band.noise) == pytest.approx(0.1, rel=0.15)
     assert (band.inside > 0.9, band.inside < 0.8) == (not limits, limits)
     if not limits:
@@ -63,7 +59,6 @@ def test_leaving_out_each_log_predicts_it(fitted):
     logs = [driven(settings, levels, seed) for seed, levels in enumerate(drives)]
     for i, log in enumerate(logs):
         problem = Problem(settings, [*logs[:i], *logs[i + 1 :]])
-        theta = problem.parameters.from_unit(refine(problem, model.theta, RefinementSettings()).point)
-        fold = IdentifiedModel(settings, theta, "fold", account(problem, uncertainty(problem, theta)))
-        band = prediction_bands(fold, log, predict(fold, log, settings.outputs))[2]
+        fold = model_of(problem, refined(problem, model.theta, RefinementSettings()))
+        band = bands_in(fold, log)[2]
         assert 0.5 < band.error / band.expected < 1.2

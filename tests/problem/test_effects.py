@@ -4,16 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from recovery import bands_in, model_of, refined
 from two_joints import PARAMETERS, TRUTH, drive, two_joints
 
 import hydroid
 from hydroid.errors import HydroidError
-from hydroid.fitting.refinement import refine
-from hydroid.fitting.summary import account
-from hydroid.identified_model import IdentifiedModel, identified
+from hydroid.identified_model import identified
 from hydroid.log import Log
-from hydroid.posterior.band import prediction_bands
-from hydroid.posterior.uncertainty import uncertainty
 from hydroid.prediction import predict
 from hydroid.problem.problem import Problem
 from hydroid.settings.fit import FitSettings
@@ -46,9 +43,7 @@ def fitted(tmp_path_factory) -> tuple[Problem, np.ndarray]:
     folder = tmp_path_factory.mktemp("days")
     problem = Problem(of_days(folder), logs_of_days(folder))
     start = problem.parameters.started(TRUTH)
-    return problem, problem.parameters.from_unit(
-        refine(problem, start, RefinementSettings(iterations=20)).point
-    )
+    return problem, refined(problem, start, RefinementSettings(iterations=20))
 
 
 def test_effects_of_two_groups_are_recovered(fitted):
@@ -62,19 +57,15 @@ def test_effects_of_two_groups_are_recovered(fitted):
 
 def test_an_unseen_group_has_the_mean_and_a_wider_band(fitted):
     problem, theta = fitted
-    known = uncertainty(problem, theta)
-    summary = account(problem, known)
+    model = model_of(problem, theta)
+    summary = model.summary
     other = summary.estimate["day_other"]
     assert (other.source, other.sd) == ("prior only", pytest.approx(3.0, rel=0.01))
     assert "day_other" not in {name for finding in summary.findings for name in finding.subjects}
-    model = IdentifiedModel(problem.settings, theta, "a fit", summary)
-    halves = dict[str, float]()
-    for name in ("mon_9.csv", "wed_1.csv"):
-        log = replace(problem.logs[0], source=name)
-        band = prediction_bands(model, log, predict(model, log, (1, 2)))
-        halves[name] = float(np.mean(band[1].half))
-    assert np.isfinite(halves["wed_1.csv"])
-    assert halves["wed_1.csv"] > 5 * halves["mon_9.csv"]
+    logs = (replace(problem.logs[0], source=name) for name in ("mon_9.csv", "wed_1.csv"))
+    monday, wednesday = (float(np.mean(bands_in(model, log)[1].half)) for log in logs)
+    assert np.isfinite(wednesday)
+    assert wednesday > 5 * monday
 
 
 @pytest.mark.parametrize("name", [*LOGS, "other.csv"])

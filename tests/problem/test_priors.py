@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from made_logs import TRUTH, noisy, stepped
+from recovery import refined
 
 from hydroid import load_settings
 from hydroid.errors import SettingsError
-from hydroid.fitting.refinement import refine
 from hydroid.parameters import Parameter, ParameterSet
 from hydroid.problem.priors import REACH, Priors
 from hydroid.problem.problem import Problem
@@ -95,7 +95,6 @@ def test_a_refinement_weighs_priors_against_the_logs():
     settings = load_settings("article-mech", {"priors": known, "objective.segments": 2})
     problem = Problem(settings, [noisy(stepped(settings, TRUTH, [60.0, -80.0, 30.0, 0.0]), 0.1)])
     truth = problem.parameters.vector(TRUTH, "truth")
-    result = refine(problem, 0.9 * truth, RefinementSettings(iterations=30), lambda *_: None)
-    theta = problem.parameters.from_unit(result.point[None])
+    theta = refined(problem, 0.9 * truth, RefinementSettings(iterations=30))[None]
     assert theta[0, 3:].sum() == pytest.approx(30.0, abs=0.3)
     assert np.rad2deg(problem.rms(problem.residuals(theta))[0]) < 0.105

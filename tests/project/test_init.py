@@ -89,9 +89,8 @@ def test_nothing_is_overwritten(place: Path):
     with pytest.raises(SettingsError, match=r"mine: holds arm\.yaml already; name another folder, or"):
         init(place / "mine")
     assert before == {path: path.read_bytes() for path in (place / "mine").glob("*.*")}
-    assert {path.name for path in place.iterdir()} == {"digger", "machine", "mine"} | {
-        f"move_{k}.csv" for k in range(3)
-    }
+    expected = {"digger", "machine", "mine", *(f"move_{k}.csv" for k in range(3))}
+    assert {path.name for path in place.iterdir()} == expected
 
 
 def test_a_project_is_replaced_if_that_is_asked_for(tmp_path: Path):

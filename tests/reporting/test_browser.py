@@ -21,17 +21,21 @@ pytestmark = pytest.mark.skipif(BROWSER is None, reason="no Chromium is installe
 PROBE = f"<script>{Path(__file__).with_name('probe.js').read_text()}</script>"
 
 
+def browse(page: Path, *how: str) -> str:
+    assert BROWSER is not None
+    how = ("--headless", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=60000", *how)
+    command = [BROWSER, *how, f"--user-data-dir={page.parent / 'profile'}", page.as_uri()]
+    return subprocess.run(command, capture_output=True, text=True, timeout=240, check=True).stdout
+
+
 def seen(page: Path, width: int, *options: str) -> dict:
     """What a browser finds in a page of a width [px] with all its folded parts open."""
     probed = page.with_name("probed.html")
     source = page.read_text(encoding="utf-8")
     probed.write_text(source.replace("<head>", f"<head>{PROBE}", 1), encoding="utf-8")
-    assert BROWSER is not None
-    how = ["--headless", "--no-sandbox", "--disable-gpu", f"--window-size={width},900", "--dump-dom"]
-    how += ["--virtual-time-budget=60000", f"--user-data-dir={page.parent / 'profile'}", *options]
-    done = subprocess.run([BROWSER, *how, probed.as_uri()], capture_output=True, text=True, timeout=240)
-    found = re.search(r"FOUND(.*)END", done.stdout)
-    assert found, done.stdout[-2000:]
+    text = browse(probed, f"--window-size={width},900", "--dump-dom", *options)
+    found = re.search(r"FOUND(.*)END", text)
+    assert found, text[-2000:]
     return json.loads(found[1].replace("&amp;", "&").replace("&lt;", "<").replace("&gt;", ">"))
 
 
@@ -69,10 +73,7 @@ def test_a_page_is_whole_in_a_browser(pages: dict[str, Path], name: str, how: tu
 
 
 def test_a_page_is_printed_on_paper(pages: dict[str, Path], tmp_path: Path):
-    assert BROWSER is not None
     paper = tmp_path / "page.pdf"
-    how = ["--headless", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=30000"]
-    how += [f"--print-to-pdf={paper}", f"--user-data-dir={tmp_path / 'profile'}"]
-    subprocess.run([BROWSER, *how, pages["report"].as_uri()], capture_output=True, timeout=240, check=True)
+    browse(pages["report"], f"--print-to-pdf={paper}")
     assert paper.read_bytes().startswith(b"%PDF")
     assert paper.stat().st_size > 30_000  # with its charts

@@ -5,6 +5,7 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
+from arms import posed
 from report_fits import make_problem
 
 from hydroid.arm.model import load_model
@@ -32,14 +33,12 @@ def moved(model: mujoco.MjModel, error=ERROR, most: int = MOST) -> MovingArm:
 
 
 def test_the_last_link_is_drawn_where_mujoco_puts_it(model):
-    arm, data = moved(model), mujoco.MjData(model)
-    address = [int(model.joint(name).qposadr[0]) for name in ARM.joint_names]
+    arm = moved(model)
     root, tip = int(model.joint(ARM.joint_names[2]).bodyid[0]), model.body(ARM.link_names[-1]).id
     poses, moments = arm.poses["measured"][2].reshape(-1, 2, 4), (0, len(arm.time) - 1)
     world, drawn = [], []
     for moment in moments:
-        data.qpos[address] = LOG.angle[np.searchsorted(LOG.time, arm.time[moment])]
-        mujoco.mj_kinematics(model, data)
+        data = posed(model, LOG.angle[np.searchsorted(LOG.time, arm.time[moment])])
         world.append(data.xpos[tip].copy())
         own = (data.xpos[tip] - data.xpos[root]) @ data.xmat[root].reshape(3, 3)
         drawn.append(poses[moment, :, :3] @ own + poses[moment, :, 3])

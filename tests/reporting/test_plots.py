@@ -62,12 +62,7 @@ SHAPES = {
     ),
     "nothing but diverged": (
         {},
-        {
-            "names": ("best", "refined"),
-            "diverged": ("best", "refined"),
-            "front": 0,
-            "effects": (np.nan,) * 4,
-        },
+        {"names": ("best", "refined"), "diverged": ("best", "refined"), "front": 0, "effects": (np.nan,) * 4},
     ),
     "fixed without bounds, relative": ({"parameters": TWO, "fixed": {"D": 80.0}, "relative": True}, {}),
     "names that are markup": ({"sources": ("<b>&_%$a$.csv",)}, {}),

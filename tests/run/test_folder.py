@@ -16,10 +16,10 @@ from small_fits import Watcher
 from hydroid import fit, load_settings, read_logs
 from hydroid.errors import RunError
 from hydroid.log import write_log
-from hydroid.reporting import page_file
 from hydroid.run.folder import RunFolder
 from hydroid.run.process import locked
 
+pytestmark = pytest.mark.usefixtures("no_report")
 SETTINGS = load_settings("article-mech", SMALL | {"refinement": None})
 
 
@@ -28,12 +28,6 @@ def path(tmp_path_factory) -> Path:
     path = tmp_path_factory.mktemp("log") / "log.csv"
     write_log(path, stepped(SETTINGS, TRUTH, [60.0, -80.0]), SETTINGS.log)
     return path
-
-
-@pytest.fixture(autouse=True)
-def _no_report(monkeypatch):
-    """Figures take longer than all else here."""
-    monkeypatch.setattr(page_file, "write_page", lambda *_: [])
 
 
 @pytest.fixture

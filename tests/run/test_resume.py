@@ -52,13 +52,7 @@ def content(folder: Path) -> dict[str, object]:
 SEARCHES = {
     "ga": [*SHORT, "--set", "search.ga.generations=20", "--set", "refinement.iterations=20"],
     "nsga2": ["-q", "--set", "search.nsga2={population: 10, generations: 20}", "--no-refinement"],
-    "multistart": [
-        "-q",
-        "--algorithm",
-        "multistart",
-        "--set",
-        "search.multistart={starts: 3, iterations: 5}",
-    ],
+    "multistart": ["-q", "--algorithm=multistart", "--set=search.multistart={starts: 3, iterations: 5}"],
 }
 
 

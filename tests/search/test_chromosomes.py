@@ -76,9 +76,7 @@ def test_candidates_are_drawn_in_proportion_to_their_fitness(objective, fitness)
     assert ((counts[drawn] - expected) ** 2 / expected).sum() < 16.3  # chi-square, 3 degrees, p = 0.001
 
 
-@given(
-    pairs=st.integers(1, 6), length=st.integers(1, 40), points=st.integers(1, 50), seed=st.integers(0, 999)
-)
+@given(st.integers(1, 6), st.integers(1, 40), st.integers(1, 50), st.integers(0, 999))
 def test_n_point_crossover_makes_n_cuts(pairs, length, points, seed):
     swaps = pointwise_swaps(pairs, length, points, np.random.default_rng(seed))
     cuts = np.count_nonzero(swaps[:, 1:] != swaps[:, :-1], axis=1)

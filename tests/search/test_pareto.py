@@ -12,9 +12,8 @@ from hydroid.search.pareto import average, crowding, non_dominated, ranks, segme
 PROBLEMS = [("zdt1", {}), ("zdt4", {}), ("dtlz7", {"n_var": 10, "n_obj": 8})]
 
 values = st.one_of(st.integers(0, 4).map(float), st.sampled_from([np.nan, np.inf, -np.inf]))
-populations = st.tuples(st.integers(1, 14), st.integers(1, 4)).flatmap(
-    lambda s: arrays(float, s, elements=values)
-)
+shapes = st.tuples(st.integers(1, 14), st.integers(1, 4))
+populations = shapes.flatmap(lambda s: arrays(float, s, elements=values))
 
 
 @pytest.mark.parametrize(("name", "size"), PROBLEMS)

@@ -124,8 +124,7 @@ design: {joints: [boom]}
 
 
 def test_joints_and_links_may_be_given_by_name(tmp_path):
-    path = tmp_path / "fit.yaml"
-    path.write_text(NAMED.replace("  m: {quantity: mass, each: [boom], fixed: 5}\n", ""))
+    path = written(tmp_path, NAMED.replace("  m: {quantity: mass, each: [boom], fixed: 5}\n", ""))
     settings = hydroid.load_settings(path, {"log.joints.arm.angle.column": "q"})
     assert settings.outputs == (1, 2)
     assert settings.log.columns("command", 4) is None
@@ -151,10 +150,8 @@ def test_joints_and_links_may_be_given_by_name(tmp_path):
     ],
 )  # fmt: skip
 def test_an_unknown_name_is_refused_with_those_there_are(tmp_path, old, new, message):
-    path = tmp_path / "fit.yaml"
-    path.write_text(NAMED.replace(old, new))
     with pytest.raises(SettingsError, match=message):
-        Bindings(hydroid.load_settings(path))
+        Bindings(hydroid.load_settings(written(tmp_path, NAMED.replace(old, new))))
 
 
 def test_a_joint_inherits_what_it_does_not_say() -> None:

@@ -1,8 +1,8 @@
 """The quasi-static rollout: closed forms, its limit of the dynamic one, the pump's balance, static loads."""
 
-import mujoco
 import numpy as np
 import pytest
+from arms import posed
 from conftest import candidates
 from made_logs import at_rest
 from observation import trace
@@ -134,12 +134,7 @@ def test_what_is_not_drawn_from_the_pump_does_not_load_it(simulated, model):
 def test_pressures_carry_the_load_and_a_closed_valve_holds_it(simulated, arm, spec):
     angle, trace, _ = simulated({SHOULDER: 0})
     np.testing.assert_array_equal(angle, np.broadcast_to(angle[0], angle.shape))
-    model = spec.compile()
-    data = mujoco.MjData(model)
-    for name, q in zip(arm.joint_names, arm.pose("study"), strict=True):
-        data.joint(name).qpos[0] = q
-    mujoco.mj_forward(model, data)
-    held = data.joint(arm.joint_names[SHOULDER]).qfrc_bias[0]
+    held = posed(spec.compile(), arm.pose("study")).qfrc_bias[SHOULDER]
     length, q = arm.joints[SHOULDER].actuator.length, arm.pose("study")[SHOULDER]
     lever = (length(q + 1e-4) - length(q - 1e-4)) / 2e-4
     assert trace.force[-1, 0] * lever == pytest.approx(held, rel=1e-3)
@@ -155,18 +150,15 @@ def test_valves_that_open_once_for_all_open_as_each_alone(spec, arm):
     command = np.zeros((60, len(arm.joints)))
     command[5:30, [SHOULDER, ROLL]], command[30:, [SHOULDER, ROLL]] = (70, -55), (-40, 80)
     log = at_rest(arm.pose("study"), command, 0.02)
-    names = [
-        name for name in JOINT.names or () if JOINT[name].kind == "f" and name not in ("sense", "stroke")
-    ]
+    names = [n for n in JOINT.names or () if JOINT[n].kind == "f" and n not in ("sense", "stroke")]
     everyone = candidates(arm, len(names))
     everyone.mass[:] = arm.masses
     everyone.joints[:] = nominal_joints(arm, HydraulicSettings(pump_flow=4.0, dead_band_a=10, dead_band_b=10))
     for row, name in enumerate(names):
         value = everyone.joints[name][row]
         everyone.joints[name][row] = np.where(np.isfinite(value), 1.01 * value, value)
-    simulation = Simulation(
-        Scenario(spec, arm, log, [SHOULDER, ROLL], SimulationSettings(model="quasi-static")), 10
-    )
+    settings = SimulationSettings(model="quasi-static")
+    simulation = Simulation(Scenario(spec, arm, log, [SHOULDER, ROLL], settings), 10)
     together = simulation.simulate(everyone).angle
     alone = [simulation.simulate(everyone[row : row + 1]).angle[0] for row in range(len(names))]
     np.testing.assert_array_equal(together, alone)

@@ -108,10 +108,12 @@ class Ladder:
         two = settings.stage == "hyd" and settings.simulation.model == "ladder"
         climbs = two or bool(settings.terms)
         for model in ("refined", "dynamic")[: 1 + two]:
-            terms = self.kept.name.split("+")[1:] if model == "dynamic" else []
+            possible = settings.terms_of(model)
+            terms = [term for term in possible if term in self.kept.name.split("+")]
             self._rung(whole, "+".join([model, *terms]), climbs=climbs, if_nearer=model == "dynamic")
-            for term in settings.terms if self.kept.name == model else ():
-                self._rung(whole, f"{self.kept.name}+{term}", climbs=climbs, if_nearer=True)
+            for term in possible if self.kept.name.startswith(model) else ():
+                if term not in terms:
+                    self._rung(whole, f"{self.kept.name}+{term}", climbs=climbs, if_nearer=True)
         if climbs:
             name, left_out = self.kept.name, self.kept.left_out
             last = self._refined(self.problem, self.kept.theta, refinement, name)

@@ -14,6 +14,8 @@ from typing import Any, TypeVar
 import numpy as np
 from numba.extending import overload, register_jitable
 
+from hydroid.arrays import Array
+
 F = TypeVar("F", bound=Callable[..., Any])
 
 
@@ -35,6 +37,17 @@ def implicit_weight(speed) -> Any:
 def kept(steps) -> Any:
     """Part of its error that a first-order lag of so many steps leaves after one."""
     return np.exp(-1.0 / np.maximum(steps, 1e-300))
+
+
+def ringing(frequency: Array, ratio: Array, step: float) -> tuple[Array, Array]:
+    """What a free oscillation leaves after a step [s]: C and S [s], of which `rung` makes its new state.
+
+    The frequency without damping is in Hz, the damping ratio below 1; of infinite frequencies without meaning.
+    """
+    pace = 2.0 * np.pi * np.where(np.isfinite(frequency), frequency, 0.0)
+    turn, decay = pace * np.sqrt(1.0 - ratio**2) * step, np.exp(-ratio * pace * step)
+    sine = decay * step * np.sinc(turn / np.pi)
+    return decay * np.cos(turn) - ratio * pace * sine, sine
 
 
 @overload(implicit_weight)

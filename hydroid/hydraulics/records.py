@@ -14,7 +14,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from hydroid.arrays import Mask, Structs
-from hydroid.hydraulics.elementwise import kept
+from hydroid.hydraulics.elementwise import kept, ringing
 from hydroid.hydraulics.solenoid import curve_exists, force_curve, plunger_weight
 from hydroid.hydraulics.valve import conductance
 from hydroid.quantity_table import QUANTITIES, ROWS
@@ -69,14 +69,14 @@ COEFFICIENTS = np.dtype(
         *((name, JOINT[name]) for name in _PLAIN),
         ("a", SIDE),
         ("b", SIDE),
-        *_fields("theta0 shortest coil gap conductance opening_keep opening_steps backflow relief"),
+        *_fields("theta0 shortest coil gap conductance opening_keep opening_steps backflow relief ring_cosine ring_sine"),
     ]
 )
 """what the kernel reads of a joint: its fields of JOINT, and constants that follow from them; theta0 is the
 pivots' angle at joint angle 0 [rad], below 0 if the rod runs out towards negative angles, shortest the
 cylinder's length with the rod fully in [m], opening_keep the part of the opening's error that a sub-step
 leaves, opening_steps its lag in sub-steps, backflow the least flow from the pump [m³/s], relief the pressure
-of the pump's relief valve [Pa]"""
+of the pump's relief valve [Pa]; ring_cosine and ring_sine [s] are those of `elementwise.ringing`"""
 
 SIDE_STATE = np.dtype(
     _fields(
@@ -93,6 +93,7 @@ JOINT_STATE = np.dtype(
         *_fields(
             "external hold "  # torque e that is neither oil nor damping; torque that held the start [N·m]
             "angle velocity "  # at the start of the step [rad]; at its end [rad/s]
+            "turning surge "  # on ringing oil: velocity [rad/s], and how it changes [rad/s²]
             "opening "  # of the valve, below 0 towards B [m²]
             "displacement open "  # of the spool [m], NaN before the first; what it opens without a lag [m²]
             "way predicted torque armature "  # of the look-ahead: turn [rad], velocity v*, torque, h κ
@@ -183,6 +184,7 @@ def coefficients(joints: Records, period: float = 0.01, substeps: int = 1) -> Re
     table["conductance"] = conductance(p.flow_coefficient)
     table["opening_steps"] = p.opening_lag * substeps / period
     table["opening_keep"] = kept(table["opening_steps"])
+    table["ring_cosine"], table["ring_sine"] = ringing(p.oil_frequency, p.oil_damping, period)
     table["backflow"] = np.where(np.isinf(p.pump_flow), -np.inf, 0.0)
     table["relief"] = np.max(p.supply_pressure, axis=1, where=p.kind != NONE, initial=0.0)[:, None]
     for end, side in (("a", table.a), ("b", table.b)):

@@ -112,7 +112,16 @@ class FitSettings(Settings):
     @property
     def terms(self) -> tuple[str, ...]:
         """Names of the terms that a fit may add, in the order of the parameters."""
-        return tuple(dict.fromkeys(p.term for p in self.parameters.values() if p.term is not None))
+        return self.terms_of("")
+
+    def terms_of(self, model: str) -> tuple[str, ...]:
+        """Names of the terms that an estimate of a model may have; `dynamic` has its own oil and inertia."""
+        known = (
+            p.term
+            for p in self.parameters.values()
+            if model != "dynamic" or not p.quantity.startswith("oil_")
+        )
+        return tuple(dict.fromkeys(filter(None, known)))
 
     def of_estimate(self, name: str | None) -> "FitSettings":
         """Return the settings that an estimate of a fit was refined with, and predicts with.

@@ -21,6 +21,7 @@ from hydroid.hydraulics.records import SCRATCH
 
 BEHIND_VALVE = (
     *("damping", "stiffness", "friction", "dry_friction", "lever_slope", "lever_bend", "compensation"),
+    *("oil_frequency", "oil_damping", "ring_cosine", "ring_sine"),
     *("pump_flow", "pump_droop", "supply_pressure", "relief"),
 )
 BEHIND_PORT = "area", "draw", "return_"

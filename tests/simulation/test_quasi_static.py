@@ -1,5 +1,8 @@
 """The quasi-static rollout: closed forms, its limit of the dynamic one, the pump's balance, static loads."""
 
+from types import SimpleNamespace
+
+import mujoco
 import numpy as np
 import pytest
 from arms import posed
@@ -7,11 +10,13 @@ from conftest import candidates
 from made_logs import at_rest
 from observation import trace
 
+from hydroid.hydraulics.elementwise import ringing
 from hydroid.hydraulics.records import JOINT, nominal_joints
 from hydroid.hydraulics.valve import DENSITY
 from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.problem import SimulationSettings
 from hydroid.simulation import Simulation
+from hydroid.simulation.quasi_static import overshoot
 from hydroid.simulation.scenario import Scenario
 
 SHOULDER, ROLL = 1, 3
@@ -143,6 +148,39 @@ def test_pressures_carry_the_load_and_a_closed_valve_holds_it(simulated, arm, sp
 def test_a_load_beyond_the_supply_is_held_and_never_sinks(simulated):
     angle, _, _ = simulated({SHOULDER: 80}, supply_pressure=6e5)
     assert np.ptp(angle) == 0.0
+
+
+@pytest.mark.parametrize("ratio", [0.0, 0.3, 0.9])
+def test_a_joint_rings_on_its_oil_as_the_exact_solution_whatever_the_step(ratio):
+    """Start at rest under a constant velocity without oil: the known step response, and its lost way."""
+    pace, wanted, ends = 2 * np.pi * 1.7, 0.6, []
+    for steps in (1, 40):
+        cosine, sine = ringing(np.array(1.7), np.array(ratio), 0.8 / steps)
+        c = SimpleNamespace(oil_frequency=1.7, oil_damping=ratio, ring_cosine=cosine, ring_sine=sine)
+        z = SimpleNamespace(turning=0.0, surge=0.0)
+        ends.append((sum(overshoot(c, z, wanted) for _ in range(steps)), z.turning, z.surge))
+    np.testing.assert_allclose(ends[0], ends[1], rtol=1e-9)
+    fast = pace * np.sqrt(1 - ratio**2)
+    shift, decay = np.arcsin(ratio), np.exp(-ratio * pace * 0.8)
+    velocity = wanted * (1 - decay * np.cos(fast * 0.8 - shift) / np.cos(shift))
+    assert ends[0][1] == pytest.approx(velocity, rel=1e-9)
+    if ratio == 0.9:  # it has come to rest at the velocity, 2 ζ/ω late
+        assert ends[0][0] == pytest.approx(-2 * ratio / pace * wanted, rel=1e-2)
+
+
+def test_the_dynamic_model_rings_as_frequency_and_damping_ratio_say(simulated, arm, spec):
+    """A rotary actuator with soft oil: ω² = 2 β D²/(V M)."""
+    soft = {"bulk_modulus": 2e6, "leakage": 1e-14, "damping": 0.0, "period": 0.005}
+    angle, _, joints = simulated({ROLL: 50}, 0.8, "dynamic", **soft)
+    model, inertia = spec.compile(), np.zeros((len(arm.joints),) * 2)
+    mujoco.mj_fullM(model, posed(model, arm.pose("study")), inertia)
+    roll = joints[ROLL]
+    stiffness = 2 * roll.bulk_modulus * roll.area_a**2 / roll.dead_volume
+    frequency = np.sqrt(stiffness / inertia[ROLL, ROLL]) / (2 * np.pi)
+    rigid, rings = (
+        simulated({ROLL: 50}, 0.8, **soft, oil_frequency=f, oil_damping=0.0)[0] for f in (np.inf, frequency)
+    )
+    assert np.abs(rings - angle).max() < 0.3 * np.abs(rigid - angle).max()
 
 
 def test_valves_that_open_once_for_all_open_as_each_alone(spec, arm):

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 import numpy as np
-from numba.extending import overload, register_jitable
+from numba.extending import register_jitable
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -22,6 +22,7 @@ def compilable(function: F) -> F:
     return register_jitable(function)
 
 
+@compilable
 def implicit_weight(speed) -> Any:
     """Weight of the new state in a linearised step, from rate times step (dimensionless).
 
@@ -35,11 +36,3 @@ def implicit_weight(speed) -> Any:
 def kept(steps) -> Any:
     """Part of its error that a first-order lag of so many steps leaves after one."""
     return np.exp(-1.0 / np.maximum(steps, 1e-300))
-
-
-@overload(implicit_weight)
-def _compiled_weight(speed) -> Any:  # pyright: ignore[reportUnusedFunction]
-    def scalar(speed) -> Any:
-        return 0.5 if speed <= 2.0 else 1.0 - 1.0 / speed
-
-    return scalar

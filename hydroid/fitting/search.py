@@ -64,7 +64,7 @@ def search(
     def theta(chromosomes: Genes) -> Array:
         if isinstance(algorithm, Multistart):  # its chromosomes are theta
             return chromosomes
-        return problem.theta(algorithm.decode(chromosomes))
+        return problem.theta(algorithm.coding.decode(chromosomes))
 
     def state() -> Arrays:
         done, _, simulated, diverged, best, _ = history[-1]

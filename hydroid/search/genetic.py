@@ -6,7 +6,7 @@ again from its seed, with the objectives that are known (`fitting.checkpoints`).
     population = None
     for _ in range(1 + generations):
         chromosomes = algorithm.ask(population, rng)
-        offspring = Population(chromosomes, objectives(algorithm.decode(chromosomes)))
+        offspring = Population(chromosomes, objectives(algorithm.coding.decode(chromosomes)))
         population = algorithm.tell(population, offspring)
 """
 
@@ -92,10 +92,6 @@ class SimpleGa:
     def coding(self) -> Coding:
         """How candidates are written as chromosomes."""
         return (GrayCoding if self.settings.coding == "binary" else IntegerCoding)(self.parameters)
-
-    def decode(self, chromosomes: Genes) -> Array:
-        """Return points of the unit box, shape (n, p)."""
-        return self.coding.decode(chromosomes)
 
     def ask(self, population: Population | None, rng: Generator) -> Genes:
         """Return chromosomes to be evaluated: the first population, or the offspring of one."""

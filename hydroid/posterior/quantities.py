@@ -34,7 +34,7 @@ Measured: TypeAlias = Iterator[tuple[Column, Array]]
 NaN where one is undefined"""
 
 
-Measure = Callable[[Candidates], list[tuple[Column, Array]]]
+Measure = Callable[[Candidates], Measured]
 
 
 @record
@@ -100,14 +100,15 @@ def joint_measure(bench: Bench, estimate: Candidates) -> Measure:
         names = zip((1.0, -1.0), signs, words, strict=True)
         tests, further = [speed_tests(bench, estimate, *name) for name in names], oil
 
-    def measure(candidates: Candidates) -> list[tuple[Column, Array]]:
+    def measure(candidates: Candidates) -> Measured:
         torque, inertia = bench.weigh(candidates)
         factor, unit = bench.unit
         word, of = ("force", "N") if unit == "mm" else ("torque", "N·m")
         label = f"gravity {word} at {factor * bench.angle:.0f} {unit}"
-        gravity = Column("gravity_torque_at_pose", label, of, False), torque
-        moved = [row for test in tests for row in test(candidates)]
-        return [*moved, *further(bench, candidates, inertia), gravity]
+        for test in tests:
+            yield from test(candidates)
+        yield from further(bench, candidates, inertia)
+        yield Column("gravity_torque_at_pose", label, of, False), torque
 
     return measure
 
@@ -166,9 +167,7 @@ ONSET, RISEN = 0.1, 1.0 - np.exp(-1.0)
 reach the second"""
 
 
-def speed_tests(
-    bench: Bench, estimate: Candidates, sign: float, ending: str, word: str
-) -> Callable[[Candidates], Measured]:
+def speed_tests(bench: Bench, estimate: Candidates, sign: float, ending: str, word: str) -> Measure:
     """Return what measures a joint in a direction, planned so that the estimate ends at its angle.
 
     `sign` is that of the commands; `ending` and `word` stand at the end of names and labels.

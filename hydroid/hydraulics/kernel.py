@@ -35,7 +35,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hydroid.hydraulics.elementwise import compilable
-from hydroid.hydraulics.joint import begin, coast, command, load, meter, move_spool, net_opening, settle
+from hydroid.hydraulics.joint import begin, coast, command, load, meter, net_opening, settle
 from hydroid.hydraulics.pump import begin_line, close_line, draw, fill, open_line
 from hydroid.hydraulics.records import LINE, SCRATCH
 from hydroid.settings import linkage
@@ -145,7 +145,7 @@ def look_ahead(plugin: Plugin, state, commands, now: int, arm, pad: Pad) -> None
             coast(c, z, w, step)
             matrix[a, a] += w.weight * step * w.drag
         else:
-            command(z, w, commands[now - c.a.late, j], commands[now - c.b.late, j])
+            command(c, z, w, commands[:, j], now)
         for b in range(a + 1, joints):
             matrix[a, b] = arm.mass[entries[a, b]]
     if shared:
@@ -164,7 +164,7 @@ def look_ahead(plugin: Plugin, state, commands, now: int, arm, pad: Pad) -> None
             c, z, w = coefficients[j], state[j], work[j]
             if a >= idle:
                 supply = min(line.pressure, c.supply_pressure) if shared else c.supply_pressure
-                meter(c, w, net_opening(c, z, move_spool(c, z, w, i, step)), supply)
+                meter(c, w, net_opening(c, z, w, i, step), supply)
                 load(c, z, w, step)
                 if shared:
                     draw(line, c, w)

@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 
 from hydroid.arrays import Array, Structs
-from hydroid.hydraulics.joint import command, mean_opening
+from hydroid.hydraulics.joint import mean_opening
 from hydroid.hydraulics.kernel import SOURCE, Plugin
 from hydroid.hydraulics.records import SCRATCH
 
@@ -32,8 +32,7 @@ def _open(valve: Plugin, rest, commands, opening, source: int = SOURCE) -> None:
     """Write the mean opening of one joint's valve in each step, (steps,), from its state at rest, (1,)."""
     c, z, w, past = valve.coefficients[0], rest[0], np.zeros(1, SCRATCH)[0], commands.size - opening.size
     for k in range(opening.size):
-        command(z, w, commands[past + k - c.a.late], commands[past + k - c.b.late])
-        opening[k] = mean_opening(c, z, w, valve.substeps, valve.period / valve.substeps)
+        opening[k] = mean_opening(c, z, w, commands, past + k, valve)
 
 
 def valve_openings(

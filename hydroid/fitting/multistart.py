@@ -28,7 +28,6 @@ from hydroid.posterior.bench import make_bench
 from hydroid.problem.problem import Problem
 from hydroid.search.chromosomes import Genes
 from hydroid.search.genetic import Population
-from hydroid.settings.search import RefinementSettings
 
 DRAWS = 64  # candidates drawn for a start that can be simulated
 MOVES = 0.01
@@ -160,31 +159,6 @@ def alone(problem: Problem, joint: int, theta: Array) -> Problem:
     """
     settings = problem.settings.alone(joint, problem.parameters.mapping(theta))
     return problem.varied(settings, [log.driving(joint) for log in problem.logs if log.driven[joint - 1]])
-
-
-def each_alone(
-    problem: Problem,
-    theta: Array,
-    settings: RefinementSettings,
-    progress: Refining,
-    checkpoints: Checkpoints,
-    name: str,
-) -> Array:
-    """Return theta, (P,), after every joint that can be was refined alone; other arguments as of `refine`.
-
-    What the joints share is known better by now. A valve whose compensation stood for it starts without, too.
-    """
-    for joint in lone_joints(problem):
-        own, parameters = alone(problem, joint, theta), problem.settings.parameters.values()
-        loaded = np.array([p.quantity == "compensation" and p.joints == (joint,) for p in parameters])
-        starts = np.unique([theta, np.where(loaded & own.parameters.free, 0.0, theta)], axis=0)
-        tried = [
-            refine(own.from_afar(), start, settings, progress, checkpoints, f"{name} joint {joint} start {i}")
-            for i, start in enumerate(starts, 1)
-        ]
-        best = min(tried, key=lambda one: one.cost)
-        theta = np.where(own.parameters.free, own.parameters.from_unit(best.point), theta)
-    return theta
 
 
 def by_numbers(problem: Problem, joint: int, theta: Array) -> Array:

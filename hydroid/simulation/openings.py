@@ -40,23 +40,22 @@ def valve_openings(
 ) -> list[Array]:
     """Return the mean opening of n candidates' valves in each step [m²], shape (steps, J) each.
 
-    `states` are those of the start, shape (n, J), and `commands` the steps' [%], shape (steps, J). `run` is
-    that of a pool. No bit depends on the other candidates.
+    `states` are those of the start, shape (n, J), and `commands` those of a `Course`. `run` is that of a
+    pool. No bit depends on the other candidates.
     """
     alike = plugin.coefficients.copy()
     for fields, names in ((alike, BEHIND_VALVE), (alike["a"], BEHIND_PORT), (alike["b"], BEHIND_PORT)):
         for name in names:
             fields[name] = 0.0
     candidates, joints = alike.shape
-    delayed = np.vstack([np.zeros((plugin.past, joints)), commands])
     keys = [[(j, alike[i, j].tobytes()) for j in range(joints)] for i in range(candidates)]
     owners = {key: i for i, row in enumerate(keys) for key in row}
-    curves = {key: np.zeros(len(commands)) for key in owners}
+    curves = {key: np.zeros(len(commands) - plugin.past) for key in owners}
 
     def open_one(key: tuple[int, bytes]) -> None:
         i, j = owners[key], key[0]
         valve = plugin._replace(coefficients=plugin.coefficients[i, j : j + 1])
-        _open(valve, states[i, j : j + 1].copy(), delayed[:, j], curves[key])
+        _open(valve, states[i, j : j + 1].copy(), commands[:, j], curves[key])
 
     driven = set(plugin.order[plugin.idle :].tolist())
     deque(run(open_one, (key for key in curves if key[0] in driven)), maxlen=0)

@@ -226,8 +226,7 @@ def roll(arm, plugin: Plugin, state, course, record, source: int = SOURCE) -> No
 class _Announcement(event.Listener):
     """Says once that numba compiles, which it does only where its cache holds nothing usable."""
 
-    def __init__(self) -> None:
-        self._made = False
+    _made = False
 
     def on_start(self, event) -> None:
         if not self._made:

@@ -109,8 +109,8 @@ def explained(problem: Problem, known: Uncertainty) -> Explained:
     """Return what a fit has explained at an estimate. Parameters at bounds are held."""
     linear = known.linear
     scores = linear.prior_weight * problem.priors.scores(known.theta[None])[0]
-    residual = np.zeros(linear.effects.shape[1])  # 0 behind: the estimate does not depend on the weak priors
-    residual[: linear.residual.size + scores.size] = np.append(linear.residual, scores)
+    weak = np.zeros(len(linear.slopes))  # the estimate does not depend on the weak priors
+    residual = np.concatenate([linear.residual, scores, weak])
     rows, noise_of = [c.rows for c in problem.channels], partial(problem_noise, problem)
     return Explained(linear.effects, residual, noise_of, rows, linear.prior_weight)
 

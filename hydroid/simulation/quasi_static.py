@@ -92,7 +92,7 @@ def line_pressure(plugin: Plugin, work, line, share: float, some) -> float:
     low, high = 0.0, some.relief
     pressure = min(max(line.pressure, 1e-3 * high), high)
     for _ in range(ITERATIONS):
-        given, slope = delivery(pressure, share, some.relief, some)
+        given, slope = delivery(pressure, share, some)
         excess = line.taken - given
         for a in range(plugin.idle, plugin.order.size):
             j = plugin.order[a]

@@ -111,8 +111,7 @@ class Simulation:
         steps, model = scenario.settings.steps, scenario.arm.model
         rollout = roll_quasi_static if self._quasi_static else roll
         model = repeat(model, copies) if copies > 1 else model
-        pushed = np.arange(model.nv) if copies > 1 else chain.pushed
-        return SteppedArm(model, chain.columns, pushed, steps, rollout, copies)
+        return SteppedArm(model, chain.columns, steps, rollout, copies)
 
     def _follower(
         self, candidates: Candidates, arm: SteppedArm, run: Callable[..., Iterable[None]]

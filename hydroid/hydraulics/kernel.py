@@ -134,7 +134,7 @@ def look_ahead(plugin: Plugin, state, commands, now: int, arm, pad: Pad) -> None
     some, last = coefficients[order[joints - 1]], state[order[joints - 1]]
     shared = idle < joints and some.pump_flow < np.inf
     part = 1.0 / substeps
-    step = part * period
+    step, demanded = part * period, False
     for a in range(joints):
         j = order[a]
         c, z, w = coefficients[j], state[j], work[j]
@@ -146,12 +146,10 @@ def look_ahead(plugin: Plugin, state, commands, now: int, arm, pad: Pad) -> None
             matrix[a, a] += w.weight * step * w.drag
         else:
             command(c, z, w, commands[:, j], now)
+            demanded |= commands[now, j] != 0.0
         for b in range(a + 1, joints):
             matrix[a, b] = arm.mass[entries[a, b]]
     if shared:
-        demanded = False
-        for a in range(idle, joints):
-            demanded |= commands[now, order[a]] != 0.0
         begin_line(line, some, last, demanded, step)
     # joints without actuator bring the same to all sub-steps: they are eliminated once
     eliminate(matrix, 0, idle)

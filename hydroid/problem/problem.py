@@ -81,10 +81,11 @@ class Problem:
         self.channels = make_channels(logs, settings)
         self.measured = np.concatenate([c.weight * c.measured for c in self.channels])
         many = settings.objective.segments  # of an angle; a pressure is one objective, however long
-        counts = [many if c.quantity == "angle" else 1 for c in self.channels]
-        pairs = zip(self.channels, counts, strict=True)
         self.bounds: Ints = np.concatenate(
-            [c.rows.start + segment_bounds(len(c.measured), n) for c, n in pairs]
+            [
+                c.rows.start + segment_bounds(len(c.measured), many if c.quantity == "angle" else 1)
+                for c in self.channels
+            ]
         )
 
     @property

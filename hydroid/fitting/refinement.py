@@ -47,9 +47,9 @@ def refine(
     problem: Problem,
     theta: Array,
     settings: RefinementSettings,
-    progress: Refining = lambda *_: False,
-    checkpoints: Checkpoints | None = None,
-    name: str = "refined",
+    progress: Refining,
+    checkpoints: Checkpoints,
+    name: str,
 ) -> Descent:
     """Improve an estimate by bounded least squares.
 
@@ -65,7 +65,6 @@ def refine(
     is; a result too.
     Raises RunError: the checkpoint cannot be written.
     """
-    checkpoints = {} if checkpoints is None else checkpoints
     simulated = 0
     if any(channel.prefilter is not UNFILTERED for channel in problem.channels):
         rough = settings.changed({"gain_tolerance": max(settings.gain_tolerance, ROUGH)})

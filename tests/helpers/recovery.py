@@ -35,7 +35,14 @@ def recover(
     rng = np.random.default_rng(0)
     # the start pose is known here; its noise is another test's subject
     problem = Problem(settings, [noisy(simulate_log(settings, log, truth), NOISE_DEG, rng) for log in logs])
-    ended = refine(problem, problem.parameters.vector(start, "start"), RefinementSettings())
+    ended = refine(
+        problem,
+        problem.parameters.vector(start, "start"),
+        RefinementSettings(),
+        lambda *_: None,
+        {},
+        "refined",
+    )
     return uncertainty(problem, problem.parameters.from_unit(ended.point))
 
 

@@ -63,7 +63,9 @@ def test_leaving_out_each_log_predicts_it(fitted):
     logs = [driven(settings, levels, seed) for seed, levels in enumerate(drives)]
     for i, log in enumerate(logs):
         problem = Problem(settings, [*logs[:i], *logs[i + 1 :]])
-        theta = problem.parameters.from_unit(refine(problem, model.theta, RefinementSettings()).point)
+        theta = problem.parameters.from_unit(
+            refine(problem, model.theta, RefinementSettings(), lambda *_: None, {}, "fold").point
+        )
         fold = IdentifiedModel(settings, theta, "fold", account(problem, uncertainty(problem, theta)))
         band = prediction_bands(fold, log, predict(fold, log, settings.outputs))[2]
         assert 0.5 < band.error / band.expected < 1.2

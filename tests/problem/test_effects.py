@@ -47,7 +47,7 @@ def fitted(tmp_path_factory) -> tuple[Problem, np.ndarray]:
     problem = Problem(of_days(folder), logs_of_days(folder))
     start = problem.parameters.started(TRUTH)
     return problem, problem.parameters.from_unit(
-        refine(problem, start, RefinementSettings(iterations=20)).point
+        refine(problem, start, RefinementSettings(iterations=20), lambda *_: None, {}, "refined").point
     )
 
 

@@ -95,7 +95,7 @@ def test_a_refinement_weighs_priors_against_the_logs():
     settings = load_settings("article-mech", {"priors": known, "objective.segments": 2})
     problem = Problem(settings, [noisy(stepped(settings, TRUTH, [60.0, -80.0, 30.0, 0.0]), 0.1)])
     truth = problem.parameters.vector(TRUTH, "truth")
-    result = refine(problem, 0.9 * truth, RefinementSettings(iterations=30), lambda *_: None)
+    result = refine(problem, 0.9 * truth, RefinementSettings(iterations=30), lambda *_: None, {}, "refined")
     theta = problem.parameters.from_unit(result.point[None])
     assert theta[0, 3:].sum() == pytest.approx(30.0, abs=0.3)
     assert np.rad2deg(problem.rms(problem.residuals(theta))[0]) < 0.105

@@ -146,9 +146,8 @@ def lone_joints(problem: Problem) -> tuple[int, ...]:
     There are none if there are fewer than two, or if a log does not measure how a driven joint moves.
     """
     measured = all(log.measured[log.driven].all() for log in problem.logs)
-    driven = np.any([log.driven for log in problem.logs], axis=0)
     settings = problem.settings
-    joints = tuple(j for j in settings.outputs if driven[j - 1] and settings.acting_on(j))
+    joints = tuple(j for j in settings.outputs if problem.driven[j - 1] and settings.acting_on(j))
     return joints if settings.stage == "hyd" and measured and len(joints) > 1 else ()
 
 

@@ -122,8 +122,14 @@ def _following(problem: Problem, now: _Refinement) -> _Refinement:
     if abs(prior_weight(problem, row) - now.weight) <= SETTLED * now.weight:
         return now
     here = _estimated(problem, now.point, None if problem.leaves_start_open else row)
-    changed = {"residual": here.residual, "cost": here.cost, "weight": here.weight, "anchor": here.anchor}
-    return replace(now, **changed, noises=now.noises + 1)
+    return replace(
+        now,
+        residual=here.residual,
+        cost=here.cost,
+        weight=here.weight,
+        anchor=here.anchor,
+        noises=now.noises + 1,
+    )
 
 
 def _residuals(problem: Problem, now: _Refinement) -> Callable[[Array], Array]:

@@ -50,6 +50,7 @@ class Problem:
 
     Attributes:
         channels: the compared signals, in the order of a row of residuals.
+        driven: joints that any log drives, shape (J,).
         measured: all channels in a row, times their weights, shape (R,).
         open_starts: what open start angles can explain, taken out of the residuals (`with_open_starts`).
         bounds: [first, end) of each objective's samples in it, shape (S, 2).
@@ -69,8 +70,8 @@ class Problem:
         self._spread = spread
         self.open_starts: tuple[OpenStart, ...] = ()
         self.bindings = Bindings(settings)
-        self._driven = np.any([log.driven for log in logs], axis=0)
-        self.bindings.refuse_idle(self._driven, outputs)
+        self.driven = np.any([log.driven for log in logs], axis=0)
+        self.bindings.refuse_idle(self.driven, outputs)
         self.parameters = settings.parameter_set()
         if not self.parameters.free.any():
             raise SettingsError("no parameter is free", "parameters", "fix fewer of them")
@@ -91,7 +92,7 @@ class Problem:
     @property
     def active_joints(self) -> tuple[int, ...]:
         """Joints that a log drives or that are compared, numbered from 1."""
-        return tuple(sorted({*(np.flatnonzero(self._driven) + 1).tolist(), *self.settings.outputs}))
+        return tuple(sorted({*(np.flatnonzero(self.driven) + 1).tolist(), *self.settings.outputs}))
 
     def varied(self, settings: FitSettings, logs: Sequence[Log] | None = None) -> "Problem":
         """Return the problem with other settings, or other logs too, simulated in the same place."""

@@ -19,11 +19,11 @@ from hydroid.hydraulics.joint import mean_opening
 from hydroid.hydraulics.kernel import SOURCE, Plugin
 from hydroid.hydraulics.records import SCRATCH
 
-BEHIND_VALVE = (
+BEHIND_VALVE = [
     *("damping", "stiffness", "friction", "dry_friction", "lever_slope", "lever_bend", "compensation"),
     *("pump_flow", "pump_droop", "supply_pressure", "relief"),
-)
-BEHIND_PORT = "area", "draw", "return_"
+]
+BEHIND_PORT = ["area", "draw", "return_"]
 """what a valve's opening does not depend on, of a joint and of its sides; the others are taken to matter"""
 
 
@@ -44,9 +44,7 @@ def valve_openings(
     pool. No bit depends on the other candidates.
     """
     alike = plugin.coefficients.copy()
-    for fields, names in ((alike, BEHIND_VALVE), (alike["a"], BEHIND_PORT), (alike["b"], BEHIND_PORT)):
-        for name in names:
-            fields[name] = 0.0
+    alike[BEHIND_VALVE] = alike["a"][BEHIND_PORT] = alike["b"][BEHIND_PORT] = 0.0
     candidates, joints = alike.shape
     keys = [[(j, alike[i, j].tobytes()) for j in range(joints)] for i in range(candidates)]
     owners = {key: i for i, row in enumerate(keys) for key in row}

@@ -33,7 +33,7 @@ from hydroid.arrays import Array, Mask, record, rms
 from hydroid.posterior.noise import Noise, problem_noise
 from hydroid.posterior.uncertainty import Uncertainty
 from hydroid.problem.problem import Problem
-from hydroid.progress import Progress, no_progress
+from hydroid.progress import Progress
 
 
 @record
@@ -153,7 +153,7 @@ class Candidate:
     gain: float
 
 
-def score_terms(problem: Problem, known: Uncertainty, progress: Progress = no_progress) -> list[Candidate]:
+def score_terms(problem: Problem, known: Uncertainty, progress: Progress) -> list[Candidate]:
     """Test every term of a problem at an estimate; those that the logs cannot show are left out."""
     every, fit, tests = terms(problem, known.theta), explained(problem, known), list[Candidate]()
     for done, term in enumerate(every):

@@ -62,8 +62,8 @@ class Multistart:
         """The point that the next start reaches, shape (1, P)."""
         number = 0 if population is None else len(population)
         theta = self.start(number)
-        if joints := lone_joints(self._problem):
-            theta = self._joint_by_joint(joints, number, theta)
+        if lone_joints(self._problem):
+            theta = self._joint_by_joint(number, theta)
             self._memo.elsewhere += 1
             rows = self._problem.residuals(theta[None])
             self._rms = rms(rows) if np.isfinite(rows).all() else np.inf
@@ -92,9 +92,9 @@ class Multistart:
         shortest = self._parts(self._problem)[0]
         return drawn[np.argmax(np.isfinite(shortest.residuals(drawn)).all(axis=1))]
 
-    def _joint_by_joint(self, joints: tuple[int, ...], number: int, theta: Array) -> Array:
+    def _joint_by_joint(self, number: int, theta: Array) -> Array:
         """Fit start `number`, (P,), to every joint alone; the last start takes the best one of each joint."""
-        for joint in joints:
+        for joint in lone_joints(self._problem):
             problem, name = alone(self._problem, joint, theta), f"start {number + 1} joint {joint}"
             tried = [self._grown(problem, by_numbers(problem, joint, theta), f"{name} numbers")]
             if not problem.leaves_noise(tried[0][1]):
@@ -167,9 +167,7 @@ def by_numbers(problem: Problem, joint: int, theta: Array) -> Array:
     """
     settings = problem.settings
     ends = [*settings.arm.ranges.values()][joint - 1]
-    found = fit_baselines(problem.logs, joint, ends).get(NAMES[-1])
-    if found is None:
-        return theta
+    found = fit_baselines(problem.logs, joint, ends)[NAMES[-1]]
     values = dict.fromkeys(("pilot_lag", "lever_slope", "lever_bend"), 0.0)
     values |= {"delay": found.delay, "compensation": 1.0}
     for row, name in (0, "dead_band"), (1, "opening_exponent"), (3, "opening_lag"):

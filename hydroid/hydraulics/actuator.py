@@ -50,8 +50,8 @@ def at_rest(plugin: Plugin, angle: Array, torque: Array) -> Structs:
     pressure_a = np.where(rests, c.trapped_pressure, pressure_a)
     pressure_b = np.where(rests, level, pressure_b)
     state = np.zeros(c.shape, JOINT_STATE)
-    sides = (state["a"], pressure_a), (state["b"], pressure_b)
-    for (z, pressure), fill in zip(sides, fills(angle, c), strict=True):
+    for side, pressure, fill in zip("ab", (pressure_a, pressure_b), fills(angle, c), strict=True):
+        z = state[side]
         z["oil"] = pressure + c.bulk_modulus * fill
         z["drive"] = drive(0.0, c)
         z["stroke"] = resting_stroke(z["drive"], c.gap, c.plunger_stiffness)

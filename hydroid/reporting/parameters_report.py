@@ -114,7 +114,7 @@ def quantity_section(settings: FitSettings, summary: FitSummary) -> Section | No
             (q.label, f"{q.value:.3g} {q.unit} ± {100 * q.within:.2g} %")
             for q in [q for q in known if q.joint == joint][:5]
         )
-        name = "machine" if joint is None else names[joint - 1]
+        name = names[joint - 1]
         if rows:
             cards[f"known_{name}"] = Table(name, ("quantity", "value"), rows)
     text = (

@@ -108,7 +108,7 @@ class Ladder:
         two = settings.stage == "hyd" and settings.simulation.model == "ladder"
         climbs = two or bool(settings.terms)
         for model in ("refined", "dynamic")[: 1 + two]:
-            terms = self.kept.name.split("+")[1:] if model == "dynamic" else []
+            terms = self.kept.name.split("+")[1:]
             self._rung(whole, "+".join([model, *terms]), climbs=climbs, if_nearer=model == "dynamic")
             for term in settings.terms if self.kept.name == model else ():
                 self._rung(whole, f"{self.kept.name}+{term}", climbs=climbs, if_nearer=True)
@@ -157,7 +157,7 @@ class Ladder:
             return
         new = self._measured(own, result, name)
         nearer = new.rms < (1 - MIN_GAIN) * start.rms
-        if nearer and own.settings.terms != last.settings.terms:
+        if nearer and more:
             without, with_it = self._error_left_out(last, start), self._error_left_out(own, new)
             self.estimates[name] = new = replace(new, left_out=(without, with_it))
             nearer = with_it < (1 - MIN_GAIN) * without or new.rms < CLEAR * start.rms

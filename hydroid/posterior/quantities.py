@@ -54,7 +54,8 @@ def quantities(problem: Problem, uncertainty: Uncertainty) -> Quantities:
     estimate = candidates(uncertainty.theta[None])
     for joint in problem.settings.outputs:
         named = problem.settings.arm.joint_names[joint - 1]
-        measure = joint_measure(make_bench(problem.settings, problem.logs, joint), estimate)
+        bench = make_bench(problem.settings, problem.logs, joint)
+        measure = joint_measure(bench, estimate)
         columns = [column for column, _ in measure(estimate)]
 
         def values(theta: Array, measure: Measure = measure) -> Array:
@@ -64,24 +65,24 @@ def quantities(problem: Problem, uncertainty: Uncertainty) -> Quantities:
         concerned = np.array([p.joints is None or joint in p.joints for p in parameters])
         positive = np.array([column.positive for column in columns])
         known = uncertainty.posterior.propagate(values, positive, concerned)
-        curve, given, unit = list[tuple[float, float, Interval]](), True, ""
+        curve, given = list[tuple[float, float, Interval]](), True
         for i in np.flatnonzero(np.isfinite(known.value)).tolist():
-            (name, label, unit_, _, command), value = columns[i], float(known.value[i])
+            (name, label, unit, _, command), value = columns[i], float(known.value[i])
             interval = finite_ends(known.interval[i])
             if command is not None:
                 curve.append((command, value, interval))
-                given, unit = given and known.given[i], unit_
+                given = given and known.given[i]
             elif not known.given[i]:
                 sd = finite(known.sd[i])
                 result.scalars[f"{named}_{name}"] = QuantityEstimate(
-                    label=label, joint=joint, value=value, unit=unit_, sd=sd, interval=interval
+                    label=label, joint=joint, value=value, unit=unit, sd=sd, interval=interval
                 )
         if not given:
             at, value, interval = zip(*sorted(curve), strict=True)
             result.curves[f"{named}_speed"] = CurveEstimate(
                 label="speed",
                 joint=joint,
-                unit=unit,
+                unit=f"{bench.unit[1]}/s",
                 along="command [%]",
                 at=at,
                 value=value,

@@ -44,8 +44,9 @@ def at_rest(plugin: Plugin, angle: Array, torque: Array) -> Structs:
     c: Records = plugin.coefficients.view(np.recarray)
     lever = rod_motion(angle, c)[1]
     level = np.where(np.isfinite(c.start_pressure), c.start_pressure, START_PRESSURE)
-    limits = c.supply_pressure, c.tank_pressure
-    pressure_a, pressure_b = holding_pressures(torque / lever, c.a.area, c.b.area, *limits, level)
+    pressure_a, pressure_b = holding_pressures(
+        torque / lever, c.a.area, c.b.area, c.supply_pressure, c.tank_pressure, level
+    )
     rests = np.isfinite(c.trapped_pressure) & (c.kind != NONE)
     pressure_a = np.where(rests, c.trapped_pressure, pressure_a)
     pressure_b = np.where(rests, level, pressure_b)

@@ -45,8 +45,7 @@ def valve_openings(
     """
     alike = plugin.coefficients.copy()
     alike[BEHIND_VALVE] = alike["a"][BEHIND_PORT] = alike["b"][BEHIND_PORT] = 0.0
-    candidates, joints = alike.shape
-    keys = [[(j, alike[i, j].tobytes()) for j in range(joints)] for i in range(candidates)]
+    keys = [[(j, valve.tobytes()) for j, valve in enumerate(row)] for row in alike]
     owners = {key: i for i, row in enumerate(keys) for key in row}
     curves = {key: np.zeros(len(commands) - plugin.past) for key in owners}
 

@@ -18,6 +18,7 @@ from hydroid.advice.design import design
 from hydroid.log import Log
 from hydroid.posterior.uncertainty import uncertainty
 from hydroid.problem.problem import Problem
+from hydroid.progress import no_progress
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.search import RefinementSettings
 
@@ -63,7 +64,7 @@ if __name__ == "__main__":
     given = options(__doc__, **chosen, without="")
     settings, clock = make_settings(given), Clock()
     estimate = THETA * np.exp(np.random.default_rng(SEED).uniform(np.log(0.8), np.log(1.25), len(THETA)))
-    best = design(settings, estimate, [], given.seed)
+    best = design(settings, estimate, [], given.seed, no_progress)
     print(f"designed in {clock} from {settings.design.effort} experiments", flush=True)
     randoms = [one.experiment for one in best.random if len(one.experiment.inputs) == len(settings.outputs)]
     randoms = randoms[: given.random]

@@ -16,6 +16,7 @@ from hydroid.arm.model import load_model
 from hydroid.log import Log
 from hydroid.problem.bindings import Bindings
 from hydroid.problem.problem import Problem, make_simulation
+from hydroid.progress import no_progress
 from hydroid.settings.fit import FitSettings
 
 TRUTH = {"A_A": 1000.0, "A_B": 750.0, "open_A": 0.4, "open_B": 0.4, "D": 150.0, "M3": 22.5}
@@ -56,7 +57,7 @@ def tried(term: str, k: int, seconds: float) -> tuple[bool, bool, bool, float, f
     """Of one log: named, first, anything named, rms on parts left out without and with it [deg]."""
     # seeds below 100 were used while the test was written
     problem = Problem(make_settings(), [make_log(term, seconds, 1000 * list(TERMS).index(term) + 100 + k)])
-    content = advice(problem, known(problem, TRUTH, np.random.default_rng([k, 5])))[0]
+    content = advice(problem, known(problem, TRUTH, np.random.default_rng([k, 5])), "RUN", no_progress)[0]
     free = [row["name"] for row in content["terms"] if "command" in row]
     sides = (term, f"{term}_a", f"{term}_b")
     rows = [row for row in (content, *content["terms"]) if "left_out_deg" in row]

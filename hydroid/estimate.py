@@ -81,7 +81,7 @@ class QuantityEstimate(Settings):
 
     label: str
     """in plain words"""
-    joint: int | None = None
+    joint: int
     """numbered from 1"""
     value: float
     unit: str

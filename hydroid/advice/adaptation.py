@@ -19,7 +19,7 @@ from hydroid.files import Plain
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
 from hydroid.problem.problem import Problem
-from hydroid.progress import Progress, no_progress
+from hydroid.progress import Progress
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.search import MultistartSettings, RefinementSettings
 
@@ -55,8 +55,8 @@ def adapted(model: IdentifiedModel, free: Sequence[str]) -> FitSettings:
 def steps(
     model: IdentifiedModel,
     logs: Sequence[Log],
-    free: Sequence[str] = (),
-    progress: Progress = no_progress,
+    free: Sequence[str],
+    progress: Progress,
 ) -> list[Plain]:
     """Return what freeing parameters one after another does, after the model as it is (""), as JSON has it.
 

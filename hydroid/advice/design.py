@@ -32,7 +32,7 @@ from hydroid.posterior.uncertainty import uncertainty
 from hydroid.problem.bindings import Bindings
 from hydroid.problem.priors import Priors
 from hydroid.problem.problem import Problem, make_simulation
-from hydroid.progress import Progress, no_progress
+from hydroid.progress import Progress
 from hydroid.search.axes import differentiate
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.search import DesignSettings
@@ -173,9 +173,7 @@ def weakest(known: Posterior, directions: Array) -> float:
     return np.sqrt(np.linalg.eigh(directions.T @ known.covariance @ directions)[0][-1])
 
 
-def design(
-    settings: FitSettings, theta: Array, logs: Sequence[Log], seed: int, progress: Progress = no_progress
-) -> Design:
+def design(settings: FitSettings, theta: Array, logs: Sequence[Log], seed: int, progress: Progress) -> Design:
     """Choose start pose, joints and commands of an experiment at an estimate, shape (P,), beside its logs.
 
     Random experiments are drawn and kept within the limits. The best few are then changed at random, and a

@@ -33,7 +33,7 @@ from hydroid.arrays import Array, Mask, record, rms
 from hydroid.posterior.noise import Noise, problem_noise
 from hydroid.posterior.uncertainty import Uncertainty
 from hydroid.problem.problem import Problem
-from hydroid.progress import Progress, no_progress
+from hydroid.progress import Progress
 
 
 @record
@@ -109,8 +109,8 @@ def explained(problem: Problem, known: Uncertainty) -> Explained:
     """Return what a fit has explained at an estimate. Parameters at bounds are held."""
     linear = known.linear
     scores = linear.prior_weight * problem.priors.scores(known.theta[None])[0]
-    residual = np.zeros(linear.effects.shape[1])  # 0 behind: the estimate does not depend on the weak priors
-    residual[: linear.residual.size + scores.size] = np.append(linear.residual, scores)
+    weak = np.zeros(len(linear.slopes))  # the estimate does not depend on the weak priors
+    residual = np.concatenate([linear.residual, scores, weak])
     rows, noise_of = [c.rows for c in problem.channels], partial(problem_noise, problem)
     return Explained(linear.effects, residual, noise_of, rows, linear.prior_weight)
 
@@ -153,7 +153,7 @@ class Candidate:
     gain: float
 
 
-def score_terms(problem: Problem, known: Uncertainty, progress: Progress = no_progress) -> list[Candidate]:
+def score_terms(problem: Problem, known: Uncertainty, progress: Progress) -> list[Candidate]:
     """Test every term of a problem at an estimate; those that the logs cannot show are left out."""
     every, fit, tests = terms(problem, known.theta), explained(problem, known), list[Candidate]()
     for done, term in enumerate(every):

@@ -22,7 +22,7 @@ from hydroid.posterior.noise import error_level
 from hydroid.posterior.posterior import Posterior
 from hydroid.posterior.uncertainty import Uncertainty
 from hydroid.problem.problem import Problem
-from hydroid.progress import Progress, no_progress
+from hydroid.progress import Progress
 from hydroid.quantity_table import MECHANICAL
 from hydroid.settings.fit import FitSettings
 
@@ -38,7 +38,7 @@ Content = Mapping[str, Any]
 
 
 def advice(
-    problem: Problem, known: Uncertainty, run: str = "RUN", progress: Progress = no_progress
+    problem: Problem, known: Uncertainty, run: str, progress: Progress
 ) -> tuple[Content, tuple[Finding, ...]]:
     """Return the suggestions about an estimate with its uncertainty, and what is to be said, the first first.
 

@@ -15,7 +15,7 @@ from hydroid.advice.growth import MIN_GAIN
 from hydroid.advice.left_out import refitted
 from hydroid.arrays import Array, record
 from hydroid.fitting.checkpoints import Checkpoints
-from hydroid.fitting.multistart import each_alone
+from hydroid.fitting.multistart import alone, lone_joints
 from hydroid.fitting.refinement import ROUGH, refine
 from hydroid.posterior.linear import estimate_box
 from hydroid.posterior.uncertainty import Uncertainty, uncertainty
@@ -153,18 +153,35 @@ class Ladder:
         if climbs:
             settings = settings.changed({"gain_tolerance": max(FIRM, settings.gain_tolerance)})
         if more:
-            theta = each_alone(own, theta, settings, self._watch.refining, self._checkpoints, name)
+            theta = self._each_alone(own, theta, settings, name)
         result = self._refined(own, theta, settings, step)
         if self._late and if_nearer:
             return
         new = self._measured(own, result, name)
         nearer = new.rms < (1 - MIN_GAIN) * start.rms
-        if nearer and own.settings.terms != last.settings.terms:
+        if nearer and more:
             without, with_it = self._error_left_out(last, start), self._error_left_out(own, new)
             self.estimates[name] = new = replace(new, left_out=(without, with_it))
             nearer = with_it < (1 - MIN_GAIN) * without or new.rms < CLEAR * start.rms
         if nearer or not if_nearer:
             self.problem, self.kept = own, new
+
+    def _each_alone(self, problem: Problem, theta: Array, settings: RefinementSettings, name: str) -> Array:
+        """Return theta, (P,), after every joint that can be was refined alone.
+
+        What joints share is known better by now. A valve whose compensation stood for it starts without, too.
+        """
+        for joint in lone_joints(problem):
+            own, parameters = alone(problem, joint, theta), problem.settings.parameters.values()
+            loaded = np.array([p.quantity == "compensation" and p.joints == (joint,) for p in parameters])
+            starts = np.unique([theta, np.where(loaded & own.parameters.free, 0.0, theta)], axis=0)
+            tried = [
+                self._refined(own.from_afar(), start, settings, f"{name} joint {joint} start {i}")
+                for i, start in enumerate(starts, 1)
+            ]
+            best = min(tried, key=lambda one: one.cost)
+            theta = np.where(own.parameters.free, own.parameters.from_unit(best.point), theta)
+        return theta
 
     def _refined(self, problem: Problem, theta: Array, settings: RefinementSettings, name: str) -> Descent:
         result = refine(problem, theta, settings, self._watch.refining, self._checkpoints, name)

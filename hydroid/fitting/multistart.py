@@ -28,7 +28,6 @@ from hydroid.posterior.bench import make_bench
 from hydroid.problem.problem import Problem
 from hydroid.search.chromosomes import Genes
 from hydroid.search.genetic import Population
-from hydroid.settings.search import RefinementSettings
 
 DRAWS = 64  # candidates drawn for a start that can be simulated
 MOVES = 0.01
@@ -63,8 +62,8 @@ class Multistart:
         """The point that the next start reaches, shape (1, P)."""
         number = 0 if population is None else len(population)
         theta = self.start(number)
-        if joints := lone_joints(self._problem):
-            theta = self._joint_by_joint(joints, number, theta)
+        if lone_joints(self._problem):
+            theta = self._joint_by_joint(number, theta)
             self._memo.elsewhere += 1
             rows = self._problem.residuals(theta[None])
             self._rms = rms(rows) if np.isfinite(rows).all() else np.inf
@@ -93,9 +92,9 @@ class Multistart:
         shortest = self._parts(self._problem)[0]
         return drawn[np.argmax(np.isfinite(shortest.residuals(drawn)).all(axis=1))]
 
-    def _joint_by_joint(self, joints: tuple[int, ...], number: int, theta: Array) -> Array:
+    def _joint_by_joint(self, number: int, theta: Array) -> Array:
         """Fit start `number`, (P,), to every joint alone; the last start takes the best one of each joint."""
-        for joint in joints:
+        for joint in lone_joints(self._problem):
             problem, name = alone(self._problem, joint, theta), f"start {number + 1} joint {joint}"
             tried = [self._grown(problem, by_numbers(problem, joint, theta), f"{name} numbers")]
             if not problem.leaves_noise(tried[0][1]):
@@ -147,9 +146,8 @@ def lone_joints(problem: Problem) -> tuple[int, ...]:
     There are none if there are fewer than two, or if a log does not measure how a driven joint moves.
     """
     measured = all(log.measured[log.driven].all() for log in problem.logs)
-    driven = np.any([log.driven for log in problem.logs], axis=0)
     settings = problem.settings
-    joints = tuple(j for j in settings.outputs if driven[j - 1] and settings.acting_on(j))
+    joints = tuple(j for j in settings.outputs if problem.driven[j - 1] and settings.acting_on(j))
     return joints if settings.stage == "hyd" and measured and len(joints) > 1 else ()
 
 
@@ -162,31 +160,6 @@ def alone(problem: Problem, joint: int, theta: Array) -> Problem:
     return problem.varied(settings, [log.driving(joint) for log in problem.logs if log.driven[joint - 1]])
 
 
-def each_alone(
-    problem: Problem,
-    theta: Array,
-    settings: RefinementSettings,
-    progress: Refining,
-    checkpoints: Checkpoints,
-    name: str,
-) -> Array:
-    """Return theta, (P,), after every joint that can be was refined alone; other arguments as of `refine`.
-
-    What the joints share is known better by now. A valve whose compensation stood for it starts without, too.
-    """
-    for joint in lone_joints(problem):
-        own, parameters = alone(problem, joint, theta), problem.settings.parameters.values()
-        loaded = np.array([p.quantity == "compensation" and p.joints == (joint,) for p in parameters])
-        starts = np.unique([theta, np.where(loaded & own.parameters.free, 0.0, theta)], axis=0)
-        tried = [
-            refine(own.from_afar(), start, settings, progress, checkpoints, f"{name} joint {joint} start {i}")
-            for i, start in enumerate(starts, 1)
-        ]
-        best = min(tried, key=lambda one: one.cost)
-        theta = np.where(own.parameters.free, own.parameters.from_unit(best.point), theta)
-    return theta
-
-
 def by_numbers(problem: Problem, joint: int, theta: Array) -> Array:
     """Return theta, (P,), with the valve of a joint whose speed follows the command alone: nine numbers.
 
@@ -194,9 +167,7 @@ def by_numbers(problem: Problem, joint: int, theta: Array) -> Array:
     """
     settings = problem.settings
     ends = [*settings.arm.ranges.values()][joint - 1]
-    found = fit_baselines(problem.logs, joint, ends).get(NAMES[-1])
-    if found is None:
-        return theta
+    found = fit_baselines(problem.logs, joint, ends)[NAMES[-1]]
     values = dict.fromkeys(("pilot_lag", "lever_slope", "lever_bend"), 0.0)
     values |= {"delay": found.delay, "compensation": 1.0}
     for row, name in (0, "dead_band"), (1, "opening_exponent"), (3, "opening_lag"):

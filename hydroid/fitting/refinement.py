@@ -47,9 +47,9 @@ def refine(
     problem: Problem,
     theta: Array,
     settings: RefinementSettings,
-    progress: Refining = lambda *_: False,
-    checkpoints: Checkpoints | None = None,
-    name: str = "refined",
+    progress: Refining,
+    checkpoints: Checkpoints,
+    name: str,
 ) -> Descent:
     """Improve an estimate by bounded least squares.
 
@@ -65,7 +65,6 @@ def refine(
     is; a result too.
     Raises RunError: the checkpoint cannot be written.
     """
-    checkpoints = {} if checkpoints is None else checkpoints
     simulated = 0
     if any(channel.prefilter is not UNFILTERED for channel in problem.channels):
         rough = settings.changed({"gain_tolerance": max(settings.gain_tolerance, ROUGH)})
@@ -123,8 +122,14 @@ def _following(problem: Problem, now: _Refinement) -> _Refinement:
     if abs(prior_weight(problem, row) - now.weight) <= SETTLED * now.weight:
         return now
     here = _estimated(problem, now.point, None if problem.leaves_start_open else row)
-    changed = {"residual": here.residual, "cost": here.cost, "weight": here.weight, "anchor": here.anchor}
-    return replace(now, **changed, noises=now.noises + 1)
+    return replace(
+        now,
+        residual=here.residual,
+        cost=here.cost,
+        weight=here.weight,
+        anchor=here.anchor,
+        noises=now.noises + 1,
+    )
 
 
 def _residuals(problem: Problem, now: _Refinement) -> Callable[[Array], Array]:

@@ -1,13 +1,13 @@
 """The search over a problem: ask for candidates, simulate them, tell their objectives, store a checkpoint."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from hydroid.arrays import Array, record
 from hydroid.fitting.checkpoints import Arrays, Checkpoints, Memo, saving
+from hydroid.fitting.ladder import Watcher
 from hydroid.fitting.multistart import Multistart
-from hydroid.fitting.refinement import Refining
 from hydroid.problem.problem import Problem
 from hydroid.progress import LOGGER
 from hydroid.search.chromosomes import Genes
@@ -34,23 +34,18 @@ class Searched:
     ends: Mapping[int, Sequence[float]]
 
 
-def search(
-    problem: Problem,
-    watch: Callable[[Array], bool | None],
-    progress: Refining,
-    checkpoints: Checkpoints,
-) -> Searched:
+def search(problem: Problem, watch: Watcher, checkpoints: Checkpoints) -> Searched:
     """Search to the last generation, from the seed or from what `checkpoints` holds as "search".
 
     `watch` takes a row of HISTORY after every generation, but for those that a resumed run repeats, and says
-    whether that was the last; `progress` watches least squares within multi-start. Raises RunError: the
-    search does not repeat what it did before the checkpoint.
+    whether that was the last; it also watches least squares within multi-start. Raises RunError: the search
+    does not repeat what it did before the checkpoint.
     """
     settings, free, late = problem.settings.search, int(problem.parameters.free.sum()), False
 
     def refining(name: str, simulated: int, rms: float) -> bool:
         nonlocal late
-        late = progress(name, simulated, rms) or late
+        late = watch.refining(name, simulated, rms) or late
         return late
 
     memo = Memo(problem, checkpoints.get("search"))
@@ -64,7 +59,7 @@ def search(
     def theta(chromosomes: Genes) -> Array:
         if isinstance(algorithm, Multistart):  # its chromosomes are theta
             return chromosomes
-        return problem.theta(algorithm.decode(chromosomes))
+        return problem.theta(algorithm.coding.decode(chromosomes))
 
     def state() -> Arrays:
         done, _, simulated, diverged, best, _ = history[-1]
@@ -91,6 +86,6 @@ def search(
             if not repeats:
                 if not late:  # else a start may not have been refined to its end
                     keep(state)
-                late = watch(history[-1]) or late
+                late = watch.generation(history[-1]) or late
     ends = algorithm.ends if isinstance(algorithm, Multistart) else {}
     return Searched(theta(population.chromosomes), population, algorithm.single, history, memo, ends)

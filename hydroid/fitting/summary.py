@@ -42,7 +42,7 @@ def summarise(problem: Problem, fit: Fit) -> FitSummary:
         {
             "joints": problem.active_joints,
             "final": fit.final,
-            "converged": refinement and refinement.converged,
+            "converged": refinement and refinement.ending.converged,
             "ending": refinement and refinement.ending.value,
             "rms_deg": finite(np.degrees(fit.best.rms)),
             "seed": settings.search.seed,
@@ -99,8 +99,7 @@ def fit_findings(fit: Fit) -> list[Finding]:
     findings, priors = list[Finding](), fit.problem.priors
     if fit.refinement is None:
         findings.append(Finding("not refined", "warning"))
-    elif not fit.refinement.converged:
-        ending = fit.refinement.ending
+    elif not (ending := fit.refinement.ending).converged:
         kind = "time up" if ending is Ending.TIME else "not converged"
         findings.append(Finding(kind, "warning", (fit.final,), {"ending": ending.value}))
     apart = [joint for joint, ends in fit.ends.items() if max(ends) > SAME_OPTIMUM * min(ends)]

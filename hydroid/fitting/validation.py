@@ -55,8 +55,8 @@ class Prediction:
     log: Log
     joints: tuple[int, ...]
     response: Array
-    bands: Mapping[int, Band] = field(default_factory=dict[int, Band])
-    unseen: bool | None = None
+    bands: Mapping[int, Band]
+    unseen: bool | None
     ahead: Array = field(default_factory=partial(np.empty, (0, len(HORIZONS), 0)))
 
     @property

@@ -44,14 +44,15 @@ def at_rest(plugin: Plugin, angle: Array, torque: Array) -> Structs:
     c: Records = plugin.coefficients.view(np.recarray)
     lever = rod_motion(angle, c)[1]
     level = np.where(np.isfinite(c.start_pressure), c.start_pressure, START_PRESSURE)
-    limits = c.supply_pressure, c.tank_pressure
-    pressure_a, pressure_b = holding_pressures(torque / lever, c.a.area, c.b.area, *limits, level)
+    pressure_a, pressure_b = holding_pressures(
+        torque / lever, c.a.area, c.b.area, c.supply_pressure, c.tank_pressure, level
+    )
     rests = np.isfinite(c.trapped_pressure) & (c.kind != NONE)
     pressure_a = np.where(rests, c.trapped_pressure, pressure_a)
     pressure_b = np.where(rests, level, pressure_b)
     state = np.zeros(c.shape, JOINT_STATE)
-    sides = (state["a"], c.a, pressure_a), (state["b"], c.b, pressure_b)
-    for (z, _, pressure), fill in zip(sides, fills(angle, c), strict=True):
+    for side, pressure, fill in zip("ab", (pressure_a, pressure_b), fills(angle, c), strict=True):
+        z = state[side]
         z["oil"] = pressure + c.bulk_modulus * fill
         z["drive"] = drive(0.0, c)
         z["stroke"] = resting_stroke(z["drive"], c.gap, c.plunger_stiffness)

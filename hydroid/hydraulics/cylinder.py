@@ -72,12 +72,11 @@ def bent(angle, c) -> Any:
     )
 
 
-def fills(angle: Array, c) -> tuple[Array, Array]:
+def fills(angle: Array, c) -> list[Array]:
     """ln(V/V_0) of chambers A and B at angles [rad] of COEFFICIENTS; ± D_m q/V_0 of a rotary actuator."""
     travel, linear, dead = rod_motion(angle, c)[0], c.kind == LINEAR, c.dead_volume
     sides = (c.a.area, travel, travel), (c.b.area, c.stroke - travel, -travel)
-    a, b = (np.where(linear, filling(out, area, dead), turn * area / dead) for area, out, turn in sides)
-    return a, b
+    return [np.where(linear, filling(out, area, dead), turn * area / dead) for area, out, turn in sides]
 
 
 def rod_motion(angle: Array, c) -> list[Array]:

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 import numpy as np
-from numba.extending import overload, register_jitable
+from numba.extending import register_jitable
 
 from hydroid.arrays import Array
 
@@ -24,6 +24,7 @@ def compilable(function: F) -> F:
     return register_jitable(function)
 
 
+@compilable
 def implicit_weight(speed) -> Any:
     """Weight of the new state in a linearised step, from rate times step (dimensionless).
 
@@ -40,19 +41,11 @@ def kept(steps) -> Any:
 
 
 def ringing(frequency: Array, ratio: Array, step: float) -> tuple[Array, Array]:
-    """What a free oscillation leaves after a step [s]: C and S [s], of which `rung` makes its new state.
+    """What a damped oscillation leaves after a step [s]: factors C and S [s] that `overshoot` takes.
 
-    The frequency without damping is in Hz, the damping ratio below 1; of infinite frequencies without meaning.
+    frequency: without damping [Hz]; of an infinite one they mean nothing. ratio: of the damping, below 1.
     """
     pace = 2.0 * np.pi * np.where(np.isfinite(frequency), frequency, 0.0)
     turn, decay = pace * np.sqrt(1.0 - ratio**2) * step, np.exp(-ratio * pace * step)
     sine = decay * step * np.sinc(turn / np.pi)
     return decay * np.cos(turn) - ratio * pace * sine, sine
-
-
-@overload(implicit_weight)
-def _compiled_weight(speed) -> Any:  # pyright: ignore[reportUnusedFunction]
-    def scalar(speed) -> Any:
-        return 0.5 if speed <= 2.0 else 1.0 - 1.0 / speed
-
-    return scalar

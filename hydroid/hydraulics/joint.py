@@ -48,10 +48,13 @@ def begin(c, z, w, angle: float, velocity: float) -> None:
 
 
 @compilable
-def command(z, w, delayed_a: float, delayed_b: float) -> None:
-    """Take the delayed commands [%]: that towards each side changes `fresh` sub-steps into this step."""
+def command(c, z, w, commands, now: int) -> None:
+    """Take the delayed commands [%]: that towards each side changes `fresh` sub-steps into this step.
+
+    `commands` are those of all steps, of which that at `now` is given in this one.
+    """
     w.a.before, w.b.before = z.a.asked, z.b.asked
-    w.a.after, w.b.after = delayed_a, -delayed_b
+    w.a.after, w.b.after = commands[now - c.a.late], -commands[now - c.b.late]
     z.a.asked, z.b.asked = w.a.after, w.b.after
 
 
@@ -90,12 +93,6 @@ def _move_plunger(c, side, z, w, substep: int, step: float) -> float:
 
 
 @compilable
-def move_spool(c, z, w, substep: int, step: float) -> float:
-    """Advance both plungers; the mean spool displacement of the sub-step [m], equation (6)."""
-    return _move_plunger(c, c.a, z.a, w.a, substep, step) - _move_plunger(c, c.b, z.b, w.b, substep, step)
-
-
-@compilable
 def opened(side, travel: float) -> float:
     """Opening of a side's pump edge [m²] at a spool travel towards it [m], without leakage."""
     share = slot_share(travel, side)
@@ -105,8 +102,11 @@ def opened(side, travel: float) -> float:
 
 
 @compilable
-def net_opening(c, z, displacement: float) -> float:
-    """Mean opening of a sub-step [m²], below 0 towards B, at a spool displacement [m]."""
+def net_opening(c, z, w, substep: int, step: float) -> float:
+    """Advance both plungers over a sub-step; the mean opening [m²], below 0 towards B."""
+    # of the spool [m], equation (6)
+    displacement = _move_plunger(c, c.a, z.a, w.a, substep, step)
+    displacement -= _move_plunger(c, c.b, z.b, w.b, substep, step)
     if z.displacement != displacement:  # else the spool rests, and its power law is not worked out again
         z.displacement = displacement
         z.open = opened(c.a, displacement) if displacement > 0.0 else -opened(c.b, -displacement)
@@ -117,12 +117,13 @@ def net_opening(c, z, displacement: float) -> float:
 
 
 @compilable
-def mean_opening(c, z, w, substeps: int, step: float) -> float:
-    """Advance the plungers over so many sub-steps; the mean opening [m²], below 0 towards B."""
+def mean_opening(c, z, w, commands, now: int, plugin) -> float:
+    """Advance the plungers over a step of the `plugin` under `command`; the mean opening as `net_opening`."""
+    command(c, z, w, commands, now)
     net = 0.0
-    for i in range(substeps):
-        net += net_opening(c, z, move_spool(c, z, w, i, step))
-    return net / substeps
+    for i in range(plugin.substeps):
+        net += net_opening(c, z, w, i, plugin.period / plugin.substeps)
+    return net / plugin.substeps
 
 
 @compilable

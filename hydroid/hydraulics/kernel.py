@@ -35,7 +35,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hydroid.hydraulics.elementwise import compilable
-from hydroid.hydraulics.joint import begin, coast, command, load, meter, move_spool, net_opening, settle
+from hydroid.hydraulics.joint import begin, coast, command, load, meter, net_opening, settle
 from hydroid.hydraulics.pump import begin_line, close_line, draw, fill, open_line
 from hydroid.hydraulics.records import LINE, SCRATCH
 from hydroid.settings import linkage
@@ -134,7 +134,7 @@ def look_ahead(plugin: Plugin, state, commands, now: int, arm, pad: Pad) -> None
     some, last = coefficients[order[joints - 1]], state[order[joints - 1]]
     shared = idle < joints and some.pump_flow < np.inf
     part = 1.0 / substeps
-    step = part * period
+    step, demanded = part * period, False
     for a in range(joints):
         j = order[a]
         c, z, w = coefficients[j], state[j], work[j]
@@ -145,13 +145,11 @@ def look_ahead(plugin: Plugin, state, commands, now: int, arm, pad: Pad) -> None
             coast(c, z, w, step)
             matrix[a, a] += w.weight * step * w.drag
         else:
-            command(z, w, commands[now - c.a.late, j], commands[now - c.b.late, j])
+            command(c, z, w, commands[:, j], now)
+            demanded |= commands[now, j] != 0.0
         for b in range(a + 1, joints):
             matrix[a, b] = arm.mass[entries[a, b]]
     if shared:
-        demanded = False
-        for a in range(idle, joints):
-            demanded |= commands[now, order[a]] != 0.0
         begin_line(line, some, last, demanded, step)
     # joints without actuator bring the same to all sub-steps: they are eliminated once
     eliminate(matrix, 0, idle)
@@ -164,7 +162,7 @@ def look_ahead(plugin: Plugin, state, commands, now: int, arm, pad: Pad) -> None
             c, z, w = coefficients[j], state[j], work[j]
             if a >= idle:
                 supply = min(line.pressure, c.supply_pressure) if shared else c.supply_pressure
-                meter(c, w, net_opening(c, z, move_spool(c, z, w, i, step)), supply)
+                meter(c, w, net_opening(c, z, w, i, step), supply)
                 load(c, z, w, step)
                 if shared:
                     draw(line, c, w)

@@ -41,10 +41,10 @@ from hydroid.hydraulics.elementwise import compilable
 
 
 @compilable
-def delivery(pressure: float, share: float, relief: float, c) -> Any:
+def delivery(pressure: float, share: float, c) -> Any:
     """Flow Q_P [m³/s] of the pump at a line pressure [Pa], and -dQ_P/dP; `share` is φ."""
     full = share * c.pump_flow
-    left = relief - pressure
+    left = c.relief - pressure
     if left < c.pump_droop:
         return full * max(left, 0.0) / c.pump_droop, full / c.pump_droop
     return full, 0.0
@@ -91,7 +91,7 @@ def draw(line, c, w) -> None:
 @compilable
 def open_line(line, c, step: float) -> None:
     """Make the sums of `draw` ready for the sub-step: δ at the present speeds, and 1/D."""
-    flow, fall = delivery(line.pressure, come_up(line, c, step), c.relief, c)
+    flow, fall = delivery(line.pressure, come_up(line, c, step), c)
     line.softness = 1.0 / (c.line_volume / (c.bulk_modulus * step) + fall + line.softness)
     line.change = line.softness * (flow - line.drawn - line.swept)
     missing = c.relief - line.pressure

@@ -69,7 +69,9 @@ COEFFICIENTS = np.dtype(
         *((name, JOINT[name]) for name in _PLAIN),
         ("a", SIDE),
         ("b", SIDE),
-        *_fields("theta0 shortest coil gap conductance opening_keep opening_steps backflow relief ring_cosine ring_sine"),
+        *_fields(
+            "theta0 shortest coil gap conductance opening_keep opening_steps backflow relief ring_cosine ring_sine"
+        ),
     ]
 )
 """what the kernel reads of a joint: its fields of JOINT, and constants that follow from them; theta0 is the
@@ -187,7 +189,8 @@ def coefficients(joints: Records, period: float = 0.01, substeps: int = 1) -> Re
     table["ring_cosine"], table["ring_sine"] = ringing(p.oil_frequency, p.oil_damping, period)
     table["backflow"] = np.where(np.isinf(p.pump_flow), -np.inf, 0.0)
     table["relief"] = np.max(p.supply_pressure, axis=1, where=p.kind != NONE, initial=0.0)[:, None]
-    for end, side in (("a", table.a), ("b", table.b)):
+    for end in "ab":
+        side = table[end]
         for name, field in _SIDE_FIELDS.items():
             side[field] = joints[f"{name}_{end}"]
         side["late"] = np.floor(side.delay / period)

@@ -237,6 +237,6 @@ class Plant:
         pushed, substeps = moving[: 0 if settings.stage == "hyd" else None], settings.substeps
         self._chain = chain = Chain(settings.arm, locked, self._active, substeps, pushed)
         rollout = roll_quasi_static if settings.quasi_static else roll
-        self._arm = SteppedArm(model, chain.columns, pushed, self._steps, rollout)
+        self._arm = SteppedArm(model, chain.columns, self._steps, rollout)
         self.model, self.data = self._arm.model, self._arm.data
         self._record = Record(np.empty((1, len(moving))), np.empty((0, len(chain.columns)), JOINT_STATE))

@@ -34,7 +34,7 @@ Measured: TypeAlias = Iterator[tuple[Column, Array]]
 NaN where one is undefined"""
 
 
-Measure = Callable[[Candidates], list[tuple[Column, Array]]]
+Measure = Callable[[Candidates], Measured]
 
 
 @record
@@ -54,7 +54,8 @@ def quantities(problem: Problem, uncertainty: Uncertainty) -> Quantities:
     estimate = candidates(uncertainty.theta[None])
     for joint in problem.settings.outputs:
         named = problem.settings.arm.joint_names[joint - 1]
-        measure = joint_measure(make_bench(problem.settings, problem.logs, joint), estimate)
+        bench = make_bench(problem.settings, problem.logs, joint)
+        measure = joint_measure(bench, estimate)
         columns = [column for column, _ in measure(estimate)]
 
         def values(theta: Array, measure: Measure = measure) -> Array:
@@ -64,24 +65,24 @@ def quantities(problem: Problem, uncertainty: Uncertainty) -> Quantities:
         concerned = np.array([p.joints is None or joint in p.joints for p in parameters])
         positive = np.array([column.positive for column in columns])
         known = uncertainty.posterior.propagate(values, positive, concerned)
-        curve, given, unit = list[tuple[float, float, Interval]](), True, ""
+        curve, given = list[tuple[float, float, Interval]](), True
         for i in np.flatnonzero(np.isfinite(known.value)).tolist():
-            (name, label, unit_, _, command), value = columns[i], float(known.value[i])
+            (name, label, unit, _, command), value = columns[i], float(known.value[i])
             interval = finite_ends(known.interval[i])
             if command is not None:
                 curve.append((command, value, interval))
-                given, unit = given and known.given[i], unit_
+                given = given and known.given[i]
             elif not known.given[i]:
                 sd = finite(known.sd[i])
                 result.scalars[f"{named}_{name}"] = QuantityEstimate(
-                    label=label, joint=joint, value=value, unit=unit_, sd=sd, interval=interval
+                    label=label, joint=joint, value=value, unit=unit, sd=sd, interval=interval
                 )
         if not given:
             at, value, interval = zip(*sorted(curve), strict=True)
             result.curves[f"{named}_speed"] = CurveEstimate(
                 label="speed",
                 joint=joint,
-                unit=unit,
+                unit=f"{bench.unit[1]}/s",
                 along="command [%]",
                 at=at,
                 value=value,
@@ -100,14 +101,15 @@ def joint_measure(bench: Bench, estimate: Candidates) -> Measure:
         names = zip((1.0, -1.0), signs, words, strict=True)
         tests, further = [speed_tests(bench, estimate, *name) for name in names], oil
 
-    def measure(candidates: Candidates) -> list[tuple[Column, Array]]:
+    def measure(candidates: Candidates) -> Measured:
         torque, inertia = bench.weigh(candidates)
         factor, unit = bench.unit
         word, of = ("force", "N") if unit == "mm" else ("torque", "N·m")
         label = f"gravity {word} at {factor * bench.angle:.0f} {unit}"
-        gravity = Column("gravity_torque_at_pose", label, of, False), torque
-        moved = [row for test in tests for row in test(candidates)]
-        return [*moved, *further(bench, candidates, inertia), gravity]
+        for test in tests:
+            yield from test(candidates)
+        yield from further(bench, candidates, inertia)
+        yield Column("gravity_torque_at_pose", label, of, False), torque
 
     return measure
 
@@ -166,9 +168,7 @@ ONSET, RISEN = 0.1, 1.0 - np.exp(-1.0)
 reach the second"""
 
 
-def speed_tests(
-    bench: Bench, estimate: Candidates, sign: float, ending: str, word: str
-) -> Callable[[Candidates], Measured]:
+def speed_tests(bench: Bench, estimate: Candidates, sign: float, ending: str, word: str) -> Measure:
     """Return what measures a joint in a direction, planned so that the estimate ends at its angle.
 
     `sign` is that of the commands; `ending` and `word` stand at the end of names and labels.

@@ -101,25 +101,26 @@ def compared_pressures(log: Log, settings: FitSettings) -> list[int]:
 def make_channels(logs: Sequence[Log], settings: FitSettings) -> tuple[Channel, ...]:
     """List the channels log by log, angles first; those of stage 2, whose errors drift, have a prefilter."""
     objective = settings.objective
-    signals: list[tuple[int, int, Quantity, int, Array, float]] = []
+    end, channels = 0, list[Channel]()
     for i, log in enumerate(logs):
+        samples = len(log.time)
         for column, joint in enumerate(settings.outputs):
-            weight = objective.weights.get(joint, 1.0)
-            signals.append((i, joint, "angle", column, log.angle[:, joint - 1], weight))
+            weight, rows = objective.weights.get(joint, 1.0), slice(end, end + samples)
+            prefilter = UNFILTERED
+            if settings.stage == "hyd" and objective.noise_of(joint) is None:
+                prefilter = np.array(bilinear((STAYING, 1), (STAYING / FAST_GAIN, 1), 1 / log.period))
+            measured = log.angle[:, joint - 1]
+            channels.append(Channel(i, joint, "angle", column, measured, weight, rows, prefilter))
+            end += samples
         for column, joint in enumerate(compared_pressures(log, settings)):
             assert log.pressure is not None
             weight = np.deg2rad(objective.pressure_weight) / 1e5  # deg/bar -> rad/Pa
             for side, quantity in enumerate(SIDES):
                 measured = log.pressure[:, joint, side]
                 if not np.isnan(measured[0]):
-                    signals.append((i, joint + 1, quantity, column, measured, weight))
-    end, channels = 0, list[Channel]()
-    for i, joint, quantity, column, measured, weight in signals:
-        rows, end = slice(end, end + len(measured)), end + len(measured)
-        prefilter = UNFILTERED
-        if settings.stage == "hyd" and quantity == "angle" and objective.noise_of(joint) is None:
-            prefilter = np.array(bilinear((STAYING, 1), (STAYING / FAST_GAIN, 1), 1 / logs[i].period))
-        channels.append(Channel(i, joint, quantity, column, measured, weight, rows, prefilter))
+                    rows = slice(end, end + samples)
+                    channels.append(Channel(i, joint + 1, quantity, column, measured, weight, rows))
+                    end += samples
     return tuple(channels)
 
 

@@ -50,6 +50,7 @@ class Problem:
 
     Attributes:
         channels: the compared signals, in the order of a row of residuals.
+        driven: joints that any log drives, shape (J,).
         measured: all channels in a row, times their weights, shape (R,).
         open_starts: what open start angles can explain, taken out of the residuals (`with_open_starts`).
         bounds: [first, end) of each objective's samples in it, shape (S, 2).
@@ -69,8 +70,8 @@ class Problem:
         self._spread = spread
         self.open_starts: tuple[OpenStart, ...] = ()
         self.bindings = Bindings(settings)
-        self._driven = np.any([log.driven for log in logs], axis=0)
-        self.bindings.refuse_idle(self._driven, outputs)
+        self.driven = np.any([log.driven for log in logs], axis=0)
+        self.bindings.refuse_idle(self.driven, outputs)
         self.parameters = settings.parameter_set()
         if not self.parameters.free.any():
             raise SettingsError("no parameter is free", "parameters", "fix fewer of them")
@@ -81,16 +82,17 @@ class Problem:
         self.channels = make_channels(logs, settings)
         self.measured = np.concatenate([c.weight * c.measured for c in self.channels])
         many = settings.objective.segments  # of an angle; a pressure is one objective, however long
-        counts = [many if c.quantity == "angle" else 1 for c in self.channels]
-        pairs = zip(self.channels, counts, strict=True)
         self.bounds: Ints = np.concatenate(
-            [c.rows.start + segment_bounds(len(c.measured), n) for c, n in pairs]
+            [
+                c.rows.start + segment_bounds(len(c.measured), many if c.quantity == "angle" else 1)
+                for c in self.channels
+            ]
         )
 
     @property
     def active_joints(self) -> tuple[int, ...]:
         """Joints that a log drives or that are compared, numbered from 1."""
-        return tuple(sorted({*(np.flatnonzero(self._driven) + 1).tolist(), *self.settings.outputs}))
+        return tuple(sorted({*(np.flatnonzero(self.driven) + 1).tolist(), *self.settings.outputs}))
 
     def varied(self, settings: FitSettings, logs: Sequence[Log] | None = None) -> "Problem":
         """Return the problem with other settings, or other logs too, simulated in the same place."""

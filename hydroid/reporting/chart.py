@@ -51,7 +51,8 @@ class Mark:
         size = -(-len(self.y) // bins)
         if self.kind not in ("line", "step", "band") or size <= 2 or not np.all(np.diff(self.x) > 0):
             return self
-        last, keep = len(self.y) - 1, [np.array([0, len(self.y) - 1])]
+        last = len(self.y) - 1
+        keep = [np.array([0, last])]
         for values in (self.y, -self.y, self.end, -self.end):
             if len(values):
                 parts = np.pad(values, (0, -len(values) % size), mode="edge").reshape(-1, size)

@@ -165,12 +165,12 @@ def moving_arm(
     poses = np.stack([body_poses(model, angle[moments]) for angle in (log.angle, simulated)])
 
     view, start = sight(*VIEW), poses[1, 0]
-    drawn: list[tuple[float, Shape]] = []
-    for shape in shapes(model):
-        world, pose = shape.placed(start), start[roots[shape.body]]
-        corners = (world - pose[:, 3]) @ pose[:, :3]
-        drawn.append((float((world @ view[2]).mean()), Shape(parts.index(roots[shape.body]), corners)))
-    outlines = [shape for _, shape in sorted(drawn, key=lambda one: -one[0])]  # the farthest first
+    farthest_first = sorted(shapes(model), key=lambda one: -(one.placed(start) @ view[2]).mean())
+    outlines: list[Shape] = []
+    for shape in farthest_first:
+        pose = start[roots[shape.body]]
+        corners = (shape.placed(start) - pose[:, 3]) @ pose[:, :3]
+        outlines.append(Shape(parts.index(roots[shape.body]), corners))
     seen = view[:2] @ poses[:, :, parts]  # in units of the picture, with the arm always inside
     corners = np.concatenate([shape.placed(seen).reshape(-1, 2) for shape in outlines])
     low, high = corners.min(axis=0), corners.max(axis=0)

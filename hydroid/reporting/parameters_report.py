@@ -114,7 +114,7 @@ def quantity_section(settings: FitSettings, summary: FitSummary) -> Section | No
             (q.label, f"{q.value:.3g} {q.unit} ± {100 * q.within:.2g} %")
             for q in [q for q in known if q.joint == joint][:5]
         )
-        name = "machine" if joint is None else names[joint - 1]
+        name = names[joint - 1]
         if rows:
             cards[f"known_{name}"] = Table(name, ("quantity", "value"), rows)
     text = (
@@ -155,12 +155,11 @@ def merged_tables(runs: Sequence[Record]) -> dict[str, Table]:
     parameters = runs[0].settings.parameter_set().parameters
     units = {f"error of {one.name}": "mm" if one.slides else "deg" for one in runs[0].summary.verdict}
     units |= {p.name: p.unit for p in parameters}
-    factors = [1e3 * np.radians(1.0) if one.slides else 1.0 for one in runs[0].summary.verdict]
     columns = np.array(
         [
             [
-                (one.fitted_deg or 0.0) * factor
-                for one, factor in zip(run.summary.verdict, factors, strict=True)
+                (one.fitted_deg or 0.0) * (1e3 * np.radians(1.0) if one.slides else 1.0)
+                for one in run.summary.verdict
             ]
             + [run.summary.values[p.name] for p in parameters]
             for run in runs

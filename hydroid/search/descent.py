@@ -74,11 +74,6 @@ class Descent:
         """Whether there is no further step."""
         return self.ending is not Ending.UNDER_WAY
 
-    @property
-    def converged(self) -> bool:
-        """Whether it has ended at an optimum."""
-        return self.ending.converged
-
     def __str__(self) -> str:
         cost = f"half the sum of squares {self.cost_before:.6g} to {self.cost:.6g}"
         return f"{cost} in {self.evaluations} simulations; {self.ending.value}"

@@ -6,7 +6,7 @@ again from its seed, with the objectives that are known (`fitting.checkpoints`).
     population = None
     for _ in range(1 + generations):
         chromosomes = algorithm.ask(population, rng)
-        offspring = Population(chromosomes, objectives(algorithm.decode(chromosomes)))
+        offspring = Population(chromosomes, objectives(algorithm.coding.decode(chromosomes)))
         population = algorithm.tell(population, offspring)
 """
 
@@ -17,7 +17,7 @@ from numpy.random import Generator
 
 from hydroid.arrays import Array, Ints, record
 from hydroid.search.chromosomes import Coding, Genes, GrayCoding, IntegerCoding, crossover, mutate, roulette
-from hydroid.search.pareto import crowding, feasible, ranks
+from hydroid.search.pareto import crowding, ranks
 from hydroid.settings.search import GeneticSettings
 
 
@@ -93,10 +93,6 @@ class SimpleGa:
         """How candidates are written as chromosomes."""
         return (GrayCoding if self.settings.coding == "binary" else IntegerCoding)(self.parameters)
 
-    def decode(self, chromosomes: Genes) -> Array:
-        """Return points of the unit box, shape (n, p)."""
-        return self.coding.decode(chromosomes)
-
     def ask(self, population: Population | None, rng: Generator) -> Genes:
         """Return chromosomes to be evaluated: the first population, or the offspring of one."""
         if population is None:
@@ -112,13 +108,13 @@ class SimpleGa:
     @staticmethod
     def select(objectives: Array, count: int, rng: Generator) -> Ints:
         """Return parents, shape (count,), by the roulette wheel of the objectives of a population."""
-        return roulette(_objective(objectives), count, rng)
+        return roulette(objectives[:, 0], count, rng)
 
     def tell(self, population: Population | None, offspring: Population) -> Population:
         """Return the elite of the present population, then all offspring."""
         if population is None:
             return offspring
-        best = np.argsort(_objective(population.objectives), kind="stable")[: self.elite]
+        best = np.argsort(population.objectives[:, 0], kind="stable")[: self.elite]
         return population.take(best).join(offspring)
 
 
@@ -135,8 +131,3 @@ class Nsga2(SimpleGa):
         """Return the best of parents and children together, in crowded order."""
         everyone = offspring if population is None else population.join(offspring)
         return everyone.take(crowded_order(everyone.objectives)[: self.settings.population])
-
-
-def _objective(objectives: Array) -> Array:
-    """The one objective, shape (n,), inf where infeasible."""
-    return np.where(feasible(objectives), objectives[:, 0], np.inf)

@@ -15,16 +15,16 @@ import numpy as np
 from numba import njit
 
 from hydroid.arrays import Array, Structs
-from hydroid.hydraulics.joint import command, mean_opening
+from hydroid.hydraulics.joint import mean_opening
 from hydroid.hydraulics.kernel import SOURCE, Plugin
 from hydroid.hydraulics.records import SCRATCH
 
-BEHIND_VALVE = (
+BEHIND_VALVE = [
     *("damping", "stiffness", "friction", "dry_friction", "lever_slope", "lever_bend", "compensation"),
     *("oil_frequency", "oil_damping", "ring_cosine", "ring_sine"),
     *("pump_flow", "pump_droop", "supply_pressure", "relief"),
-)
-BEHIND_PORT = "area", "draw", "return_"
+]
+BEHIND_PORT = ["area", "draw", "return_"]
 """what a valve's opening does not depend on, of a joint and of its sides; the others are taken to matter"""
 
 
@@ -33,8 +33,7 @@ def _open(valve: Plugin, rest, commands, opening, source: int = SOURCE) -> None:
     """Write the mean opening of one joint's valve in each step, (steps,), from its state at rest, (1,)."""
     c, z, w, past = valve.coefficients[0], rest[0], np.zeros(1, SCRATCH)[0], commands.size - opening.size
     for k in range(opening.size):
-        command(z, w, commands[past + k - c.a.late], commands[past + k - c.b.late])
-        opening[k] = mean_opening(c, z, w, valve.substeps, valve.period / valve.substeps)
+        opening[k] = mean_opening(c, z, w, commands, past + k, valve)
 
 
 def valve_openings(
@@ -42,23 +41,19 @@ def valve_openings(
 ) -> list[Array]:
     """Return the mean opening of n candidates' valves in each step [m²], shape (steps, J) each.
 
-    `states` are those of the start, shape (n, J), and `commands` the steps' [%], shape (steps, J). `run` is
-    that of a pool. No bit depends on the other candidates.
+    `states` are those of the start, shape (n, J), and `commands` those of a `Course`. `run` is that of a
+    pool. No bit depends on the other candidates.
     """
     alike = plugin.coefficients.copy()
-    for fields, names in ((alike, BEHIND_VALVE), (alike["a"], BEHIND_PORT), (alike["b"], BEHIND_PORT)):
-        for name in names:
-            fields[name] = 0.0
-    candidates, joints = alike.shape
-    delayed = np.vstack([np.zeros((plugin.past, joints)), commands])
-    keys = [[(j, alike[i, j].tobytes()) for j in range(joints)] for i in range(candidates)]
+    alike[BEHIND_VALVE] = alike["a"][BEHIND_PORT] = alike["b"][BEHIND_PORT] = 0.0
+    keys = [[(j, valve.tobytes()) for j, valve in enumerate(row)] for row in alike]
     owners = {key: i for i, row in enumerate(keys) for key in row}
-    curves = {key: np.zeros(len(commands)) for key in owners}
+    curves = {key: np.zeros(len(commands) - plugin.past) for key in owners}
 
     def open_one(key: tuple[int, bytes]) -> None:
         i, j = owners[key], key[0]
         valve = plugin._replace(coefficients=plugin.coefficients[i, j : j + 1])
-        _open(valve, states[i, j : j + 1].copy(), delayed[:, j], curves[key])
+        _open(valve, states[i, j : j + 1].copy(), commands[:, j], curves[key])
 
     driven = set(plugin.order[plugin.idle :].tolist())
     deque(run(open_one, (key for key in curves if key[0] in driven)), maxlen=0)

@@ -27,7 +27,7 @@ from numba import njit, types
 
 from hydroid.hydraulics.cylinder import bent, filling, rod
 from hydroid.hydraulics.elementwise import compilable
-from hydroid.hydraulics.joint import command, mean_opening
+from hydroid.hydraulics.joint import mean_opening
 from hydroid.hydraulics.kernel import SOURCE, Plugin, make_pad
 from hydroid.hydraulics.pump import begin_line, come_up, delivery
 from hydroid.hydraulics.records import LINEAR
@@ -93,7 +93,7 @@ def line_pressure(plugin: Plugin, work, line, share: float, some) -> float:
     low, high = 0.0, some.relief
     pressure = min(max(line.pressure, 1e-3 * high), high)
     for _ in range(ITERATIONS):
-        given, slope = delivery(pressure, share, some.relief, some)
+        given, slope = delivery(pressure, share, some)
         excess = line.taken - given
         for a in range(plugin.idle, plugin.order.size):
             j = plugin.order[a]
@@ -194,7 +194,7 @@ def roll_quasi_static(arm, plugin: Plugin, state, course, record, source: int = 
 
     Valves open as the course says, or, where it does not, as their state follows from the commands.
     """
-    order, idle, period, substeps = plugin.order, plugin.idle, plugin.period, plugin.substeps
+    order, idle, period = plugin.order, plugin.idle, plugin.period
     commands, followed, taken, opening = course
     pad, past = make_pad(order.size), commands.shape[0] - followed.shape[0]
     for k in range(followed.shape[0]):
@@ -209,8 +209,7 @@ def roll_quasi_static(arm, plugin: Plugin, state, course, record, source: int = 
             if opening.size:
                 pad.joints[j].travel = opening[k, j]
             else:
-                command(z, pad.joints[j], commands[now - c.a.late, j], commands[now - c.b.late, j])
-                pad.joints[j].travel = mean_opening(c, z, pad.joints[j], substeps, period / substeps)
+                pad.joints[j].travel = mean_opening(c, z, pad.joints[j], commands[:, j], now, plugin)
             demanded |= commands[now, j] != 0.0
         _kinematics(arm.model, arm.data)
         _com_pos(arm.model, arm.data)

@@ -100,8 +100,8 @@ class SteppedArm:
     count the joints of all of them, and each takes a candidate.
 
     Args:
-        columns: the moving joints with actuators, and those they couple with, shape (J,).
-        pushed: all others, whose torques are given, shape (P,).
+        columns: the moving joints with actuators, and those they couple with, shape (J,). The torques of the
+            P others are given.
         steps: of MuJoCo in one sample.
         rollout: the compiled one, with the arguments of `roll`, which it is by default.
         copies: how often the arm is in the model.
@@ -114,7 +114,6 @@ class SteppedArm:
         self,
         model: mujoco.MjModel,
         columns: Index = NO_JOINTS,
-        pushed: Index = NO_JOINTS,
         steps: int = 1,
         rollout: Callable[..., None] | None = None,
         copies: int = 1,
@@ -133,7 +132,7 @@ class SteppedArm:
             d.warning.number,
             columns,
             own[columns],
-            pushed,
+            np.setdiff1d(np.arange(m.nv), columns),
             steps,
             d.qfrc_bias,
             m.qpos_spring,
@@ -226,8 +225,7 @@ def roll(arm, plugin: Plugin, state, course, record, source: int = SOURCE) -> No
 class _Announcement(event.Listener):
     """Says once that numba compiles, which it does only where its cache holds nothing usable."""
 
-    def __init__(self) -> None:
-        self._made = False
+    _made = False
 
     def on_start(self, event) -> None:
         if not self._made:

@@ -193,7 +193,7 @@ class Chain:
     def __init__(self, arm: Arm, locked: LockedArm, active: Mask, substeps: int, pushed: Index) -> None:
         self.columns = np.setdiff1d(np.arange(len(locked.columns)), pushed)
         self.joints, self.pushed = locked.columns[self.columns], pushed
-        self._pushed = locked.columns[pushed].tolist()
+        self._pushed = locked.columns[pushed]
         self._idle = ~active[self.joints]
         for joint in self.joints[active[self.joints]].tolist():
             if arm.joints[joint].actuator is None:

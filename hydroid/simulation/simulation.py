@@ -111,8 +111,7 @@ class Simulation:
         steps, model = scenario.settings.steps, scenario.arm.model
         rollout = roll_quasi_static if self._quasi_static else roll
         model = repeat(model, copies) if copies > 1 else model
-        pushed = np.arange(model.nv) if copies > 1 else chain.pushed
-        return SteppedArm(model, chain.columns, pushed, steps, rollout, copies)
+        return SteppedArm(model, chain.columns, steps, rollout, copies)
 
     def _follower(
         self, candidates: Candidates, arm: SteppedArm, run: Callable[..., Iterable[None]]
@@ -128,9 +127,11 @@ class Simulation:
         balance = np.concatenate([arm.start(values, some, np.tile(pose, arm.copies)) for some in starts])
         balance = balance.reshape(-1, len(pose))[:n]
         plugin, states = chain.start(candidates, pose, balance, scenario.pressure)
+        before = np.zeros((plugin.past, len(chain.columns)))
+        commands = np.concatenate([before, scenario.command[:, chain.columns]])
         taken, openings = chain.taken(candidates, servo), [np.empty((0, 0))] * n
         if self._quasi_static and not observed:  # what the valves do is seen in their states alone
-            openings = valve_openings(plugin, states, scenario.command[:, chain.columns], run)
+            openings = valve_openings(plugin, states, commands, run)
         gain = candidates.joints.gain[:, scenario.arm.columns[chain.pushed]]
         served = np.searchsorted(chain.pushed, servo.columns)
 
@@ -141,8 +142,6 @@ class Simulation:
             if served.size:
                 torque[:, :, served] = (servo.angle if self._quasi_static else servo.torque)[:, None]
             one, state = plugin.of(row), states[row]
-            before = np.zeros((one.past, len(state)))
-            commands = np.concatenate([before, scenario.command[:, chain.columns]])
             angle = np.full((1 + samples, start.size), np.nan)
             record = np.zeros((1 + samples if observed else 1, len(state)), JOINT_STATE)
             angle[0], record[0] = start, state

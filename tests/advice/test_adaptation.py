@@ -8,6 +8,7 @@ import hydroid
 from hydroid.advice.adaptation import adapted, steps
 from hydroid.errors import SettingsError
 from hydroid.identified_model import identified
+from hydroid.progress import no_progress
 
 SLOWER = TRUTH | {"flow": 90.0}
 
@@ -15,7 +16,7 @@ SLOWER = TRUTH | {"flow": 90.0}
 def test_what_changed_is_freed_and_found(tmp_path):
     settings = two_joints(tmp_path)
     model, log = identified(settings, TRUTH, "a fit"), drive(settings, 3, SLOWER)
-    path = steps(model, [log])
+    path = steps(model, [log], (), no_progress)
     assert [step["parameter"] for step in path] == ["", "flow"]
     assert max(path[1]["left_out_deg"].values()) < 0.3 * max(path[0]["left_out_deg"].values())
     result = hydroid.adapt(log, fit=model, free="flow", out=tmp_path / "run")
@@ -27,7 +28,7 @@ def test_what_changed_is_freed_and_found(tmp_path):
 def test_an_unchanged_machine_needs_no_adaptation(tmp_path):
     settings = two_joints(tmp_path)
     model = identified(settings, TRUTH, "a fit")
-    assert [step["parameter"] for step in steps(model, [drive(settings, 4)])] == [""]
+    assert [step["parameter"] for step in steps(model, [drive(settings, 4)], (), no_progress)] == [""]
     with pytest.raises(SettingsError, match="no parameter lowers the error"):
         hydroid.adapt(drive(settings, 4), fit=model, out=None)
 
@@ -40,7 +41,7 @@ def test_an_effect_of_a_new_day_is_freed_for_one_joint(tmp_path):
     model = identified(settings, TRUTH | {"day_monday": 0.5, "day_other": 0.0}, "a fit")
     log = drive(settings, 3, TRUTH | {"day_monday": 0.0, "day_other": -2.0})
     log.angle[:, 1] += np.radians(2.0) * np.sin(log.time)
-    first, then, *_ = steps(model, [log])
+    first, then, *_ = steps(model, [log], (), no_progress)
     assert then["parameter"] == "day_other"
     assert then["left_out_deg"]["lift"] < 0.7 * first["left_out_deg"]["lift"]
     assert then["left_out_deg"]["tilt"] == pytest.approx(first["left_out_deg"]["tilt"], rel=0.05)

@@ -11,6 +11,7 @@ from hydroid.arm.model import load_machine
 from hydroid.errors import SettingsError
 from hydroid.posterior.uncertainty import uncertainty
 from hydroid.problem.problem import Problem
+from hydroid.progress import no_progress
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.search import DesignSettings
 
@@ -27,7 +28,7 @@ def configured(**changes: object) -> FitSettings:
 @pytest.fixture(scope="module")
 def designed() -> tuple[FitSettings, Design]:
     settings = configured()
-    return settings, design(settings, THETA, [], 3)
+    return settings, design(settings, THETA, [], 3, no_progress)
 
 
 def keeps_limits(settings: FitSettings, result: Design) -> bool:
@@ -57,7 +58,7 @@ def test_experiments_keep_clear_where_others_collide():
     smallest: list[list[float]] = []
     for margin in (0.05, None):
         settings = configured(clearance_m=margin, effort=8, duration_s=4)
-        tried = design(settings, THETA, [], 1).random
+        tried = design(settings, THETA, [], 1, no_progress).random
         smallest.append([clearance(settings, trial.log.angle).min() for trial in tried])
     checked, unchecked = smallest
     assert min(checked) >= 0.05
@@ -79,7 +80,7 @@ def test_a_design_keeps_its_limits_when_simulate_runs_it(designed: tuple[FitSett
 )
 def test_tight_limits_are_kept_too(tight: dict[str, object]):
     settings = configured(**{"effort": 3} | tight)
-    assert keeps_limits(settings, design(settings, THETA, [], 1))
+    assert keeps_limits(settings, design(settings, THETA, [], 1, no_progress))
 
 
 def test_the_best_is_no_worse_than_any_random_one_and_repeats(designed: tuple[FitSettings, Design]):
@@ -90,7 +91,7 @@ def test_the_best_is_no_worse_than_any_random_one_and_repeats(designed: tuple[Fi
     )
     assert least < np.median(at_random)
     assert (least <= at_random).all()
-    again = design(settings, THETA, [], 3)
+    again = design(settings, THETA, [], 3, no_progress)
     assert np.array_equal(again.log.command, result.log.command)
     assert np.array_equal(again.best.gained, result.best.gained)
 
@@ -130,4 +131,4 @@ def test_the_information_of_least_squares_has_the_closed_form():
 )
 def test_a_design_that_cannot_be_made_is_refused(changes: dict[str, object], message: str):
     with pytest.raises(SettingsError, match=message):
-        design(configured(**changes), THETA, [], 1)
+        design(configured(**changes), THETA, [], 1, no_progress)

@@ -16,6 +16,7 @@ from hydroid.posterior.linear import with_open_start
 from hydroid.posterior.posterior import regular
 from hydroid.posterior.uncertainty import Uncertainty, uncertainty
 from hydroid.problem.problem import Problem
+from hydroid.progress import no_progress
 from hydroid.quantity_table import QUANTITIES, ROWS, TARGETS
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.problem import ParameterSettings
@@ -89,7 +90,7 @@ def test_an_unchanged_term_changes_nothing_and_a_changed_one_what_it_sets(late: 
 
 def test_a_missing_delay_is_found_and_lowers_the_error_on_parts_left_out(late: tuple[Problem, Uncertainty]):
     problem, known = late
-    content, _ = advice(problem, known, "runs/late")
+    content, _ = advice(problem, known, "runs/late", no_progress)
     first = content["terms"][0]
     assert first["name"] == "delay"
     assert first["freed"] == pytest.approx(0.03, rel=0.1)
@@ -107,7 +108,7 @@ def test_a_parameter_that_differs_between_the_sides_is_split():
     problem = Problem(model, [make_log(truth)])
     start = problem.parameters.vector(TRUTH | {"late": 0.035}, "start")
     known = uncertainty(problem, refitted(problem, start, 0.0).theta)
-    best = promising(score_terms(problem, known))[0]
+    best = promising(score_terms(problem, known, no_progress))[0]
     assert best.term.name == "late_b"
     split = {name: p.quantity for name, p in best.term.entries.items()}
     assert split == {"late": "delay_a", "late_b": "delay_b"}
@@ -121,7 +122,7 @@ def test_a_parameter_that_differs_between_the_sides_is_split():
 def test_nothing_is_named_where_nothing_is_missing(noise_deg: float):
     settings = make_settings()
     problem = Problem(settings, [make_log(settings, noise_deg)])
-    tests = score_terms(problem, uncertainty(problem, problem.parameters.vector(TRUTH, "truth")))
+    tests = score_terms(problem, uncertainty(problem, problem.parameters.vector(TRUTH, "truth")), no_progress)
     assert tests
     assert promising(tests) == []
 

@@ -6,7 +6,7 @@ from small_fits import Watcher, study
 from hydroid import load_settings
 from hydroid.errors import RunError, SettingsError
 from hydroid.fitting.checkpoints import Memo
-from hydroid.fitting.fit import fit
+from hydroid.fitting.fit import Silent, fit
 from hydroid.fitting.search import search
 from hydroid.fitting.validation import error_indices
 from hydroid.problem.problem import Problem
@@ -74,11 +74,11 @@ def test_a_fit_recovers_what_the_data_tell_and_names_what_they_do_not(algorithm)
 def test_a_resumed_search_ends_as_the_uninterrupted_one(algorithm, stop):
     """A search is repeated, and what it had simulated is not simulated again."""
     problem = study(**{"search.algorithm": algorithm})
-    whole = search(problem, lambda row: None, lambda n, rms: None, {})
+    whole = search(problem, Silent(), {})
     stopped, rest, stored = Watcher(stop_at=stop), Watcher(), {}
     with pytest.raises(KeyboardInterrupt):
-        search(problem, stopped.generation, stopped.refining, stored)
-    parts = search(problem, rest.generation, rest.refining, stored)
+        search(problem, stopped, stored)
+    parts = search(problem, rest, stored)
     assert len(rest.rows) == 7 - stop
     np.testing.assert_array_equal(parts.history, whole.history)
     np.testing.assert_array_equal(parts.theta, whole.theta)

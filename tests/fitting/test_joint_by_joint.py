@@ -89,7 +89,7 @@ def test_joint_by_joint_then_together_finds_the_truth(problem, truth):
     np.testing.assert_allclose(result.estimates["best"].theta[own], truth[own], rtol=0.2)
     np.testing.assert_allclose(result.best.theta, truth, rtol=1e-3)
     assert result.refinement is not None
-    assert result.refinement.converged
+    assert result.refinement.ending.converged
 
 
 def test_a_single_joint_is_fitted_with_the_others_as_the_settings_say(problem):

@@ -8,6 +8,7 @@ from recovery import refined
 from small_fits import Watcher, steps_of
 
 from hydroid import load_settings
+from hydroid.fitting.fit import Silent
 from hydroid.fitting.search import search
 from hydroid.problem.problem import Problem
 
@@ -48,12 +49,12 @@ def test_a_horizon_in_which_nothing_moves_is_left_out():
     (log,) = problem.logs
     late = replace(log, command=np.roll(log.command, -60, axis=0) * (np.arange(450) < 390)[:, None])
     stored: dict[str, dict] = {}
-    search(Problem(problem.settings, [late]), lambda row: None, lambda *_: None, stored)
+    search(Problem(problem.settings, [late]), Silent(), stored)
     assert set(stored) == {"search", "start 1 part 1", "start 1 part 2"}  # two seconds, and all
 
 
 def test_all_starts_end_at_one_optimum_which_is_the_truth_without_noise(exact):
-    found = search(exact, lambda row: None, lambda *_: None, {})
+    found = search(exact, Silent(), {})
     truth = exact.parameters.vector(TRUTH, "truth")
     np.testing.assert_allclose(found.theta, np.tile(truth, (2, 1)), rtol=1e-3)
     assert found.population.objectives.max() < np.deg2rad(1e-5)
@@ -63,12 +64,12 @@ def test_a_resumed_search_ends_bit_for_bit_and_gains_no_more_on_noise_than_its_p
     how = {"starts": 2, "iterations": 4, "horizons": [0.25, 2.0]}
     problem = make(noise_deg=0.02, **{"search.multistart": how})
     watcher, stopped, last, stored = Watcher(), Watcher(stop_at=1, simulations=60), Watcher(), {}
-    whole = search(problem, watcher.generation, watcher.refining, {})
+    whole = search(problem, watcher, {})
     assert [row[0] for row in watcher.rows] == [1, 2]
     assert whole.history[-1, 1] == whole.history[-1, 2] > whole.history[0, 1]
     with pytest.raises(KeyboardInterrupt):
-        search(problem, stopped.generation, stopped.refining, stored)
-    again = search(problem, last.generation, last.refining, stored)
+        search(problem, stopped, stored)
+    again = search(problem, last, stored)
     assert [row[0] for row in last.rows] == [2]  # the first start is not repeated
     np.testing.assert_array_equal(again.history, whole.history)
     np.testing.assert_array_equal(again.theta, whole.theta)

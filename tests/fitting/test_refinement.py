@@ -49,16 +49,16 @@ def stop_after(limit: int):
 def test_an_interrupted_refinement_goes_on_without_loss(problem, tmp_path, limit):
     file = tmp_path / "refinement.npz"
     problem.simulated = 0
-    whole = refine(problem, begin(problem), SHORT, lambda *_: None)
+    whole = refine(problem, begin(problem), SHORT, lambda *_: None, {}, "one")
     assert whole.evaluations == problem.simulated
     problem.simulated = 0
     with pytest.raises(KeyboardInterrupt):
-        refine(problem, begin(problem), SHORT, stop_after(limit), CheckpointFile(file, "a"))
-    parts = refine(problem, begin(problem), SHORT, lambda *_: None, CheckpointFile(file, "a"))
+        refine(problem, begin(problem), SHORT, stop_after(limit), CheckpointFile(file, "a"), "one")
+    parts = refine(problem, begin(problem), SHORT, lambda *_: None, CheckpointFile(file, "a"), "one")
     assert equal(parts, whole)
     simulated = problem.simulated
     assert simulated < whole.evaluations + limit + 12  # the steps since the last Jacobian are repeated
-    again = refine(problem, begin(problem), SHORT, lambda *_: None, CheckpointFile(file, "a"))
+    again = refine(problem, begin(problem), SHORT, lambda *_: None, CheckpointFile(file, "a"), "one")
     assert equal(again, whole)
     assert problem.simulated == simulated  # the result itself is kept
 
@@ -67,4 +67,4 @@ def test_another_refinement_has_a_checkpoint_of_its_own(problem, tmp_path):
     checkpoints = CheckpointFile(tmp_path / "refinement.npz", "a")
     refine(problem, begin(problem), SHORT, lambda *_: None, checkpoints, "one")
     other = refine(problem, 1.1 * begin(problem), SHORT, lambda *_: None, checkpoints, "another")
-    assert equal(other, refine(problem, 1.1 * begin(problem), SHORT, lambda *_: None))
+    assert equal(other, refine(problem, 1.1 * begin(problem), SHORT, lambda *_: None, {}, "one"))

@@ -34,7 +34,7 @@ class Off:
 
 
 def predicted(error: float, log: Log) -> Prediction:
-    return Prediction("fit", log, (2,), log.angle[:, [1]] - np.radians(error))
+    return Prediction("fit", log, (2,), log.angle[:, [1]] - np.radians(error), {}, None)
 
 
 def verdict(fitted=None, unseen=None, nine=(5, 5), tolerance=None, log=None):

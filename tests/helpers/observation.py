@@ -45,7 +45,7 @@ def trace(scenario: Scenario, substeps: int, candidates: Candidates) -> Observat
     chain = Chain(scenario.machine, scenario.arm, scenario.active, substeps, scenario.prescribed.columns)
     steps, pose = scenario.settings.steps, scenario.arm.pose
     rollout = roll if scenario.settings.model == "dynamic" else roll_quasi_static
-    arm = SteppedArm(scenario.arm.model, chain.columns, chain.pushed, steps, rollout)
+    arm = SteppedArm(scenario.arm.model, chain.columns, steps, rollout)
     with quiet_mujoco():
         balance = arm.start(scenario.values(candidates), [0], pose)
         plugin, states = chain.start(candidates, pose, balance[None], scenario.pressure)

@@ -42,7 +42,8 @@ def recover(
 
 def refined(problem: Problem, start: np.ndarray, how: RefinementSettings | None = None) -> np.ndarray:
     """Where the refinement of an estimate ends, by default as the settings say, shape (P,)."""
-    result = refine(problem, start, how or problem.settings.refinement or RefinementSettings())
+    how = how or problem.settings.refinement or RefinementSettings()
+    result = refine(problem, start, how, lambda *_: None, {}, "refined")
     return problem.parameters.from_unit(result.point)
 
 

@@ -53,7 +53,7 @@ def test_a_reader_meets_millimetres_and_newtons(settings: FitSettings) -> None:
     assert [p.unit for p in settings.parameter_set().parameters if p.name == "D"] == ["N·s/m"]
     time, place = np.arange(300) * 0.01, np.zeros((300, 2))
     log = Log("a.csv", time, np.tile([0.0, 50.0], (300, 1)), place, 0.01)
-    one = Prediction("fit", log, (2,), place[:, [1]] - 0.02)
+    one = Prediction("fit", log, (2,), place[:, [1]] - 0.02, {}, None)
     errors = validation_page([one], {"fit": judge(settings, [], {}, [one])}, settings.arm).tables["errors"]
     row = dict(zip(errors.header, errors.rows[0], strict=True))
     assert row["rms [deg, mm of joints that slide]"] == pytest.approx(20)

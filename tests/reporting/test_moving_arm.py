@@ -25,7 +25,7 @@ def model() -> mujoco.MjModel:
 
 
 def predicted(response: np.ndarray, joints: tuple[int, ...] = (2, 3), log: Log = LOG) -> Prediction:
-    return Prediction("fit", log, joints, response)
+    return Prediction("fit", log, joints, response, {}, None)
 
 
 def moved(model: mujoco.MjModel, error=ERROR, most: int = MOST) -> MovingArm:

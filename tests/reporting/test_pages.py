@@ -178,6 +178,6 @@ def test_a_validation_of_several_fits_shows_the_best_first_in_shared_charts():
 
 def test_a_folder_that_cannot_be_written_is_said(tmp_path: Path):
     (tmp_path / "tables").write_text("in the way")
-    page = Page("p", "t", "l", (Section("s", tables={"t": Table("t", ("a",), ((1,),))}),))
+    page = Page("p", "t", "l", (Section("s", tables={"t": Table("t", ("a",), ((1,),))}),), ())
     with pytest.raises(RunError, match="cannot be written"):
         write_page(page, tmp_path)

@@ -11,7 +11,7 @@ from hydroid.settings.search import GeneticSettings
 
 
 def evaluate(algorithm, chromosomes, function):
-    objectives = np.asarray(function(algorithm.decode(chromosomes)), dtype=float)
+    objectives = np.asarray(function(algorithm.coding.decode(chromosomes)), dtype=float)
     for array in (chromosomes, objectives):
         array.flags.writeable = False
     return Population(chromosomes, objectives)
@@ -63,7 +63,7 @@ def test_the_infeasible_neither_survive_nor_win_while_a_feasible_candidate_is_th
     search = Nsga2(GeneticSettings(population=20), 2)
     rng = np.random.default_rng(0)
     chromosomes = search.ask(None, rng)
-    objectives = two_goals(search.decode(chromosomes))
+    objectives = two_goals(search.coding.decode(chromosomes))
     objectives[::2, 1] = bad
     population = Population(chromosomes, objectives)
     assert sorted(crowded_order(objectives)[:10]) == list(range(1, 20, 2))

@@ -35,7 +35,7 @@ def oscillator(points):
 def test_finds_the_bottom_of_rosenbrocks_valley(start):
     result = least_squares(np.array(start), rosenbrock, SETTINGS)
     np.testing.assert_allclose(result.point, 0.75, atol=1e-9)
-    assert result.converged
+    assert result.ending.converged
     assert result.cost < 1e-18 < result.cost_before
 
 

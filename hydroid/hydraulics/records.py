@@ -69,9 +69,8 @@ COEFFICIENTS = np.dtype(
         *((name, JOINT[name]) for name in _PLAIN),
         ("a", SIDE),
         ("b", SIDE),
-        *_fields(
-            "theta0 shortest coil gap conductance opening_keep opening_steps backflow relief ring_cosine ring_sine"
-        ),
+        *_fields("theta0 shortest coil gap conductance opening_keep opening_steps backflow relief"),
+        *_fields("ring_cosine ring_sine"),
     ]
 )
 """what the kernel reads of a joint: its fields of JOINT, and constants that follow from them; theta0 is the

@@ -160,8 +160,7 @@ def weigh(c, w, angle: float, torque: float) -> None:
 
 @compilable
 def overshoot(c, z, wanted: float) -> float:
-    """Advance a joint that rings on its oil over a step; how much further than at the velocity `wanted` [rad/s]
-    it turns [rad].
+    """Advance a joint on its oil over a step; how much further than at `wanted` [rad/s] it turns [rad].
 
     Its velocity v follows that of the rod without oil, u, as v̈ + 2ζω v̇ + ω²(v − u) = 0 with ω and ζ constant
     (H. E. Merritt, "Hydraulic Control Systems", 1967): exact where u is constant.

@@ -1,8 +1,11 @@
 """A recording's samples -> one period: repairs that invent no data, then commands held, angles interpolated.
 
+Each command holds until the next one. Where samples are not the new ones, by jitter or another rate, commands
+are averaged over each new sample: the arm has felt all of them, each for as long as it held.
+
 A faster log is thinned by plain interpolation of its angles, without a filter before it: the fit compares
 angles sample by sample, and white sensor noise stays what it was, while a filter would colour it and delay
-the angle. Its commands are averaged over each new sample: the arm has felt all of them.
+the angle.
 """
 
 from dataclasses import replace

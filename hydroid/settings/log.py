@@ -130,8 +130,8 @@ class LogSettings(Settings):
     joints: dict[JointNumber, JointColumns | None] = {}
     """what differs for single joints, by joint; null: the log does not hold this joint"""
     period_s: Annotated[float, Field(ge=1e-4, le=1)] = 0.01
-    """sample period to which logs are resampled [s]: angles are interpolated, commands held. Commands of a
-    faster log are averaged over the period, those of a slower one change on a line from sample to sample"""
+    """sample period to which logs are resampled [s]: angles are interpolated, held commands
+    averaged over the period; those of a slower log change on a line from sample to sample"""
     delay_s: Annotated[float, Field(ge=-10, le=10)] = 0.0
     """transport delay: commands act this much later than logged [s]"""
     groups: dict[

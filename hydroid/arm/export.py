@@ -18,9 +18,9 @@ from hydroid.files import Plain, fill_template, write_atomic
 from hydroid.mjcf import mjcf_text, quiet_mujoco
 
 _FIELDS = (
-    *("body_pos", "body_quat", "body_ipos", "body_iquat", "body_mass", "body_inertia", "body_simple"),
-    *("body_sameframe", "jnt_pos", "jnt_axis", "dof_simplenum"),
-)
+    "body_pos", "body_quat", "body_ipos", "body_iquat", "body_mass", "body_inertia", "body_simple",
+    "body_sameframe", "jnt_pos", "jnt_axis", "dof_simplenum"
+)  # fmt: skip
 """of a model, whose last bits depend on how its bodies were fused"""
 
 

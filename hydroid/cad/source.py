@@ -169,11 +169,10 @@ def convert_meshes(
 def sort_shapes(spec: mujoco.MjSpec) -> None:
     """Show what the file shows, or else what collides; let collide what collides, or else what is shown."""
     for body in spec.bodies:
-        visual = [geom for geom in body.geoms if not geom.contype and not geom.conaffinity]
-        solid = [geom for geom in body.geoms if geom.contype or geom.conaffinity]
-        for geom in body.geoms:
-            geom.group = SHOWN if geom in (visual or solid) else HIDDEN
-            geom.contype = geom.conaffinity = int(geom in (solid or visual))
+        collide = [bool(geom.contype or geom.conaffinity) for geom in body.geoms]
+        for geom, solid in zip(body.geoms, collide, strict=True):
+            geom.group = HIDDEN if solid and not all(collide) else SHOWN
+            geom.contype = geom.conaffinity = int(solid or not any(collide))
             if not geom.material and np.allclose(geom.rgba, (0.5, 0.5, 0.5, 1.0)):
                 geom.rgba = (0.94, 0.53, 0.08, 1.0)
 

@@ -22,8 +22,8 @@ _OPTIONS = (
 )  # fmt: skip
 _JOINT_FIELDS = (
     "jnt_range", "jnt_limited", "jnt_margin", "jnt_solref", "jnt_solimp", "jnt_stiffness",
-    "jnt_stiffnesspoly", "dof_solref", "dof_solimp", "dof_damping", "dof_dampingpoly", "dof_armature", "dof_frictionloss",
-    "qpos0", "qpos_spring"
+    "jnt_stiffnesspoly", "dof_solref", "dof_solimp", "dof_damping", "dof_dampingpoly", "dof_armature",
+    "dof_frictionloss", "qpos0", "qpos_spring"
 )  # fmt: skip
 
 

@@ -1,10 +1,10 @@
 """Fit one problem, with settings and logs that are read: `hydroid.fit`."""
 
 import time
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from hydroid.arrays import record
 from hydroid.commands.console import Printed
 from hydroid.commands.inputs import LogSource, LogSources, Source
 from hydroid.commands.logs import read_logs
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from hydroid.run.folder import RunFolder
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@record
 class FitResult(Printed):
     """A finished fit; every command takes it as `fit`, and `load_plant` as its source.
 

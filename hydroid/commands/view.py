@@ -1,12 +1,13 @@
 """`hydroid simulate` and `hydroid view`: what a model predicts as a log, and as an arm in motion."""
 
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hydroid.arrays import record
 from hydroid.commands.console import Result
 from hydroid.commands.inputs import (
     ConfigSource,
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
     from hydroid.settings.fit import FitSettings
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@record
 class Simulated(Result["dict[str, Log]"]):
     """Simulated logs by the arm's name: right, left, or alone."""
 

@@ -83,6 +83,13 @@ def csv_text(rows: Iterable[Iterable[Any]]) -> str:
     return buffer.getvalue()
 
 
+def yaml_text(values: Any, **style: Any) -> str:
+    """Return plain values as YAML, mappings in their order; `style` is that of PyYAML's `dump`."""
+    import yaml
+
+    return yaml.safe_dump(values, sort_keys=False, allow_unicode=True, **style)
+
+
 def fill_template(path: str, /, **values: Any) -> str:
     """Return the text of a template in the package with values in it."""
     from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape

@@ -4,11 +4,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from hydroid.arrays import Array, record
 from hydroid.estimate import NAME, FitSummary, ParameterEstimate, read_estimate
-from hydroid.files import find_config, is_file, write_atomic
+from hydroid.files import find_config, is_file, write_atomic, yaml_text
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load
 
@@ -117,7 +115,7 @@ def write_settings(folder: Path, settings: FitSettings) -> None:
     copy_models({Path(name).name: path for name, path in models.items()}, folder / Path(MODEL).parent)
     paths = {"model": MODEL, "pair": PAIR if arm.pair else None}
     for name, content in ((ARM, arm.model_dump(mode="json") | paths), (CONFIG, portable(settings))):
-        write_atomic(folder / name, yaml.safe_dump(content, sort_keys=False, allow_unicode=True))
+        write_atomic(folder / name, yaml_text(content))
 
 
 def portable(settings: FitSettings) -> dict[str, Any]:

@@ -10,11 +10,10 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
-import yaml
 from numpy.typing import ArrayLike
 
 from hydroid.arm.locked import LockedArm
-from hydroid.files import Plain, fill_template, write_atomic
+from hydroid.files import Plain, fill_template, write_atomic, yaml_text
 from hydroid.mjcf import mjcf_text, quiet_mujoco
 
 _FIELDS = (
@@ -110,8 +109,7 @@ def write_fitted(folder: Path, fitted: mujoco.MjSpec, joints: str, actuators: Pl
     name = "fitted"
     if actuators is not None:
         name = "mechanics"
-        text = yaml.safe_dump(actuators, sort_keys=False, allow_unicode=True)
-        write_atomic(folder / "actuators.yaml", text)
+        write_atomic(folder / "actuators.yaml", yaml_text(actuators))
     write_atomic(folder / f"{name}.xml", mjcf_text(fitted))
     readme = fill_template(f"arm/{name}.txt.j2", timestep=fitted.option.timestep, joints=joints)
     write_atomic(folder / "README.txt", readme)

@@ -9,11 +9,10 @@ from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
-import yaml
 
 from hydroid.arm.model import load_model
 from hydroid.cad.importer import ImportedArm
-from hydroid.files import Plain, fill_template
+from hydroid.files import Plain, fill_template, yaml_text
 from hydroid.hydraulics.valve import DENSITY
 from hydroid.project.layout import Layout
 from hydroid.settings.arm import Arm
@@ -96,8 +95,7 @@ def arm_text(imported: ImportedArm, arm: Arm | None, sizes: Sequence[JointSize])
 
 def flow(value: Any) -> str:
     """Write a value as YAML, on one line."""
-    text = yaml.safe_dump(value, default_flow_style=True, width=10_000, allow_unicode=True, sort_keys=False)
-    return text.removesuffix("...\n").strip()
+    return yaml_text(value, default_flow_style=True, width=10_000).removesuffix("...\n").strip()
 
 
 def rounded(value: float) -> float:

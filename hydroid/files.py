@@ -15,6 +15,8 @@ from hydroid.errors import RunError, SettingsError
 
 Plain = dict[str, Any]  # a mapping as YAML and JSON hold it
 PART = ".part"  # suffix of a file that is being written
+NOTICES = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGUSR1") if hasattr(signal, name))
+"""signals by which a cluster says that time is nearly up"""
 
 
 @contextmanager
@@ -27,8 +29,7 @@ def undisturbed() -> Generator[None]:
         yield
         return
     held: list[int] = []
-    stops = (getattr(signal, name, None) for name in ("SIGINT", "SIGTERM", "SIGUSR1"))
-    ours = [number for number in stops if number is not None and signal.getsignal(number) is not None]
+    ours = [number for number in (signal.SIGINT, *NOTICES) if signal.getsignal(number) is not None]
     before = {number: signal.signal(number, lambda number, _: held.append(number)) for number in ours}
     try:
         yield

@@ -88,7 +88,7 @@ def load_identified(
     beside = file and file.parent / CONFIG
     shipped = "fit-hyd" if nominal else "fit-mech"
     chosen = config or (beside if beside and is_file(beside) else shipped)
-    settings = load(find_config(chosen), FitSettings, dict(overrides or {}))
+    settings = load(find_config(chosen), FitSettings, overrides)
     if config is None and summary is not None:
         settings = settings.of_estimate(summary.final)
     missing = [n for n, p in settings.parameters.items() if n not in values and p.fixed is None]

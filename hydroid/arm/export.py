@@ -100,14 +100,14 @@ def _draw_tendons(spec: mujoco.MjSpec) -> None:
         tendon.frictionloss = tendon.armature = 0.0
 
 
-def write_fitted(folder: Path, fitted: mujoco.MjSpec, joints: str, actuators: Plain | None) -> None:
+def write_fitted(folder: Path, fitted: mujoco.MjSpec, joints: str, actuators: Plain) -> None:
     """Write the fitted arm to `model/`, beside `arm.xml`, and a README that says what it is good for.
 
-    `joints` names those that take commands; `actuators` are hydraulic parameters by joint (stage 2), or None:
-    the MJCF has motors (stage 1).
+    `joints` names those that take commands; `actuators` are hydraulic parameters by joint; of stage 1
+    there are none: the MJCF has motors.
     """
     name = "fitted"
-    if actuators is not None:
+    if actuators:
         name = "mechanics"
         write_atomic(folder / "actuators.yaml", yaml_text(actuators))
     write_atomic(folder / f"{name}.xml", mjcf_text(fitted))

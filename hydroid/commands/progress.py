@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Self
 
 import typer
 
+from hydroid.files import NOTICES
+
 if TYPE_CHECKING:
     from hydroid.arrays import Array
     from hydroid.settings.fit import FitSettings
-
-NOTICES = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGUSR1") if hasattr(signal, name))
 
 VISIBLE: ContextVar[bool] = ContextVar("visible", default=False)
 """whether progress is shown: the command line sets it"""
@@ -102,8 +102,8 @@ class FitProgress(Progress):
     def _fallen(self, what: str, part: str, error: float) -> str:
         """Say how far the best error has fallen: as a part of the first one, since joints differ in size."""
         errors = self._errors.setdefault((what, part), [error])
-        errors.append(min(errors[-1], error))
-        return f"error at {100 * errors[-1] / max(errors[0], 1e-12):.0f} % of the start's"
+        errors.append(error)
+        return f"error at {100 * min(errors) / max(errors[0], 1e-12):.0f} % of the start's"
 
     def generation(self, row: "Array") -> bool:
         """Take a row of `fitting.search.HISTORY`; return whether time is up."""

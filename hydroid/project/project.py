@@ -45,7 +45,7 @@ class Project:
 
 
 def write_project(
-    folder: Path, robot: Path | None, logs: Sequence[Path], joints: Sequence[str] = (), **options: Any
+    folder: Path, robot: Path | None, logs: Sequence[Path], joints: Sequence[str], **options: Any
 ) -> Project:
     """Write a project to a folder, new or with other things in it (`hydroid.init` says what is given)."""
     taken = [name for name in FILES if os.path.lexists(folder / name)]

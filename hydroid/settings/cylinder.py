@@ -53,8 +53,8 @@ def make_cylinder(
 ) -> LinearActuator:
     """Return a cylinder that moves its joint through a range [rad], or along it [m] where the joint `slides`.
 
-    MuJoCo's `data` has all joints of the arm at 0; a cylinder whose triangle is given, or that lies along its
-    joint, needs none.
+    MuJoCo's `data` has all joints of the arm at 0. A cylinder whose triangle is given needs none, nor one that
+    lies along its joint without pivots.
     """
     sides, pivots = settings.triangle, None
     if slides:
@@ -62,7 +62,7 @@ def make_cylinder(
             raise ValueError("its joint slides, so it lies along it: give neither triangle nor four_bar")
         # along the joint b is 0; by default the rod runs out forward
         given, way = settings.pivots, 1.0
-        if given is not None and data is not None:
+        if given is not None:
             way = float(np.subtract(given.child, given.parent) @ data.joint(joint).xaxis)
         sides = Triangle.model_construct(a=1.0, b=0.0, theta0=90.0 if way > 0 else -90.0)
     elif sides is None:

@@ -102,8 +102,7 @@ def load_identified(
 
 def start_values(settings: FitSettings) -> IdentifiedModel:
     """Return the model before any fit, where a search starts: nominal values, or the middle of the bounds."""
-    parameters = settings.parameter_set()
-    return IdentifiedModel(settings, parameters.start, "the start values")
+    return IdentifiedModel(settings, settings.parameter_set().start, "the start values")
 
 
 def write_settings(folder: Path, settings: FitSettings) -> None:

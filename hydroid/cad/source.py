@@ -75,8 +75,8 @@ def read_source(path: Path, notes: Notes) -> tuple[mujoco.MjSpec, dict[str, Path
         rest = Path(given.rpartition("://")[2].replace("\\", "/").lstrip("/"))
         tails = (Path(given), rest, Path(*rest.parts[1:]))
         tried = (place / tail for place in (folder, *islice(folder.parents, 4)) for tail in tails)
-        alike = [below[rest.name.lower()]] if rest.name.lower() in below else []
-        if place := next((path for path in chain(tried, alike) if is_file(path)), None):
+        alike = below.get(rest.name.lower(), folder)
+        if place := next((path for path in chain(tried, [alike]) if is_file(path)), None):
             found[name] = place
         else:
             what = (

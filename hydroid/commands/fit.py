@@ -187,8 +187,7 @@ def _store(folder: "RunFolder", result: FitResult) -> Path:
 
     began = time.monotonic()
     folder.write_estimate(result.model, result.problem.logs[0])
-    arrays = fit_result(result.fit, result.predictions, result.baselines)
-    write_atomic(folder.path / RESULT, pack(arrays))
+    write_atomic(folder.path / RESULT, pack(fit_result(result.fit, result.predictions, result.baselines)))
     page = draw(folder.path)
     folder.status("done", seconds=dict(result.fit.seconds) | {"report": time.monotonic() - began})
     return page

@@ -154,9 +154,15 @@ def design(
         result = best_experiment(settings, model.theta, existing, seed, progress)
     deviations = result.known.deviations, result.random_deviations, result.after.deviations
     rows: list[Plain] = [
-        {"parameter": name, "estimate": model.values[name]}
-        | {"before_percent": 100 * before, "random_percent": 100 * random, "designed_percent": 100 * after}
-        | {"gain": random / after, "flag": flag_of(after).value}
+        {
+            "parameter": name,
+            "estimate": model.values[name],
+            "before_percent": 100 * before,
+            "random_percent": 100 * random,
+            "designed_percent": 100 * after,
+            "gain": random / after,
+            "flag": flag_of(after).value,
+        }
         for name, before, random, after in zip(result.names, *deviations, strict=True)
     ]
     note = (

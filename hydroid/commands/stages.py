@@ -222,5 +222,4 @@ def adapt(
     columns, rows = errors_by_joint(settings.arm, named)
     columns = {"parameter": "freed"} | columns
     steps_table = Table.of("Parameters freed one after another", columns, rows, LEFT_OUT)
-    content = {**result.content, "steps": path}
-    return replace(result, lines=[steps_table, *result.lines], content=content)
+    return replace(result, lines=[steps_table, *result.lines], content={**result.content, "steps": path})

@@ -53,8 +53,8 @@ def make_cylinder(
 ) -> LinearActuator:
     """Return a cylinder that moves its joint through a range [rad], or along it [m] where the joint `slides`.
 
-    MuJoCo's `data` has all joints of the arm at 0. A cylinder whose triangle is given needs none, nor one that
-    lies along its joint without pivots.
+    MuJoCo's `data` has all joints of the arm at 0; a cylinder whose triangle is given needs none, nor one
+    that lies along its joint and has no pivots.
     """
     sides, pivots = settings.triangle, None
     if slides:

@@ -25,7 +25,7 @@ SIDES = ("right", "left")
 def load_model(arm: Arm) -> mujoco.MjSpec:
     """Read the arm's MJCF, which compiles."""
     spec = read_mjcf(arm.model)
-    with mujoco_errors(str(arm.model)):
+    with mujoco_errors(arm.model):
         spec.compile()
     return spec
 
@@ -172,5 +172,5 @@ def load_machine(arm: Arm, *, pair: bool) -> Machine:
     if [joint.name for joint in spec.joints] != wanted:
         hint = f"the joints of two arms are {', '.join(wanted)}"
         raise ModelError("is not the model of two of the arm", arm.pair, hint)
-    with mujoco_errors(str(arm.pair)):
+    with mujoco_errors(arm.pair):
         return Machine(arm, spec.compile(), SIDES)

@@ -49,21 +49,20 @@ class Notes:
 
 def read_source(path: Path, notes: Notes) -> tuple[mujoco.MjSpec, dict[str, Path], bool]:
     """Read a URDF or an MJCF: its spec, where each mesh file that it names lies, and whether it is a URDF."""
-    where = str(path)
     usd = path.suffix.lower() in (".usd", ".usda", ".usdc", ".usdz")
     root = ElementTree.Element("usd") if usd else _parsed(path)
     kind = "xacro" if any("xacro" in str(part.tag).lower() for part in root.iter()) else str(root.tag)
     if kind in REFUSED:
         what, hint = REFUSED[kind]
-        raise ModelError(what, where, hint.format(name=path.name))
+        raise ModelError(what, path, hint.format(name=path.name))
     urdf, folder = kind == "robot", path.resolve().parent
     if not urdf and kind != "mujoco":
         what = f"is neither URDF nor MJCF: its root element is <{root.tag}>"
-        raise ModelError(what, where, "export the arm as URDF")
+        raise ModelError(what, path, "export the arm as URDF")
     files = _prepare_urdf(root, notes) if urdf else {}
     if not urdf:
         _prepare_mjcf(root, folder)
-    with mujoco_errors(where):
+    with mujoco_errors(path):
         spec = mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
     if not urdf:
         files = {mesh.file: mesh.file for mesh in spec.meshes if mesh.file}

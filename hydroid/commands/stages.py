@@ -149,7 +149,7 @@ def held_mechanics(mech: "ModelSource | None", settings: FitSettings, changes: P
     values, summary = ({}, None) if mech is None else open_values(mech)
     if summary is not None and summary.stage != "mech":
         hint = "name a run of fit-mech, or begin at this fit with --start"
-        raise SettingsError("is a fit of stage 2, but --mech takes one of stage 1", str(mech), hint)
+        raise SettingsError("is a fit of stage 2, but --mech takes one of stage 1", mech, hint)
     held, missing = Plain(), list[str]()
     for name, p in settings.parameters.items():
         if p.quantity not in MECHANICAL or p.quantity == "gain":

@@ -223,7 +223,7 @@ def _compiled(path: Path, _changed: int, _size: int) -> Any:
     used = {geom.meshname for geom in spec.geoms}
     for one in [mesh for mesh in spec.meshes if mesh.name not in used]:
         spec.delete(one)
-    with mujoco_errors(str(path)):
+    with mujoco_errors(path):
         data = mujoco.MjData(spec.compile())
     data.qpos[:] = 0.0
     mujoco.mj_kinematics(data.model, data)

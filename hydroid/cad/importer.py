@@ -7,7 +7,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from hydroid.arrays import record
+from hydroid.arrays import Array, record
 from hydroid.cad.cylinders import is_part_of_cylinder, take_cylinders
 from hydroid.cad.repair import repair_inertias, weigh
 from hydroid.cad.source import Notes, convert_meshes, read_source, sort_shapes, word
@@ -57,12 +57,17 @@ def import_arm(
             notes.add("without limits: moving without stops, unless you give a range in arm.xml", joint.name)
     kept = {joint.name: own for joint in spec.joints if (own := cylinders.get(joint.name))}
     title = f"{spec.modelname}, from {path.name}"
-    scene = fill_template("cad/scene.xml")  # light, floor and cameras, which `arrange` puts around the arm
+    # with light, floor and cameras, and the pose nearest to 0 as `home`
+    scene = fill_template("cad/scene.xml")  # `arrange` puts its lights and cameras around the arm
     text = mjcf_text(spec).replace("<worldbody>", scene + "<worldbody>", 1)
     with mujoco_errors(spec.modelname):
         whole = mujoco.MjSpec.from_string(text, assets=meshes)
         model = whole.compile()
-    arrange(whole, model)
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    low, high = np.where(model.jnt_limited, model.jnt_range.T, 0.0)
+    whole.add_key(name="home", qpos=np.clip(0.0, low, high))
+    arrange(whole, data.xanchor[0], data.xanchor[-1])
     return ImportedArm(title, mjcf_text(whole), meshes, kept, tuple(notes.lines()))
 
 
@@ -164,15 +169,14 @@ def _named(spec: mujoco.MjSpec, chain: Sequence[str], columns: Sequence[str]) ->
     return sum(names.index(name) + 1 in hits for name in chain)
 
 
-def arrange(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
+def arrange(spec: mujoco.MjSpec, base: Array, tip: Array) -> None:
     """Put lights and cameras around the stretched arm, as far away as it reaches; exclude contacts by design.
 
-    The pose nearest to 0 is `home`. What touches there is close by design, or its hull is wide. `model` is
-    the compiled spec.
+    `base` and `tip` are its ends in the world [m], shape (3,). What touches in a named pose is close by
+    design, or its hull is wide.
     """
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    base, tip = data.xanchor[[0, -1]]  # of the arm, in the world [m]
+    with mujoco_errors(spec.modelname):
+        model = spec.compile()
     centre, reach = np.round(0.5 * (base + tip), 6), round(0.8 * float(np.linalg.norm(tip - base)), 6)
     if reach < 0.2 * model.stat.extent:  # one joint, or joints close together: the links reach farther
         centre, reach = np.round(model.stat.center, 6), round(0.5 * float(model.stat.extent), 6)
@@ -183,10 +187,10 @@ def arrange(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
     for camera in spec.cameras:
         camera.pos = np.round(centre + 2.3 * reach * camera.pos, 3)
     spec.stat.center, spec.stat.extent = centre, reach
-    low, high = np.where(model.jnt_limited, model.jnt_range.T, 0.0)
-    data.qpos = np.clip(0.0, low, high)
-    spec.add_key(name="home", qpos=data.qpos)
-    mujoco.mj_forward(model, data)
-    pairs = {(int(pair.min()), int(pair.max())) for pair in model.geom_bodyid[data.contact.geom]}
+    data, pairs = mujoco.MjData(model), set[tuple[int, int]]()
+    for key in range(model.nkey):
+        mujoco.mj_resetDataKeyframe(model, data, key)
+        mujoco.mj_forward(model, data)
+        pairs |= {(int(pair.min()), int(pair.max())) for pair in model.geom_bodyid[data.contact.geom]}
     for first, second in sorted(pairs):
         spec.add_exclude(bodyname1=model.body(first).name, bodyname2=model.body(second).name)

@@ -38,8 +38,14 @@ def add_payload(spec: mujoco.MjSpec, arm: Arm, mass: float) -> mujoco.MjSpec:
     loaded = spec.copy()
     # of a ball of 5 cm: its own inertia is small beside what its distance makes
     site, moment = loaded.site(arm.payload), 0.4 * mass * 0.05**2
-    ball = {"explicitinertial": True, "mass": mass, "ipos": [0.0] * 3, "inertia": [moment] * 3}
-    body = site.parent.add_body(name="payload", pos=site.pos, **ball)
+    body = site.parent.add_body(
+        name="payload",
+        pos=site.pos,
+        explicitinertial=True,
+        mass=mass,
+        ipos=[0.0] * 3,
+        inertia=[moment] * 3,
+    )
     if site.frame is not None:
         body.set_frame(site.frame)
     return loaded
@@ -117,8 +123,9 @@ class CollisionChecker:
         """Distances of all pairs of shapes in a pose [m], shape (P,); farther than `within` they are that."""
         self._data.qpos[:] = pose
         mujoco.mj_kinematics(self._model, self._data)
-        here = self._model, self._data
-        return np.array([mujoco.mj_geomDistance(*here, *pair, within, None) for pair in self._pairs])
+        return np.array(
+            [mujoco.mj_geomDistance(self._model, self._data, *pair, within, None) for pair in self._pairs]
+        )
 
 
 def _name(model: mujoco.MjModel, geom: int) -> str:

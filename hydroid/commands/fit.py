@@ -166,8 +166,8 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
     baselines = baselines_of(settings, problem.logs)
     verdict, summary = judge(settings, predictions, baselines), summarise(problem, fit)
     doubted = assumption_findings(settings, problem.logs, doubts(settings, problem.logs))
-    changes = {"verdict": verdict, "findings": (*behind(settings, verdict), *summary.findings, *doubted)}
-    summary = summary.changed(changes)
+    findings = *behind(settings, verdict), *summary.findings, *doubted
+    summary = summary.changed({"verdict": verdict, "findings": findings})
     source = "the fit" if folder is None else str(folder / NAME)
     model = IdentifiedModel(settings, fit.best.theta, source, summary)
     lines: list[Table | str] = [*verdict_lines({fit.final: verdict}), *warnings(summary)]
@@ -176,8 +176,9 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
         lines += [*next_lines(step), str(folder / "report.html")]
     details = [parameter_table(settings, summary), *map(str, summary.findings)]
     content = summary.plain() | {"out": folder and str(folder)}
-    own = (problem, fit, folder, summary, model, predictions, baselines)
-    return FitResult(lines, content, *own, details=details)
+    return FitResult(
+        lines, content, problem, fit, folder, summary, model, predictions, baselines, details=details
+    )
 
 
 def _store(folder: "RunFolder", result: FitResult) -> Path:

@@ -74,8 +74,8 @@ class Progress:
                 from rich.console import Console
                 from rich.progress import Progress as Bar, TextColumn
 
-                columns = *Bar.get_default_columns(), TextColumn("{task.fields[text]}")
-                self._bar = Bar(*columns, console=Console(stderr=True), transient=True)
+                text_column, console = TextColumn("{task.fields[text]}"), Console(stderr=True)
+                self._bar = Bar(*Bar.get_default_columns(), text_column, console=console, transient=True)
                 self._bar.add_task("", total=None, text="")
                 self._bar.start()
             self._bar.update(self._bar.task_ids[0], completed=done, total=total, description=line, text=text)

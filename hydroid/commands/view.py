@@ -149,9 +149,11 @@ def view(
     from hydroid.viewer.motion import simulated_motion
 
     if out is not None:
-        from hydroid.viewer.film import check_kind, render_motion
+        from hydroid.viewer.film import KINDS, render_motion
 
-        kind, part = check_kind(Path(out)), _span(span)
+        kind, part = Path(out).suffix.lower(), _span(span)
+        if kind not in KINDS:
+            raise SettingsError("is no film or picture", out, f"end it in {', '.join(KINDS)}")
         with Progress() as progress:
             film = render_motion(simulated_motion(model, logs or {}), kind, part, progress)
         write_atomic(Path(out), film)

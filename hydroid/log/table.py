@@ -119,8 +119,9 @@ class Recording:
         at = [f"{word} {row + 1 if of is None else of[row]}" for row in self.rows[[*rows[:1], *rows[-1:]]]]
         more = f" (and {len(rows) - 1} more, to {at[1]})" if len(rows) > 1 else ""
         about = subjects or ((signal,) if signal else ())
-        place = {"row": at[0] if at else "", "column": signal.name if signal else ""}
-        return log_finding(level, kind, self.table.source, *about, **place, rows=more, **numbers)
+        row, column = at[0] if at else "", signal.name if signal else ""
+        source = self.table.source
+        return log_finding(level, kind, source, *about, row=row, column=column, rows=more, **numbers)
 
 
 def number(cell: str) -> float | None:

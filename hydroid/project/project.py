@@ -85,8 +85,10 @@ def write_project(
         if imported and guessed:
             what = "no cylinder is known. A stand-in predicts angles; its pressures and forces mean nothing"
             notes.append(f"{listed(guessed)}: {what}")
-        said = {"steps": steps, "notes": notes, "reasons": reasons}
-        write_atomic(stage / STEPS, fill_template("project/next-steps.md.j2", name=arm.name, **said))
+        text = fill_template(
+            "project/next-steps.md.j2", name=arm.name, steps=steps, notes=notes, reasons=reasons
+        )
+        write_atomic(stage / STEPS, text)
         written = _move(stage, folder)
     return Project(folder, written, tuple(notes), reasons, layout.unused if layout else (), steps)
 

@@ -89,8 +89,14 @@ def arm_text(imported: ImportedArm, arm: Arm | None, sizes: Sequence[JointSize])
         if own is not None:  # the rod leaves about 65 % of the area
             oil = own | {"area_a": rounded(area), "area_b": rounded(0.65 * area)}
         actuators[joint.name] = oil | {"max_opening": rounded(size.opening)}
-    values: Plain = {"title": imported.title, "notes": imported.notes, "lift": LIFT, "actuators": actuators}
-    return fill_template("project/arm.yaml.j2", flow=flow, **values)
+    return fill_template(
+        "project/arm.yaml.j2",
+        title=imported.title,
+        notes=imported.notes,
+        lift=LIFT,
+        actuators=actuators,
+        flow=flow,
+    )
 
 
 def flow(value: Any) -> str:

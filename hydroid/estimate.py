@@ -202,8 +202,8 @@ class FitSummary(Settings):
 
 def write_estimate(folder: Path, summary: FitSummary) -> None:
     """Write `estimate.yaml`."""
-    text = yaml_text(summary.plain(), default_flow_style=None, width=110)  # one line a list
-    write_atomic(folder / NAME, text)
+    # one line a list
+    write_atomic(folder / NAME, yaml_text(summary.plain(), default_flow_style=None, width=110))
 
 
 def read_estimate(source: Path) -> tuple[Path, Plain, FitSummary | None]:

@@ -49,9 +49,8 @@ class IdentifiedModel:
         """Return the fit's own account, or the values alone."""
         if self.summary is not None:
             return self.summary
-        parameters = self.settings.parameters
         estimate = {
-            name: ParameterEstimate(value=value, unit=parameters[name].unit)
+            name: ParameterEstimate(value=value, unit=self.settings.parameters[name].unit)
             for name, value in self.values.items()
         }
         return FitSummary(stage=self.settings.stage, estimate=estimate)

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
-from numpy.typing import ArrayLike
 
 from hydroid.arm.locked import LockedArm
+from hydroid.arrays import Array
 from hydroid.files import Plain, fill_template, write_atomic, yaml_text
 from hydroid.mjcf import mjcf_text, quiet_mujoco
 
@@ -39,7 +39,7 @@ def dressed_model(spec: mujoco.MjSpec, locked: LockedArm) -> mujoco.MjModel:
 
 
 def locked_spec(
-    spec: mujoco.MjSpec, locked: LockedArm, model: mujoco.MjModel, motors: ArrayLike | None = None
+    spec: mujoco.MjSpec, locked: LockedArm, model: mujoco.MjModel, motors: Array | None = None
 ) -> mujoco.MjSpec:
     """Return an arm's MJCF with joints locked; inertia, joints and time step are those of `model`.
 
@@ -64,7 +64,7 @@ def locked_spec(
     source.option.timestep = model.opt.timestep
     source.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
     for j, joint in enumerate(map(source.joint, locked.joints)):
-        body, k, slack = joint.parent, int(model.jnt_bodyid[j]), float(model.qpos_spring[j])
+        body, k, slack = joint.parent, model.jnt_bodyid[j], model.qpos_spring[j]
         body.explicitinertial, body.mass, body.ipos = True, model.body_mass[k], model.body_ipos[k]
         body.iquat, body.ialt.type = model.body_iquat[k], mujoco.mjtOrientation.mjORIENTATION_QUAT
         body.inertia, body.fullinertia = model.body_inertia[k], [np.nan, 0, 0, 0, 0, 0]
@@ -74,7 +74,7 @@ def locked_spec(
         turns = joint.type == mujoco.mjtJoint.mjJNT_HINGE
         joint.springref = math.degrees(slack) if compiler.degree and turns else slack
     if motors is not None:
-        for name, gain, bias in zip(locked.joints, *np.asarray(motors), strict=True):
+        for name, gain, bias in zip(locked.joints, *motors, strict=True):
             source.add_actuator(
                 name=name,
                 target=name,

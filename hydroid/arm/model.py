@@ -116,8 +116,7 @@ class CollisionChecker:
 
     def first_below(self, angle: Array, margin: float) -> int | None:
         """Return the first sample of a motion [rad], (T, nq), with two bodies nearer than a margin [m]."""
-        near = (k for k, pose in enumerate(angle) if self._distances(pose, margin).min() < margin)
-        return next(near, None)
+        return next((k for k, pose in enumerate(angle) if self._distances(pose, margin).min() < margin), None)
 
     def _distances(self, pose: Array, within: float) -> Array:
         """Distances of all pairs of shapes in a pose [m], shape (P,); farther than `within` they are that."""

@@ -128,8 +128,7 @@ def _linkage(
 
 
 def _joint(pins: Sequence[_Pin], first: str, second: str) -> Any:
-    between = (pin.joint for pin in pins if {*pin.bodies} == {first, second} and pin.joint is not None)
-    return next(between, None)
+    return next((pin.joint for pin in pins if {*pin.bodies} == {first, second} and pin.joint), None)
 
 
 def _four_bar(joint: Any, pins: Sequence[_Pin]) -> Plain | None:

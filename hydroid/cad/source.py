@@ -75,13 +75,11 @@ def read_source(path: Path, notes: Notes) -> tuple[mujoco.MjSpec, dict[str, Path
         tails = (Path(given), rest, Path(*rest.parts[1:]))
         tried = (place / tail for place in (folder, *islice(folder.parents, 4)) for tail in tails)
         alike = below.get(rest.name.lower(), folder)
-        if place := next((path for path in chain(tried, [alike]) if is_file(path)), None):
+        if place := next(filter(is_file, chain(tried, [alike])), None):
             found[name] = place
         else:
-            what = (
-                f"not found from {folder} and its parents, nor by name below it: these shapes are not shown"
-            )
-            notes.add(what, f"mesh {given}")
+            what = "nor by name below it: these shapes are not shown"
+            notes.add(f"not found from {folder} and its parents, {what}", f"mesh {given}")
     return spec, found, urdf
 
 

@@ -190,5 +190,5 @@ def _store(folder: "RunFolder", result: FitResult) -> Path:
     folder.write_estimate(result.model, result.problem.logs[0])
     write_atomic(folder.path / RESULT, pack(fit_result(result.fit, result.predictions, result.baselines)))
     page = draw(folder.path)
-    folder.status("done", seconds=dict(result.fit.seconds) | {"report": time.monotonic() - began})
+    folder.status("done", seconds={**result.fit.seconds, "report": time.monotonic() - began})
     return page

@@ -176,7 +176,7 @@ def _collisions(logs: "dict[str, Log]", settings: "FitSettings") -> "Result[Clea
     rest = settings.arm.pose(settings.start_pose)
     angle = machine.joined({side: log.angle for side, log in logs.items()}, rest)
     result = machine.checker.clearance(next(iter(logs.values())).time, angle)
-    nearest = int(result.distance.argmin())
+    nearest = result.distance.argmin()
     content = {
         "free": not result.meetings,
         "clearance_m": result.distance[nearest],

@@ -34,8 +34,8 @@ def open_table(path: Path, settings: LogSettings = DEFAULT) -> Table:
     The settings name the time column, and the period to which the channels of a bag are resampled.
     """
     try:
-        folder = (path / "metadata.yaml").is_file()
-        data = b"#ROSBAG V" if folder else path.read_bytes()
+        # a ROS 2 bag is a folder
+        data = b"#ROSBAG V" if (path / "metadata.yaml").is_file() else path.read_bytes()
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise LogError(f"cannot be read ({reason})", path) from None

@@ -109,7 +109,7 @@ def _write_arm(
 @contextmanager
 def _stage(folder: Path) -> Generator[Path]:
     """A folder beside the project, or in it where it exists, that disappears."""
-    home = next(path for path in (folder.absolute(), *folder.absolute().parents) if path.is_dir())
+    home = next(filter(Path.is_dir, (folder.absolute(), *folder.absolute().parents)))
     with writing(folder):
         stage = tempfile.TemporaryDirectory(prefix=".hydroid-init-", dir=home, ignore_cleanup_errors=True)
     with stage as path:

@@ -137,7 +137,7 @@ def fit_text(arm: Arm, layout: Layout | None, sizes: Sequence[JointSize], file: 
                 "dead": short(DEAD * min(max(motion.dead_band, 5.0), 40.0) if motion else 10.0),
             }
         )
-    period = 0.01 if layout is None else float(layout.section["period_s"])
+    period = 0.01 if layout is None else layout.section["period_s"]
     steps = math.ceil(period / LONGEST_STEP - 1e-9)
     return fill_template(
         "project/fit.yaml.j2",

@@ -69,8 +69,7 @@ def run_log(file: Path) -> Generator[None]:
 
 def log_start() -> None:
     """Log what runs, where, with what."""
-    versions = ", ".join(map(" ".join, VERSIONS.items()))
-    LOGGER.info("%s, Python %s", versions, platform.python_version())
+    LOGGER.info("%s, Python %s", ", ".join(map(" ".join, VERSIONS.items())), platform.python_version())
     LOGGER.info("process %d on %s: %s", os.getpid(), socket.gethostname(), shlex.join(sys.argv))
 
 

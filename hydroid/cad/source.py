@@ -74,7 +74,7 @@ def read_source(path: Path, notes: Notes) -> tuple[mujoco.MjSpec, dict[str, Path
         rest = Path(given.rpartition("://")[2].replace("\\", "/").lstrip("/"))
         tails = (Path(given), rest, Path(*rest.parts[1:]))
         tried = (place / tail for place in (folder, *islice(folder.parents, 4)) for tail in tails)
-        alike = below.get(rest.name.lower(), folder)
+        alike = below.get(rest.name.lower(), folder)  # a folder is no file
         if place := next(filter(is_file, chain(tried, [alike])), None):
             found[name] = place
         else:

@@ -17,8 +17,11 @@ T = TypeVar("T")
 
 @dataclass_transform(frozen_default=True, eq_default=False, field_specifiers=(field,))
 def record(kind: type[T]) -> type[T]:
-    """Make a frozen dataclass that equals itself alone: whether arrays are equal has no one answer."""
-    return dataclass(frozen=True, eq=False)(kind)
+    """Make a frozen dataclass that equals itself alone: whether arrays are equal has no one answer.
+
+    One that prints itself in its own way keeps it.
+    """
+    return dataclass(frozen=True, eq=False, repr=kind.__repr__ is object.__repr__)(kind)
 
 
 def rms(values: Array, axis: int | None = None) -> Any:

@@ -47,8 +47,4 @@ class RunError(HydroidError):
 
 
 class Stopped(KeyboardInterrupt):
-    """A fit or study that Ctrl-C or a signal ended; `kept`: what remains of it, and what continues it."""
-
-    def __init__(self, kept: str) -> None:
-        self.kept = kept
-        super().__init__(kept)
+    """A fit or study that Ctrl-C or a signal ended; its text: what remains of it, and what continues it."""

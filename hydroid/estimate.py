@@ -4,12 +4,11 @@ import math
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import yaml
 from pydantic import BeforeValidator, Field, model_validator
 
 from hydroid.arrays import Array
 from hydroid.errors import RunError, SettingsError
-from hydroid.files import Plain, is_file, write_atomic
+from hydroid.files import Plain, is_file, write_atomic, yaml_text
 from hydroid.findings import Finding
 from hydroid.settings.document import read_yaml
 from hydroid.settings.load import JointNumber, NotNegative, Settings, load
@@ -203,9 +202,8 @@ class FitSummary(Settings):
 
 def write_estimate(folder: Path, summary: FitSummary) -> None:
     """Write `estimate.yaml`."""
-    one_line_a_list: Any = {"default_flow_style": None, "width": 110}
-    text = yaml.safe_dump(summary.plain(), sort_keys=False, allow_unicode=True, **one_line_a_list)
-    write_atomic(folder / NAME, text)
+    # one line a list
+    write_atomic(folder / NAME, yaml_text(summary.plain(), default_flow_style=None, width=110))
 
 
 def read_estimate(source: Path) -> tuple[Path, Plain, FitSummary | None]:

@@ -4,17 +4,19 @@ import csv
 import io
 import os
 import signal
-import tempfile
 import threading
 from collections.abc import Generator, Iterable
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from secrets import token_hex
 from typing import Any, Literal
 
 from hydroid.errors import RunError, SettingsError
 
 Plain = dict[str, Any]  # a mapping as YAML and JSON hold it
 PART = ".part"  # suffix of a file that is being written
+NOTICES = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGUSR1") if hasattr(signal, name))
+"""signals by which a cluster says that time is nearly up"""
 
 
 @contextmanager
@@ -27,8 +29,7 @@ def undisturbed() -> Generator[None]:
         yield
         return
     held: list[int] = []
-    stops = (getattr(signal, name, None) for name in ("SIGINT", "SIGTERM", "SIGUSR1"))
-    ours = [number for number in stops if number is not None and signal.getsignal(number) is not None]
+    ours = [number for number in (signal.SIGINT, *NOTICES) if signal.getsignal(number) is not None]
     before = {number: signal.signal(number, lambda number, _: held.append(number)) for number in ours}
     try:
         yield
@@ -37,6 +38,15 @@ def undisturbed() -> Generator[None]:
             signal.signal(number, handler)
         for number in held[:1]:
             signal.raise_signal(number)
+
+
+@contextmanager
+def writing(where: Path) -> Generator[None]:
+    """Turn what keeps a file or folder from being written into a RunError about it."""
+    try:
+        yield
+    except OSError as error:
+        raise RunError(f"cannot be written ({error.strerror})", where) from None
 
 
 @undisturbed()
@@ -48,24 +58,20 @@ def write_atomic(path: Path, content: str | bytes, *, keep: Path | None = None) 
     the same folder to which the old file, if any, is moved first: after a crash between the two renamings
     only it exists. Raises RunError: the folder cannot be written, or the disk is full.
     """
-    temporary = ""
+    temporary = path.parent / f".{path.name}.{token_hex(4)}{PART}"
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=PART)
-        with os.fdopen(handle, "wb") as file:
-            file.write(content.encode() if isinstance(content, str) else content)
-            file.flush()
-            os.fsync(file.fileno())
-        os.umask(mask := os.umask(0))  # it can only be read by setting it
-        os.chmod(temporary, 0o666 & ~mask)
-        if keep is not None and path.exists():
-            os.replace(path, keep)
-        os.replace(temporary, path)
-    except OSError as error:
-        raise RunError(f"cannot be written ({error.strerror})", path) from None
+        with writing(path):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with temporary.open("xb") as file:
+                file.write(content.encode() if isinstance(content, str) else content)
+                file.flush()
+                os.fsync(file.fileno())
+            if keep is not None and path.exists():
+                path.replace(keep)
+            temporary.replace(path)
     finally:
-        if temporary and os.path.exists(temporary):
-            os.unlink(temporary)
+        with suppress(OSError):  # it has its name by now, or was never made
+            temporary.unlink()
 
 
 is_file = os.path.isfile  # Path's own raises for a name that no file can have
@@ -76,6 +82,13 @@ def csv_text(rows: Iterable[Iterable[Any]]) -> str:
     buffer = io.StringIO()
     csv.writer(buffer, lineterminator="\n").writerows(rows)
     return buffer.getvalue()
+
+
+def yaml_text(values: Any, **style: Any) -> str:
+    """Return plain values as YAML, mappings in their order; `style` is that of PyYAML's `dump`."""
+    import yaml
+
+    return yaml.safe_dump(values, sort_keys=False, allow_unicode=True, **style)
 
 
 def fill_template(path: str, /, **values: Any) -> str:
@@ -120,8 +133,7 @@ def find_config(
     names the error lists.
     """
     shipped = assets() / "configs"
-    folders = [Path(), shipped] if beside is None else [beside, Path(), shipped]
-    for folder in folders:
+    for folder in (beside or Path(), Path(), shipped):
         for candidate in (folder / name, folder / f"{name}.yaml"):
             if is_file(candidate):
                 return candidate

@@ -4,11 +4,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from hydroid.arrays import Array, record
 from hydroid.estimate import NAME, FitSummary, ParameterEstimate, read_estimate
-from hydroid.files import find_config, is_file, write_atomic
+from hydroid.files import find_config, is_file, write_atomic, yaml_text
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load
 
@@ -51,9 +49,8 @@ class IdentifiedModel:
         """Return the fit's own account, or the values alone."""
         if self.summary is not None:
             return self.summary
-        parameters = self.settings.parameters
         estimate = {
-            name: ParameterEstimate(value=value, unit=parameters[name].unit)
+            name: ParameterEstimate(value=value, unit=self.settings.parameters[name].unit)
             for name, value in self.values.items()
         }
         return FitSummary(stage=self.settings.stage, estimate=estimate)
@@ -90,7 +87,7 @@ def load_identified(
     beside = file and file.parent / CONFIG
     shipped = "fit-hyd" if nominal else "fit-mech"
     chosen = config or (beside if beside and is_file(beside) else shipped)
-    settings = load(find_config(chosen), FitSettings, dict(overrides or {}))
+    settings = load(find_config(chosen), FitSettings, overrides)
     if config is None and summary is not None:
         settings = settings.of_estimate(summary.final)
     missing = [n for n, p in settings.parameters.items() if n not in values and p.fixed is None]
@@ -104,8 +101,7 @@ def load_identified(
 
 def start_values(settings: FitSettings) -> IdentifiedModel:
     """Return the model before any fit, where a search starts: nominal values, or the middle of the bounds."""
-    parameters = settings.parameter_set()
-    return IdentifiedModel(settings, parameters.start, "the start values")
+    return IdentifiedModel(settings, settings.parameter_set().start, "the start values")
 
 
 def write_settings(folder: Path, settings: FitSettings) -> None:
@@ -117,7 +113,7 @@ def write_settings(folder: Path, settings: FitSettings) -> None:
     copy_models({Path(name).name: path for name, path in models.items()}, folder / Path(MODEL).parent)
     paths = {"model": MODEL, "pair": PAIR if arm.pair else None}
     for name, content in ((ARM, arm.model_dump(mode="json") | paths), (CONFIG, portable(settings))):
-        write_atomic(folder / name, yaml.safe_dump(content, sort_keys=False, allow_unicode=True))
+        write_atomic(folder / name, yaml_text(content))
 
 
 def portable(settings: FitSettings) -> dict[str, Any]:

@@ -13,21 +13,20 @@ from hydroid.files import is_file, write_atomic
 
 def read_mjcf(path: Path) -> mujoco.MjSpec:
     """Read an MJCF whose joints turn or slide, each alone on its body."""
-    where = str(path)
     if not is_file(path):
-        raise ModelError("no such model", where)
-    with mujoco_errors(where):
-        spec = mujoco.MjSpec.from_file(where)
+        raise ModelError("no such model", path)
+    with mujoco_errors(path):
+        spec = mujoco.MjSpec.from_file(str(path))
     if not spec.joints:
-        raise ModelError("has no joint", where)
+        raise ModelError("has no joint", path)
     for joint in spec.joints:
         if not joint.name or not joint.parent.name:
-            raise ModelError(f"joint {joint.name!r} of body {joint.parent.name!r}: both need a name", where)
+            raise ModelError(f"joint {joint.name!r} of body {joint.parent.name!r}: both need a name", path)
         kinds = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
         if joint.type not in kinds or len(joint.parent.joints) > 1:
-            raise ModelError(f"joint {joint.name!r} must be a hinge or a slide, alone on its body", where)
+            raise ModelError(f"joint {joint.name!r} must be a hinge or a slide, alone on its body", path)
     if spec.equalities:
-        raise ModelError("has equality constraints, which hydroid does not simulate", where)
+        raise ModelError("has equality constraints, which hydroid does not simulate", path)
     return spec
 
 
@@ -63,7 +62,7 @@ def mjcf_text(spec: mujoco.MjSpec) -> str:
 
 
 @contextmanager
-def mujoco_errors(where: str) -> Generator[None]:
+def mujoco_errors(where: object) -> Generator[None]:
     """Turn MuJoCo's errors into one line; `quiet_mujoco` beside."""
     try:
         with quiet_mujoco():

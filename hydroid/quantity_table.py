@@ -5,15 +5,14 @@ causes, and `delay_b` towards B; the name without an ending sets both.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
 from itertools import chain
+from typing import NamedTuple
 
 from hydroid.files import Plain, read_table
 from hydroid.units import UNITS
 
 
-@dataclass(frozen=True)
-class Quantity:
+class Quantity(NamedTuple):
     """One physical quantity of a joint, its actuator, a link or the pump.
 
     Attributes:
@@ -68,8 +67,8 @@ class Quantity:
             return
         for side, other, default in zip("AB", "BA", self.default, strict=True):
             name, plain = f"{self.name}_{side.lower()}", f"{self.plain}, side {side}"
-            yield replace(
-                self, name=name, default=default, plain=plain, note=self.note.format(side=side, other=other)
+            yield self._replace(
+                name=name, default=default, plain=plain, note=self.note.format(side=side, other=other)
             )
 
 

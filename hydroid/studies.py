@@ -47,13 +47,14 @@ class Task:
 
     def key(self) -> str:
         """Return the digest of all that decides the run's result."""
-        content = {
-            "versions": VERSIONS,
-            "settings": deciding(self.settings),
-            "model": model_hash(self.settings.arm),
-            "logs": [samples_hash(log) for log in self.logs],
-        }
-        return digest(content)[:24]
+        return digest(
+            {
+                "versions": VERSIONS,
+                "settings": deciding(self.settings),
+                "model": model_hash(self.settings.arm),
+                "logs": [samples_hash(log) for log in self.logs],
+            }
+        )[:24]
 
 
 def perform(task: Task) -> Result:
@@ -160,7 +161,7 @@ def measured(task: Task, result: Result) -> Row:
 
 def _read(file: Path) -> Result:
     try:
-        content = json.loads(file.read_text(encoding="utf-8"))
+        content = json.loads(file.read_bytes())
         if content.keys() & {"theta", "failed"}:
             return content
         what = "is no result of a run"

@@ -2,13 +2,12 @@
 
 import math
 import re
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from hydroid.files import read_table
 
 
-@dataclass(frozen=True)
-class Unit:
+class Unit(NamedTuple):
     """A unit by its usual spelling: what it measures, and what one of it is in SI."""
 
     name: str

@@ -10,17 +10,16 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
-import yaml
-from numpy.typing import ArrayLike
 
 from hydroid.arm.locked import LockedArm
-from hydroid.files import Plain, fill_template, write_atomic
+from hydroid.arrays import Array
+from hydroid.files import Plain, fill_template, write_atomic, yaml_text
 from hydroid.mjcf import mjcf_text, quiet_mujoco
 
 _FIELDS = (
-    *("body_pos", "body_quat", "body_ipos", "body_iquat", "body_mass", "body_inertia", "body_simple"),
-    *("body_sameframe", "jnt_pos", "jnt_axis", "dof_simplenum"),
-)
+    "body_pos", "body_quat", "body_ipos", "body_iquat", "body_mass", "body_inertia", "body_simple",
+    "body_sameframe", "jnt_pos", "jnt_axis", "dof_simplenum"
+)  # fmt: skip
 """of a model, whose last bits depend on how its bodies were fused"""
 
 
@@ -40,7 +39,7 @@ def dressed_model(spec: mujoco.MjSpec, locked: LockedArm) -> mujoco.MjModel:
 
 
 def locked_spec(
-    spec: mujoco.MjSpec, locked: LockedArm, model: mujoco.MjModel, motors: ArrayLike | None = None
+    spec: mujoco.MjSpec, locked: LockedArm, model: mujoco.MjModel, motors: Array | None = None
 ) -> mujoco.MjSpec:
     """Return an arm's MJCF with joints locked; inertia, joints and time step are those of `model`.
 
@@ -65,7 +64,7 @@ def locked_spec(
     source.option.timestep = model.opt.timestep
     source.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
     for j, joint in enumerate(map(source.joint, locked.joints)):
-        body, k, slack = joint.parent, int(model.jnt_bodyid[j]), float(model.qpos_spring[j])
+        body, k, slack = joint.parent, model.jnt_bodyid[j], model.qpos_spring[j]
         body.explicitinertial, body.mass, body.ipos = True, model.body_mass[k], model.body_ipos[k]
         body.iquat, body.ialt.type = model.body_iquat[k], mujoco.mjtOrientation.mjORIENTATION_QUAT
         body.inertia, body.fullinertia = model.body_inertia[k], [np.nan, 0, 0, 0, 0, 0]
@@ -75,7 +74,7 @@ def locked_spec(
         turns = joint.type == mujoco.mjtJoint.mjJNT_HINGE
         joint.springref = math.degrees(slack) if compiler.degree and turns else slack
     if motors is not None:
-        for name, gain, bias in zip(locked.joints, *np.asarray(motors), strict=True):
+        for name, gain, bias in zip(locked.joints, *motors, strict=True):
             source.add_actuator(
                 name=name,
                 target=name,
@@ -101,17 +100,16 @@ def _draw_tendons(spec: mujoco.MjSpec) -> None:
         tendon.frictionloss = tendon.armature = 0.0
 
 
-def write_fitted(folder: Path, fitted: mujoco.MjSpec, joints: str, actuators: Plain | None) -> None:
+def write_fitted(folder: Path, fitted: mujoco.MjSpec, joints: str, actuators: Plain) -> None:
     """Write the fitted arm to `model/`, beside `arm.xml`, and a README that says what it is good for.
 
-    `joints` names those that take commands; `actuators` are hydraulic parameters by joint (stage 2), or None:
-    the MJCF has motors (stage 1).
+    `joints` names those that take commands; `actuators` are hydraulic parameters by joint; of stage 1
+    there are none: the MJCF has motors.
     """
     name = "fitted"
-    if actuators is not None:
+    if actuators:
         name = "mechanics"
-        text = yaml.safe_dump(actuators, sort_keys=False, allow_unicode=True)
-        write_atomic(folder / "actuators.yaml", text)
+        write_atomic(folder / "actuators.yaml", yaml_text(actuators))
     write_atomic(folder / f"{name}.xml", mjcf_text(fitted))
     readme = fill_template(f"arm/{name}.txt.j2", timestep=fitted.option.timestep, joints=joints)
     write_atomic(folder / "README.txt", readme)

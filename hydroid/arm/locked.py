@@ -21,11 +21,10 @@ _OPTIONS = (
     "timestep", "gravity", "integrator", "solver", "iterations", "tolerance", "jacobian", "enableflags"
 )  # fmt: skip
 _JOINT_FIELDS = (
-    *("jnt_" + field for field in ("range", "limited", "margin", "stiffness", "stiffnesspoly")),
-    *(prefix + field for prefix in ("jnt_", "dof_") for field in ("solref", "solimp")),
-    *("dof_" + field for field in ("damping", "dampingpoly", "armature", "frictionloss")),
-    *("qpos0", "qpos_spring"),
-)
+    "jnt_range", "jnt_limited", "jnt_margin", "jnt_solref", "jnt_solimp", "jnt_stiffness",
+    "jnt_stiffnesspoly", "dof_solref", "dof_solimp", "dof_damping", "dof_dampingpoly", "dof_armature",
+    "dof_frictionloss", "qpos0", "qpos_spring"
+)  # fmt: skip
 
 
 PART = np.dtype(

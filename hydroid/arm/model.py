@@ -25,7 +25,7 @@ SIDES = ("right", "left")
 def load_model(arm: Arm) -> mujoco.MjSpec:
     """Read the arm's MJCF, which compiles."""
     spec = read_mjcf(arm.model)
-    with mujoco_errors(str(arm.model)):
+    with mujoco_errors(arm.model):
         spec.compile()
     return spec
 
@@ -38,8 +38,14 @@ def add_payload(spec: mujoco.MjSpec, arm: Arm, mass: float) -> mujoco.MjSpec:
     loaded = spec.copy()
     # of a ball of 5 cm: its own inertia is small beside what its distance makes
     site, moment = loaded.site(arm.payload), 0.4 * mass * 0.05**2
-    ball = {"explicitinertial": True, "mass": mass, "ipos": [0.0] * 3, "inertia": [moment] * 3}
-    body = site.parent.add_body(name="payload", pos=site.pos, **ball)
+    body = site.parent.add_body(
+        name="payload",
+        pos=site.pos,
+        explicitinertial=True,
+        mass=mass,
+        ipos=[0.0] * 3,
+        inertia=[moment] * 3,
+    )
     if site.frame is not None:
         body.set_frame(site.frame)
     return loaded
@@ -110,15 +116,15 @@ class CollisionChecker:
 
     def first_below(self, angle: Array, margin: float) -> int | None:
         """Return the first sample of a motion [rad], (T, nq), with two bodies nearer than a margin [m]."""
-        near = (k for k, pose in enumerate(angle) if self._distances(pose, margin).min() < margin)
-        return next(near, None)
+        return next((k for k, pose in enumerate(angle) if self._distances(pose, margin).min() < margin), None)
 
     def _distances(self, pose: Array, within: float) -> Array:
         """Distances of all pairs of shapes in a pose [m], shape (P,); farther than `within` they are that."""
         self._data.qpos[:] = pose
         mujoco.mj_kinematics(self._model, self._data)
-        here = self._model, self._data
-        return np.array([mujoco.mj_geomDistance(*here, *pair, within, None) for pair in self._pairs])
+        return np.array(
+            [mujoco.mj_geomDistance(self._model, self._data, *pair, within, None) for pair in self._pairs]
+        )
 
 
 def _name(model: mujoco.MjModel, geom: int) -> str:
@@ -172,5 +178,5 @@ def load_machine(arm: Arm, *, pair: bool) -> Machine:
     if [joint.name for joint in spec.joints] != wanted:
         hint = f"the joints of two arms are {', '.join(wanted)}"
         raise ModelError("is not the model of two of the arm", arm.pair, hint)
-    with mujoco_errors(str(arm.pair)):
+    with mujoco_errors(arm.pair):
         return Machine(arm, spec.compile(), SIDES)

@@ -95,8 +95,7 @@ def _pins(spec: mujoco.MjSpec, data: mujoco.MjData) -> list[_Pin]:
     for one in spec.equalities:
         if one.type == connect and one.objtype == mujoco.mjtObj.mjOBJ_SITE:
             first, second = (spec.site(name) for name in (one.name1, one.name2))
-            bodies = first.parent.name, second.parent.name
-            pins.append(_Pin(bodies, data.site(one.name1).xpos))
+            pins.append(_Pin((first.parent.name, second.parent.name), data.site(one.name1).xpos))
         elif one.type == connect:
             body = data.body(one.name1)
             at = body.xpos + body.xmat.reshape(3, 3) @ np.array(one.data[:3])
@@ -129,8 +128,7 @@ def _linkage(
 
 
 def _joint(pins: Sequence[_Pin], first: str, second: str) -> Any:
-    between = (pin.joint for pin in pins if {*pin.bodies} == {first, second} and pin.joint is not None)
-    return next(between, None)
+    return next((pin.joint for pin in pins if {*pin.bodies} == {first, second} and pin.joint), None)
 
 
 def _four_bar(joint: Any, pins: Sequence[_Pin]) -> Plain | None:

@@ -41,11 +41,11 @@ def import_arm(
     spec, files, urdf = read_source(path, notes)
     _clear(spec, path)
     cylinders = take_cylinders(spec, notes)
-    _choose_chain(spec, str(path), notes, columns, tip)
+    _choose_chain(spec, path, notes, columns, tip)
     exact = urdf or all(geom.parent.explicitinertial for geom in spec.geoms if geom.meshname)
     meshes, lost = convert_meshes(spec, files, exact, notes)
     sort_shapes(spec)
-    with mujoco_errors(str(path)):
+    with mujoco_errors(path):
         repair_inertias(spec, urdf, notes)
         spec.fuse_static()
         weigh(spec, notes, total_mass, lost)
@@ -95,7 +95,7 @@ def _clear(spec: mujoco.MjSpec, path: Path) -> None:
 
 
 def _choose_chain(
-    spec: mujoco.MjSpec, where: str, notes: Notes, columns: Sequence[str], tip: str | None
+    spec: mujoco.MjSpec, path: Path, notes: Notes, columns: Sequence[str], tip: str | None
 ) -> None:
     """Choose the joints from the base to `tip`, or else to the tip that fits best, and delete the others.
 
@@ -108,12 +108,12 @@ def _choose_chain(
     for joint in spec.joints:
         if len(joint.parent.joints) > 1:
             hint = "put a small body between them: hydroid moves one joint per link"
-            raise ModelError(f"body {joint.parent.name!r} has several joints", where, hint)
+            raise ModelError(f"body {joint.parent.name!r} has several joints", path, hint)
         chains[joint.parent.name] = _path(joint.parent)
     inner = {name for chain in chains.values() for name in chain[:-1]}
     tips = {link: chain for link, chain in chains.items() if chain[-1] not in inner}
     if not tips:
-        raise ModelError("has no joint that hydroid could move", where)
+        raise ModelError("has no joint that hydroid could move", path)
     if tip is None:
         wanted = max(tips.values(), key=lambda chain: (_named(spec, chain, columns), len(chain)))
         why = "the log names most of its joints" if _named(spec, wanted, columns) else "the longest branch"
@@ -121,7 +121,7 @@ def _choose_chain(
         link, why = spec.body(tip), "as asked"
         wanted = () if link is None else _path(link)
         if not wanted:
-            raise ModelError(f"no joint moves a link {tip!r}", where, f"tips: {', '.join(tips)}")
+            raise ModelError(f"no joint moves a link {tip!r}", path, f"tips: {', '.join(tips)}")
     left = [joint for joint in spec.joints if joint.name not in wanted]
     if left:
         others = listed([f"--tip {link}" for link, chain in tips.items() if chain != wanted], 6)

@@ -157,4 +157,4 @@ def _stated_fault(body: mujoco.MjsBody, urdf: bool) -> str:
 
 
 def _gyration(tensor: Array, mass: float) -> float:
-    return float(np.sqrt(np.linalg.eigvalsh(tensor)[-1] / mass))
+    return np.sqrt(np.linalg.eigvalsh(tensor)[-1] / mass)

@@ -49,21 +49,20 @@ class Notes:
 
 def read_source(path: Path, notes: Notes) -> tuple[mujoco.MjSpec, dict[str, Path], bool]:
     """Read a URDF or an MJCF: its spec, where each mesh file that it names lies, and whether it is a URDF."""
-    where = str(path)
     usd = path.suffix.lower() in (".usd", ".usda", ".usdc", ".usdz")
     root = ElementTree.Element("usd") if usd else _parsed(path)
     kind = "xacro" if any("xacro" in str(part.tag).lower() for part in root.iter()) else str(root.tag)
     if kind in REFUSED:
         what, hint = REFUSED[kind]
-        raise ModelError(what, where, hint.format(name=path.name))
+        raise ModelError(what, path, hint.format(name=path.name))
     urdf, folder = kind == "robot", path.resolve().parent
     if not urdf and kind != "mujoco":
         what = f"is neither URDF nor MJCF: its root element is <{root.tag}>"
-        raise ModelError(what, where, "export the arm as URDF")
+        raise ModelError(what, path, "export the arm as URDF")
     files = _prepare_urdf(root, notes) if urdf else {}
     if not urdf:
         _prepare_mjcf(root, folder)
-    with mujoco_errors(where):
+    with mujoco_errors(path):
         spec = mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
     if not urdf:
         files = {mesh.file: mesh.file for mesh in spec.meshes if mesh.file}
@@ -75,14 +74,12 @@ def read_source(path: Path, notes: Notes) -> tuple[mujoco.MjSpec, dict[str, Path
         rest = Path(given.rpartition("://")[2].replace("\\", "/").lstrip("/"))
         tails = (Path(given), rest, Path(*rest.parts[1:]))
         tried = (place / tail for place in (folder, *islice(folder.parents, 4)) for tail in tails)
-        alike = [below[rest.name.lower()]] if rest.name.lower() in below else []
-        if place := next((path for path in chain(tried, alike) if is_file(path)), None):
+        alike = below.get(rest.name.lower(), folder)  # a folder is no file
+        if place := next(filter(is_file, chain(tried, [alike])), None):
             found[name] = place
         else:
-            what = (
-                f"not found from {folder} and its parents, nor by name below it: these shapes are not shown"
-            )
-            notes.add(what, f"mesh {given}")
+            what = "nor by name below it: these shapes are not shown"
+            notes.add(f"not found from {folder} and its parents, {what}", f"mesh {given}")
     return spec, found, urdf
 
 
@@ -169,11 +166,10 @@ def convert_meshes(
 def sort_shapes(spec: mujoco.MjSpec) -> None:
     """Show what the file shows, or else what collides; let collide what collides, or else what is shown."""
     for body in spec.bodies:
-        visual = [geom for geom in body.geoms if not geom.contype and not geom.conaffinity]
-        solid = [geom for geom in body.geoms if geom.contype or geom.conaffinity]
-        for geom in body.geoms:
-            geom.group = SHOWN if geom in (visual or solid) else HIDDEN
-            geom.contype = geom.conaffinity = int(geom in (solid or visual))
+        collide = [bool(geom.contype or geom.conaffinity) for geom in body.geoms]
+        for geom, solid in zip(body.geoms, collide, strict=True):
+            geom.group = HIDDEN if solid and not all(collide) else SHOWN
+            geom.contype = geom.conaffinity = int(solid or not any(collide))
             if not geom.material and np.allclose(geom.rgba, (0.5, 0.5, 0.5, 1.0)):
                 geom.rgba = (0.94, 0.53, 0.08, 1.0)
 

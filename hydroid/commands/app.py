@@ -14,7 +14,7 @@ from typer.core import TyperGroup
 import hydroid
 from hydroid.commands.console import log_lines, program, show, show_error
 from hydroid.commands.progress import VISIBLE, listen, stopped
-from hydroid.errors import HydroidError
+from hydroid.errors import HydroidError, Stopped
 
 if TYPE_CHECKING:
     from typer.core import TyperCommand
@@ -140,7 +140,7 @@ def main() -> None:
     except typer.Exit as end:
         code = end.exit_code
     except KeyboardInterrupt as stop:
-        code, kept = 130, getattr(stop, "kept", None)
+        code, kept = 130, str(stop) if isinstance(stop, Stopped) else None
     except BrokenPipeError:
         sys.stderr.close()  # the reader has left; Python would complain at exit
     except Exception as error:

@@ -81,8 +81,7 @@ def check(
         checks.append(LogCheck(path, log, findings, moved))
     every = (finding for one in checks for finding in one.findings)
     lines = [f"{level}: {line}" for level, line in grouped(every)]
-    exit_status = 0 if len(sizes) == len(checks) else 2
-    return Result([*lines, *sizes], {"logs": rows}, checks, exit_status=exit_status)
+    return Result([*lines, *sizes], {"logs": rows}, checks, exit_status=0 if len(sizes) == len(checks) else 2)
 
 
 @command

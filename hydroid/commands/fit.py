@@ -1,10 +1,10 @@
 """Fit one problem, with settings and logs that are read: `hydroid.fit`."""
 
 import time
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from hydroid.arrays import record
 from hydroid.commands.console import Printed
 from hydroid.commands.inputs import LogSource, LogSources, Source
 from hydroid.commands.logs import read_logs
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from hydroid.run.folder import RunFolder
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@record
 class FitResult(Printed):
     """A finished fit; every command takes it as `fit`, and `load_plant` as its source.
 
@@ -166,8 +166,8 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
     baselines = baselines_of(settings, problem.logs)
     verdict, summary = judge(settings, predictions, baselines), summarise(problem, fit)
     doubted = assumption_findings(settings, problem.logs, doubts(settings, problem.logs))
-    changes = {"verdict": verdict, "findings": (*behind(settings, verdict), *summary.findings, *doubted)}
-    summary = summary.changed(changes)
+    findings = *behind(settings, verdict), *summary.findings, *doubted
+    summary = summary.changed({"verdict": verdict, "findings": findings})
     source = "the fit" if folder is None else str(folder / NAME)
     model = IdentifiedModel(settings, fit.best.theta, source, summary)
     lines: list[Table | str] = [*verdict_lines({fit.final: verdict}), *warnings(summary)]
@@ -176,8 +176,9 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
         lines += [*next_lines(step), str(folder / "report.html")]
     details = [parameter_table(settings, summary), *map(str, summary.findings)]
     content = summary.plain() | {"out": folder and str(folder)}
-    own = (problem, fit, folder, summary, model, predictions, baselines)
-    return FitResult(lines, content, *own, details=details)
+    return FitResult(
+        lines, content, problem, fit, folder, summary, model, predictions, baselines, details=details
+    )
 
 
 def _store(folder: "RunFolder", result: FitResult) -> Path:
@@ -187,8 +188,7 @@ def _store(folder: "RunFolder", result: FitResult) -> Path:
 
     began = time.monotonic()
     folder.write_estimate(result.model, result.problem.logs[0])
-    arrays = fit_result(result.fit, result.predictions, result.baselines)
-    write_atomic(folder.path / RESULT, pack(arrays))
+    write_atomic(folder.path / RESULT, pack(fit_result(result.fit, result.predictions, result.baselines)))
     page = draw(folder.path)
-    folder.status("done", seconds=dict(result.fit.seconds) | {"report": time.monotonic() - began})
+    folder.status("done", seconds={**result.fit.seconds, "report": time.monotonic() - began})
     return page

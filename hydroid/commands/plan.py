@@ -101,8 +101,7 @@ def suggest(
     columns, rows = errors_by_joint(model.settings.arm, [{**content, "name": "none of them"}, *terms])
     tables = {"missing_terms": Table.of("Quantities that the fit holds", TERMS | columns, rows, note)}
     said = [line for one in findings for line in (f"- {one}", f"  {one.numbers.get('command', '')}")]
-    lines = [*tables.values(), *filter(str.strip, said), *written(tables, out)]
-    return Result(lines, content, findings)
+    return Result([*tables.values(), *filter(str.strip, said), *written(tables, out)], content, findings)
 
 
 @command
@@ -152,12 +151,23 @@ def design(
     with Progress() as progress:
         existing = read_logs(logs, settings, repair=repair)
         result = best_experiment(settings, model.theta, existing, seed, progress)
-    deviations = result.known.deviations, result.random_deviations, result.after.deviations
     rows: list[Plain] = [
-        {"parameter": name, "estimate": model.values[name]}
-        | {"before_percent": 100 * before, "random_percent": 100 * random, "designed_percent": 100 * after}
-        | {"gain": random / after, "flag": flag_of(after).value}
-        for name, before, random, after in zip(result.names, *deviations, strict=True)
+        {
+            "parameter": name,
+            "estimate": model.values[name],
+            "before_percent": 100 * before,
+            "random_percent": 100 * random,
+            "designed_percent": 100 * after,
+            "gain": random / after,
+            "flag": flag_of(after).value,
+        }
+        for name, before, random, after in zip(
+            result.names,
+            result.known.deviations,
+            result.random_deviations,
+            result.after.deviations,
+            strict=True,
+        )
     ]
     note = (
         f"Noise: {settings.design.noise_deg:g} deg. before: every parameter ±100 % unless logs say more. "

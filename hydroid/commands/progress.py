@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Self
 
 import typer
 
+from hydroid.files import NOTICES
+
 if TYPE_CHECKING:
     from hydroid.arrays import Array
     from hydroid.settings.fit import FitSettings
-
-NOTICES = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGUSR1") if hasattr(signal, name))
 
 VISIBLE: ContextVar[bool] = ContextVar("visible", default=False)
 """whether progress is shown: the command line sets it"""
@@ -74,8 +74,8 @@ class Progress:
                 from rich.console import Console
                 from rich.progress import Progress as Bar, TextColumn
 
-                columns = *Bar.get_default_columns(), TextColumn("{task.fields[text]}")
-                self._bar = Bar(*columns, console=Console(stderr=True), transient=True)
+                text_column, console = TextColumn("{task.fields[text]}"), Console(stderr=True)
+                self._bar = Bar(*Bar.get_default_columns(), text_column, console=console, transient=True)
                 self._bar.add_task("", total=None, text="")
                 self._bar.start()
             self._bar.update(self._bar.task_ids[0], completed=done, total=total, description=line, text=text)
@@ -102,8 +102,8 @@ class FitProgress(Progress):
     def _fallen(self, what: str, part: str, error: float) -> str:
         """Say how far the best error has fallen: as a part of the first one, since joints differ in size."""
         errors = self._errors.setdefault((what, part), [error])
-        errors.append(min(errors[-1], error))
-        return f"error at {100 * errors[-1] / max(errors[0], 1e-12):.0f} % of the start's"
+        errors.append(error)
+        return f"error at {100 * min(errors) / max(errors[0], 1e-12):.0f} % of the start's"
 
     def generation(self, row: "Array") -> bool:
         """Take a row of `fitting.search.HISTORY`; return whether time is up."""

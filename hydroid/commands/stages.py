@@ -105,8 +105,12 @@ def fit_hyd(
 
 
 def _fit(stage: str, given: Mapping[str, Any]) -> FitResult:
-    keys = {"search.algorithm": "algorithm", "search.seed": "seed", "simulation.threads": "threads"}
-    changes = setting_changes(given["set"], {key: given[name] for key, name in keys.items()})
+    options = {
+        "search.algorithm": given["algorithm"],
+        "search.seed": given["seed"],
+        "simulation.threads": given["threads"],
+    }
+    changes = setting_changes(given["set"], options)
     if given["refinement"] is False:
         changes["refinement"] = None
     config, start = given["config"], given["start"]
@@ -118,8 +122,11 @@ def _fit(stage: str, given: Mapping[str, Any]) -> FitResult:
         more |= held_mechanics(given["mech"], settings, changes)
     if start is not None:
         values, _ = open_values(start)
-        free = [name for name, p in settings.parameters.items() if p.fixed is None and name in values]
-        starts = {f"parameters.{n}.start": values[n] for n in free if f"parameters.{n}.fixed" not in more}
+        starts = {
+            f"parameters.{name}.start": values[name]
+            for name, p in settings.parameters.items()
+            if p.fixed is None and name in values and f"parameters.{name}.fixed" not in more
+        }
         if not starts:
             raise SettingsError("has a value of none of the free parameters", start)
         more |= starts
@@ -149,7 +156,7 @@ def held_mechanics(mech: "ModelSource | None", settings: FitSettings, changes: P
     values, summary = ({}, None) if mech is None else open_values(mech)
     if summary is not None and summary.stage != "mech":
         hint = "name a run of fit-mech, or begin at this fit with --start"
-        raise SettingsError("is a fit of stage 2, but --mech takes one of stage 1", str(mech), hint)
+        raise SettingsError("is a fit of stage 2, but --mech takes one of stage 1", mech, hint)
     held, missing = Plain(), list[str]()
     for name, p in settings.parameters.items():
         if p.quantity not in MECHANICAL or p.quantity == "gain":
@@ -222,5 +229,4 @@ def adapt(
     columns, rows = errors_by_joint(settings.arm, named)
     columns = {"parameter": "freed"} | columns
     steps_table = Table.of("Parameters freed one after another", columns, rows, LEFT_OUT)
-    content = {**result.content, "steps": path}
-    return replace(result, lines=[steps_table, *result.lines], content=content)
+    return replace(result, lines=[steps_table, *result.lines], content={**result.content, "steps": path})

@@ -140,8 +140,7 @@ def report(
         "out": out and str(out),
         "best": best.folder,
         "runs": {
-            run.folder: {"seed": run.seed}
-            | {"fitted_deg": {v.name: v.fitted_deg for v in run.summary.verdict}}
+            run.folder: {"seed": run.seed, "fitted_deg": {v.name: v.fitted_deg for v in run.summary.verdict}}
             for run in collected
         },
         "parameters": [dict(zip(spread.header, row, strict=True)) for row in spread.rows],

@@ -1,12 +1,13 @@
 """`hydroid simulate` and `hydroid view`: what a model predicts as a log, and as an arm in motion."""
 
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hydroid.arrays import record
 from hydroid.commands.console import Result
 from hydroid.commands.inputs import (
     ConfigSource,
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
     from hydroid.settings.fit import FitSettings
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@record
 class Simulated(Result["dict[str, Log]"]):
     """Simulated logs by the arm's name: right, left, or alone."""
 
@@ -148,9 +149,11 @@ def view(
     from hydroid.viewer.motion import simulated_motion
 
     if out is not None:
-        from hydroid.viewer.film import check_kind, render_motion
+        from hydroid.viewer.film import KINDS, render_motion
 
-        kind, part = check_kind(Path(out)), _span(span)
+        kind, part = Path(out).suffix.lower(), _span(span)
+        if kind not in KINDS:
+            raise SettingsError("is no film or picture", out, f"end it in {', '.join(KINDS)}")
         with Progress() as progress:
             film = render_motion(simulated_motion(model, logs or {}), kind, part, progress)
         write_atomic(Path(out), film)
@@ -173,7 +176,7 @@ def _collisions(logs: "dict[str, Log]", settings: "FitSettings") -> "Result[Clea
     rest = settings.arm.pose(settings.start_pose)
     angle = machine.joined({side: log.angle for side, log in logs.items()}, rest)
     result = machine.checker.clearance(next(iter(logs.values())).time, angle)
-    nearest = int(result.distance.argmin())
+    nearest = result.distance.argmin()
     content = {
         "free": not result.meetings,
         "clearance_m": result.distance[nearest],

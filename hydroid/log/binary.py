@@ -13,7 +13,7 @@ column has the name that the settings give it.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import fields, is_dataclass
 from numbers import Real
 from pathlib import Path
 from typing import Any
@@ -21,12 +21,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hydroid.arrays import record
 from hydroid.errors import LogError
 from hydroid.log.repair import hold
 from hydroid.log.table import Recording, Signal, Table, format_library
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@record
 class BagTable(Table):
     """The channels of a bag, by name: values by the time of their messages [ns]; rows are at `period` [s]."""
 

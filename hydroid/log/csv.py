@@ -38,8 +38,7 @@ def open_csv(path: Path, data: bytes) -> Table:
     names, width = rows[header], len(rows[header])
     if all(number(name.replace(",", ".")) is not None for name in names if name):
         hint = "write the columns' names above it (a line that starts with # is a comment)"
-        where = f"{path}, line {header + 1}"
-        raise LogError("has no header: this line holds numbers", where, hint)
+        raise LogError("has no header: this line holds numbers", f"{path}, line {header + 1}", hint)
     if width == 1:
         raise LogError("has one column only", path, "part cells by , ; | tabs or spaces")
     above = f"the names are in line {header + 1}; what stands above is left out"

@@ -82,8 +82,13 @@ def guess_columns(
             entry["angle"] = {"column": column.name, "unit": column.unit or usual}
             reasons.append(f"{column.name}: {what} in {column.unit or usual} of {of}, {why}")
     used = {time.name} | {c.name for pairs in (commands, angles) for pair, _ in pairs.values() for c in pair}
-    log = {"time": {"column": time.name, "unit": unit}, "command": None, "angle": None}
-    log |= {"period_s": min(PERIODS, key=lambda p: max(p, step) / max(min(p, step), 1e-9)), "joints": entries}
+    log: Plain = {
+        "time": {"column": time.name, "unit": unit},
+        "command": None,
+        "angle": None,
+        "period_s": min(PERIODS, key=lambda p: max(p, step) / max(min(p, step), 1e-9)),
+        "joints": entries,
+    }
     unused = tuple(name for name in table.names if name and name not in used)
     reasons += [f"not used: {listed(unused)}"] if unused else []
     return ColumnGuess(log, tuple(reasons), unused)

@@ -98,8 +98,14 @@ class Log:
     def part(self, first: int, end: int) -> "Log":
         """Return the samples from `first` to before `end`, which start where they were measured."""
         at = slice(first, end)
-        cut = {"command": self.command[at], "angle": self.angle[at], "time": self.time[at] - self.time[first]}
-        return replace(self, **cut, pressure=None if self.pressure is None else self.pressure[at], rest=0)
+        return replace(
+            self,
+            time=self.time[at] - self.time[first],
+            command=self.command[at],
+            angle=self.angle[at],
+            pressure=None if self.pressure is None else self.pressure[at],
+            rest=0,
+        )
 
     @property
     def _rest(self) -> int:

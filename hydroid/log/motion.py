@@ -128,9 +128,10 @@ class JointMotion:
         bell = np.exp(-0.5 * (at / width) ** 2)
         bell /= bell.sum()
         slope = -at / width**2 * bell / self.log.period
-        pairs = (self._logged, bell), (angle, bell), (angle, slope)
-        padded = ((np.pad(signal, reach, "symmetric"), by) for signal, by in pairs)
-        return tuple(np.convolve(*pair, "valid").astype(np.float64) for pair in padded)
+        return tuple(
+            np.convolve(np.pad(signal, reach, "symmetric"), by, "valid").astype(np.float64)
+            for signal, by in ((self._logged, bell), (angle, bell), (angle, slope))
+        )
 
 
 def _correlations(leading: Array, following: Array, most: int) -> Array:

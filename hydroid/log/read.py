@@ -34,10 +34,10 @@ def open_table(path: Path, settings: LogSettings = DEFAULT) -> Table:
     The settings name the time column, and the period to which the channels of a bag are resampled.
     """
     try:
-        folder = (path / "metadata.yaml").is_file()
-        data = b"#ROSBAG V" if folder else path.read_bytes()
+        # a ROS 2 bag is a folder
+        data = b"#ROSBAG V" if (path / "metadata.yaml").is_file() else path.read_bytes()
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
+        reason = getattr(error, "strerror", None) or error
         raise LogError(f"cannot be read ({reason})", path) from None
     if data.startswith((b"#ROSBAG V", b"\x89MCAP0", b"SQLite format 3")):
         return open_bag(path, settings.time.column, settings.period_s)
@@ -89,8 +89,8 @@ def check_log(
             log = resample(recording, settings, len(ranges))
             findings += check_motion(log, recording.signals, compared, backward, settings.delay_s)
     except LogError as error:
-        said = {"what": error.what, "hint": error.hint}
-        findings.append(LogFinding("unreadable", "error", (), said, error.where, source))
+        numbers = {"what": error.what, "hint": error.hint}
+        findings.append(LogFinding("unreadable", "error", (), numbers, error.where, source))
     return log, by_level(findings)
 
 

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, field
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -47,7 +47,7 @@ class Signal:
         return f"{self.kind} of joint {self.owner}" if self.joint else self.kind
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@record
 class Table:
     """Named columns of one file, the source.
 
@@ -60,6 +60,7 @@ class Table:
         lines: of the rows [1-based], shape (R,); None: 1, 2, ...
     """
 
+    _: KW_ONLY
     source: str
     names: tuple[str, ...]
     columns: Mapping[str, NDArray[Any]] = field(default_factory=dict[str, NDArray[Any]])
@@ -118,8 +119,9 @@ class Recording:
         at = [f"{word} {row + 1 if of is None else of[row]}" for row in self.rows[[*rows[:1], *rows[-1:]]]]
         more = f" (and {len(rows) - 1} more, to {at[1]})" if len(rows) > 1 else ""
         about = subjects or ((signal,) if signal else ())
-        place = {"row": at[0] if at else "", "column": signal.name if signal else ""}
-        return log_finding(level, kind, self.table.source, *about, **place, rows=more, **numbers)
+        row, column = at[0] if at else "", signal.name if signal else ""
+        source = self.table.source
+        return log_finding(level, kind, source, *about, row=row, column=column, rows=more, **numbers)
 
 
 def number(cell: str) -> float | None:

@@ -49,19 +49,17 @@ class DaskWorkers:
                 self._sent[target] = self.client.submit(bytes, pickle.dumps(target), pure=False)
             edges = np.linspace(0, len(theta), min(self.count, len(theta)) + 1).astype(int).tolist()
             parts = [slice(*edge) for edge in pairwise(edges)]
-            failed: list[int] = []
             for part, rows in zip(parts, self._map(target, method, [theta[p] for p in parts]), strict=True):
-                if rows is None:
-                    failed += range(part.start, part.stop)
-                else:
+                if rows is not None:
                     result[part] = rows
-            # Dask also gives up chunks that waited behind a killer: try each of their candidates alone
-            for i in failed:
-                rows = self._map(target, method, [theta[i : i + 1]])[0]
-                if rows is None:
-                    _log.warning("a candidate has killed worker after worker and counts as infeasible")
-                else:
-                    result[i] = rows[0]
+                    continue
+                # Dask also gives up chunks that waited behind a killer: try each of their candidates alone
+                for i in range(part.start, part.stop):
+                    (row,) = self._map(target, method, [theta[i : i + 1]])
+                    if row is None:
+                        _log.warning("a candidate has killed worker after worker and counts as infeasible")
+                    else:
+                        result[i] = row[0]
         except Exception as error:  # many errors follow the loss of a scheduler
             if not isinstance(error, OSError | CancelledError) and self.client.status == "running":
                 raise

@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from copy import copy
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +13,7 @@ from hydroid.arm.model import add_payload, load_model
 from hydroid.arrays import Array
 from hydroid.errors import RunError, SettingsError
 from hydroid.estimate import write_estimate
+from hydroid.files import Plain
 from hydroid.hydraulics.actuator import pressures
 from hydroid.hydraulics.records import JOINT_STATE, has_force_curve
 from hydroid.identified_model import IdentifiedModel, write_settings
@@ -215,10 +215,10 @@ class Plant:
         model.dof_damping[:], model.dof_armature[:] = self._values["dof_damping"][0], self._armature
         spec = read_mjcf(folder / "arm.xml")  # with the meshes' names there
         motors: Array | None = np.array([self._gain, self._balance])
-        actuators: dict[str, dict[str, Any]] | None = None
+        actuators = Plain()
         if self._chain.joints.size:
             hydraulic = {name: q for name, q in QUANTITIES.items() if name not in MECHANICAL}
-            motors, actuators = None, {"units": {name: q.unit for name, q in hydraulic.items()}}
+            motors, actuators["units"] = None, {name: q.unit for name, q in hydraulic.items()}
             for joint, values in zip(self._named, candidate.joints[0, self._active], strict=True):
                 actuators[joint] = {name: float(values[name] / q.factor) for name, q in hydraulic.items()}
         fitted = locked_spec(spec, self._locked, model, motors)

@@ -11,8 +11,8 @@ from typing import Any
 from hydroid.arrays import record
 from hydroid.cad.importer import ImportedArm, import_arm
 from hydroid.cad.source import MESHES
-from hydroid.errors import RunError, SettingsError
-from hydroid.files import fill_template, undisturbed, write_atomic
+from hydroid.errors import SettingsError
+from hydroid.files import fill_template, undisturbed, write_atomic, writing
 from hydroid.log import open_table
 from hydroid.project.layout import find_layout
 from hydroid.project.texts import JointSize, arm_text, fit_text, joint_sizes
@@ -45,7 +45,7 @@ class Project:
 
 
 def write_project(
-    folder: Path, robot: Path | None, logs: Sequence[Path], joints: Sequence[str] = (), **options: Any
+    folder: Path, robot: Path | None, logs: Sequence[Path], joints: Sequence[str], **options: Any
 ) -> Project:
     """Write a project to a folder, new or with other things in it (`hydroid.init` says what is given)."""
     taken = [name for name in FILES if os.path.lexists(folder / name)]
@@ -85,8 +85,10 @@ def write_project(
         if imported and guessed:
             what = "no cylinder is known. A stand-in predicts angles; its pressures and forces mean nothing"
             notes.append(f"{listed(guessed)}: {what}")
-        said = {"steps": steps, "notes": notes, "reasons": reasons}
-        write_atomic(stage / STEPS, fill_template("project/next-steps.md.j2", name=arm.name, **said))
+        text = fill_template(
+            "project/next-steps.md.j2", name=arm.name, steps=steps, notes=notes, reasons=reasons
+        )
+        write_atomic(stage / STEPS, text)
         written = _move(stage, folder)
     return Project(folder, written, tuple(notes), reasons, layout.unused if layout else (), steps)
 
@@ -107,11 +109,9 @@ def _write_arm(
 @contextmanager
 def _stage(folder: Path) -> Generator[Path]:
     """A folder beside the project, or in it where it exists, that disappears."""
-    home = next(path for path in (folder.absolute(), *folder.absolute().parents) if path.is_dir())
-    try:
+    home = next(filter(Path.is_dir, (folder.absolute(), *folder.absolute().parents)))
+    with writing(folder):
         stage = tempfile.TemporaryDirectory(prefix=".hydroid-init-", dir=home, ignore_cleanup_errors=True)
-    except OSError as error:
-        raise RunError(f"cannot be written ({error.strerror})", folder) from None
     with stage as path:
         yield Path(path)
 
@@ -119,17 +119,17 @@ def _stage(folder: Path) -> Generator[Path]:
 def _move(stage: Path, folder: Path) -> tuple[str, ...]:
     names, old = tuple(name for name in FILES if (stage / name).exists()), stage / "old"
     old.mkdir()
-    with undisturbed():
+    with undisturbed(), writing(folder):
         try:
             folder.mkdir(parents=True, exist_ok=True)
             for name in names:
                 if os.path.lexists(folder / name):  # of an earlier project
                     os.rename(folder / name, old / name)
                 os.rename(stage / name, folder / name)
-        except OSError as error:
+        except OSError:
             for name in names:
                 for place, back in ((folder, stage), (old, folder)):
                     if os.path.lexists(place / name) and not os.path.lexists(back / name):
                         os.rename(place / name, back / name)
-            raise RunError(f"cannot be written ({error.strerror})", folder) from None
+            raise
     return names

@@ -9,11 +9,10 @@ from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
-import yaml
 
 from hydroid.arm.model import load_model
 from hydroid.cad.importer import ImportedArm
-from hydroid.files import Plain, fill_template
+from hydroid.files import Plain, fill_template, yaml_text
 from hydroid.hydraulics.valve import DENSITY
 from hydroid.project.layout import Layout
 from hydroid.settings.arm import Arm
@@ -90,14 +89,19 @@ def arm_text(imported: ImportedArm, arm: Arm | None, sizes: Sequence[JointSize])
         if own is not None:  # the rod leaves about 65 % of the area
             oil = own | {"area_a": rounded(area), "area_b": rounded(0.65 * area)}
         actuators[joint.name] = oil | {"max_opening": rounded(size.opening)}
-    values: Plain = {"title": imported.title, "notes": imported.notes, "lift": LIFT, "actuators": actuators}
-    return fill_template("project/arm.yaml.j2", flow=flow, **values)
+    return fill_template(
+        "project/arm.yaml.j2",
+        title=imported.title,
+        notes=imported.notes,
+        lift=LIFT,
+        actuators=actuators,
+        flow=flow,
+    )
 
 
 def flow(value: Any) -> str:
     """Write a value as YAML, on one line."""
-    text = yaml.safe_dump(value, default_flow_style=True, width=10_000, allow_unicode=True, sort_keys=False)
-    return text.removesuffix("...\n").strip()
+    return yaml_text(value, default_flow_style=True, width=10_000).removesuffix("...\n").strip()
 
 
 def rounded(value: float) -> float:
@@ -133,7 +137,7 @@ def fit_text(arm: Arm, layout: Layout | None, sizes: Sequence[JointSize], file: 
                 "dead": short(DEAD * min(max(motion.dead_band, 5.0), 40.0) if motion else 10.0),
             }
         )
-    period = 0.01 if layout is None else float(layout.section["period_s"])
+    period = 0.01 if layout is None else layout.section["period_s"]
     steps = math.ceil(period / LONGEST_STEP - 1e-9)
     return fill_template(
         "project/fit.yaml.j2",

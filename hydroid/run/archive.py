@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from hydroid.errors import RunError
-from hydroid.files import undisturbed, write_atomic
+from hydroid.files import Plain, undisturbed, write_atomic
 from hydroid.fitting.checkpoints import Arrays
 from hydroid.progress import LOGGER
 
@@ -28,18 +28,15 @@ def pack(tree: object, *, compressed: bool = True) -> bytes:
     arrays: dict[str, np.ndarray] = {}
 
     def plain(value: Any) -> Any:
+        """Return what JSON takes in place of a value that it does not know."""
         if isinstance(value, np.ndarray):
             arrays[name := f"a{len(arrays)}"] = value
             return {"array": name}
         if is_dataclass(value):
-            return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
-        if isinstance(value, Mapping):
-            return {str(key): plain(one) for key, one in value.items()}
-        if isinstance(value, tuple | list):
-            return [plain(one) for one in value]
-        return value.item() if isinstance(value, np.generic) else value
+            return {field.name: getattr(value, field.name) for field in fields(value)}
+        return dict(value) if isinstance(value, Mapping) else value.item()
 
-    content = np.frombuffer(json.dumps(plain(tree)).encode(), dtype=np.uint8)
+    content = np.frombuffer(json.dumps(tree, default=plain).encode(), dtype=np.uint8)
     buffer, save = io.BytesIO(), np.savez_compressed if compressed else np.savez
     save(buffer, content=content, **arrays)  # pyright: ignore[reportArgumentType]
     return buffer.getvalue() + hashlib.sha256(buffer.getvalue()).digest()
@@ -53,14 +50,10 @@ def unpack(file: Path) -> Any:
         raise ValueError("checksum")
     arrays = np.load(io.BytesIO(data), allow_pickle=False)
 
-    def filled(value: Any) -> Any:
-        if isinstance(value, dict):
-            if value.keys() == {"array"}:
-                return arrays[value["array"]]
-            return {key: filled(one) for key, one in value.items()}
-        return [filled(one) for one in value] if isinstance(value, list) else value
+    def filled(value: Plain) -> Any:
+        return arrays[value["array"]] if value.keys() == {"array"} else value
 
-    return filled(json.loads(arrays["content"].tobytes()))
+    return json.loads(arrays["content"].tobytes(), object_hook=filled)
 
 
 class CheckpointFile(UserDict[str, Arrays]):

@@ -170,7 +170,7 @@ class RunFolder:
         """Read the run's description."""
         file = self.path / DESCRIPTION
         try:
-            content = json.loads(file.read_text(encoding="utf-8"))
+            content = json.loads(file.read_bytes())
         except (OSError, ValueError, RecursionError) as error:
             what = f"cannot be read as a run ({getattr(error, 'strerror', None) or 'it is damaged'})"
             raise RunError(what, file, "name a folder that a fit has made") from None

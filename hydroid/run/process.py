@@ -15,6 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from hydroid.errors import RunError
+from hydroid.files import writing
 from hydroid.parallel.workers import VERSIONS
 from hydroid.progress import LOGGER, logging_to
 
@@ -36,7 +37,7 @@ def locked(folder: Path) -> Generator[None]:
     between machines; with `localflock`, or NFS's `nolock`, it holds on one machine only. On a file system
     that has no locks there is none, but a warning.
     """
-    try:
+    with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
         file = (folder / LOCK).open("a+b", buffering=0)  # for writing: NFS grants no exclusive lock otherwise
         if fcntl is not None:
@@ -53,8 +54,6 @@ def locked(folder: Path) -> Generator[None]:
             else:
                 file.truncate(0)
                 file.write(f"process {os.getpid()} on {socket.gethostname()}".encode())
-    except OSError as error:
-        raise RunError(f"cannot be written ({error.strerror})", folder) from None
     with file:  # to close it ends the lock
         yield
 
@@ -62,18 +61,15 @@ def locked(folder: Path) -> Generator[None]:
 @contextmanager
 def run_log(file: Path) -> Generator[None]:
     """Write what hydroid's loggers say, INFO and above, to a file as well."""
-    try:
+    with writing(file):
         handler = _File(file, encoding="utf-8")
-    except OSError as error:
-        raise RunError(f"cannot be written ({error.strerror})", file) from None
     with logging_to(handler):
         yield
 
 
 def log_start() -> None:
     """Log what runs, where, with what."""
-    versions = ", ".join(map(" ".join, VERSIONS.items()))
-    LOGGER.info("%s, Python %s", versions, platform.python_version())
+    LOGGER.info("%s, Python %s", ", ".join(map(" ".join, VERSIONS.items())), platform.python_version())
     LOGGER.info("process %d on %s: %s", os.getpid(), socket.gethostname(), shlex.join(sys.argv))
 
 

@@ -8,7 +8,7 @@ import math
 from dataclasses import replace
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+from typing import Annotated, Any, TypeAlias
 
 import numpy as np
 from pydantic import AfterValidator, Field, Strict, ValidationInfo
@@ -19,10 +19,6 @@ from hydroid.files import find_config
 from hydroid.settings.cylinder import LinearActuator, make_cylinder
 from hydroid.settings.linkage import DIGITS, Cylinder, RotaryActuator
 from hydroid.settings.load import Settings, load
-
-if TYPE_CHECKING:
-    import mujoco
-
 
 Actuator: TypeAlias = LinearActuator | RotaryActuator
 
@@ -115,8 +111,8 @@ class Arm(Settings):
                 try:
                     if not limited:
                         raise ValueError("a joint without limits needs a rotary actuator")
-                    zero = _at_zero(self.model)
-                    actuator = make_cylinder(actuator, bare.limits, zero, name, slides=slides)
+                    data = _at_zero(self.model)
+                    actuator = make_cylinder(actuator, bare.limits, data, name, slides=slides)
                 except ValueError as error:
                     raise SettingsError(f"actuators.{name}: {error}", self.where) from None
             joints.append(replace(bare, actuator=actuator))
@@ -203,7 +199,8 @@ def load_arm(name: str | Path, beside: Path | None = None) -> Arm:
     return load(find_config(name, beside, kind="arm"), Arm)
 
 
-def _at_zero(path: Path) -> "mujoco.MjData":
+def _at_zero(path: Path) -> Any:
+    """Return MuJoCo's data of a model with all joints at 0."""
     if not path.is_file():
         raise ModelError("no such model", path, "give the arm's MJCF; `hydroid init` writes one")
     state = path.stat()
@@ -211,7 +208,7 @@ def _at_zero(path: Path) -> "mujoco.MjData":
 
 
 @lru_cache(maxsize=8)
-def _compiled(path: Path, _changed: int, _size: int) -> "mujoco.MjData":
+def _compiled(path: Path, _changed: int, _size: int) -> Any:
     """The same of a file that did not change, without meshes that decide no inertia: these take long."""
     import mujoco
 
@@ -226,7 +223,7 @@ def _compiled(path: Path, _changed: int, _size: int) -> "mujoco.MjData":
     used = {geom.meshname for geom in spec.geoms}
     for one in [mesh for mesh in spec.meshes if mesh.name not in used]:
         spec.delete(one)
-    with mujoco_errors(str(path)):
+    with mujoco_errors(path):
         data = mujoco.MjData(spec.compile())
     data.qpos[:] = 0.0
     mujoco.mj_kinematics(data.model, data)

@@ -53,8 +53,8 @@ def make_cylinder(
 ) -> LinearActuator:
     """Return a cylinder that moves its joint through a range [rad], or along it [m] where the joint `slides`.
 
-    MuJoCo's `data` has all joints of the arm at 0; a cylinder whose triangle is given, or that lies along its
-    joint, needs none.
+    MuJoCo's `data` has all joints of the arm at 0; a cylinder whose triangle is given needs none, nor one
+    that lies along its joint and has no pivots.
     """
     sides, pivots = settings.triangle, None
     if slides:
@@ -62,8 +62,8 @@ def make_cylinder(
             raise ValueError("its joint slides, so it lies along it: give neither triangle nor four_bar")
         # along the joint b is 0; by default the rod runs out forward
         given, way = settings.pivots, 1.0
-        if given is not None and data is not None:
-            way = float(np.subtract(given.child, given.parent) @ data.joint(joint).xaxis)
+        if given is not None:
+            way = np.subtract(given.child, given.parent) @ data.joint(joint).xaxis
         sides = Triangle.model_construct(a=1.0, b=0.0, theta0=90.0 if way > 0 else -90.0)
     elif sides is None:
         sides, pivots = _pinned(settings.pivots, data, joint)
@@ -71,8 +71,8 @@ def make_cylinder(
     cylinder = LinearActuator(settings, sides, 0.0, pivots)
     angles = np.linspace(*limits, 181)
     with np.errstate(all="ignore"):
-        arm = np.asarray(cylinder.moment_arm(angles))
-        bars = np.asarray(four_bar(angles, settings.four_bar)[1]) if settings.four_bar else np.ones(1)
+        arm = cylinder.moment_arm(angles)
+        bars = four_bar(angles, settings.four_bar)[1] if settings.four_bar else np.ones(1)
     # beyond a dead centre the moment arm has another sign
     if not ((bars * bars[0] > 0).all() and (arm * arm[0] > 0).all()):
         what = "does not reach all of its range, or has a dead centre in it"
@@ -94,8 +94,8 @@ def _pinned(given: Pivots | None, data: Any, joint: str) -> tuple[Triangle, tupl
         except KeyError as error:
             name = str(error).split("'")[1]
             raise ValueError(f"the model has no site {name}; add it, or give pivots") from None
-    at, child = data.joint(joint), int(data.model.joint(joint).bodyid[0])
-    bodies = int(data.model.body_parentid[child]), child
+    at, child = data.joint(joint), data.model.joint(joint).bodyid[0]
+    bodies = data.model.body_parentid[child], child
     local = [data.xmat[b].reshape(3, 3).T @ (e - data.xpos[b]) for b, e in zip(bodies, ends, strict=True)]
     parent, moved = (tuple(place.round(DIGITS).tolist()) for place in local)
     ends, axis = ends - at.xanchor, at.xaxis
@@ -111,5 +111,5 @@ def _pinned(given: Pivots | None, data: Any, joint: str) -> tuple[Triangle, tupl
             f"its pivots lie {skew:.4g} m apart along the joint's axis and {length:.4g} m across it; "
             "a cylinder must lie across the axis"
         )
-    turn = round(math.degrees(math.atan2(float(np.cross(near, far) @ axis), float(near @ far))), DIGITS)
+    turn = round(math.degrees(math.atan2(np.cross(near, far) @ axis, near @ far)), DIGITS)
     return Triangle(a=round(a, DIGITS), b=round(b, DIGITS), theta0=turn), (parent, moved)

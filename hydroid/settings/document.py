@@ -38,13 +38,13 @@ def read_yaml(path: Path) -> tuple[dict[str, Any], Lines]:
         raise SettingsError(f"cannot be read ({reason})", path) from None
     if len(data) > most:
         raise SettingsError(f"is larger than {most >> 10} KiB, too large for settings", path)
-    values, lines = read_document(text, str(path))
+    values, lines = read_document(text, path)
     if not isinstance(values, dict):
         raise SettingsError("must be a mapping of settings", path, "write `key: value` lines")
     return values, lines
 
 
-def read_document(text: str, source: str) -> tuple[Any, Lines]:
+def read_document(text: str, source: object) -> tuple[Any, Lines]:
     """Read one YAML document."""
     lines: Lines = {}
     try:
@@ -60,7 +60,7 @@ def read_document(text: str, source: str) -> tuple[Any, Lines]:
         raise SettingsError("is not YAML: it is nested too deeply", source) from None
 
 
-def _value(node: yaml.Node, path: tuple[str, ...], lines: Lines, source: str) -> Any:
+def _value(node: yaml.Node, path: tuple[str, ...], lines: Lines, source: object) -> Any:
     """The value of a node; the lines of all that is in it are noted."""
     where = f"{source}, line {node.start_mark.line + 1}"
     if len(lines) >= 20_000:  # aliases count whenever they are used: a few lines cannot expand to billions

@@ -142,9 +142,8 @@ class FitSettings(Settings):
 
     def parameter_set(self) -> ParameterSet:
         """Return the parameters with units, bounds, priors and fixed values, in the order of theta."""
-        log = self.scale == "log"
         parameters = [
-            make_parameter(name, own, self.arm, self.hydraulics, log=log)
+            make_parameter(name, own, self.arm, self.hydraulics, log=self.scale == "log")
             for name, own in self.parameters.items()
         ]
         if not any(own.states_start for own in self.parameters.values() if own.fixed is None):

@@ -62,11 +62,11 @@ def actuator_values(
     values: dict[str, Any] = {name: q.default for name, q in QUANTITIES.items()} | settings.model_dump()
     if isinstance(actuator, LinearActuator):
         one, sides = actuator.settings, actuator.triangle
-        values |= {"opening_a": one.max_opening, "opening_b": one.max_opening}
+        values |= dict.fromkeys(TARGETS["opening"], one.max_opening)
         values |= {"area_a": one.area_a, "area_b": one.area_b, "pivot_angle": abs(sides.theta0)}
         values |= {"pivot_distance_1": sides.a, "pivot_distance_2": sides.b}
     elif actuator is not None:
-        values |= dict.fromkeys(("opening_a", "opening_b"), actuator.max_opening)
-        values |= dict.fromkeys(("area_a", "area_b"), actuator.displacement)
+        values |= dict.fromkeys(TARGETS["opening"], actuator.max_opening)
+        values |= dict.fromkeys(TARGETS["area"], actuator.displacement)
         values["dead_volume"] = settings.rotary_volume
     return {name: values[name] for name in QUANTITIES}

@@ -8,10 +8,9 @@ log:
     7: null                     # not in the log
 """
 
-from dataclasses import dataclass
 from fnmatch import fnmatch
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NamedTuple
 
 from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, ValidationInfo
 
@@ -65,8 +64,7 @@ class Columns(Settings):
     """is added to the scaled cells, in `unit`; default: 0"""
 
 
-@dataclass(frozen=True)
-class ColumnMap:
+class ColumnMap(NamedTuple):
     """The columns of one quantity of one joint, complete: value [unit] = scale · cell + offset."""
 
     column: tuple[str, ...]

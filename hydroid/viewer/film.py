@@ -7,7 +7,6 @@ import threading
 import time
 import warnings
 from collections.abc import Iterable, Iterator
-from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -73,14 +72,6 @@ def render_motion(
     return (_mp4 if kind == ".mp4" else _still)(rendered(motion, size, frames()), kind)
 
 
-def check_kind(file: Path) -> str:
-    """Return the ending of a file that `render_motion` writes."""
-    kind = file.suffix.lower()
-    if kind not in KINDS:
-        raise SettingsError("is no film or picture", file, f"end it in {', '.join(KINDS)}")
-    return kind
-
-
 def look_at(camera: mujoco.MjvCamera, model: mujoco.MjModel) -> None:
     """Point a camera at a whole machine."""
     camera.lookat[:], camera.distance = model.stat.center, 2.3 * model.stat.extent
@@ -95,8 +86,9 @@ def add_ghost(playback: Playback, scene: mujoco.MjvScene, view: tuple[float, flo
     """
     if playback.ghost is None:
         return
-    first, seen = scene.ngeom, (mujoco.MjvOption(), mujoco.MjvPerturb())
-    mujoco.mjv_addGeoms(playback.model, playback.ghost, *seen, mujoco.mjtCatBit.mjCAT_DYNAMIC, scene)
+    first, dynamic = scene.ngeom, mujoco.mjtCatBit.mjCAT_DYNAMIC
+    option, perturb = mujoco.MjvOption(), mujoco.MjvPerturb()
+    mujoco.mjv_addGeoms(playback.model, playback.ghost, option, perturb, dynamic, scene)
     for geom in scene.geoms[first : scene.ngeom]:
         geom.rgba[:], geom.matid, geom.transparent = (0.12, 0.44, 0.82, 0.42), -1, 1
         geom.pos[:] += 0.004 * sight(*view)[2]

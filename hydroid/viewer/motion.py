@@ -99,7 +99,7 @@ class Replay:
     def advance(self, until: float) -> None:
         """Go on to the sample before `until` [s]."""
         motion = self._motion
-        sample = max(0, int(np.searchsorted(motion.time, until + 1e-9)) - 1)
+        sample = max(0, np.searchsorted(motion.time, until + 1e-9) - 1)
         self.time = self.data.time = motion.time[sample]
         place(self.model, self.data, motion.simulated[sample])
         if self.ghost is not None and motion.measured is not None:

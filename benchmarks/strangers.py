@@ -242,19 +242,18 @@ class Ending:
 
     errors: unseen rms errors of each of RUNGS [deg], (4, J). blamed: joints that the verdict does not call
     predicted, from 1. kept: name of the estimate. terms: as `Machine.terms`; the larger lag counts. seconds:
-    wall and CPU time; where nobody noted them the wall time of the fit, without `init` and `validate`.
+    wall and CPU time.
     """
 
     def __init__(self, folder: Path) -> None:
-        record, noted = load_record(folder / "mine" / "runs" / "fit"), folder / "seconds.txt"
+        record = load_record(folder / "mine" / "runs" / "fit")
         rows = [one.baselines_deg | {RUNGS[-1]: one.unseen_deg} for one in record.verdict]
         self.errors = np.array([[one.get(rung) for one in rows] for rung in RUNGS], float)
         self.blamed = [one.joint for one in record.verdict if one.verdict != "predicts"]
         self.kept, values = str(record.summary.final), record.summary.values
         early = [values.get(f"pilot_{v.name}", 0) > values.get(f"lag_{v.name}", 0) for v in record.verdict]
-        self.terms = np.array(["pump" in self.kept, not record.settings.quasi_static, *early])
-        known = [sum(record.identity["seconds"].values()), np.nan]
-        self.seconds = np.loadtxt(noted) if noted.exists() else np.array(known)
+        self.terms = np.array(["pump" in self.kept, "oil" in self.kept or "dynamic" in self.kept, *early])
+        self.seconds = np.loadtxt(folder / "seconds.txt")
 
 
 def stranger(seed: int, number: int, folder: Path, *, stored: bool) -> tuple[str, Array, Any]:

@@ -44,6 +44,7 @@ def adapted(model: IdentifiedModel, free: Sequence[str]) -> FitSettings:
     return settings.changed(
         {
             "parameters": parameters,
+            "payloads": {},  # those of the fit's own logs
             "simulation.model": "quasi-static" if ladder else settings.simulation.model,
             "search.algorithm": "multistart",
             "search.multistart": MultistartSettings(starts=1, horizons=(), iterations=20),

@@ -106,9 +106,9 @@ class Ladder:
         settings, refinement = whole.settings, whole.settings.refinement
         assert refinement is not None
         two = settings.stage == "hyd" and settings.simulation.model == "ladder"
-        climbs = two or bool(settings.terms)
+        climbs = two or bool(settings.terms())
         for model in ("refined", "dynamic")[: 1 + two]:
-            possible = settings.terms_of(model)
+            possible = settings.terms(model)
             terms = [term for term in possible if term in self.kept.name.split("+")]
             self._rung(whole, "+".join([model, *terms]), climbs=climbs, if_nearer=model == "dynamic")
             for term in possible if self.kept.name.startswith(model) else ():
@@ -142,7 +142,7 @@ class Ladder:
         other_model = own.settings.quasi_static != last.settings.quasi_static
         if if_nearer and (self._late or last.leaves_noise(start.theta)):
             return
-        more = len(own.settings.terms) > len(last.settings.terms)  # other parameters may stand for it
+        more = len(own.settings.terms()) > len(last.settings.terms())  # other parameters may stand for it
         if more or other_model:
             rough = settings.changed({"gain_tolerance": ROUGH})
             first = self._refined(own, theta, rough, f"{name} at first")

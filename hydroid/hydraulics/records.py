@@ -188,8 +188,7 @@ def coefficients(joints: Records, period: float = 0.01, substeps: int = 1) -> Re
     table["ring_cosine"], table["ring_sine"] = ringing(p.oil_frequency, p.oil_damping, period)
     table["backflow"] = np.where(np.isinf(p.pump_flow), -np.inf, 0.0)
     table["relief"] = np.max(p.supply_pressure, axis=1, where=p.kind != NONE, initial=0.0)[:, None]
-    for end in "ab":
-        side = table[end]
+    for end, side in (("a", table.a), ("b", table.b)):
         for name, field in _SIDE_FIELDS.items():
             side[field] = joints[f"{name}_{end}"]
         side["late"] = np.floor(side.delay / period)

@@ -109,19 +109,13 @@ class FitSettings(Settings):
         simulation = self.simulation
         return self.hydraulics.substeps * simulation.steps_per_sample // simulation.steps
 
-    @property
-    def terms(self) -> tuple[str, ...]:
-        """Names of the terms that a fit may add, in the order of the parameters."""
-        return self.terms_of("")
+    def terms(self, model: str = "quasi-static") -> tuple[str, ...]:
+        """Names of the terms that a fit may add to a model, in the order of the parameters.
 
-    def terms_of(self, model: str) -> tuple[str, ...]:
-        """Names of the terms that an estimate of a model may have; `dynamic` has its own oil and inertia."""
-        known = (
-            p.term
-            for p in self.parameters.values()
-            if model != "dynamic" or not p.quantity.startswith("oil_")
-        )
-        return tuple(dict.fromkeys(filter(None, known)))
+        The oil of a quasi-static model is none of the dynamic one, which has its own.
+        """
+        own = [p for p in self.parameters.values() if model != "dynamic" or not p.quantity.startswith("oil_")]
+        return tuple(dict.fromkeys(p.term for p in own if p.term is not None))
 
     def of_estimate(self, name: str | None) -> "FitSettings":
         """Return the settings that an estimate of a fit was refined with, and predicts with.
@@ -135,7 +129,7 @@ class FitSettings(Settings):
         if model == "joint":  # every parameter is free that can be
             free = {n: p.changed({"fixed": None}) for n, p in self.parameters.items() if p.can_be_free}
             settings = self.with_parameters(free)
-        if self.terms != tuple(terms):
+        if self.terms() != tuple(terms):
             own = {n: p for n, p in settings.parameters.items() if p.term is None or p.term in terms}
             settings = settings.changed({"parameters": own})
         return settings.changed({"simulation.model": model}) if model == "dynamic" else settings

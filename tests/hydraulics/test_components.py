@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hydroid.hydraulics.cylinder import holding_pressures, stop_damping, triangle
+from hydroid.hydraulics.cylinder import holding_pressures, stop_damping
 from hydroid.hydraulics.elementwise import kept
-from hydroid.hydraulics.records import coefficients, has_force_curve, nominal_joints
+from hydroid.hydraulics.records import has_force_curve, nominal_joints
 from hydroid.hydraulics.solenoid import (
     beyond_dead_band,
     coil_force,
@@ -20,7 +20,6 @@ from hydroid.hydraulics.solenoid import (
 )
 from hydroid.hydraulics.valve import notched, port_flow
 from hydroid.settings.arm import Arm
-from hydroid.settings.cylinder import LinearActuator
 from hydroid.settings.hydraulics import HydraulicSettings
 
 ARTICLE = (8.0, 0.7, 0.8e-3, 12e-3, 0.9)
@@ -124,17 +123,6 @@ def test_the_flow_into_a_chamber_has_the_slopes_that_it_states(compensation: flo
     assert stronger[2] == pytest.approx(give, rel=1e-5)
     if compensation == 1.0 and pressure < 0.75 * 150e5:
         assert pumped == pytest.approx(0.03 * 2e-6 * np.sqrt(0.25 * 150e5), rel=1e-4)
-
-
-def test_linkages_are_those_of_the_arms_cylinders(arm: Arm):
-    moved = coefficients(nominal_joints(arm, HydraulicSettings())[None].view(np.recarray))[0]
-    for joint, c in zip(arm.joints, moved, strict=True):
-        if not isinstance(joint.actuator, LinearActuator):
-            continue
-        q = np.radians(np.linspace(*joint.range, 9))
-        x, r, _ = triangle(q, c.pivot_distance_1, c.pivot_distance_2, c.theta0, c.shortest)
-        np.testing.assert_allclose(x, joint.actuator.length(q) - joint.actuator.length(q[0]), atol=1e-12)
-        np.testing.assert_allclose(r, joint.actuator.moment_arm(q), rtol=1e-12)
 
 
 def test_stops_oppose_motion_into_them_only():

@@ -43,17 +43,6 @@ def test_random_points_are_uniform(kind):
     assert chi2 < 49 + 5 * np.sqrt(2 * 49)  # five standard deviations of chi-square with 49 degrees
 
 
-def test_a_bit_flip_changes_one_bit_of_every_element():
-    coding = GrayCoding(5)
-    rng = np.random.default_rng(0)
-    chromosomes = coding.random(2000, rng)
-    flips = (coding.altered(chromosomes, rng) != chromosomes).reshape(-1, 16)
-    assert (flips.sum(axis=1) == 1).all()
-    counts = flips.sum(axis=0)
-    expected = len(flips) / 16
-    assert ((counts - expected) ** 2 / expected).sum() < 15 + 5 * np.sqrt(30)
-
-
 INF, NAN = np.inf, np.nan
 
 

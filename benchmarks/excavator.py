@@ -1,8 +1,8 @@
 """The real excavator: fitted to its twelve logs, judged on the other six, from several starts.
 
 Nothing in the shipped fit is random: seed 1 is the shipped start, and every other seed moves all start values
-by half a standard deviation of their priors. --folder: of the authors' other logs as well, those of other days
-also with a few parameters adapted to the first; --more fits those of the morning. Mean absolute errors [deg].
+by half a standard deviation of their priors. --folder: of all of the authors' logs; those of other days are
+also predicted with a few parameters adapted to the first. --more fits the morning. Mean absolute errors [deg].
 """
 
 from contextlib import suppress

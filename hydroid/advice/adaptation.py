@@ -54,10 +54,7 @@ def adapted(model: IdentifiedModel, free: Sequence[str]) -> FitSettings:
 
 
 def steps(
-    model: IdentifiedModel,
-    logs: Sequence[Log],
-    free: Sequence[str],
-    progress: Progress,
+    model: IdentifiedModel, logs: Sequence[Log], free: Sequence[str], progress: Progress
 ) -> list[Plain]:
     """Return what freeing parameters one after another does, after the model as it is (""), as JSON has it.
 

@@ -39,12 +39,7 @@ def add_payload(spec: mujoco.MjSpec, arm: Arm, mass: float) -> mujoco.MjSpec:
     # of a ball of 5 cm: its own inertia is small beside what its distance makes
     site, moment = loaded.site(arm.payload), 0.4 * mass * 0.05**2
     body = site.parent.add_body(
-        name="payload",
-        pos=site.pos,
-        explicitinertial=True,
-        mass=mass,
-        ipos=[0.0] * 3,
-        inertia=[moment] * 3,
+        name="payload", pos=site.pos, explicitinertial=True, mass=mass, ipos=[0.0] * 3, inertia=[moment] * 3
     )
     if site.frame is not None:
         body.set_frame(site.frame)

@@ -59,12 +59,7 @@ class Problem:
 
     afar = False
 
-    def __init__(
-        self,
-        settings: FitSettings,
-        logs: Sequence[Log],
-        spread: DaskWorkers | None = None,
-    ) -> None:
+    def __init__(self, settings: FitSettings, logs: Sequence[Log], spread: DaskWorkers | None = None) -> None:
         spec, outputs = load_model(settings.arm), [j - 1 for j in settings.outputs]
         self.settings, self.logs, self.outputs = settings, tuple(logs), outputs
         self._spread = spread
@@ -216,11 +211,7 @@ class Problem:
 
 
 def make_simulation(
-    spec: mujoco.MjSpec,
-    log: Log,
-    outputs: list[int],
-    settings: FitSettings,
-    pressures: Sequence[int] = (),
+    spec: mujoco.MjSpec, log: Log, outputs: list[int], settings: FitSettings, pressures: Sequence[int] = ()
 ) -> Simulation:
     """Return the simulation of one log in the settings' stage.
 

@@ -2,7 +2,7 @@
 
 Nothing in the shipped fit is random: seed 1 is the shipped start, and every other seed moves all start values
 by half a standard deviation of their priors. --folder: of all of the authors' logs; those of other days are
-also predicted with a few parameters adapted to the first. --more fits the morning. Mean absolute errors [deg].
+predicted with a few parameters adapted to the first, too. --more fits the morning. Mean absolute errors, deg.
 """
 
 from contextlib import suppress

@@ -19,7 +19,7 @@ from hydroid.prediction import predict
 FOLDER = EXAMPLES / "excavator"
 KINDS = ("fit", "more", "check", "later", "heavy")  # the last: of the next day, with a loaded bucket
 JOINTS = {2: "boom", 3: "arm", 4: "bucket", 1: "swing"}
-FREED = {"later": (None, "day_A,day_B"), "heavy": (None, "P_flow,M_bucket", "P_flow,day_A,day_B")}
+FREED = {"later": (None, "day_A,day_B"), "heavy": (None, "P_flow,M_bucket", "P_flow,M_boom,M_bucket")}
 
 
 def starts(seed: int) -> dict[str, object]:

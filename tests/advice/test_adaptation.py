@@ -14,7 +14,7 @@ SLOWER = TRUTH | {"flow": 90.0}
 
 
 def test_what_changed_is_freed_and_found(tmp_path):
-    settings = two_joints(tmp_path)
+    settings = two_joints(tmp_path, payloads={"loaded.csv": 5.0})  # one of the fit's own logs
     model, log = identified(settings, TRUTH, "a fit"), drive(settings, 3, SLOWER)
     path = steps(model, [log], (), no_progress)
     assert [step["parameter"] for step in path] == ["", "flow"]

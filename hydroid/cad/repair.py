@@ -72,6 +72,7 @@ def weigh(spec: mujoco.MjSpec, notes: Notes, total: float | None, lost: Collecti
     before = places[-2] if len(links) > 1 else places[-1] - [1.0, 0.0, 0.0]
     places.append(1.5 * places[-1] - 0.5 * before)
     longest = np.linalg.norm(np.diff(places, axis=0), axis=1).max()
+    what = "MASSES THAT NO MACHINE HAS" if any(body.mass for body in links) else "no masses in the file"
     for body, (here, there) in zip(links, pairwise(places), strict=True):
         usual, least, most = inertial_of(hulls, model.body(body.name).id), LEAST, MOST
         if usual.mass <= MASSLESS or body.name in lost:
@@ -86,7 +87,7 @@ def weigh(spec: mujoco.MjSpec, notes: Notes, total: float | None, lost: Collecti
         set_inertia(body, *usual)
     if lines:
         notes.add(
-            f"MASSES THAT NO MACHINE HAS [kg]: {', '.join(lines)} ({USUAL:g} kg/m³ of hull is taken). Say "
+            f"{what} [kg]: {', '.join(lines)} ({USUAL:g} kg/m³ of hull is taken). Say "
             "what you know: --total-mass KG, or masses in arm.xml"
         )
     if total is not None:

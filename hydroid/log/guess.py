@@ -1,6 +1,7 @@
 """A table of unknown columns -> a `log` section that maps them, with a reason for each guess.
 
-The unit of a column, or else the words of its name, tell what it is. Its joint is the one whose name or
+The unit of a column, or else the words of its name, tell what it is; without either, the bare name of a joint
+or of what a command moves is its angle's. Its joint is the one whose name or
 number its own name holds. Where no column of a kind has a joint they are given to the joints in order; beside
 columns that have one, a column without is left out and named.
 """
@@ -14,7 +15,7 @@ import numpy as np
 from hydroid.arrays import Array
 from hydroid.errors import LogError
 from hydroid.files import Plain
-from hydroid.log.clues import column_unit, direction, joint_of, kind_of, likely_range, number_in
+from hydroid.log.clues import CLUES, column_unit, direction, joint_of, kind_of, likely_range, number_in, words
 from hydroid.log.table import Signal, Table
 from hydroid.units import UNITS, likely_time_unit
 from hydroid.words import listed
@@ -52,7 +53,7 @@ def guess_columns(
     Columns may have the names of the links that the joints move instead; positions of joints (from 1) that
     slide are in m.
     """
-    columns = [*_columns(table)]
+    columns = [*_columns(table, (*joints, *links))]
     time = max((c for c in columns if c.kind == "time"), key=lambda c: _rises(c.values), default=None)
     if time is None:
         hint = f"it has {listed([*filter(None, table.names)], 6)}"
@@ -94,10 +95,14 @@ def guess_columns(
     return ColumnGuess(log, tuple(reasons), unused)
 
 
-def _columns(table: Table) -> Iterator[_Column]:
+def _columns(table: Table, names: Sequence[str]) -> Iterator[_Column]:
     """Yield the columns that seem to be times, commands or angles; arrays of a rare length are no signals."""
     units = {name: column_unit(name, table.units.get(name, "")) for name in table.names if name}
-    kinds = {name: kind for name, unit in units.items() if (kind := kind_of(name, unit)) != "other"}
+    every = {name: kind_of(name, unit) for name, unit in units.items()}
+    bare = [{*words(name)} - {"joint"} for name in names]
+    bare += [{*words(name)} - {*CLUES["kinds"]["command"]} for name, kind in every.items() if kind == "command"]
+    kinds = {name: kind for name, kind in every.items() if kind != "other"}
+    kinds |= {name: "angle" for name in every if name not in kinds and {*words(name)} - {"joint"} in bare}
     lengths = [len(table.columns.get(name, ())) for name in kinds]  # 0 in a bag
     for (name, kind), length in zip(kinds.items(), lengths, strict=True):
         if length == max(lengths, key=lengths.count):

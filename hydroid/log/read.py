@@ -148,7 +148,7 @@ def _match(
             lacking = sorted((one for one in wanted if one in missing), key=lambda one: one.name not in close)
             guess = {name: f", did you mean {other!r}?" for name, other in close.items()}
             what = listed([f"{one.name!r} ({one}{guess.get(one.name, '')})" for one in lacking], 2)
-            what = f"lacks {what}; unused: {listed([*filter(None, free.values())] or ['no column'], 3)}"
+            what = f"lacks {what}; unused: {listed([*filter(None, free.values())] or ['none'], 3)}"
             places = listed([*dict.fromkeys(f"log.{one.kind}" for one in lacking)])
             hint = f"give {places} in the config the right column, or null if the log has none"
         line = f", line {table.header}" if table.header else ""

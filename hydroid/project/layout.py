@@ -70,8 +70,8 @@ def find_layout(table: Table, arm: Arm, order: Sequence[str]) -> Layout:
             entries[joint]["command"] = turned(entries[joint]["command"])
     reasons += [REVERSED] if wrong else []
     driven = [joint for joint in measured if entries[joint]["command"] is not None]
-    for what, have in ("angle", measured), ("command", driven):
-        lacking = [name for place, name in enumerate(names, 1) if place not in have]
+    for what in "angle", "command":
+        lacking = [name for place, name in enumerate(names, 1) if not entries.get(place, {}).get(what)]
         reasons += [f"no {what} found for {listed(lacking)}"] if lacking else []
     followed = any(m.travel > 1 for joint, m in motions.items() if joint not in driven)  # [deg]
     return Layout(section, tuple(driven or measured), tuple(reasons), unused, motions, followed)

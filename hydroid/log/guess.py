@@ -100,7 +100,9 @@ def _columns(table: Table, names: Sequence[str]) -> Iterator[_Column]:
     units = {name: column_unit(name, table.units.get(name, "")) for name in table.names if name}
     every = {name: kind_of(name, unit) for name, unit in units.items()}
     bare = [{*words(name)} - {"joint"} for name in names]
-    bare += [{*words(name)} - {*CLUES["kinds"]["command"]} for name, kind in every.items() if kind == "command"]
+    bare += [
+        {*words(name)} - {*CLUES["kinds"]["command"]} for name, kind in every.items() if kind == "command"
+    ]
     kinds = {name: kind for name, kind in every.items() if kind != "other"}
     kinds |= {name: "angle" for name in every if name not in kinds and {*words(name)} - {"joint"} in bare}
     lengths = [len(table.columns.get(name, ())) for name in kinds]  # 0 in a bag

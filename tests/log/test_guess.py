@@ -75,7 +75,9 @@ def test_numbers_from_zero_other_words_for_joints_and_derived_signals(tmp_path: 
     assert any("count from 0" in reason for reason in found.reasons)
 
 
-@pytest.mark.parametrize("names", [["t", "valve_lift", "lift", "lift_speed"], ["t", "u2", "Boom_joint", "flow"]])
+@pytest.mark.parametrize(
+    "names", [["t", "valve_lift", "lift", "lift_speed"], ["t", "u2", "Boom_joint", "flow"]]
+)
 def test_the_bare_name_of_a_joint_or_of_what_a_command_moves_is_an_angle(names: list, tmp_path: Path) -> None:
     found = guess(tmp_path, names, T, STEPS, SWEEP, SWEEP)
     mapped = {"command": {"column": names[1]}, "angle": {"column": names[2], "unit": "deg"}}

@@ -1,7 +1,7 @@
 """Every term is estimated from simulated logs: the truth lies within the interval."""
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ class Case(NamedTuple):
     """Quantities with (lowest, highest, truth, start), what else the chain has, and commands [%] by joint."""
 
     rows: Mapping[str, tuple[float, float, float, float]]
-    hydraulics: Mapping[str, float] = NOTHING
+    hydraulics: Mapping[str, Any] = NOTHING
     commands: Sequence[Mapping[int, Sequence[float]]] = ({2: DUTIES},)
     dwell: float = 1.0
     pose: np.ndarray | None = None
@@ -34,6 +34,9 @@ CASES = {
     "lever of a rotary actuator": Case(
         {"lever_slope": (-0.8, 0.8, 0.2, 0.0), "lever_bend": (-0.8, 0.8, -0.3, 0.0)},
         NOTHING, ({ROTARY: [90, 90, -90, -90, -90, 60, -80, 90]},),
+    ),
+    "a joint that rings on its oil": Case(
+        {"oil_frequency": (0.5, 20, 1.4, 3), "oil_damping": (0, 0.9, 0.2, 0.5)}, {"model": "quasi-static"}
     ),
     "droop": Case({"pump_droop": (1, 150, 60, 20)}, {"pump_flow": 3.0}),
     "width of the slots": Case({"slot_width_a": (0.5, 5, 2.4, 1.5), "slot_width_b": (0.5, 5, 1.6, 2.2)}),

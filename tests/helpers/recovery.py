@@ -22,18 +22,11 @@ STOPPED = np.radians([0, -30, -60, 0, 0, 0, 20])
 """the shoulder at the lower end of its range"""
 
 
-def settings_of(
-    parameters: Mapping[str, Mapping[str, object]], model: str = "dynamic", **hydraulics: float | None
-) -> FitSettings:
+def settings_of(parameters: Mapping[str, Mapping[str, object]], **hydraulics: float | None) -> FitSettings:
     """Stage 2 with known mechanics and the given parameters; other settings of the chain by name."""
     known = {"D": {"quantity": "damping", "fixed": 231.8}, "S": {"quantity": "stiffness", "fixed": 53.4}}
     changes: dict[str, object] = {f"hydraulics.{name}": value for name, value in hydraulics.items()}
-    changes |= {
-        "parameters": known | dict(parameters),
-        "hydraulics.substeps": 5,
-        "simulation.threads": 1,
-        "simulation.model": model,
-    }
+    changes |= {"parameters": known | dict(parameters), "hydraulics.substeps": 5, "simulation.threads": 1}
     return hydroid.load_settings("article-hyd", changes)
 
 

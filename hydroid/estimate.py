@@ -11,7 +11,7 @@ from hydroid.errors import RunError, SettingsError
 from hydroid.files import Plain, is_file, write_atomic, yaml_text
 from hydroid.findings import Finding
 from hydroid.settings.document import read_yaml
-from hydroid.settings.load import JointNumber, NotNegative, Settings, load
+from hydroid.settings.load import JointNumber, NotNegative, Settings, validate
 
 Interval = tuple[float | None, float | None]  # its ends; null: it has no limit there
 NAME = "estimate.yaml"  # name of the file in a run folder and beside a saved plant
@@ -217,9 +217,9 @@ def read_estimate(source: Path) -> tuple[Path, Plain, FitSummary | None]:
         begun = is_file(source / "run.json")
         hint = "resume the fit" if begun else "name a run folder, a folder of Plant.save or a YAML file"
         raise RunError("holds no estimate" + (" yet" if begun else ""), source, hint)
-    content, _ = read_yaml(file)
+    content, lines = read_yaml(file)
     if "estimate" in content:
-        summary = load(file, FitSummary)
+        summary = validate(content, FitSummary, str(file), lines)
         return file, summary.values, summary
     values = content.get("parameters", content)
     if not isinstance(values, dict) or any(isinstance(value, dict) for value in values.values()):

@@ -25,12 +25,11 @@ from hydroid.files import write_atomic
 from hydroid.fitting.fit import Fit
 from hydroid.fitting.validation import Prediction
 from hydroid.fitting.verdict import Baselines, judge
-from hydroid.identified_model import CONFIG, IdentifiedModel, load_identified
+from hydroid.identified_model import IdentifiedModel, load_identified
 from hydroid.progress import LOGGER
 from hydroid.run.archive import pack, unpack
 from hydroid.run.folder import RunFolder, difference
 from hydroid.settings.fit import FitSettings
-from hydroid.settings.load import load
 from hydroid.words import distinct
 
 RESULT, VALIDATIONS = "result.npz", "validations"
@@ -140,12 +139,11 @@ def fitted_by(model: IdentifiedModel) -> tuple[Sequence[Prediction], Baselines, 
 def load_record(folder: str | Path) -> Record:
     """Read a finished run."""
     path = Path(folder)
-    identity = RunFolder(path).identity()
-    summary = load(path / NAME, FitSummary)
-    settings = load(path / CONFIG, FitSettings).of_estimate(summary.final)
+    identity, model = RunFolder(path).identity(), load_identified(path)
     files = sorted(path.glob(f"{VALIDATIONS}/*/{RESULT}"))
     unseen = {file.parent.name: _read(file, Prediction) for file in files}
-    return Record(str(folder), identity, settings, summary, _read(path / RESULT, FitResult), unseen)
+    result = _read(path / RESULT, FitResult)
+    return Record(str(folder), identity, model.settings, model.summarise(), result, unseen)
 
 
 def _read(file: Path, kind: type[T]) -> T:

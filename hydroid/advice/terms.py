@@ -5,6 +5,7 @@ side or joint in a parameter that serves several.
 """
 
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -85,8 +86,9 @@ def _split(problem: Problem, theta: Array) -> Iterator[Term]:
         if len(sides) == 2:
             parts["b"] = [{"quantity": side} for side in sides]
         if len(moving := [j for j in joints if j in problem.active_joints]) > 1:
-            rests = [tuple(other for other in joints if other != j) for j in moving]
-            parts |= {str(j): [{"joints": r}, {"joints": (j,)}] for j, r in zip(moving, rests, strict=True)}
+            for own in moving:
+                others = tuple(joint for joint in joints if joint != own)
+                parts[_label(settings, own)] = [{"joints": others}, {"joints": (own,)}]
         free = p.changed({"bounds": (parameter.lower, parameter.upper)})
         for ending, (rest, own) in parts.items():
             if (new := f"{name}_{ending}") not in settings.parameters:
@@ -113,13 +115,19 @@ def _nominal(problem: Problem) -> Iterator[Term]:
                 atoms = [(target, joint) for target in TARGETS[quantity] for joint in group]
                 values = {_nominal_value(settings, target, joint or 1) for target, joint in atoms}
                 if len(values) == 1 and taken.isdisjoint(atoms):
-                    name = quantity if alone or pump or len(group) > 1 else f"{quantity}_{min(group)}"
+                    one = not (alone or pump or group[1:])
+                    name = f"{quantity}_{_label(settings, *group)}" if one else quantity
                     while name in settings.parameters:
                         name += "_"
                     own = ParameterSettings(
                         quantity=quantity, joints=None if pump else group, bounds=row.span
                     )
                     yield Term(name, {name: own}, values.pop())
+
+
+def _label(settings: FitSettings, joint: int) -> str:
+    """Return the name of a joint as names of parameters have it."""
+    return re.sub(r"\W", "_", settings.arm.joint_names[joint - 1])
 
 
 def _joints(settings: FitSettings, p: ParameterSettings) -> tuple[int, ...]:

@@ -166,13 +166,14 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
     baselines = baselines_of(settings, problem.logs)
     verdict, summary = judge(settings, predictions, baselines), summarise(problem, fit)
     doubted = assumption_findings(settings, problem.logs, doubts(settings, problem.logs))
-    findings = *behind(settings, verdict), *summary.findings, *doubted
-    summary = summary.changed({"verdict": verdict, "findings": findings})
+    findings = [*summary.findings, *doubted]
+    findings[1:1] = behind(settings, verdict)  # after the first, which may be that time was up
+    summary = summary.changed({"verdict": verdict, "findings": tuple(findings)})
     source = "the fit" if folder is None else str(folder / NAME)
     model = IdentifiedModel(settings, fit.best.theta, source, summary)
     lines: list[Table | str] = [*verdict_lines({fit.final: verdict}), *warnings(summary)]
     if folder is not None:
-        step = next_step(settings, verdict, str(folder), problem.logs)
+        step = next_step(summary, verdict, str(folder), predictions)
         lines += [*next_lines(step), str(folder / "report.html")]
     details = [parameter_table(settings, summary), *map(str, summary.findings)]
     content = summary.plain() | {"out": folder and str(folder)}

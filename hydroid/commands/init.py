@@ -68,7 +68,7 @@ def init(
     )
     lines = [f"{project.folder}: {', '.join(project.files)}"]
     guessed = "The log's columns, guessed. Check them, and correct them in fit.yaml:"
-    look = f"Next: look at {project.folder / 'arm.png'}, then"
+    look = f"Next: look at {project.folder / 'arm.png'}, then (--budget 5min stops a fit at its best model):"
     parts = {"The arm:": project.notes, guessed: project.columns, look: project.commands}
     for heading, group in parts.items():
         lines += ["", heading, *(f"  {line}" for line in group)] if group else []

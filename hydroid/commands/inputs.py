@@ -59,8 +59,8 @@ SHARED = """
     start (RUN|YAML): Start the search from the values of an estimate.
     resume: Continue the stopped run in --out; start it if there is none.
     refinement: After the search, refine its estimate by least squares.
-    budget (TIME): Time for search and refinement, such as 90s, 5min or 2h. The best model until then is kept;
-        the same command with --resume and more time goes on.
+    budget (TIME): Time for search and refinement, such as 90s, 5min or 2h; intervals and report take some
+        more. The best model until then is kept; the same command with --resume and more time goes on.
     threads (N): Number of threads (0: one per core, or with --dask one per worker).
 """
 

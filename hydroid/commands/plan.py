@@ -76,8 +76,7 @@ def suggest(
     problem = problem_of(model, logs, repair=repair)
     from hydroid.advice.suggestions import advice
     from hydroid.posterior.uncertainty import uncertainty
-    from hydroid.reporting.page import Table
-    from hydroid.reporting.verdict_table import LEFT_OUT, errors_by_joint
+    from hydroid.reporting.verdict_table import left_out_table
     from hydroid.run.record import load_record, run_of
 
     folder = Path(model.source).parent
@@ -91,17 +90,18 @@ def suggest(
         findings = (Finding("fails unseen", "warning", bad), *findings)
     note = (
         f"Of {content['tested']} quantities that the fit holds. promised: part of the rms error that freeing "
-        f"it saves. {LEFT_OUT}"
+        "it saves. "
     )
     terms = [
         term
         | {"verdict": "free it" if "command" in term else "leave it" if "freed" in term else "others first"}
         for term in content["terms"]
     ]
-    columns, rows = errors_by_joint(model.settings.arm, [{**content, "name": "none of them"}, *terms])
-    tables = {"missing_terms": Table.of("Quantities that the fit holds", TERMS | columns, rows, note)}
+    rows = [{**content, "name": "none of them"}, *terms]
+    table = left_out_table("Quantities that the fit holds", TERMS, rows, model.settings.arm, note)
     said = [line for one in findings for line in (f"- {one}", f"  {one.numbers.get('command', '')}")]
-    return Result([*tables.values(), *filter(str.strip, said), *written(tables, out)], content, findings)
+    files = written({"missing_terms": table}, out)
+    return Result([table, *filter(str.strip, said), *files], content, findings)
 
 
 @command

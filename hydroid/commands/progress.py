@@ -5,6 +5,7 @@ time is nearly up ends a run as Ctrl-C does: with a checkpoint.
 """
 
 import math
+import re
 import signal
 import sys
 import time
@@ -69,19 +70,22 @@ class Progress:
         if not VISIBLE.get():
             return
         line = f"{what}:" if total is None else f"{what} {done:.0f} of {total:.0f}"
+        line = f"{line} {text}".strip()
         if sys.stderr.isatty():
             if self._bar is None:
                 from rich.console import Console
-                from rich.progress import Progress as Bar, TextColumn
+                from rich.progress import Progress as Bar
 
-                text_column, console = TextColumn("{task.fields[text]}"), Console(stderr=True)
-                self._bar = Bar(*Bar.get_default_columns(), text_column, console=console, transient=True)
-                self._bar.add_task("", total=None, text="")
+                columns = reversed(Bar.get_default_columns())  # the line last: its length varies
+                self._bar = Bar(*columns, console=Console(stderr=True), transient=True)
+                self._bar.add_task("", total=None)
                 self._bar.start()
-            self._bar.update(self._bar.task_ids[0], completed=done, total=total, description=line, text=text)
+            task = self._bar.tasks[0]
+            task.total = total  # `update` takes None for no change
+            self._bar.update(task.id, completed=done, description=line)
         elif time.monotonic() - self._shown > 30.0:  # seconds between plain lines
             self._shown = time.monotonic()
-            typer.echo(f"{line} {text}".strip(), err=True)
+            typer.echo(line, err=True)
 
 
 class FitProgress(Progress):
@@ -93,32 +97,31 @@ class FitProgress(Progress):
     def __init__(self, settings: "FitSettings", budget: float | None = None) -> None:
         super().__init__()
         self._end = math.inf if budget is None else time.monotonic() + budget
-        search, self._joints = settings.search, settings.arm.joint_names
-        names = {"ga": "GA population", "nsga2": "NSGA-II population", "multistart": "multi-start start"}
-        self._step = names[search.algorithm]
+        self._settings, search = settings, settings.search
         self._total = 1 + getattr(search, search.algorithm).generations
-        self._errors = dict[tuple[str, str], list[float]]()
-
-    def _fallen(self, what: str, part: str, error: float) -> str:
-        """Say how far the best error has fallen: as a part of the first one, since joints differ in size."""
-        errors = self._errors.setdefault((what, part), [error])
-        errors.append(error)
-        return f"error at {100 * min(errors) / max(errors[0], 1e-12):.0f} % of the start's"
+        self._steps = ["start", "refined", *settings.terms()]
+        self._steps += ["dynamic"] * (settings.simulation.model == "ladder")
 
     def generation(self, row: "Array") -> bool:
         """Take a row of `fitting.search.HISTORY`; return whether time is up."""
-        number, _, simulated, _, best, _ = map(float, row)
-        text = f"{self._fallen(self._step, '', best)}, {simulated:.0f} simulations"
-        self(self._step, number, self._total, text)
+        self("generation", row[0], self._total, f"({row[2]:.0f} simulations)")
         return time.monotonic() > self._end
 
     def refining(self, name: str, simulated: int, rms: float) -> bool:
         """Take the name of a least squares, its number of simulations, and its rms error [rad] so far.
 
+        A step is the search, or a model or term of the ladder; what is kept is refined in the last one.
         Returns whether time is up.
         """
-        alone = (f"joint {joint}" for k, joint in enumerate(self._joints, 1) if f" joint {k} " in name)
-        what = next(alone, name.replace("refined", "refinement"))
-        fallen = self._fallen(what, name.rpartition(" part ")[2], rms)
-        self(what, simulated, None, f"{simulated} simulations, {fallen}")
+        from hydroid.units import way
+
+        arm, every = self._settings.arm, self._settings.outputs
+        model, *part = re.split(" (?:joint|part|at|on) ", name.removesuffix(" from afar"))
+        steps = [i for i, step in enumerate(self._steps, 1) if step in model or not part]
+        joints = [joint for joint in every if f" joint {joint} " in name] or every
+        of = "all joints" if joints[1:] else arm.joint_names[joints[0] - 1]
+        error = way(math.degrees(rms), slides={*joints} <= {*arm.slides})
+        model += " from nine numbers" * ("numbers" in name)
+        what = f"step {max(steps, default=1)} of {len(self._steps)} ({model}), {of}"
+        self(what, simulated, None, f"{simulated} simulations, rms error {error}")
         return time.monotonic() > self._end

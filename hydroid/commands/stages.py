@@ -135,9 +135,10 @@ def _fit(stage: str, given: Mapping[str, Any]) -> FitResult:
     if config == f"fit-{stage}":
         what = f"note: the arm is the shipped {settings.arm.name}"
         LOGGER.log(NOTE, f"{what}: for your machine give --config, which `hydroid init` writes")
-    budget = given["budget"] and seconds(given["budget"])
-    if given["budget"] is not None and not budget:
-        raise SettingsError(f"is no time: {given['budget']!r}", "--budget", "such as 90s, 5min or 2h")
+    limit = given["budget"]
+    budget = limit and seconds(limit)
+    if limit is not None and not budget:
+        raise SettingsError(f"is no time: {limit!r}", "--budget", "such as 90s, 5min or 2h")
     read = read_logs(given["logs"], settings, repair=given["repair"])
     with open_workers(given["dask"]) as workers, FitProgress(settings, budget) as watcher:
         return run_fit(
@@ -213,8 +214,7 @@ def adapt(
     model = open_model(fit)
     read = read_logs(logs, model.settings, repair=repair)
     from hydroid.advice.adaptation import adapted, steps
-    from hydroid.reporting.page import Table
-    from hydroid.reporting.verdict_table import LEFT_OUT, errors_by_joint
+    from hydroid.reporting.verdict_table import left_out_table
 
     with Progress() as progress:
         path = steps(model, read, names(free), progress)
@@ -226,7 +226,5 @@ def adapt(
     with FitProgress(settings) as watcher:
         result = run_fit(settings, read, out, progress=watcher)
     named = [step | {"parameter": step["parameter"] or "none"} for step in path]
-    columns, rows = errors_by_joint(settings.arm, named)
-    columns = {"parameter": "freed"} | columns
-    steps_table = Table.of("Parameters freed one after another", columns, rows, LEFT_OUT)
-    return replace(result, lines=[steps_table, *result.lines], content={**result.content, "steps": path})
+    table = left_out_table("Parameters freed one after another", {"parameter": "freed"}, named, settings.arm)
+    return replace(result, lines=[table, *result.lines], content={**result.content, "steps": path})

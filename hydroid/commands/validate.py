@@ -83,7 +83,8 @@ def validate(
     every = [prediction for name in fits for prediction in results[name]]
     best = next(iter(fits))
     run = run_of(named[best])
-    steps = [next_step(named[best].settings, fits[best], str(run))] if run else []
+    fitted, *_ = fitted_by(named[best])
+    steps = [next_step(named[best].summarise(), fits[best], str(run), fitted)] if run else []
     page = validation_page(every, fits, arm, *steps)
     content = {
         "verdict": [{"fit": name} | one.model_dump() for name in fits for one in fits[name]],

@@ -12,7 +12,6 @@ from hydroid.fitting.search import Searched, search
 from hydroid.posterior.quantities import Quantities, quantities
 from hydroid.posterior.uncertainty import Uncertainty
 from hydroid.problem.problem import Problem
-from hydroid.progress import LOGGER
 from hydroid.search.descent import Descent
 from hydroid.search.pareto import average, non_dominated, segment_best, utopia
 
@@ -77,16 +76,11 @@ def fit(problem: Problem, watch: Watcher | None = None, checkpoints: Checkpoints
     if settings.refinement is not None:
         ladder.climb(problem)
         final = ladder.kept.name
-        ending = ladder.refinements[final].ending
-        if not ending.converged:
-            words = "The least-squares refinement did not converge: %s. '%s' need not be an optimum."
-            LOGGER.warning(words, ending.value, final)
     times.append(time.perf_counter())
     last = ladder.problem
     about = ladder.known(estimates[final].theta)
     determined = quantities(last, about)
     seconds = np.diff([*times, time.perf_counter()]).tolist()
-    took: dict[str, float] = dict(zip(("search", "refinement", "uncertainty"), seconds, strict=True))
     return Fit(
         last,
         estimates,
@@ -97,7 +91,7 @@ def fit(problem: Problem, watch: Watcher | None = None, checkpoints: Checkpoints
         searched.ends,
         about,
         determined,
-        took,
+        dict(zip(("search", "refinement", "uncertainty"), seconds, strict=True)),
     )
 
 

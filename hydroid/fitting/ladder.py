@@ -20,7 +20,6 @@ from hydroid.fitting.refinement import ROUGH, refine
 from hydroid.posterior.linear import estimate_box
 from hydroid.posterior.uncertainty import Uncertainty, uncertainty
 from hydroid.problem.problem import Problem
-from hydroid.progress import LOGGER
 from hydroid.search.descent import Descent, Ending
 from hydroid.settings.search import RefinementSettings
 
@@ -66,8 +65,6 @@ def measured(problem: Problem, candidates: Mapping[str, Array]) -> dict[str, Est
     for i, name in enumerate(candidates):
         angles = tuple(response.angle[i] for response in responses)
         estimates.append(Estimate(name, theta[i], norms[i, :-1], norms[i, -1], rms[i], angles))
-        if not estimates[-1].usable:
-            LOGGER.warning("the estimate %s diverged when it was simulated; it is not used", name)
     return {e.name: e for e in sorted(estimates, key=lambda e: not e.usable)}
 
 

@@ -62,9 +62,8 @@ def search(problem: Problem, watch: Watcher, checkpoints: Checkpoints) -> Search
         return problem.theta(algorithm.coding.decode(chromosomes))
 
     def state() -> Arrays:
-        done, _, simulated, diverged, best, _ = history[-1]
-        words = "checkpoint: generation %d of %d, %d simulated, %d diverged, best objective %.6g"
-        LOGGER.info(words, done, generations, simulated, diverged, best)
+        words = "checkpoint: generation %d, %d evaluated, %d simulated, %d diverged, best objective %.6g"
+        LOGGER.info(words, *history[-1, :5])
         return memo.arrays()
 
     generations, rng = 1 + algorithm.settings.generations, np.random.default_rng(settings.seed)

@@ -119,7 +119,9 @@ def fit_findings(fit: Fit) -> list[Finding]:
     findings += [Finding("diverged", "warning", (e.name,)) for e in fit.estimates.values() if not e.usable]
     # half of a 95 % interval as large as the value, or without end
     lost = dict.fromkeys(q.label for q in fit.quantities.scalars.values() if not q.within <= 1.0)
-    return [*findings, *([Finding("quantities open", "note", tuple(lost))] if lost else [])]
+    if lost:
+        findings.append(Finding("quantities open", "note", tuple(lost)))
+    return findings
 
 
 def _parameter_findings(problem: Problem, estimate: Mapping[str, ParameterEstimate]) -> list[Finding]:

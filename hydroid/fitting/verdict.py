@@ -9,8 +9,8 @@ its. The first of these that is true is the verdict:
    there are unseen logs, one must be as good there too;
 3. not tested: no unseen log drives the joint;
 4. predicts no better than a baseline: one is as good on the unseen logs; the simplest such is named;
-5. fits but does not predict: the error on the unseen logs is more than twice that on the fitted ones, or it
-   diverges;
+5. predicts worse than it fits: the error on the unseen logs is more than twice that on the fitted ones, or
+   it diverges;
 6. predicts roughly: none of these. It is better than every baseline, and outside the tolerance.
 """
 
@@ -31,7 +31,7 @@ SHARE = 0.02
 CLEARLY = 0.9
 """part of another model's error that a better one stays below"""
 WORSE = 2.0
-"""times the error on fitted logs, beyond which a fit does not predict"""
+"""times the error on fitted logs, beyond which a fit predicts worse than it fits"""
 ANYWHERE = np.array([-np.inf, np.inf])
 
 Baselines = Mapping[int, Mapping[str, Baseline]]
@@ -111,7 +111,7 @@ def _word(errors: Sequence[float | None], rivals: Sequence[Mapping[str, float]],
     if as_good and (fitted is None or np.isfinite(unseen)):
         return f"predicts no better than {as_good[0]}"
     if fitted is not None and not unseen <= WORSE * fitted:
-        return "fits but does not predict"
+        return "predicts worse than it fits"
     return "predicts roughly"
 
 

@@ -169,14 +169,13 @@ def fit_page(record: Record) -> Page:
     """Return the page of a fit, with the unseen logs that it was validated on."""
     settings, summary, fitted = record.settings, record.summary, record.result.fitted
     fits = {str(summary.final): record.verdict}
-    logs = [one.log for one in fitted]
     sections = (
-        *verdict_sections(fits, next_step(settings, record.verdict, record.folder, logs)),
+        *verdict_sections(fits, next_step(summary, record.verdict, record.folder, fitted)),
         *prediction_sections([*record.validations.values(), *fitted], settings.arm, fits),
         quantity_section(settings, summary),
         *unknown_sections(summary),
         parameter_section(settings, summary),
-        speed_section(settings, summary, logs),
+        speed_section(settings, summary, [one.log for one in fitted]),
         search_section(record),
     )
     in_order = sorted(filter(None, sections), key=lambda section: section.folded)

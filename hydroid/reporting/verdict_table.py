@@ -5,16 +5,15 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from hydroid.estimate import JointVerdict
+from hydroid.estimate import FitSummary, JointVerdict
 from hydroid.files import Plain
 from hydroid.findings import Finding
 from hydroid.fitting.baselines import NAMES
-from hydroid.fitting.validation import HORIZONS
+from hydroid.fitting.validation import HORIZONS, Prediction
 from hydroid.fitting.verdict import WORSE
-from hydroid.log import Log
 from hydroid.reporting.page import Cell, Given, Section, Table, short_name, shown
+from hydroid.search.descent import Ending
 from hydroid.settings.arm import Arm
-from hydroid.settings.fit import FitSettings
 from hydroid.words import listed, two_digits
 
 _SIGNS = {"predicts": "✓", "predicts roughly": "!", "not tested": "?"}  # of verdicts; all others are a ✗
@@ -24,8 +23,7 @@ _RIVALS = (
     "exponent, speed, lag)."
 )
 
-LEFT_OUT = "By joint: the rms error [deg] on parts of the logs, each predicted by a fit without it."
-"""said of errors by joint"""
+_LEFT_OUT = "By joint: the rms error [deg] on parts of the logs, each predicted by a fit without it."
 
 Verdicts = Mapping[str, Sequence[JointVerdict]]  # by fit
 
@@ -54,13 +52,16 @@ def _shown(error: float | None, slides: bool) -> Cell:
     return f"{two_digits(1e3 * np.radians(error))} mm" if slides else Given(two_digits(error))
 
 
-def errors_by_joint(arm: Arm, rows: Sequence[Plain]) -> tuple[dict[str, str], list[Plain]]:
-    """Return one column for each joint of errors by joint, and rows with them in place of `left_out_deg`."""
-    columns = {name: name for row in rows for name in row.get("left_out_deg", ())}
+def left_out_table(
+    title: str, columns: dict[str, str], rows: Sequence[Plain], arm: Arm, note: str = ""
+) -> Table:
+    """Return a table of rows by key, with a further column for each joint of their `left_out_deg`."""
+    joints = {name: name for row in rows for name in row.get("left_out_deg", ())}
     slides = {arm.joint_names[joint - 1] for joint in arm.slides}
-    return columns, [
+    cells = [
         row | {n: _shown(e, n in slides) for n, e in row.get("left_out_deg", {}).items()} for row in rows
     ]
+    return Table.of(title, columns | joints, cells, note + _LEFT_OUT)
 
 
 def verdict_sections(fits: Verdicts, *steps: Finding) -> tuple[Section, ...]:
@@ -144,28 +145,33 @@ def worst(verdicts: Sequence[JointVerdict]) -> str:
     one = max(verdicts, key=_size)
     if not np.isfinite(_error(one)):
         return f"Worst: {one.name}, whose simulation diverges."
-    unit = "" if one.slides else " deg"
-    error, tolerance = (f"{shown(_shown(e, one.slides))}{unit}" for e in (_error(one), one.tolerance_deg))
-    return f"Worst: {one.name}, {error}; good is up to {tolerance} (by default 2 % of its travel)."
+    errors = _error(one), one.tolerance_deg, min(one.baselines_deg.values(), default=np.nan)
+    error, good, simple = (f"{shown(_shown(e, one.slides))}{'' if one.slides else ' deg'}" for e in errors)
+    bar = f"good is up to {good} (by default 2 % of its travel)"
+    return f"Worst: {one.name}, {error}; {bar}, and simple models err by {simple} or more."
 
 
 def next_step(
-    settings: FitSettings, verdicts: Sequence[JointVerdict], folder: str, logs: Sequence[Log] = ()
+    summary: FitSummary, verdicts: Sequence[JointVerdict], folder: str, fitted: Sequence[Prediction]
 ) -> Finding:
-    """Return what to do after a fit of `logs` in a run folder, with its command."""
-    run, changed = shlex.quote(folder), list[str]()
-    for one in verdicts:
-        if one.verdict != "predicts" and (one.unseen_deg or 0.0) > WORSE * (one.expected_deg or np.inf):
-            changed.append(one.name)
-    if settings.stage == "mech":
-        files = shlex.join(log.source for log in logs) or "LOG.csv"
+    """Return what to do after a fit in a run folder, which made `fitted` of its logs, with the command."""
+    run, files = shlex.quote(folder), shlex.join(one.log.source for one in fitted)
+    joints = [one.name for one in verdicts if one.verdict == "not tested"]
+    if summary.ending == Ending.TIME.value:
+        command = f"hydroid fit-{summary.stage} {files} --config {run}/config.yaml --out {run} --resume"
+        kind = "go on"
+    elif summary.stage == "mech":
         kind, command = "fit the hydraulics", f"hydroid fit-hyd {files} --mech {run}"
-    elif any(one.verdict == "not tested" for one in verdicts):
+    elif joints:
         kind, command = "predict unseen", f"hydroid validate OTHER.csv --fit {run}"
     elif all(one.verdict == "predicts" for one in verdicts):
         kind, command = "use the machine", f"hydroid simulate COMMANDS.csv --fit {run}"
-    elif changed:
+    elif joints := [
+        one.name
+        for one in verdicts
+        if one.verdict != "predicts" and (one.unseen_deg or 0.0) > WORSE * (one.expected_deg or np.inf)
+    ]:
         kind, command = "machine changed", f"hydroid adapt UNSEEN.csv --fit {run}"
     else:
         kind, command = "look for terms", f"hydroid suggest --fit {run}"
-    return Finding(kind, "note", tuple(changed), {"command": command})
+    return Finding(kind, "note", tuple(joints), {"command": command})

@@ -150,6 +150,8 @@ class RunFolder:
             self._describe(own | {"files": own_hashes(self.path), "status": "running"})
             return self.checkpoints()
         self.refuse_changes()
+        if (self.path / MODEL).samefile(settings.arm.model):  # its own copy, to the last bit
+            own["origin"] = self.identity().get("origin")
         if other := difference(self.identity(), own):
             hint = "continue it with the command that began it, or choose another folder"
             raise RunError(f"the run here {other}", self.path, hint)

@@ -59,7 +59,7 @@ def test_what_diverged_is_counted_and_told_and_never_an_estimate(algorithm, refi
     assert np.isfinite(result.history[:, 4:]).all()
 
 
-def test_a_compromise_that_diverges_gives_way_to_one_that_does_not(caplog):
+def test_a_compromise_that_diverges_gives_way_to_one_that_does_not():
     """The mean of the best sets is none of the sets, and need not be one that can be simulated."""
     problem = make(**{"search.algorithm": "nsga2", "refinement": None})
     problem.grid = True
@@ -67,7 +67,6 @@ def test_a_compromise_that_diverges_gives_way_to_one_that_does_not(caplog):
     assert not result.estimates["average"].usable
     assert result.final == next(iter(result.estimates)) == "utopia"
     assert result.best.usable
-    assert "estimate average diverged" in caplog.text
     assert Finding("diverged", "warning", ("average",)) in fit_findings(result)
 
 

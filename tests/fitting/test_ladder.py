@@ -5,6 +5,7 @@ import pytest
 from made_logs import noisy, simulate_log, step_log
 from recovery import settings_of
 
+from hydroid.commands.progress import FitProgress
 from hydroid.fitting.fit import Silent, fit
 from hydroid.problem.problem import Problem
 from hydroid.search.descent import Ending
@@ -39,12 +40,17 @@ def _problem(name):
 
 
 @pytest.mark.parametrize("name", ["refined", "refined+pump", "dynamic", "dynamic+pump"])
-def test_a_fit_keeps_what_the_logs_ask_for(name):
+def test_a_fit_keeps_what_the_logs_ask_for(name, monkeypatch):
     """Soft oil shows in the logs, and a droop shows where two joints move together."""
-    problem = _problem(name)
+    shown, problem = [], _problem(name)
     ladder, (log,) = problem.settings, problem.logs
-    found = fit(problem)
+    monkeypatch.setattr(FitProgress, "__call__", lambda _, *line: shown.append(line))
+    found = fit(problem, FitProgress(ladder))
     assert found.final == name
+    steps = [what[:6] for what, *_ in shown if what != "generation"]
+    assert steps == sorted(steps)
+    assert shown[-1][0] == f"step 4 of 4 ({name}), all joints"
+    assert f"rms error {np.degrees(found.best.rms):.3g} deg" in shown[-1][-1]
     assert np.degrees(found.best.rms) == pytest.approx(0.02, rel=0.1)
     if found.best.left_out:
         assert found.best.left_out[1] < 0.98 * found.best.left_out[0]

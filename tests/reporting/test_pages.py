@@ -11,9 +11,8 @@ import numpy as np
 import pytest
 from report_fits import make_fit, make_prediction, make_problem, make_record
 
-from hydroid import load_settings
 from hydroid.errors import RunError
-from hydroid.estimate import JointVerdict
+from hydroid.estimate import FitSummary, JointVerdict
 from hydroid.fitting.search import HISTORY
 from hydroid.fitting.verdict import judge
 from hydroid.reporting.page import Page, Section, Table
@@ -72,12 +71,10 @@ def test_every_chart_becomes_a_figure_well_formed_and_undated(written, tmp_path:
 
 def test_history_and_front_come_back_to_the_last_bit(written):
     path, problem, fit, _ = written
-    with (path / "history.csv").open(newline="") as file:
-        header, *rows = csv.reader(file)
+    header, *rows = csv.reader((path / "history.csv").read_text().splitlines())
     assert tuple(header) == HISTORY
     assert np.array_equal(np.array(rows, dtype=float), fit.history)
-    with (path / "pareto.csv").open(newline="") as file:
-        header, *rows = csv.reader(file)
+    header, *rows = csv.reader((path / "pareto.csv").read_text().splitlines())
     assert header == [*problem.parameters.names, *(f"segment_{s}_rad" for s in range(1, 5)), "overall_rad"]
     expected = np.column_stack(fit.front)
     assert np.array_equal(np.array(rows, dtype=float), expected)
@@ -128,17 +125,20 @@ def test_errors_of_a_joint_that_slides_are_in_millimetres():
 
 
 @pytest.mark.parametrize(
-    ("stage", "words", "command"),
+    ("about", "words", "command"),
     [
-        ("mech", ("predicts",), "hydroid fit-hyd LOG.csv --mech 'a run'"),
-        ("hyd", ("predicts", "not tested"), "hydroid validate OTHER.csv --fit 'a run'"),
-        ("hyd", ("predicts", "predicts"), "hydroid simulate COMMANDS.csv --fit 'a run'"),
-        ("hyd", ("predicts", "does not fit"), "hydroid suggest --fit 'a run'"),
+        ({"stage": "mech"}, ("predicts",), "fit-hyd a.csv --mech 'a b'"),
+        ({"ending": "its time was up"}, (), "fit-hyd a.csv --config 'a b'/config.yaml --out 'a b' --resume"),
+        ({}, ("predicts", "not tested"), "validate OTHER.csv --fit 'a b'"),
+        ({}, ("predicts", "predicts"), "simulate COMMANDS.csv --fit 'a b'"),
+        ({}, ("predicts", "does not fit"), "suggest --fit 'a b'"),
     ],
 )
-def test_what_to_do_next_follows_from_the_verdicts(stage, words, command):
+def test_what_to_do_next_follows_from_the_verdicts(about, words, command):
     verdicts = [JointVerdict(joint=1, name="boom", verdict=word, tolerance_deg=1) for word in words]
-    assert next_step(load_settings(f"fit-{stage}"), verdicts, "a run").numbers == {"command": command}
+    summary, (log,) = FitSummary(**{"stage": "hyd", "estimate": {}} | about), make_problem().logs
+    step = next_step(summary, verdicts, "a b", [make_prediction(log)])
+    assert step.numbers == {"command": f"hydroid {command}"}
 
 
 def test_the_worst_joint_is_that_which_errs_most_for_its_tolerance():

@@ -136,7 +136,7 @@ def test_a_full_disk_ends_a_fit_with_a_line_and_it_goes_on_afterwards(path, tmp_
     with files_up_to(4000), pytest.raises(RunError, match="cannot be written"):
         fit(SETTINGS, path, tmp_path / "run", resume=True, progress=Watcher())
     assert "search" in RunFolder(tmp_path / "run").checkpoints()
-    fit(SETTINGS, path, tmp_path / "run", resume=True, progress=Watcher())
+    fit(load_settings(tmp_path / "run" / "config.yaml"), path, tmp_path / "run", resume=True)
     for name in ("checkpoint.npz", "estimate.yaml", "model/fitted.xml"):
         assert (tmp_path / "run" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
 

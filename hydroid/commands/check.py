@@ -71,20 +71,27 @@ def check(
     settings = load_settings(config, set)
     names, slides = settings.arm.joint_names, settings.arm.slides
     checks, rows, sizes = list[LogCheck](), list[Plain](), list[str]()
-    for path in map(Path, as_list(logs)):
-        log, findings = check_file(path, settings, repair=repair)
-        row: Plain = {"log": str(path), "usable": log is not None, "samples": None, "duration_s": None}
-        moved, driven = dict[str, float](), list[str]()
+    read = [(path, *check_file(path, settings, repair=repair)) for path in map(Path, as_list(logs))]
+    motion = [*motion_findings([log for _, log, _ in read if log is not None], settings.arm)]
+    for path, log, findings in read:
+        motions = {} if log is None else driven_joints(log)
+        moved = {names[j - 1]: one.travel for j, one in motions.items()}
         if log is not None:
-            findings = [*findings, *motion_findings(log, names)]
-            motions = driven_joints(log)
-            moved = {names[j - 1]: motion.travel for j, motion in motions.items()}
-            driven = np.array(names)[log.driven].tolist()
-            row |= {"samples": len(log.time), "duration_s": log.duration}
+            findings = [*findings, *(one for one in motion if one.source == log.source)]
             ways = (f"{names[j - 1]} by {way(m.travel, slides=j in slides)}" for j, m in motions.items())
             moves = ", ".join(ways) or "nothing"
             sizes.append(f"{path}: {len(log.time)} samples, {log.duration:.2f} s; driven and moved: {moves}")
-        rows.append(row | {"driven_joints": driven, "moved_deg": moved, "findings": plain_findings(findings)})
+        rows.append(
+            {
+                "log": str(path),
+                "usable": log is not None,
+                "samples": log and len(log.time),
+                "duration_s": log and log.duration,
+                "driven_joints": [] if log is None else np.array(names)[log.driven].tolist(),
+                "moved_deg": moved,
+                "findings": plain_findings(findings),
+            }
+        )
         checks.append(LogCheck(path, log, findings, moved))
     every = (finding for one in checks for finding in one.findings)
     lines = [f"{level}: {line}" for level, line in grouped(every)]

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,27 +20,36 @@ from hydroid.commands.inputs import (
 )
 from hydroid.commands.logs import check_file, plain_findings
 from hydroid.files import Plain
+from hydroid.log import (
+    ColumnGuess,
+    Log,
+    LogFinding,
+    check_log,
+    driven_joints,
+    grouped,
+    guess_columns,
+    motion_findings,
+    open_table,
+    write_log,
+)
 from hydroid.settings.log import LogSettings
 from hydroid.units import way
-
-if TYPE_CHECKING:
-    from hydroid.log import ColumnGuess, Log, LogFinding
 
 
 class LogCheck(NamedTuple):
     """One file; its log is None if unusable, findings are errors first, travel is by the joints' names."""
 
     path: Path
-    log: "Log | None"
-    findings: "Sequence[LogFinding]"
+    log: Log | None
+    findings: Sequence[LogFinding]
     moved_deg: Mapping[str, float]
 
 
 class Converted(NamedTuple):
     """What was written, and what each column was taken for; None where settings say it."""
 
-    log: "Log"
-    guess: "ColumnGuess | None"
+    log: Log
+    guess: ColumnGuess | None
 
 
 @command
@@ -60,24 +69,29 @@ def check(
         print(*hydroid.check(["a.csv", "b.csv"]).result[0].findings, sep="\\n")
     """
     settings = load_settings(config, set)
-    from hydroid.log import driven_joints, grouped, motion_findings
-
     names, slides = settings.arm.joint_names, settings.arm.slides
     checks, rows, sizes = list[LogCheck](), list[Plain](), list[str]()
-    for path in map(Path, as_list(logs)):
-        log, findings = check_file(path, settings, repair=repair)
-        row: Plain = {"log": str(path), "usable": log is not None, "samples": None, "duration_s": None}
-        moved, driven = dict[str, float](), list[str]()
+    read = [(path, *check_file(path, settings, repair=repair)) for path in map(Path, as_list(logs))]
+    motion = [*motion_findings([log for _, log, _ in read if log is not None], settings.arm)]
+    for path, log, findings in read:
+        motions = {} if log is None else driven_joints(log)
+        moved = {names[j - 1]: one.travel for j, one in motions.items()}
         if log is not None:
-            findings = [*findings, *motion_findings(log, names)]
-            motions = driven_joints(log)
-            moved = {names[j - 1]: motion.travel for j, motion in motions.items()}
-            driven = np.array(names)[log.driven].tolist()
-            row |= {"samples": len(log.time), "duration_s": log.duration}
+            findings = [*findings, *(one for one in motion if one.source == log.source)]
             ways = (f"{names[j - 1]} by {way(m.travel, slides=j in slides)}" for j, m in motions.items())
             moves = ", ".join(ways) or "nothing"
             sizes.append(f"{path}: {len(log.time)} samples, {log.duration:.2f} s; driven and moved: {moves}")
-        rows.append(row | {"driven_joints": driven, "moved_deg": moved, "findings": plain_findings(findings)})
+        rows.append(
+            {
+                "log": str(path),
+                "usable": log is not None,
+                "samples": log and len(log.time),
+                "duration_s": log and log.duration,
+                "driven_joints": [] if log is None else np.array(names)[log.driven].tolist(),
+                "moved_deg": moved,
+                "findings": plain_findings(findings),
+            }
+        )
         checks.append(LogCheck(path, log, findings, moved))
     every = (finding for one in checks for finding in one.findings)
     lines = [f"{level}: {line}" for level, line in grouped(every)]
@@ -103,7 +117,6 @@ def convert(
         hydroid.convert("a.mat", out="a.csv", config="my-fit.yaml")
 
     Args:
-        log (LOG): CSV, .mat, Parquet, ROS bag or MCAP.
         out (OUT.csv): The CSV to write.
         config (YAML): Settings that map the columns (`log`): a file, or the name of a shipped config
             [default: the columns are guessed, and each guess is printed].
@@ -114,8 +127,6 @@ def convert(
         SettingsError: `out` would overwrite the log, or a setting that is not allowed.
         RunError: `out` cannot be written.
     """
-    from hydroid.log import check_log, guess_columns, open_table, write_log
-
     path, guess, reasons = Path(log), None, list[str]()
     refuse_overwriting(path, out)
     if config is not None or set:
@@ -123,7 +134,7 @@ def convert(
         layout, ranges = settings.log, settings.arm.ranges
     else:
         most = [f"joint {number}" for number in range(1, 13)]  # more joints than an arm has
-        guess = guess_columns(open_table(path, LogSettings()), most)
+        guess = guess_columns(open_table(path), most)
         layout = LogSettings.model_validate(guess.log)
         ranges = {str(number): (-np.inf, np.inf) for number in range(1, 1 + max(layout.joints, default=1))}
         reasons = [*guess.reasons]
@@ -145,7 +156,7 @@ def convert(
     return Result([*reasons, *said, size], content, Converted(replace(read, source=str(out)), guess))
 
 
-def _plain_layout(log: "Log") -> LogSettings:
+def _plain_layout(log: Log) -> LogSettings:
     """Return the default columns of what a log holds: commands, angles, pressures of both chambers."""
     columns: dict[int, dict[str, None] | None] = {}
     for joint, measured in enumerate(log.measured):

@@ -9,7 +9,7 @@ import inspect
 import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, TypeVar
+from typing import Annotated, Any, TypeAlias, TypeVar
 
 import typer
 
@@ -17,27 +17,26 @@ from hydroid.errors import SettingsError
 from hydroid.estimate import FitSummary, read_estimate
 from hydroid.files import Plain, find_config
 from hydroid.identified_model import IdentifiedModel, load_identified
+from hydroid.log import FORMATS, Log
 from hydroid.progress import LOGGER, NOTE
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load, parse_override
-
-if TYPE_CHECKING:
-    from hydroid.log import Log
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 Source = str | Path
 ConfigSource = str | Path | FitSettings
-LogSource: TypeAlias = "str | Path | Log"
-LogSources: TypeAlias = "LogSource | Sequence[LogSource] | None"
+LogSource = str | Path | Log
+LogSources: TypeAlias = LogSource | Sequence[LogSource] | None
 ModelSource: TypeAlias = "str | Path | IdentifiedModel | Any"
 """a run or a file, a model, or what a fit returned (`commands.fit.FitResult`, which builds on this file)"""
 SettingChanges = Mapping[str, Any] | Sequence[str] | None
 """settings to replace: values by dotted key, or texts `KEY=VALUE`"""
 
 
-SHARED = """
-    logs (LOG): Logs of commands and joint angles: CSV, .mat, Parquet, ROS bags, MCAP.
+SHARED = f"""
+    logs (LOG): Logs of commands and joint angles. Formats: {FORMATS}.
+    log (LOG): A log. Formats: {FORMATS}.
     fit (RUN|YAML): An estimate: a run folder, a folder written by Plant.save (Python), an estimate.yaml, or a
         YAML file of values by name.
     out (DIR): Folder for page and tables [default: runs/COMMAND on the command line; in Python nothing is

@@ -12,18 +12,18 @@ from hydroid.commands.inputs import LogSource, LogSources, as_list
 from hydroid.errors import RunError, SettingsError
 from hydroid.files import is_file
 from hydroid.identified_model import IdentifiedModel
+from hydroid.log import Log, LogFinding, check_log, grouped, open_table
 from hydroid.progress import LOGGER, NOTE
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.log import LogSettings
 
 if TYPE_CHECKING:
-    from hydroid.log import Log, LogFinding
     from hydroid.problem.problem import Problem
 
 
 def read_logs(
     logs: LogSources, settings: FitSettings, *, repair: bool = False, angles: bool = True
-) -> "list[Log]":
+) -> list[Log]:
     """Read logs as the settings map them; warnings and notes go to the `hydroid` logger.
 
         logs = hydroid.read_logs(["a.csv", "b.csv"], hydroid.load_settings("fit-mech"))
@@ -37,8 +37,6 @@ def read_logs(
     Raises:
         LogError: the first fault that keeps a log from being used.
     """
-    from hydroid.log import Log, grouped
-
     read: list[Log] = []
     findings: list[LogFinding] = []
     for source in as_list(logs):
@@ -58,15 +56,13 @@ def read_logs(
 
 def check_file(
     path: Path, settings: FitSettings, *, repair: bool, angles: bool = True
-) -> "tuple[Log | None, list[LogFinding]]":
+) -> tuple[Log | None, list[LogFinding]]:
     """Read a log as the settings map it; None if it cannot be used."""
-    from hydroid.log import check_log
-
     arm, outputs = settings.arm, settings.outputs if angles else None
     return check_log(path, settings.log, arm.ranges, outputs=outputs, backward=arm.backward, repair=repair)
 
 
-def plain_findings(findings: "Sequence[LogFinding]") -> list[dict[str, str]]:
+def plain_findings(findings: Sequence[LogFinding]) -> list[dict[str, str]]:
     """Return findings as JSON holds them."""
     keys = ("level", "kind", "what", "where", "hint")
     return [{key: getattr(finding, key) for key in keys} for finding in findings]
@@ -80,14 +76,13 @@ def read_arms(
     pose: str | None = None,
     angles: bool = False,
     repair: bool = False,
-) -> "dict[str, Log]":
+) -> dict[str, Log]:
     """Read commands of an arm, or of the arms of a pair that move; return logs by the arm's name.
 
     Columns that begin with `right_` and `left_` are those of the two arms. Without them every arm that moves
     has the same commands: both move as mirror images. `angles`: read joint angles over time instead.
     """
     from hydroid.arm.model import ALONE, SIDES
-    from hydroid.log import open_table
 
     if arm not in (None, *SIDES, "both"):
         raise SettingsError(f"{arm!r} is no arm of a pair", "--arm", f"choose {', '.join(SIDES)} or both")
@@ -95,7 +90,7 @@ def read_arms(
     columns = settings.log.angles_only() if angles else settings.log
     names = open_table(Path(log), settings.log).names if isinstance(log, str | Path) and arm else ()
 
-    def read(columns: LogSettings) -> "Log":
+    def read(columns: LogSettings) -> Log:
         layout = {"log": columns} | ({"outputs": ()} if angles else {})
         (one,) = read_logs(log, settings.changed(layout), repair=repair, angles=angles)
         stand = one.angle if pose is None else np.zeros_like(one.angle) + settings.arm.pose(pose)

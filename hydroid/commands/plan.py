@@ -20,6 +20,7 @@ from hydroid.commands.progress import Progress
 from hydroid.files import Plain, is_file
 from hydroid.findings import Finding
 from hydroid.identified_model import CONFIG
+from hydroid.log import write_log
 
 if TYPE_CHECKING:
     from hydroid.advice.design import Design
@@ -143,7 +144,6 @@ def design(
     options = {"design.duration_s": duration, "design.joints": names(joints) or None}
     model = open_model(fit, config, setting_changes(set, options))
     from hydroid.advice.design import design as best_experiment
-    from hydroid.log import write_log
     from hydroid.posterior.uncertainty import flag_of
     from hydroid.reporting.page import Table
 

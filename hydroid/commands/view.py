@@ -23,20 +23,20 @@ from hydroid.commands.logs import read_arms, run_logs
 from hydroid.commands.progress import Progress
 from hydroid.errors import SettingsError
 from hydroid.files import is_file, write_atomic
+from hydroid.log import Log, write_logs
 from hydroid.viewer import choose_platform
 
 if TYPE_CHECKING:
     from hydroid.arm.model import Clearance
-    from hydroid.log import Log
     from hydroid.settings.fit import FitSettings
 
 
 @record
-class Simulated(Result["dict[str, Log]"]):
+class Simulated(Result[dict[str, Log]]):
     """Simulated logs by the arm's name: right, left, or alone."""
 
     @property
-    def log(self) -> "Log":
+    def log(self) -> Log:
         """The log of the first arm."""
         return next(iter(self.result.values()))
 
@@ -76,7 +76,6 @@ def simulate(
     refuse_overwriting(commands, out)
     model = open_model(fit, config, set)
     read = read_arms(commands, model.settings, arm, pose=pose, repair=repair)
-    from hydroid.log import write_logs
     from hydroid.prediction import predict_log
 
     logs: dict[str, Log] = {}

@@ -23,7 +23,7 @@ from hydroid.hydraulics.cylinder import (
 from hydroid.hydraulics.elementwise import compilable, implicit_weight, kept
 from hydroid.hydraulics.records import LINEAR, NONE, ROTARY
 from hydroid.hydraulics.solenoid import beyond_dead_band, drive, plunger_step, plunger_weight, side_voltage
-from hydroid.hydraulics.valve import notched, port_flow, slot_share
+from hydroid.hydraulics.valve import notched, slot_share
 
 STILL = 1e-15
 """speed of a plunger before and after a sub-step, below which rounding alone moves it [m/s]"""
@@ -124,25 +124,6 @@ def mean_opening(c, z, w, commands, now: int, plugin) -> float:
     for i in range(plugin.substeps):
         net += net_opening(c, z, w, i, plugin.period / plugin.substeps)
     return net / plugin.substeps
-
-
-@compilable
-def _fill(c, w, supply: float, pump_area: float, tank_area: float) -> None:
-    # oil that cavitates pushes with vapour pressure, whatever volume is missing, and does not resist
-    w.filled = 1.0 if w.pressure > 0.0 else 0.0
-    w.pushing = max(w.pressure, 0.0)
-    w.inflow, w.relief, w.pumped, w.give = port_flow(w.pushing, supply, pump_area, tank_area, c)
-
-
-@compilable
-def meter(c, w, area: float, supply: float) -> None:
-    """Flows into both chambers from `supply` pressure [Pa], and how they fall with the chambers' own.
-
-    `area` is the net opening [m²].
-    """
-    a, b = np.maximum(area, 0.0), np.maximum(-area, 0.0)
-    _fill(c, w.a, supply, c.leakage + a, c.leakage + b * c.a.return_)
-    _fill(c, w.b, supply, c.leakage + b, c.leakage + a * c.b.return_)
 
 
 @compilable

@@ -35,9 +35,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hydroid.hydraulics.elementwise import compilable
-from hydroid.hydraulics.joint import begin, coast, command, load, meter, net_opening, settle
+from hydroid.hydraulics.joint import begin, coast, command, load, net_opening, settle
 from hydroid.hydraulics.pump import begin_line, close_line, draw, fill, open_line
 from hydroid.hydraulics.records import LINE, SCRATCH
+from hydroid.hydraulics.valve import meter
 from hydroid.settings import linkage
 
 RAMP_TORQUE, RAMP_WAY = 1.0 / 6.0, 1.0 / 2.0

@@ -95,3 +95,22 @@ def port_flow(pressure, supply, pump_area, tank_area, c) -> Any:
     filling = c.anticavitation if pressure < c.tank_pressure else 0.0
     drained = c.conductance * (tank_area + filling)
     return pumped - drained * out, kept * pumped_slope + drained * out_slope, pumped, fed * pumped_slope
+
+
+@compilable
+def _fill(c, w, supply: float, pump_area: float, tank_area: float) -> None:
+    # oil that cavitates pushes with vapour pressure, whatever volume is missing, and does not resist
+    w.filled = 1.0 if w.pressure > 0.0 else 0.0
+    w.pushing = max(w.pressure, 0.0)
+    w.inflow, w.relief, w.pumped, w.give = port_flow(w.pushing, supply, pump_area, tank_area, c)
+
+
+@compilable
+def meter(c, w, area: float, supply: float) -> None:
+    """Flows into both chambers from `supply` pressure [Pa], and how they fall with the chambers' own.
+
+    `area` is the net opening [m²]; w is the joint's scratch space of a look-ahead.
+    """
+    a, b = np.maximum(area, 0.0), np.maximum(-area, 0.0)
+    _fill(c, w.a, supply, c.leakage + a, c.leakage + b * c.a.return_)
+    _fill(c, w.b, supply, c.leakage + b, c.leakage + a * c.b.return_)

@@ -1,5 +1,6 @@
 """File -> `Log`: read, checked, repaired on request, resampled to one period; and back."""
 
+from hydroid.log.binary import FORMATS as FORMATS
 from hydroid.log.checks import motion_findings as motion_findings
 from hydroid.log.guess import ColumnGuess as ColumnGuess, guess_columns as guess_columns
 from hydroid.log.log import Log as Log, LogFinding as LogFinding, grouped as grouped

@@ -1,4 +1,4 @@
-"""Files that are no text -> a table: .mat (v4 to v7 by scipy, v7.3 by h5py), Parquet by pyarrow, bags.
+"""Formats of logs besides CSV -> a table: .mat (v4 to v7 by scipy, v7.3 by h5py), Parquet by pyarrow, bags.
 
 Of a .mat a vector is a column of the variable's name; column k of a matrix is `name[k]`, from 1, and its
 longer axis is the time; fields of structs follow after a dot; element k of a cell array is `name[k]`.
@@ -25,6 +25,8 @@ from hydroid.arrays import record
 from hydroid.errors import LogError
 from hydroid.log.repair import hold
 from hydroid.log.table import Recording, Signal, Table, format_library
+from hydroid.settings.log import LogSettings
+from hydroid.words import listed
 
 
 @record
@@ -63,8 +65,8 @@ class BagTable(Table):
         return Table(source=self.source, names=self.names, columns=columns, remarks=remarks).read(signals)
 
 
-def open_bag(path: Path, time: str, period: float) -> BagTable:
-    """Read the channels of a bag; `time` is the name of its time column, `period` that of its rows [s]."""
+def open_bag(path: Path, _data: bytes, settings: LogSettings) -> BagTable:
+    """Read the channels of a bag."""
     channels = dict[str, dict[int, float]]()
     with format_library("rosbags.highlevel", "ros", path, "a bag") as rosbags:
         from rosbags.typesys import Stores, get_typestore
@@ -81,7 +83,8 @@ def open_bag(path: Path, time: str, period: float) -> BagTable:
                     channels.setdefault(name, {}).setdefault(at or recorded, number)
     if not channels:
         raise LogError("holds no channel of numbers", path)
-    return BagTable(source=str(path), names=(time, *channels), channels=channels, period=period)
+    names = settings.time.column, *channels
+    return BagTable(source=str(path), names=names, channels=channels, period=settings.period_s)
 
 
 def _numbers(message: Any, prefix: str) -> Iterator[tuple[str, float]]:
@@ -101,8 +104,9 @@ def _numbers(message: Any, prefix: str) -> Iterator[tuple[str, float]]:
                 yield from _numbers(part, f"{key}.")
 
 
-def open_mat(path: Path, *, hdf5: bool) -> Table:
-    """Read all variables of a file; `hdf5`: it is of version 7.3."""
+def open_mat(path: Path, data: bytes, _settings: LogSettings) -> Table:
+    """Read all variables of a file, which is HDF5 from version 7.3 on."""
+    hdf5 = HDF5 in data[:520]
     package = "h5py" if hdf5 else "scipy.io"
     with format_library(package, "mat", path, "a MATLAB file") as library:
         if hdf5:
@@ -120,7 +124,7 @@ def open_mat(path: Path, *, hdf5: bool) -> Table:
     return Table(source=str(path), names=tuple(columns), columns=columns)
 
 
-def open_parquet(path: Path) -> Table:
+def open_parquet(path: Path, _data: bytes, _settings: LogSettings) -> Table:
     """Read all columns of a file."""
     with format_library("pyarrow.parquet", "parquet", path, "Parquet") as parquet:
         table = parquet.read_table(str(path))
@@ -151,3 +155,16 @@ def _without_hdf5(item: Any) -> Any:
         return {name: _without_hdf5(inner) for name, inner in item.items()}
     text = item.attrs.get("MATLAB_class") == b"char" or "MATLAB_empty" in item.attrs
     return None if text or item.dtype.kind not in "fiub" else np.asarray(item[()]).T
+
+
+HDF5 = b"\x89HDF\r\n\x1a\n"
+BINARY = {
+    ".mat": (open_mat, (b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file", HDF5)),
+    "Parquet": (open_parquet, (b"PAR1",)),
+    "ROS bag": (open_bag, (b"#ROSBAG V", b"SQLite format 3")),
+    "MCAP": (open_bag, (b"\x89MCAP0",)),
+}
+"""by a format's name: what reads a file, its bytes and the log's settings, and how such files begin; a name
+that is an ending marks a file as well"""
+FORMATS = listed(["CSV", *BINARY])
+"""all formats that are read, for `--help` and messages"""

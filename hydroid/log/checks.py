@@ -1,6 +1,7 @@
 """Checks of a recording and of the motion in it: what is wrong, where, and what to do."""
 
 from collections.abc import Collection, Iterator, Sequence
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -8,13 +9,15 @@ import numpy as np
 from hydroid.arrays import Array
 from hydroid.log.clues import CLUES, column_unit, likely_range
 from hydroid.log.log import Log, LogFinding, log_finding
-from hydroid.log.motion import driven_joints
+from hydroid.log.motion import driven_joints, motion_of
 from hydroid.log.repair import GAP, sample_period
 from hydroid.log.table import Recording, Signal
+from hydroid.settings.arm import Arm
 from hydroid.settings.log import LogSettings
 from hydroid.units import UNITS, likely_time_unit, way
 
 DEGREE = UNITS["deg"].factor
+END = 0.02  # part of a joint's travel that counts as its end
 
 
 def check_recording(recording: Recording, settings: LogSettings, *, repaired: bool) -> Iterator[LogFinding]:
@@ -154,12 +157,25 @@ def check_motion(
             yield warning("late", command, lag=ahead, delay=delay - ahead)
 
 
-def motion_findings(log: Log, names: Sequence[str]) -> Iterator[LogFinding]:
-    """Yield joints of these names that stand at a stop, and whether a log does not begin at rest."""
-    for joint, motion in driven_joints(log).items():
-        if motion.stopped >= 0.5:
-            yield log_finding("note", "at a stop", log.source, names[joint - 1], seconds=motion.stopped)
-    rest = log.first_command * log.period
-    if log.driven.any() and rest < 0.2:
-        after = f" after {rest:.2g} s" if rest else ""
-        yield log_finding("note", "no rest", log.source, after=after)
+def motion_findings(logs: Sequence[Log], arm: Arm) -> Iterator[LogFinding]:
+    """Yield where joints stand although they are driven, and which logs do not begin at rest.
+
+    Where no log passes the angle, it is an end of the joint's travel.
+    """
+    for joint, name in enumerate(arm.joint_names, 1):
+        motions = [motion_of(log, joint) for log in logs if log.measured[joint - 1]]
+        reach = [angle for motion in motions for angle in motion.reach]
+        for motion, (side, sign) in product(motions, (("upper", 1), ("lower", -1))):
+            held = motion.held(sign)
+            if (seconds := motion.log.period * held.shape[1]) >= 1:
+                angle, command = np.median(held, axis=1)
+                left = max(sign * other for other in reach) - sign * angle
+                kind = "stall" if left > END * np.ptp(reach) else "at a stop"
+                at = way(np.rad2deg(angle), slides=joint in arm.slides)
+                numbers = {"angle": at, "command": command, "seconds": seconds}
+                yield log_finding("note", kind, motion.log.source, name, side, **numbers)
+    for log in logs:
+        rest = log.first_command * log.period
+        if log.driven.any() and rest < 0.2:
+            after = f" after {rest:.2g} s" if rest else ""
+            yield log_finding("note", "no rest", log.source, after=after)

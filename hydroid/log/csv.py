@@ -18,12 +18,13 @@ from pathlib import Path
 import numpy as np
 
 from hydroid.errors import LogError
+from hydroid.log.binary import FORMATS
 from hydroid.log.table import Table, clock, number
 from hydroid.units import bare, unit_of
 
 SEPARATORS = "\t;,| "
 csv.field_size_limit(2**31 - 1)  # a longer cell is no number, which is said, with its place
-IS_CSV = "a log is a CSV file with a header, one row a sample, or .mat, Parquet, a ROS bag or MCAP"
+IS_CSV = f"formats of logs are {FORMATS}; a CSV file has a header and one row per sample"
 
 
 def open_csv(path: Path, data: bytes) -> Table:

@@ -159,7 +159,7 @@ def grouped(findings: Iterable[LogFinding]) -> list[tuple[Level, str]]:
     groups: dict[tuple[object, ...], list[LogFinding]] = {}
     for finding in by_level(findings):
         several = "{names}" in WORDS[finding.kind][0]  # its sentence has room for several subjects
-        about = finding.hint if several else (finding.column, finding.numbers.get("what"))
+        about = finding.hint if several else (finding.subjects, finding.column, finding.numbers.get("what"))
         groups.setdefault((finding.level, finding.kind, about), []).append(finding)
     lines = list[tuple[Level, str]]()
     for group in groups.values():

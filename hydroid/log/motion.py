@@ -19,7 +19,12 @@ class JointMotion:
     log: Log
     joint: int
 
-    @cached_property
+    @property
+    def reach(self) -> tuple[float, float]:
+        """Its least and largest angle but for the noise [rad]."""
+        return self._slow[1].min(), self._slow[1].max()
+
+    @property
     def travel(self) -> float:
         """Range of its angle but for the noise [deg]."""
         return np.rad2deg(np.ptp(self._slow[1]))
@@ -88,21 +93,16 @@ class JointMotion:
         cost = [np.mean(moves == (size < 5 * k)) + 0.001 * k for k in range(20)]
         return 5.0 * int(np.argmin(cost))
 
-    @cached_property
-    def stopped(self) -> float:
-        """How long it is pushed on at an end of its travel [s].
+    def held(self, sign: int) -> Array:
+        """Angle [rad] and command [%], (2, n), of the samples in which it stands, pushed up (1) or down (-1).
 
         By a command that is larger than most of those that move it: a joint also stands while its command is
-        in the dead band.
+        in the dead band. Less than a second of it may be lateness.
         """
-        command, angle, speed = self._quick
-        if not np.ptp(angle):
-            return 0.0
-        push, fast = command * np.sign(command @ speed), np.abs(speed) / np.abs(speed).max()
-        at = (angle - angle.min()) / np.ptp(angle)
-        ends = ((at > 0.98) & (push > 0)) | ((at < 0.02) & (push < 0))
-        enough = 0.99 * np.median(np.abs(command[fast > 0.1]))
-        return (ends & (fast < 0.03) & (np.abs(command) > enough)).sum() * self.log.period
+        command, angle, speed = self._slow
+        push, fast = sign * command * np.sign(command @ speed), np.abs(speed)
+        enough = 0.99 * np.median(np.abs(command[fast >= 0.1 * fast.max()]))
+        return np.stack([angle, command])[:, (fast < 0.03 * fast.max()) & (push > enough)]
 
     @property
     def _logged(self) -> Array:

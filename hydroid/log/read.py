@@ -9,7 +9,7 @@ import numpy as np
 
 from hydroid.errors import LogError
 from hydroid.files import csv_text, write_atomic
-from hydroid.log.binary import open_bag, open_mat, open_parquet
+from hydroid.log.binary import BINARY
 from hydroid.log.checks import check_motion, check_recording
 from hydroid.log.csv import open_csv
 from hydroid.log.log import Log, LogFinding, by_level, log_finding
@@ -29,7 +29,7 @@ Ranges = Mapping[str, tuple[float, float]]
 
 
 def open_table(path: Path, settings: LogSettings = DEFAULT) -> Table:
-    """Open a log of any format, recognised by its first bytes: CSV, .mat, Parquet, a ROS bag or MCAP.
+    """Open a log of any format, recognised by its first bytes.
 
     The settings name the time column, and the period to which the channels of a bag are resampled.
     """
@@ -39,13 +39,9 @@ def open_table(path: Path, settings: LogSettings = DEFAULT) -> Table:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise LogError(f"cannot be read ({reason})", path) from None
-    if data.startswith((b"#ROSBAG V", b"\x89MCAP0", b"SQLite format 3")):
-        return open_bag(path, settings.time.column, settings.period_s)
-    if data.startswith(b"PAR1"):
-        return open_parquet(path)
-    hdf5 = b"\x89HDF\r\n\x1a\n" in (data[:8], data[512:520])
-    if hdf5 or data.startswith(b"MATLAB 5.0 MAT-file") or path.suffix.lower() == ".mat":
-        return open_mat(path, hdf5=hdf5)
+    for name, (reader, starts) in BINARY.items():
+        if data.startswith(starts) or path.suffix.lower() == name:
+            return reader(path, data, settings)
     return open_csv(path, data)
 
 

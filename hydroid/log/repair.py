@@ -89,9 +89,8 @@ def resample(recording: Recording, settings: LogSettings, joints: int) -> Log:
         else:
             measured[:, signal.joint - 1, (signal.kind == "pressure") + signal.part] = values
     grid = period * np.arange(int(time[-1] / period + 0.01) + 1, dtype=np.float64)
-    steps = np.rint(time / period)
-    if (np.abs(time / period - steps) <= 0.01).all():
-        time = period * steps  # whose values then pass unchanged
+    exact = on_grid(time, period)
+    time = time if exact is None else exact  # on the grid values pass unchanged
     measured = np.stack([np.interp(grid, time, column) for column in measured.reshape(rows, -1).T], axis=1)
     measured = measured.reshape(-1, joints, 3)
     at, command = grid - settings.delay_s, command.clip(-100, 100)
@@ -104,6 +103,12 @@ def resample(recording: Recording, settings: LogSettings, joints: int) -> Log:
     return Log(recording.table.source, grid, command.clip(-100, 100), measured[..., 0], period, pressure)
 
 
+def on_grid(time: Array, period: float) -> Array | None:
+    """Return times as multiples of a period; None if any is off by more than 1 % of the period."""
+    steps = np.rint(time / period)
+    return period * steps if (np.abs(time / period - steps) <= 0.01).all() else None
+
+
 def hold(time: Array, command: Array, at: Array, period: float) -> Array:
     """Return the command for a period from each time in `at` [s]; 0 before the first, shape (len(at), J).
 
@@ -111,8 +116,8 @@ def hold(time: Array, command: Array, at: Array, period: float) -> Array:
     that time; of others, of a faster log or one with jitter, the mean over the period: the last one would be
     too old by up to a period.
     """
-    places = time / period
-    if (np.abs(places - np.rint(places)) > 1e-6).any():
+    exact = on_grid(time, period)
+    if exact is None:
         steps = np.diff(time, prepend=time[0])[:, None]
         areas = np.cumsum(steps * np.roll(command, 1, axis=0), axis=0)
 
@@ -123,5 +128,5 @@ def hold(time: Array, command: Array, at: Array, period: float) -> Array:
             return np.where(index[:, None] >= 0, areas[index] + since * command[index], 0.0)
 
         return (area(at + period) - area(at)) / period
-    index = np.searchsorted(time, at + 1e-6 * period, side="right") - 1  # but for rounding
+    index = np.searchsorted(exact, at + 1e-6 * period, side="right") - 1  # but for rounding
     return np.where(index[:, None] >= 0, command[index], 0.0)

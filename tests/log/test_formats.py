@@ -8,8 +8,9 @@ import pytest
 from log_files import NAMES, assert_same, cells, faults, lines, read, save
 from log_formats import BagWriter, matlab, write_mat, write_mat73, write_parquet
 
+import hydroid
 from hydroid.errors import LogError
-from hydroid.log import Log, open_table
+from hydroid.log import FORMATS, Log, open_table
 from hydroid.settings.log import LogSettings
 
 VALUES = cells()
@@ -18,8 +19,7 @@ WRITERS = {"mat": write_mat, "mat73": write_mat73, "parquet": write_parquet}
 
 
 def same(log: Log, tmp_path: Path) -> None:
-    reference, _ = read(save(tmp_path / "plain.csv", lines(VALUES)))
-    assert_same(log, reference)
+    assert_same(log, read(save(tmp_path / "plain.csv", lines(VALUES)))[0])
 
 
 @pytest.mark.parametrize("kind", WRITERS)
@@ -32,6 +32,12 @@ def test_the_same_bits_as_the_csv(kind: str, tmp_path: Path) -> None:
 def settings(time: str, command: str, angle: str) -> LogSettings:
     names = {"time": time, "command": command, "angle": angle}
     return LogSettings.model_validate({what: {"column": name} for what, name in names.items()})
+
+
+def test_help_and_page_name_every_format() -> None:
+    page, text = Path(__file__).parents[2] / "docs" / "logs.md", hydroid.check.__doc__
+    assert FORMATS in str(text)
+    assert all(name in page.read_text() for name in FORMATS.replace(" and ", ", ").split(", "))
 
 
 MATRIX = settings("t", "u[{joint}]", "q[{joint}]")
@@ -105,6 +111,7 @@ BAD = {
         lambda p: write_mat(p / "log.mat", {**COLUMNS, "q2_deg": T[:40]}),
         "column q2_deg: holds 40 values, but column time_s holds 80",
     ),
+    "empty": (lambda p: save(p / "a.csv", []), FORMATS),
     "workbook": (lambda p: save(p / "a.xlsx", [["PK\3\4\0\0"]]), "save the sheet as CSV"),
 }
 

@@ -78,8 +78,7 @@ def without(*rows: int) -> list[Table]:
 
 
 def exchanged() -> list[Table]:
-    table = rig("rig_shoulder_1")
-    return [{**table, "q2_deg": table["q1_deg"]}]
+    return [(table := rig("rig_shoulder_1")) | {"q2_deg": table["q1_deg"]}]
 
 
 def renamed(old: str, new: str) -> list[Table]:
@@ -93,10 +92,6 @@ def early(seconds: float) -> list[Table]:
 
 def holed(angle: np.ndarray) -> np.ndarray:
     return np.where(np.arange(len(angle)) == 700, np.nan, angle)
-
-
-def pushed() -> list[Table]:
-    return [boom([60, -60, 100, -100], seconds=8)]
 
 
 ROWS = np.insert(np.arange(4100), 900, 900)
@@ -132,7 +127,8 @@ WRONG = (
     Wrong("the angle of another joint", "warning: strong commands hardly move joint shoulder", exchanged),
     Wrong("an encoder that wraps", "note: wraps by 360", lambda: of("q6", lambda q: (q + 280) % 360 - 180)),
     Wrong("a misspelt column", "error: did you mean 'U2_pct'?", lambda: renamed("u2", "U2")),
-    Wrong("a joint that is pushed against its stop", "note: against the end of its travel", pushed),
+    Wrong("a joint that is pushed against its stop", "note: upper end", lambda: [boom([100, 60, -60])]),
+    Wrong("a joint that stalls", "note: stalls", lambda: [boom([60], stop=30.0), boom([100])]),
     Wrong("no rest before the first command", "note: begins with", lambda: of("", lambda v: v[100:])),
 )
 
@@ -168,16 +164,13 @@ def test_a_good_log_has_no_finding(tmp_path: Path) -> None:
 @pytest.mark.parametrize("duties", [[60, -60, 100, -100], [100, 100, -80, -80], [90], [-90, -90]])
 @pytest.mark.parametrize("stop", [22.0, 30.0, 60.0])
 def test_a_stop_is_no_other_sign(duties: list[float], stop: float, tmp_path: Path) -> None:
-    kinds = [finding.kind for finding in findings(tmp_path, boom(duties, stop=stop, seconds=8))]
-    assert "at a stop" in kinds
-    assert not {"turned", "late"} & {*kinds}
+    kinds = {finding.kind for finding in findings(tmp_path, boom(duties, stop=stop, seconds=8))}
+    assert kinds & {"at a stop", "stall", "turned", "late"} == {"at a stop"}
 
 
 def test_how_far_each_joint_moves(tmp_path: Path) -> None:
-    (path,) = save(Wrong("", "", lambda: [boom([50])]), tmp_path)
-    (log,) = hydroid.check([path], config=SETTINGS).result
-    angle = log.log.angle[:, 1]
-    assert log.moved_deg == {"shoulder": pytest.approx(np.rad2deg(np.ptp(angle)), abs=0.2)}
+    (log,) = hydroid.check(save(Wrong("", "", lambda: [boom([50])]), tmp_path), config=SETTINGS).result
+    assert log.moved_deg == {"shoulder": pytest.approx(np.rad2deg(np.ptp(log.log.angle[:, 1])), abs=0.2)}
 
 
 def test_small_motions_about_zero_are_not_taken_for_radians(tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hydroid.arrays import Array, Mask, record
+from hydroid.arrays import Array, Mask
 from hydroid.errors import SettingsError
 from hydroid.hydraulics.records import Records, nominal_joints
 from hydroid.quantity_table import QUANTITIES, TARGETS
@@ -14,22 +14,11 @@ from hydroid.settings.problem import ParameterSettings
 from hydroid.simulation import Candidates
 
 
-@record
-class Binding:
-    """One column of theta sets one quantity of some joints, or the mass of a link, 0-based.
-
-    With a group of logs it is added to what is set otherwise, in these logs alone.
-    """
-
-    column: int
-    quantity: str
-    places: list[int]
-    group: str | None
-
-
 class Bindings:
     """Spreads a parameter vector over joints and links.
 
+    Each column of theta sets one quantity of some joints, or the mass of a link; with a group of logs it is
+    added to what is set otherwise, in these logs alone.
     What the settings do not name has its nominal value: 0 for gains, dampers, springs and dry friction, else
     what `hydraulics` and the arm's file say.
     Raises SettingsError: a joint or link the arm lacks, or two parameters for the same thing.
@@ -39,42 +28,42 @@ class Bindings:
         self._arm, self._stage, self._group_of = settings.arm, settings.stage, settings.log.group_of
         self._nominal = nominal_joints(settings.arm, settings.hydraulics)
         rows = [
-            Binding(column, quantity, _places(settings.arm, name, p), p.per)
+            (column, quantity, _places(settings.arm, name, p), p.per)
             for column, (name, p) in enumerate(settings.parameters.items())
             for quantity in TARGETS[p.quantity]
         ]
-        self._rows = sorted(rows, key=lambda row: row.group is not None)  # what is added comes last
+        self._rows = sorted(rows, key=lambda row: row[-1] is not None)  # what is added comes last
         names, taken = list(settings.parameters), dict[tuple[str, int, str | None], str]()
-        for row in self._rows:
-            name = names[row.column]
-            for place in row.places:
-                if (other := taken.setdefault((row.quantity, place, row.group), name)) != name:
+        for column, quantity, places, group in self._rows:
+            name = names[column]
+            for place in places:
+                if (other := taken.setdefault((quantity, place, group), name)) != name:
                     raise SettingsError(
-                        f"{other} and {name} both set the {row.quantity} of the same joint or link",
+                        f"{other} and {name} both set the {quantity} of the same joint or link",
                         f"parameters.{name}",
                         "give each its own joints, or remove one",
                     )
 
     def candidates(self, theta: Array, log: str = "") -> Candidates:
         """Spread theta, shape (n, P), over joints and links, in SI, as they are in a log of this name."""
-        group = self._group_of(log)
+        own = self._group_of(log)
         joints: Records = np.tile(self._nominal, (len(theta), 1)).view(np.recarray)
         mass = np.tile(self._arm.masses, (len(theta), 1))
-        for row in self._rows:
-            target = mass if row.quantity == "mass" else joints[row.quantity]
-            value, factor = theta[:, row.column, None], QUANTITIES[row.quantity].factor
-            if row.group is None:
-                target[:, row.places] = value * factor
-            elif row.group == group:
-                least = QUANTITIES[row.quantity].lowest
-                target[:, row.places] = np.maximum(target[:, row.places] + value * factor, least * factor)
+        for column, quantity, places, group in self._rows:
+            target = mass if quantity == "mass" else joints[quantity]
+            value, factor = theta[:, column, None], QUANTITIES[quantity].factor
+            if group is None:
+                target[:, places] = value * factor
+            elif group == own:
+                least = QUANTITIES[quantity].lowest
+                target[:, places] = np.maximum(target[:, places] + value * factor, least * factor)
         return Candidates(joints, mass)
 
     def refuse_idle(self, driven: Mask, outputs: Sequence[int]) -> None:
         """Refuse driven, (J,), or compared joints, 0-based, for which stage 1 has no gain or no damping."""
         moved = {*np.flatnonzero(driven).tolist(), *outputs}
         for quantity in ("gain", "damping") if self._stage == "mech" else ():
-            served = {place for row in self._rows if row.quantity == quantity for place in row.places}
+            served = {place for _, what, places, _ in self._rows if what == quantity for place in places}
             for joint in sorted(moved - served)[:1]:
                 raise SettingsError(
                     f"joint {joint + 1} is driven or compared, but no parameter is its {quantity}",

@@ -39,12 +39,12 @@ def dressed_model(spec: mujoco.MjSpec, locked: LockedArm) -> mujoco.MjModel:
 
 
 def locked_spec(
-    spec: mujoco.MjSpec, locked: LockedArm, model: mujoco.MjModel, motors: Array | None = None
+    spec: mujoco.MjSpec, locked: LockedArm, model: mujoco.MjModel, motors: Array
 ) -> mujoco.MjSpec:
     """Return an arm's MJCF with joints locked; inertia, joints and time step are those of `model`.
 
     `motors` are torque per command [N·m/%] and torque without one [N·m] of the moving joints, shape (2, V);
-    None: no motors.
+    shape (2, 0): no motors.
     """
     source = spec.copy()
     forces = source.actuators, source.sensors, source.equalities, source.keys, source.excludes, source.pairs
@@ -73,18 +73,17 @@ def locked_spec(
         joint.actfrclimited = mujoco.mjtLimited.mjLIMITED_FALSE  # a URDF's effort is of another motor
         turns = joint.type == mujoco.mjtJoint.mjJNT_HINGE
         joint.springref = math.degrees(slack) if compiler.degree and turns else slack
-    if motors is not None:
-        for name, gain, bias in zip(locked.joints, *motors, strict=True):
-            source.add_actuator(
-                name=name,
-                target=name,
-                trntype=mujoco.mjtTrn.mjTRN_JOINT,
-                gainprm=[gain] + [0.0] * 9,
-                biastype=mujoco.mjtBias.mjBIAS_AFFINE,
-                biasprm=[bias] + [0.0] * 9,
-                ctrllimited=mujoco.mjtLimited.mjLIMITED_TRUE,
-                ctrlrange=[-100.0, 100.0],
-            )
+    for name, gain, bias in zip(locked.joints, *motors, strict=False):
+        source.add_actuator(
+            name=name,
+            target=name,
+            trntype=mujoco.mjtTrn.mjTRN_JOINT,
+            gainprm=[gain] + [0.0] * 9,
+            biastype=mujoco.mjtBias.mjBIAS_AFFINE,
+            biasprm=[bias] + [0.0] * 9,
+            ctrllimited=mujoco.mjtLimited.mjLIMITED_TRUE,
+            ctrlrange=[-100.0, 100.0],
+        )
     source.add_key(name="start", qpos=model.qpos_spring)
     return source
 

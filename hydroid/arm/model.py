@@ -85,7 +85,10 @@ class CollisionChecker:
         if not self._pairs:
             hint = "give bodies geoms with contype and conaffinity 1"
             raise ModelError("no two of its bodies can collide", source, hint)
-        self.names = [(_name(model, first), _name(model, second)) for first, second in self._pairs]
+        # what stands in the world has the shape's name, such as the floor's
+        owners = enumerate(model.geom_bodyid.tolist())
+        names = [model.body(b).name if b else model.geom(g).name or "world" for g, b in owners]
+        self.names = [(names[first], names[second]) for first, second in self._pairs]
         """of the bodies of each pair of shapes"""
 
     def clearance(self, time: Array, angle: Array) -> Clearance:
@@ -105,8 +108,8 @@ class CollisionChecker:
         meetings.sort(key=lambda meeting: meeting.from_s)
         nearest = tuple(self.names[pair] for pair in distance.argmin(axis=1))
         checked = len({*map(frozenset, self.names)})
-        pairs = [(s >> 16, s & 0xFFFF) for s in self._model.exclude_signature.tolist()]
-        excluded = tuple((self._model.body(a).name, self._model.body(b).name) for a, b in pairs)
+        body, signatures = self._model.body, self._model.exclude_signature.tolist()
+        excluded = tuple((body(pair >> 16).name, body(pair & 0xFFFF).name) for pair in signatures)
         return Clearance(time, distance.min(axis=1), nearest, tuple(meetings), checked, excluded)
 
     def first_below(self, angle: Array, margin: float) -> int | None:
@@ -120,12 +123,6 @@ class CollisionChecker:
         return np.array(
             [mujoco.mj_geomDistance(self._model, self._data, *pair, within, None) for pair in self._pairs]
         )
-
-
-def _name(model: mujoco.MjModel, geom: int) -> str:
-    """A body's name; of what stands in the world the shape's, such as the floor's."""
-    body = int(model.geom_bodyid[geom])
-    return model.body(body).name if body else model.geom(geom).name or "world"
 
 
 def _pairs(model: mujoco.MjModel) -> list[list[int]]:

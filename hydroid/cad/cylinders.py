@@ -18,7 +18,7 @@ from hydroid.arrays import Array, record
 from hydroid.cad.repair import compiled
 from hydroid.cad.source import Notes
 from hydroid.files import Plain
-from hydroid.settings.linkage import FourBar, Triangle, four_bar
+from hydroid.settings.linkage import FourBar, four_bar
 
 PARTS = {"rod", "piston", "cylinder", "cyl", "ram", "tube", "barrel"}
 """words in the names of a cylinder's links and joints"""
@@ -90,7 +90,7 @@ def _pins(spec: mujoco.MjSpec, data: mujoco.MjData) -> list[_Pin]:
     pins = [
         _Pin((joint.parent.name, joint.parent.parent.name), data.joint(joint.name).xanchor, joint)
         for joint in spec.joints
-        if joint.type == hinge and joint.parent.parent is not None
+        if joint.type == hinge
     ]
     for one in spec.equalities:
         if one.type == connect and one.objtype == mujoco.mjtObj.mjOBJ_SITE:
@@ -154,5 +154,5 @@ def _four_bar(joint: Any, pins: Sequence[_Pin]) -> Plain | None:
     theta0 = math.degrees(math.remainder(theta - psi, math.tau))
     theta0 += 360.0 * sense if theta0 * sense < 0 else 0.0  # its sign is the rod's way
     a, b = (round(abs(pivot - ground), 6) for pivot in (foot, eye))
-    shape = Triangle(a=a, b=b, theta0=round(theta0, 6))
-    return {"kind": "linear", "triangle": shape.model_dump(), "four_bar": bars.model_dump()}
+    shape = {"a": a, "b": b, "theta0": round(theta0, 6)}
+    return {"kind": "linear", "triangle": shape, "four_bar": bars.model_dump()}

@@ -152,9 +152,8 @@ def _hold(spec: mujoco.MjSpec, notes: Notes) -> None:
         else:
             continue
         spec.delete(joint)
-    for section in (spec.equalities, spec.actuators, spec.tendons):
-        for part in list(section):
-            spec.delete(part)
+    for part in (*spec.equalities, *spec.actuators, *spec.tendons):
+        spec.delete(part)
 
 
 def _path(body: mujoco.MjsBody | None) -> tuple[str, ...]:

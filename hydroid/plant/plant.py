@@ -58,14 +58,13 @@ class Plant:
     ) -> None:
         settings = identified.settings
         arm = settings.arm
-        self.identified, numbers = identified, range(1, 1 + len(arm.joints))
+        self.identified, names = identified, dict(enumerate(arm.joint_names, 1))
         wanted = set(joints or identified.summarise().joints or settings.outputs)
-        pairs = list(zip(numbers, arm.joint_names, strict=True))
-        self.joints = tuple(number for number, name in pairs if wanted & {number, name})
-        self._named = [name for number, name in pairs if number in self.joints]
-        self._active = np.isin(numbers, self.joints)
-        if stray := wanted.difference(numbers, arm.joint_names):
-            what = f"the arm has joints 1 to {len(arm.joints)}: {', '.join(arm.joint_names)}"
+        self.joints = tuple(number for number, name in names.items() if wanted & {number, name})
+        self._named = [names[joint] for joint in self.joints]
+        self._active = np.isin([*names], self.joints)
+        if stray := wanted.difference(names, names.values()):
+            what = f"the arm has joints 1 to {len(names)}: {', '.join(names.values())}"
             raise SettingsError(what, f"joints {[*stray]}")
         self._moving = self._active | (settings.simulation.other_joints == "passive")
         self.timestep = settings.log.period_s / settings.simulation.steps
@@ -77,7 +76,7 @@ class Plant:
         if payload:
             self._spec = add_payload(self._spec, arm, payload)
         self._candidate = Bindings(settings).candidates(identified.theta[None])
-        self._locked_pose: Array | None = None
+        self._locked_pose = np.empty(0)  # none yet
         if settings.stage == "hyd" and not has_force_curve(self._candidate.joints)[0]:
             hint = "it takes F1 > F2 > 0, x2 > x1 > 0 and F1/F2 < (x2/x1)²"
             raise SettingsError("no force-stroke curve runs through its two points", identified.source, hint)
@@ -141,7 +140,7 @@ class Plant:
             if self._pose.shape != self._active.shape or not np.isfinite(self._pose).all():
                 raise SettingsError(f"a pose needs {len(self._active)} finite angles [rad]", f"{start}")
         locked = np.where(self._moving, 0.0, self._pose)
-        if self._locked_pose is None or not np.array_equal(locked, self._locked_pose):
+        if not np.array_equal(locked, self._locked_pose):
             self._lock(locked)
         start_angle = self._pose[self._columns]
         self.model.qpos_spring[:] = start_angle
@@ -212,13 +211,14 @@ class Plant:
             RunError: the folder cannot be written.
         """
         model, candidate = copy(self.model), self._candidate
-        model.dof_damping[:], model.dof_armature[:] = self._values["dof_damping"][0], self._armature
+        model.dof_damping[:] = self._values["dof_damping"][0]
+        model.dof_armature[:] = self._locked.model.dof_armature  # a rollout steps with another
         spec = read_mjcf(folder / "arm.xml")  # with the meshes' names there
-        motors: Array | None = np.array([self._gain, self._balance])
+        motors = np.array([self._gain, self._balance])[:, self._chain.pushed]
         actuators = Plain()
         if self._chain.joints.size:
             hydraulic = {name: q for name, q in QUANTITIES.items() if name not in MECHANICAL}
-            motors, actuators["units"] = None, {name: q.unit for name, q in hydraulic.items()}
+            actuators["units"] = {name: q.unit for name, q in hydraulic.items()}
             for joint, values in zip(self._named, candidate.joints[0, self._active], strict=True):
                 actuators[joint] = {name: float(values[name] / q.factor) for name, q in hydraulic.items()}
         fitted = locked_spec(spec, self._locked, model, motors)
@@ -229,7 +229,6 @@ class Plant:
         locked = lock(self._spec, settings.arm, self._moving, pose)
         locked.model.opt.timestep = self.timestep
         model = dressed_model(self._spec, locked)
-        self._armature = model.dof_armature.copy()
         self._locked, self._locked_pose, self._columns = locked, pose, locked.columns
         self._values = model_values(locked, candidate)
         self._gain = candidate.joints.gain[0, self._columns]

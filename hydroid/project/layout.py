@@ -37,8 +37,14 @@ class Layout:
     followed: bool
 
 
-def find_layout(table: Table, arm: Arm, order: Sequence[str]) -> Layout:
-    """Guess the columns of a log, turn commands that act against the angle, and see how fast joints are."""
+def find_layout(table: Table | None, arm: Arm, order: Sequence[str]) -> Layout:
+    """Guess the columns of a log, turn commands that act against the angle, and see how fast joints are.
+
+    Without a log all joints have a command and an angle, and none is seen to move.
+    """
+    if table is None:
+        every = range(1, len(arm.joints) + 1)
+        return Layout({"period_s": 0.01, "joints": {}}, tuple(every), (), (), {}, followed=False)
     names = arm.joint_names
     for name in order:
         if name not in names:
@@ -99,5 +105,5 @@ def turned(command: Plain) -> Plain:
     """Return the settings of a command of the other sign."""
     if isinstance(command["column"], list):
         return command | {"column": command["column"][::-1]}
-    changed = {"scale": -command.get("scale", 1.0)}
-    return command | changed | ({"offset": -command["offset"]} if command.get("offset") else {})
+    offset = {"offset": -command["offset"]} if command.get("offset") else {}
+    return command | {"scale": -command.get("scale", 1.0)} | offset

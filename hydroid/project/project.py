@@ -3,8 +3,7 @@
 import os
 import shlex
 import tempfile
-from collections.abc import Generator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -58,10 +57,11 @@ def write_project(
         own, reference = robot, Path(os.path.relpath(robot.resolve(), folder.resolve())).as_posix()
     elif robot is not None:
         imported = import_arm(robot, table.names if table else (), **options)
-    with _stage(folder) as stage:
+    with _stage(folder) as hidden:
+        stage = Path(hidden)
         arm = load_arm(own) if own else _write_arm(stage, imported)
-        layout = find_layout(table, arm, joints) if table is not None else None
-        sizes = joint_sizes(arm, {j: m.speed for j, m in layout.motions.items()} if layout else {})
+        layout = find_layout(table, arm, joints)
+        sizes = joint_sizes(arm, {j: m.speed for j, m in layout.motions.items()})
         if imported is not None:
             arm = _write_arm(stage, imported, arm, sizes)
         caption = f"{arm.name}, all joints at or near 0: does it look and turn like yours?"
@@ -80,17 +80,15 @@ def write_project(
             f"hydroid validate {other} --fit {run} --out {home}/runs/validation",
             f"hydroid suggest {fitted} --fit {run} --out {home}/runs/suggestions",
         )
-        notes, reasons = [*imported.notes] if imported else [], layout.reasons if layout else ()
+        notes = [*imported.notes] if imported else []
         guessed = [joint.name for joint in arm.joints if isinstance(joint.actuator, RotaryActuator)]
         if imported and guessed:
             what = "no cylinder is known. A stand-in predicts angles; its pressures and forces mean nothing"
             notes.append(f"{listed(guessed)}: {what}")
-        text = fill_template(
-            "project/next-steps.md.j2", name=arm.name, steps=steps, notes=notes, reasons=reasons
-        )
-        write_atomic(stage / STEPS, text)
+        told = {"steps": steps, "notes": notes, "reasons": layout.reasons}
+        write_atomic(stage / STEPS, fill_template("project/next-steps.md.j2", name=arm.name, **told))
         written = _move(stage, folder)
-    return Project(folder, written, tuple(notes), reasons, layout.unused if layout else (), steps)
+    return Project(folder, written, tuple(notes), layout.reasons, layout.unused, steps)
 
 
 def _write_arm(
@@ -106,14 +104,11 @@ def _write_arm(
     return load_arm(stage / ARM)
 
 
-@contextmanager
-def _stage(folder: Path) -> Generator[Path]:
+def _stage(folder: Path) -> tempfile.TemporaryDirectory[str]:
     """A folder beside the project, or in it where it exists, that disappears."""
     home = next(filter(Path.is_dir, (folder.absolute(), *folder.absolute().parents)))
     with writing(folder):
-        stage = tempfile.TemporaryDirectory(prefix=".hydroid-init-", dir=home, ignore_cleanup_errors=True)
-    with stage as path:
-        yield Path(path)
+        return tempfile.TemporaryDirectory(prefix=".hydroid-init-", dir=home, ignore_cleanup_errors=True)
 
 
 def _move(stage: Path, folder: Path) -> tuple[str, ...]:

@@ -30,15 +30,14 @@ LIFT = 2.0  # torque of a joint at the pump's pressure, over the largest that gr
 class JointSize(NamedTuple):
     """What a joint needs: oil [cm³/rad], valve opening [mm²] and damping [N·m·s/rad] at a speed [rad/s].
 
-    Of a joint that slides [mm², mm², N·s/m, m/s]. `area` is the one that pushes its cylinder's rod out [mm²];
-    0: it has none.
+    Of a joint that slides [mm², mm², N·s/m, m/s]. `area` is the one that pushes its cylinder's rod out [mm²].
     """
 
     displacement: float
     opening: float
     damping: float
     speed: float
-    area: float = 0.0
+    area: float
 
 
 def joint_sizes(arm: Arm, speeds: Mapping[int, float]) -> tuple[JointSize, ...]:
@@ -63,12 +62,10 @@ def joint_sizes(arm: Arm, speeds: Mapping[int, float]) -> tuple[JointSize, ...]:
     through = settings.flow_coefficient * np.sqrt((1 - 1 / LIFT) * pressure / DENSITY)  # [m/s]
     for joint, most in enumerate(torque.tolist(), 1):
         speed = max(speeds.get(joint, 0.5), 0.01)
-        oil, own, lever = 1e6 * most / pressure, arm.joints[joint - 1], 0.0
+        oil, own, lever = 1e6 * most / pressure, arm.joints[joint - 1], 1.0
         if isinstance(own.actuator, LinearActuator):
             lever = np.abs(own.actuator.moment_arm(np.linspace(*own.limits, 50))).mean()
-        sizes.append(
-            JointSize(oil, oil * speed / through, most / speed, speed, oil / lever if lever else 0.0)
-        )
+        sizes.append(JointSize(oil, oil * speed / through, most / speed, speed, oil / lever))
     return tuple(sizes)
 
 
@@ -84,10 +81,9 @@ def arm_text(imported: ImportedArm, arm: Arm | None, sizes: Sequence[JointSize])
         actuators = {name: own | areas for name, own in imported.cylinders.items()}
     for joint, size in zip(arm.joints if arm else (), sizes, strict=True):
         own = imported.cylinders.get(joint.name, {"kind": "linear"} if joint.slides else None)
-        area = size.area or size.displacement
         oil: Plain = {"kind": "rotary", "displacement": rounded(size.displacement)}
         if own is not None:  # the rod leaves about 65 % of the area
-            oil = own | {"area_a": rounded(area), "area_b": rounded(0.65 * area)}
+            oil = own | {"area_a": rounded(size.area), "area_b": rounded(0.65 * size.area)}
         actuators[joint.name] = oil | {"max_opening": rounded(size.opening)}
     return fill_template(
         "project/arm.yaml.j2",
@@ -109,18 +105,17 @@ def rounded(value: float) -> float:
     return float(f"{value:.3g}")
 
 
-def fit_text(arm: Arm, layout: Layout | None, sizes: Sequence[JointSize], file: str, arm_file: str) -> str:
+def fit_text(arm: Arm, layout: Layout, sizes: Sequence[JointSize], file: str, arm_file: str) -> str:
     """Return the settings of a fit of the whole chain.
 
     `file` is their own name as a command takes it, and `arm_file` that of the arm as they name it.
     """
     joints, volumes = list[Plain](), list[float]()
-    outputs = range(1, len(arm.joints) + 1) if layout is None else layout.outputs
-    flows = {joint: 0.06 * sizes[joint - 1].displacement * sizes[joint - 1].speed for joint in outputs}
+    flows = {joint: 0.06 * sizes[joint - 1].displacement * sizes[joint - 1].speed for joint in layout.outputs}
     middle = np.median([*flows.values()])
-    for joint in outputs:
+    for joint in layout.outputs:
         name, size, own = arm.joint_names[joint - 1], sizes[joint - 1], arm.joints[joint - 1]
-        motion = layout.motions.get(joint) if layout else None
+        motion = layout.motions.get(joint)
         linear = isinstance(own.actuator, LinearActuator)
         if not linear:
             volumes.append(size.displacement * math.radians(own.range[1] - own.range[0]) / 2)
@@ -137,7 +132,7 @@ def fit_text(arm: Arm, layout: Layout | None, sizes: Sequence[JointSize], file: 
                 "dead": short(DEAD * min(max(motion.dead_band, 5.0), 40.0) if motion else 10.0),
             }
         )
-    period = 0.01 if layout is None else layout.section["period_s"]
+    period = layout.section["period_s"]
     steps = math.ceil(period / LONGEST_STEP - 1e-9)
     return fill_template(
         "project/fit.yaml.j2",

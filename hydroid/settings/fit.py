@@ -6,7 +6,7 @@ from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
+from pydantic import Field, ValidationInfo, model_validator
 
 from hydroid.errors import SettingsError
 from hydroid.files import find_config
@@ -21,19 +21,12 @@ from hydroid.settings.problem import ObjectiveSettings, ParameterSettings, Prior
 from hydroid.settings.search import DesignSettings, RefinementSettings, SearchSettings
 
 
-def _read_arm(value: Any, info: ValidationInfo) -> Any:
-    folder = (info.context or {}).get("folder")
-    if isinstance(value, str):
-        return load_arm(value, folder)
-    return validate(value, Arm, "arm", folder=folder) if isinstance(value, dict) else value
-
-
 class FitSettings(Settings):
     """All that a fit needs besides its logs."""
 
     stage: Literal["mech", "hyd"] = "mech"
     """mech: the hydraulics are a gain; hyd: the whole chain from command to torque is simulated"""
-    arm: Annotated[Arm, BeforeValidator(_read_arm)] = Field("hydrolek", validate_default=True)  # pyright: ignore[reportAssignmentType]
+    arm: Arm = "hydrolek"  # pyright: ignore[reportAssignmentType]
     """name of a shipped arm, or path of an arm's YAML file, relative to this file or to the working folder"""
     outputs: Annotated[tuple[JointNumber, ...], Field(min_length=1)] = (2,)
     """joints whose measured angle is compared"""
@@ -74,10 +67,12 @@ class FitSettings(Settings):
         names = values.get("parameters")
         if isinstance(names, dict) and not all(isinstance(n, str) and n.isidentifier() for n in names):
             raise ValueError("parameter names must be plain words such as K or M1")
-        arm = _read_arm(values.get("arm", cls.model_fields["arm"].default), info)
-        known = arm if isinstance(arm, Arm) else None
-        if info.context is not None:
-            info.context["arm"] = known
+        context, arm = info.context or {}, values.get("arm", cls.model_fields["arm"].default)
+        if isinstance(arm, str):
+            arm = load_arm(arm, context.get("folder"))
+        elif isinstance(arm, dict):
+            arm = validate(arm, Arm, "arm", folder=context.get("folder"))
+        known = context["arm"] = arm if isinstance(arm, Arm) else None
         if isinstance(names, dict):
             compared = values.get("outputs", cls.model_fields["outputs"].default)
             log = values.get("log")

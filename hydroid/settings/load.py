@@ -5,15 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Self, TypeVar
 
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    ValidationError,
-    ValidationInfo,
-    model_validator,
-)
+from pydantic import BaseModel, BeforeValidator, Field, ValidationError, ValidationInfo, model_validator
 
 from hydroid.errors import SettingsError
 from hydroid.files import Plain
@@ -29,16 +21,19 @@ _PLAIN = {
 """what a fault means in YAML, by the start of pydantic's name for it; its own words say the others"""
 
 
+def _with_tuples(values: Any) -> Any:
+    """Take YAML's lists for tuples, which frozen settings hold."""
+    if isinstance(values, dict):
+        return {key: _with_tuples(value) for key, value in values.items()}
+    return tuple(_with_tuples(value) for value in values) if isinstance(values, list) else values
+
+
 class Settings(BaseModel):
     """Base of all settings: frozen; an unknown key is an error, and so is true for a number or "3" for 3."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, strict=True)
+    model_config = {"frozen": True, "extra": "forbid", "allow_inf_nan": False, "strict": True}
 
-    @model_validator(mode="before")
-    @classmethod
-    def _lists_are_tuples(cls, values: Any) -> Any:
-        """Take YAML's lists for tuples, which frozen settings hold."""
-        return _with_tuples(values)
+    _of_yaml = model_validator(mode="before")(_with_tuples)
 
     def changed(self, changes: Mapping[str, Any]) -> Self:
         """Return the settings with values replaced by dotted key, such as `search.seed`; none is checked."""
@@ -48,12 +43,6 @@ class Settings(BaseModel):
             within = getattr(settings, name).changed({inner: value}) if inner else value
             settings = settings.model_copy(update={name: within})
         return settings
-
-
-def _with_tuples(values: Any) -> Any:
-    if isinstance(values, dict):
-        return {key: _with_tuples(value) for key, value in values.items()}
-    return tuple(_with_tuples(value) for value in values) if isinstance(values, list) else values
 
 
 def _number_of(key: Any, info: ValidationInfo) -> Any:

@@ -43,22 +43,18 @@ def expanded(parameters: Mapping[str, Any], compared: Any, arm: Arm | None) -> P
             result[name] = entry  # refused as any other wrong value
             continue
         shared = {setting: value for setting, value in entry.items() if setting != "each"}
-        if key == "joints":
-            named = arm is not None and any(isinstance(place, str) for place in places)
-            joints = arm.joint_names if arm and named else ()
-            places = [joints.index(place) + 1 if place in joints else place for place in places]
-            if len(places) == 1:
-                everywhere = each is True and quantity in MECHANICAL
-                result[name] = shared | ({} if everywhere else {"joints": places})
-                continue
+        names = dict(enumerate(arm.joint_names, 1)) if arm and key == "joints" else {}
+        numbers: Plain = {label: number for number, label in names.items()}
+        places = [numbers.get(place, place) for place in places]
+        if key == "joints" and len(places) == 1:
+            everywhere = each is True and quantity in MECHANICAL
+            result[name] = shared | ({} if everywhere else {"joints": places})
+            continue
         taken = set[str]()
         for place in places:
-            label = place
-            if arm and isinstance(place, int) and 0 < place <= len(arm.joint_names):
-                label = arm.joint_names[place - 1]
+            label = names.get(place, place)
             own = distinct(re.sub(r"\W", "_", f"{name}_{label}"), taken)  # --set splits names at dots
-            changes = result.get(own, parameters.get(own, {}))
-            result[own] = shared | {key: place if key == "link" else [place]} | changes
+            result[own] = shared | {key: place if key == "link" else [place]} | result.get(own, {})
     return result
 
 
@@ -77,7 +73,7 @@ def by_group(parameters: Mapping[str, Any], groups: Collection[str]) -> Plain:
             raise ValueError(f"parameters.{name}: {what}")
         for group in (*groups, OTHER):
             own = f"{name}_{group}"
-            result[own] = entry | {"per": group} | result.get(own, parameters.get(own, {}))
+            result[own] = entry | {"per": group} | result.get(own, {})
     return result
 
 
@@ -135,11 +131,11 @@ def _prior(name: str, own: ParameterSettings, nominal: float | None) -> Prior | 
 def _default_bounds(own: ParameterSettings, prior: Prior | None) -> tuple[float, float]:
     if prior is None:
         return own.fixed or 0.0, own.fixed or 0.0
-    if own.per is not None:
-        return prior.value(-4.0), prior.value(4.0)
-    quantity = CHOICES[own.quantity]  # one that must be above 0 is not searched below 1 % of its value
-    least = 0.01 * prior.nominal if quantity.positive else quantity.lowest
-    return max(prior.value(-4.0), least), prior.value(4.0)
+    lower, upper = prior.value(-4.0), prior.value(4.0)
+    if own.per is None:  # what must be above 0 is not searched below 1 % of its value
+        quantity = CHOICES[own.quantity]
+        lower = max(lower, 0.01 * prior.nominal if quantity.positive else quantity.lowest)
+    return lower, upper
 
 
 def _unit(arm: Arm, own: ParameterSettings) -> str:

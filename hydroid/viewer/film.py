@@ -23,7 +23,6 @@ Picture = NDArray[np.uint8]
 
 KINDS = {".mp4": ((1920, 1080), 20.0), ".gif": ((960, 540), 10.0), ".png": ((1920, 1080), 0.0)}
 """width and height of a file's pictures [px], and pictures in a second"""
-AZIMUTH, ELEVATION = 125.0, -18.0  # where a camera looks to at first [deg]
 
 
 def rendered(motion: Motion, size: tuple[int, int], frames: Iterable[tuple[float, str]]) -> Iterator[Picture]:
@@ -45,7 +44,7 @@ def rendered(motion: Motion, size: tuple[int, int], frames: Iterable[tuple[float
         for time, text in frames:
             replay.advance(time)
             renderer.update_scene(replay.data, camera)
-            add_ghost(replay, renderer.scene, (AZIMUTH, ELEVATION))
+            add_ghost(replay, renderer.scene, camera)
             picture, place = Image.fromarray(renderer.render()), (letters, letters // 2)
             ImageDraw.Draw(picture).text(place, text, "black", ImageFont.load_default(letters))
             yield np.asarray(picture)
@@ -73,16 +72,16 @@ def render_motion(
 
 
 def look_at(camera: mujoco.MjvCamera, model: mujoco.MjModel) -> None:
-    """Point a camera at a whole machine."""
+    """Point a camera at a whole machine, as it is seen at first."""
     camera.lookat[:], camera.distance = model.stat.center, 2.3 * model.stat.extent
-    camera.azimuth, camera.elevation = AZIMUTH, ELEVATION
+    camera.azimuth, camera.elevation = 125.0, -18.0  # [deg]
 
 
-def add_ghost(playback: Playback, scene: mujoco.MjvScene, view: tuple[float, float]) -> None:
+def add_ghost(playback: Playback, scene: mujoco.MjvScene, camera: mujoco.MjvCamera) -> None:
     """Add what moves of a playback's ghost, if it has one, to a scene, blue and translucent.
 
-    It stands 4 mm farther away in a view of these angles [deg]: where both machines agree only the
-    simulated one is seen, and their surfaces do not flicker.
+    It stands 4 mm farther away from the camera: where both machines agree only the simulated one is seen,
+    and their surfaces do not flicker.
     """
     if playback.ghost is None:
         return
@@ -91,7 +90,7 @@ def add_ghost(playback: Playback, scene: mujoco.MjvScene, view: tuple[float, flo
     mujoco.mjv_addGeoms(playback.model, playback.ghost, option, perturb, dynamic, scene)
     for geom in scene.geoms[first : scene.ngeom]:
         geom.rgba[:], geom.matid, geom.transparent = (0.12, 0.44, 0.82, 0.42), -1, 1
-        geom.pos[:] += 0.004 * sight(*view)[2]
+        geom.pos[:] += 0.004 * sight(camera.azimuth, camera.elevation)[2]
 
 
 def _still(pictures: Iterable[Picture], kind: str) -> bytes:
@@ -138,7 +137,7 @@ def play(playback: Playback, viewer: Any) -> None:
         begun += max(0.0, late) if playback.time < playback.duration else 0.0
         playback.advance(frame - begun)
         viewer.user_scn.ngeom = 0
-        add_ghost(playback, viewer.user_scn, (viewer.cam.azimuth, viewer.cam.elevation))
+        add_ghost(playback, viewer.user_scn, viewer.cam)
         before = playback.data.time
         viewer.sync()
         if playback.data.time < before:

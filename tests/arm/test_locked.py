@@ -109,7 +109,7 @@ def test_the_export_stands_where_the_whole_arm_does(tmp_path, moving):
     for joint in spec.joints:
         joint.actfrclimited, joint.actfrcrange = mujoco.mjtLimited.mjLIMITED_TRUE, [-1, 1]
     locked, whole = locked_arm(spec, arm, moving, pose), spec.compile()
-    model = locked_spec(spec, locked, locked.model).compile()
+    model = locked_spec(spec, locked, locked.model, np.empty((2, 0))).compile()
     here, there = posed(model, locked.pose), posed(whole, pose)
     assert (model.njnt, model.ntendon, model.jnt_actfrclimited[0]) == (1, 0, 0)
     places = (d.geom_xpos[np.argsort(d.geom_xpos[:, 0])] for d in (here, there))

@@ -153,10 +153,9 @@ def make_tasks(cells: Mapping[str, FitSettings], seeds: int, logs: Sequence[Log]
 
 def measured(task: Task, result: Result) -> Row:
     """Return the measures of one run (docs/studies.md)."""
-    if "failed" in result:
-        return Row(task.cell, task.seed, {}, result["failed"])
-    values = result["measures"] | {f"value {name}": value for name, value in result["theta"].items()}
-    return Row(task.cell, task.seed, {name: float(value) for name, value in values.items()})
+    values = {name: float(value) for name, value in result.get("measures", {}).items()}
+    values |= {f"value {name}": value for name, value in result.get("theta", {}).items()}
+    return Row(task.cell, task.seed, values, result.get("failed", ""))
 
 
 def _read(file: Path) -> Result:

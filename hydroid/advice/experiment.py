@@ -75,14 +75,13 @@ class RandomExperiments:
         moving = [j - 1 for j in {*(limits.joints or ()), *settings.outputs}]
         margin = np.radians(limits.margin_deg)
         inside = (poses >= arm.lower + margin) & (poses <= arm.upper - margin)
-        poses = poses[inside[:, moving].all(axis=1)]
-        if not len(poses) and limits.poses != "any":
+        self._poses = poses[inside[:, moving].all(axis=1)]
+        if not len(self._poses) and limits.poses != "any":
             raise SettingsError(
                 f"no pose of {', '.join(names)} is {limits.margin_deg:g} deg inside the ranges of what moves",
                 "design.poses",
                 "add one to the arm's file, reduce design.margin_deg, or set design.poses=any",
             )
-        self._poses = poses
         lower, upper = np.array([joint.limits for joint in arm.joints]).T
         inward = np.minimum(margin, 0.5 * (upper - lower))
         self._lower, self._upper = lower + inward, upper - inward

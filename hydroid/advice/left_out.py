@@ -66,10 +66,10 @@ def refitted(problem: Problem, theta: Array, weight: float | None = None) -> Ref
     here = rows(best[None])[0]
     if not np.isfinite(here).all():
         return Refit(problem, theta, np.full((1, size), np.inf))
-    several, number = len(problem.logs) > 1, np.append(parts(problem), np.zeros(here.size - size))
+    number = np.append(parts(problem), np.zeros(here.size - size))
     for part in np.unique(number[:size]):
         out = number == part
-        if several:  # only the other logs are simulated
+        if len(problem.logs) > 1:  # only the other logs are simulated
             kept = sorted({c.log for c in problem.channels if not out[c.rows.start]})
             others = problem.varied(problem.settings, [problem.logs[i] for i in kept])
             point = fitted(whole, least_squares_rows(others, theta, weight))

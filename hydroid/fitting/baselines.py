@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from scipy.optimize import OptimizeResult, least_squares
+from scipy.optimize import least_squares
 
 from hydroid.arrays import Array, record
 from hydroid.log import Log
@@ -106,17 +106,9 @@ def fit_baselines(logs: Sequence[Log], joint: int, limits: tuple[float, float]) 
     def made(x: Array) -> Baseline:
         return replace(table, table=None, delay=float(x[8]), numbers=x[:8].reshape(4, 2))
 
-    def fit(start: Array, evaluations: int) -> OptimizeResult:
-        return least_squares(
-            lambda x: made(x).errors(measured),
-            start,
-            bounds=(lower, upper),
-            x_scale=scale,
-            max_nfev=evaluations,
-        )
-
-    best = min((fit(start, 10) for start in _starts(table)), key=lambda ended: ended.cost)
-    numbers = made(fit(best.x, 40).x)
+    fit = partial(least_squares, lambda x: made(x).errors(measured), bounds=(lower, upper), x_scale=scale)
+    best = min((fit(start, max_nfev=10) for start in _starts(table)), key=lambda ended: ended.cost)
+    numbers = made(fit(best.x, max_nfev=40).x)
     return dict(zip(NAMES, (still, table, numbers), strict=True))
 
 

@@ -61,10 +61,8 @@ def measured(problem: Problem, candidates: Mapping[str, Array]) -> dict[str, Est
     responses = problem.responses(theta)
     errors = problem.errors(responses)
     norms, rms = problem.norms(errors), problem.rms(errors)
-    estimates: list[Estimate] = []
-    for i, name in enumerate(candidates):
-        angles = tuple(response.angle[i] for response in responses)
-        estimates.append(Estimate(name, theta[i], norms[i, :-1], norms[i, -1], rms[i], angles))
+    angles = zip(*(response.angle for response in responses), strict=True)  # of each candidate
+    estimates = map(Estimate, candidates, theta, norms[:, :-1], norms[:, -1], rms, angles)
     return {e.name: e for e in sorted(estimates, key=lambda e: not e.usable)}
 
 
@@ -112,10 +110,10 @@ class Ladder:
                 if term not in terms:
                     self._rung(whole, f"{self.kept.name}+{term}", climbs=climbs, if_nearer=True)
         if climbs:
-            name, left_out = self.kept.name, self.kept.left_out
-            last = self._refined(self.problem, self.kept.theta, refinement, name)
-            kept = replace(self._measured(self.problem, last, name), left_out=left_out)
-            self.kept = self.estimates[name] = kept
+            kept = self.kept
+            last = self._refined(self.problem, kept.theta, refinement, kept.name)
+            new = self._measured(self.problem, last, kept.name)
+            self.kept = self.estimates[kept.name] = replace(new, left_out=kept.left_out)
         if settings.joint_refinement:
             self._rung(whole, self.kept.name.replace("refined", "joint"), climbs=False, if_nearer=False)
 

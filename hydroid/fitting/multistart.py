@@ -60,7 +60,7 @@ class Multistart:
 
     def ask(self, population: Population | None, rng: Generator) -> Genes:
         """The point that the next start reaches, shape (1, P)."""
-        number = 0 if population is None else len(population)
+        number = 0 if population is None else len(population.chromosomes)
         theta = self.start(number)
         if lone_joints(self._problem):
             theta = self._joint_by_joint(number, theta)
@@ -128,10 +128,8 @@ class Multistart:
 
         A part in which nothing moves yet, as at the start from a stop, would only lead a start astray.
         """
-        longest, settings = (
-            max(log.duration for log in problem.logs),
-            problem.settings.changed({"objective.segments": 1}),
-        )
+        longest = max(log.duration for log in problem.logs)
+        settings = problem.settings.changed({"objective.segments": 1})
         travels, parts = [MOVES * np.ptp(c.measured) for c in problem.channels], list[Problem]()
         for seconds in (one for one in self.settings.horizons if one < longest):
             part = problem.varied(settings, [log.first(seconds) for log in problem.logs])
@@ -171,8 +169,8 @@ def by_numbers(problem: Problem, joint: int, theta: Array) -> Array:
     values = dict.fromkeys(("pilot_lag", "lever_slope", "lever_bend"), 0.0)
     values |= {"delay": found.delay, "compensation": 1.0}
     for row, name in (0, "dead_band"), (1, "opening_exponent"), (3, "opening_lag"):
-        values |= dict(zip((f"{name}_a", f"{name}_b"), found.numbers[row].tolist(), strict=True))
-        values[name] = float(found.numbers[row].mean())
+        a, b = found.numbers[row].tolist()
+        values |= {name: (a + b) / 2, f"{name}_a": a, f"{name}_b": b}
     start, places = theta.copy(), dict[str, int]()
     for i, one in enumerate(settings.parameters.values()):
         if one.fixed is None and one.joints == (joint,):

@@ -83,11 +83,13 @@ def refine(
         now = replace(now, evaluations=now.evaluations + simulated)
     residuals, moved = _residuals(problem, now), False
     with saving(checkpoints, name) as keep:
-        while not now.ended and not _shown(problem, now, progress, name):
+        while not now.ended:
+            errors = problem.unfiltered(now.residual[None, : problem.measured.size])
+            if progress(name, now.evaluations, problem.rms(errors)[0]):
+                break
             if not len(now.jacobian):
-                after = _following(problem, now)
-                residuals = residuals if after is now else _residuals(problem, after)
-                now = after
+                now = _following(problem, now)
+                residuals = _residuals(problem, now)
                 keep(now.arrays)
             now, moved = step(now, residuals, settings), True
         if moved or now.ended:  # else a start that itself may have been reached too late
@@ -96,12 +98,6 @@ def refine(
         now = replace(now, ending=Ending.TIME)
     LOGGER.info("refinement of %d parameters: %s", now.point.size, now)
     return now
-
-
-def _shown(problem: Problem, now: _Refinement, progress: Refining, name: str) -> bool:
-    """Show the progress; return whether its time is up."""
-    errors = problem.unfiltered(now.residual[None, : problem.measured.size])
-    return bool(progress(name, now.evaluations, problem.rms(errors)[0]))
 
 
 def _estimated(problem: Problem, unit: Array, row: Array | None = None) -> _Refinement:

@@ -80,8 +80,15 @@ def search(problem: Problem, watch: Watcher, checkpoints: Checkpoints) -> Search
             finite = overall[np.isfinite(overall)]
             best = min(history[-1, 4] if len(history) else np.inf, result[:, -1].min())
             median = np.median(finite) if finite.size else np.inf
-            counts = [len(history) + 1, evaluations + memo.elsewhere, memo.simulated, memo.infeasible]
-            history = np.vstack([history, [*counts, best, median]])
+            row = [
+                len(history) + 1,
+                evaluations + memo.elsewhere,
+                memo.simulated,
+                memo.infeasible,
+                best,
+                median,
+            ]
+            history = np.vstack([history, row])
             if not repeats:
                 if not late:  # else a start may not have been refined to its end
                     keep(state)

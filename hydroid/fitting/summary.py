@@ -50,8 +50,8 @@ def summarise(problem: Problem, fit: Fit) -> FitSummary:
             "diverged": int(fit.history[-1, 3]),
             "findings": (*fit_findings(fit), *known.findings),
             "estimates": estimates,
-            "quantities": fit.quantities.scalars,
-            "curves": fit.quantities.curves,
+            "quantities": fit.quantities[0],
+            "curves": fit.quantities[1],
         }
     )
 
@@ -118,7 +118,7 @@ def fit_findings(fit: Fit) -> list[Finding]:
         findings.append(Finding("strained prior", "warning", tuple(far), far))
     findings += [Finding("diverged", "warning", (e.name,)) for e in fit.estimates.values() if not e.usable]
     # half of a 95 % interval as large as the value, or without end
-    lost = dict.fromkeys(q.label for q in fit.quantities.scalars.values() if not q.within <= 1.0)
+    lost = dict.fromkeys(q.label for q in fit.quantities[0].values() if not q.within <= 1.0)
     if lost:
         findings.append(Finding("quantities open", "note", tuple(lost)))
     return findings

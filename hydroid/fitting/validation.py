@@ -1,7 +1,7 @@
 """How well a model predicts a log: its response with a band, and the article's error indices (table 9)."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import field
+from dataclasses import field, replace
 from functools import partial
 from math import degrees
 
@@ -101,8 +101,8 @@ def predicted(model: IdentifiedModel, log: Log, unseen: bool | None) -> Predicti
     def errors(part: Log) -> Array:
         return part.angle[:, [j - 1 for j in joints]] - predict(model, part, joints)
 
-    ahead = np.empty((0, len(HORIZONS), 0)) if unseen is False else errors_ahead(log, errors)
-    return Prediction(model.name, log, joints, response, bands, unseen, ahead)
+    found = Prediction(model.name, log, joints, response, bands, unseen)
+    return found if unseen is False else replace(found, ahead=errors_ahead(log, errors))
 
 
 def errors_ahead(log: Log, errors: Callable[[Log], Array]) -> Array:

@@ -70,9 +70,8 @@ def judge(
             {name: rms_deg(one.errors([p.log]) for p in some) for name, one in rivals.items()} if some else {}
             for some in (own, new)
         ]
-        bands = [(np.ones(len(p.log.time)), p.bands[joint]) for p in new if joint in p.bands]
-        inside = [one * band.inside for one, band in bands]
-        expected = [one * band.expected for one, band in bands if len(own) > 1]
+        bands = [p.bands[joint] for p in new if joint in p.bands for _ in p.log.time]  # of each sample
+        expected = [band.expected for band in bands if len(own) > 1]
         ahead: dict[str, list[Array]] = {}
         if new and all(len(p.ahead) for p in new):
             ahead["the fit"] = [p.ahead[..., p.joints.index(joint)] for p in new]
@@ -88,8 +87,8 @@ def judge(
                 unseen_deg=finite(errors[1]),
                 unseen_logs=len(new),
                 tolerance_deg=tolerance,
-                inside_percent=100 * float(np.mean(np.concatenate(inside))) if inside else None,
-                expected_deg=finite(rms_deg(expected)) if expected else None,
+                inside_percent=100 * float(np.mean([band.inside for band in bands])) if bands else None,
+                expected_deg=finite(rms_deg([np.array(expected)])) if expected else None,
                 baselines_deg=by_rival[1] or by_rival[0],
                 horizons_deg={name: _rms_ahead(np.concatenate(rows)) for name, rows in ahead.items()},
             )

@@ -51,8 +51,8 @@ def fitted_bands(problem: Problem, known: Uncertainty, responses: Sequence[Array
             slopes = channel.unfiltered(known.linear.slopes[:, channel.rows])
             sd = known.posterior.sd(slopes) / channel.weight
             error = channel.measured - responses[channel.log][:, channel.column]
-            band = _band(known.posterior, error_level(channel, noise), sd**2, error)
-            bands[channel.log][channel.joint] = band
+            level = error_level(channel, noise)
+            bands[channel.log][channel.joint] = _band(known.posterior, level, sd**2, error)
     return bands
 
 

@@ -97,8 +97,8 @@ def by_log(problem: Problem, uncertainty: Uncertainty) -> ByLog:
     # in 5 % of the fits with a right model any parameter is said to differ
     known = np.isfinite(relative)
     differing = known & (chi2.sf(freedom * ratio, freedom) < 0.05 / max(known.sum(), 1))
-    names, interval = problem.parameters.named(differing), ends(problem.parameters, linear.box, half)
-    return ByLog(relative, interval, freedom, names, left_out)
+    interval = ends(problem.parameters, linear.box, half)
+    return ByLog(relative, interval, freedom, problem.parameters.named(differing), left_out)
 
 
 def _expected(changes: Array, shares: Array, scatters: Array, priors: Array) -> Array:

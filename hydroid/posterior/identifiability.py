@@ -12,7 +12,6 @@ from hydroid.posterior.linear import least_squares_rows
 from hydroid.posterior.posterior import COVERAGE
 from hydroid.posterior.uncertainty import WEAK_ABOVE, Uncertainty
 from hydroid.problem.problem import Problem
-from hydroid.search.axes import Function
 from hydroid.search.least_squares import least_squares
 from hydroid.settings.search import RefinementSettings
 
@@ -52,6 +51,16 @@ def profile(problem: Problem, uncertainty: Uncertainty, name: str) -> Profile:
     units = linear.spread(uncertainty.posterior.deviations**2 / np.sum(linear.changes**2, axis=1))
     unit = units[i] if linear.box.varied[i] else np.nanmax(units)
 
+    def fit_others(start: Array, value: float) -> tuple[Array, float]:
+        """Fit all but the one, held at a value; return the result, shape (P,), and its sum of squares."""
+        held = [replace(p, fixed=value) if j == i else p for j, p in enumerate(parameters.parameters)]
+        others, theta = ParameterSet(tuple(held)), np.where(np.arange(len(held)) == i, value, start)
+        if not others.free.any():
+            return theta, np.sum(residuals(theta[None])[0] ** 2)
+        how = RefinementSettings(iterations=50, gain_tolerance=1e-6)
+        ended = least_squares(others.to_unit(start), lambda unit: residuals(others.from_unit(unit)), how)
+        return others.from_unit(ended.point), 2 * ended.cost
+
     reach = 3.0 * uncertainty.standard_deviation[i]
     reach = np.inf if np.isnan(reach) else reach  # it lies at a bound
     ends, lowest = list[float](), 0.0
@@ -62,7 +71,7 @@ def profile(problem: Problem, uncertainty: Uncertainty, name: str) -> Profile:
         for number in range(2 * STEPS if length else 0):
             before, length = value, length * (1.5 if number >= STEPS else 1.0)
             value = bound if (bound - value - length) / length < 1e-6 else value + length
-            start, square = _fit_others(parameters, residuals, start, i, value)
+            start, square = fit_others(start, value)
             deviance = (square - cost) / unit
             lowest = min(lowest, deviance)
             if deviance > THRESHOLD:  # the root is about linear
@@ -73,19 +82,6 @@ def profile(problem: Problem, uncertainty: Uncertainty, name: str) -> Profile:
             near = deviance
         ends.append(crossing)
     return Profile((ends[0], ends[1]), lowest)
-
-
-def _fit_others(
-    parameters: ParameterSet, residuals: Function, start: Array, i: int, value: float
-) -> tuple[Array, float]:
-    """Fit all but parameter i, held at a value; return the result, shape (P,), and its sum of squares."""
-    held = [replace(p, fixed=value) if j == i else p for j, p in enumerate(parameters.parameters)]
-    others, theta = ParameterSet(tuple(held)), np.where(np.arange(len(held)) == i, value, start)
-    if not others.free.any():
-        return theta, np.sum(residuals(theta[None])[0] ** 2)
-    how = RefinementSettings(iterations=50, gain_tolerance=1e-6)
-    ended = least_squares(others.to_unit(start), lambda unit: residuals(others.from_unit(unit)), how)
-    return others.from_unit(ended.point), 2 * ended.cost
 
 
 @record

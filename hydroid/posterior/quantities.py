@@ -5,7 +5,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from hydroid.arrays import Array, record
+from hydroid.arrays import Array
 from hydroid.estimate import CurveEstimate, Interval, QuantityEstimate, finite, finite_ends
 from hydroid.hydraulics.cylinder import rod_motion, volume
 from hydroid.hydraulics.records import LINEAR, Records, coefficients
@@ -37,20 +37,17 @@ NaN where one is undefined"""
 Measure = Callable[[Candidates], Measured]
 
 
-@record
-class Quantities:
-    """What follows from an estimate: single quantities and curves by name.
-
-    Quantities that no free parameter changes are left out: the settings give them, not the logs.
-    """
-
-    scalars: dict[str, QuantityEstimate]
-    curves: dict[str, CurveEstimate]
+Quantities = tuple[dict[str, QuantityEstimate], dict[str, CurveEstimate]]
+"""what follows from an estimate: single quantities, and curves, by name"""
 
 
 def quantities(problem: Problem, uncertainty: Uncertainty) -> Quantities:
-    """Return the quantities of every compared joint at a fit's estimate."""
-    result, candidates = Quantities({}, {}), problem.bindings.candidates
+    """Return the quantities of every compared joint at a fit's estimate.
+
+    Those that no free parameter changes are left out: the settings give them, not the logs.
+    """
+    scalars, curves = dict[str, QuantityEstimate](), dict[str, CurveEstimate]()
+    candidates = problem.bindings.candidates
     estimate = candidates(uncertainty.theta[None])
     for joint in problem.settings.outputs:
         named = problem.settings.arm.joint_names[joint - 1]
@@ -74,12 +71,12 @@ def quantities(problem: Problem, uncertainty: Uncertainty) -> Quantities:
                 given = given and known.given[i]
             elif not known.given[i]:
                 sd = finite(known.sd[i])
-                result.scalars[f"{named}_{name}"] = QuantityEstimate(
+                scalars[f"{named}_{name}"] = QuantityEstimate(
                     label=label, joint=joint, value=value, unit=unit, sd=sd, interval=interval
                 )
         if not given:
             at, value, interval = zip(*sorted(curve), strict=True)
-            result.curves[f"{named}_speed"] = CurveEstimate(
+            curves[f"{named}_speed"] = CurveEstimate(
                 label="speed",
                 joint=joint,
                 unit=f"{bench.unit[1]}/s",
@@ -88,7 +85,7 @@ def quantities(problem: Problem, uncertainty: Uncertainty) -> Quantities:
                 value=value,
                 interval=interval,
             )
-    return result
+    return scalars, curves
 
 
 def joint_measure(bench: Bench, estimate: Candidates) -> Measure:

@@ -13,7 +13,7 @@ import numpy as np
 from hydroid.arrays import Array, record
 
 Color = str  # ink, grey, pale or one of SERIES
-SERIES: tuple[Color, ...] = ("orange", "blue", "green", "pink", "yellow", "sky")
+SERIES = ("orange", "blue", "green", "pink", "yellow", "sky")
 """colours of several models, the first of the most important"""
 _none = partial(np.empty, 0)
 

@@ -105,16 +105,14 @@ def unknown_sections(summary: FitSummary) -> tuple[Section, ...]:
 
 def quantity_section(settings: FitSettings, summary: FitSummary) -> Section | None:
     """Return the section with a card of the best known quantities of each joint; none without any."""
-    names, cards = settings.arm.joint_names, dict[str, Table]()
-    known = sorted(
-        (q for q in summary.quantities.values() if q.within <= BEST_WITHIN), key=lambda q: q.within
-    )
-    for joint in dict.fromkeys(q.joint for q in summary.quantities.values()):
+    cards = dict[str, Table]()
+    for joint in settings.outputs:
+        known = [q for q in summary.quantities.values() if q.joint == joint and q.within <= BEST_WITHIN]
         rows = tuple(
             (q.label, f"{q.value:.3g} {q.unit} ± {100 * q.within:.2g} %")
-            for q in [q for q in known if q.joint == joint][:5]
+            for q in sorted(known, key=lambda q: q.within)[:5]
         )
-        name = names[joint - 1]
+        name = settings.arm.joint_names[joint - 1]
         if rows:
             cards[f"known_{name}"] = Table(name, ("quantity", "value"), rows)
     text = (
@@ -152,20 +150,19 @@ def speed_section(settings: FitSettings, summary: FitSummary, logs: Sequence[Log
 def merged_tables(runs: Sequence[Record]) -> dict[str, Table]:
     """Return the tables `spread` and `runs` of runs that differ in their seeds only, the best run first."""
     runs = sorted(runs, key=lambda run: run.rms_deg)
-    parameters = runs[0].settings.parameter_set().parameters
+    best = runs[0].summary.estimate
     units = {f"error of {one.name}": "mm" if one.slides else "deg" for one in runs[0].summary.verdict}
-    units |= {p.name: p.unit for p in parameters}
+    units |= {name: one.unit for name, one in best.items()}
     columns = np.array(
         [
             [
                 (one.fitted_deg or 0.0) * (1e3 * np.radians(1.0) if one.slides else 1.0)
                 for one in run.summary.verdict
             ]
-            + [run.summary.values[p.name] for p in parameters]
+            + [run.summary.values[name] for name in best]
             for run in runs
         ]
     )
-    best = runs[0].summary.estimate
     spread = np.quantile(columns, [0.5, 0, 0.25, 0.75, 1], axis=0).T.tolist()
     rows = [
         (name, unit, *row, status(best[name]) if name in best else "")

@@ -81,8 +81,7 @@ def prediction_sections(predictions: Sequence[Prediction], arm: Arm, fits: Verdi
             size = f"{two_digits(1e3 * np.radians(error))} mm" if slides else f"{two_digits(error)}°"
             size = size if np.isfinite(error) else "diverged"
             row, column = f"{names[log]} {_KINDS[first.unseen]}".strip(), arm.joint_names[joint - 1]
-            name = f"response_{len(tabs) + 1}"
-            tabs.append(Plot(name, title, drawing, True, size, row, column, state))
+            tabs.append(Plot(f"response_{len(tabs) + 1}", title, drawing, True, size, row, column, state))
     rows = [
         row | {"fit": short_name(one.fit), "log": names[one.log.source], "kind": _KINDS[one.unseen]}
         for one in predictions

@@ -86,7 +86,7 @@ def model_hash(arm: Arm) -> str:
 
 def log_hash(log: Log) -> str:
     """Return the hash of the log's file, or of its samples where it has none."""
-    return _file_hash(Path(log.source)) if is_file(Path(log.source)) else samples_hash(log)
+    return _file_hash(Path(log.source)) if is_file(log.source) else samples_hash(log)
 
 
 def samples_hash(log: Log) -> str:

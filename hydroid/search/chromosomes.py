@@ -88,14 +88,15 @@ def _nearest(points: Array) -> Ints:
 CUTS = 2  # of the pointwise crossover (ours; the article gives none)
 
 
-def roulette(objective: Array, count: int, rng: Generator) -> Ints:
-    """Indices of `count` parents from the weighted roulette wheel, with replacement, by objectives J, (n,).
+def roulette(objectives: Array, count: int, rng: Generator) -> Ints:
+    """Indices of `count` parents from the weighted roulette wheel, with replacement, by objectives J, (n, 1).
 
     The wheel needs a fitness to be proportional to, and the objective is to be small: the fitness is the
     distance to the worst feasible candidate of this population, max(J) - J. The worst itself and infeasible
     candidates, whose J is not finite, are never drawn; among equals, and where no candidate is feasible, all
     are equally likely.
     """
+    objective = objectives[:, 0]
     feasible = np.isfinite(objective)
     fitness = np.zeros(len(objective))
     if feasible.any():

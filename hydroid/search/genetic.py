@@ -31,9 +31,6 @@ class Population:
     chromosomes: Genes
     objectives: Array
 
-    def __len__(self) -> int:
-        return len(self.chromosomes)
-
     def take(self, index: Ints) -> "Population":
         """Return the candidates at `index`, in that order."""
         return Population(self.chromosomes[index], self.objectives[index])
@@ -87,6 +84,7 @@ class SimpleGa:
     start: Array | None = None
     single: ClassVar[bool] = True
     elite: ClassVar[int] = 1
+    select = staticmethod(roulette)
 
     @property
     def coding(self) -> Coding:
@@ -104,11 +102,6 @@ class SimpleGa:
         parents = self.select(population.objectives, count + count % 2, rng)
         children = crossover(population.chromosomes[parents], self.settings, rng)[:count]
         return mutate(children, self.settings.mutation_rate, self.coding, rng)
-
-    @staticmethod
-    def select(objectives: Array, count: int, rng: Generator) -> Ints:
-        """Return parents, shape (count,), by the roulette wheel of the objectives of a population."""
-        return roulette(objectives[:, 0], count, rng)
 
     def tell(self, population: Population | None, offspring: Population) -> Population:
         """Return the elite of the present population, then all offspring."""

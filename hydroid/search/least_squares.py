@@ -69,9 +69,7 @@ def least_squares(start_at: Array, residuals: Function, settings: RefinementSett
 
 
 def step(now: State, residuals: Function, settings: RefinementSettings) -> State:
-    """Return the descent after taking a Jacobian, or after trying a step. One that has ended stays."""
-    if now.ended:
-        return now
+    """Return a descent that has not ended after taking a Jacobian, or after trying a step."""
     simulated = 0
 
     def counted(points: Array) -> Array:

@@ -123,7 +123,7 @@ def make_quantities(problem: Problem) -> Quantities:
             interval=((None, None), (-13.0, -11.0), (11.0, 13.0), (None, None)),
             **one,
         )
-    return Quantities(scalars, curves)
+    return scalars, curves
 
 
 def make_record(

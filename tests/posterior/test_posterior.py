@@ -84,7 +84,6 @@ def test_a_measurement_adds_its_information_and_some_of_the_parameters_keep_thei
 @pytest.mark.parametrize(
     ("sd", "share", "flag", "source"),
     [
-        (0.1, 1.0, Flag.IDENTIFIABLE, Source.DATA),
         (0.1, 0.95, Flag.IDENTIFIABLE, Source.DATA),
         (0.2, 0.5, Flag.IDENTIFIABLE, Source.BOTH),
         (0.3, 0.25, Flag.WEAK, Source.BOTH),

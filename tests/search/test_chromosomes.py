@@ -58,7 +58,7 @@ INF, NAN = np.inf, np.nan
     ],
 )
 def test_candidates_are_drawn_in_proportion_to_their_fitness(objective, fitness):
-    index = roulette(np.array(objective, dtype=float), 50_000, np.random.default_rng(11))
+    index = roulette(np.array(objective, dtype=float)[:, None], 50_000, np.random.default_rng(11))
     counts, drawn = np.bincount(index, minlength=len(objective)), np.array(fitness) > 0
     assert counts[~drawn].sum() == 0
     expected = (np.array(fitness) / np.sum(fitness) * counts.sum())[drawn]

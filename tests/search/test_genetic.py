@@ -86,7 +86,7 @@ def test_the_seed_alone_decides_every_bit(kind, coding):
     generators = (np.random.default_rng(seed) for seed in (7, 7, 8))
     one, again, other = (advance(search, function, None, rng, 12) for rng in generators)
     assert bits(one) == bits(again) != bits(other)
-    assert len(one) == 13
+    assert len(one.chromosomes) == 13
 
 
 def sphere(points):
@@ -117,7 +117,7 @@ def test_the_best_one_is_kept_and_not_evaluated_again():
         chromosomes = ga.ask(population, rng)
         assert len(chromosomes) == 10
         successor = ga.tell(population, evaluate(ga, chromosomes, half_fail))
-        assert len(successor) == 11
+        assert len(successor.chromosomes) == 11
         best = np.sort(population.objectives[:, 0])[:1]  # numpy sorts nan last
         assert np.array_equal(successor.objectives[:1, 0], best, equal_nan=True)
         population = successor

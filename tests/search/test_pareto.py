@@ -6,7 +6,6 @@ from pymoo.operators.survival.rank_and_crowding.metrics import calc_crowding_dis
 from pymoo.problems import get_problem
 from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
 
-from hydroid.errors import SettingsError
 from hydroid.search.pareto import average, crowding, non_dominated, ranks, segment_best, utopia
 
 PROBLEMS = [("zdt1", {}), ("zdt4", {}), ("dtlz7", {"n_var": 10, "n_obj": 8})]
@@ -60,7 +59,7 @@ def test_an_objective_without_range_makes_no_ends():
 
 
 POINTS = np.array([[0.0, 1.0], [0.2, 0.4], [0.5, 0.5], [1.0, 0.0]])
-OBJECTIVES = np.array([[1.0, 90, 30], [2, 40, 20], [9, 30, 25], [np.nan, 0, 0]])
+OBJECTIVES = np.array([[1.0, 90, 30], [2, 40, 20], [9, 30, 25], [np.nan, -np.inf, 0]])
 
 
 def test_the_articles_average_counts_a_point_as_often_as_it_is_best():
@@ -83,13 +82,3 @@ def test_a_candidate_that_is_best_everywhere_is_every_compromise(seed):
     objectives[6] = rng.random(5)
     for point in (average(points, objectives), utopia(points, objectives)):
         np.testing.assert_allclose(point, points[6], rtol=1e-15)
-
-
-def test_best_ignores_the_infeasible():
-    assert segment_best(np.array([[3.0], [2.0], [np.inf], [-np.inf]])).tolist() == [1]
-
-
-@pytest.mark.parametrize("choose", [average, utopia, lambda _, rows: segment_best(rows[:, :1])])
-def test_nothing_to_choose_from_is_said_so(choose):
-    with pytest.raises(SettingsError, match="could be simulated"):
-        choose(POINTS, np.full((4, 3), np.nan))

@@ -123,5 +123,5 @@ class FitProgress(Progress):
         error = way(math.degrees(rms), slides={*joints} <= {*arm.slides})
         model += " from nine numbers" * ("numbers" in name)
         what = f"step {max(steps, default=1)} of {len(self._steps)} ({model}), {of}"
-        self(what, simulated, None, f"{simulated} simulations, rms error {error}")
+        self(what, simulated, None, f"rms error {error}, {simulated} simulations")
         return time.monotonic() > self._end

@@ -66,7 +66,7 @@ def validate(
     from hydroid.run.record import fitted_by, keep_validation, run_of
 
     stated = {} if tolerance is None else {"tolerance_deg": tolerance}
-    results, verdicts = Plain(), Plain()
+    results, verdicts, own_logs = Plain(), Plain(), Plain()
     named = dict(zip(numbered(model.name for model in models), models, strict=True))
     for one, own, (name, model) in zip(given, read, named.items(), strict=True):
         fitted, baselines, hashes = fitted_by(model)
@@ -77,14 +77,14 @@ def validate(
         ]
         if out is not None and (run := keep_validation(model, predictions)):
             draw(run)
+        own_logs[name] = fitted
         verdicts[name] = judge(model.settings.changed(stated), fitted, baselines, predictions)
         results[name] = [replace(prediction, fit=name) for prediction in predictions]
     fits, arm = ordered(verdicts), models[0].settings.arm
     every = [prediction for name in fits for prediction in results[name]]
     best = next(iter(fits))
     run = run_of(named[best])
-    fitted, *_ = fitted_by(named[best])
-    steps = [next_step(named[best].summarise(), fits[best], str(run), fitted)] if run else []
+    steps = [next_step(named[best].summarise(), fits[best], str(run), own_logs[best])] if run else []
     page = validation_page(every, fits, arm, *steps)
     content = {
         "verdict": [{"fit": name} | one.model_dump() for name in fits for one in fits[name]],

@@ -70,8 +70,12 @@ def judge(
             {name: rms_deg(one.errors([p.log]) for p in some) for name, one in rivals.items()} if some else {}
             for some in (own, new)
         ]
-        bands = [p.bands[joint] for p in new if joint in p.bands for _ in p.log.time]  # of each sample
-        expected = [band.expected for band in bands if len(own) > 1]
+        banded = [p for p in new if joint in p.bands]
+        sizes = np.array([len(p.log.time) for p in banded], int)
+        inside, expected = (
+            np.repeat([getattr(p.bands[joint], what) for p in banded], sizes)
+            for what in ("inside", "expected")
+        )
         ahead: dict[str, list[Array]] = {}
         if new and all(len(p.ahead) for p in new):
             ahead["the fit"] = [p.ahead[..., p.joints.index(joint)] for p in new]
@@ -87,8 +91,8 @@ def judge(
                 unseen_deg=finite(errors[1]),
                 unseen_logs=len(new),
                 tolerance_deg=tolerance,
-                inside_percent=100 * float(np.mean([band.inside for band in bands])) if bands else None,
-                expected_deg=finite(rms_deg([np.array(expected)])) if expected else None,
+                inside_percent=100 * float(np.mean(inside)) if banded else None,
+                expected_deg=finite(rms_deg([expected])) if banded and len(own) > 1 else None,
                 baselines_deg=by_rival[1] or by_rival[0],
                 horizons_deg={name: _rms_ahead(np.concatenate(rows)) for name, rows in ahead.items()},
             )

@@ -159,12 +159,12 @@ def _without_hdf5(item: Any) -> Any:
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
 BINARY = {
-    ".mat": (open_mat, (b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file", HDF5)),
     "Parquet": (open_parquet, (b"PAR1",)),
     "ROS bag": (open_bag, (b"#ROSBAG V", b"SQLite format 3")),
     "MCAP": (open_bag, (b"\x89MCAP0",)),
+    ".mat": (open_mat, (b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file", HDF5)),
 }
 """by a format's name: what reads a file, its bytes and the log's settings, and how such files begin; a name
-that is an ending marks a file as well"""
+that is an ending marks a file as well, and comes last: the bytes count first"""
 FORMATS = listed(["CSV", *BINARY])
 """all formats that are read, for `--help` and messages"""

@@ -1,9 +1,9 @@
 """A table of unknown columns -> a `log` section that maps them, with a reason for each guess.
 
 The unit of a column, or else the words of its name, tell what it is; without either, the bare name of a joint
-or of what a command moves is its angle's. Its joint is the one whose name or
-number its own name holds. Where no column of a kind has a joint they are given to the joints in order; beside
-columns that have one, a column without is left out and named.
+or of what a command moves is its angle's. Its joint is the one whose name or number its own name holds. Where
+no column of a kind has a joint they are given to the joints in order; beside columns that have one, a column
+without is left out and named.
 """
 
 from collections.abc import Iterator, Sequence

@@ -27,3 +27,15 @@ def record(kind: type[T]) -> type[T]:
 def rms(values: Array, axis: int | None = None) -> Any:
     """Return the root mean square of values, of all or along an axis."""
     return np.sqrt(np.mean(values**2, axis=axis))
+
+
+def independent_samples(deviations: Array) -> Array:
+    """Return how many independent samples deviations from their mean, (T, m), are worth: shape (m,).
+
+    Their correlation from one sample to the next is taken for that of a first-order process.
+    """
+    square = np.sum(deviations**2, axis=0)
+    with np.errstate(invalid="ignore"):
+        correlation = np.sum(deviations[1:] * deviations[:-1], axis=0) / square
+    correlation = np.where(square > 0, correlation, 0.0).clip(0, 1)
+    return len(deviations) * (1 - correlation) / (1 + correlation)

@@ -11,7 +11,7 @@ from hydroid.errors import RunError, SettingsError
 from hydroid.files import Plain, is_file, write_atomic, yaml_text
 from hydroid.findings import Finding
 from hydroid.settings.document import read_yaml
-from hydroid.settings.load import JointNumber, NotNegative, Settings, validate
+from hydroid.settings.load import JointNumber, NotNegative, Positive, Settings, validate
 
 Interval = tuple[float | None, float | None]  # its ends; null: it has no limit there
 NAME = "estimate.yaml"  # name of the file in a run folder and beside a saved plant
@@ -52,8 +52,9 @@ class NamedEstimate(Settings):
     """rms error of the compared angles [deg]"""
     objective: float | None = None
     """over the whole record: [deg], or [-] where `objective.relative` is set"""
-    left_out_deg: tuple[float | None, float | None] | None = None
-    """rms error on parts of the logs left out, without the term that it adds and with it [deg]"""
+    gained: tuple[float | None, float | None] | None = None
+    """by how much it foretells parts of the logs left out better than the estimate without its last term: a
+    difference of log-likelihoods, and its standard error"""
 
 
 class Covariance(Settings):
@@ -150,6 +151,30 @@ def _finding(value: Any) -> Any:
         raise ValueError("is no finding") from None
 
 
+class AngleError(Settings):
+    """The error model of one angle (`posterior.error_model`)."""
+
+    sensor_deg: NotNegative
+    """standard deviation of the sensor's noise [deg]"""
+    drift_per_s: NotNegative
+    """growth of the drift's variance with time [deg²/s]"""
+    drift_per_way: NotNegative
+    """growth of the drift's variance with the way travelled [deg²/deg]"""
+    relaxation_s: Positive
+    """time in which the drift is forgotten [s]"""
+    after_10_s_deg: NotNegative
+    """standard deviation of a prediction 10 s ahead, whatever the parameters, at the logs' mean speed [deg]"""
+    lasts_s: NotNegative = 0.0
+    """time for which what is left of the error lasts [s]; 0: it is as the error model says"""
+
+    @property
+    def numbers(self) -> tuple[float, float, float, float]:
+        """The numbers of the error model in rad and s."""
+        degree = math.radians(1.0)
+        drifts = degree**2 * self.drift_per_s, degree * self.drift_per_way
+        return (degree * self.sensor_deg) ** 2, *drifts, self.relaxation_s
+
+
 class FitSummary(Settings):
     """The final estimate of a fit, and the estimates that it was chosen from."""
 
@@ -185,8 +210,8 @@ class FitSummary(Settings):
     """the same against a command or an angle"""
     covariance: Covariance | None = None
     """of the final estimate"""
-    noise_deg: dict[str, float] = {}
-    """standard deviation of the noise of each compared angle, `q2` of joint 2, from the residuals [deg]"""
+    errors: dict[str, AngleError] = {}
+    """what the residuals of each compared angle show of its error, by angle: `q2` of joint 2"""
     left_out_deg: dict[str, tuple[float, ...]] = {}
     """rms error of each compared angle on each fitted log if it is left out [deg]; none of one log"""
 

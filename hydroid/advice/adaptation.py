@@ -1,8 +1,7 @@
 """Adaptation: a fit moved to a changed machine by a few of its parameters, all others held at its estimate.
 
-Which few is found by trying: the one that lowers the error most on parts of the logs left out is freed, then
-the next, until none lowers it by 5 % on every part: what helps in one half of a log alone may be chance.
-Each joint counts by its error before: what one errs by in degrees must not hide that another's is halved.
+Which few is found by trying: the one whose fit foretells parts of the logs left out best is freed, then the
+next, until none foretells them clearly better (`fitting.left_out`).
 Candidates are what all joints share, such as the pump and the masses, and the effects of the logs' groups:
 what a load, a slower engine or another day changes.
 """
@@ -11,13 +10,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hydroid.advice.growth import MIN_RESIDUAL
-from hydroid.advice.left_out import Refit, parts, refitted
-from hydroid.arrays import rms
+from hydroid.advice.suggestions import refitted
 from hydroid.errors import SettingsError
 from hydroid.files import Plain
 from hydroid.identified_model import IdentifiedModel
+from hydroid.fitting.left_out import LeftOut, gain, is_better, parts, predict_parts
 from hydroid.log import Log
+from hydroid.posterior.error_model import likelihood_at
 from hydroid.problem.problem import Problem
 from hydroid.progress import Progress
 from hydroid.settings.fit import FitSettings
@@ -69,35 +68,28 @@ def steps(
         and (p.fixed is None or p.term is not None)
     ]
     problem, taken = Problem(adapted(model, pool), logs), list[str]()
-    last = Refit(problem, model.theta, problem.output_errors(model.theta[None]))
+    last = _as_it_is(problem, model)
     path = list[Plain]()
     name = ""
     while True:
         path.append({"parameter": name, "left_out_deg": last.by_joint})
-        trials = dict[str, Refit]()
+        trials = dict[str, LeftOut]()
         for trial in pool[:1] if free else pool:
             progress(f"freeing {trial}", len(taken), len(taken) + len(pool))
             own = problem.varied(adapted(model, [*taken, trial]))
-            # the noise, beside which priors count, is that of the adapted model
-            trials[trial] = refitted(own, refitted(own, last.theta).theta)
-        errors = {trial: _share(one, last) for trial, one in trials.items()}
-        name = min(errors, key=lambda trial: errors[trial], default="")
-        if not name or (not free and errors[name] > 0.95):
+            trials[trial] = predict_parts(own, last.thetas, refitted)
+        rises = {trial: gain(one, last)[0] for trial, one in trials.items()}
+        name = max(rises, key=lambda trial: rises[trial], default="")
+        if not name or (not free and not is_better(trials[name], last)):
             return path
         taken, last = [*taken, name], trials[name]
         pool.remove(name)
 
 
-def _share(trial: Refit, before: Refit) -> float:
-    """Return the error as a part of what it was, an rms over the joints, on the part that gains least."""
-    if not np.isfinite([trial.left_out, before.left_out]).all():
-        return trial.left_out
-    number, shares = parts(trial.problem), list[float]()
-    for part in np.unique(number):
-        rows = [np.flatnonzero(number[c.rows] == part) + c.rows.start for c in trial.problem.channels]
-        after, error = (
-            np.array([rms(one.errors[0, some]) + MIN_RESIDUAL for some in rows if some.size])
-            for one in (trial, before)
-        )
-        shares.append(rms(after / error))
-    return max(shares)
+def _as_it_is(problem: Problem, model: IdentifiedModel) -> LeftOut:
+    """Return what a model that is not fitted to them makes of the parts of the logs."""
+    errors = problem.output_errors(model.theta[None])[0]
+    judge = likelihood_at(problem, model.theta).errors
+    density = judge.log_density(judge.innovations(errors[None])[0])
+    density[~np.isfinite(density)] = -np.inf
+    return LeftOut(problem, np.tile(model.theta, (len(np.unique(parts(problem))), 1)), errors, density)

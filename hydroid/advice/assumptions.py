@@ -13,10 +13,9 @@ import mujoco
 import numpy as np
 
 from hydroid.arm.model import load_model
-from hydroid.arrays import Array, record
+from hydroid.arrays import Array, independent_samples, record
 from hydroid.findings import Finding
 from hydroid.log import Log
-from hydroid.posterior.noise import fit_noise
 from hydroid.settings.fit import FitSettings
 
 ENOUGH = 6.0  # evidence that names a joint: turned round is 400 times as likely
@@ -89,7 +88,7 @@ def doubts(settings: FitSettings, logs: Sequence[Log]) -> dict[int, float]:
         return [law(loads[:, joint]) for joint, law in laws.items()]
 
     before, found = left(), dict[int, float]()
-    samples = [fit_noise(one).effective_sample_size for one in before]
+    samples = [float(independent_samples(one[:, None])[0]) for one in before]
     for joint in laws:
         sizes = np.array([[np.linalg.norm(one) for one in each] for each in (before, left(joint))])
         gains = np.log(sizes[0] / sizes[1])

@@ -26,8 +26,8 @@ from hydroid.arrays import Array, record
 from hydroid.errors import SettingsError
 from hydroid.log import Log
 from hydroid.posterior.linear import estimate_box, prior_slopes, white_posterior
-from hydroid.posterior.noise import Noise
-from hydroid.posterior.posterior import Posterior
+from hydroid.posterior.error_model import whitened
+from hydroid.posterior.posterior import Posterior, regular
 from hydroid.posterior.uncertainty import uncertainty
 from hydroid.problem.bindings import Bindings
 from hydroid.problem.priors import Priors
@@ -47,20 +47,17 @@ def forecast(known: Posterior) -> Posterior:
     return known.add(np.eye(len(known.root)) / PRIOR_SD)
 
 
-def measured(signals: Iterable[tuple[Array, Noise]]) -> Array:
-    """Return rows N of the information N' N that a least-squares fit gains from signals, shape (p, p)."""
-    parts = [(slopes @ slopes.T, noise.covariance_of(slopes)) for slopes, noise in signals]
-    bread, scatter = np.sum(parts, axis=0)
-    floor = 1e-12 * np.trace(scatter) + np.finfo(float).tiny
-    lower = np.linalg.cholesky(scatter + floor * np.eye(len(scatter)))
-    return solve_triangular(lower, bread, lower=True)
+def measured(settings: DesignSettings, signals: Sequence[Array], period: float) -> Array:
+    """Return rows N of the information N' N that signals of the joints' angles give, shape (p, p).
 
-
-def sensor_noise(settings: DesignSettings, samples: int, period: float) -> Noise:
-    """Return the noise of a future log of angles [rad]: white, or a first-order autoregression."""
-    level, time = np.radians(settings.noise_deg), settings.noise_correlation_s
-    reflection = np.array([-np.exp(-period / time)]) if time > 0 else np.empty(0)
-    return Noise(samples, level, reflection, given=True)
+    `signals` are derivatives by p parameters [rad], (p, T). The errors of a future log are those of an error
+    model: the sensor's noise, and a drift.
+    """
+    noise, drift = np.radians([settings.noise_deg, settings.drift_deg])
+    rows = [whitened(one, period, noise**2, drift**2 / 10.0) for one in signals]
+    p = len(rows[0])
+    floor = 1e-6 * max(float(np.abs(row).max()) for row in rows) + np.finfo(float).tiny
+    return regular(np.vstack([floor * np.eye(p), *(row.T for row in rows)]))
 
 
 class Trial(NamedTuple):
@@ -83,7 +80,6 @@ class ExperimentSimulator:
             settings = settings.changed({"simulation.other_joints": "locked"})
         self._settings, self._bindings = settings, Bindings(settings)
         self._outputs = [j - 1 for j in settings.outputs]
-        self._noise = sensor_noise(settings.design, experiment_samples(settings), settings.log.period_s)
         arm, self._margin = settings.arm, settings.design.clearance_m
         self._spec, self._pose = load_model(arm), arm.pose(settings.start_pose)
         self._machine = None if self._margin is None else load_machine(arm, pair=arm.pair is not None)
@@ -122,7 +118,7 @@ class ExperimentSimulator:
         if not np.isfinite(slopes).all():
             return None
         each = np.moveaxis(slopes.reshape(len(slopes), -1, len(self._outputs)), -1, 0)
-        gained = measured((one, self._noise) for one in each)
+        gained = measured(self._settings.design, each, self._settings.log.period_s)
         return Trial(experiment, gained, replace(experiment.log(self._settings), angle=angle))
 
     def _simulate(self, experiment: Experiment, theta: Array) -> Array:

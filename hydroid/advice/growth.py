@@ -5,32 +5,24 @@ clearly the term is missing, and how much freeing it would gain (`score`). That 
 term. The best few are then really freed: least squares goes on from the estimate, once with all samples and
 once without each part of them, on which the result is judged. A term that only follows the noise loses there.
 
-The score test: let r be the residual of a least-squares fit and d the change of the residual with a quantity
-that the fit holds. What the free parameters can do as well as d, the fit has done already. So d is projected
-off their effects, with the priors as further residuals: d' = d - U' U d with orthonormal rows U. The
-statistic is the score of C. R. Rao (1948), robust to autocorrelated noise of covariance S (H. White, 1982):
+The score test: let r be the innovations at a maximum of the likelihood and d the change of them with a
+quantity that the fit holds. What the free parameters can do as well as d, the fit has done already. So d is
+projected off their effects, with the priors' scores as further rows: d' = d - U' U d with orthonormal rows U.
+The statistic is the score of C. R. Rao (1948), a standard normal variable where the model lacks nothing:
 
-    z = -d' r / sqrt(d' S d').
+    z = -d' r / |d'|.
 
-The change of the quantity that would explain most is a = -d' r / |d'|². S is that of the noise which the
-residual shows without what d' explains, r + a d': a term that explains nearly everything is no noise. z then
-follows about Student's t. Where d' and the noise are slow it has few degrees of freedom: the variance d' S d'
-is a sum over frequencies, each of which is known from two numbers of the record. As many degrees count as the
-sum has terms of equal size (F. E. Satterthwaite, 1946), or as the level of an autoregressive noise has, half
-its effective samples; less the one that a took.
+The change of the quantity that would explain most is a = -d' r / |d'|², and raises the log-likelihood by z² / 2.
 """
 
 import math
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Sequence
 
 import numpy as np
-from scipy.linalg import matmul_toeplitz
-from scipy.stats import t as student
+from scipy.stats import norm as normal
 
 from hydroid.advice.terms import Term, terms
 from hydroid.arrays import Array, Mask, record, rms
-from hydroid.posterior.noise import Noise, problem_noise
 from hydroid.posterior.uncertainty import Uncertainty
 from hydroid.problem.problem import Problem
 from hydroid.progress import Progress
@@ -40,79 +32,54 @@ from hydroid.progress import Progress
 class Score:
     """Statistic z of one change of the model, positive where the change lowers the error.
 
-    By the linear approximation the `amount` of it that lowers the error most saves a `part` of the rms
-    residual. `strength` is the statistic that the whole change would have without noise: what can be seen at
-    all. `freedom` are the degrees of freedom of z.
+    By the linear approximation the `amount` of it that lowers the error most raises the log-likelihood by
+    `gain`. `strength` is the statistic that the whole change would have without noise: what can be seen at all.
     """
 
     statistic: float
     amount: float
-    part: float
     strength: float
-    freedom: float
+
+    @property
+    def gain(self) -> float:
+        """Rise of the log-likelihood by the best amount of the change."""
+        return 0.5 * self.statistic**2
 
     def chance(self, *, one_sided: bool) -> float:
         """Return the probability of such a statistic where the model lacks nothing."""
-        tail = float(student.sf(self.statistic if one_sided else abs(self.statistic), self.freedom))
+        tail = float(normal.sf(self.statistic if one_sided else abs(self.statistic)))
         return tail if one_sided else 2 * tail
 
 
 @record
 class Explained:
-    """What a fit has explained, and the noise that it has left.
+    """What a fit has explained, and what it has left.
 
     Attributes:
-        effects: of the free parameters, orthonormal rows of residuals with all priors behind, (k, R + M + p).
-        residual: of the fit with the priors' weighted scores behind, shape (R + M + p,).
-        noise_of: the noise of each channel, from a row of residuals, shape (R,).
-        rows: of each channel.
-        prior_weight: standard deviation of a prior's row.
+        effects: of the free parameters, orthonormal rows with all priors behind, (k, R + M + p).
+        left: innovations with the priors' scores behind, shape (R + M + p,).
     """
 
     effects: Array
-    residual: Array
-    noise_of: Callable[[Array], Sequence[Noise]]
-    rows: Sequence[slice]
-    prior_weight: float
+    left: Array
 
     def score(self, change: Array) -> Score:
-        """Return the score of a change of the residuals, shape (R,)."""
-        row = np.append(change, np.zeros(self.residual.size - change.size))
+        """Return the score of a change of the innovations, shape (R,)."""
+        row = np.append(change, np.zeros(self.left.size - change.size))
         row -= self.effects.T @ (self.effects @ row)
-        square = float(row @ row)
-        if not square > 0:
-            return Score(0.0, 0.0, 0.0, 0.0, 1.0)
-        gain = -float(row @ self.residual)
-        left = (self.residual + gain / square * row)[: change.size]
-        variance, freedom = self._variance(row, self.noise_of(left))
-        deviation = np.sqrt(variance)
-        before = max(float(np.linalg.norm(self.residual[: change.size])), np.finfo(float).tiny)
-        saved = 1.0 - float(np.linalg.norm(left)) / before
-        return Score(gain / deviation, gain / square, saved, square / deviation, freedom)
-
-    def _variance(self, row: Array, noise: Sequence[Noise]) -> tuple[float, float]:
-        """Variance of the product of a row, (R + M + p,), with the residuals, and its degrees of freedom."""
-        variance = self.prior_weight**2 * np.sum(row[self.rows[-1].stop :] ** 2)
-        spectra: list[Array] = []
-        for process, part in zip(noise, self.rows, strict=True):
-            weighed = matmul_toeplitz(process.autocovariance, row[part])
-            variance += float(row[part] @ weighed)
-            power = np.real(np.conj(np.fft.rfft(row[part])) * np.fft.rfft(weighed))
-            spectra.append(np.maximum(power, 0.0) / weighed.size)
-        spectrum = np.concatenate(spectra)
-        equal = np.sum(spectrum) ** 2 / np.sum(spectrum**2)
-        level = 0.5 * sum(process.effective_sample_size for process in noise)
-        return variance, max(max(2 * equal, level) - 1, 1.0)
+        strength = float(np.linalg.norm(row))
+        if not strength > 0:
+            return Score(0.0, 0.0, 0.0)
+        statistic = -float(row @ self.left) / strength
+        return Score(statistic, statistic / strength, strength)
 
 
 def explained(problem: Problem, known: Uncertainty) -> Explained:
     """Return what a fit has explained at an estimate. Parameters at bounds are held."""
     linear = known.linear
-    scores = linear.prior_weight * problem.priors.scores(known.theta[None])[0]
     weak = np.zeros(len(linear.slopes))  # the estimate does not depend on the weak priors
-    residual = np.concatenate([linear.residual, scores, weak])
-    rows, noise_of = [c.rows for c in problem.channels], partial(problem_noise, problem)
-    return Explained(linear.effects, residual, noise_of, rows, linear.prior_weight)
+    left = np.concatenate([linear.innovations, problem.priors.scores(known.theta[None])[0], weak])
+    return Explained(linear.effects, left)
 
 
 def holm(chances: Sequence[float], level: float) -> Mask:
@@ -126,14 +93,13 @@ def holm(chances: Sequence[float], level: float) -> Mask:
 
 
 LEVEL = 0.05  # probability that any term is a candidate where none is missing
-MIN_GAIN = 0.02
-"""part of the rms error that a candidate must promise to save, and then save on the parts left out"""
+MIN_GAIN = 2.0
+"""rise of the log-likelihood that a candidate must promise: that of one more parameter by Akaike's measure"""
 VISIBLE = 3.0
 """statistic of the largest change, without noise; a term below it cannot be told from the free parameters"""
 LARGEST_EFFECT = 0.5
-"""rms effect of the change that is tested, in parts of the rms residual: large enough for terms that act
-beyond a threshold, small enough for a derivative"""
-MIN_RESIDUAL = np.deg2rad(0.05)  # what the rms residual counts at least [rad]
+"""rms effect of the change that is tested, in standard deviations of an innovation: large enough for terms
+that act beyond a threshold, small enough for a derivative"""
 
 
 @record
@@ -143,7 +109,7 @@ class Candidate:
     Attributes:
         score: how clearly the residual shows its effect, in standard deviations.
         chance: of such a score if the model lacks nothing.
-        gain: part of the rms error that freeing it saves, by the linear approximation.
+        gain: rise of the log-likelihood by freeing it, by the linear approximation.
     """
 
     term: Term
@@ -158,7 +124,7 @@ def score_terms(problem: Problem, known: Uncertainty, progress: Progress) -> lis
     every, fit, tests = terms(problem, known.theta), explained(problem, known), list[Candidate]()
     for done, term in enumerate(every):
         progress("terms", done, len(every))
-        tests += _tested(term, problem, known, fit)
+        tests += _tested(term, known, fit)
     return tests
 
 
@@ -174,15 +140,15 @@ def promising(tests: Sequence[Candidate]) -> list[Candidate]:
     return list(best.values())
 
 
-def _tested(term: Term, problem: Problem, known: Uncertainty, fit: Explained) -> list[Candidate]:
+def _tested(term: Term, known: Uncertainty, fit: Explained) -> list[Candidate]:
     """Test one term by the largest change whose effect is small, a limit by each that acts."""
     (low, high), limit = term.span, math.isinf(term.value)
     end = high if high - term.value >= term.value - low else low
     parts = np.zeros(16) if limit else 4.0 ** np.arange(-5.0, 1.0)
     values = np.geomspace(high, low, 16) if limit else term.value + parts * (end - term.value)
-    residual = known.linear.residual
-    effects = term.residuals(problem, known.theta, values.tolist()) - residual
-    sizes = rms(effects, axis=1) / max(rms(residual), MIN_RESIDUAL)
+    likelihood = known.likelihood
+    effects = term.innovations(likelihood, known.theta, values.tolist()) - known.linear.innovations
+    sizes = rms(effects, axis=1)
     acting = np.flatnonzero(np.isfinite(sizes) & (sizes > 0))
     if not limit:
         acting = acting[: max(np.sum(sizes[acting] <= LARGEST_EFFECT), 1)][-1:]
@@ -191,7 +157,7 @@ def _tested(term: Term, problem: Problem, known: Uncertainty, fit: Explained) ->
     for i in acting:
         score = fit.score(effects[i])
         if score.strength >= VISIBLE * parts[i]:
-            gain = 0.0 if one_sided and score.statistic <= 0 else score.part
+            gain = 0.0 if one_sided and score.statistic <= 0 else score.gain
             away = values[i] - term.value
             start = values[i] if limit else term.value + np.copysign(away, away * score.amount)
             scores.append((gain, score, np.clip(start, low, high)))

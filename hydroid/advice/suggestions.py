@@ -11,22 +11,29 @@ import yaml
 from hydroid.advice.assumptions import assumption_findings, doubts
 from hydroid.advice.design import ExperimentSimulator, forecast
 from hydroid.advice.experiment import RandomExperiments
-from hydroid.advice.growth import MIN_GAIN, Candidate, promising, score_terms
-from hydroid.advice.left_out import refitted
+from hydroid.advice.growth import Candidate, promising, score_terms
 from hydroid.arrays import Array
 from hydroid.errors import SettingsError
 from hydroid.estimate import finite
 from hydroid.files import Plain
 from hydroid.findings import Finding
-from hydroid.posterior.noise import error_level
+from hydroid.fitting.left_out import LeftOut, gain, is_better, parts, predict_parts
+from hydroid.fitting.summary import angle_errors
+from hydroid.fitting.refinement import Refinement, refine
+from hydroid.posterior.error_model import Likelihood
 from hydroid.posterior.posterior import Posterior
 from hydroid.posterior.uncertainty import Uncertainty
 from hydroid.problem.problem import Problem
 from hydroid.progress import Progress
 from hydroid.quantity_table import MECHANICAL
 from hydroid.settings.fit import FitSettings
+from hydroid.settings.search import RefinementSettings
 
 MOST_TRIED = 6  # terms that are really freed, the most promising first
+AHEAD = 10.0
+"""time over which a predicted change of an angle is compared [s]"""
+COMPARED = RefinementSettings(iterations=60, gain_tolerance=1e-4)
+"""of the refinements without a part of the logs"""
 
 STATED_SD = {"weigh": 0.02, "state": 0.05}
 """relative standard deviation of a mass that was weighed, and of a value from a data sheet (ours)"""
@@ -44,31 +51,35 @@ def advice(
 
     The suggestions are as JSON has them (docs/json.md); `run` is the estimate's folder in commands.
     """
-    tests, weight = score_terms(problem, known, progress), known.linear.prior_weight
+    tests = score_terms(problem, known, progress)
     best = promising(tests)
-    without = refitted(problem, known.theta, weight)
+    starts = np.tile(known.theta, (len(np.unique(parts(problem))), 1))
+    without = predict_parts(problem, starts, refitted)
     rows: list[tuple[bool, float, Plain]] = []
     for i, one in enumerate(best):
-        error = math.inf
         row = {
             "name": one.term.name,
             "unit": one.term.entries[one.term.name].unit,
             "held": finite(one.term.value),
             "score": one.score,
             "chance": one.chance,
-            "gain_percent": 100 * one.gain,
+            "gain": one.gain,
         }
+        rise = -math.inf
         if i < MOST_TRIED:
             progress(f"freeing {one.term.name}", i, min(MOST_TRIED, len(best)))
             more = one.term.added_to(problem)
-            freed = refitted(more, one.term.theta(problem, known.theta, one.start), weight)
-            value = more.parameters.mapping(freed.theta)[one.term.name]
-            error = freed.left_out
+            at = [one.term.theta(problem, theta, one.start) for theta in without.thetas]
+            freed = predict_parts(more, np.array(at), refitted)
+            value = float(np.mean([more.parameters.mapping(theta)[one.term.name] for theta in freed.thetas]))
+            rise, error = gain(freed, without)
             row |= {"freed": value, "left_out_deg": freed.by_joint}
-            if error < (1 - MIN_GAIN) * without.left_out:
+            row |= {"left_out_gain": finite(rise), "left_out_gain_sd": finite(error)}
+            if is_better(freed, without):
                 entries = proposed(one, value)
                 row |= {"parameters": entries, "command": freeing_command(problem, entries, run)}
-        rows.append(("command" not in row, error, row))
+                row |= {"improvement_deg": improvement(freed, without)}
+        rows.append(("command" not in row, -rise, row))
     doubted = doubts(problem.settings, problem.logs)
     content = {
         "left_out_deg": without.by_joint,
@@ -79,6 +90,43 @@ def advice(
     }
     said = *assumption_findings(problem.settings, problem.logs, doubted), *missing_findings(content)
     return content, (*said, *action_findings(content, problem.settings))
+
+
+def refitted(likelihood: Likelihood, theta: Array, name: str) -> Refinement:
+    """Refine an estimate for a comparison on parts left out; nothing is shown or stored of it."""
+    return refine(likelihood, theta, COMPARED, lambda *_: False, {}, name)
+
+
+def improvement(after: LeftOut, before: LeftOut) -> dict[str, tuple[float, float]]:
+    """Return by how much the rms error on a part left out falls, with a standard error, by joint [deg].
+
+    The error is that of the change of an angle over AHEAD. The standard error is by leaving out one block of
+    time after the other (a jackknife).
+    """
+    problem = after.problem
+    names = problem.settings.arm.joint_names
+    result = dict[str, tuple[float, float]]()
+    for joint in problem.settings.outputs:
+        squares = np.array([squares_ahead(one, joint) for one in (before, after)])
+        sums = squares.sum(axis=1)
+        fall = np.subtract(*np.sqrt(sums / squares.shape[1]))
+        others = np.sqrt((sums[:, None] - squares) / max(squares.shape[1] - 1, 1))
+        spread = others[0] - others[1]
+        sd = np.sqrt((len(spread) - 1) * np.var(spread))
+        result[names[joint - 1]] = float(np.degrees(fall)), float(np.degrees(sd))
+    return result
+
+
+def squares_ahead(one: LeftOut, joint: int) -> Array:
+    """Squares of the errors of a joint's change over AHEAD, one span after the other in all logs [rad²]."""
+    spans = list[Array]()
+    for channel in one.problem.channels:
+        if channel.quantity == "angle" and channel.joint == joint:
+            step = max(round(AHEAD / one.problem.logs[channel.log].period), 1)
+            error = one.errors[channel.rows] / channel.weight
+            step = min(step, len(error) - 1)
+            spans.append(np.diff(error[::step]) ** 2)
+    return np.concatenate(spans)
 
 
 def next_actions(problem: Problem, known: Uncertainty) -> list[Plain]:
@@ -112,14 +160,12 @@ def _forecasts(problem: Problem, known: Uncertainty, now: Posterior) -> Iterator
         if own.unit in MEASURABLE and stand_ins.isdisjoint(own.joints or ()):
             kind = "weigh" if own.quantity == "mass" else "state"
             yield kind, name, row[None] / STATED_SD[kind]
-    level, time = max(
-        (error_level(channel, noise), noise.correlation_time * problem.logs[channel.log].period)
-        for channel, noise in zip(problem.channels, known.noise, strict=True)
-        if channel.quantity == "angle"
-    )
+    errors = known.errors
+    sensor = [errors.numbers[i, 0] for i, one in enumerate(errors.signals) if one.quantity == "angle"]
+    drift = [one.after_10_s_deg for one in angle_errors(known).values()]
     # what the best of a few could measure; hydroid design then looks for one free of collisions
-    noise = {"noise_deg": np.degrees(level), "noise_correlation_s": time}
-    settings = settings.changed({"design": settings.design.changed(noise | {"clearance_m": None})})
+    noise = {"noise_deg": np.degrees(np.sqrt(max(sensor))), "drift_deg": max(drift), "clearance_m": None}
+    settings = settings.changed({"design": settings.design.changed(noise)})
     try:
         draws = RandomExperiments(settings, np.random.default_rng(1))
     except SettingsError:

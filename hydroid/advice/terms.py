@@ -13,7 +13,7 @@ import numpy as np
 
 from hydroid.arrays import Array, record
 from hydroid.hydraulics.actuator import START_PRESSURE
-from hydroid.posterior.linear import with_open_start
+from hydroid.posterior.error_model import Likelihood
 from hydroid.problem.problem import Problem
 from hydroid.quantity_table import CHOICES, MECHANICAL, QUANTITIES, ROWS, TARGETS
 from hydroid.settings.fit import FitSettings
@@ -48,10 +48,11 @@ class Term:
         values = problem.parameters.mapping(theta) | {self.name: value}
         return np.array([values[name] for name in problem.settings.parameters | dict(self.entries)])
 
-    def residuals(self, problem: Problem, theta: Array, values: Sequence[float]) -> Array:
-        """Residuals [rad] of a problem at an estimate, (P,), with the term at n values, shape (n, R)."""
-        more = self.added_to(problem).with_open_starts(with_open_start(problem, theta).open_starts)
-        return more.residuals(np.array([self.theta(problem, theta, value) for value in values]))
+    def innovations(self, likelihood: Likelihood, theta: Array, values: Sequence[float]) -> Array:
+        """Innovations of a likelihood at an estimate, (P,), with the term at n values, shape (n, R)."""
+        problem = likelihood.problem
+        thetas = np.array([self.theta(problem, theta, value) for value in values])
+        return likelihood.errors.innovations(self.added_to(problem).output_errors(thetas))
 
     @property
     def kind(self) -> tuple[object, ...]:

@@ -12,7 +12,7 @@ from hydroid.fitting.search import Searched, search
 from hydroid.posterior.quantities import Quantities, quantities
 from hydroid.posterior.uncertainty import Uncertainty
 from hydroid.problem.problem import Problem
-from hydroid.search.descent import Descent
+from hydroid.fitting.refinement import Refinement
 from hydroid.search.pareto import average, non_dominated, segment_best, utopia
 
 
@@ -33,14 +33,14 @@ class Fit:
     final: str
     front: tuple[Array, Array]
     history: Array
-    refinements: dict[str, Descent]
+    refinements: dict[str, Refinement]
     ends: Mapping[int, Sequence[float]]
     uncertainty: Uncertainty
     quantities: Quantities
     seconds: Mapping[str, float]
 
     @property
-    def refinement(self) -> Descent | None:
+    def refinement(self) -> Refinement | None:
         """The refinement that gave the estimate to use; None where the search did."""
         return self.refinements.get(self.final)
 

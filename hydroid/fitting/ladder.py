@@ -1,8 +1,9 @@
 """The ladder of a fit: refinements one after another, each of a model that has more in it than the last one.
 
-A rung is kept where it errs clearly less: another model on the fitted logs, another term on parts of the logs
-left out, or by half on the fitted ones. Which rung that is shows long before least squares has converged, so
-that ends early on the way (`FIRM`). What is kept at the end is refined to the tolerance of the settings.
+A rung is kept where it foretells parts of the logs that it has not seen better than the one below, by more
+than the uncertainty of that (`left_out.is_better`). Which rung that is shows long before least squares has
+converged, so that ends early on the way (`FIRM`). What is kept at the end is refined to the tolerance of the
+settings.
 """
 
 from collections.abc import Mapping
@@ -11,24 +12,25 @@ from typing import Protocol
 
 import numpy as np
 
-from hydroid.advice.growth import MIN_GAIN
-from hydroid.advice.left_out import refitted
 from hydroid.arrays import Array, record
 from hydroid.fitting.checkpoints import Checkpoints
-from hydroid.fitting.multistart import alone, lone_joints
-from hydroid.fitting.refinement import ROUGH, refine
+from hydroid.fitting.left_out import LeftOut, gain, is_better, parts, predict_parts
+from hydroid.fitting.refinement import Refinement, refine
+from hydroid.posterior.error_model import Likelihood, make_likelihood
 from hydroid.posterior.linear import estimate_box
 from hydroid.posterior.uncertainty import Uncertainty, uncertainty
 from hydroid.problem.problem import Problem
-from hydroid.search.descent import Descent, Ending
+from hydroid.search.descent import Ending
 from hydroid.settings.search import RefinementSettings
 
 FAR = 2.0
 """times the rms error of the last estimate at which the dynamic model is given up after a rough refinement:
 lags that stand for oil in a quasi-static model are too much beside it, and it errs by more at first"""
-CLEAR = 0.5
-"""part of the rms error up to which a term is kept, whatever errors left out say: these are those of fewer
-logs, of which one alone may leave so much open that it predicts nothing, with the term or without"""
+WORTH = 2.0
+"""gain of the fitted logs' log-likelihood, for each parameter more, below which no part is left out: such a
+rung cannot foretell them clearly better"""
+ROUGH = 0.1
+"""gain below which a rough refinement ends"""
 FIRM = 1e-3  # gain below which least squares ends where another rung may follow
 
 
@@ -37,8 +39,9 @@ class Estimate:
     """One parameter set with its response.
 
     theta: shape (P,). segments: objectives by segment, shape (S,). overall: norm over the whole record.
-    rms: of the output error [rad]. responses: simulated outputs [rad], (T, K) a log. left_out: of an estimate
-    with another term, the rms error on parts of the logs left out, without the term and with it [rad].
+    rms: of the output error [rad]. responses: simulated outputs [rad], (T, K) a log. gained: of an estimate
+    with another term or model, by how much it foretells parts of the logs left out better than the one below,
+    and the standard error of that (`left_out.gain`).
     """
 
     name: str
@@ -47,7 +50,7 @@ class Estimate:
     overall: float
     rms: float
     responses: tuple[Array, ...]
-    left_out: tuple[float, float] | None = None
+    gained: tuple[float, float] | None = None
 
     @property
     def usable(self) -> bool:
@@ -91,10 +94,12 @@ class Ladder:
     def __init__(
         self, problem: Problem, estimates: dict[str, Estimate], watch: Watcher, checkpoints: Checkpoints
     ) -> None:
-        self.problem, self.estimates, self.refinements = problem, estimates, dict[str, Descent]()
+        self.problem, self.estimates = problem, estimates
+        self.refinements = dict[str, Refinement]()
         self.kept = min(estimates.values(), key=lambda e: e.rms if e.usable else np.inf)
         self._watch, self._checkpoints, self._late = watch, checkpoints, False
-        self._left_out = dict[str, float]()
+        self._left_out = dict[str, LeftOut]()
+        self._searched = problem.parameters.mapping(self.kept.theta)
 
     def climb(self, whole: Problem) -> None:
         """Refine the estimate with each model and term that the settings of a fit's problem name."""
@@ -102,94 +107,96 @@ class Ladder:
         assert refinement is not None
         two = settings.stage == "hyd" and settings.simulation.model == "ladder"
         climbs = two or bool(settings.terms())
+        tolerance = max(FIRM, refinement.gain_tolerance) if climbs else refinement.gain_tolerance
+        on_the_way = refinement.changed({"gain_tolerance": tolerance})
         for model in ("refined", "dynamic")[: 1 + two]:
             possible = settings.terms(model)
             terms = [term for term in possible if term in self.kept.name.split("+")]
-            self._rung(whole, "+".join([model, *terms]), climbs=climbs, if_nearer=model == "dynamic")
+            self._rung(whole, "+".join([model, *terms]), on_the_way, if_better=model == "dynamic")
             for term in possible if self.kept.name.startswith(model) else ():
                 if term not in terms:
-                    self._rung(whole, f"{self.kept.name}+{term}", climbs=climbs, if_nearer=True)
+                    self._rung(whole, f"{self.kept.name}+{term}", on_the_way, if_better=True)
         if climbs:
             kept = self.kept
-            last = self._refined(self.problem, kept.theta, refinement, kept.name)
+            last = self._refined(make_likelihood(self.problem), kept.theta, refinement, kept.name)
             new = self._measured(self.problem, last, kept.name)
-            self.kept = self.estimates[kept.name] = replace(new, left_out=kept.left_out)
+            self.kept = self.estimates[kept.name] = replace(new, gained=kept.gained)
         if settings.joint_refinement:
-            self._rung(whole, self.kept.name.replace("refined", "joint"), climbs=False, if_nearer=False)
+            self._rung(whole, self.kept.name.replace("refined", "joint"), refinement, if_better=False)
 
     def known(self, theta: Array) -> Uncertainty:
         """Return how well the logs determine theta, (P,): the estimate that is kept, or one of a search."""
-        problem, descent, slopes = self.problem, self.refinements.get(self.kept.name), None
-        if descent is not None and len(descent.jacobian):  # what least squares ended with
-            parameters, free = problem.parameters, problem.parameters.free
-            change = estimate_box(parameters, theta).scale[free] / parameters.width(theta)[free]
-            slopes = descent.jacobian[: problem.measured.size].T * change[:, None]
-        return uncertainty(problem, theta, slopes)
+        problem, descent = self.problem, self.refinements.get(self.kept.name)
+        if descent is None or not len(descent.jacobian):
+            return uncertainty(problem, theta)
+        # what least squares ended with
+        parameters, free = problem.parameters, problem.parameters.free
+        change = estimate_box(parameters, theta).scale[free] / parameters.width(theta)[free]
+        slopes = descent.jacobian[: problem.measured.size].T * change[:, None]
+        return uncertainty(problem, theta, slopes, descent.numbers)
 
-    def _rung(self, whole: Problem, name: str, *, climbs: bool, if_nearer: bool) -> None:
+    def _rung(self, whole: Problem, name: str, settings: RefinementSettings, *, if_better: bool) -> None:
         """Refine with the settings of an estimate, from the one kept; keep the result where it is better.
 
-        climbs: whether it is enough to see that it is better. if_nearer: else it is kept in any case.
+        if_better: else it is kept in any case.
         """
-        last, start, settings = self.problem, self.kept, whole.settings.refinement or RefinementSettings()
+        last, start = self.problem, self.kept
+        if if_better and (self._late or last.leaves_noise(start.theta)):
+            return
         own = whole.varied(whole.settings.of_estimate(name))
         theta = own.parameters.started(last.parameters.mapping(start.theta))
-        other_model = own.settings.quasi_static != last.settings.quasi_static
-        if if_nearer and (self._late or last.leaves_noise(start.theta)):
-            return
-        more = len(own.settings.terms()) > len(last.settings.terms())  # other parameters may stand for it
-        if more or other_model:
+        likelihood = make_likelihood(own)
+        if own.settings.quasi_static != last.settings.quasi_static:
             rough = settings.changed({"gain_tolerance": ROUGH})
-            first = self._refined(own, theta, rough, f"{name} at first")
+            first = self._refined(likelihood, theta, rough, f"{name} at first")
             theta = own.parameters.from_unit(first.point)
-            if other_model and not own.rms(own.output_errors(theta[None]))[0] < FAR * start.rms:
+            if not own.rms(own.output_errors(theta[None]))[0] < FAR * start.rms:
                 return
-        step = f"{name} on the way" if climbs else name
-        if climbs:
-            settings = settings.changed({"gain_tolerance": max(FIRM, settings.gain_tolerance)})
-        if more:
-            theta = self._each_alone(own, theta, settings, name)
-        result = self._refined(own, theta, settings, step)
-        if self._late and if_nearer:
+        result = self._refined(likelihood, theta, settings, f"{name} on the way")
+        if self._late and if_better:
             return
         new = self._measured(own, result, name)
-        nearer = new.rms < (1 - MIN_GAIN) * start.rms
-        if nearer and more:
-            without, with_it = self._error_left_out(last, start), self._error_left_out(own, new)
-            self.estimates[name] = new = replace(new, left_out=(without, with_it))
-            nearer = with_it < (1 - MIN_GAIN) * without or new.rms < CLEAR * start.rms
-        if nearer or not if_nearer:
+        if not if_better:
+            self.problem, self.kept = own, new
+            return
+        more = max(int(own.parameters.free.sum() - last.parameters.free.sum()), 1)
+        before = self.refinements[start.name].negative_log
+        if before - result.negative_log < WORTH * more:
+            return
+        without = self._parts_left_out(last, start.name, settings)
+        mapped = [last.parameters.mapping(one) for one in without.thetas]
+        starts = np.array([own.parameters.started(one) for one in mapped])
+        with_it = self._predicted(own, starts, name, settings)
+        self.estimates[name] = new = replace(new, gained=gain(with_it, without))
+        if not self._late and is_better(with_it, without):
+            self._left_out[name] = with_it
             self.problem, self.kept = own, new
 
-    def _each_alone(self, problem: Problem, theta: Array, settings: RefinementSettings, name: str) -> Array:
-        """Return theta, (P,), after every joint that can be was refined alone.
+    def _parts_left_out(self, problem: Problem, name: str, settings: RefinementSettings) -> LeftOut:
+        """Return the parts of the logs as an estimate's model foretells them, from where the search began."""
+        if name not in self._left_out:
+            start = problem.parameters.started(self._searched)
+            starts = np.tile(start, (len(np.unique(parts(problem))), 1))
+            self._left_out[name] = self._predicted(problem, starts, name, settings)
+        return self._left_out[name]
 
-        What joints share is known better by now. A valve whose compensation stood for it starts without, too.
-        """
-        for joint in lone_joints(problem):
-            own, parameters = alone(problem, joint, theta), problem.settings.parameters.values()
-            loaded = np.array([p.quantity == "compensation" and p.joints == (joint,) for p in parameters])
-            starts = np.unique([theta, np.where(loaded & own.parameters.free, 0.0, theta)], axis=0)
-            tried = [
-                self._refined(own.from_afar(), start, settings, f"{name} joint {joint} start {i}")
-                for i, start in enumerate(starts, 1)
-            ]
-            best = min(tried, key=lambda one: one.cost)
-            theta = np.where(own.parameters.free, own.parameters.from_unit(best.point), theta)
-        return theta
+    def _predicted(
+        self, problem: Problem, starts: Array, name: str, settings: RefinementSettings
+    ) -> LeftOut:
+        def refit(likelihood: Likelihood, theta: Array, part: str) -> Refinement:
+            return self._refined(likelihood, theta, settings, f"{name} {part}")
 
-    def _refined(self, problem: Problem, theta: Array, settings: RefinementSettings, name: str) -> Descent:
-        result = refine(problem, theta, settings, self._watch.refining, self._checkpoints, name)
+        return predict_parts(problem, starts, refit)
+
+    def _refined(
+        self, likelihood: Likelihood, theta: Array, settings: RefinementSettings, name: str
+    ) -> Refinement:
+        result = refine(likelihood, theta, settings, self._watch.refining, self._checkpoints, name)
         self._late |= result.ending is Ending.TIME
         return result
 
-    def _measured(self, problem: Problem, end: Descent, name: str) -> Estimate:
+    def _measured(self, problem: Problem, end: Refinement, name: str) -> Estimate:
         """Measure an end of least squares, and list it."""
         self.estimates |= measured(problem, {name: problem.parameters.from_unit(end.point)})
         self.refinements[name] = end
         return self.estimates[name]
-
-    def _error_left_out(self, problem: Problem, one: Estimate) -> float:
-        if one.name not in self._left_out:
-            self._left_out[one.name] = refitted(problem, one.theta).left_out
-        return self._left_out[one.name]

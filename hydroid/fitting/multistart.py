@@ -19,12 +19,12 @@ from operator import itemgetter
 import numpy as np
 from numpy.random import Generator
 
-from hydroid.arrays import rms
 from hydroid.fitting.baselines import NAMES, fit_baselines
 from hydroid.fitting.checkpoints import Checkpoints, Memo
 from hydroid.fitting.refinement import Refining, refine
 from hydroid.parameters import Array
 from hydroid.posterior.bench import make_bench
+from hydroid.posterior.error_model import likelihood_at, make_likelihood
 from hydroid.problem.problem import Problem
 from hydroid.search.chromosomes import Genes
 from hydroid.search.genetic import Population
@@ -32,13 +32,13 @@ from hydroid.search.genetic import Population
 DRAWS = 64  # candidates drawn for a start that can be simulated
 MOVES = 0.01
 """part of an angle's travel over the whole record, below which a shorter part of it shows no motion"""
-COST = itemgetter(0)  # of a cost and the theta that it is of
+COST = itemgetter(0)  # of a negative log-likelihood and the theta that it is of
 
 
 class Multistart:
     """Least squares from one random start after the other: a search whose chromosomes are theta.
 
-    Its objective is the rms residual, priors included. A start depends on the seed and its number alone.
+    Its objective is the negative log-likelihood, priors included. A start depends on the seed and its number alone.
 
     Args:
         problem: what is minimised.
@@ -53,10 +53,10 @@ class Multistart:
         self.settings = problem.settings.search.multistart
         self._problem, self._memo, self._progress, self._checkpoints = problem, memo, progress, checkpoints
         self._best: dict[int, tuple[float, Array]] = {}
-        """the best fit of each joint alone, over the starts so far: its cost, and theta"""
-        self._rms = np.inf
+        """the best fit of each joint alone, over the starts so far: its negative log-likelihood, and theta"""
+        self._cost = np.inf
         self.ends = defaultdict[int, list[float]](list)
-        """costs at which starts ended, by the joint fitted alone, 0: all together"""
+        """negative log-likelihoods at which starts ended, by the joint fitted alone, 0: all together"""
 
     def ask(self, population: Population | None, rng: Generator) -> Genes:
         """The point that the next start reaches, shape (1, P)."""
@@ -65,18 +65,17 @@ class Multistart:
         if lone_joints(self._problem):
             theta = self._joint_by_joint(number, theta)
             self._memo.elsewhere += 1
-            rows = self._problem.residuals(theta[None])
-            self._rms = rms(rows) if np.isfinite(rows).all() else np.inf
+            likelihood = likelihood_at(self._problem, theta)
+            rows = likelihood.rows(theta[None])[0]
+            self._cost = likelihood.negative_log(rows) if np.isfinite(rows).all() else np.inf
         else:
-            cost, theta = self._grown(self._problem, theta, f"start {number + 1}")
-            self.ends[0].append(cost)
-            size = self._problem.measured.size + len(self._problem.priors)
-            self._rms = np.sqrt(2 * cost / size)
+            self._cost, theta = self._grown(self._problem, theta, f"start {number + 1}")
+            self.ends[0].append(self._cost)
         return theta[None]
 
     def tell(self, population: Population | None, offspring: Population) -> Population:
-        """The points reached so far, with their rms residuals."""
-        reached = Population(offspring.chromosomes, np.array([[self._rms]]))
+        """The points reached so far, with their negative log-likelihoods."""
+        reached = Population(offspring.chromosomes, np.array([[self._cost]]))
         return reached if population is None else population.join(reached)
 
     def start(self, number: int) -> Array:
@@ -90,7 +89,7 @@ class Multistart:
             unit[0] = self._problem.start
         drawn = self._problem.theta(unit)
         shortest = self._parts(self._problem)[0]
-        return drawn[np.argmax(np.isfinite(shortest.residuals(drawn)).all(axis=1))]
+        return drawn[np.argmax(np.isfinite(shortest.output_errors(drawn)).all(axis=1))]
 
     def _joint_by_joint(self, number: int, theta: Array) -> Array:
         """Fit start `number`, (P,), to every joint alone; the last start takes the best one of each joint."""
@@ -107,19 +106,23 @@ class Multistart:
         return theta
 
     def _grown(self, problem: Problem, theta: Array, name: str) -> tuple[float, Array]:
-        """Fit theta, (P,), to growing parts of the records, at last all of them; return its cost, and it."""
+        """Fit theta, (P,), to growing parts of the records, at last all of them.
+
+        Returned are its negative log-likelihood, and it.
+        """
         cost = np.inf
         for number, part in enumerate(self._parts(problem), 1):
             before = self._memo.simulated
             result = refine(
-                part.from_afar(),
+                make_likelihood(part),
                 theta,
                 self.settings,
                 lambda what, n, rms, before=before: self._progress(what, before + n, rms),
                 self._checkpoints,
                 f"{name} part {number}",
             )
-            cost, theta = result.cost, part.parameters.from_unit(result.point)
+            cost = result.negative_log
+            theta = part.parameters.from_unit(result.point)
             self._memo.elsewhere += result.evaluations
         return cost, theta
 

@@ -5,20 +5,21 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from hydroid.estimate import FitSummary, NamedEstimate, ParameterEstimate, finite, finite_ends
+from hydroid.estimate import AngleError, FitSummary, NamedEstimate, ParameterEstimate, finite, finite_ends
 from hydroid.findings import Finding
 from hydroid.fitting.fit import Fit
 from hydroid.posterior.by_log import by_log
 from hydroid.posterior.identifiability import identifiability
-from hydroid.posterior.noise import error_level
+from hydroid.posterior.error_model import ErrorModel
 from hydroid.posterior.uncertainty import Flag, Source, Uncertainty
+from hydroid.posterior.whiteness import lasting
 from hydroid.problem.problem import Problem
 from hydroid.search.descent import Ending
 
 STRAINED_ABOVE = 2.0
 """standard deviations from its prior beyond which an estimate strains it, if the logs determine it"""
-SAME_OPTIMUM = 1.04
-"""times the lowest cost up to which a start has found the same optimum: 2 % of the rms error"""
+SAME_OPTIMUM = 10.0
+"""log-likelihood below the best up to which a start has found the same optimum"""
 _WARNINGS = "at bound", "effect unknown"
 _KINDS = (*_WARNINGS, "at zero", "no effect", "not identifiable", "prior only", "weakly identifiable")
 """of what is found about single parameters, the most important first"""
@@ -34,7 +35,7 @@ def summarise(problem: Problem, fit: Fit) -> FitSummary:
             values=settings.of_estimate(e.name).parameter_set().mapping(e.theta),
             rms_deg=finite(np.degrees(e.rms)),
             objective=finite(objective * e.overall),
-            left_out_deg=e.left_out and finite_ends(np.degrees(e.left_out)),
+            gained=e.gained and finite_ends(np.array(e.gained)),
         )
         for e in fit.estimates.values()
     }
@@ -75,10 +76,6 @@ def account(problem: Problem, known: Uncertainty) -> FitSummary:
         )
         for i, (parameter, status) in enumerate(zip(parameters.parameters, known.status, strict=True))
     }
-    squares = defaultdict[str, list[float]](list)
-    for channel, noise in zip(problem.channels, known.noise, strict=True):
-        if channel.quantity == "angle":
-            squares[f"q{channel.joint}"].append(error_level(channel, noise) ** 2)
     findings = _parameter_findings(problem, estimate)
     findings += [Finding("logs disagree", "warning", logs.differing)] if logs.differing else []
     combinations = identifiability(problem, known).combinations
@@ -89,9 +86,37 @@ def account(problem: Problem, known: Uncertainty) -> FitSummary:
         estimate=estimate,
         findings=tuple(sorted(findings, key=lambda finding: finding.level == "note")),
         covariance=known.posterior.stored(parameters),
-        noise_deg={angle: float(np.degrees(np.sqrt(np.mean(each)))) for angle, each in squares.items()},
+        errors=angle_errors(known),
         left_out_deg={angle: tuple(errors) for angle, errors in logs.left_out.items()},
     )
+
+
+def angle_errors(known: Uncertainty) -> dict[str, AngleError]:
+    """Return what is known of the error of each compared angle, by its name."""
+    errors = known.errors
+    lasts = lasting(errors, known.linear.innovations)
+    result = dict[str, AngleError]()
+    for i, signal in enumerate(errors.signals):
+        if signal.quantity == "angle":
+            sensor, rate, way, relaxation = errors.numbers[i].tolist()
+            result[f"q{signal.joint}"] = AngleError(
+                sensor_deg=np.degrees(np.sqrt(sensor)),
+                drift_per_s=np.degrees(np.degrees(rate)),
+                drift_per_way=np.degrees(way),
+                relaxation_s=relaxation,
+                after_10_s_deg=np.degrees(_deviation_ahead(errors, i, 10.0)),
+                lasts_s=lasts[signal.joint],
+            )
+    return result
+
+
+def _deviation_ahead(errors: ErrorModel, i: int, seconds: float) -> float:
+    """Standard deviation of a signal so many seconds ahead, at its mean speed in the logs [rad]."""
+    sensor, rate, way, relaxation = errors.numbers[i]
+    courses = [course for course, own in zip(errors.courses, errors.of, strict=True) if own == i]
+    speed = sum(course.way.sum() for course in courses) / sum(c.period * len(c.way) for c in courses)
+    grown = 0.5 * relaxation * -np.expm1(-2 * seconds / relaxation)
+    return np.sqrt(sensor + (rate + way * speed) * grown)
 
 
 def fit_findings(fit: Fit) -> list[Finding]:
@@ -102,7 +127,7 @@ def fit_findings(fit: Fit) -> list[Finding]:
     elif not (ending := fit.refinement.ending).converged:
         kind = "time up" if ending is Ending.TIME else "not converged"
         findings.append(Finding(kind, "warning", (fit.final,), {"ending": ending.value}))
-    apart = [joint for joint, ends in fit.ends.items() if max(ends) > SAME_OPTIMUM * min(ends)]
+    apart = [joint for joint, ends in fit.ends.items() if max(ends) > SAME_OPTIMUM + min(ends)]
     if apart:
         names = [fit.problem.settings.arm.joint_names[joint - 1] for joint in apart if joint]
         findings.append(Finding("several optima", "note", tuple(names or ["all joints"])))

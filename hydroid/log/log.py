@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hydroid.arrays import Array, Mask, record
+from hydroid.arrays import Array, Mask, independent_samples, record
 from hydroid.errors import LogError
 from hydroid.findings import WORDS, Finding, Level
 from hydroid.words import listed
@@ -24,6 +24,8 @@ class Log:
         period: [s].
         pressure: of chambers A and B [Pa], shape (T, J, 2), NaN where unmeasured; None: the log has none.
         rest: samples before the first command of the recording; None: before the first one in `command`.
+        recorded: samples that stand in for a row of the file, shape (T,): angles of the others lie between
+            two rows, and say nothing new. None: all do.
     """
 
     source: str
@@ -33,6 +35,7 @@ class Log:
     period: float
     pressure: Array | None = None
     rest: int | None = None
+    recorded: Mask | None = None
 
     @property
     def joints(self) -> int:
@@ -80,11 +83,7 @@ class Log:
         resting = self._at_rest(self.angle)
         if len(resting) < 3:
             return np.full(self.joints, float(len(resting)))
-        off = resting - self.start
-        square = np.sum(off**2, axis=0)
-        with np.errstate(invalid="ignore"):
-            correlation = np.where(square > 0, np.sum(off[1:] * off[:-1], axis=0) / square, 0.0).clip(0, 1)
-        return len(resting) * (1 - correlation) / (1 + correlation)
+        return independent_samples(resting - self.start)
 
     def driving(self, joint: int) -> "Log":
         """Return the recording without the commands of all joints but this one (number, from 1)."""
@@ -105,6 +104,7 @@ class Log:
             angle=self.angle[at],
             pressure=None if self.pressure is None else self.pressure[at],
             rest=0,
+            recorded=None if self.recorded is None else self.recorded[at],
         )
 
     @property

@@ -100,7 +100,17 @@ def resample(recording: Recording, settings: LogSettings, joints: int) -> Log:
         middle = at + 0.5 * period
         command = np.stack([np.interp(middle, time, column, left=0.0) for column in command.T], axis=1)
     pressure = measured[..., 1:] if any(signal.kind == "pressure" for signal in recording.signals) else None
-    return Log(recording.table.source, grid, command.clip(-100, 100), measured[..., 0], period, pressure)
+    recorded = np.zeros(len(grid), dtype=bool)
+    recorded[np.minimum(np.rint(time / period).astype(np.int64), len(grid) - 1)] = True
+    return Log(
+        recording.table.source,
+        grid,
+        command.clip(-100, 100),
+        measured[..., 0],
+        period,
+        pressure,
+        recorded=None if recorded.all() else recorded,
+    )
 
 
 def on_grid(time: Array, period: float) -> Array | None:

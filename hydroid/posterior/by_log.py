@@ -59,7 +59,7 @@ def by_log(problem: Problem, uncertainty: Uncertainty) -> ByLog:
     if len(logs) < 2:
         unknown = np.full(len(uncertainty.theta), np.nan)
         return ByLog(unknown, np.stack([unknown, unknown], axis=1), unknown, (), {})
-    linear, row = uncertainty.linear, uncertainty.linear.residual.copy()
+    linear, row = uncertainty.linear, uncertainty.linear.innovations.copy()
     columns = [np.flatnonzero(number == g) for g in logs]
     effects = [linear.effects[:, own] for own in columns]
     shares = np.array([u @ u.T for u in effects])  # A_g
@@ -73,9 +73,10 @@ def by_log(problem: Problem, uncertainty: Uncertainty) -> ByLog:
     for own, step, u in zip(columns, steps, effects, strict=True):
         row[own] += step @ u
     left_out = defaultdict[str, list[float]](list)
+    errors = uncertainty.likelihood.errors.errors(row[None])[0]
     for channel in problem.channels:
         if channel.quantity == "angle":
-            error = rms(channel.unfiltered(row[channel.rows]) / channel.weight)
+            error = rms(errors[channel.rows]) / channel.weight
             left_out[f"q{channel.joint}"].append(float(np.degrees(error)))
 
     rows, pooled = linear.changes, scatters.sum(axis=0)  # of the p parameters that vary

@@ -8,7 +8,6 @@ from scipy.stats import chi2
 from hydroid.arrays import Array, record
 from hydroid.errors import SettingsError
 from hydroid.parameters import ParameterSet
-from hydroid.posterior.linear import least_squares_rows
 from hydroid.posterior.posterior import COVERAGE
 from hydroid.posterior.uncertainty import WEAK_ABOVE, Uncertainty
 from hydroid.problem.problem import Problem
@@ -38,14 +37,15 @@ class Profile:
 def profile(problem: Problem, uncertainty: Uncertainty, name: str) -> Profile:
     """Hold a parameter at several values and fit the others, each time from the neighbour's result.
 
-    With autocorrelated noise the rise of a sum of squares is no likelihood ratio. It is scaled so that its
-    curvature is the estimate's variance (L. Pace, A. Salvan, N. Sartori, 2011).
+    The rise of the sum of squares is the deviance. Stage 1 minimises output errors, whose sum of squares is no
+    likelihood: it is scaled so that its curvature is the estimate's variance (L. Pace, A. Salvan, N. Sartori,
+    2011).
     """
     parameters, linear, theta = problem.parameters, uncertainty.linear, uncertainty.theta
     free = parameters.named(parameters.free)
     if name not in free:
         raise SettingsError(f"no free parameter {name!r} to profile", hint=f"free: {', '.join(free)}")
-    i, residuals = parameters.names.index(name), least_squares_rows(problem, theta, linear.prior_weight)
+    i, residuals = parameters.names.index(name), uncertainty.likelihood.rows
     cost = np.sum(residuals(theta[None])[0] ** 2)
     # what a deviance of 1 is: the parameter's variance over (J J')^-1; held at a bound, the others' largest
     units = linear.spread(uncertainty.posterior.deviations**2 / np.sum(linear.changes**2, axis=1))

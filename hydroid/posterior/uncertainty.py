@@ -1,44 +1,34 @@
 """Uncertainty of an estimate: its covariance, and the intervals and flags that follow from it.
 
-The estimate minimises the weighted sum of squares of the residuals and of the priors' scores. The noise need
-not be white, and the weights need not match it. Let J, shape (p, R), be the derivatives of all these
-residuals per relative change of the free parameters, and S the covariance of the noise. The covariance of the
-estimate is then the *sandwich*
+The estimate minimises the sum of squares of innovations and of the priors' scores, all of variance 1. Let J,
+shape (p, R), be their derivatives per relative change of the free parameters, and S their covariance. The
+covariance of the estimate is
 
-    C = (J J')^-1 J S J' (J J')^-1        (P. J. Huber, 1967; G. A. F. Seber and C. J. Wild, 1989)
+    C = (J J')^-1 J S J' (J J')^-1        (G. A. F. Seber and C. J. Wild, *Nonlinear Regression*, 1989),
 
-For white noise of one level this is the usual s² (J J')^-1. It is computed from one singular value
+which is (J J')^-1 where S = 1: where least squares weighs the errors as they are. That of stage 1 does not:
+it minimises output errors, and S is what their drift makes of it. C is computed from one singular value
 decomposition J = V D U as C^-1 = G' G with G = L^-1 D V', L L' = U S U'. No product J J' is formed. The weak
-prior on every parameter (`WEAK_PRIOR`), one more residual each, makes J regular.
-
-The process that describes the noise is estimated too. The variance of a parameter is then uncertain, and its
-interval must be wider than one with a known variance. The logarithm of the estimated variance is about
-normal: `quantile`. (Student's t, for a variance that follows a χ², is far too wide where the noise is slow:
-its quantile grows without limit, while a variance from a spectrum errs to both sides.)
+prior on every parameter (`WEAK_PRIOR`), one more row each, makes J regular.
 
 The covariance is a local, first-order approximation. It assumes that the model is right: a wrong model shifts
-the estimate by more than an interval says. A parameter within a tenth of a standard deviation of a bound is
-held there, and has no interval; but one that the logs do not determine says nothing by lying there, and stays
-free.
+the estimate by more than an interval says (`by_log`, `whiteness`). A parameter within a tenth of a standard
+deviation of a bound is held there, and has no interval; but one that the logs do not determine says nothing
+by lying there, and stays free.
 """
 
 import math
-from collections.abc import Sequence
 from enum import StrEnum
 from typing import Literal
 
 import numpy as np
-from numpy.polynomial.hermite_e import hermegauss
 from scipy.linalg import solve_triangular
-from scipy.optimize import brentq
-from scipy.stats import norm as normal
 
 from hydroid.arrays import Array, record, rms
 from hydroid.parameters import ParameterSet
+from hydroid.posterior.error_model import ErrorModel, Likelihood, likelihood_at
 from hydroid.posterior.linear import Linear, linearised, white_posterior
-from hydroid.posterior.noise import STEP, Noise, neighbours, problem_noise, transformed, unbiased
 from hydroid.posterior.posterior import (
-    COVERAGE,
     NORMAL,
     UNIDENTIFIABLE_ABOVE,
     WEAK_PRIOR,
@@ -111,10 +101,11 @@ class Uncertainty:
     """How precisely the data determine P parameters, p of them free, at an estimate.
 
     Attributes:
+        likelihood: that the estimate maximises.
         linear: least squares linearised there, in the parameters that vary: free ones, but for those held at
             a bound.
-        noise: of each channel.
-        scatters: covariance of the effects by each channel's noise, shape (C, p, p).
+        errors: the model of the output errors, as they are.
+        scatters: covariance of the effects by each channel's errors, shape (C, p, p).
         sensitivity: rms change of the output error [rad] per 1 % of each parameter, shape (P,); NaN where
             fixed or where simulations diverge.
         posterior: what is known of the parameters that vary.
@@ -124,8 +115,9 @@ class Uncertainty:
         status: of each parameter.
     """
 
+    likelihood: Likelihood
     linear: Linear
-    noise: Sequence[Noise]
+    errors: ErrorModel
     scatters: Array
     sensitivity: Array
     posterior: Posterior
@@ -144,53 +136,58 @@ class Uncertainty:
         return self.relative * self.linear.box.scale
 
 
-def uncertainty(problem: Problem, theta: Array, first: Array | None = None) -> Uncertainty:
-    """Return the uncertainty of theta, shape (P,), for the noise that its residuals show (`linearised`)."""
-    return uncertainty_from(problem, linearised(problem, theta, first))
+def uncertainty(
+    problem: Problem, theta: Array, first: Array | None = None, numbers: Array | None = None
+) -> Uncertainty:
+    """Return the uncertainty of theta, shape (P,) (`linearised`).
 
-
-def uncertainty_from(problem: Problem, whole: Linear, noise: Sequence[Noise] = ()) -> Uncertainty:
-    """Return the uncertainty from derivatives by all free parameters, without simulations.
-
-    Without `noise` of each channel it is that which the residual shows.
+    `numbers` of the error model, (S, 4), are those that least squares ended with; None: those that the errors
+    at theta show.
     """
+    likelihood = likelihood_at(problem, theta, numbers)
+    return uncertainty_from(likelihood, linearised(likelihood, theta, first))
+
+
+def uncertainty_from(likelihood: Likelihood, whole: Linear) -> Uncertainty:
+    """Return the uncertainty from derivatives by all free parameters, without simulations."""
+    problem, fitted = likelihood.problem, likelihood.errors
     free, room, white = whole.box.varied, whole.box.room, whole.white.deviations
-    effects = 0.01 * rms(problem.unfiltered(whole.slopes), axis=1)
+    effects = 0.01 * rms(fitted.errors(whole.slopes), axis=1)
     sensitivity = whole.spread(np.where(whole.diverging, np.nan, effects))
     edge = held_by_bound(room, white)
     held = edge & (white <= UNIDENTIFIABLE_ABOVE)
     linear = whole.of(~held | held.all())
-    if not noise:  # that before the fit absorbed a part of it
-        shown = problem_noise(problem, linear.residual)
-        spread = linear.prior_scatter + linear.scatters(problem.channels, shown).sum(axis=0)
-        pairs = zip(problem.channels, shown, strict=True)
-        noise = [unbiased(one, linear.effects[:, channel.rows], spread) for channel, one in pairs]
-    scatters = linear.scatters(problem.channels, noise)
+    errors = fitted
+    if problem.settings.stage == "mech":  # least squares took them for white noise
+        errors = fitted.estimated(fitted.errors(whole.innovations[None])[0])
+    scatters = np.array(
+        [
+            errors.scatter(number, linear.effects[:, channel.rows], fitted)
+            for number, channel in enumerate(problem.channels)
+        ]
+    )
     size = np.linalg.norm(linear.changes, axis=0)  # D V' is (V D^-1)^-1
     half = np.linalg.cholesky(scatters.sum(axis=0) + linear.prior_scatter)
     root = regular(solve_triangular(half, (linear.changes / size**2).T, lower=True))
-    deviations = Posterior(linear.box, root).deviations
-    widths = _widths(problem, linear, noise, deviations**2)
-    # a quantity may depend on the parameter whose noise is least known
-    posterior = Posterior(linear.box, root, quantile=float(widths.max()))
-    relative, widths = linear.spread(deviations), linear.spread(widths)
-    # held ones are flagged as if the noise were white
+    posterior = Posterior(linear.box, root)
+    relative = linear.spread(posterior.deviations)
+    # held ones are flagged as if they were free
     known = np.where(np.isnan(relative), whole.spread(white), relative)
     prior = whole.spread(white_posterior(whole.box, whole.prior_slopes).deviations)
     shares = np.where(free, np.clip(1 - (known / prior) ** 2, 0.0, 1.0), 1.0)
     shares[sensitivity == 0] = 0.0  # not the rounding of their factorisation
-    # where the noise is not well known the intervals are wider, and the flags are set accordingly;
     # a stated prior limits a parameter to half of what the weak one leaves, or less
-    widened = known * np.where(np.isnan(widths), NORMAL, widths) / NORMAL
-    unknown = (widened > UNIDENTIFIABLE_ABOVE) & ~(prior < 0.5 * WEAK_PRIOR)
+    unknown = (known > UNIDENTIFIABLE_ABOVE) & ~(prior < 0.5 * WEAK_PRIOR)
     relative[unknown] = np.inf
     status = [ParameterStatus(Flag.FIXED)] * len(free)
     for i, at_edge, (down, up) in zip(np.flatnonzero(free).tolist(), edge, room.T, strict=True):
-        flag = Flag.NO_EFFECT if sensitivity[i] == 0 else flag_of(widened[i], shares[i])
+        flag = Flag.NO_EFFECT if sensitivity[i] == 0 else flag_of(known[i], shares[i])
         side = ("lower" if down <= up else "upper") if at_edge else None
         status[i] = ParameterStatus(flag, side, float(shares[i]), not unknown[i])
-    between = ends(problem.parameters, linear.box, widths * relative)
-    return Uncertainty(linear, noise, scatters, sensitivity, posterior, relative, between, tuple(status))
+    between = ends(problem.parameters, linear.box, NORMAL * relative)
+    return Uncertainty(
+        likelihood, linear, errors, scatters, sensitivity, posterior, relative, between, tuple(status)
+    )
 
 
 def ends(parameters: ParameterSet, box: Box, half: Array) -> Array:
@@ -202,28 +199,3 @@ def ends(parameters: ParameterSet, box: Box, half: Array) -> Array:
     low = between[:, 0]
     low[(low < 0) & np.isfinite(low) & (parameters.lower >= 0)] = 0.0
     return between
-
-
-def quantile(spread: float) -> float:
-    """Half the interval of a normal estimate whose variance is estimated, in standard deviations.
-
-    `spread` is the standard deviation of the logarithm of the estimated variance: 0 gives 1.96.
-    """
-    nodes, weights = hermegauss(60)
-
-    def outside(half: float) -> float:
-        chance = weights @ (2 * normal.sf(half * np.exp(spread * nodes / 2))) / weights.sum()
-        return chance - (1 - COVERAGE)
-
-    return brentq(outside, 1.0, 3.0 * np.exp(3 * spread))  # pyright: ignore
-
-
-def _widths(problem: Problem, linear: Linear, noise: Sequence[Noise], variance: Array) -> Array:
-    """Half the interval of each parameter in standard deviations, shape (p,), from their variances, (p,)."""
-    square = np.zeros_like(variance)
-    for channel, process in zip(problem.channels, noise, strict=True):
-        waves, power = linear.changes @ transformed(linear.effects[:, channel.rows]), process.power
-        for other in neighbours(process):
-            square += (waves**2 @ (other.power - power) / STEP) ** 2
-    # where the logarithm of a variance is known to 5 or worse, nothing is, and no interval is of use
-    return np.array([quantile(spread) for spread in np.minimum(np.sqrt(square) / variance, 5.0)])

@@ -11,22 +11,12 @@ factor N^(-1/p) per segment.
 
 A segment is a pair of sample indices [first, end). Segments cover the record without overlap, and none is
 empty.
-
-A hydraulic joint integrates: an error of its speed stays in its angle, and the error drifts. Least squares of
-stage 2 sees the errors of angles through a *prefilter* (L. Ljung, System Identification, 1999, chapter 14),
-
-    F(s) = (1 + s T) / (1 + s T/2),   T = 3 s,
-
-so that an error which comes and goes within seconds counts twice as much as one that stays. It does not if
-the settings say that the noise is white.
 """
 
 from collections.abc import Sequence
-from dataclasses import field
 from typing import Literal
 
 import numpy as np
-from scipy.signal import bilinear, lfilter
 
 from hydroid.arrays import Array, Ints, record
 from hydroid.errors import SettingsError
@@ -37,9 +27,6 @@ from hydroid.simulation import Response
 
 Quantity = Literal["angle", "pressure_a", "pressure_b"]
 SIDES: tuple[Quantity, Quantity] = ("pressure_a", "pressure_b")
-STAYING, FAST_GAIN = 3.0, 2.0
-"""T of the prefilter [s], and its gain of fast errors (ours: of 1, 2 and 4; docs/measured.md)"""
-UNFILTERED: Array = np.array([[1.0, 0.0], [1.0, 0.0]])
 
 
 @record
@@ -53,7 +40,6 @@ class Channel:
         measured: [rad] or [Pa], shape (T,).
         weight: error times weight is the residual [rad]: no unit for an angle, rad/Pa for a pressure.
         rows: its residuals in a row of all channels' residuals.
-        prefilter: coefficients of F by rising powers of 1/z, numerator and denominator, shape (2, 2).
     """
 
     log: int
@@ -63,7 +49,6 @@ class Channel:
     measured: Array
     weight: float
     rows: slice
-    prefilter: Array = field(default_factory=lambda: UNFILTERED)
 
     def error(self, response: Response) -> Array:
         """Return the weighted output error y - y_hat of (17) in its log's response [rad], shape (n, T)."""
@@ -72,23 +57,6 @@ class Channel:
         else:
             simulated = response.pressure[:, :, self.column, "ab".index(self.quantity[-1])]
         return self.weight * (self.measured - simulated)
-
-    def filtered(self, errors: Array, way: int = 1) -> Array:
-        """Return residuals, shape (n, T), from weighted output errors; `way` -1: errors from residuals."""
-        if self.prefilter is UNFILTERED:
-            return errors
-        above, below = self.prefilter[::way]
-        return np.asarray(lfilter(above, below, errors))
-
-    def unfiltered(self, residuals: Array) -> Array:
-        """Return the weighted output errors that residuals, shape (n, T), come from."""
-        return self.filtered(residuals, -1)
-
-    def gain(self, size: int) -> Array:
-        """Return |F| at the frequencies of a transform of so many real samples, shape (1 + size / 2,)."""
-        later = np.exp(-1j * np.linspace(0, np.pi, 1 + size // 2))
-        above, below = np.abs(self.prefilter @ np.stack([np.ones_like(later), later]))
-        return above / below
 
 
 def compared_pressures(log: Log, settings: FitSettings) -> list[int]:
@@ -99,18 +67,15 @@ def compared_pressures(log: Log, settings: FitSettings) -> list[int]:
 
 
 def make_channels(logs: Sequence[Log], settings: FitSettings) -> tuple[Channel, ...]:
-    """List the channels log by log, angles first; those of stage 2, whose errors drift, have a prefilter."""
+    """List the channels log by log, angles first."""
     objective = settings.objective
     end, channels = 0, list[Channel]()
     for i, log in enumerate(logs):
         samples = len(log.time)
         for column, joint in enumerate(settings.outputs):
             weight, rows = objective.weights.get(joint, 1.0), slice(end, end + samples)
-            prefilter = UNFILTERED
-            if settings.stage == "hyd" and objective.noise_of(joint) is None:
-                prefilter = np.array(bilinear((STAYING, 1), (STAYING / FAST_GAIN, 1), 1 / log.period))
             measured = log.angle[:, joint - 1]
-            channels.append(Channel(i, joint, "angle", column, measured, weight, rows, prefilter))
+            channels.append(Channel(i, joint, "angle", column, measured, weight, rows))
             end += samples
         for column, joint in enumerate(compared_pressures(log, settings)):
             assert log.pressure is not None

@@ -4,9 +4,7 @@ Evaluating a population is one function, `Problem.evaluate`; the search knows on
 simulated by threads of this process, or on workers (`DaskWorkers`); no bit of a result depends on how many.
 """
 
-from collections.abc import Callable, Collection, Sequence
-from copy import copy
-from dataclasses import replace
+from collections.abc import Collection, Sequence
 from functools import cached_property
 from pathlib import Path
 
@@ -20,7 +18,6 @@ from hydroid.log import Log
 from hydroid.parallel.workers import DaskWorkers
 from hydroid.problem.bindings import Bindings
 from hydroid.problem.channels import (
-    UNFILTERED,
     compared_pressures,
     make_channels,
     overall_objective,
@@ -38,9 +35,6 @@ WHITE = 1.6
 """mean square of the change between samples, in variances of the error, from which the error is noise; it is
 2 of white noise, and that of J. von Neumann (1941)"""
 
-OpenStart = Callable[[Array], None]
-"""takes what one log's open start angles can explain out of residuals, shape (n, R)"""
-
 
 class Problem:
     """Logs, each with its start pose, a model that should reproduce them, and the measure of the difference.
@@ -52,18 +46,13 @@ class Problem:
         channels: the compared signals, in the order of a row of residuals.
         driven: joints that any log drives, shape (J,).
         measured: all channels in a row, times their weights, shape (R,).
-        open_starts: what open start angles can explain, taken out of the residuals (`with_open_starts`).
         bounds: [first, end) of each objective's samples in it, shape (S, 2).
-        afar: whether it is as least squares far from an optimum sees it (`from_afar`).
     """
-
-    afar = False
 
     def __init__(self, settings: FitSettings, logs: Sequence[Log], spread: DaskWorkers | None = None) -> None:
         spec, outputs = load_model(settings.arm), [j - 1 for j in settings.outputs]
         self.settings, self.logs, self.outputs = settings, tuple(logs), outputs
         self._spread = spread
-        self.open_starts: tuple[OpenStart, ...] = ()
         self.bindings = Bindings(settings)
         self.driven = np.any([log.driven for log in logs], axis=0)
         self.bindings.refuse_idle(self.driven, outputs)
@@ -94,24 +83,6 @@ class Problem:
         if settings is self.settings and logs is None:
             return self
         return Problem(settings, self.logs if logs is None else logs, self._spread)
-
-    @property
-    def leaves_start_open(self) -> bool:
-        """Whether the start angle of any log is open."""
-        return self.settings.free_start and any(self.started(log) for log in self.logs)
-
-    def from_afar(self, *, filtered: bool = True) -> "Problem":
-        """Return it with priors that count more (`prior_weight`), with or without its prefilter."""
-        rough = copy(self)
-        plain = tuple(replace(c, prefilter=UNFILTERED) for c in self.channels)
-        rough.afar, rough.channels = True, self.channels if filtered else plain
-        return rough
-
-    def with_open_starts(self, open_starts: Sequence[OpenStart]) -> "Problem":
-        """Return the problem whose residuals hold for any start angle that its logs leave open."""
-        opened = copy(self)
-        opened.open_starts = tuple(open_starts)
-        return opened
 
     def started(self, log: Log) -> list[int]:
         """Joints whose measured angle only their start is simulated from, numbered from 1."""
@@ -145,7 +116,8 @@ class Problem:
     def objectives(self, theta: Array) -> Array:
         """Evaluate theta, shape (n, P), in this process."""
         size = max(1, CHUNK // len(self.measured))
-        parts = (self.norms(self.output_errors(theta[at : at + size])) for at in range(0, len(theta), size))
+        chunks = [theta[at : at + size] for at in range(0, len(theta), size)]
+        parts = [self.norms(self.errors(self.responses(chunk))) for chunk in chunks]
         return np.vstack([*parts])
 
     def norms(self, errors: Array) -> Array:
@@ -154,22 +126,10 @@ class Problem:
         segments = segment_objectives(errors, self.measured, self.bounds, objective)
         return np.column_stack([segments, overall_objective(errors, self.measured, objective)])
 
-    def residuals(self, theta: Array) -> Array:
-        """Output errors through the prefilter [rad], shape (n, R): channel after channel; NaN where diverged.
-
-        What open start angles can explain is taken out (`with_open_starts`).
-        """
-        if self._spread is None:
-            rows = self.output_errors(theta)
-        else:
-            rows = self._spread(self._on_worker, "output_errors", theta, len(self.measured))
-        rows = np.concatenate([c.filtered(rows[:, c.rows]) for c in self.channels], axis=1)
-        for close in self.open_starts:
-            close(rows)
-        return rows
-
     def output_errors(self, theta: Array) -> Array:
-        """Weighted output errors of (17) [rad] of theta, shape (n, P), simulated in this process: (n, R)."""
+        """Weighted output errors of (17) [rad] of theta, shape (n, P): (n, R); NaN where one diverged."""
+        if self._spread is not None:
+            return self._spread(self._on_worker, "output_errors", theta, len(self.measured))
         return self.errors(self.responses(theta))
 
     def errors(self, responses: Sequence[Response]) -> Array:
@@ -186,10 +146,6 @@ class Problem:
         """Simulate theta, shape (n, P); return one response of n candidates per log."""
         pairs = zip(self._simulations, self.logs, strict=True)
         return [one.simulate(self.bindings.candidates(theta, log.source)) for one, log in pairs]
-
-    def unfiltered(self, residuals: Array) -> Array:
-        """Return output errors from residuals, shape (n, R)."""
-        return np.concatenate([c.unfiltered(residuals[:, c.rows]) for c in self.channels], axis=1)
 
     def angles(self, errors: Array, joints: Collection[int] = ()) -> Array:
         """Return the output errors, of (n, R), of the angles of joints (from 1), or all, unweighted [rad]."""

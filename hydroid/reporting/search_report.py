@@ -23,10 +23,10 @@ def search_section(record: Record) -> Section:
         points.append(
             f"{one.name}: {one.iterations} iterations, {one.simulations:,} simulations; {one.ending}."
         )
-        without, with_it = record.summary.estimates[one.name].left_out_deg or (None, None)
-        if without and with_it:
-            errors = f"{two_digits(without)} deg without its term, {two_digits(with_it)} with it"
-            points[-1] += f" Error on parts of the logs left out: {errors}."
+        rise, error = record.summary.estimates[one.name].gained or (None, None)
+        if rise is not None and error is not None:
+            better = f"by {two_digits(rise)} ± {two_digits(error)}"
+            points[-1] += f" It foretells parts of the logs left out better {better} (log-likelihood)."
     final = str(record.summary.final)
     segments = {final: result.segments[final], **result.segments}
     plots = (

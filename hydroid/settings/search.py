@@ -117,8 +117,8 @@ class DesignSettings(Settings):
     also from the carrier and the other arm, at rest in start_pose [m]; null: collisions are not checked"""
     noise_deg: Positive = 0.1
     """standard deviation of the angles' noise [deg]"""
-    noise_correlation_s: NotNegative = 0.0
-    """time in which the noise's autocorrelation falls to 1/e (first order) [s]; 0: white noise"""
+    drift_deg: NotNegative = 0.0
+    """standard deviation of the drift of a prediction after 10 s [deg]; 0: white noise alone"""
     effort: Annotated[int, Field(ge=2, le=1_000_000)] = 240
     """number of experiments that are tried: one in six drawn at random, the others changes of the best"""
 

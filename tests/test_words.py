@@ -22,6 +22,17 @@ def test_a_sentence_agrees_with_its_subjects(names: str):
     assert str(finding).endswith("Otherwise the model lacks something.")
 
 
+TAKEN = ("names", "few", "is", "s", "side", "kind", "0")
+
+
+@pytest.mark.parametrize("name", TAKEN)
+def test_a_subject_may_be_called_as_a_word_of_the_sentence(name: str):
+    at = Finding("at bound", "warning", (name,), {"side": "upper"})
+    assert at.what == f"{name} is at the upper bound: the error would fall beyond it."
+    strained = Finding("strained prior", "warning", (name, "K"), details={name: "2.9 above"})
+    assert strained.what == f"Far from expected, in standard deviations: {name} (2.9 above) and K."
+
+
 def test_a_long_list_ends_with_how_many_more():
     assert listed(list("abcdefg"), 4) == "a, b, c, d and 3 more"
     assert listed(list("abcde"), 4) == "a, b, c, d and e"

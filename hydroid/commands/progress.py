@@ -99,8 +99,10 @@ class FitProgress(Progress):
         self._end = math.inf if budget is None else time.monotonic() + budget
         self._settings, search = settings, settings.search
         self._total = 1 + getattr(search, search.algorithm).generations
-        self._steps = ["start", "refined", *settings.terms()]
-        self._steps += ["dynamic"] * (settings.simulation.model == "ladder")
+        terms, ladder = settings.terms(), settings.simulation.model == "ladder"
+        self._models = {"start": 1, "refined": 2, "joint": 2, "dynamic": 3 + len(terms)}
+        self._terms = {term: number for number, term in enumerate(terms, 3)}  # which may be called "start"
+        self._steps = 2 + len(terms) + ladder
 
     def generation(self, row: "Array") -> bool:
         """Take a row of `fitting.search.HISTORY`; return whether time is up."""
@@ -117,11 +119,14 @@ class FitProgress(Progress):
 
         arm, every = self._settings.arm, self._settings.outputs
         model, *part = re.split(" (?:joint|part|at|on) ", name.removesuffix(" from afar"))
-        steps = [i for i, step in enumerate(self._steps, 1) if step in model or not part]
+        first, *terms = model.split("+")
+        step = self._steps  # in which what is kept is refined
+        if part:
+            step = max([self._models[first.split()[0]], *(self._terms[term] for term in terms)])
         joints = [joint for joint in every if f" joint {joint} " in name] or every
         of = "all joints" if joints[1:] else arm.joint_names[joints[0] - 1]
         error = way(math.degrees(rms), slides={*joints} <= {*arm.slides})
         model += " from nine numbers" * ("numbers" in name)
-        what = f"step {max(steps, default=1)} of {len(self._steps)} ({model}), {of}"
+        what = f"step {step} of {self._steps} ({model}), {of}"
         self(what, simulated, None, f"rms error {error}, {simulated} simulations")
         return time.monotonic() > self._end

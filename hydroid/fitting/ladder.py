@@ -104,9 +104,11 @@ class Ladder:
         climbs = two or bool(settings.terms())
         for model in ("refined", "dynamic")[: 1 + two]:
             possible = settings.terms(model)
-            terms = [term for term in possible if term in self.kept.name.split("+")]
+            _, *kept_terms = self.kept.name.split("+")
+            terms = [term for term in possible if term in kept_terms]
             self._rung(whole, "+".join([model, *terms]), climbs=climbs, if_nearer=model == "dynamic")
-            for term in possible if self.kept.name.startswith(model) else ():
+            kept_model, *_ = self.kept.name.split("+")
+            for term in possible if kept_model == model else ():
                 if term not in terms:
                     self._rung(whole, f"{self.kept.name}+{term}", climbs=climbs, if_nearer=True)
         if climbs:
@@ -115,7 +117,8 @@ class Ladder:
             new = self._measured(self.problem, last, kept.name)
             self.kept = self.estimates[kept.name] = replace(new, left_out=kept.left_out)
         if settings.joint_refinement:
-            self._rung(whole, self.kept.name.replace("refined", "joint"), climbs=False, if_nearer=False)
+            _, *terms = self.kept.name.split("+")
+            self._rung(whole, "+".join(["joint", *terms]), climbs=False, if_nearer=False)
 
     def known(self, theta: Array) -> Uncertainty:
         """Return how well the logs determine theta, (P,): the estimate that is kept, or one of a search."""

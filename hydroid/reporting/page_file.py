@@ -7,6 +7,7 @@ import base64
 import gzip
 import json
 import math
+import re
 from collections.abc import Mapping
 from functools import cache
 from importlib.resources import files
@@ -17,7 +18,8 @@ import numpy as np
 
 from hydroid.files import fill_template, write_atomic
 from hydroid.reporting.chart import Chart
-from hydroid.reporting.page import Page, Table
+from hydroid.reporting.page import Page, Table, short_name
+from hydroid.words import distinct
 
 
 def write_page(page: Page, out: Path) -> Path:
@@ -26,8 +28,15 @@ def write_page(page: Page, out: Path) -> Path:
 
 
 def write_tables(tables: Mapping[str, Table], out: Path, **more: str) -> Path:
-    """Write tables as CSV, to tables/ in the folder `out`, and more files by name; return the last."""
-    content = {f"tables/{name}.csv": table.csv() for name, table in tables.items()} | more
+    """Write tables as CSV, to tables/ in the folder `out`, and more files by name; return the last.
+
+    A table's name, which may hold a joint's, leads nowhere else: what is no letter or digit becomes `_`.
+    """
+    content, taken = dict[str, str](), set[str]()
+    for name, table in tables.items():
+        file = distinct(re.sub(r"[^\w.-]", "_", short_name(name)), taken)
+        content[f"tables/{file}.csv"] = table.csv()
+    content |= more
     for name, text in content.items():
         write_atomic(out / name, text)
     return out / [*content][-1]

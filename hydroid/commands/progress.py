@@ -72,6 +72,8 @@ class Progress:
         line = f"{what}:" if total is None else f"{what} {done:.0f} of {total:.0f}"
         line = f"{line} {text}".strip()
         if sys.stderr.isatty():
+            from rich.markup import escape  # a joint may be called [/b]
+
             if self._bar is None:
                 from rich.console import Console
                 from rich.progress import Progress as Bar
@@ -82,7 +84,7 @@ class Progress:
                 self._bar.start()
             task = self._bar.tasks[0]
             task.total = total  # `update` takes None for no change
-            self._bar.update(task.id, completed=done, description=line)
+            self._bar.update(task.id, completed=done, description=escape(line))
         elif time.monotonic() - self._shown > 30.0:  # seconds between plain lines
             self._shown = time.monotonic()
             typer.echo(line, err=True)

@@ -17,7 +17,7 @@ pose, target = plant.reset(), low + TARGET * (high - low)
 pose[joint] = low + START * (high - low)
 
 # a positive command lowers the angle of some joints
-plant.reset(pose)
+angle = plant.reset(pose)
 while plant.time < 1.0:
     angle = plant.step({plant.names[joint]: 100.0})
 sense = 1.0 if angle[joint] > pose[joint] else -1.0

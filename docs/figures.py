@@ -17,13 +17,14 @@ import numpy as np
 import yaml
 
 from hydroid.arrays import Array
+from hydroid.errors import HydroidError
 from hydroid.estimate import FitSummary
 from hydroid.files import write_atomic
 from hydroid.fitting.baselines import NAMES
 from hydroid.fitting.validation import HORIZONS, Prediction
 from hydroid.reporting.verdict_table import verdict_table
 from hydroid.run.record import Record, load_record
-from hydroid.words import number, two_digits
+from hydroid.words import number
 
 ROOT = Path(__file__).parents[1]
 FILE = ROOT / "docs" / "figures.yaml"
@@ -99,8 +100,8 @@ def _quantities(summary: FitSummary) -> list[Figures]:
 
 
 def _rounded(value: float | None) -> float | None:
-    """Return four digits: more than any page states."""
-    return None if value is None else float(f"{value:.4g}")
+    """Return six digits: more than any page states, or a page would round what is rounded."""
+    return None if value is None else float(f"{value:.6g}")
 
 
 def at_a_glance(figures: Figures) -> str:
@@ -172,20 +173,23 @@ def filled(text: str, figures: Figures) -> str:
             value: Any = figures
             for key in name.split("."):
                 value = value[key]
-            words = number(value) if name.startswith("parameters") else _plain(name, value)
+            words = _stated(name, value)
         return f"{begin}{words}{end}"
 
     return MARKED.sub(part, text)
 
 
-def _plain(name: str, value: float | None) -> str:
+def _stated(name: str, value: float | None) -> str:
+    """Return one number as a sentence or a table by hand states it."""
     if value is None or not name.endswith(("percent", "mae_deg")):
         return _error(value)
     return f"{value:.0f}" if name.endswith("percent") else f"{value:.2f}"
 
 
 def _error(value: float | None) -> str:
-    return "diverged" if value is None else two_digits(value)
+    if value is None:
+        return "diverged"
+    return f"{value:.0f}" if value >= 100 else f"{value:#.2g}".rstrip(".")
 
 
 def _table(lines: Sequence[Sequence[str]]) -> str:
@@ -203,7 +207,10 @@ def marked() -> Iterator[tuple[Path, str]]:
 def main(given: Sequence[str]) -> None:
     """Write the file, unless only the pages are asked for, and the pages."""
     if given != ["--pages"]:
-        found = collected(Path(*given) if given else ROOT / "runs")
+        try:
+            found = collected(Path(*given) if given else ROOT / "runs")
+        except HydroidError as error:
+            sys.exit(f"{error}; `make demo excavator` comes first")
         write_atomic(FILE, HEAD + yaml.safe_dump(found, sort_keys=False, allow_unicode=True, width=110))
     figures = yaml.safe_load(FILE.read_text(encoding="utf-8"))
     for page, text in marked():

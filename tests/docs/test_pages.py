@@ -117,6 +117,19 @@ def test_the_pages_state_the_figures_of_one_file():
         assert not re.search(r"^<!--=.*--> *\S", text, re.MULTILINE), page
 
 
+def test_a_row_that_stands_on_two_pages_has_the_same_figures():
+    rows: dict[tuple[str, str], dict[str, str]] = {}
+    for page in FIGURES["PAGES"]:
+        text = re.sub(r"<!--.*?-->", "", page.read_text(encoding="utf-8"))
+        for header, body in re.findall(r"^(\|.*\|)\n\|[ :|-]+\|\n((?:\|.*\|\n?)+)", text, re.MULTILINE):
+            for name, cells in re.findall(r"^\| ([^|]+) \|(.*)\|$", body, re.MULTILINE):
+                rows.setdefault((header, name), {})[str(page)] = cells
+    several = {key: pages for key, pages in rows.items() if len(pages) > 1}
+    assert several
+    for key, pages in several.items():
+        assert len({*pages.values()}) == 1, (key, pages)
+
+
 def test_figures_are_rounded_as_they_are_printed():
     """By hand: a fit that errs by 0.18499 deg, of whose samples 84.57 % are inside, and a diverged one."""
     joint = {"unseen_deg": 0.18499, "inside_percent": 84.57, "unseen_mae_deg": 1.5}

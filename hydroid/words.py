@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import chain, count
+from unicodedata import category
 
 
 def listed(names: Sequence[str], most: int | None = None) -> str:
@@ -25,6 +26,14 @@ def numbered(names: Iterable[str]) -> list[str]:
     """Return names for readers, all different."""
     taken = set[str]()
     return [distinct(name, taken, " ({})") for name in names]
+
+
+def printable(text: str) -> str:
+    """Replace what would act on a terminal instead of being shown: a file may be called by such letters."""
+    return "".join("?" if category(c) in _ACTING and c not in "\n\t" else c for c in text)
+
+
+_ACTING = ("Cc", "Cf", "Cs")  # controls, marks of direction, and halves of letters
 
 
 def number(value: float) -> str:

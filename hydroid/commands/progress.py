@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Self
 import typer
 
 from hydroid.files import NOTICES
+from hydroid.words import printable
 
 if TYPE_CHECKING:
     from hydroid.arrays import Array
@@ -70,7 +71,7 @@ class Progress:
         if not VISIBLE.get():
             return
         line = f"{what}:" if total is None else f"{what} {done:.0f} of {total:.0f}"
-        line = f"{line} {text}".strip()
+        line = printable(f"{line} {text}".strip())
         if sys.stderr.isatty():
             from rich.markup import escape  # a joint may be called [/b]
 

@@ -122,8 +122,8 @@ class JointVerdict(Settings):
     slides: bool = False
     """whether it slides: 1 deg then stands for 17.5 mm"""
     verdict: str
-    """predicts, predicts roughly, predicts no better than BASELINE, predicts worse than it fits, does not
-    fit, or not tested (`fitting.verdict` has the rules)"""
+    """predicts, predicts roughly, predicts little, predicts no better than BASELINE, predicts worse than it
+    fits, does not fit, or not tested (`fitting.verdict` has the rules)"""
     fitted_deg: float | None = None
     """on the logs that it was fitted to"""
     unseen_deg: float | None = None

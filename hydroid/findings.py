@@ -20,6 +20,7 @@ class Finding:
         level: how much it matters.
         subjects: names of what it is about: parameters, joints, logs.
         numbers: what the sentence states, by name, in the units that the sentence prints.
+        details: by subject, what stands in brackets behind it. Apart from `numbers`: a user names subjects.
         where: file with line and column, or a setting; empty where there is none.
     """
 
@@ -28,16 +29,22 @@ class Finding:
     subjects: tuple[str, ...] = ()
     numbers: Mapping[str, float | str] = field(default_factory=dict[str, float | str])
     where: str = ""
+    details: Mapping[str, str] = field(default_factory=dict[str, str], kw_only=True)
 
     @property
     def what(self) -> str:
         """What it states."""
-        return filled(WORDS[self.kind][0], self.subjects, self.numbers)
+        return self._filled(WORDS[self.kind][0])
 
     @property
     def hint(self) -> str:
         """What to do about it; empty where nothing is to be done."""
-        return filled(WORDS[self.kind][1], self.subjects, self.numbers)
+        return self._filled(WORDS[self.kind][1])
+
+    def _filled(self, words: str) -> str:
+        details = self.details
+        names = [f"{name} ({details[name]})" if name in details else name for name in self.subjects]
+        return filled(words, names, self.numbers)
 
     def __str__(self) -> str:
         return f"{self.what} {self.hint}".strip()

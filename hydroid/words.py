@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import chain, count
+from unicodedata import category
 
 
 def listed(names: Sequence[str], most: int | None = None) -> str:
@@ -25,6 +26,14 @@ def numbered(names: Iterable[str]) -> list[str]:
     """Return names for readers, all different."""
     taken = set[str]()
     return [distinct(name, taken, " ({})") for name in names]
+
+
+def printable(text: str) -> str:
+    """Replace what would act on a terminal instead of being shown: a file may be called by such letters."""
+    return "".join("?" if category(c) in _ACTING and c not in "\n\t" else c for c in text)
+
+
+_ACTING = ("Cc", "Cf", "Cs")  # controls, marks of direction, and halves of letters
 
 
 def number(value: float) -> str:
@@ -56,12 +65,13 @@ class _Number(float):
         return super().__format__(spec) if spec else number(self)
 
 
+_ONE = {"is": "is", "has": "has", "s": "", "it": "it", "them": "it", "its": "its"}
+_MANY = {"is": "are", "has": "have", "s": "s", "it": "they", "them": "them", "its": "their"}
+
+
 def filled(words: str, names: Sequence[str], numbers: Mapping[str, float | str]) -> str:
-    """Return a sentence of WORDS with a finding's subjects and numbers; a subject's own one follows it."""
-    one, many = ("is", "has", "", "it", "it", "its"), ("are", "have", "s", "they", "them", "their")
-    grammar = dict(
-        zip(("is", "has", "s", "it", "them", "its"), one if len(names) == 1 else many, strict=True)
-    )
+    """Return a sentence of WORDS with a finding's subjects and numbers; numbers by key stand in braces."""
     shown = {key: value if isinstance(value, str) else _Number(value) for key, value in numbers.items()}
-    names = [f"{name} ({shown[name]})" if name in shown else name for name in names]
-    return words.format(*names, **(shown | grammar), names=listed(names), few=listed(names, 4))
+    grammar = _ONE if len(names) == 1 else _MANY
+    lists = {"names": listed(names), "few": listed(names, 4)}
+    return words.format(*names, **(shown | grammar | lists))

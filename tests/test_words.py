@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from hydroid.findings import WORDS, Finding
-from hydroid.words import listed
+from hydroid.words import listed, printable
 
 ROOT = Path(__file__).parents[1] / "hydroid"
 
@@ -20,6 +20,25 @@ def test_a_sentence_agrees_with_its_subjects(names: str):
     finding = Finding("at bound", "warning", tuple(names.split()[:-1:2]), {"side": "upper"})
     assert finding.what.startswith(f"{names} at the upper bound: ")
     assert str(finding).endswith("Otherwise the model lacks something.")
+
+
+TAKEN = ("names", "few", "is", "s", "side", "kind", "0")
+
+
+@pytest.mark.parametrize("name", TAKEN)
+def test_a_subject_may_be_called_as_a_word_of_the_sentence(name: str):
+    at = Finding("at bound", "warning", (name,), {"side": "upper"})
+    assert at.what == f"{name} is at the upper bound: the error would fall beyond it."
+    strained = Finding("strained prior", "warning", (name, "K"), details={name: "2.9 above"})
+    assert strained.what == f"Far from expected, in standard deviations: {name} (2.9 above) and K."
+
+
+@pytest.mark.parametrize("name", ["\x1b]0;title\x07", "\x9b31m", "\u202egpj.exe", "\udcff"])
+def test_a_name_does_nothing_to_a_terminal(name: str):
+    shown = printable(f"a\t{name}\u00a0ä√\n")
+    assert shown.startswith("a\t?")
+    assert shown.endswith("\u00a0ä√\n")
+    assert shown.replace("\t", "").replace("\n", "").replace("\u00a0", "").isprintable()
 
 
 def test_a_long_list_ends_with_how_many_more():

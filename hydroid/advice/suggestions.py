@@ -214,7 +214,11 @@ def missing_findings(content: Content) -> Iterator[Finding]:
         yield Finding("nothing missing", "note", (), {"count": str(content["tested"])})
         return
     freed, before = free[0]["left_out_deg"], content["left_out_deg"]
-    left = {joint: (error or 0.0) / before[joint] for joint, error in freed.items() if before[joint]}
+    left = {
+        joint: math.inf if error is None else error / before[joint]  # None: it diverged
+        for joint, error in freed.items()
+        if before[joint]
+    }
     joint = min(left, key=lambda one: left[one])
     numbers = {"part": 100 * (1 - left[joint]), "command": free[0]["command"]}
     yield Finding("term missing", "warning", (free[0]["name"], joint), numbers)

@@ -24,7 +24,7 @@ GROUPS = {
     "Look at logs and at the arm": {
         "check": "find faults in logs",
         "convert": "write a log of any format as plain CSV",
-        "view": "show or film the arm in motion, its collisions, its actuators",
+        "view": "show or film the arm in motion, and find its collisions",
     },
     "Fit parameters to logs": {
         "fit-mech": "stage 1: gain, damping, stiffness, masses",
@@ -33,7 +33,7 @@ GROUPS = {
     },
     "Judge a fit": {
         "validate": "test fits on other logs",
-        "analyse": "find what the logs determine, and what each parameter does",
+        "analyse": "find which parameters the logs determine, and how well",
         "report": "draw reports anew, or merge runs with different seeds",
     },
     "Plan what to do next": {

@@ -17,6 +17,7 @@ import typer
 from hydroid.errors import HydroidError
 from hydroid.files import Plain, fill_template
 from hydroid.progress import logging_to
+from hydroid.words import printable
 
 if TYPE_CHECKING:
     from hydroid.reporting.page import Page, Table
@@ -94,7 +95,7 @@ def show(result: Printed, *, as_json: bool, verbose: bool = False) -> None:
     for line in [*(result.details if verbose else ()), *result.lines]:
         if isinstance(line, str):
             command = line.lstrip().startswith("hydroid ")
-            typer.echo(line.replace("hydroid", program(), 1) if command else line)
+            typer.echo(printable(line.replace("hydroid", program(), 1) if command else line))
         else:
             line.show()
 
@@ -120,7 +121,7 @@ def show_error(error: Any) -> None:
         _print_json({"error": {"kind": kind, "what": what, "where": where, "hint": hint}})
     else:
         text = str(type(error)(what, where, hint))
-        typer.echo(f"hydroid: {' '.join(text.split())}", err=True)
+        typer.echo(printable(f"hydroid: {' '.join(text.split())}"), err=True)
 
 
 def _print_json(content: Plain) -> None:
@@ -139,4 +140,4 @@ class _Terminal(logging.Handler):
     """Writes to what is stderr at that moment: a progress bar takes its place while it is drawn."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        typer.echo(self.format(record), err=True)
+        typer.echo(printable(self.format(record)), err=True)

@@ -39,7 +39,7 @@ SHARED = f"""
     log (LOG): A log. Formats: {FORMATS}.
     fit (RUN|YAML): An estimate: a run folder, a folder written by Plant.save (Python), an estimate.yaml, or a
         YAML file of values by name.
-    out (DIR): Folder for page and tables [default: runs/COMMAND on the command line; in Python nothing is
+    out (DIR): Folder for the tables [default: runs/COMMAND on the command line; in Python nothing is
         written].
     config (YAML): Settings: a file, as `hydroid init` writes it for your machine, or the name of a shipped
         config, which is the shipped arm's. A run needs none: it holds its own.

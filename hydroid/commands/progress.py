@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Self
 import typer
 
 from hydroid.files import NOTICES
+from hydroid.words import printable
 
 if TYPE_CHECKING:
     from hydroid.arrays import Array
@@ -70,8 +71,10 @@ class Progress:
         if not VISIBLE.get():
             return
         line = f"{what}:" if total is None else f"{what} {done:.0f} of {total:.0f}"
-        line = f"{line} {text}".strip()
+        line = printable(f"{line} {text}".strip())
         if sys.stderr.isatty():
+            from rich.markup import escape  # a joint may be called [/b]
+
             if self._bar is None:
                 from rich.console import Console
                 from rich.progress import Progress as Bar
@@ -82,7 +85,7 @@ class Progress:
                 self._bar.start()
             task = self._bar.tasks[0]
             task.total = total  # `update` takes None for no change
-            self._bar.update(task.id, completed=done, description=line)
+            self._bar.update(task.id, completed=done, description=escape(line))
         elif time.monotonic() - self._shown > 30.0:  # seconds between plain lines
             self._shown = time.monotonic()
             typer.echo(line, err=True)
@@ -99,8 +102,10 @@ class FitProgress(Progress):
         self._end = math.inf if budget is None else time.monotonic() + budget
         self._settings, search = settings, settings.search
         self._total = 1 + getattr(search, search.algorithm).generations
-        self._steps = ["start", "refined", *settings.terms()]
-        self._steps += ["dynamic"] * (settings.simulation.model == "ladder")
+        terms, ladder = settings.terms(), settings.simulation.model == "ladder"
+        self._models = {"start": 1, "refined": 2, "joint": 2, "dynamic": 3 + len(terms)}
+        self._terms = {term: number for number, term in enumerate(terms, 3)}  # which may be called "start"
+        self._steps = 2 + len(terms) + ladder
 
     def generation(self, row: "Array") -> bool:
         """Take a row of `fitting.search.HISTORY`; return whether time is up."""
@@ -117,11 +122,14 @@ class FitProgress(Progress):
 
         arm, every = self._settings.arm, self._settings.outputs
         model, *part = re.split(" (?:joint|part|at|on) ", name.removesuffix(" from afar"))
-        steps = [i for i, step in enumerate(self._steps, 1) if step in model or not part]
+        first, *terms = model.split("+")
+        step = self._steps  # in which what is kept is refined
+        if part:
+            step = max([self._models[first.split()[0]], *(self._terms[term] for term in terms)])
         joints = [joint for joint in every if f" joint {joint} " in name] or every
         of = "all joints" if joints[1:] else arm.joint_names[joints[0] - 1]
         error = way(math.degrees(rms), slides={*joints} <= {*arm.slides})
         model += " from nine numbers" * ("numbers" in name)
-        what = f"step {max(steps, default=1)} of {len(self._steps)} ({model}), {of}"
+        what = f"step {step} of {self._steps} ({model}), {of}"
         self(what, simulated, None, f"rms error {error}, {simulated} simulations")
         return time.monotonic() > self._end

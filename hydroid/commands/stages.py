@@ -49,8 +49,8 @@ def fit_mech(
 ) -> FitResult:
     """Estimate gain, damping, stiffness and link masses from logs (stage 1).
 
-    Writes a run folder with report.html, estimate.yaml, tables, figures and the fitted arm. Then test the
-    estimate on a log that it was not fitted to: `hydroid validate`.
+    Writes a run folder with report.html, estimate.yaml, tables and the fitted arm. Then test the estimate on
+    a log that it was not fitted to: `hydroid validate`.
 
     Example: hydroid fit-mech LOG.csv --out runs/mech
 

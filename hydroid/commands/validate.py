@@ -50,6 +50,8 @@ def validate(
             Repeat the option for several estimates.
         tolerance (0.001 to 90): The rms error [deg] that you accept for every joint; config.yaml can
             hold one for each (tolerance_deg) [default: that of the fit, or else 2 % of a joint's travel].
+        out (DIR): Folder for page and tables [default: runs/COMMAND on the command line; in Python nothing is
+            written].
 
     Raises:
         LogError: a log cannot be used.

@@ -129,6 +129,8 @@ def view(
         RunError: no window, no OpenGL, no package that writes films, or the simulation diverged.
         SettingsError: another kind of file, no such arm or pose, a span without time.
     """
+    if out is not None:
+        choose_platform()  # before anything here imports MuJoCo
     log = source
     if isinstance(source, str | Path) and is_file(Path(source) / "run.json"):
         if fit is not None:
@@ -141,8 +143,6 @@ def view(
         known = open_model(fit, config, set, nominal=True).settings if fit else None
         settings = known or load_settings(config or "fit-hyd", set)
         return _collisions(read_arms(log or "", settings, arm, angles=True, repair=repair), settings)
-    if out is not None:
-        choose_platform()
     model = open_model(fit, config, set, nominal=True)
     logs = None if log is None else read_arms(log, model.settings, arm, pose=pose, repair=repair)
     from hydroid.viewer.motion import simulated_motion

@@ -111,9 +111,11 @@ class Ladder:
         on_the_way = refinement.changed({"gain_tolerance": tolerance})
         for model in ("refined", "dynamic")[: 1 + two]:
             possible = settings.terms(model)
-            terms = [term for term in possible if term in self.kept.name.split("+")]
+            _, *kept_terms = self.kept.name.split("+")
+            terms = [term for term in possible if term in kept_terms]
             self._rung(whole, "+".join([model, *terms]), on_the_way, if_better=model == "dynamic")
-            for term in possible if self.kept.name.startswith(model) else ():
+            kept_model, *_ = self.kept.name.split("+")
+            for term in possible if kept_model == model else ():
                 if term not in terms:
                     self._rung(whole, f"{self.kept.name}+{term}", on_the_way, if_better=True)
         if climbs:
@@ -122,7 +124,8 @@ class Ladder:
             new = self._measured(self.problem, last, kept.name)
             self.kept = self.estimates[kept.name] = replace(new, gained=kept.gained)
         if settings.joint_refinement:
-            self._rung(whole, self.kept.name.replace("refined", "joint"), refinement, if_better=False)
+            _, *terms = self.kept.name.split("+")
+            self._rung(whole, "+".join(["joint", *terms]), refinement, if_better=False)
 
     def known(self, theta: Array) -> Uncertainty:
         """Return how well the logs determine theta, (P,): the estimate that is kept, or one of a search."""

@@ -140,7 +140,7 @@ def fit_findings(fit: Fit) -> list[Finding]:
         if abs(score) > STRAINED_ABOVE and prior not in vague
     }
     if far:
-        findings.append(Finding("strained prior", "warning", tuple(far), far))
+        findings.append(Finding("strained prior", "warning", tuple(far), details=far))
     findings += [Finding("diverged", "warning", (e.name,)) for e in fit.estimates.values() if not e.usable]
     # half of a 95 % interval as large as the value, or without end
     lost = dict.fromkeys(q.label for q in fit.quantities[0].values() if not q.within <= 1.0)

@@ -11,7 +11,8 @@ its. The first of these that is true is the verdict:
 4. predicts no better than a baseline: one is as good on the unseen logs; the simplest such is named;
 5. predicts worse than it fits: the error on the unseen logs is more than twice that on the fitted ones, or
    it diverges;
-6. predicts roughly: none of these. It is better than every baseline, and outside the tolerance.
+6. predicts little: the error on the unseen logs is more than half of what standing still errs by there;
+7. predicts roughly: none of these. It is better than every baseline, and outside the tolerance.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -32,6 +33,8 @@ CLEARLY = 0.9
 """part of another model's error that a better one stays below"""
 WORSE = 2.0
 """times the error on fitted logs, beyond which a fit predicts worse than it fits"""
+LITTLE = 0.5
+"""part of the error of standing still, above which a fit predicts little of the motion"""
 ANYWHERE = np.array([-np.inf, np.inf])
 
 Baselines = Mapping[int, Mapping[str, Baseline]]
@@ -115,6 +118,8 @@ def _word(errors: Sequence[float | None], rivals: Sequence[Mapping[str, float]],
         return f"predicts no better than {as_good[0]}"
     if fitted is not None and not unseen <= WORSE * fitted:
         return "predicts worse than it fits"
+    if not unseen <= LITTLE * here[NAMES[0]]:
+        return "predicts little"
     return "predicts roughly"
 
 

@@ -13,7 +13,7 @@
 
   const color = (name) => getComputedStyle(page).getPropertyValue(`--${name}`).trim();
   const numbers = (values) => (values ?? []).map((v) => v ?? NaN);
-  
+
   // [low, high] of all marks that are shown along an axis, with a margin
   function extent(panel, axis, shown) {
     let low = Infinity, high = -Infinity;
@@ -53,10 +53,11 @@
     }
     for (const one of made) {
       one.visible = !mark.label || shown.get(mark.label) !== false;
-      if (mark.label) one.tags = [mark.label];
+      if (mark.label) { one.tags = [mark.label]; one.name = mark.label; }
     }
+    // a label is text: Bokeh reads a tooltip's own words as HTML, but not what it fills in for $name
     if (["line", "step", "points"].includes(mark.kind) && mark.label && made.length && !touch)
-      figure.add_tools(new Bokeh.HoverTool({ renderers: made, mode: mark.kind === "points" ? "mouse" : "vline", line_policy: "nearest", tooltips: [["", mark.label], ["x", "@x{0.[0000]}"], ["y", "@y{0.[0000]}"]] }));
+      figure.add_tools(new Bokeh.HoverTool({ renderers: made, mode: mark.kind === "points" ? "mouse" : "vline", line_policy: "nearest", tooltips: [["", "$name"], ["x", "@x{0.[0000]}"], ["y", "@y{0.[0000]}"]] }));
     return made;
   }
 

@@ -5,8 +5,10 @@ The page is one HTML file: it carries its charts as data, with the script of Bok
 
 import base64
 import gzip
+import hashlib
 import json
 import math
+import re
 from collections.abc import Mapping
 from functools import cache
 from importlib.resources import files
@@ -17,7 +19,8 @@ import numpy as np
 
 from hydroid.files import fill_template, write_atomic
 from hydroid.reporting.chart import Chart
-from hydroid.reporting.page import Page, Table
+from hydroid.reporting.page import Page, Table, short_name
+from hydroid.words import distinct
 
 
 def write_page(page: Page, out: Path) -> Path:
@@ -26,8 +29,15 @@ def write_page(page: Page, out: Path) -> Path:
 
 
 def write_tables(tables: Mapping[str, Table], out: Path, **more: str) -> Path:
-    """Write tables as CSV, to tables/ in the folder `out`, and more files by name; return the last."""
-    content = {f"tables/{name}.csv": table.csv() for name, table in tables.items()} | more
+    """Write tables as CSV, to tables/ in the folder `out`, and more files by name; return the last.
+
+    A table's name, which may hold a joint's, leads nowhere else: what is no letter or digit becomes `_`.
+    """
+    content, taken = dict[str, str](), set[str]()
+    for name, table in tables.items():
+        file = distinct(re.sub(r"[^\w.-]", "_", short_name(name)), taken)
+        content[f"tables/{file}.csv"] = table.csv()
+    content |= more
     for name, text in content.items():
         write_atomic(out / name, text)
     return out / [*content][-1]
@@ -66,9 +76,36 @@ def html(page: Page) -> str:
     drawings = {plot.name: plot.draw() for plot in page.plots}
     charts = {name for name, drawing in drawings.items() if isinstance(drawing, Chart)}
     content = _packed(json.dumps(drawings, default=plain, ensure_ascii=False, separators=(",", ":")))
-    library = _library() if charts else ""
-    path = "reporting/template.html.j2"
-    return fill_template(path, page=page, charts=charts, content=content, library=library)
+    scripts = [_script(), *([_library()] if charts else [])]
+    return fill_template(
+        "reporting/template.html.j2",
+        page=page,
+        charts=charts,
+        content=content,
+        script=scripts[0],
+        packed_library=_packed_library() if charts else "",
+        policy=_policy(*scripts),
+    )
+
+
+def _policy(*scripts: str) -> str:
+    """Return what a browser may run and load: these scripts, to the last letter, and nothing else.
+
+    A name that got into the page as HTML in spite of all care could then do nothing.
+    """
+    hashes = (base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in scripts)
+    allowed = " ".join(f"'sha256-{one}'" for one in hashes)
+    return (
+        f"default-src 'none'; script-src {allowed}; style-src 'unsafe-inline'; img-src data:; "
+        "base-uri 'none'; form-action 'none'"
+    )
+
+
+@cache
+def _script() -> str:
+    """The page's own script."""
+    folder = files("hydroid").joinpath("reporting")
+    return "\n".join(folder.joinpath(name).read_text("utf-8") for name in ("moving_arm.js", "charts.js"))
 
 
 @cache
@@ -76,7 +113,12 @@ def _library() -> str:
     """Bokeh's scripts, from the installed package."""
     folder = files("bokeh").joinpath("server", "static", "js")
     scripts = (folder.joinpath(name).read_text("utf-8") for name in ("bokeh.min.js", "bokeh-api.min.js"))
-    return _packed(";\n".join(scripts))
+    return ";\n".join(scripts)
+
+
+@cache
+def _packed_library() -> str:
+    return _packed(_library())
 
 
 def _packed(text: str) -> str:

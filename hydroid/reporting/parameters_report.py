@@ -11,7 +11,7 @@ from hydroid.parameters import Parameter
 from hydroid.posterior.uncertainty import Flag, Source
 from hydroid.quantity_table import CHOICES
 from hydroid.reporting.chart import Chart, Mark, Panel
-from hydroid.reporting.page import Given, Plot, Section, Table
+from hydroid.reporting.page import Cell, Given, Plot, Section, Table
 from hydroid.run.record import Record
 from hydroid.settings.fit import FitSettings
 from hydroid.words import number
@@ -148,29 +148,36 @@ def speed_section(settings: FitSettings, summary: FitSummary, logs: Sequence[Log
 
 
 def merged_tables(runs: Sequence[Record]) -> dict[str, Table]:
-    """Return the tables `spread` and `runs` of runs that differ in their seeds only, the best run first."""
+    """Return the tables `spread` and `runs` of runs that differ in their seeds only, the best run first.
+
+    A seed may lead to further terms, and so to parameters that others lack; their cells are empty, as are
+    errors of joints that diverged. The spread is over the runs that have a value.
+    """
     runs = sorted(runs, key=lambda run: run.rms_deg)
-    best = runs[0].summary.estimate
-    units = {f"error of {one.name}": "mm" if one.slides else "deg" for one in runs[0].summary.verdict}
-    units |= {name: one.unit for name, one in best.items()}
-    columns = np.array(
-        [
-            [
-                (one.fitted_deg or 0.0) * (1e3 * np.radians(1.0) if one.slides else 1.0)
-                for one in run.summary.verdict
-            ]
-            + [run.summary.values[name] for name in best]
-            for run in runs
-        ]
-    )
-    spread = np.quantile(columns, [0.5, 0, 0.25, 0.75, 1], axis=0).T.tolist()
-    rows = [
-        (name, unit, *row, status(best[name]) if name in best else "")
-        for (name, unit), row in zip(units.items(), spread, strict=True)
-    ]
-    each = [(run.folder, run.seed, *row) for run, row in zip(runs, columns.tolist(), strict=True)]
+    units, flags = dict[str, str](), dict[str, str]()
+    for run in runs:
+        units |= {f"error of {one.name}": "mm" if one.slides else "deg" for one in run.summary.verdict}
+    for run in runs:
+        units |= {name: one.unit for name, one in run.summary.estimate.items()}
+        flags = {name: status(one) for name, one in run.summary.estimate.items()} | flags
+    values = [_errors(run) | run.summary.values for run in runs]
+    each = [(run.folder, run.seed, *map(one.get, units)) for run, one in zip(runs, values, strict=True)]
+    spread: list[tuple[Cell, ...]] = []
+    for name, unit in units.items():
+        known = [value for one in values if (value := one.get(name)) is not None]
+        quantiles = np.quantile(known, [0.5, 0, 0.25, 0.75, 1]).tolist() if known else [None] * 5
+        spread.append((name, unit, *quantiles, flags.get(name, "")))
     header = "run", "seed", *(f"{name} [{unit}]" for name, unit in units.items())
     return {
-        "spread": Table(f"{len(runs)} runs", SPREAD, tuple(rows), optional=SPREAD[4:6]),
+        "spread": Table(f"{len(runs)} runs", SPREAD, tuple(spread), optional=SPREAD[4:6]),
         "runs": Table("Runs, smallest error first", header, tuple(each), optional=header[:1:-1]),
     }
+
+
+def _errors(run: Record) -> dict[str, float | None]:
+    """Return each joint's error on the fitted logs [deg], of one that slides [mm]; None: there is none."""
+    errors = dict[str, float | None]()
+    for one in run.summary.verdict:
+        factor = 1e3 * float(np.radians(1.0)) if one.slides else 1.0
+        errors[f"error of {one.name}"] = None if one.fitted_deg is None else factor * one.fitted_deg
+    return errors

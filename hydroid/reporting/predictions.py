@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from itertools import cycle
+from itertools import chain, cycle
 from pathlib import Path
 
 import numpy as np
@@ -57,8 +57,8 @@ _COLUMNS = {
 def prediction_sections(predictions: Sequence[Prediction], arm: Arm, fits: Verdicts) -> list[Section]:
     """Return the arm in motion, each joint's error in each log with the responses behind it, and all numbers.
 
-    The first prediction of a log is the one that moves, and whose errors are shown; they are coloured by the
-    tolerances of the first of the fits.
+    The first prediction of a log is the one that moves. Of each joint the errors are shown of the first
+    prediction that compares it; they are coloured by the tolerances of the first fit that does.
     """
     if len(fits) == 1:
         predictions = [replace(one, fit="simulated") for one in predictions]
@@ -66,13 +66,19 @@ def prediction_sections(predictions: Sequence[Prediction], arm: Arm, fits: Verdi
     for one in predictions:
         by_log.setdefault(one.log.source, []).append(one)
     names = log_names(by_log)
-    bins = min(1000, max(150, 9000 // sum(len(first.joints) for first, *_ in by_log.values())))
-    tolerances = {one.joint: one.tolerance_deg for one in next(iter(fits.values()), ())}
+    compared = {
+        log: [*dict.fromkeys(j for one in group for j in one.joints)] for log, group in by_log.items()
+    }
+    bins = min(1000, max(150, 9000 // sum(map(len, compared.values()))))
+    tolerances = dict[int, float]()
+    for one in chain.from_iterable(fits.values()):
+        tolerances.setdefault(one.joint, one.tolerance_deg)
     tabs: list[Plot] = []
     for log, group in by_log.items():
-        for joint in (first := group[0]).joints:
+        for joint in compared[log]:
             title = f"{arm.joint_names[joint - 1]} in {names[log]}"
             several = [one for one in group if joint in one.joints]
+            first = several[0]
             slides = arm.joints[joint - 1].slides
             # of many logs fewer samples are drawn: the page stays small
             drawing = partial(draw_response, title, joint, several, bins, slides=slides)

@@ -56,12 +56,16 @@ def left_out_table(
     title: str, columns: dict[str, str], rows: Sequence[Plain], arm: Arm, note: str = ""
 ) -> Table:
     """Return a table of rows by key, with a further column for each joint of their `left_out_deg`."""
-    joints = {name: name for row in rows for name in row.get("left_out_deg", ())}
+    keys = dict[str, str]()  # of the joints' columns: a joint may be called as one of `columns`
     slides = {arm.joint_names[joint - 1] for joint in arm.slides}
-    cells = [
-        row | {n: _shown(e, n in slides) for n, e in row.get("left_out_deg", {}).items()} for row in rows
-    ]
-    return Table.of(title, columns | joints, cells, note + _LEFT_OUT)
+    cells = list[dict[str, Cell]]()
+    for row in rows:
+        cells.append(dict(row))
+        for name, error in row.get("left_out_deg", {}).items():
+            key = f"left_out_deg.{name}"
+            keys[key] = name
+            cells[-1][key] = _shown(error, name in slides)
+    return Table.of(title, columns | keys, cells, note + _LEFT_OUT)
 
 
 def verdict_sections(fits: Verdicts, *steps: Finding) -> tuple[Section, ...]:
@@ -89,8 +93,16 @@ def horizon_section(fits: Verdicts) -> Section | None:
 
 
 def ordered(fits: Verdicts) -> Verdicts:
-    """Return the fits, the smallest errors first: in parts of the tolerances of the joints."""
-    return dict(sorted(fits.items(), key=lambda fit: sum(map(_size, fit[1]))))
+    """Return the fits, the smallest errors first: in parts of the tolerances of the joints that all compare.
+
+    Where there is no such joint, each fit counts by the mean of its own ones.
+    """
+    shared = set.intersection(*({one.joint for one in verdicts} for verdicts in fits.values()))
+
+    def size(verdicts: Sequence[JointVerdict]) -> float:
+        return float(np.mean([_size(one) for one in verdicts if one.joint in shared or not shared]))
+
+    return dict(sorted(fits.items(), key=lambda fit: size(fit[1])))
 
 
 def _error(one: JointVerdict) -> float:

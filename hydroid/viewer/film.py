@@ -33,7 +33,9 @@ def rendered(motion: Motion, size: tuple[int, int], frames: Iterable[tuple[float
     # the map covers what the camera sees, or its border shows as dots on the floor
     look.map.shadowclip, look.quality.shadowsize = 3.0, 4096
     try:
-        renderer = mujoco.Renderer(replay.model, height=height, width=width)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # glfw says in warnings what the error says as well
+            renderer = mujoco.Renderer(replay.model, height=height, width=width)
     except (mujoco.FatalError, ImportError, RuntimeError, AttributeError) as error:
         how = f"MUJOCO_GL={os.environ.get('MUJOCO_GL')}: {' '.join(str(error).split())}"
         hint = "install libegl1 or libosmesa6, and set MUJOCO_GL=egl or osmesa before Python starts"

@@ -2,6 +2,7 @@
 
 import json
 import logging
+import re
 import shutil
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,6 +14,7 @@ from command_line import Run
 from conftest import SMALL
 
 import hydroid
+from hydroid.commands.app import click_command
 from hydroid.commands.stages import held_mechanics
 from hydroid.estimate import FitSummary, ParameterEstimate, write_estimate
 from hydroid.findings import Finding
@@ -25,6 +27,38 @@ ROOT = Path(__file__).parents[2]
 QUICK = ["--set=search.ga.population=6", "--set=search.ga.generations=2", "--set=refinement.iterations=1"]
 GA = ["--algorithm", "ga"]
 VALUES = {"D": 80.0, "S": 0.0, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
+
+
+PROMISES = {
+    "page": "*.html",
+    "report.html": "report.html",
+    "estimate.yaml": "estimate.yaml",
+    "tables": "tables/*.csv",
+    "figures": "figures/*",
+    "fitted arm": "model/*.xml",
+    "commands.csv": "commands.csv",
+    "predicted.csv": "predicted.csv",
+}
+"""what help says that a command writes, and the files that this is"""
+
+
+def test_a_command_writes_what_its_help_promises(short: Path, hydroid_cli: Run, tmp_path: Path):
+    hydroid_cli("fit-mech", short, *GA, "--out", "fit-mech", *QUICK)
+    for name, options in {
+        "validate": [short],
+        "analyse": [],
+        "suggest": [],
+        "design": ["--set=design.effort=3", "--set=design.poses=any"],
+    }.items():
+        hydroid_cli(name, *options, "--fit", "fit-mech", "--out", name)
+    for name in ("fit-mech", "validate", "analyse", "suggest", "design"):
+        command = click_command(name)
+        (out,) = (option.help for option in command.params if "--out" in option.opts)
+        words = f"{command.help} {out}"
+        promised = {what for what in PROMISES if re.search(rf"(Folder for|Writes) [^\[]*{what}", words)}
+        there = {what for what, files in PROMISES.items() if any((tmp_path / name).glob(files))}
+        assert promised <= there, name
+        assert promised, name
 
 
 def test_fit_validate_and_simulate_walk_through(short: Path, hydroid_cli: Run, tmp_path: Path):

@@ -21,10 +21,12 @@ CONFIG = {
     "P_flow": {"quantity": "pump_flow", "fixed": 3.0, "term": "pump"},
     "P_droop": {"quantity": "pump_droop", "bounds": [0, 140], "start": 20, "term": "pump"},
 }
+JOINT = {"simulation.model": "quasi-static", "joint_refinement": True}
 
 
-def _problem(name):
+def _problem(name, term="pump", **more):
     """The fit of a simulated log whose machine is what an estimate of this name has."""
+    rows = {n: row | {"term": term} if "term" in row else row for n, row in CONFIG.items()}
     changes = {
         "outputs": (2, 3),
         "simulation.model": "ladder",
@@ -32,7 +34,7 @@ def _problem(name):
         "search.multistart": MultistartSettings(starts=1, horizons=()),
         "refinement": RefinementSettings(iterations=40),
     }
-    ladder = settings_of(CONFIG, bulk_modulus=20.0).changed(changes)
+    ladder = settings_of(rows, bulk_modulus=20.0).changed(changes | more)
     machine = ladder.of_estimate(name)
     log = step_log(machine.arm.pose("study"), {2: SHOULDER, 3: ELBOW})
     exact = simulate_log(machine, log, {n: TRUTH[n] for n in CONFIG if n in machine.parameters})
@@ -57,6 +59,26 @@ def test_a_fit_keeps_what_the_logs_ask_for(name, monkeypatch):
     if name == "dynamic+pump":  # a study measures the estimate as it is, though its search has another model
         measures = perform(Task(name, 1, ladder, (log,)))["measures"]
         assert measures["rms error"] == pytest.approx(np.degrees(found.best.rms))
+
+
+@pytest.mark.parametrize("term", ["refined", "start"])
+def test_a_term_may_be_called_as_a_model_or_a_step(term, monkeypatch):
+    shown, problem = [], _problem(f"refined+{term}", term)
+    monkeypatch.setattr(FitProgress, "__call__", lambda _, *line: shown.append(line))
+    found = fit(problem, FitProgress(problem.settings))
+    assert found.final == f"refined+{term}"
+    assert np.degrees(found.best.rms) == pytest.approx(0.02, rel=0.1)
+    steps = [what[: len("step 1 of 4")] for what, *_ in shown if what != "generation"]
+    assert steps == sorted(steps)
+    assert {*steps} == {f"step {number} of 4" for number in (1, 2, 3, 4)}
+
+
+def test_a_joint_refinement_keeps_a_term_that_is_called_as_its_model():
+    problem = _problem("refined+refined_pump", "refined_pump", **JOINT)
+    found = fit(problem)
+    assert found.final == "joint+refined_pump"
+    assert "P_droop" in found.problem.parameters.names
+    assert np.degrees(found.best.rms) == pytest.approx(0.02, rel=0.1)
 
 
 class Hurried(Silent):

@@ -37,9 +37,10 @@ def predicted(error: float, log: Log) -> Prediction:
     return Prediction("fit", log, (2,), log.angle[:, [1]] - np.radians(error), {}, None)
 
 
-def verdict(fitted=None, unseen=None, nine=(5, 5), tolerance=None, log=None):
+def verdict(fitted=None, unseen=None, nine=(5, 5), tolerance=None, log=None, still=40):
     settings = SETTINGS.model_copy(update={"tolerance_deg": tolerance})
-    rivals = {2: dict(zip(NAMES, (Off(40, 40), Off(8, 8), Off(*nine)), strict=True))}
+    table = Off(8, 8) if nine[1] < 8 else Off(*nine)
+    rivals = {2: dict(zip(NAMES, (Off(still, still), table, Off(*nine)), strict=True))}
     own = [] if fitted is None else [predicted(fitted, LOG)]
     others = [] if unseen is None else [predicted(unseen, log or replace(LOG, source="b.csv"))]
     (one,) = judge(settings, own, rivals, others)
@@ -55,6 +56,8 @@ ROWS = {
     "as bad as the user allows": ((2.5, 4.5), {"tolerance": 5}, "predicts"),
     "worse than the user allows": ((0.4, 0.7), {"tolerance": 0.5}, "predicts roughly"),
     "much worse than on its own logs": ((1.0, 4.4), {}, "predicts worse than it fits"),
+    "most of the motion is missed": ((12.0, 12.0), {"still": 15, "nine": (14, 14)}, "predicts little"),
+    "half of the motion is missed": ((12.0, 12.0), {"still": 24, "nine": (14, 14)}, "predicts roughly"),
     "hardly better than nine numbers": ((2.5, 4.6), {}, "predicts no better than nine numbers"),
     "worse than nine numbers": ((1.0, 5.5), {}, "predicts no better than nine numbers"),
     "worse than a table: the simplest is named": ((1.0, 9.0), {}, "predicts no better than speed tables"),

@@ -72,6 +72,43 @@ def test_a_page_is_whole_in_a_browser(pages: dict[str, Path], name: str, how: tu
     assert np.max(np.diff(levels)) <= 1
 
 
+INJECTED = "<img src=x onerror=\"ran='a name'\">"  # short: pages shorten long names
+SCRIPT = "<script>ran='a script'</script>"
+
+
+@pytest.fixture(scope="module")
+def hostile(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A validation whose fits and logs are called as HTML that runs a script."""
+    problem = make_problem(outputs=(2, 3))
+    logs = [replace(problem.logs[0], source=name) for name in (INJECTED, f"{INJECTED}.csv")]
+    results = [make_prediction(log, (2, 3), fit=name) for name in (INJECTED, SCRIPT) for log in logs]
+    fits = {p.fit: judge(problem.settings, [], {}, [p]) for p in results}
+    page = validation_page(results, fits, problem.settings.arm)
+    return write_page(page, tmp_path_factory.mktemp("hostile"))
+
+
+def test_names_are_text_in_a_browser_in_tooltips_too(hostile: Path):
+    found = seen(hostile, 1400)
+    assert found["ran"] == "nothing"
+    assert found["images"] == 0
+    assert found["problems"] == []
+    labels = [text for text in found["tooltips"] if text.startswith(INJECTED)]
+    assert labels, found["tooltips"]
+
+
+def test_a_script_that_got_into_a_page_is_not_run(pages: dict[str, Path], tmp_path: Path):
+    """The second line of defence: the policy names the page's own scripts."""
+    page = tmp_path / "page.html"
+    source = pages["report"].read_text(encoding="utf-8")
+    page.write_text(
+        source.replace("<main>", f"<main>{INJECTED}{SCRIPT}<base href='https://a.org'>"), encoding="utf-8"
+    )
+    found = seen(page, 1400)
+    assert found["ran"] == "nothing"
+    assert found["images"] == 1
+    assert len([problem for problem in found["problems"] if problem.startswith("refused")]) >= 3
+
+
 def test_a_page_is_printed_on_paper(pages: dict[str, Path], tmp_path: Path):
     paper = tmp_path / "page.pdf"
     browse(pages["report"], f"--print-to-pdf={paper}")

@@ -3,12 +3,14 @@
 from dataclasses import replace
 
 import pytest
-from report_fits import MODEL, make_fit, make_problem, make_uncertainty
+from report_fits import MODEL, make_fit, make_problem, make_record, make_uncertainty
 
 from hydroid.findings import Finding
 from hydroid.fitting.summary import summarise
 from hydroid.reporting.page import Table, log_names
-from hydroid.reporting.parameters_report import parameter_table
+from hydroid.reporting.parameters_report import merged_tables, parameter_table
+
+FEWER = {name: bounds for name, bounds in MODEL.items() if name != "M2"}
 
 
 def column(table: Table, name: str) -> list:
@@ -54,6 +56,27 @@ def test_what_the_logs_move_far_from_its_prior_is_one_finding():
     fit = with_theta(make_fit(problem, effects=effects), problem, effects, K=0.1, D=300.0, M1=9.0)
     (finding,) = [one for one in summarise(problem, fit).findings if one.kind == "strained prior"]
     assert finding.what.endswith("in standard deviations: D (4.0 above) and K (3.0 below).")
+
+
+def test_runs_of_several_seeds_have_no_value_where_there_is_none():
+    """One seed has led to a further term, and in another the joint diverged."""
+    problem, more = make_problem(parameters=FEWER), make_problem()
+    first, second = make_record(problem, make_fit(problem)), make_record(more, make_fit(more), folder="TWO")
+    verdict = [one.changed({"fitted_deg": None}) for one in second.verdict]
+    good = replace(first, summary=first.summary.changed({"verdict": first.verdict, "rms_deg": 0.1}))
+    bad = replace(second, summary=second.summary.changed({"verdict": verdict, "rms_deg": 0.2}))
+    tables = merged_tables([bad, good])
+    assert [column(tables["runs"], name) for name in ("run", "M2 [kg]")] == [
+        ["RUN", "TWO"],
+        [None, bad.summary.values["M2"]],
+    ]
+    error = first.verdict[0].fitted_deg
+    assert column(tables["runs"], "error of shoulder [deg]") == [error, None]
+    spread = {row[0]: row[2:5] for row in tables["spread"].rows}
+    assert spread["error of shoulder"] == (error, error, error)
+    assert spread["M2"] == (bad.summary.values["M2"],) * 3
+    nowhere = merged_tables([bad])["spread"].rows[0]
+    assert nowhere[:3] == ("error of shoulder", "deg", None)
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,9 @@
 """Pages: complete, the same every time, self-contained, and safe whatever a log is called."""
 
+import base64
 import csv
+import gzip
+import hashlib
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -16,9 +19,16 @@ from hydroid.estimate import FitSummary, JointVerdict
 from hydroid.fitting.search import HISTORY
 from hydroid.fitting.verdict import judge
 from hydroid.reporting.page import Page, Section, Table
-from hydroid.reporting.page_file import html, write_figures, write_page
+from hydroid.reporting.page_file import html, write_figures, write_page, write_tables
 from hydroid.reporting.predictions import fit_page, validation_page
-from hydroid.reporting.verdict_table import horizon_section, next_step, ordered, verdict_table, worst
+from hydroid.reporting.verdict_table import (
+    horizon_section,
+    left_out_table,
+    next_step,
+    ordered,
+    verdict_table,
+    worst,
+)
 
 HOSTILE = "<b>&_%$.csv"
 
@@ -27,16 +37,28 @@ class Reader(HTMLParser):
     def __init__(self, source: str) -> None:
         super().__init__()
         self.tags: list[str] = []
+        self.policies: list[str] = []
         self.links: list[str] = []
         self.text, self.source = "", source
         self.feed(source)
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.tags.append(tag)
+        found = dict(attrs)
+        if found.get("http-equiv") == "Content-Security-Policy":
+            self.policies.append(found["content"] or "")
         self.links += [v or "" for name, v in attrs if name in ("src", "href", "action", "data", "srcset")]
 
     def handle_data(self, data: str) -> None:
         self.text += data
+
+
+def hashes(source: str) -> list[str]:
+    """Of the scripts of a page that are run: its own, and the library that it unpacks."""
+    (own,) = re.findall(r"<script>(.*?)</script>", source, re.DOTALL)
+    (packed,) = re.findall(r'<script type="text/plain" id="library">(.*?)</script>', source)
+    scripts = own.encode(), gzip.decompress(base64.b64decode(packed))
+    return [base64.b64encode(hashlib.sha256(script).digest()).decode() for script in scripts]
 
 
 def files(path: Path) -> dict[str, bytes]:
@@ -84,7 +106,16 @@ def test_the_page_loads_nothing_from_elsewhere_and_a_name_is_text(written):
     source = (written[0] / "report.html").read_text(encoding="utf-8")
     page = Reader(source)
     assert not page.links
-    assert "default-src 'none'" in source  # what would load all the same is refused by the browser
+    (policy,) = page.policies  # what would load or run all the same is refused by the browser
+    allowed = dict(rule.split(" ", 1) for rule in policy.split("; "))
+    assert allowed == {
+        "default-src": "'none'",
+        "script-src": " ".join(f"'sha256-{one}'" for one in hashes(source)),
+        "style-src": "'unsafe-inline'",
+        "img-src": "data:",
+        "base-uri": "'none'",
+        "form-action": "'none'",
+    }
     own = re.sub(r'<script type="text/plain".*?</script>', "", source, flags=re.DOTALL)
     assert not re.search(r"https?://(?!www\.w3\.org/2000/svg)|@import|url\(|fetch\(", own)
     assert not {"link", "iframe", "object"} & set(page.tags)
@@ -174,6 +205,54 @@ def test_a_validation_of_several_fits_shows_the_best_first_in_shared_charts():
     (tab,) = next(section for section in page.sections if section.title == "Response").tabs
     labels = {mark.label for panel in tab.draw().panels for mark in panel.marks}
     assert {label.partition(" (")[0] for label in labels} >= {"good", "bad", "measured"}
+
+
+def test_a_joint_that_only_a_later_fit_compares_is_shown():
+    problem = make_problem(outputs=(2, 3))
+    settings, log = problem.settings, problem.logs[0]
+    of_two = make_prediction(log, (2, 3), fit="two", error=0.2)
+    of_one = make_prediction(log, (2,), fit="one", error=0.001)
+    judged = {
+        "one": judge(settings.changed({"outputs": (2,)}), [], {}, [of_one]),
+        "two": judge(settings, [], {}, [of_two]),
+    }
+    page = validation_page([of_one, of_two], ordered(judged), settings.arm)
+    (tabs,) = [section.tabs for section in page.sections if section.title == "Errors by log"]
+    size = f"{np.degrees(0.2):.2g}°"
+    assert [(tab.column, tab.button, tab.state) for tab in tabs] == [
+        ("shoulder", f"{np.degrees(0.001):.2g}°", "good"),
+        ("elbow", size, "bad"),
+    ]
+    labels = {mark.label.partition(" (")[0] for panel in tabs[1].draw().panels for mark in panel.marks}
+    assert "two" in labels
+    assert "one" not in labels
+
+
+def test_the_best_fit_is_found_by_the_joints_that_all_compare():
+    boom, swing = (
+        JointVerdict(joint=j, name=str(j), verdict="", unseen_deg=e, unseen_logs=1, tolerance_deg=1.0)
+        for j, e in ((1, 2.0), (2, 3.0))
+    )
+    better = boom.changed({"unseen_deg": 1.0})
+    assert [*ordered({"only boom": [boom], "both": [better, swing]})] == ["both", "only boom"]
+    assert [*ordered({"swing": [swing], "boom": [boom]})] == ["boom", "swing"]  # none is shared
+
+
+def test_a_joint_may_be_called_as_a_column():
+    arm = make_problem().settings.arm
+    rows = [{"parameter": "P_flow", "left_out_deg": {"parameter": 1.5, "boom": None}}]
+    table = left_out_table("", {"parameter": "freed"}, rows, arm)
+    assert table.header == ("freed", "parameter", "boom")
+    assert table.shown == [["P_flow", "1.5", ""]]
+
+
+def test_a_table_of_any_name_stays_in_its_folder(tmp_path: Path):
+    cells = Table("", ("a",), ((1,),))
+    names = ("known_../../../out", "known_a/b", "known_a_b", "known_A_b", "x" * 300)
+    write_tables(dict.fromkeys(names, cells), tmp_path / "run" / "here")
+    assert len(list((tmp_path / "run" / "here" / "tables").glob("*.csv"))) == len(names)
+    assert [path.name for path in tmp_path.iterdir()] == ["run"]
+    assert [path.name for path in (tmp_path / "run").iterdir()] == ["here"]
 
 
 def test_a_folder_that_cannot_be_written_is_said(tmp_path: Path):

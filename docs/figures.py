@@ -1,0 +1,221 @@
+"""Figures of `make demo` and `make excavator` that the pages state: one file, and the pages' parts from it.
+
+    python docs/figures.py [runs]     # reads the runs, writes docs/figures.yaml and the marked parts of pages
+    python docs/figures.py --pages    # writes the marked parts alone, from docs/figures.yaml
+
+A marked part stands between <!--=NAME--> and <!--/-->: NAME is one of PARTS, or leads to one number of the
+file by its keys, as rig.shoulder.unseen_deg does. It must not begin a line within a paragraph.
+"""
+
+import re
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from hydroid.arrays import Array
+from hydroid.errors import HydroidError
+from hydroid.estimate import FitSummary
+from hydroid.files import write_atomic
+from hydroid.fitting.baselines import NAMES
+from hydroid.fitting.validation import HORIZONS, Prediction
+from hydroid.reporting.verdict_table import verdict_table
+from hydroid.run.record import Record, load_record
+from hydroid.words import number
+
+ROOT = Path(__file__).parents[1]
+FILE = ROOT / "docs" / "figures.yaml"
+PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), ROOT / "examples/excavator/README.md")
+HEAD = "# Written by `make figures` from the runs of `make demo` and `make excavator`; pages state them.\n"
+MARKED = re.compile(r"(<!--=([\w. ]+)-->)(.*?)(<!--/-->)", re.DOTALL)
+JOINTS = (("rig", "shoulder"), *(("excavator", joint) for joint in ("boom", "arm", "bucket", "swing")))
+ROWS = {
+    "standing still": "standing still",
+    "a table of mean speeds, with a delay": "speed tables",
+    "nine numbers: dead band, exponent, speed and lag of each direction, and a delay": "nine numbers",
+    "hydroid, fitted logs": "fitted_deg",
+    "**hydroid, unseen logs**": "unseen_deg",
+}
+"""of the README's table: their names, and their keys"""
+
+Figures = dict[str, Any]
+
+
+def collected(runs: Path) -> Figures:
+    """Return the figures of the runs of both targets of `make`."""
+    stage_1, stage_2 = (load_record(runs / "demo" / stage) for stage in ("mech", "hyd"))
+    rig = _joints(stage_2)
+    for one in stage_1.verdict:
+        rig[one.name]["stage_1_deg"] = _rounded(one.fitted_deg)
+    quantities = {"stage 1": _quantities(stage_1.summary), "stage 2": _quantities(stage_2.summary)}
+    parameters = {
+        name: {
+            "value": _rounded(one.value),
+            "from": _rounded(one.interval[0]),
+            "to": _rounded(one.interval[1]),
+        }
+        for name, one in stage_2.summary.estimate.items()
+    }
+    excavator = _joints(load_record(runs / "excavator" / "fit"))
+    return {"rig": rig, "excavator": excavator, "quantities": quantities, "parameters": parameters}
+
+
+def _joints(record: Record) -> Figures:
+    """Return what the verdict says of each joint, and the mean absolute errors [deg]."""
+    joints, fitted, unseen = Figures(), record.result.fitted, [*record.validations.values()]
+    shown = verdict_table({"": record.verdict})
+    for one, row in zip(record.verdict, shown.rows, strict=True):
+        joints[one.name] = {
+            "verdict": row[shown.header.index("verdict")],
+            "fitted_deg": _rounded(one.fitted_deg),
+            "unseen_deg": _rounded(one.unseen_deg),
+            "fitted_mae_deg": _mean_absolute(fitted, one.joint),
+            "unseen_mae_deg": _mean_absolute(unseen, one.joint),
+            "inside_percent": _rounded(one.inside_percent),
+            **{name: _rounded(error) for name, error in one.baselines_deg.items()},
+            "ahead": {name: [*map(_rounded, errors)] for name, errors in one.horizons_deg.items()},
+        }
+    return joints
+
+
+def _mean_absolute(predictions: Sequence[Prediction], joint: int) -> float | None:
+    errors: list[Array] = [one.error(joint) for one in predictions]
+    return _rounded(float(np.degrees(np.abs(np.concatenate(errors)).mean()))) if errors else None
+
+
+def _quantities(summary: FitSummary) -> list[Figures]:
+    return [
+        {
+            "label": one.label,
+            "unit": one.unit,
+            "value": _rounded(one.value),
+            "interval": [*map(_rounded, ends)],
+        }
+        for one in summary.quantities.values()
+        if (ends := one.interval)
+    ]
+
+
+def _rounded(value: float | None) -> float | None:
+    """Return six digits: more than any page states, or a page would round what is rounded."""
+    return None if value is None else float(f"{value:.6g}")
+
+
+def at_a_glance(figures: Figures) -> str:
+    """Return the README's table."""
+    lines = [["", "rig: shoulder", "excavator: boom", "arm", "bucket", "swing"], ["---"] * 6]
+    for name, key in ROWS.items():
+        errors = [_error(figures[machine][joint][key]) for machine, joint in JOINTS]
+        lines.append([name, *(f"**{error}**" if name.startswith("**") else error for error in errors)])
+    lines.append(["verdict", *(figures[machine][joint]["verdict"] for machine, joint in JOINTS)])
+    return _table(lines)
+
+
+def ahead(figures: Figures) -> str:
+    """Return the table of errors by prediction time."""
+    lines = [["after [s]", "", *(f"{seconds:g}" for seconds in HORIZONS)], ["---"] * (2 + len(HORIZONS))]
+    for machine, joint in JOINTS:
+        by_model = figures[machine][joint]["ahead"]
+        simple = zip(*(by_model[name] for name in NAMES[1:]), strict=True)
+        lines.append([f"{machine}, {joint}", "hydroid", *map(_error, by_model["the fit"])])
+        pairs = ["; ".join(map(_error, pair)) for pair in simple]
+        lines.append(["", "table of speeds; nine numbers", *pairs])
+    return _table(lines)
+
+
+def not_better(figures: Figures) -> str:
+    """Return the sentence on where a simple model errs less."""
+    found = list[str]()
+    for machine, joint in JOINTS:
+        by_model = figures[machine][joint]["ahead"]
+        worse = [
+            f"{seconds:g}"
+            for seconds, own, *simple in zip(
+                HORIZONS, *map(by_model.get, ("the fit", *NAMES[1:])), strict=True
+            )
+            if own is None or own >= min(simple)
+        ]
+        found += [f"the {joint} after {' and '.join(worse)} s"] if worse else []
+    but = f", but for {', '.join(found)}" if found else ""
+    return f"Every joint is predicted better than by both simple models{but}."
+
+
+def quantities(figures: Figures) -> str:
+    """Return the table of what the demo's fits state about the rig."""
+    lines = [["stage", "quantity", "value", "95 % interval"], ["---"] * 4]
+    for stage, rows in figures["quantities"].items():
+        for row in rows:
+            low, high = ("no limit" if end is None else number(end) for end in row["interval"])
+            unit = f" [{row['unit']}]" if row["unit"] else ""
+            lines.append([stage, f"{row['label']}{unit}", number(row["value"]), f"{low} to {high}"])
+    return _table(lines)
+
+
+PARTS: dict[str, Callable[[Figures], str]] = {
+    "at a glance": at_a_glance,
+    "ahead": ahead,
+    "not better": not_better,
+    "quantities": quantities,
+}
+
+
+def filled(text: str, figures: Figures) -> str:
+    """Return a page with its marked parts as the figures have them."""
+
+    def part(found: re.Match[str]) -> str:
+        begin, name, _, end = found.groups()
+        if name in PARTS:
+            words = PARTS[name](figures)
+        else:
+            value: Any = figures
+            for key in name.split("."):
+                value = value[key]
+            words = _stated(name, value)
+        return f"{begin}{words}{end}"
+
+    return MARKED.sub(part, text)
+
+
+def _stated(name: str, value: float | None) -> str:
+    """Return one number as a sentence or a table by hand states it."""
+    if value is None or not name.endswith(("percent", "mae_deg")):
+        return _error(value)
+    return f"{value:.0f}" if name.endswith("percent") else f"{value:.2f}"
+
+
+def _error(value: float | None) -> str:
+    if value is None:
+        return "diverged"
+    return f"{value:.0f}" if value >= 100 else f"{value:#.2g}".rstrip(".")
+
+
+def _table(lines: Sequence[Sequence[str]]) -> str:
+    rows = "\n".join(f"| {' | '.join(cells)} |".replace("|  |", "| |") for cells in lines)
+    return f"\n\n{rows}\n\n"
+
+
+def marked() -> Iterator[tuple[Path, str]]:
+    """Yield the pages that have marked parts, with their text."""
+    for page in PAGES:
+        if MARKED.search(text := page.read_text(encoding="utf-8")):
+            yield page, text
+
+
+def main(given: Sequence[str]) -> None:
+    """Write the file, unless only the pages are asked for, and the pages."""
+    if given != ["--pages"]:
+        try:
+            found = collected(Path(*given) if given else ROOT / "runs")
+        except HydroidError as error:
+            sys.exit(f"{error}; `make demo excavator` comes first")
+        write_atomic(FILE, HEAD + yaml.safe_dump(found, sort_keys=False, allow_unicode=True, width=110))
+    figures = yaml.safe_load(FILE.read_text(encoding="utf-8"))
+    for page, text in marked():
+        write_atomic(page, filled(text, figures))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -13,8 +13,8 @@ import numpy as np
 from hydroid.advice.suggestions import refitted
 from hydroid.errors import SettingsError
 from hydroid.files import Plain
-from hydroid.identified_model import IdentifiedModel
 from hydroid.fitting.left_out import LeftOut, gain, is_better, parts, predict_parts
+from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
 from hydroid.posterior.error_model import likelihood_at
 from hydroid.problem.problem import Problem

@@ -6,18 +6,16 @@ Where that is far from the truth, design again after the next fit.
 Only the simulated motion is kept within the limits; an arm that differs from the model moves differently.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import solve_triangular
 
 from hydroid.advice.experiment import (
     Experiment,
     RandomExperiments,
     Violation,
-    experiment_samples,
     repaired,
     violation,
 )
@@ -25,8 +23,8 @@ from hydroid.arm.model import load_machine, load_model
 from hydroid.arrays import Array, record
 from hydroid.errors import SettingsError
 from hydroid.log import Log
-from hydroid.posterior.linear import estimate_box, prior_slopes, white_posterior
 from hydroid.posterior.error_model import whitened
+from hydroid.posterior.linear import estimate_box, prior_slopes, white_posterior
 from hydroid.posterior.posterior import Posterior, regular
 from hydroid.posterior.uncertainty import uncertainty
 from hydroid.problem.bindings import Bindings

@@ -18,8 +18,8 @@ from hydroid.estimate import finite
 from hydroid.files import Plain
 from hydroid.findings import Finding
 from hydroid.fitting.left_out import LeftOut, gain, is_better, parts, predict_parts
-from hydroid.fitting.summary import angle_errors
 from hydroid.fitting.refinement import Refinement, refine
+from hydroid.fitting.summary import angle_errors
 from hydroid.posterior.error_model import Likelihood
 from hydroid.posterior.posterior import Posterior
 from hydroid.posterior.uncertainty import Uncertainty

@@ -8,11 +8,11 @@ import numpy as np
 from hydroid.arrays import Array, record
 from hydroid.fitting.checkpoints import Checkpoints
 from hydroid.fitting.ladder import Estimate, Ladder, Watcher, measured
+from hydroid.fitting.refinement import Refinement
 from hydroid.fitting.search import Searched, search
 from hydroid.posterior.quantities import Quantities, quantities
 from hydroid.posterior.uncertainty import Uncertainty
 from hydroid.problem.problem import Problem
-from hydroid.fitting.refinement import Refinement
 from hydroid.search.pareto import average, non_dominated, segment_best, utopia
 
 

@@ -23,14 +23,11 @@ from hydroid.problem.problem import Problem
 from hydroid.search.descent import Ending
 from hydroid.settings.search import RefinementSettings
 
-FAR = 2.0
-"""times the rms error of the last estimate at which the dynamic model is given up after a rough refinement:
-lags that stand for oil in a quasi-static model are too much beside it, and it errs by more at first"""
+FIRST = 10
+"""iterations after which another model must be more likely than the last one: each is slow to simulate"""
 WORTH = 2.0
 """gain of the fitted logs' log-likelihood, for each parameter more, below which no part is left out: such a
 rung cannot foretell them clearly better"""
-ROUGH = 0.1
-"""gain below which a rough refinement ends"""
 FIRM = 1e-3  # gain below which least squares ends where another rung may follow
 
 
@@ -149,11 +146,11 @@ class Ladder:
         own = whole.varied(whole.settings.of_estimate(name))
         theta = own.parameters.started(last.parameters.mapping(start.theta))
         likelihood = make_likelihood(own)
+        before = np.inf if not if_better else self.refinements[start.name].negative_log
         if own.settings.quasi_static != last.settings.quasi_static:
-            rough = settings.changed({"gain_tolerance": ROUGH})
-            first = self._refined(likelihood, theta, rough, f"{name} at first")
+            first = self._refined(likelihood, theta, settings.changed({"iterations": FIRST}), f"{name} at first")
             theta = own.parameters.from_unit(first.point)
-            if not own.rms(own.output_errors(theta[None]))[0] < FAR * start.rms:
+            if first.negative_log > before:
                 return
         result = self._refined(likelihood, theta, settings, f"{name} on the way")
         if self._late and if_better:
@@ -163,7 +160,6 @@ class Ladder:
             self.problem, self.kept = own, new
             return
         more = max(int(own.parameters.free.sum() - last.parameters.free.sum()), 1)
-        before = self.refinements[start.name].negative_log
         if before - result.negative_log < WORTH * more:
             return
         without = self._parts_left_out(last, start.name, settings)

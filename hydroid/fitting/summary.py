@@ -9,8 +9,8 @@ from hydroid.estimate import AngleError, FitSummary, NamedEstimate, ParameterEst
 from hydroid.findings import Finding
 from hydroid.fitting.fit import Fit
 from hydroid.posterior.by_log import by_log
-from hydroid.posterior.identifiability import identifiability
 from hydroid.posterior.error_model import ErrorModel
+from hydroid.posterior.identifiability import identifiability
 from hydroid.posterior.uncertainty import Flag, Source, Uncertainty
 from hydroid.posterior.whiteness import lasting
 from hydroid.problem.problem import Problem

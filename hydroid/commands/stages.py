@@ -18,7 +18,7 @@ from hydroid.commands.inputs import (
     open_values,
     setting_changes,
 )
-from hydroid.commands.logs import read_logs
+from hydroid.commands.logs import read_logs, refuse_undriven
 from hydroid.commands.progress import FitProgress, Progress
 from hydroid.errors import SettingsError
 from hydroid.files import Plain
@@ -213,6 +213,7 @@ def adapt(
     """
     model = open_model(fit)
     read = read_logs(logs, model.settings, repair=repair)
+    refuse_undriven(read, model.settings)
     from hydroid.advice.adaptation import adapted, steps
     from hydroid.reporting.verdict_table import left_out_table
 

@@ -30,6 +30,8 @@ SHARE = 0.02
 """of a joint's travel that its error may be where no tolerance is stated"""
 CLEARLY = 0.9
 """part of another model's error that a better one stays below"""
+LEAST_TOLERANCE = 0.001
+"""the least that a tolerance can be [deg]: of a joint that no log drives, or that never moves, none follows"""
 WORSE = 2.0
 """times the error on fitted logs, beyond which a fit predicts worse than it fits"""
 ANYWHERE = np.array([-np.inf, np.inf])
@@ -64,7 +66,7 @@ def judge(
         stated = settings.tolerance_deg
         stated = stated.get(joint) if isinstance(stated, dict) else stated
         travel = max((np.ptp(p.log.angle[:, joint - 1]) for p in new or own), default=0.0)
-        tolerance = stated or float(np.degrees(SHARE * travel))
+        tolerance = stated or max(float(np.degrees(SHARE * travel)), LEAST_TOLERANCE)
         errors = [rms_deg(p.error(joint) for p in some) if some else None for some in (own, new)]
         by_rival = [
             {name: rms_deg(one.errors([p.log]) for p in some) for name, one in rivals.items()} if some else {}

@@ -180,6 +180,33 @@ def test_check_prints_json_and_says_by_its_status_that_a_log_is_unusable(short: 
     assert {finding["level"] for finding in bad["findings"]} >= {"error"}
 
 
+def test_check_refuses_logs_that_leave_stage_two_nothing_to_fit(short: Path, hydroid_cli: Run):
+    """As the fit itself does; a standstill beside a log that drives the joint is right."""
+    undriven = ("--config=fit-hyd", "--json", "--set=log.command=null")
+    (one,) = json.loads(hydroid_cli("check", short, *undriven, code=2).out)["logs"]
+    assert (one["usable"], one["findings"][0]["kind"]) == (False, "nothing to fit")
+    rows = short.read_text().splitlines()
+    column = rows[0].split(",").index("u2_pct")
+    still = [row.split(",") for row in rows[1:]]
+    for row in still:
+        row[column] = "0"
+    Path("still.csv").write_text("\n".join([rows[0], *map(",".join, still)]))
+    hydroid_cli("check", "still.csv", "--config=fit-hyd", code=2)
+    both = json.loads(hydroid_cli("check", "still.csv", short, "--config=fit-hyd", "--json").out)["logs"]
+    assert [log["usable"] for log in both] == [True, True]
+
+
+def test_a_compared_joint_that_no_log_drives_is_not_tested(short: Path, caplog):
+    """Its fit ends with a verdict on the other; it is warned of before the first simulation."""
+    two = {"outputs": [2, 3], "simulation.other_joints": "measured"}
+    with caplog.at_level(logging.WARNING, "hydroid"):
+        fitted = hydroid.fit_mech(short, refinement=False, set=SMALL | two)
+    assert any("no log drives joint elbow, compared all the same" in line for line in caplog.messages)
+    shoulder, elbow = fitted.summary.verdict
+    assert (elbow.name, elbow.verdict, elbow.fitted_deg) == ("elbow", "not tested", None)
+    assert any(str(line).startswith(f"Worst: {shoulder.name},") for line in fitted.lines)
+
+
 def test_stage_two_holds_masses_and_says_which_stage_1_moved_without_knowing_it(tmp_path: Path, caplog):
     """The arm's file has 5.1 and 22.5 kg: M2 was moved, M3 stayed, and the logs know M4."""
     flags = {"M2": "weakly identifiable", "M3": "not identifiable", "M4": "identifiable"}

@@ -13,6 +13,7 @@ from hydroid.advice.design import ExperimentSimulator, forecast
 from hydroid.advice.experiment import RandomExperiments
 from hydroid.advice.growth import MIN_GAIN, Candidate, promising, score_terms
 from hydroid.advice.left_out import refitted
+from hydroid.advice.terms import joints_of
 from hydroid.arrays import Array
 from hydroid.errors import SettingsError
 from hydroid.estimate import finite
@@ -105,11 +106,11 @@ def _forecasts(problem: Problem, known: Uncertainty, now: Posterior) -> Iterator
     the noise of the fit's worst angle.
     """
     settings, names = problem.settings, problem.parameters.named(now.box.varied)
-    levers = (p.joints or () for p in settings.parameters.values() if p.quantity.startswith("lever"))
-    stand_ins = {joint for joints in levers for joint in joints}  # for cylinders of unknown size
     for name, row in zip(names, np.eye(len(names)), strict=True):
         own = settings.parameters[name]
-        if own.unit in MEASURABLE and stand_ins.isdisjoint(own.joints or ()):
+        # what stands in for a cylinder of unknown size has no sizes that anybody can measure
+        invented = any(settings.arm.joints[joint - 1].may_stand_in for joint in joints_of(settings, own))
+        if own.unit in MEASURABLE and own.per is None and not invented:
             kind = "weigh" if own.quantity == "mass" else "state"
             yield kind, name, row[None] / STATED_SD[kind]
     level, time = max(

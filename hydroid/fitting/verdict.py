@@ -31,7 +31,7 @@ SHARE = 0.02
 CLEARLY = 0.9
 """part of another model's error that a better one stays below"""
 LEAST_TOLERANCE = 0.001
-"""the least that a tolerance can be [deg]: of a joint that no log drives, or that never moves, none follows"""
+"""the least that a tolerance can be [deg]; none follows from a joint that is never driven, or never moves"""
 WORSE = 2.0
 """times the error on fitted logs, beyond which a fit predicts worse than it fits"""
 ANYWHERE = np.array([-np.inf, np.inf])

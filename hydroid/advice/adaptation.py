@@ -8,6 +8,7 @@ what a load, a slower engine or another day changes.
 """
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from hydroid.advice.left_out import Refit, parts, refitted
 from hydroid.arrays import rms
 from hydroid.errors import SettingsError
 from hydroid.files import Plain
+from hydroid.findings import Finding
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
 from hydroid.problem.problem import Problem
@@ -24,10 +26,10 @@ from hydroid.settings.fit import FitSettings
 from hydroid.settings.search import MultistartSettings, RefinementSettings
 
 
-def adapted(model: IdentifiedModel, free: Sequence[str]) -> FitSettings:
+def adapted(model: IdentifiedModel, free: Sequence[str], logs: Sequence[Log] = ()) -> FitSettings:
     """Return the settings in which only some parameters of a model are free, by name, from its estimate.
 
-    Their priors stay as wide as they were, around the estimate.
+    Their priors stay as wide as they were, around the estimate. Of the payloads those of these logs stay.
     Raises SettingsError: a name that is none of a parameter with bounds or a prior.
     """
     settings, parameters = model.settings, dict(model.settings.parameters)
@@ -40,11 +42,12 @@ def adapted(model: IdentifiedModel, free: Sequence[str]) -> FitSettings:
         value = model.values[name]
         freed = {"fixed": None, "start": value} | ({"nominal": value} if own.has_prior else {})
         parameters[name] = own.changed({"term": None} | (freed if name in free else {"fixed": value}))
+    names = {Path(log.source).name for log in logs}
     ladder = settings.simulation.model == "ladder"
     return settings.changed(
         {
             "parameters": parameters,
-            "payloads": {},  # those of the fit's own logs
+            "payloads": {name: mass for name, mass in settings.payloads.items() if name in names},
             "simulation.model": "quasi-static" if ladder else settings.simulation.model,
             "search.algorithm": "multistart",
             "search.multistart": MultistartSettings(starts=1, horizons=(), iterations=20),
@@ -68,7 +71,7 @@ def steps(
         and p.can_be_free
         and (p.fixed is None or p.term is not None)
     ]
-    problem, taken = Problem(adapted(model, pool), logs), list[str]()
+    problem, taken = Problem(adapted(model, pool, logs), logs), list[str]()
     last = Refit(problem, model.theta, problem.output_errors(model.theta[None]))
     path = list[Plain]()
     name = ""
@@ -77,7 +80,7 @@ def steps(
         trials = dict[str, Refit]()
         for trial in pool[:1] if free else pool:
             progress(f"freeing {trial}", len(taken), len(taken) + len(pool))
-            own = problem.varied(adapted(model, [*taken, trial]))
+            own = problem.varied(adapted(model, [*taken, trial], logs))
             # the noise, beside which priors count, is that of the adapted model
             trials[trial] = refitted(own, refitted(own, last.theta).theta)
         errors = {trial: _share(one, last) for trial, one in trials.items()}
@@ -86,6 +89,13 @@ def steps(
             return path
         taken, last = [*taken, name], trials[name]
         pool.remove(name)
+
+
+def load_findings(settings: FitSettings) -> tuple[Finding, ...]:
+    """Return which masses an adaptation has freed, although a load at the tip has no payload to be in."""
+    own = settings.parameters.items()
+    freed = tuple(name for name, p in own if p.quantity == "mass" and p.fixed is None)
+    return (Finding("load as mass", "warning", freed),) if freed and not settings.payloads else ()
 
 
 def _share(trial: Refit, before: Refit) -> float:

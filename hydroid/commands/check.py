@@ -38,7 +38,7 @@ from hydroid.units import way
 
 
 class LogCheck(NamedTuple):
-    """One file; its log is None if it cannot be read. Findings: errors first; travel: by the joints' names."""
+    """One file; its log is None if it cannot be read, findings are errors first, travel is by joints."""
 
     path: Path
     log: Log | None

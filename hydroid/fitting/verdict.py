@@ -127,7 +127,8 @@ def behind(settings: FitSettings, verdicts: Sequence[JointVerdict]) -> list[Find
         for one in verdicts
         if one.baselines_deg.get(NAMES[-1], np.inf) < CLEARLY * (one.fitted_deg or 0.0)
     )
-    return [Finding("behind nine numbers", "warning", joints)] if joints and settings.stage == "hyd" else []
+    kind = "behind nine numbers" if settings.seeded else "behind nine numbers from its start"
+    return [Finding(kind, "warning", joints)] if joints and settings.stage == "hyd" else []
 
 
 def rms_deg(errors: Iterable[Array]) -> float:

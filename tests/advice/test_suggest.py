@@ -147,7 +147,7 @@ def test_stating_a_value_leaves_it_as_stated_and_helps_what_goes_with_it(late: t
 
 
 def test_levers_change_with_the_angle_only_where_a_cylinder_may_turn_the_joint(tmp_path):
-    """Not on a cylinder of known pivots, nor on a slewing gear; whether nothing says them, or they are held."""
+    """Not on a cylinder of known pivots, nor on a slewing gear; whether it is stated or not."""
 
     def named(joint: str, model: str = BOOM) -> set[str]:
         settings = two_joints(tmp_path, model)

@@ -9,7 +9,7 @@ import numpy as np
 import yaml
 
 from hydroid.advice.assumptions import assumption_findings, doubts
-from hydroid.advice.design import ExperimentSimulator, forecast
+from hydroid.advice.design import ExperimentSimulator, Trial, forecast
 from hydroid.advice.experiment import RandomExperiments
 from hydroid.advice.growth import MIN_GAIN, Candidate, promising, score_terms
 from hydroid.advice.left_out import refitted
@@ -126,7 +126,7 @@ def _forecasts(problem: Problem, known: Uncertainty, now: Posterior) -> Iterator
     except SettingsError:
         return  # no pose that an experiment may start from: hydroid design says so
     simulator = ExperimentSimulator(settings, now)
-    gained = [t.gained for _ in range(6) if (t := simulator.trial(draws.draw())) is not None]
+    gained = [t.gained for _ in range(6) if isinstance(t := simulator.trial(draws.draw()), Trial)]
     if gained:
         best = max(gained, key=lambda rows: np.sum(np.log(np.diag(now.add(rows).root))))
         yield "experiment", f"{settings.design.duration_s:g}", best

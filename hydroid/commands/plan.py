@@ -186,4 +186,4 @@ def design(
         write_log(Path(out) / "predicted.csv", result.best.log, settings.log)
         files.insert(0, commands)
     content = {"commands": commands, "precision": rows}
-    return Result([table, *(f"- {one}" for one in findings), *files], content, result, findings)
+    return Result([table, *(f"- {one}" for one in findings), *files], content, result)

@@ -34,6 +34,8 @@ LEAST_TOLERANCE = 0.001
 """the least that a tolerance can be [deg]; none follows from a joint that is never driven, or never moves"""
 WORSE = 2.0
 """times the error on fitted logs, beyond which a fit predicts worse than it fits"""
+STANDING_OUT = 3.0
+"""times the median error of the other unseen logs, beyond which a log is named"""
 ANYWHERE = np.array([-np.inf, np.inf])
 
 Baselines = Mapping[int, Mapping[str, Baseline]]
@@ -56,12 +58,12 @@ def judge(
 
     `fitted` is what the fit makes of its own logs; none of values that are no fit's. `baselines` are fitted
     to the same logs; none: a joint is compared with standing still. Of the predictions `unseen`, those of
-    logs that the fit has seen test nothing.
+    logs that the fit has seen test nothing, and those that are `apart` do not count.
     """
     verdicts = list[JointVerdict]()
     for joint in settings.outputs:
         rivals = baselines.get(joint) or {NAMES[0]: Baseline(joint, ANYWHERE)}
-        new = [p for p in unseen if p.log.driven[joint - 1] and p.unseen is not False]
+        new = [p for p in unseen if p.log.driven[joint - 1] and p.unseen is not False and not p.apart]
         own = [p for p in fitted if p.log.driven[joint - 1]]
         stated = settings.tolerance_deg
         stated = stated.get(joint) if isinstance(stated, dict) else stated
@@ -118,6 +120,26 @@ def _word(errors: Sequence[float | None], rivals: Sequence[Mapping[str, float]],
     if fitted is not None and not unseen <= WORSE * fitted:
         return "predicts worse than it fits"
     return "predicts roughly"
+
+
+def standing_out(
+    unseen: Sequence[Prediction], verdicts: Sequence[JointVerdict], where: str = "RUN"
+) -> list[Finding]:
+    """Return which unseen logs err by more than STANDING_OUT times what the other ones do, in any joint.
+
+    Three logs at least, and beyond the tolerance. Whether such a log counts is for its user to say: the
+    hint has the command, with the run's folder `where`.
+    """
+    names = list[str]()
+    for one in verdicts:
+        new = [p for p in unseen if p.log.driven[one.joint - 1] and p.unseen is not False and not p.apart]
+        errors = np.nan_to_num([rms_deg([p.error(one.joint)]) for p in new], nan=np.inf)
+        for i, own in enumerate(new if len(new) > 2 else ()):
+            usual = max(float(np.median(np.delete(errors, i))), one.tolerance_deg)
+            if errors[i] > STANDING_OUT * usual:
+                names.append(own.log.source)
+    logs = tuple(dict.fromkeys(names))
+    return [Finding("log stands out", "note", logs, {"run": where})] if logs else []
 
 
 def behind(settings: FitSettings, verdicts: Sequence[JointVerdict]) -> list[Finding]:

@@ -20,6 +20,7 @@ from hydroid.fitting import validation
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
 from hydroid.prediction import predict
+from hydroid.run.record import load_record
 
 ROOT = Path(__file__).parents[2]
 QUICK = ["--set=search.ga.population=6", "--set=search.ga.generations=2", "--set=refinement.iterations=1"]
@@ -60,6 +61,21 @@ def test_fit_validate_and_simulate_walk_through(short: Path, hydroid_cli: Run, t
     assert done["verdict"][0]["verdict"] == "predicts"
     assert (run / "validations" / "sim.csv" / "result.npz").exists()  # and the fit's own report shows it
     assert sorted(p.name for p in tmp_path.iterdir()) == ["run", "sim.csv", "val", "val2"]
+
+
+def test_a_log_set_apart_stays_on_the_page_and_out_of_the_verdict(array, hydroid_cli: Run):
+    shutil.copytree(array[0] / "seed-1", "run")
+    other = ROOT / "examples" / "logs" / "rig_shoulder_2.csv"
+    counts = {}
+    for options in (["--apart"], []):
+        done = hydroid_cli("validate", other, "--fit=run", "--json", "--out=val", *options)
+        assert json.loads(done.out)["verdict"][0]["unseen_logs"] == 1  # of this very validation
+        (one,) = load_record("run").verdict
+        counts[len(options)] = one.unseen_logs
+        text = Path("run/report.html").read_text("utf-8")
+        assert ("The verdict does not count rig_shoulder_2.csv" in text) == bool(options)
+        assert "rig_shoulder_2" in text
+    assert counts == {1: 0, 0: 1}
 
 
 def test_a_log_that_diverges_is_named_and_judged_with_the_others(

@@ -6,7 +6,7 @@ causes, and `delay_b` towards B; the name without an ending sets both.
 
 from collections.abc import Iterator
 from itertools import chain
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from hydroid.files import Plain, read_table
 from hydroid.units import UNITS
@@ -23,6 +23,7 @@ class Quantity(NamedTuple):
         note: what those who set it must know besides.
         span: values of real machines, between which `hydroid suggest` searches a quantity that is not free.
         limits: least and largest value; None: from 0 where 0 is the default, or else above 0.
+        of: the kind of actuator that alone has it, as `Joint.has` tells them apart; "": all have.
         optional: whether null is allowed beside a number; where it is the default, it is.
     """
 
@@ -33,6 +34,7 @@ class Quantity(NamedTuple):
     note: str = ""
     span: tuple[float, float] | None = None
     limits: tuple[float, float] | None = None
+    of: Literal["", "cylinder", "stand-in"] = ""
     optional: bool = False
 
     @property

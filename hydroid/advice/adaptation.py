@@ -7,12 +7,14 @@ what a load, a slower engine or another day changes.
 """
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
 from hydroid.advice.suggestions import refitted
 from hydroid.errors import SettingsError
 from hydroid.files import Plain
+from hydroid.findings import Finding
 from hydroid.fitting.left_out import LeftOut, gain, is_better, parts, predict_parts
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
@@ -23,10 +25,10 @@ from hydroid.settings.fit import FitSettings
 from hydroid.settings.search import MultistartSettings, RefinementSettings
 
 
-def adapted(model: IdentifiedModel, free: Sequence[str]) -> FitSettings:
+def adapted(model: IdentifiedModel, free: Sequence[str], logs: Sequence[Log] = ()) -> FitSettings:
     """Return the settings in which only some parameters of a model are free, by name, from its estimate.
 
-    Their priors stay as wide as they were, around the estimate.
+    Their priors stay as wide as they were, around the estimate. Of the payloads those of these logs stay.
     Raises SettingsError: a name that is none of a parameter with bounds or a prior.
     """
     settings, parameters = model.settings, dict(model.settings.parameters)
@@ -39,11 +41,12 @@ def adapted(model: IdentifiedModel, free: Sequence[str]) -> FitSettings:
         value = model.values[name]
         freed = {"fixed": None, "start": value} | ({"nominal": value} if own.has_prior else {})
         parameters[name] = own.changed({"term": None} | (freed if name in free else {"fixed": value}))
+    names = {Path(log.source).name for log in logs}
     ladder = settings.simulation.model == "ladder"
     return settings.changed(
         {
             "parameters": parameters,
-            "payloads": {},  # those of the fit's own logs
+            "payloads": {name: mass for name, mass in settings.payloads.items() if name in names},
             "simulation.model": "quasi-static" if ladder else settings.simulation.model,
             "search.algorithm": "multistart",
             "search.multistart": MultistartSettings(starts=1, horizons=(), iterations=20),
@@ -67,7 +70,7 @@ def steps(
         and p.can_be_free
         and (p.fixed is None or p.term is not None)
     ]
-    problem, taken = Problem(adapted(model, pool), logs), list[str]()
+    problem, taken = Problem(adapted(model, pool, logs), logs), list[str]()
     last = _as_it_is(problem, model)
     path = list[Plain]()
     name = ""
@@ -76,7 +79,7 @@ def steps(
         trials = dict[str, LeftOut]()
         for trial in pool[:1] if free else pool:
             progress(f"freeing {trial}", len(taken), len(taken) + len(pool))
-            own = problem.varied(adapted(model, [*taken, trial]))
+            own = problem.varied(adapted(model, [*taken, trial], logs))
             trials[trial] = predict_parts(own, last.thetas, refitted)
         rises = {trial: gain(one, last)[0] for trial, one in trials.items()}
         name = max(rises, key=lambda trial: rises[trial], default="")
@@ -93,3 +96,10 @@ def _as_it_is(problem: Problem, model: IdentifiedModel) -> LeftOut:
     density = judge.log_density(judge.innovations(errors[None])[0])
     density[~np.isfinite(density)] = -np.inf
     return LeftOut(problem, np.tile(model.theta, (len(np.unique(parts(problem))), 1)), errors, density)
+
+
+def load_findings(settings: FitSettings) -> tuple[Finding, ...]:
+    """Return which masses an adaptation has freed, although a load at the tip has no payload to be in."""
+    own = settings.parameters.items()
+    freed = tuple(name for name, p in own if p.quantity == "mass" and p.fixed is None)
+    return (Finding("load as mass", "warning", freed),) if freed and not settings.payloads else ()

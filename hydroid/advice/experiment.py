@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hydroid.arrays import Array, Ints, record
+from hydroid.arrays import Array, Ints, Mask, record
 from hydroid.errors import SettingsError
 from hydroid.log import Log
 from hydroid.problem.bindings import Bindings
@@ -144,14 +144,20 @@ class Violation(NamedTuple):
 
 def violation(angle: Array, settings: FitSettings) -> Violation | None:
     """Return where a motion [rad], shape (T, J), first leaves the joints' ranges or is too fast; or None."""
+    out, fast = beyond(angle, settings)
+    for sample, joint in np.argwhere(out | fast)[:1].tolist():
+        return Violation(sample, joint, not out[sample, joint])
+    return None
+
+
+def beyond(angle: Array, settings: FitSettings) -> tuple[Mask, Mask]:
+    """Return where joints of a motion [rad], (T, J), are outside their ranges, and too fast: both (T, J)."""
     limits, arm = settings.design, settings.arm
     margin, speed = np.radians([limits.margin_deg, limits.speed_deg_s])
     fast = np.abs(np.diff(angle, axis=0, prepend=angle[:1])) / settings.log.period_s > speed
     # a joint that stands at the end of its range, and never moves, breaks no limit
     out = ((angle < arm.lower + margin) | (angle > arm.upper - margin)) & (np.ptp(angle, axis=0) > 0)
-    for sample, joint in np.argwhere(out | fast)[:1].tolist():
-        return Violation(sample, joint, not out[sample, joint])
-    return None
+    return out, fast
 
 
 def repaired(experiment: Experiment, first: Violation) -> Experiment:

@@ -9,9 +9,10 @@ import numpy as np
 import yaml
 
 from hydroid.advice.assumptions import assumption_findings, doubts
-from hydroid.advice.design import ExperimentSimulator, forecast
+from hydroid.advice.design import ExperimentSimulator, Trial, forecast
 from hydroid.advice.experiment import RandomExperiments
 from hydroid.advice.growth import Candidate, promising, score_terms
+from hydroid.advice.terms import joints_of
 from hydroid.arrays import Array
 from hydroid.errors import SettingsError
 from hydroid.estimate import finite
@@ -19,6 +20,7 @@ from hydroid.files import Plain
 from hydroid.findings import Finding
 from hydroid.fitting.left_out import LeftOut, gain, is_better, parts, predict_parts
 from hydroid.fitting.refinement import Refinement, refine
+from hydroid.fitting.step import Step
 from hydroid.fitting.summary import angle_errors
 from hydroid.posterior.error_model import Likelihood
 from hydroid.posterior.posterior import Posterior
@@ -92,9 +94,9 @@ def advice(
     return content, (*said, *action_findings(content, problem.settings))
 
 
-def refitted(likelihood: Likelihood, theta: Array, name: str) -> Refinement:
+def refitted(likelihood: Likelihood, theta: Array, without: int) -> Refinement:
     """Refine an estimate for a comparison on parts left out; nothing is shown or stored of it."""
-    return refine(likelihood, theta, COMPARED, lambda *_: False, {}, name)
+    return refine(likelihood, theta, COMPARED, lambda *_: False, {}, Step("compared", without=without))
 
 
 def improvement(after: LeftOut, before: LeftOut) -> dict[str, tuple[float, float]]:
@@ -153,11 +155,11 @@ def _forecasts(problem: Problem, known: Uncertainty, now: Posterior) -> Iterator
     the noise of the fit's worst angle.
     """
     settings, names = problem.settings, problem.parameters.named(now.box.varied)
-    levers = (p.joints or () for p in settings.parameters.values() if p.quantity.startswith("lever"))
-    stand_ins = {joint for joints in levers for joint in joints}  # for cylinders of unknown size
     for name, row in zip(names, np.eye(len(names)), strict=True):
         own = settings.parameters[name]
-        if own.unit in MEASURABLE and stand_ins.isdisjoint(own.joints or ()):
+        # what stands in for a cylinder of unknown size has no sizes that anybody can measure
+        invented = any(settings.arm.joints[joint - 1].may_stand_in for joint in joints_of(settings, own))
+        if own.unit in MEASURABLE and own.per is None and not invented:
             kind = "weigh" if own.quantity == "mass" else "state"
             yield kind, name, row[None] / STATED_SD[kind]
     errors = known.errors
@@ -171,7 +173,7 @@ def _forecasts(problem: Problem, known: Uncertainty, now: Posterior) -> Iterator
     except SettingsError:
         return  # no pose that an experiment may start from: hydroid design says so
     simulator = ExperimentSimulator(settings, now)
-    gained = [t.gained for _ in range(6) if (t := simulator.trial(draws.draw())) is not None]
+    gained = [t.gained for _ in range(6) if isinstance(t := simulator.trial(draws.draw()), Trial)]
     if gained:
         best = max(gained, key=lambda rows: np.sum(np.log(np.diag(now.add(rows).root))))
         yield "experiment", f"{settings.design.duration_s:g}", best

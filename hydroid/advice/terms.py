@@ -6,7 +6,7 @@ side or joint in a parameter that serves several.
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -63,17 +63,32 @@ class Term:
 
 def terms(problem: Problem, theta: Array) -> tuple[Term, ...]:
     """List the terms of a problem at theta, shape (P,)."""
-    return (*_held(problem.settings), *_split(problem, theta), *_nominal(problem))
+    return (*_held(problem), *_split(problem, theta), *_nominal(problem))
 
 
-def _held(settings: FitSettings) -> Iterator[Term]:
-    for name, p in settings.parameters.items():
-        if p.fixed is not None:
+def _held(problem: Problem) -> Iterator[Term]:
+    for name, p in problem.settings.parameters.items():
+        if p.fixed is not None and _means_something(problem, p):
             # without bounds from a quarter to four times the value
             low, high = p.bounds or CHOICES[p.quantity].span or (p.fixed / 4.0, 4.0 * p.fixed)
             span = min(low, p.fixed), max(high, p.fixed)
             if span[0] < span[1]:
                 yield Term(name, {name: p.changed({"fixed": None, "bounds": span})}, p.fixed)
+
+
+def _means_something(problem: Problem, p: ParameterSettings) -> bool:
+    """Whether what moves the joints has such a quantity, and an effect of a group has logs beside it."""
+    acts_on = joints_of(problem.settings, p)
+    groups = {problem.settings.log.group_of(log.source) for log in problem.logs}
+    if p.per is not None and (p.per not in groups or len(groups) == 1):
+        return False
+    return not acts_on or bool(_moving(problem, p.quantity, acts_on))
+
+
+def _moving(problem: Problem, quantity: str, joints: Iterable[int]) -> tuple[int, ...]:
+    """Return those of some joints that move, by an actuator that has the quantity."""
+    every = problem.settings.arm.joints
+    return tuple(j for j in joints if j in problem.active_joints and every[j - 1].has(quantity))
 
 
 def _split(problem: Problem, theta: Array) -> Iterator[Term]:
@@ -83,10 +98,10 @@ def _split(problem: Problem, theta: Array) -> Iterator[Term]:
         name, p = parameter.name, settings.parameters[parameter.name]
         if p.fixed is not None or p.per is not None:
             continue
-        sides, joints, parts = TARGETS[p.quantity], _joints(settings, p), dict[str, list[dict[str, Any]]]()
+        sides, joints, parts = TARGETS[p.quantity], joints_of(settings, p), dict[str, list[dict[str, Any]]]()
         if len(sides) == 2:
             parts["b"] = [{"quantity": side} for side in sides]
-        if len(moving := [j for j in joints if j in problem.active_joints]) > 1:
+        if len(moving := _moving(problem, p.quantity, joints)) > 1:
             for own in moving:
                 others = tuple(joint for joint in joints if joint != own)
                 parts[_label(settings, own)] = [{"joints": others}, {"joints": (own,)}]
@@ -98,19 +113,20 @@ def _split(problem: Problem, theta: Array) -> Iterator[Term]:
 
 def _nominal(problem: Problem) -> Iterator[Term]:
     """Yield what no parameter sets: of all joints together and each, of both sides together and each."""
-    settings, joints = problem.settings, problem.active_joints
+    settings, moving = problem.settings, problem.active_joints
     always = [p for p in settings.parameters.values() if p.per is None]
-    taken = {(t, j) for p in always for t in TARGETS[p.quantity] for j in _joints(settings, p) or (0,)}
-    gauged, alone = any(log.pressure is not None for log in problem.logs), len(joints) == 1
+    taken = {(t, j) for p in always for t in TARGETS[p.quantity] for j in joints_of(settings, p) or (0,)}
+    gauged, alone = any(log.pressure is not None for log in problem.logs), len(moving) == 1
     for row in ROWS:
         pump = row.of_the_pump
         # the pump of one actuator is no more than its flow limit; the logs may say the pressure
         known = (pump and alone) or (row.name == "start_pressure" and gauged)
         if row.span is None or known or (settings.stage == "mech" and row.name not in MECHANICAL):
             continue
+        joints = _moving(problem, row.name, moving)
         for quantity in dict.fromkeys((row.name, *TARGETS[row.name])):
             groups: list[tuple[int, ...]] = [(0,)] if pump else [(joint,) for joint in joints]
-            if quantity == row.name and not pump and not alone:
+            if quantity == row.name and not pump and len(joints) > 1:
                 groups.append(joints)
             for group in groups:
                 atoms = [(target, joint) for target in TARGETS[quantity] for joint in group]
@@ -131,8 +147,8 @@ def _label(settings: FitSettings, joint: int) -> str:
     return re.sub(r"\W", "_", settings.arm.joint_names[joint - 1])
 
 
-def _joints(settings: FitSettings, p: ParameterSettings) -> tuple[int, ...]:
-    """Joints that a parameter acts on; a link's mass, and the pump's numbers, act on none."""
+def joints_of(settings: FitSettings, p: ParameterSettings) -> tuple[int, ...]:
+    """Return the joints that a parameter acts on; a link's mass, and the pump's numbers, act on none."""
     if p.link is not None or CHOICES[p.quantity].of_the_pump:
         return ()
     return p.joints or tuple(range(1, len(settings.arm.joints) + 1))

@@ -12,7 +12,7 @@ from functools import cached_property
 import mujoco
 import numpy as np
 
-from hydroid.arrays import Array, record
+from hydroid.arrays import Array, Mask, record
 from hydroid.errors import ModelError, SettingsError
 from hydroid.mjcf import mujoco_errors, read_mjcf
 from hydroid.settings.arm import Arm
@@ -46,6 +46,7 @@ def add_payload(spec: mujoco.MjSpec, arm: Arm, mass: float) -> mujoco.MjSpec:
     return loaded
 
 
+STILL = 1e-4  # change of a distance that is none [m]
 FARTHEST = 100.0  # distance beyond which MuJoCo need not look [m]
 
 
@@ -112,9 +113,28 @@ class CollisionChecker:
         excluded = tuple((body(pair >> 16).name, body(pair & 0xFFFF).name) for pair in signatures)
         return Clearance(time, distance.min(axis=1), nearest, tuple(meetings), checked, excluded)
 
-    def first_below(self, angle: Array, margin: float) -> int | None:
-        """Return the first sample of a motion [rad], (T, nq), with two bodies nearer than a margin [m]."""
-        return next((k for k, pose in enumerate(angle) if self._distances(pose, margin).min() < margin), None)
+    def first_below(self, angle: Array, margin: float, counted: Mask | None = None) -> int | None:
+        """Return the first sample of a motion [rad], (T, nq), with two bodies nearer than a margin [m].
+
+        `counted` are the pairs of shapes that count, shape (P,); None: all.
+        """
+        for k, pose in enumerate(angle):
+            if np.any(self._distances(pose, margin)[... if counted is None else counted] < margin):
+                return k
+        return None
+
+    def below(self, angle: Array, margin: float, counted: Mask) -> tuple[tuple[str, str], float]:
+        """Return which two bodies are nearer than a margin [m] most often, and in what part of a motion."""
+        near = np.stack([self._distances(pose, margin) for pose in angle]) < margin
+        share = np.where(counted, near.mean(axis=0), -1.0)
+        return self.names[int(np.argmax(share))], float(share.max())
+
+    def changing(self, poses: Array) -> Mask:
+        """Return which pairs of shapes stand at different distances in some poses [rad], (n, nq): shape (P,).
+
+        No joint moves the others nearer: a base and what turns on it.
+        """
+        return np.ptp([self._distances(pose, FARTHEST) for pose in poses], axis=0) > STILL
 
     def _distances(self, pose: Array, within: float) -> Array:
         """Distances of all pairs of shapes in a pose [m], shape (P,); farther than `within` they are that."""

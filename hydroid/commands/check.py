@@ -18,12 +18,13 @@ from hydroid.commands.inputs import (
     load_settings,
     refuse_overwriting,
 )
-from hydroid.commands.logs import check_file, plain_findings
+from hydroid.commands.logs import check_file, plain_findings, undriven_findings
 from hydroid.files import Plain
 from hydroid.log import (
     ColumnGuess,
     Log,
     LogFinding,
+    by_level,
     check_log,
     driven_joints,
     grouped,
@@ -37,7 +38,7 @@ from hydroid.units import way
 
 
 class LogCheck(NamedTuple):
-    """One file; its log is None if unusable, findings are errors first, travel is by the joints' names."""
+    """One file; its log is None if it cannot be read, findings are errors first, travel is by joints."""
 
     path: Path
     log: Log | None
@@ -62,7 +63,8 @@ def check(
 ) -> "Result[list[LogCheck]]":
     """List the faults of logs, and anything unusual in them.
 
-    A finding shared by several logs is listed once. The exit status is 2 if a log is unusable.
+    A finding shared by several logs is listed once. The exit status is 2 if a log is unusable, or if these
+    logs together leave a fit of the settings nothing to fit.
 
     Example: hydroid check LOG.csv
 
@@ -72,19 +74,22 @@ def check(
     names, slides = settings.arm.joint_names, settings.arm.slides
     checks, rows, sizes = list[LogCheck](), list[Plain](), list[str]()
     read = [(path, *check_file(path, settings, repair=repair)) for path in map(Path, as_list(logs))]
-    motion = [*motion_findings([log for _, log, _ in read if log is not None], settings.arm)]
+    there, refused = [log for _, log, _ in read if log is not None], False
+    motion = [*undriven_findings(there, settings), *motion_findings(there, settings.arm)]
     for path, log, findings in read:
         motions = {} if log is None else driven_joints(log)
         moved = {names[j - 1]: one.travel for j, one in motions.items()}
         if log is not None:
-            findings = [*findings, *(one for one in motion if one.source == log.source)]
+            findings = by_level([*findings, *(one for one in motion if one.source == log.source)])
             ways = (f"{names[j - 1]} by {way(m.travel, slides=j in slides)}" for j, m in motions.items())
             moves = ", ".join(ways) or "nothing"
             sizes.append(f"{path}: {len(log.time)} samples, {log.duration:.2f} s; driven and moved: {moves}")
+        usable = all(finding.level != "error" for finding in findings)
+        refused |= not usable
         rows.append(
             {
                 "log": str(path),
-                "usable": log is not None,
+                "usable": usable,
                 "samples": log and len(log.time),
                 "duration_s": log and log.duration,
                 "driven_joints": [] if log is None else np.array(names)[log.driven].tolist(),
@@ -95,7 +100,7 @@ def check(
         checks.append(LogCheck(path, log, findings, moved))
     every = (finding for one in checks for finding in one.findings)
     lines = [f"{level}: {line}" for level, line in grouped(every)]
-    return Result([*lines, *sizes], {"logs": rows}, checks, exit_status=0 if len(sizes) == len(checks) else 2)
+    return Result([*lines, *sizes], {"logs": rows}, checks, exit_status=2 if refused else 0)
 
 
 @command

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from hydroid.arrays import record
 from hydroid.commands.console import Printed
 from hydroid.commands.inputs import LogSource, LogSources, Source
-from hydroid.commands.logs import read_logs
+from hydroid.commands.logs import read_logs, refuse_undriven
 from hydroid.errors import RunError, SettingsError
 from hydroid.estimate import NAME, FitSummary
 from hydroid.files import write_atomic
@@ -123,6 +123,7 @@ def fit(
         workers: where candidates are simulated (`open_workers`); None: in this process.
 
     Raises:
+        LogError: a log cannot be used, or none drives a joint that stage 2 compares.
         SettingsError: settings that do not fit the logs or the arm.
         RunError: `out` holds another run or cannot be written, or every simulation diverged.
     """
@@ -130,6 +131,7 @@ def fit(
     names = [Path(log.source).name for log in read]
     if stray := sorted(set(settings.payloads) - set(names)):  # misspelt, it would be left out silently
         raise SettingsError("is none of the logs", f"payloads.{stray[0]}", f"logs: {', '.join(names)}")
+    refuse_undriven(read, settings)
     groups = {None, OTHER, *map(settings.log.group_of, names)}
     if empty := [p.per for p in settings.parameters.values() if p.fixed is None and p.per not in groups]:
         raise SettingsError(

@@ -118,6 +118,9 @@ def open_model(
     Where `nominal`, parameters without a value have nominal ones, which only stage 2 has; a note names them.
     """
     if fit is not None and not isinstance(fit, str | Path):
+        if changes := setting_changes(overrides):
+            hint = "name its run folder, or make the model with `identified`"
+            raise SettingsError("cannot be replaced in a model that is read", ", ".join(changes), hint)
         return getattr(fit, "model", fit)
     if isinstance(config, FitSettings):
         raise SettingsError("settings that are read make a model with `identified`", "config")

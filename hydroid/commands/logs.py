@@ -12,7 +12,7 @@ from hydroid.commands.inputs import LogSource, LogSources, as_list
 from hydroid.errors import RunError, SettingsError
 from hydroid.files import is_file
 from hydroid.identified_model import IdentifiedModel
-from hydroid.log import Log, LogFinding, check_log, grouped, open_table
+from hydroid.log import Log, LogFinding, check_log, grouped, log_finding, open_table
 from hydroid.progress import LOGGER, NOTE
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.log import LogSettings
@@ -60,6 +60,31 @@ def check_file(
     """Read a log as the settings map it; None if it cannot be used."""
     arm, outputs = settings.arm, settings.outputs if angles else None
     return check_log(path, settings.log, arm.ranges, outputs=outputs, backward=arm.backward, repair=repair)
+
+
+def undriven_findings(logs: Sequence[Log], settings: FitSettings) -> list[LogFinding]:
+    """Return that no log drives some compared joints, once for each log; of stage 2 an error if none is.
+
+    Joints of stage 1 may move by themselves.
+    """
+    names, driven = settings.arm.joint_names, np.any([log.driven for log in logs], axis=0)
+    idle = [joint for joint in settings.outputs if len(logs) and not driven[joint - 1]]
+    hopeless = settings.stage == "hyd" and len(idle) == len(settings.outputs)
+    level, kind = ("error", "nothing to fit") if hopeless else ("warning", "not driven")
+    subjects = [names[joint - 1] for joint in idle]
+    return [log_finding(level, kind, log.source, *subjects) for log in logs if subjects]
+
+
+def refuse_undriven(logs: Sequence[Log], settings: FitSettings) -> None:
+    """Say which compared joints no log drives.
+
+    Raises LogError: there is no other one, and stage 2 has nothing to fit.
+    """
+    findings = undriven_findings(logs, settings)
+    for level, line in grouped(findings):
+        if level == "error":
+            raise findings[0].error()
+        LOGGER.warning("%s: %s", level, line)
 
 
 def plain_findings(findings: Sequence[LogFinding]) -> list[dict[str, str]]:

@@ -159,16 +159,20 @@ def design(
             "random_percent": 100 * random,
             "designed_percent": 100 * after,
             "gain": random / after,
+            "moved": moved,
             "flag": flag_of(after).value,
         }
-        for name, before, random, after in zip(
+        for name, before, random, after, moved in zip(
             result.names,
             result.known.deviations,
             result.random_deviations,
             result.after.deviations,
+            result.moved.tolist(),
             strict=True,
         )
     ]
+    still = tuple(name for name, moved in zip(result.names, result.moved, strict=True) if not moved)
+    findings = (Finding("no experiment moves", "note", still),) if still else ()
     note = (
         f"Noise: {settings.design.noise_deg:g} deg. before: every parameter ±100 % unless logs say more. "
         f"random: median of {len(result.random)} experiments of the same length and limits. "
@@ -181,4 +185,5 @@ def design(
         write_log(Path(commands), result.log, settings.log)
         write_log(Path(out) / "predicted.csv", result.best.log, settings.log)
         files.insert(0, commands)
-    return Result([table, *files], {"commands": commands, "precision": rows}, result)
+    content = {"commands": commands, "precision": rows}
+    return Result([table, *(f"- {one}" for one in findings), *files], content, result)

@@ -5,7 +5,6 @@ time is nearly up ends a run as Ctrl-C does: with a checkpoint.
 """
 
 import math
-import re
 import signal
 import sys
 import time
@@ -20,6 +19,7 @@ from hydroid.words import printable
 
 if TYPE_CHECKING:
     from hydroid.arrays import Array
+    from hydroid.fitting.step import Step
     from hydroid.settings.fit import FitSettings
 
 VISIBLE: ContextVar[bool] = ContextVar("visible", default=False)
@@ -102,34 +102,38 @@ class FitProgress(Progress):
         self._end = math.inf if budget is None else time.monotonic() + budget
         self._settings, search = settings, settings.search
         self._total = 1 + getattr(search, search.algorithm).generations
-        terms, ladder = settings.terms(), settings.simulation.model == "ladder"
-        self._models = {"start": 1, "refined": 2, "joint": 2, "dynamic": 3 + len(terms)}
-        self._terms = {term: number for number, term in enumerate(terms, 3)}  # which may be called "start"
-        self._steps = 2 + len(terms) + ladder
+        terms = settings.terms()
+        ladder = settings.simulation.model == "ladder"
+        self._rungs = ["start", "refined", *terms, *(["dynamic"] if ladder else [])]
 
     def generation(self, row: "Array") -> bool:
         """Take a row of `fitting.search.HISTORY`; return whether time is up."""
         self("generation", row[0], self._total, f"({row[2]:.0f} simulations)")
         return time.monotonic() > self._end
 
-    def refining(self, name: str, simulated: int, rms: float) -> bool:
-        """Take the name of a least squares, its number of simulations, and its rms error [rad] so far.
+    def refining(self, step: "Step", simulated: int, rms: float) -> bool:
+        """Take a step of the fit, its number of simulations, and its rms error [rad] so far.
 
-        A step is the search, or a model or term of the ladder; what is kept is refined in the last one.
+        A rung is the search, or a model or term of the ladder; what is kept is refined as the last one.
         Returns whether time is up.
         """
         from hydroid.units import way
 
-        arm, every = self._settings.arm, self._settings.outputs
-        model, *part = re.split(" (?:joint|part|at|on) ", name.removesuffix(" from afar"))
-        first, *terms = model.split("+")
-        step = self._steps  # in which what is kept is refined
-        if part:
-            step = max([self._models[first.split()[0]], *(self._terms[term] for term in terms)])
-        joints = [joint for joint in every if f" joint {joint} " in name] or every
-        of = "all joints" if joints[1:] else arm.joint_names[joints[0] - 1]
+        arm, outputs = self._settings.arm, self._settings.outputs
+        joints = (step.joint,) if step.joint else outputs
+        about = arm.joint_names[joints[0] - 1] if len(joints) == 1 else "all joints"
         error = way(math.degrees(rms), slides={*joints} <= {*arm.slides})
-        model += " from nine numbers" * ("numbers" in name)
-        what = f"step {step} of {self._steps} ({model}), {of}"
-        self(what, simulated, None, f"rms error {error}, {simulated} simulations")
+        self(self._rung(step) + f", {about}", simulated, None, f"rms error {error}, {simulated} simulations")
         return time.monotonic() > self._end
+
+    def _rung(self, step: "Step") -> str:
+        """Return which step of how many it is, and what is done there."""
+        total = len(self._rungs)
+        number = total  # in which what is kept is refined
+        if step.phase or step.without or step.start:
+            named = [step.model, *step.terms]
+            number = max((self._rungs.index(one) + 1 for one in named if one in self._rungs), default=1)
+        words = f"start {step.start}" if step.start else step.estimate
+        words += " from nine numbers" if step.numbers else ""
+        words += f" without part {step.without} of the logs" if step.without else ""
+        return f"step {number} of {total} ({words})"

@@ -1,7 +1,9 @@
 """`hydroid fit-mech`, `hydroid fit-hyd` and `hydroid adapt`: fits, from files to run folders."""
 
-from collections.abc import Mapping
-from dataclasses import replace
+import builtins
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
 from typing import Any
 
 from hydroid.commands.fit import FitResult, fit as run_fit
@@ -18,10 +20,11 @@ from hydroid.commands.inputs import (
     open_values,
     setting_changes,
 )
-from hydroid.commands.logs import read_logs
+from hydroid.commands.logs import read_logs, refuse_undriven
 from hydroid.commands.progress import FitProgress, Progress
 from hydroid.errors import SettingsError
 from hydroid.files import Plain
+from hydroid.log import Log
 from hydroid.parallel.cluster import open_workers
 from hydroid.progress import LOGGER, NOTE
 from hydroid.quantity_table import MECHANICAL
@@ -190,11 +193,13 @@ def adapt(
     fit: "ModelSource",
     free: "str | None" = None,
     out: "Source | None" = None,
+    set: "SettingChanges" = None,
     repair: bool = False,
 ) -> FitResult:
     """Adapt a fit to new logs: a few parameters are freed, all others are held at its estimate.
 
-    For another load, a slower engine, a colder day. Writes a run that every command takes. Judges each
+    For a slower engine, a colder day, another tool. A load of known mass is no parameter but a payload of the
+    logs: --set 'payloads={LOADED.csv: 250}'. Writes a run that every command takes. Judges each
     freed parameter by parts of the logs left out.
 
     Example: hydroid adapt LOADED.csv --fit runs/hyd --free P_flow,P_droop
@@ -207,13 +212,17 @@ def adapt(
         free (NAME,NAME): Parameters to be freed [default: masses, pump and effects of the logs' groups, one
             after the other, as long as the error falls on every part of the logs left out].
         out (DIR): Run folder [default of the command line: runs/adapt].
+        set (KEY=VALUE): Replace a setting of the fit, such as refinement.iterations=100.
 
     Raises:
         HydroidError: an input or a folder that cannot be used, or no parameter that helps.
     """
-    model = open_model(fit)
+    model = open_model(fit, overrides=set)
     read = read_logs(logs, model.settings, repair=repair)
-    from hydroid.advice.adaptation import adapted, steps
+    if set and (stray := model.settings.payloads.keys() - _own_payloads(fit, read)):
+        raise SettingsError("is none of the logs", f"payloads.{min(stray)}")
+    refuse_undriven(read, model.settings)
+    from hydroid.advice.adaptation import adapted, load_findings, steps
     from hydroid.reporting.verdict_table import left_out_table
 
     with Progress() as progress:
@@ -222,9 +231,16 @@ def adapt(
     if not chosen:
         hint = "name parameters with --free, or fit anew with --start RUN"
         raise SettingsError("no parameter lowers the error on parts left out", model.source, hint)
-    settings = adapted(model, chosen)
+    settings = adapted(model, chosen, read)
     with FitProgress(settings) as watcher:
         result = run_fit(settings, read, out, progress=watcher)
     named = [step | {"parameter": step["parameter"] or "none"} for step in path]
     table = left_out_table("Parameters freed one after another", {"parameter": "freed"}, named, settings.arm)
-    return replace(result, lines=[table, *result.lines], content={**result.content, "steps": path})
+    said = load_findings(settings)
+    content = {**result.content, "steps": path, "findings": [*result.content["findings"], *map(asdict, said)]}
+    return replace(result, lines=[table, *map(str, said), *result.lines], content=content)
+
+
+def _own_payloads(fit: "ModelSource", logs: Sequence[Log]) -> builtins.set[str]:
+    """Return the logs that may have a payload: these, and those of the fit itself."""
+    return {*open_model(fit).settings.payloads, *(Path(log.source).name for log in logs)}

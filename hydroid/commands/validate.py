@@ -31,6 +31,7 @@ def validate(
     *,
     fit: "ModelSource | Sequence[ModelSource]",
     tolerance: float | None = None,
+    apart: bool = False,
     out: "Source | None" = None,
     set: "SettingChanges" = None,
     repair: bool = False,
@@ -50,8 +51,8 @@ def validate(
             Repeat the option for several estimates.
         tolerance (0.001 to 90): The rms error [deg] that you accept for every joint; config.yaml can
             hold one for each (tolerance_deg) [default: that of the fit, or else 2 % of a joint's travel].
-        out (DIR): Folder for page and tables [default: runs/COMMAND on the command line; in Python nothing is
-            written].
+        apart: These logs are of other conditions than the fit's, such as another load: its own report shows
+            them, and does not count them in its verdict. Without it, they count again.
 
     Raises:
         LogError: a log cannot be used.
@@ -61,7 +62,7 @@ def validate(
     models = [open_model(one, None, set) for one in given]
     read = [read_logs(logs, model.settings, repair=repair) for model in models]
     from hydroid.fitting.validation import predicted
-    from hydroid.fitting.verdict import judge
+    from hydroid.fitting.verdict import judge, standing_out
     from hydroid.reporting.predictions import draw, validation_page
     from hydroid.reporting.verdict_table import next_lines, next_step, ordered, verdict_lines
     from hydroid.run.folder import log_hash
@@ -77,7 +78,8 @@ def validate(
         predictions = [
             predicted(model, log, None if hashes is None else log_hash(log) not in hashes) for log in own
         ]
-        if out is not None and (run := keep_validation(model, predictions)):
+        kept = [replace(one, apart=apart) for one in predictions]
+        if out is not None and (run := keep_validation(model, kept)):
             draw(run)
         own_logs[name] = fitted
         verdicts[name] = judge(model.settings.changed(stated), fitted, baselines, predictions)
@@ -93,6 +95,7 @@ def validate(
         "results": [row for one in every for row in one.plain(arm.joint_names)],
     }
     lines = [*verdict_lines(fits), *(line for step in steps for line in next_lines(step))]
+    lines += map(str, standing_out(results[best], fits[best], str(run or "RUN")))
     if seen := [one.log.source for one in results[best] if one.unseen is False]:
         lines.insert(1, f"The fit was made with {listed(seen, 3)}: that tests nothing.")
     return Result([*lines, *written(page, out)], content, every, page, details=[page.tables["errors"]])

@@ -16,6 +16,7 @@ from hydroid.arrays import Array, record
 from hydroid.fitting.checkpoints import Checkpoints
 from hydroid.fitting.left_out import LeftOut, gain, is_better, parts, predict_parts
 from hydroid.fitting.refinement import Refinement, refine
+from hydroid.fitting.step import Step, step_of
 from hydroid.posterior.error_model import Likelihood, make_likelihood
 from hydroid.posterior.linear import estimate_box
 from hydroid.posterior.uncertainty import Uncertainty, uncertainty
@@ -72,10 +73,8 @@ class Watcher(Protocol):
     def generation(self, row: Array) -> bool | None:
         """Take a row of HISTORY; return whether the search is to end."""
 
-    def refining(self, name: str, simulated: int, rms: float) -> bool | None:
-        """Take the name of a least squares, its number of simulations, and its rms error [rad] so far; return
-        whether it is to end.
-        """
+    def refining(self, step: Step, simulated: int, rms: float) -> bool | None:
+        """Take a step, its number of simulations, and its rms error [rad] so far; return whether it is to end."""
 
 
 class Ladder:
@@ -95,6 +94,7 @@ class Ladder:
         self.refinements = dict[str, Refinement]()
         self.kept = min(estimates.values(), key=lambda e: e.rms if e.usable else np.inf)
         self._watch, self._checkpoints, self._late = watch, checkpoints, False
+        self._step = step_of(self.kept.name)
         self._left_out = dict[str, LeftOut]()
         self._searched = problem.parameters.mapping(self.kept.theta)
 
@@ -108,21 +108,19 @@ class Ladder:
         on_the_way = refinement.changed({"gain_tolerance": tolerance})
         for model in ("refined", "dynamic")[: 1 + two]:
             possible = settings.terms(model)
-            _, *kept_terms = self.kept.name.split("+")
-            terms = [term for term in possible if term in kept_terms]
-            self._rung(whole, "+".join([model, *terms]), on_the_way, if_better=model == "dynamic")
-            kept_model, *_ = self.kept.name.split("+")
-            for term in possible if kept_model == model else ():
+            terms = tuple(term for term in possible if term in self._step.terms)
+            self._rung(whole, Step(model, terms), on_the_way, if_better=model == "dynamic")
+            for term in possible if self._step.model == model else ():
                 if term not in terms:
-                    self._rung(whole, f"{self.kept.name}+{term}", on_the_way, if_better=True)
+                    with_term = self._step.changed(terms=(*self._step.terms, term))
+                    self._rung(whole, with_term, on_the_way, if_better=True)
         if climbs:
             kept = self.kept
-            last = self._refined(make_likelihood(self.problem), kept.theta, refinement, kept.name)
-            new = self._measured(self.problem, last, kept.name)
+            last = self._refined(make_likelihood(self.problem), kept.theta, refinement, self._step)
+            new = self._measured(self.problem, last, self._step)
             self.kept = self.estimates[kept.name] = replace(new, gained=kept.gained)
         if settings.joint_refinement:
-            _, *terms = self.kept.name.split("+")
-            self._rung(whole, "+".join(["joint", *terms]), refinement, if_better=False)
+            self._rung(whole, self._step.changed(model="joint"), refinement, if_better=False)
 
     def known(self, theta: Array) -> Uncertainty:
         """Return how well the logs determine theta, (P,): the estimate that is kept, or one of a search."""
@@ -135,7 +133,7 @@ class Ladder:
         slopes = descent.jacobian[: problem.measured.size].T * change[:, None]
         return uncertainty(problem, theta, slopes, descent.numbers)
 
-    def _rung(self, whole: Problem, name: str, settings: RefinementSettings, *, if_better: bool) -> None:
+    def _rung(self, whole: Problem, step: Step, settings: RefinementSettings, *, if_better: bool) -> None:
         """Refine with the settings of an estimate, from the one kept; keep the result where it is better.
 
         if_better: else it is kept in any case.
@@ -143,59 +141,65 @@ class Ladder:
         last, start = self.problem, self.kept
         if if_better and (self._late or last.leaves_noise(start.theta)):
             return
-        own = whole.varied(whole.settings.of_estimate(name))
+        own = whole.varied(whole.settings.of_estimate(step.estimate))
         theta = own.parameters.started(last.parameters.mapping(start.theta))
         likelihood = make_likelihood(own)
-        before = np.inf if not if_better else self.refinements[start.name].negative_log
+        before = self.refinements[start.name].negative_log if if_better else np.inf
         if own.settings.quasi_static != last.settings.quasi_static:
-            first = self._refined(likelihood, theta, settings.changed({"iterations": FIRST}), f"{name} at first")
+            few = settings.changed({"iterations": FIRST})
+            first = self._refined(likelihood, theta, few, step.changed(phase="at first"))
             theta = own.parameters.from_unit(first.point)
             if first.negative_log > before:
                 return
-        result = self._refined(likelihood, theta, settings, f"{name} on the way")
+        result = self._refined(likelihood, theta, settings, step.changed(phase="on the way"))
         if self._late and if_better:
             return
-        new = self._measured(own, result, name)
+        new = self._measured(own, result, step)
         if not if_better:
-            self.problem, self.kept = own, new
+            self._keep(own, new, step)
             return
         more = max(int(own.parameters.free.sum() - last.parameters.free.sum()), 1)
         if before - result.negative_log < WORTH * more:
             return
-        without = self._parts_left_out(last, start.name, settings)
+        without = self._parts_left_out(settings)
         mapped = [last.parameters.mapping(one) for one in without.thetas]
         starts = np.array([own.parameters.started(one) for one in mapped])
-        with_it = self._predicted(own, starts, name, settings)
-        self.estimates[name] = new = replace(new, gained=gain(with_it, without))
+        with_it = self._predicted(own, starts, step, settings)
+        self.estimates[step.estimate] = new = replace(new, gained=gain(with_it, without))
         if not self._late and is_better(with_it, without):
-            self._left_out[name] = with_it
-            self.problem, self.kept = own, new
+            self._left_out[step.estimate] = with_it
+            self._keep(own, new, step)
 
-    def _parts_left_out(self, problem: Problem, name: str, settings: RefinementSettings) -> LeftOut:
-        """Return the parts of the logs as an estimate's model foretells them, from where the search began."""
+    def _keep(self, problem: Problem, estimate: Estimate, step: Step) -> None:
+        self.problem, self.kept, self._step = problem, estimate, step
+
+    def _parts_left_out(self, settings: RefinementSettings) -> LeftOut:
+        """Return the parts of the logs as the kept model foretells them, from where the search began."""
+        name, problem = self.kept.name, self.problem
         if name not in self._left_out:
             start = problem.parameters.started(self._searched)
             starts = np.tile(start, (len(np.unique(parts(problem))), 1))
-            self._left_out[name] = self._predicted(problem, starts, name, settings)
+            self._left_out[name] = self._predicted(problem, starts, self._step, settings)
         return self._left_out[name]
 
     def _predicted(
-        self, problem: Problem, starts: Array, name: str, settings: RefinementSettings
+        self, problem: Problem, starts: Array, step: Step, settings: RefinementSettings
     ) -> LeftOut:
-        def refit(likelihood: Likelihood, theta: Array, part: str) -> Refinement:
-            return self._refined(likelihood, theta, settings, f"{name} {part}")
+        def refit(likelihood: Likelihood, theta: Array, part: int) -> Refinement:
+            return self._refined(likelihood, theta, settings, step.changed(without=part))
 
         return predict_parts(problem, starts, refit)
 
     def _refined(
-        self, likelihood: Likelihood, theta: Array, settings: RefinementSettings, name: str
+        self, likelihood: Likelihood, theta: Array, settings: RefinementSettings, step: Step
     ) -> Refinement:
-        result = refine(likelihood, theta, settings, self._watch.refining, self._checkpoints, name)
+        result = refine(likelihood, theta, settings, self._watch.refining, self._checkpoints, step)
         self._late |= result.ending is Ending.TIME
         return result
 
-    def _measured(self, problem: Problem, end: Refinement, name: str) -> Estimate:
+    def _measured(self, problem: Problem, end: Refinement, step: Step) -> Estimate:
         """Measure an end of least squares, and list it."""
+        name = step.estimate
         self.estimates |= measured(problem, {name: problem.parameters.from_unit(end.point)})
         self.refinements[name] = end
         return self.estimates[name]

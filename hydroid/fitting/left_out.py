@@ -21,8 +21,8 @@ BLOCK = 5.0
 CERTAIN = 1.64
 """standard errors that a gain must exceed: in 5 % of the cases one without a reason does"""
 
-Refit = Callable[[Likelihood, Array, str], Refinement]
-"""refines an estimate, shape (P,), by a likelihood; takes the name of the step"""
+Refit = Callable[[Likelihood, Array, int], Refinement]
+"""refines an estimate, shape (P,), by a likelihood; takes the number of the part left out, from 1"""
 
 
 @record
@@ -66,7 +66,7 @@ def predict_parts(problem: Problem, starts: Array, refit: Refit) -> LeftOut:
         likelihood = make_likelihood(rest)
         if not several:
             likelihood = replace(likelihood, errors=likelihood.errors.without(out))
-        end = refit(likelihood, start, f"without part {g + 1}")
+        end = refit(likelihood, start, g + 1)
         thetas[g] = problem.parameters.from_unit(end.point)
         unseen = _of_logs(problem, out) if several else problem
         judge = likelihood_at(unseen, thetas[g], end.numbers)

@@ -22,6 +22,7 @@ from numpy.random import Generator
 from hydroid.fitting.baselines import NAMES, fit_baselines
 from hydroid.fitting.checkpoints import Checkpoints, Memo
 from hydroid.fitting.refinement import Refining, refine
+from hydroid.fitting.step import Step
 from hydroid.parameters import Array
 from hydroid.posterior.bench import make_bench
 from hydroid.posterior.error_model import likelihood_at, make_likelihood
@@ -69,7 +70,7 @@ class Multistart:
             rows = likelihood.rows(theta[None])[0]
             self._cost = likelihood.negative_log(rows) if np.isfinite(rows).all() else np.inf
         else:
-            self._cost, theta = self._grown(self._problem, theta, f"start {number + 1}")
+            self._cost, theta = self._grown(self._problem, theta, Step("start", start=number + 1))
             self.ends[0].append(self._cost)
         return theta[None]
 
@@ -94,10 +95,12 @@ class Multistart:
     def _joint_by_joint(self, number: int, theta: Array) -> Array:
         """Fit start `number`, (P,), to every joint alone; the last start takes the best one of each joint."""
         for joint in lone_joints(self._problem):
-            problem, name = alone(self._problem, joint, theta), f"start {number + 1} joint {joint}"
-            tried = [self._grown(problem, by_numbers(problem, joint, theta), f"{name} numbers")]
+            problem = alone(self._problem, joint, theta)
+            step = Step("start", start=number + 1, joint=joint)
+            start = by_numbers(problem, joint, theta)
+            tried = [self._grown(problem, start, step.changed(numbers=True))]
             if not problem.leaves_noise(tried[0][1]):
-                tried.append(self._grown(problem, theta, name))
+                tried.append(self._grown(problem, theta, step))
             result = min(tried, key=COST)
             self.ends[joint] += map(COST, tried)
             best = self._best[joint] = min(self._best.get(joint, result), result, key=COST)
@@ -105,7 +108,7 @@ class Multistart:
             theta = np.where(problem.parameters.free, reached, theta)
         return theta
 
-    def _grown(self, problem: Problem, theta: Array, name: str) -> tuple[float, Array]:
+    def _grown(self, problem: Problem, theta: Array, step: Step) -> tuple[float, Array]:
         """Fit theta, (P,), to growing parts of the records, at last all of them.
 
         Returned are its negative log-likelihood, and it.
@@ -119,7 +122,7 @@ class Multistart:
                 self.settings,
                 lambda what, n, rms, before=before: self._progress(what, before + n, rms),
                 self._checkpoints,
-                f"{name} part {number}",
+                step.changed(horizon=number),
             )
             cost = result.negative_log
             theta = part.parameters.from_unit(result.point)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hydroid.fitting.checkpoints import Checkpoints, saving
+from hydroid.fitting.step import Step
 from hydroid.parameters import Array
 from hydroid.posterior.error_model import Likelihood
 from hydroid.progress import LOGGER
@@ -18,8 +19,8 @@ SETTLED = 1.0
 MAX_NOISES = 12
 """times at most that these numbers are estimated"""
 
-Refining = Callable[[str, int, float], bool | None]
-"""takes the name of a least squares, its number of simulations, and its rms error [rad] so far; returns
+Refining = Callable[[Step, int, float], bool | None]
+"""takes a step of the fit, its number of simulations, and its rms error [rad] so far; returns
 whether its time is up"""
 
 
@@ -44,7 +45,7 @@ def refine(
     settings: RefinementSettings,
     progress: Refining,
     checkpoints: Checkpoints,
-    name: str,
+    what: Step,
 ) -> Refinement:
     """Improve an estimate by bounded least squares of innovations.
 
@@ -52,11 +53,12 @@ def refine(
     settles. Between two Jacobians nothing is stored: a resumed refinement repeats the steps since the last
     one.
 
-    It starts at theta, shape (P,). It continues from `checkpoints`, and stores there by its name how far it
-    is; a result too.
+    It starts at theta, shape (P,). It continues from `checkpoints`, and stores there how far it is by the
+    name of the step; a result too.
     Raises RunError: the checkpoint cannot be written.
     """
     parameters = likelihood.problem.parameters
+    name = what.name
     if name in checkpoints:
         now = Refinement.from_arrays(checkpoints[name])
         if now.ended:
@@ -67,7 +69,7 @@ def refine(
     moved = False
     with saving(checkpoints, name) as keep:
         while not now.ended:
-            if progress(name, now.evaluations, _rms_error(likelihood, now)):
+            if progress(what, now.evaluations, _rms_error(likelihood, now)):
                 break
             if not len(now.jacobian):
                 now = _with_new_numbers(likelihood, now)

@@ -8,6 +8,7 @@ from hydroid.arrays import Array, record
 from hydroid.fitting.checkpoints import Arrays, Checkpoints, Memo, saving
 from hydroid.fitting.ladder import Watcher
 from hydroid.fitting.multistart import Multistart
+from hydroid.fitting.step import Step
 from hydroid.problem.problem import Problem
 from hydroid.progress import LOGGER
 from hydroid.search.chromosomes import Genes
@@ -43,9 +44,9 @@ def search(problem: Problem, watch: Watcher, checkpoints: Checkpoints) -> Search
     """
     settings, free, late = problem.settings.search, int(problem.parameters.free.sum()), False
 
-    def refining(name: str, simulated: int, rms: float) -> bool:
+    def refining(step: Step, simulated: int, rms: float) -> bool:
         nonlocal late
-        late = watch.refining(name, simulated, rms) or late
+        late = watch.refining(step, simulated, rms) or late
         return late
 
     memo = Memo(problem, checkpoints.get("search"))

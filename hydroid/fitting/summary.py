@@ -125,7 +125,9 @@ def fit_findings(fit: Fit) -> list[Finding]:
     if fit.refinement is None:
         findings.append(Finding("not refined", "warning"))
     elif not (ending := fit.refinement.ending).converged:
-        kind = "time up" if ending is Ending.TIME else "not converged"
+        seeded = fit.problem.settings.seeded
+        stopped = "not converged" if seeded else "not converged from its start"
+        kind = "time up" if ending is Ending.TIME else stopped
         findings.append(Finding(kind, "warning", (fit.final,), {"ending": ending.value}))
     apart = [joint for joint, ends in fit.ends.items() if max(ends) > SAME_OPTIMUM + min(ends)]
     if apart:

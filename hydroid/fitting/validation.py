@@ -48,6 +48,7 @@ class Prediction:
         response: their angles [rad], shape (T, K).
         bands: prediction bands by joint; empty of a model that is no fit.
         unseen: whether the model was made without this log; None: not known.
+        apart: whether a user has said that it is of other conditions than the fit's: no verdict counts it.
         ahead: `errors_ahead` of the joints [rad], shape (N, HORIZONS, K); none where N is 0.
     """
 
@@ -58,6 +59,7 @@ class Prediction:
     bands: Mapping[int, Band]
     unseen: bool | None
     ahead: Array = field(default_factory=partial(np.empty, (0, len(HORIZONS), 0)))
+    apart: bool = False
 
     @property
     def indices(self) -> dict[int, ErrorIndices]:

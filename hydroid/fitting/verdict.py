@@ -31,10 +31,14 @@ SHARE = 0.02
 """of a joint's travel that its error may be where no tolerance is stated"""
 CLEARLY = 0.9
 """part of another model's error that a better one stays below"""
+LEAST_TOLERANCE = 0.001
+"""the least that a tolerance can be [deg]; none follows from a joint that is never driven, or never moves"""
 WORSE = 2.0
 """times the error on fitted logs, beyond which a fit predicts worse than it fits"""
 LITTLE = 0.5
 """part of the error of standing still, above which a fit predicts little of the motion"""
+STANDING_OUT = 3.0
+"""times the median error of the other unseen logs, beyond which a log is named"""
 ANYWHERE = np.array([-np.inf, np.inf])
 
 Baselines = Mapping[int, Mapping[str, Baseline]]
@@ -57,17 +61,17 @@ def judge(
 
     `fitted` is what the fit makes of its own logs; none of values that are no fit's. `baselines` are fitted
     to the same logs; none: a joint is compared with standing still. Of the predictions `unseen`, those of
-    logs that the fit has seen test nothing.
+    logs that the fit has seen test nothing, and those that are `apart` do not count.
     """
     verdicts = list[JointVerdict]()
     for joint in settings.outputs:
         rivals = baselines.get(joint) or {NAMES[0]: Baseline(joint, ANYWHERE)}
-        new = [p for p in unseen if p.log.driven[joint - 1] and p.unseen is not False]
+        new = [p for p in unseen if p.log.driven[joint - 1] and p.unseen is not False and not p.apart]
         own = [p for p in fitted if p.log.driven[joint - 1]]
         stated = settings.tolerance_deg
         stated = stated.get(joint) if isinstance(stated, dict) else stated
         travel = max((np.ptp(p.log.angle[:, joint - 1]) for p in new or own), default=0.0)
-        tolerance = stated or float(np.degrees(SHARE * travel))
+        tolerance = stated or max(float(np.degrees(SHARE * travel)), LEAST_TOLERANCE)
         errors = [rms_deg(p.error(joint) for p in some) if some else None for some in (own, new)]
         by_rival = [
             {name: rms_deg(one.errors([p.log]) for p in some) for name, one in rivals.items()} if some else {}
@@ -123,6 +127,26 @@ def _word(errors: Sequence[float | None], rivals: Sequence[Mapping[str, float]],
     return "predicts roughly"
 
 
+def standing_out(
+    unseen: Sequence[Prediction], verdicts: Sequence[JointVerdict], where: str = "RUN"
+) -> list[Finding]:
+    """Return which unseen logs err by more than STANDING_OUT times what the other ones do, in any joint.
+
+    Three logs at least, and beyond the tolerance. Whether such a log counts is for its user to say: the
+    hint has the command, with the run's folder `where`.
+    """
+    names = list[str]()
+    for one in verdicts:
+        new = [p for p in unseen if p.log.driven[one.joint - 1] and p.unseen is not False and not p.apart]
+        errors = np.nan_to_num([rms_deg([p.error(one.joint)]) for p in new], nan=np.inf)
+        for i, own in enumerate(new if len(new) > 2 else ()):
+            usual = max(float(np.median(np.delete(errors, i))), one.tolerance_deg)
+            if errors[i] > STANDING_OUT * usual:
+                names.append(own.log.source)
+    logs = tuple(dict.fromkeys(names))
+    return [Finding("log stands out", "note", logs, {"run": where})] if logs else []
+
+
 def behind(settings: FitSettings, verdicts: Sequence[JointVerdict]) -> list[Finding]:
     """Return that a fit of the hydraulics errs more on its own logs than nine numbers do, which it holds."""
     joints = tuple(
@@ -130,7 +154,8 @@ def behind(settings: FitSettings, verdicts: Sequence[JointVerdict]) -> list[Find
         for one in verdicts
         if one.baselines_deg.get(NAMES[-1], np.inf) < CLEARLY * (one.fitted_deg or 0.0)
     )
-    return [Finding("behind nine numbers", "warning", joints)] if joints and settings.stage == "hyd" else []
+    kind = "behind nine numbers" if settings.seeded else "behind nine numbers from its start"
+    return [Finding(kind, "warning", joints)] if joints and settings.stage == "hyd" else []
 
 
 def rms_deg(errors: Iterable[Array]) -> float:

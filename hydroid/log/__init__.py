@@ -3,7 +3,13 @@
 from hydroid.log.binary import FORMATS as FORMATS
 from hydroid.log.checks import motion_findings as motion_findings
 from hydroid.log.guess import ColumnGuess as ColumnGuess, guess_columns as guess_columns
-from hydroid.log.log import Log as Log, LogFinding as LogFinding, grouped as grouped
+from hydroid.log.log import (
+    Log as Log,
+    LogFinding as LogFinding,
+    by_level as by_level,
+    grouped as grouped,
+    log_finding as log_finding,
+)
 from hydroid.log.motion import (
     JointMotion as JointMotion,
     driven_joints as driven_joints,

@@ -124,6 +124,7 @@ def fit_text(arm: Arm, layout: Layout, sizes: Sequence[JointSize], file: str, ar
                 "own": name.removesuffix("_joint"),
                 "name": name,
                 "linear": linear,
+                "lever": own.has("lever_slope"),
                 "damping": short(DRAG * size.damping),
                 "delay": min(max(motion.likely_lag - RESPONSE, 0.0), 0.9) if motion else 0.0,
                 "unit": "N·s/m" if own.slides else "N·m·s/rad",

@@ -13,7 +13,7 @@ from hydroid.files import csv_text
 from hydroid.findings import Finding
 from hydroid.fitting.search import HISTORY
 from hydroid.fitting.validation import Prediction
-from hydroid.fitting.verdict import rms_deg
+from hydroid.fitting.verdict import rms_deg, standing_out
 from hydroid.reporting import page_file
 from hydroid.reporting.chart import SERIES, Chart, Mark, Panel, finite
 from hydroid.reporting.outlines import motion_section
@@ -36,7 +36,7 @@ from hydroid.reporting.verdict_table import (
 )
 from hydroid.run.record import Record, load_record
 from hydroid.settings.arm import Arm
-from hydroid.words import number, two_digits
+from hydroid.words import listed, number, two_digits
 
 _MATRIX = "Rms error of each joint. Green: within its tolerance; amber: within twice that; red: beyond."
 _KINDS = {True: "unseen", False: "fitted", None: ""}
@@ -86,10 +86,10 @@ def prediction_sections(predictions: Sequence[Prediction], arm: Arm, fits: Verdi
             state = "good" if error <= tolerance else "fair" if error <= 2 * tolerance else "bad"
             size = f"{two_digits(1e3 * np.radians(error))} mm" if slides else f"{two_digits(error)}°"
             size = size if np.isfinite(error) else "diverged"
-            row, column = f"{names[log]} {_KINDS[first.unseen]}".strip(), arm.joint_names[joint - 1]
+            row, column = f"{names[log]} {_kind(first)}".strip(), arm.joint_names[joint - 1]
             tabs.append(Plot(f"response_{len(tabs) + 1}", title, drawing, True, size, row, column, state))
     rows = [
-        row | {"fit": short_name(one.fit), "log": names[one.log.source], "kind": _KINDS[one.unseen]}
+        row | {"fit": short_name(one.fit), "log": names[one.log.source], "kind": _kind(one)}
         for one in predictions
         for row in one.plain(arm.joint_names)
     ]
@@ -111,6 +111,10 @@ def prediction_sections(predictions: Sequence[Prediction], arm: Arm, fits: Verdi
         horizon_section(fits),
     )
     return [*filter(None, sections)]
+
+
+def _kind(one: Prediction) -> str:
+    return "unseen, not counted" if one.apart else _KINDS[one.unseen]
 
 
 def draw_response(
@@ -186,7 +190,11 @@ def fit_page(record: Record) -> Page:
     in_order = sorted(filter(None, sections), key=lambda section: section.folded)
     title = f"Fit of {settings.arm.name}, stage {2 if settings.stage == 'hyd' else 1}"
     made_by = {k: str(v) for k, v in record.identity.items() if k in ("hydroid", "mujoco", "numpy", "python")}
-    warned = (*outside(record.verdict), *warnings(summary))
+    unseen = [*record.validations.values()]
+    apart = [Path(one.log.source).name for one in unseen if one.apart]
+    left_out = [f"The verdict does not count {listed(apart)}: validated with --apart."] if apart else []
+    out = map(str, standing_out(unseen, record.verdict, record.folder))
+    warned = (*left_out, *out, *outside(record.verdict), *warnings(summary))
     # the history and the Pareto set with every bit, in the search's units: rad unless relative
     theta, objectives = record.result.front
     unit = "" if settings.objective.relative else "_rad"

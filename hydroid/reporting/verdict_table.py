@@ -112,7 +112,9 @@ def _error(one: JointVerdict) -> float:
 
 
 def _size(one: JointVerdict) -> float:
-    return _error(one) / one.tolerance_deg
+    """Return the error in parts of the tolerance; 0 of a joint that no log drives, which has none."""
+    driven = one.unseen_logs or one.fitted_deg is not None or one.verdict != "not tested"
+    return _error(one) / one.tolerance_deg if driven else 0.0
 
 
 def verdict_lines(fits: Verdicts) -> list[Table | str]:

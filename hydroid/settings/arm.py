@@ -16,12 +16,16 @@ from pydantic import AfterValidator, Field, Strict, ValidationInfo
 from hydroid.arrays import Array, record
 from hydroid.errors import ModelError, SettingsError
 from hydroid.files import find_config
+from hydroid.quantity_table import CHOICES
 from hydroid.settings.cylinder import LinearActuator, make_cylinder
 from hydroid.settings.linkage import DIGITS, Cylinder, RotaryActuator
 from hydroid.settings.load import Settings, load
 
 Actuator: TypeAlias = LinearActuator | RotaryActuator
 
+FARTHEST_BY_CYLINDER = 200.0
+"""how far a cylinder turns a joint at most, with a linkage such as a bucket's [deg]; slewing gears and
+rotators turn farther"""
 SLIDE = 2  # MuJoCo's number of a joint that slides
 
 
@@ -53,6 +57,19 @@ class Joint:
         """The range in the units of a simulation [rad], or [m]."""
         low, high = self.range
         return self.range if self.slides else (math.radians(low), math.radians(high))
+
+    @property
+    def may_stand_in(self) -> bool:
+        """Whether its rotary actuator may stand in for a cylinder of unknown size and linkage."""
+        free = self.continuous or self.slides
+        within = self.range[1] - self.range[0] <= FARTHEST_BY_CYLINDER
+        return isinstance(self.actuator, RotaryActuator) and within and not free
+
+    def has(self, quantity: str) -> bool:
+        """Whether a quantity of a joint's actuator means anything of what moves this one."""
+        of = CHOICES[quantity].of
+        kinds = {"cylinder": isinstance(self.actuator, LinearActuator), "stand-in": self.may_stand_in}
+        return kinds.get(of, True)
 
 
 class Arm(Settings):

@@ -99,6 +99,13 @@ class FitSettings(Settings):
         return self.stage == "hyd" and self.simulation.model != "dynamic"
 
     @property
+    def seeded(self) -> bool:
+        """Whether another seed may lead a search elsewhere: not one that begins at stated starts alone."""
+        stated = any(p.states_start for p in self.parameters.values() if p.fixed is None)
+        drawn = self.search.algorithm != "multistart" or self.search.multistart.starts > 1
+        return drawn or not stated
+
+    @property
     def substeps(self) -> int:
         """Sub-steps of valves and oil in one step of the model."""
         simulation = self.simulation

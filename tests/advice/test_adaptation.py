@@ -1,12 +1,17 @@
 """A fit is moved to a changed machine by what changed, and nothing else."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from two_joints import PARAMETERS, PERIOD, TRUTH, drive, two_joints
 
 import hydroid
-from hydroid.advice.adaptation import adapted, steps
+from hydroid.advice.adaptation import adapted, load_findings, steps
 from hydroid.errors import SettingsError
+from hydroid.estimate import JointVerdict
+from hydroid.fitting.baselines import NAMES
+from hydroid.fitting.verdict import behind
 from hydroid.identified_model import identified
 from hydroid.progress import no_progress
 
@@ -45,6 +50,39 @@ def test_an_effect_of_a_new_day_is_freed_for_one_joint(tmp_path):
     assert then["parameter"] == "day_other"
     assert then["left_out_deg"]["lift"] < 0.7 * first["left_out_deg"]["lift"]
     assert then["left_out_deg"]["tilt"] == pytest.approx(first["left_out_deg"]["tilt"], rel=0.05)
+
+
+def test_a_load_is_said_to_be_a_payload_and_one_that_is_stated_moves_no_mass(tmp_path):
+    settings = two_joints(tmp_path, payloads={"loaded.csv": 5.0})
+    model, log = identified(settings, TRUTH, "a fit"), drive(settings, 3)
+    (said,) = load_findings(adapted(model, ["flow", "M_boom"], [log]))
+    assert "M_boom may stand for a load" in str(said)
+    assert "--set 'payloads={LOG: KG}'" in str(said)
+    assert load_findings(adapted(model, ["flow"], [log])) == ()
+    loaded = adapted(model, ["M_boom"], [replace(log, source="day 2/loaded.csv")])
+    assert loaded.payloads == {"loaded.csv": 5.0}
+    assert load_findings(loaded) == ()
+    assert adapted(model, ["M_boom"], [log]).payloads == {}
+
+
+def test_an_adaptation_names_no_seed_which_it_does_not_have(tmp_path):
+    settings = two_joints(tmp_path)
+    joint = JointVerdict(joint=1, name="lift", verdict="", fitted_deg=2, tolerance_deg=1)
+    bad = [joint.changed({"baselines_deg": {NAMES[-1]: 1.0}})]
+    alone = adapted(identified(settings, TRUTH, "a fit"), ["flow"])
+    assert (settings.seeded, alone.seeded) == (True, False)
+    for own in (settings, alone):
+        (said,) = behind(own, bad)
+        assert ("seed" in str(said)) == own.seeded
+
+
+def test_settings_of_a_model_that_is_read_are_not_replaced_in_silence(tmp_path):
+    settings = two_joints(tmp_path)
+    model, log = identified(settings, TRUTH, "a fit"), drive(settings)
+    with pytest.raises(SettingsError, match="payloads: cannot be replaced in a model that is read"):
+        hydroid.adapt(log, fit=model, set={"payloads": {"drive_0.csv": 5.0}})
+    with pytest.raises(SettingsError, match="duration_s: cannot be replaced in a model that is read"):
+        hydroid.design(log, fit=model, duration=5.0)
 
 
 def test_what_cannot_be_freed_is_refused(tmp_path):

@@ -1,13 +1,15 @@
 """The designed experiment: its limits, its information, and the search, held to laws."""
 
+import mujoco
 import numpy as np
 import pytest
 from made_logs import TRUTH, simulate_log
+from two_joints import PARAMETERS, TRUTH as OIL, two_joints
 
 from hydroid import load_settings
-from hydroid.advice.design import Design, design, forecast, measured, sensor_noise, weakest
+from hydroid.advice.design import Design, design, forecast, measured, sensor_noise, typical
 from hydroid.advice.experiment import violation
-from hydroid.arm.model import load_machine
+from hydroid.arm.model import CollisionChecker, load_machine
 from hydroid.errors import SettingsError
 from hydroid.posterior.uncertainty import uncertainty
 from hydroid.problem.problem import Problem
@@ -16,6 +18,19 @@ from hydroid.settings.fit import FitSettings
 from hydroid.settings.search import DesignSettings
 
 THETA = np.array(list(TRUTH.values()))
+TURNTABLE = """<mujoco model="turntable">
+  <worldbody>
+    <body name="base"><geom type="box" size="0.5 0.5 0.5" pos="0 0 0.5"/>
+      <body name="house" pos="0 0 1.05"><joint name="swing" axis="0 0 1" range="-60 60"/>
+        <geom type="box" size="0.6 0.6 0.3" pos="0 0 0.3"/>
+        <body name="boom" pos="0.7 0 0.3"><joint name="lift" axis="0 1 0" range="-20 90"/>
+          <geom type="capsule" fromto="0 0 0 2 0 0" size="0.05"/>
+        </body>
+      </body>
+    </body>
+  </worldbody>
+</mujoco>"""
+"""a house that turns 5 cm above its base, with a boom in front"""
 DESIGN = {"duration_s": 6, "effort": 24, "dwell_s": [0.5, 2], "poses": "any"}
 TWO: dict[str, object] = {f"parameters.{name}.fixed": TRUTH[name] for name in ("M1", "M4", "M5")}
 TWO |= {"outputs": [2, 3], "simulation.other_joints": "locked"}
@@ -86,7 +101,7 @@ def test_tight_limits_are_kept_too(tight: dict[str, object]):
 def test_the_best_is_no_worse_than_any_random_one_and_repeats(designed: tuple[FitSettings, Design]):
     settings, result = designed
     least, at_random = (
-        np.array([weakest(result.known.add(t.gained), result.directions) for t in trials])
+        np.array([typical(result.known.add(t.gained), result.moved) for t in trials])
         for trials in ([result.best], result.random)
     )
     assert least < np.median(at_random)
@@ -120,13 +135,50 @@ def test_the_information_of_least_squares_has_the_closed_form():
     assert np.abs(measured([(rows, slow)])[:, 2]).max() < 1e-9
 
 
+def test_what_no_experiment_moves_hides_nothing_else(tmp_path):
+    """The damping of oil that does not ring, and an effect of the logs of another day."""
+    ring = {"quantity": "oil_damping", "joints": [1], "within": 3}
+    day = {"quantity": "dead_band", "joints": [1], "sd": 3, "per": "other"}
+    limits = {"duration_s": 10.0, "effort": 12, "clearance_m": None, "poses": "any", "speed_deg_s": 90.0}
+    settings = two_joints(tmp_path, parameters=PARAMETERS | {"ring": ring, "day": day}, design=limits)
+    theta = settings.parameter_set().vector(OIL | {"ring": 0.3, "day": 0.0}, "the truth")
+    result = design(settings, theta, [], 1, no_progress)
+    still = {name for name, moved in zip(result.names, result.moved, strict=True) if not moved}
+    assert {"ring", "day"} <= still
+    assert "open_A_lift" not in still
+    place = result.names.index("ring")
+    assert result.after.deviations[place] == pytest.approx(result.known.deviations[place])
+
+
+def test_a_base_and_what_turns_on_it_do_not_count_as_meeting():
+    model = mujoco.MjModel.from_xml_string(TURNTABLE)
+    checker = CollisionChecker(model)
+    poses = np.random.default_rng(1).uniform(-1, 1, (20, 2))
+    counted = checker.changing(poses)
+    names = {frozenset(pair) for pair, one in zip(checker.names, counted, strict=True) if one}
+    assert frozenset({"base", "house"}) not in names
+    assert frozenset({"base", "boom"}) in names
+    assert checker.first_below(poses, 0.2) == 0
+    low = np.tile([[0.0, 0.0]], (10, 1))
+    assert checker.first_below(low, 0.2, counted) is None
+    low[4:, 1] = 1.5  # the boom hangs down beside the base
+    first = checker.first_below(low, 0.2, counted)
+    assert first == 4
+    pair, share = checker.below(low, 0.2, counted)
+    assert ({*pair}, share) == ({"base", "boom"}, 0.6)
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
         ({"joints": [9]}, "joints 1 to 7"),
         ({"poses": ["asleep"]}, "no pose 'asleep'"),
         ({"poses": ["home"]}, "no pose of home is 5 deg inside"),
-        ({"margin_deg": 70}, "none of 8 random experiments keeps the limits"),
+        (
+            {"margin_deg": 70},
+            "margin_deg: none of 8 random experiments keeps the limits in simulation: .* nearer than 70 deg",
+        ),
+        ({"clearance_m": 3.0}, r"clearance_m: none of 8 .* and .* nearer than 3 m in .* 100 % of the time"),
     ],
 )
 def test_a_design_that_cannot_be_made_is_refused(changes: dict[str, object], message: str):

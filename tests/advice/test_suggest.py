@@ -1,10 +1,13 @@
 """Suggestions on simulated logs of which the truth is known."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from arms import BOOM
 from made_logs import noisy, stepped
+from two_joints import PARAMETERS, PERIOD, drive, two_joints
 
 from hydroid import load_settings
 from hydroid.advice.growth import promising, score_terms
@@ -137,7 +140,38 @@ def test_stating_a_value_leaves_it_as_stated_and_helps_what_goes_with_it(late: t
     for action in stated:
         assert action["parameter"] in {"A_A", "A_B"} - {action["of"]}
         assert action["after_percent"] == pytest.approx(5, rel=0.05)
-    # a lever shows that the actuator stands in for a cylinder, whose areas nobody can measure
-    lever = ParameterSettings(quantity="lever_slope", joints=(2,), bounds=(-0.8, 0.8))
-    rotary = problem.varied(problem.settings.with_parameters({"D": lever}))
+    # a rotary actuator of a joint that a cylinder may turn: nobody can measure its areas
+    moved = {n: p.changed({"joints": (4,)}) for n, p in problem.settings.parameters.items()}
+    rotary = problem.varied(problem.settings.with_parameters(moved))
     assert "state" not in {action["action"] for action in next_actions(rotary, known)}
+
+
+def test_levers_change_with_the_angle_only_where_a_cylinder_may_turn_the_joint(tmp_path):
+    """Not on a cylinder of known pivots, nor on a slewing gear; whether it is stated or not."""
+
+    def named(joint: str, model: str = BOOM) -> set[str]:
+        settings = two_joints(tmp_path, model)
+        held = {"held": ParameterSettings(quantity="lever_bend", joints=(1,), fixed=0.0)}
+        settings = settings.with_parameters(held)
+        problem = Problem(settings, [drive(two_joints(tmp_path))])
+        every = terms(problem, problem.parameters.start)
+        return {term.name for term in every} & {f"lever_slope_{joint}", "lever_slope", "held"}
+
+    assert named("lift") == {"lever_slope_lift", "lever_slope", "held"}
+    slewing = re.sub(r'(name="lift" axis="[^"]*") range="[^"]*"', r'\1 range="-180 180"', BOOM)
+    assert slewing != BOOM
+    assert named("lift", slewing) == set()
+    assert named("tilt", slewing) == {"lever_slope_tilt"}
+    joints = load_settings("fit-hyd").arm.joints
+    assert [joint.name for joint in joints if joint.has("lever_slope")] == ["roll"]
+    assert not {"roll", "rotation"} & {joint.name for joint in joints if joint.has("pivot_angle")}
+
+
+def test_an_effect_of_a_group_is_a_term_only_where_some_logs_are_in_it_and_others_not(tmp_path):
+    day = {"quantity": "dead_band", "joints": [1], "sd": 3, "per": "other", "fixed": 0}
+    for groups, expected in (({}, False), ({"monday": "mon_*"}, False), ({"monday": "*_1.csv"}, True)):
+        log = {"period_s": PERIOD, "groups": groups}
+        settings = two_joints(tmp_path, parameters=PARAMETERS | {"day": day}, log=log)
+        problem = Problem(settings, [drive(settings, seed) for seed in (0, 1)])
+        named = {term.name for term in terms(problem, problem.parameters.start)}
+        assert ("day" in named) == expected

@@ -29,6 +29,7 @@ WRONG = [
     ("fit-mech {log} --config fit-hyd", "settings", "use hydroid fit-hyd"),
     ("fit-mech {log} --sed 1", "usage", "--sed"),
     ("fit-hyd {log} --mech nowhere", "settings", "nowhere"),
+    ("fit-hyd {log} --set log.command=null", "log", "no log drives a joint that is compared (shoulder)"),
     ("fit-hyd {log} --set parameters.D.start=null", "settings", "give the run of stage 1 with --mech RUN"),
     ("fit-hyd {log} --mech d.yaml", "settings", "M6"),
     ("fit-hyd {log} --mech hyd.yaml", "settings", "hyd.yaml: is a fit of stage 2, but --mech takes one of"),

@@ -22,6 +22,7 @@ from hydroid.fitting import validation
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
 from hydroid.prediction import predict
+from hydroid.run.record import load_record
 
 ROOT = Path(__file__).parents[2]
 QUICK = ["--set=search.ga.population=6", "--set=search.ga.generations=2", "--set=refinement.iterations=1"]
@@ -94,6 +95,21 @@ def test_fit_validate_and_simulate_walk_through(short: Path, hydroid_cli: Run, t
     assert done["verdict"][0]["verdict"] == "predicts"
     assert (run / "validations" / "sim.csv" / "result.npz").exists()  # and the fit's own report shows it
     assert sorted(p.name for p in tmp_path.iterdir()) == ["run", "sim.csv", "val", "val2"]
+
+
+def test_a_log_set_apart_stays_on_the_page_and_out_of_the_verdict(array, hydroid_cli: Run):
+    shutil.copytree(array[0] / "seed-1", "run")
+    other = ROOT / "examples" / "logs" / "rig_shoulder_2.csv"
+    counts = {}
+    for options in (["--apart"], []):
+        done = hydroid_cli("validate", other, "--fit=run", "--json", "--out=val", *options)
+        assert json.loads(done.out)["verdict"][0]["unseen_logs"] == 1  # of this very validation
+        (one,) = load_record("run").verdict
+        counts[len(options)] = one.unseen_logs
+        text = Path("run/report.html").read_text("utf-8")
+        assert ("The verdict does not count rig_shoulder_2.csv" in text) == bool(options)
+        assert "rig_shoulder_2" in text
+    assert counts == {1: 0, 0: 1}
 
 
 def test_a_log_that_diverges_is_named_and_judged_with_the_others(
@@ -212,6 +228,33 @@ def test_check_prints_json_and_says_by_its_status_that_a_log_is_unusable(short: 
     assert (good["usable"], good["driven_joints"]) == (True, ["shoulder"])
     assert not bad["usable"]
     assert {finding["level"] for finding in bad["findings"]} >= {"error"}
+
+
+def test_check_refuses_logs_that_leave_stage_two_nothing_to_fit(short: Path, hydroid_cli: Run):
+    """As the fit itself does; a standstill beside a log that drives the joint is right."""
+    undriven = ("--config=fit-hyd", "--json", "--set=log.command=null")
+    (one,) = json.loads(hydroid_cli("check", short, *undriven, code=2).out)["logs"]
+    assert (one["usable"], one["findings"][0]["kind"]) == (False, "nothing to fit")
+    rows = short.read_text().splitlines()
+    column = rows[0].split(",").index("u2_pct")
+    still = [row.split(",") for row in rows[1:]]
+    for row in still:
+        row[column] = "0"
+    Path("still.csv").write_text("\n".join([rows[0], *map(",".join, still)]))
+    hydroid_cli("check", "still.csv", "--config=fit-hyd", code=2)
+    both = json.loads(hydroid_cli("check", "still.csv", short, "--config=fit-hyd", "--json").out)["logs"]
+    assert [log["usable"] for log in both] == [True, True]
+
+
+def test_a_compared_joint_that_no_log_drives_is_not_tested(short: Path, caplog):
+    """Its fit ends with a verdict on the other; it is warned of before the first simulation."""
+    two = {"outputs": [2, 3], "simulation.other_joints": "measured"}
+    with caplog.at_level(logging.WARNING, "hydroid"):
+        fitted = hydroid.fit_mech(short, refinement=False, set=SMALL | two)
+    assert any("no log drives joint elbow, compared all the same" in line for line in caplog.messages)
+    shoulder, elbow = fitted.summary.verdict
+    assert (elbow.name, elbow.verdict, elbow.fitted_deg) == ("elbow", "not tested", None)
+    assert any(str(line).startswith(f"Worst: {shoulder.name},") for line in fitted.lines)
 
 
 def test_stage_two_holds_masses_and_says_which_stage_1_moved_without_knowing_it(tmp_path: Path, caplog):

@@ -9,7 +9,7 @@ from hydroid import load_settings
 from hydroid.estimate import FitSummary
 from hydroid.fitting.baselines import NAMES
 from hydroid.fitting.validation import HORIZONS, Prediction, errors_ahead
-from hydroid.fitting.verdict import behind, judge
+from hydroid.fitting.verdict import behind, judge, standing_out
 from hydroid.log import Log
 from hydroid.posterior.band import Band
 from hydroid.reporting.verdict_table import next_step, outside
@@ -113,6 +113,27 @@ def test_errors_far_beyond_the_expected_say_that_the_machine_has_changed(fitted_
     step = next_step(FitSummary(stage="hyd", estimate={}), judge(SETTINGS, own, rivals, [other]), "run", own)
     assert step.kind == kind
     assert ("shoulder" in str(step)) == (kind == "machine changed")
+
+
+def test_a_log_that_a_user_sets_apart_counts_in_no_verdict_and_one_that_stands_out_is_named():
+    rivals = {2: dict(zip(NAMES, (Off(40, 40), Off(8, 8), Off(8, 8)), strict=True))}
+    own = [predicted(1.0, LOG)]
+    good = [predicted(1.0, replace(LOG, source=name)) for name in ("b.csv", "c.csv")]
+    heavy = predicted(30.0, replace(LOG, source="heavy.csv"))
+
+    def judged(*unseen: Prediction):
+        return judge(SETTINGS, own, rivals, unseen)
+
+    (bad,) = judged(*good, heavy)
+    assert (bad.verdict, bad.unseen_logs) == ("predicts no better than speed tables", 3)
+    (finding,) = standing_out([*good, heavy], [bad], "runs/a")
+    assert finding.subjects == ("heavy.csv",)
+    assert "hydroid validate LOG --fit runs/a --apart" in str(finding)
+    apart = replace(heavy, apart=True)
+    assert judged(*good, apart) == judged(*good)
+    assert standing_out([*good, apart], judged(*good, apart)) == []
+    # of two that differ nobody can say which is the odd one
+    assert standing_out([good[0], heavy], judged(good[0], heavy)) == []
 
 
 def test_an_error_ahead_begins_anew_at_every_start():

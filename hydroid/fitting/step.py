@@ -1,0 +1,58 @@
+"""What a fit does next: one least squares, as a record that names its checkpoint and its line of progress."""
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+Phase = Literal["", "at first", "on the way"]
+"""of a rung: to see whether it is likely at all, to see whether it is better, or to the end (no words)"""
+
+
+@dataclass(frozen=True)
+class Step:
+    """One least squares of a fit.
+
+    Attributes:
+        model: start (a start of the search), refined, dynamic or joint; or what a comparison calls it.
+        terms: that the model has.
+        phase: of the rung.
+        start: number of the start, from 1; 0: none.
+        joint: that is fitted alone, from 1; 0: all joints.
+        numbers: whether it begins at the nine numbers of the joint.
+        horizon: number of the part of the logs that it is fitted to, from 1; 0: all of them.
+        without: number of the part of the logs that is left out, from 1; 0: none.
+    """
+
+    model: str
+    terms: tuple[str, ...] = ()
+    phase: Phase = ""
+    start: int = 0
+    joint: int = 0
+    numbers: bool = False
+    horizon: int = 0
+    without: int = 0
+
+    @property
+    def estimate(self) -> str:
+        """Name of the estimate that it leads to: model and terms."""
+        return "+".join([self.model, *self.terms])
+
+    @property
+    def name(self) -> str:
+        """Its own name: no two least squares of a fit have the same."""
+        words = [self.estimate, *([str(self.start)] if self.start else [])]
+        words += [f"joint {self.joint}"] if self.joint else []
+        words += ["numbers"] if self.numbers else []
+        words += [f"part {self.horizon}"] if self.horizon else []
+        words += [f"without part {self.without}"] if self.without else []
+        words += [self.phase] if self.phase else []
+        return " ".join(words)
+
+    def changed(self, **changes: object) -> "Step":
+        """Return the step with other attributes."""
+        return replace(self, **changes)  # pyright: ignore[reportArgumentType]
+
+
+def step_of(estimate: str) -> Step:
+    """Return the step that leads to an estimate by its name."""
+    model, *terms = estimate.split("+")
+    return Step(model, tuple(terms))

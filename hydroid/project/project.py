@@ -9,7 +9,7 @@ from typing import Any
 
 from hydroid.arrays import record
 from hydroid.cad.importer import ImportedArm, import_arm
-from hydroid.cad.source import MESHES
+from hydroid.cad.meshes import MESHES
 from hydroid.errors import SettingsError
 from hydroid.files import fill_template, undisturbed, write_atomic, writing
 from hydroid.log import open_table

@@ -15,8 +15,8 @@ LARGEST = 32  # of a file [MiB]
 MOST = 200_000  # elements of a file
 DEEPEST = 200  # elements in each other, and joints behind each other
 FARTHEST = 1e9  # larger numbers are no lengths in any unit
-GEOMETRY = {"xyz", "rpy", "radius", "length", "size", "scale", "pos", "quat", "axis", "axisangle", "xyaxes"}
-GEOMETRY |= {"zaxis", "euler", "fromto", "ref", "anchor"}
+_PLACES = ("xyz", "rpy", "pos", "quat", "axis", "axisangle", "xyaxes", "zaxis", "euler", "fromto", "anchor")
+GEOMETRY = {*_PLACES, "radius", "length", "size", "scale", "ref"}
 """attributes that say where things are and how large"""
 OWN_NAMES = ("link", "joint", "body")  # elements whose name may stand once only
 NO_NAMES = ("null", "true", "false")  # in YAML

@@ -85,8 +85,8 @@ def take_sites(spec: mujoco.MjSpec, notes: Notes) -> dict[str, Plain]:
     found, sites = dict[str, Plain](), {word(site.name): site for site in spec.sites}
     for joint in spec.joints:
         for name in (joint.name, joint.name.removesuffix("_joint"), joint.parent.name):
-            pair = [sites.get(f"{name}_pivot_{end}") for end in ENDS]
-            if None not in pair:
+            pair = [sites[f"{name}_pivot_{end}"] for end in ENDS if f"{name}_pivot_{end}" in sites]
+            if len(pair) == len(ENDS):
                 for site, end in zip(pair, ENDS, strict=True):
                     site.name = f"{joint.name}_pivot_{end}"
                 found[joint.name] = {"kind": "linear"}

@@ -25,6 +25,7 @@ BOXED = 500.0
 SLENDER = 0.015  # volume of a link without a shape, over the cube of its length: a box of 1 to 8
 SLIGHT = 67.0
 """the least density of this box: that of a boom of 1 to 20 with 400 kg/m³, 1 kg for a length of 1 m"""
+WATER = 1000.0  # MuJoCo's density of shapes without mass and density [kg/m³]
 NO_TENSOR = [np.nan, 0, 0, 0, 0, 0]  # MuJoCo's word for a full inertia that is not given
 
 
@@ -187,7 +188,9 @@ def set_inertia(body: mujoco.MjsBody, mass: float, centre: Array, tensor: Array)
 def _stated_fault(body: mujoco.MjsBody, urdf: bool) -> str:
     """Say why no rigid body has the mass or inertia that a file states, and take it out; empty: one has."""
     if not body.explicitinertial:
-        return "no mass" if urdf else ""
+        # MuJoCo fills every shape with water of which the file says nothing
+        unsaid = all(np.isnan(geom.mass) and geom.density == WATER for geom in body.geoms)
+        return "no mass" if urdf or unsaid else ""
     full = np.array(body.fullinertia)  # xx, yy, zz, xy, xz, yz
     tensor = np.diag(body.inertia) if np.isnan(full[0]) else full[[0, 3, 4, 3, 1, 5, 4, 5, 2]].reshape(3, 3)
     fault = "no mass"

@@ -84,6 +84,8 @@ def init(
     lines = [f"{project.folder}: {', '.join(project.files)}"]
     guessed = "The log's columns, guessed. Check them, and correct them in fit.yaml:"
     look = f"Next: look at {project.folder / 'arm.png'}, then (--budget 5min stops a fit at its best model):"
+    if configs:
+        guessed = "Of the log, by the columns that you gave:"
     if project.missing:
         guessed = "Of the log's columns:"
         settings = project.folder / "fit.yaml"

@@ -120,7 +120,7 @@ def _guessed(table: Table, arm: Arm, order: Sequence[str]) -> ColumnGuess:
     except LogError:
         if not holds_numbers(table):
             raise
-        return ColumnGuess({"period_s": PERIOD, "joints": {}}, (), ())
+        return ColumnGuess({"joints": {}}, (), ())
     section["period_s"] = _period(section["period_s"])
     entries = {places[k - 1] + 1: entry for k, entry in section["joints"].items()}
     section["joints"] = dict(sorted(entries.items()))
@@ -146,7 +146,8 @@ def _section(table: Table, arm: Arm, given: LogSettings) -> Plain:
         if own:
             entries[joint] = {"command": None, "angle": None} | own
     section = given.model_dump(mode="json", exclude_defaults=True) | {"joints": entries}
-    section |= {"time": given.time.model_dump(), "command": None, "angle": None, "pressure": None}
+    section |= {"time": given.time.model_dump(), "command": None, "angle": None}
+    section |= {"pressure": None} if given.pressure is not None else {}
     if "period_s" not in given.model_fields_set:
         (time,) = table.read([Signal(given.time.column, "time", gain=UNITS[given.time.unit].factor)]).values.T
         section["period_s"] = _period(nearest_period(float(np.nanmedian(np.diff(time)))))
@@ -186,10 +187,7 @@ def _skeleton(table: Table, arm: Arm, guess: ColumnGuess, missing: str) -> Layou
         entry["command"] = entry["command"] or {"column": "COMMAND", "scale": 1}
         entry["angle"] = entry["angle"] or {"column": "ANGLE", "unit": unit}
     section = {"time": {"column": "TIME", "unit": "s"}, "command": None, "angle": None} | section
-    section = {key: value for key, value in section.items() if key != "period_s"} | {
-        "period_s": section["period_s"],
-        "joints": entries,
-    }
+    section["joints"] = entries
     lines = column_lines(table)
     return Layout(
         section, tuple(entries), guess.reasons, (), {}, followed=False, missing=missing, candidates=lines

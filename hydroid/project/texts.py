@@ -169,7 +169,7 @@ def fit_text(
                 "dead": short(DEAD * min(max(motion.dead_band, 5.0), 40.0) if motion else 10.0),
             }
         )
-    period = layout.section["period_s"]
+    period = layout.section.get("period_s", 0.01)
     steps = math.ceil(period / LONGEST_STEP - 1e-9)
     return fill_template(
         "project/fit.yaml.j2",

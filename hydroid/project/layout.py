@@ -7,17 +7,15 @@ from pathlib import Path
 import numpy as np
 
 from hydroid.arrays import record
-from hydroid.errors import LogError, SettingsError
+from hydroid.errors import LogError
 from hydroid.files import Plain
-from hydroid.log import ColumnGuess, JointMotion, Log, Table, check_log, guess_columns, motion_of
-from hydroid.log.guess import nearest_period
+from hydroid.log import ColumnGuess, JointMotion, Log, Table, check_log, motion_of
 from hydroid.log.read import angle_margin
-from hydroid.log.table import Signal
-from hydroid.project.columns import column_lines, holds_numbers
+from hydroid.project.columns import column_lines
+from hydroid.project.section import given_section, guessed_section, missing_column
 from hydroid.settings.arm import Arm, Joint
 from hydroid.settings.load import validate
-from hydroid.settings.log import ColumnMap, LogSettings
-from hydroid.units import UNITS
+from hydroid.settings.log import LogSettings
 from hydroid.words import listed
 
 REVERSED = (
@@ -25,7 +23,6 @@ REVERSED = (
     "(compare arm.png), set scale: -1 at its angle and not at its command: gravity follows the angle"
 )
 
-PERIOD = 0.02  # of a simulation of quick logs [s]
 MOVED = 0.5  # travel from which a joint moves [deg]
 
 
@@ -74,9 +71,11 @@ def find_layout(
     if table is None:
         every = range(1, len(arm.joints) + 1)
         return Layout({"period_s": 0.01, "joints": {}}, tuple(every), (), (), {}, followed=False)
-    guess = ColumnGuess(_section(table, arm, given), (), ()) if given else _guessed(table, arm, order)
+    guess = (
+        ColumnGuess(given_section(table, arm, given), (), ()) if given else guessed_section(table, arm, order)
+    )
     section, reasons = guess.log, [*guess.reasons]
-    if missing := _missing(section):
+    if missing := missing_column(section):
         if given is not None:
             raise LogError(
                 missing.replace("looks like", "is given as"), table.source, "correct the log section"
@@ -104,75 +103,6 @@ def find_layout(
     followed = any(m.travel > 1 for joint, m in motions.items() if joint not in driven)  # [deg]
     made = Layout(section, tuple(driven), tuple(reasons), guess.unused, motions, followed)
     return made if given is None else replace(made, origin="As you gave them, compared with the log.")
-
-
-def _guessed(table: Table, arm: Arm, order: Sequence[str]) -> ColumnGuess:
-    """Guess the columns; joints have the numbers of the arm."""
-    names = arm.joint_names
-    for name in order:
-        if name not in names:
-            raise SettingsError(f"no joint {name!r}", "--joints", f"the arm's joints: {', '.join(names)}")
-    places = [names.index(name) for name in order or names]
-    slides = [k for k, place in enumerate(places, 1) if arm.joints[place].slides]
-    links = [arm.link_names[place] for place in places]
-    try:
-        section, reasons, unused = guess_columns(table, order or names, links=links, slides=slides)
-    except LogError:
-        if not holds_numbers(table):
-            raise
-        return ColumnGuess({"joints": {}}, (), ())
-    section["period_s"] = _period(section["period_s"])
-    entries = {places[k - 1] + 1: entry for k, entry in section["joints"].items()}
-    section["joints"] = dict(sorted(entries.items()))
-    return ColumnGuess(section, reasons, unused)
-
-
-def _period(period: float) -> float:
-    """Return the period of a simulation [s] for a log's.
-
-    A slow log is simulated in two steps a sample; what a fast one adds is not seen on such machines.
-    """
-    if period < 0.03:
-        return max(period, PERIOD)
-    return PERIOD if period < 0.1 else 0.05
-
-
-def _section(table: Table, arm: Arm, given: LogSettings) -> Plain:
-    """Return what a person says of the columns, joint by joint."""
-    entries = dict[int, Plain]()
-    for joint in range(1, len(arm.joints) + 1):
-        maps = {kind: given.columns(kind, joint) for kind in ("command", "angle", "pressure")}
-        own = {kind: _entry(columns) for kind, columns in maps.items() if columns is not None}
-        if own:
-            entries[joint] = {"command": None, "angle": None} | own
-    section = given.model_dump(mode="json", exclude_defaults=True) | {"joints": entries}
-    section |= {"time": given.time.model_dump(), "command": None, "angle": None}
-    section |= {"pressure": None} if given.pressure is not None else {}
-    if "period_s" not in given.model_fields_set:
-        (time,) = table.read([Signal(given.time.column, "time", gain=UNITS[given.time.unit].factor)]).values.T
-        section["period_s"] = _period(nearest_period(float(np.nanmedian(np.diff(time)))))
-    return section
-
-
-def _entry(columns: ColumnMap) -> Plain:
-    one = columns.column[0] if len(columns.column) == 1 else [*columns.column]
-    entry: Plain = {"column": one}
-    if columns.unit != "%":
-        entry["unit"] = columns.unit
-    numbers = {"scale": (columns.scale, 1.0), "offset": (columns.offset, 0.0)}
-    return entry | {key: value for key, (value, usual) in numbers.items() if value != usual}
-
-
-def _missing(section: Plain) -> str:
-    """Say what no column looks like; empty: there is all that a fit needs."""
-    if "time" not in section:
-        return "no column looks like a time"
-    entries = section["joints"].values()
-    for kind in "angle", "command":
-        if not any(entry[kind] for entry in entries):
-            return f"no column looks like {'an' if kind == 'angle' else 'a'} {kind}"
-    both = any(entry["angle"] and entry["command"] for entry in entries)
-    return "" if both else "no joint has both a command and an angle"
 
 
 def _skeleton(table: Table, arm: Arm, guess: ColumnGuess, missing: str) -> Layout:

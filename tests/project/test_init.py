@@ -199,7 +199,7 @@ def test_a_log_of_unknown_columns_gets_a_skeleton_and_goes_on_from_there(place: 
     for joint in found.outputs:
         assert found.log.columns("command", joint).scale == known.log.columns("command", joint).scale
     starts = [
-        {one.name: (one.nominal, one.start) for one in settings.parameter_set().parameters}
+        {one.name: (one.lower, one.upper) for one in settings.parameter_set().parameters}
         for settings in (found, known)
     ]
     assert {*starts[0]} == {*starts[1]}

@@ -15,6 +15,8 @@ from hydroid.settings.load import JointNumber, NotNegative, Settings, validate
 
 Interval = tuple[float | None, float | None]  # its ends; null: it has no limit there
 NAME = "estimate.yaml"  # name of the file in a run folder and beside a saved plant
+DESCRIPTION = "run.json"
+"""name of the file that describes a run: versions, seed, hashes of its logs and files, status, seconds"""
 
 
 class ParameterEstimate(Settings):
@@ -214,7 +216,7 @@ def read_estimate(source: Path) -> tuple[Path, Plain, FitSummary | None]:
     """
     file = source / NAME if source.is_dir() else source
     if source.is_dir() and not is_file(file):
-        begun = is_file(source / "run.json")
+        begun = is_file(source / DESCRIPTION)
         hint = "resume the fit" if begun else "name a run folder, a folder of Plant.save or a YAML file"
         raise RunError("holds no estimate" + (" yet" if begun else ""), source, hint)
     content, lines = read_yaml(file)

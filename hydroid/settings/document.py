@@ -11,6 +11,7 @@ from typing import Any
 import yaml
 
 from hydroid.errors import SettingsError
+from hydroid.files import read_file
 
 Lines = dict[tuple[str, ...], int]  # line [1-based] of each key or item, by its path
 
@@ -30,8 +31,7 @@ def read_yaml(path: Path) -> tuple[dict[str, Any], Lines]:
     """Read a file that holds one mapping."""
     most = 2**18
     try:
-        with path.open("rb") as file:
-            data = file.read(most + 1)
+        data = read_file(path, most + 1)
         text = data.decode("utf-8-sig")
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "it is not UTF-8 text"

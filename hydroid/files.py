@@ -16,8 +16,8 @@ from hydroid.errors import RunError, SettingsError
 
 Plain = dict[str, Any]  # a mapping as YAML and JSON hold it
 PART = ".part"  # suffix of a file that is being written
-NOTICES = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGUSR1") if hasattr(signal, name))
-"""signals by which a cluster says that time is nearly up"""
+NOTICES = tuple(getattr(signal, n) for n in ("SIGTERM", "SIGUSR1", "SIGHUP") if hasattr(signal, n))
+"""signals by which a cluster says that time is nearly up, and a terminal that it is closed"""
 
 
 @contextmanager
@@ -60,20 +60,20 @@ def write_atomic(path: Path, content: str | bytes, *, keep: Path | None = None) 
     only it exists. Raises RunError: the folder cannot be written, the disk is full, or the path is that of a
     folder, a pipe or a device, which a file would replace.
     """
-    path = Path(os.path.realpath(path))  # a link stays, and what it leads to is written
+    place = Path(os.path.realpath(path))  # a link stays, and what it leads to is written
     if os.path.exists(path) and not is_file(path):
         raise RunError("cannot be written (it is no file)", path, "name another file")
-    temporary = path.parent / f".{path.name}.{token_hex(4)}{PART}"
+    temporary = place.parent / f".{place.name}.{token_hex(4)}{PART}"
     try:
         with writing(path):
-            path.parent.mkdir(parents=True, exist_ok=True)
+            place.parent.mkdir(parents=True, exist_ok=True)
             with temporary.open("xb") as file:
                 file.write(content.encode() if isinstance(content, str) else content)
                 file.flush()
                 os.fsync(file.fileno())
-            if keep is not None and path.exists():
-                path.replace(keep)
-            temporary.replace(path)
+            if keep is not None and place.exists():
+                place.replace(keep)
+            temporary.replace(place)
     finally:
         with suppress(OSError):  # it has its name by now, or was never made
             temporary.unlink()

@@ -3,6 +3,7 @@
 A command's module is imported when the command is called, so that `--help` answers at once.
 """
 
+import errno
 import inspect
 import sys
 from collections.abc import Callable
@@ -14,7 +15,7 @@ from typer.core import TyperGroup
 import hydroid
 from hydroid.commands.console import log_lines, program, show, show_error
 from hydroid.commands.progress import VISIBLE, listen, stopped
-from hydroid.errors import HydroidError, Stopped
+from hydroid.errors import HydroidError, RunError, Stopped
 
 if TYPE_CHECKING:
     from typer.core import TyperCommand
@@ -49,6 +50,8 @@ PLAIN: Any = {"add_completion": False, "rich_markup_mode": None, "pretty_excepti
 """of typer's apps; plain help: importing rich would triple the time it takes"""
 
 
+SYSTEM = (errno.ENAMETOOLONG, errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EIO, errno.EMFILE)
+"""what a system refuses that no program can help"""
 VERBOSE = "Also print all tables, findings, and the lines that go to run.log."
 
 
@@ -131,10 +134,10 @@ def _root(  # pyright: ignore[reportUnusedFunction]  # typer calls it
 
 def main() -> None:
     """Run a command: exit 0 when it is done, 2 for an error of the input, 130 when it was stopped."""
-    listen()
     code, kept = 0, None
-    group: Any = typer.main.get_command(app)
     try:
+        listen()
+        group: Any = typer.main.get_command(app)
         with group.make_context(program(), sys.argv[1:] or ["--help"]) as context:
             group.invoke(context)
     except typer.Exit as end:
@@ -146,6 +149,9 @@ def main() -> None:
     except Exception as error:
         if isinstance(error, HydroidError) or hasattr(error, "format_message"):
             show_error(error)
+            code = 2
+        elif isinstance(error, OSError) and error.errno in SYSTEM:
+            show_error(RunError(f"cannot be used ({error.strerror})", error.filename or "the system"))
             code = 2
         elif stopped():  # what the interrupt met may have made another error of it
             code = 130

@@ -136,7 +136,7 @@ def validation_name(log: Log) -> str:
 
     Of a log that is no file the digest is that of its samples.
     """
-    place = Path(log.source).resolve()
+    place = Path(os.path.realpath(log.source))
     key = os.fsencode(place) if os.path.exists(place) else samples(log)
     name = re.sub(r"[^\w.-]+", "_", place.name).strip(".")[:LONGEST_NAME]
     return f"{name or 'log'}-{hashlib.sha256(key).hexdigest()[:8]}"

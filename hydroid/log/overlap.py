@@ -73,7 +73,7 @@ def _holds(known: Log, log: Log, moves: Mask) -> bool:
 
 
 def _noise(angle: Array) -> Array:
-    """Standard deviation of the noise of angles [rad], shape (K,), from how they bend from sample to sample."""
+    """Standard deviation of the noise of angles [rad], shape (K,), from their second differences."""
     bends = np.abs(np.diff(angle, 2, axis=0))
     return np.median(bends, axis=0) / (0.6745 * np.sqrt(6.0))
 

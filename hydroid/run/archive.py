@@ -24,6 +24,7 @@ from hydroid.progress import LOGGER
 
 LARGEST = 2**32  # bytes that a file may unpack to
 
+
 def pack(tree: object, *, compressed: bool = True) -> bytes:
     """Return a tree as npz: its arrays as they are, and what is left as JSON under `content`.
 
@@ -49,7 +50,8 @@ def pack(tree: object, *, compressed: bool = True) -> bytes:
 def unpack(file: Path) -> Any:
     """Read a tree that `pack` made, its dataclasses as mappings and its sequences as lists.
 
-    Raises OSError: the file cannot be read. ValueError: it is not what `pack` writes, or is larger than LARGEST.
+    Raises OSError: the file cannot be read. ValueError: it is not what `pack` writes, or unpacks to
+    more than LARGEST.
     """
     packed = read_file(file)
     data, digest = packed[:-32], packed[-32:]

@@ -143,7 +143,7 @@ def validation_name(log: Log) -> str:
 
 
 def fitted_by(model: IdentifiedModel) -> tuple[Sequence[Prediction], Baselines]:
-    """Return what a model's run made of its logs, and the baselines; nothing of a model that is from no run."""
+    """Return what a model's run made of its logs, and the baselines; nothing if it is from no run."""
     if (folder := run_of(model)) is None:
         return (), {}
     result = _read(folder / RESULT, FitResult)
@@ -162,8 +162,7 @@ def load_record(folder: str | Path) -> Record:
     every = [*result.fitted, *unseen.values()]
     sources = numbered(one.log.source for one in every)
     named = [
-        replace(one, log=replace(one.log, source=source))
-        for one, source in zip(every, sources, strict=True)
+        replace(one, log=replace(one.log, source=source)) for one, source in zip(every, sources, strict=True)
     ]
     count = len(result.fitted)
     validations = dict(zip(unseen, named[count:], strict=True))

@@ -145,8 +145,7 @@ def validate(
     try:
         return kind.model_validate(values, context={"folder": folder, "source": source})
     except ValidationError as error:
-        # a setting that does not exist may be why another is missing
-        faults = sorted(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
+        faults = sorted(error.errors(), key=_rank)
     found = dict[str, str]()  # a value that is none of several types is one fault
     for fault in faults:
         key, problem = _explained(fault, kind)
@@ -175,9 +174,24 @@ def parse_override(text: str) -> tuple[str, Any]:
     return key.strip(), read_document(value, f"--set {text}")[0]
 
 
+def _rank(fault: Any) -> int:
+    """Order faults: a setting that does not exist first, for it may be why another is missing.
+
+    Of a value of several types, the one that it has not comes last.
+    """
+    if fault["type"] == "extra_forbidden":
+        return 0
+    return 2 if fault["type"].endswith("_type") and any(map(_is_type, fault["loc"])) else 1
+
+
+def _is_type(part: Any) -> bool:
+    """Return whether pydantic means a type by a part of a place, not a setting."""
+    return isinstance(part, str) and (part.startswith("constrained-") or part.endswith("]"))
+
+
 def _explained(fault: Any, kind: type[Settings]) -> tuple[str, str]:
     """The dotted key of a setting, and what is wrong with it, from one of pydantic's faults."""
-    key = ".".join(str(part) for part in fault["loc"]).removesuffix(".[key]")
+    key = ".".join(str(part) for part in fault["loc"] if not _is_type(part))
     if fault["type"] == "missing":
         return key, f"setting {key!r} is missing"
     if fault["type"] == "extra_forbidden":

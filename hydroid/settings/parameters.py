@@ -38,7 +38,7 @@ def expanded(parameters: Mapping[str, Any], compared: Any, arm: Arm | None) -> P
         key, kind = ("link", str) if quantity == "mass" else ("joints", int | str)
         if entry.get(key) is not None:
             what = "link or each: links" if key == "link" else "joints that share it or each: joints"
-            raise ValueError(f"{name}: give {what} that have their own, not both")
+            raise ValueError(f"parameters.{name}: give {what} that have their own, not both")
         every = arm.link_names if key == "link" and arm else compared
         places = every if each is True else each
         if not isinstance(places, list | tuple) or not all(isinstance(place, kind) for place in places):
@@ -47,7 +47,7 @@ def expanded(parameters: Mapping[str, Any], compared: Any, arm: Arm | None) -> P
         shared = {setting: value for setting, value in entry.items() if setting != "each"}
         names = dict(enumerate(arm.joint_names, 1)) if arm and key == "joints" else {}
         if key == "joints":
-            _refuse(places, name if each is not True else "outputs", [*names.values()])
+            _refuse(places, "outputs" if each is True else f"parameters.{name}.each", [*names.values()])
         numbers: Plain = {label: number for number, label in names.items()}
         places = [numbers.get(place, place) for place in places]
         if key == "joints" and len(places) == 1:

@@ -5,6 +5,7 @@ A command's module is imported when the command is called, so that `--help` answ
 
 import errno
 import inspect
+import os
 import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Annotated, Any
@@ -52,6 +53,8 @@ PLAIN: Any = {"add_completion": False, "rich_markup_mode": None, "pretty_excepti
 
 SYSTEM = (errno.ENAMETOOLONG, errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EIO, errno.EMFILE)
 """what a system refuses that no program can help"""
+ONE_THREAD = ("OPENBLAS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+"""what keeps linear algebra from sums over several threads, whose last bits depend on how many there are"""
 VERBOSE = "Also print all tables, findings, and the lines that go to run.log."
 
 
@@ -135,6 +138,8 @@ def _root(  # pyright: ignore[reportUnusedFunction]  # typer calls it
 def main() -> None:
     """Run a command: exit 0 when it is done, 2 for an error of the input, 130 when it was stopped."""
     code, kept = 0, None
+    for variable in ONE_THREAD:  # numpy is not imported yet
+        os.environ.setdefault(variable, "1")
     try:
         listen()
         group: Any = typer.main.get_command(app)

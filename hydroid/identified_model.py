@@ -2,8 +2,8 @@
 
 import hashlib
 import json
+import os
 from collections.abc import Mapping
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -89,6 +89,19 @@ def load_identified(
         RunError: the folder holds no estimate, or a fit's settings are not beside its estimate.
         SettingsError: a file that cannot be read, a parameter that is unknown, or missing and not `nominal`.
     """
+    if source is not None and config is None:
+        warn_of_changes(Path(source))
+    return read_identified(source, config, overrides, nominal=nominal)
+
+
+def read_identified(
+    source: str | Path | None,
+    config: str | Path | None = None,
+    overrides: Mapping[str, Any] | None = None,
+    *,
+    nominal: bool = False,
+) -> IdentifiedModel:
+    """Read as `load_identified` does, without a word on what was changed."""
     file, values, summary = (None, {}, None) if source is None else read_estimate(Path(source))
     beside = file and file.parent / CONFIG
     if beside and is_file(beside):
@@ -98,9 +111,6 @@ def load_identified(
     else:
         what = f"is missing, and {NAME} says nothing without the settings of its fit"
         raise RunError(what, beside, "put it back, or name the run folder")
-    if file is not None and config is None:
-        for name in changed_files(file.parent):
-            _warn_of_change(file.parent / name, file_hash(file.parent / name))
     chosen = config or own
     settings = load(find_config(chosen), FitSettings, overrides)
     if config is None and summary is not None:
@@ -121,6 +131,14 @@ def own_hashes(folder: Path) -> dict[str, str]:
     return {f.relative_to(folder).as_posix(): file_hash(f) for f in files if f.is_file()}
 
 
+def warn_of_changes(source: Path) -> None:
+    """Say which files of a run, given by its folder or its estimate, are not as its fit left them."""
+    folder = source if os.path.isdir(source) else source.parent
+    for name in changed_files(folder):
+        text = "warning: %s: is not as the fit left it; put it back, or fit again"
+        LOGGER.warning(text, folder / name)
+
+
 def changed_files(folder: Path) -> list[str]:
     """Return the files of a run folder that are not what its fit wrote; none of a folder that is no run's."""
     try:
@@ -136,11 +154,6 @@ def file_hash(*files: Path) -> str:
     """Return one hash of the content of files; those that are not there count as empty."""
     contents = (read_file(file) for file in files if is_file(file))
     return hashlib.sha256(b"".join(contents)).hexdigest()
-
-
-@cache  # several parts of a command read the same run
-def _warn_of_change(file: Path, _hash: str) -> None:
-    LOGGER.warning("warning: %s: is not as the fit left it; put it back, or fit again", file)
 
 
 def start_values(settings: FitSettings) -> IdentifiedModel:

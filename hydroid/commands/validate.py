@@ -17,7 +17,7 @@ from hydroid.commands.inputs import (
 )
 from hydroid.commands.logs import read_logs
 from hydroid.files import Plain
-from hydroid.identified_model import IdentifiedModel
+from hydroid.identified_model import IdentifiedModel, warn_of_changes
 from hydroid.log import Log
 from hydroid.log.overlap import KNOWN, overlap
 from hydroid.progress import LOGGER
@@ -139,6 +139,8 @@ def report(
     if not merge:
         from hydroid.reporting.predictions import draw
 
+        for run in as_list(runs):
+            warn_of_changes(Path(run))
         files = [str(draw(run, figures=figures)) for run in as_list(runs)]
         return Result(files, {"files": files}, ())
     from hydroid.reporting.parameters_report import merged_tables

@@ -27,7 +27,7 @@ from hydroid.files import write_atomic
 from hydroid.fitting.fit import Fit
 from hydroid.fitting.validation import Prediction
 from hydroid.fitting.verdict import Baselines, judge
-from hydroid.identified_model import IdentifiedModel, load_identified
+from hydroid.identified_model import IdentifiedModel, read_identified
 from hydroid.log import Log
 from hydroid.progress import LOGGER
 from hydroid.run.archive import pack, unpack
@@ -124,7 +124,7 @@ def keep_validation(model: IdentifiedModel, predictions: Sequence[Prediction]) -
     the same file before is replaced.
     """
     folder, unseen = run_of(model), [p for p in predictions if p.unseen]
-    if folder is None or not unseen or load_identified(folder).settings != model.settings:
+    if folder is None or not unseen or read_identified(folder).settings != model.settings:
         return None
     for one in unseen:
         write_atomic(folder / VALIDATIONS / validation_name(one.log) / RESULT, pack(one))
@@ -136,8 +136,9 @@ def validation_name(log: Log) -> str:
 
     Of a log that is no file the digest is that of its samples.
     """
-    place = Path(os.path.realpath(log.source))
-    key = os.fsencode(place) if os.path.exists(place) else samples(log)
+    there = os.path.exists(log.source)
+    place = Path(os.path.realpath(log.source)) if there else Path(log.source)
+    key = os.fsencode(place) if there else samples(log)
     name = re.sub(r"[^\w.-]+", "_", place.name).strip(".")[:LONGEST_NAME]
     return f"{name or 'log'}-{hashlib.sha256(key).hexdigest()[:8]}"
 
@@ -156,7 +157,7 @@ def load_record(folder: str | Path) -> Record:
     Logs of one name have different ones there: `log.csv` and `log.csv (2)`.
     """
     path = Path(folder)
-    identity, model = RunFolder(path).identity(), load_identified(path)
+    identity, model = RunFolder(path).identity(), read_identified(path)
     result = _read(path / RESULT, FitResult)
     unseen = _validations(path)
     every = [*result.fitted, *unseen.values()]

@@ -178,7 +178,9 @@ def test_a_validation_stays_below_its_folder_whatever_the_log_is_called(
     assert up.startswith("bag-")
     assert name("x\0y").startswith("x_y-")
     assert len(name("x" * 300).encode()) < 255
-    assert len({name(tmp_path / letters / "log") for letters in ("日", "本")}) == 1  # in memory: samples alone
+    assert (
+        len({name(tmp_path / letters / "log") for letters in ("日", "本")}) == 1
+    )  # in memory: samples alone
     for letters in ("日", "本"):
         (tmp_path / letters).mkdir()
     assert name(tmp_path / "日") != name(tmp_path / "本")
@@ -206,4 +208,6 @@ def test_whatever_decides_a_result_is_in_the_hash_of_its_log():
 def test_a_simulated_log_is_none_of_the_commands(run: Path):
     simulated = hydroid.simulate(run.parent / "a.csv", fit=run).log
     assert simulated.source == "simulated a.csv"
-    assert hydroid.simulate(run.parent / "a.csv", fit=run, out=run.parent / "s.csv").log.source.endswith("s.csv")
+    assert hydroid.simulate(run.parent / "a.csv", fit=run, out=run.parent / "s.csv").log.source.endswith(
+        "s.csv"
+    )

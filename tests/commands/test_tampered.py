@@ -189,10 +189,11 @@ def test_a_validation_stays_below_its_folder_whatever_the_log_is_called(
 def test_whatever_decides_a_result_is_in_the_hash_of_its_log():
     settings = hydroid.load_settings("article-mech", {"log.groups": {"monday": "mon_*"}})
     time, zeros = np.arange(5) * 0.01, np.zeros((5, 2))
-    log = Log("a.csv", time, zeros, zeros, 0.01, np.zeros((5, 2, 2)))
+    pressure = np.zeros((5, 2, 2))
+    log = Log("a.csv", time, zeros, zeros, 0.01, pressure)
     loaded = settings.changed({"payloads": {"a.csv": 100.0}})
     others = [
-        log_hash(replace(log, pressure=log.pressure + 1.0), settings),
+        log_hash(replace(log, pressure=pressure + 1.0), settings),
         log_hash(replace(log, pressure=None), settings),
         log_hash(replace(log, rest=2), settings),
         log_hash(replace(log, source="mon_1.csv"), settings),

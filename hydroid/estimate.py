@@ -1,6 +1,7 @@
 """`estimate.yaml`: what a fit found, as plain values; `--json` of a fit prints the same."""
 
 import math
+import os
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -15,6 +16,8 @@ from hydroid.settings.load import JointNumber, NotNegative, Positive, Settings, 
 
 Interval = tuple[float | None, float | None]  # its ends; null: it has no limit there
 NAME = "estimate.yaml"  # name of the file in a run folder and beside a saved plant
+DESCRIPTION = "run.json"
+"""name of the file that describes a run: versions, seed, hashes of its logs and files, status, seconds"""
 
 
 class ParameterEstimate(Settings):
@@ -241,9 +244,10 @@ def read_estimate(source: Path) -> tuple[Path, Plain, FitSummary | None]:
     Returned are the file, its values, unchecked where they are not an estimate's, and the estimate where
     there is one.
     """
-    file = source / NAME if source.is_dir() else source
-    if source.is_dir() and not is_file(file):
-        begun = is_file(source / "run.json")
+    folder = os.path.isdir(source)  # Path's own raises for a name that no folder can have
+    file = source / NAME if folder else source
+    if folder and not is_file(file):
+        begun = is_file(source / DESCRIPTION)
         hint = "resume the fit" if begun else "name a run folder, a folder of Plant.save or a YAML file"
         raise RunError("holds no estimate" + (" yet" if begun else ""), source, hint)
     content, lines = read_yaml(file)

@@ -57,7 +57,11 @@ def read_logs(
 def check_file(
     path: Path, settings: FitSettings, *, repair: bool, angles: bool = True
 ) -> tuple[Log | None, list[LogFinding]]:
-    """Read a log as the settings map it; None if it cannot be used."""
+    """Read a log as the settings map it; None if it cannot be used.
+
+    A bag that is given as `.` or `..` has its folder's name: by names payloads and groups find their logs.
+    """
+    path = path.resolve() if path.name in ("", "..") else path
     arm, outputs = settings.arm, settings.outputs if angles else None
     return check_log(path, settings.log, arm.ranges, outputs=outputs, backward=arm.backward, repair=repair)
 
@@ -134,7 +138,7 @@ def run_logs(folder: Path) -> list[Path]:
     from hydroid.run.folder import RunFolder
 
     logs = [Path(name) for name in RunFolder(folder).identity().get("logs", {})]
-    missing = [str(log) for log in logs if not log.is_file()]
+    missing = [str(log) for log in logs if not log.exists()]  # a bag is a folder
     if missing or not logs:
         raise RunError(f"its log {', '.join(missing)} is not there", folder, "name the log")
     return logs
@@ -142,10 +146,23 @@ def run_logs(folder: Path) -> list[Path]:
 
 def problem_of(model: IdentifiedModel, logs: LogSources, *, repair: bool) -> "Problem":
     """Return the estimation problem of a model and logs, or those of its run where none is given."""
-    read = read_logs(logs or run_logs(Path(model.source).parent), model.settings, repair=repair)
+    folder = Path(model.source).parent
+    read = read_logs(logs or run_logs(folder), model.settings, repair=repair)
+    if not logs:
+        _warn_of_changes(folder, read, model.settings)
     from hydroid.problem.problem import Problem
 
     problem = Problem(model.settings, read)
     if not np.isfinite(problem.residuals(model.theta[None])).all():
         raise RunError("the simulation diverged with these parameters", model.source)
     return problem
+
+
+def _warn_of_changes(folder: Path, logs: Sequence[Log], settings: FitSettings) -> None:
+    """Say which logs of a run are no longer what it was fitted to."""
+    from hydroid.run.folder import RunFolder, log_hash
+
+    fitted = RunFolder(folder).identity().get("logs", {})
+    for log in logs:
+        if fitted.get(log.source) != log_hash(log, settings):
+            LOGGER.warning("warning: %s: is not what %s was fitted to", log.source, folder)

@@ -29,9 +29,13 @@ _stopped = False
 
 
 def listen() -> None:
-    """Turn the first of the notices into a KeyboardInterrupt: clusters repeat themselves."""
+    """Turn the first of the notices into a KeyboardInterrupt: clusters repeat themselves.
+
+    One that is ignored from the start, as `nohup` has it, stays ignored.
+    """
     for number in NOTICES:
-        signal.signal(number, _stop)
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, _stop)
 
 
 def stopped() -> bool:

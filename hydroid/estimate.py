@@ -160,19 +160,23 @@ class AngleError(Settings):
     """growth of the drift's variance with time [deg²/s]"""
     drift_per_way: NotNegative
     """growth of the drift's variance with the way travelled [deg²/deg]"""
-    relaxation_s: Positive
-    """time in which the drift is forgotten [s]"""
+    lasting_deg: NotNegative
+    """standard deviation of an error that lasts for a moment [deg]"""
+    lasting_s: Positive
+    """time constant of that error [s]"""
     after_10_s_deg: NotNegative
-    """standard deviation of a prediction 10 s ahead, whatever the parameters, at the logs' mean speed [deg]"""
+    """standard deviation of a prediction 10 s ahead, whatever the parameters, at the logs' mean speed [deg]
+    """
     lasts_s: NotNegative = 0.0
     """time for which what is left of the error lasts [s]; 0: it is as the error model says"""
 
     @property
-    def numbers(self) -> tuple[float, float, float, float]:
+    def numbers(self) -> tuple[float, ...]:
         """The numbers of the error model in rad and s."""
         degree = math.radians(1.0)
         drifts = degree**2 * self.drift_per_s, degree * self.drift_per_way
-        return (degree * self.sensor_deg) ** 2, *drifts, self.relaxation_s
+        lasting = (degree * self.lasting_deg) ** 2
+        return (degree * self.sensor_deg) ** 2, *drifts, lasting, self.lasting_s
 
 
 class FitSummary(Settings):

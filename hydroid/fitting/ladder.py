@@ -17,9 +17,10 @@ from hydroid.fitting.checkpoints import Checkpoints
 from hydroid.fitting.left_out import LeftOut, gain, is_better, parts, predict_parts
 from hydroid.fitting.refinement import Refinement, refine
 from hydroid.fitting.step import Step, step_of
-from hydroid.posterior.error_model import Likelihood, make_likelihood
+from hydroid.posterior.error_model import Likelihood, likelihood_at, make_likelihood
 from hydroid.posterior.linear import estimate_box
 from hydroid.posterior.uncertainty import Uncertainty, uncertainty
+from hydroid.posterior.whiteness import lasting
 from hydroid.problem.problem import Problem
 from hydroid.search.descent import Ending
 from hydroid.settings.search import RefinementSettings
@@ -146,6 +147,8 @@ class Ladder:
         likelihood = make_likelihood(own)
         before = self.refinements[start.name].negative_log if if_better else np.inf
         if own.settings.quasi_static != last.settings.quasi_static:
+            if self._is_white():  # there is nothing for a model that is slow to simulate
+                return
             few = settings.changed({"iterations": FIRST})
             first = self._refined(likelihood, theta, few, step.changed(phase="at first"))
             theta = own.parameters.from_unit(first.point)
@@ -169,6 +172,12 @@ class Ladder:
         if not self._late and is_better(with_it, without):
             self._left_out[step.estimate] = with_it
             self._keep(own, new, step)
+
+    def _is_white(self) -> bool:
+        """Whether the innovations of the estimate that is kept are white."""
+        likelihood = likelihood_at(self.problem, self.kept.theta, self.refinements[self.kept.name].numbers)
+        innovations = likelihood.innovations(self.kept.theta[None])[0]
+        return not any(lasting(likelihood.errors, innovations).values())
 
     def _keep(self, problem: Problem, estimate: Estimate, step: Step) -> None:
         self.problem, self.kept, self._step = problem, estimate, step

@@ -29,7 +29,7 @@ class Refinement(Descent):
     """A descent over innovations, then the priors' scores.
 
     Attributes:
-        numbers: of the error model, shape (S, 4).
+        numbers: of the error model, shape (S, 5).
         negative_log: of likelihood and priors at the point: what starts are compared by.
         noises: how often the numbers were estimated.
     """

@@ -87,12 +87,17 @@ def guess_columns(
         "time": {"column": time.name, "unit": unit},
         "command": None,
         "angle": None,
-        "period_s": min(PERIODS, key=lambda p: max(p, step) / max(min(p, step), 1e-9)),
+        "period_s": nearest_period(step),
         "joints": entries,
     }
     unused = tuple(name for name in table.names if name and name not in used)
     reasons += [f"not used: {listed(unused)}"] if unused else []
     return ColumnGuess(log, tuple(reasons), unused)
+
+
+def nearest_period(step: float) -> float:
+    """Return the usual period that is most like a log's [s]."""
+    return min(PERIODS, key=lambda p: max(p, step) / max(min(p, step), 1e-9))
 
 
 def _columns(table: Table, names: Sequence[str]) -> Iterator[_Column]:

@@ -5,11 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from hydroid.arrays import Array
-from hydroid.posterior.error_model import LONGEST, Course, ErrorModel, Signal, travelled
+from hydroid.posterior.error_model import SHORTEST, Course, ErrorModel, Signal, travelled
 
 SENSOR, RATE, WAY = 4e-6, 2e-6, 3e-5
 """variance of a sensor [rad²], growth of a drift's with time [rad²/s] and with the way [rad²/rad]"""
-NUMBERS = np.array([SENSOR, RATE, WAY, LONGEST])
+DRIFTING = np.array([SENSOR, RATE, WAY, 0.0, SHORTEST])
+LASTING = np.array([SENSOR, RATE, WAY, 2e-5, 0.5])
+"""an error besides that lasts for half a second"""
 
 
 def course_of(samples: int, first: int = 0, weight: float = 1.0, **changes) -> Course:
@@ -28,48 +30,59 @@ def stopping(samples: int) -> Course:
     return course_of(samples, stops=stops, used=used, readings=4.0)
 
 
-def model_of_errors(
-    courses: Sequence[Course], numbers: Array = NUMBERS, *, given: bool = False, stays: bool = True
-) -> ErrorModel:
+def model_of_errors(courses: Sequence[Course], numbers: Array, *, given: bool = False) -> ErrorModel:
     """The error model of one angle in several logs."""
     of = (0,) * len(courses)
-    return ErrorModel(
-        (Signal(2, "angle"),), numbers[None].copy(), tuple(courses), of, np.array([given]), np.array([stays])
-    )
+    return ErrorModel((Signal(2, "angle"),), numbers[None].copy(), tuple(courses), of, np.array([given]))
 
 
-def reach(course: Course, numbers: Array) -> Array:
-    """What a step of the drift at each sample, the start's first, leaves in all samples: (T, T)."""
-    forgotten = np.exp(-course.period / numbers[3])
+def reach(course: Course, kept: float) -> Array:
+    """What of an error at each sample is left in all samples, if a part is kept from one to the next: (T, T).
+
+    Row k is of sample k. A stop ends it.
+    """
     samples = len(course.way)
     result = np.zeros((samples, samples))
     result[0, 0] = 1.0
     for k in range(1, samples):
         if not course.stops[k]:
-            result[k] = forgotten * result[k - 1]
+            result[k] = kept * result[k - 1]
             result[k, k] = 1.0
     return result
 
 
-def steps_of(course: Course, numbers: Array) -> Array:
-    """Variance of the drift's start, and of its steps to the samples after it, (T,)."""
-    sensor, rate, way, _ = numbers
-    return np.append(sensor / course.readings, rate * course.period + way * course.way[:-1])
+def parts_of(course: Course, numbers: Array) -> list[tuple[float, Array]]:
+    """Of drift and lasting error: what is kept, and the variance of what begins at each sample, (T,)."""
+    sensor, rate, way, lasting, time = numbers
+    kept = np.exp(-course.period / time)
+    drift = np.append(sensor / course.readings, rate * course.period + way * course.way[:-1])
+    new = np.full(len(course.way), lasting * (1 - kept**2))
+    new[0] = 0.0
+    return [(1.0, drift), (kept, new)]
+
+
+def drift_covariance(course: Course, numbers: Array) -> Array:
+    """Of drift and lasting error together, (T, T)."""
+    total = np.zeros((len(course.way), len(course.way)))
+    for kept, begun in parts_of(course, numbers):
+        effects = reach(course, kept)
+        total += (effects * begun) @ effects.T
+    return total
 
 
 def covariance(course: Course, numbers: Array) -> Array:
     """Of the errors, (T, T)."""
-    effects = reach(course, numbers)
-    return (effects * steps_of(course, numbers)) @ effects.T + numbers[0] * np.eye(len(effects))
+    return drift_covariance(course, numbers) + numbers[0] * np.eye(len(course.way))
 
 
 def drawn(rng: np.random.Generator, course: Course, numbers: Array, count: int = 1) -> Array:
     """Errors of a course, (count, T)."""
     samples = len(course.way)
-    steps = rng.normal(size=(count, samples)) * np.sqrt(steps_of(course, numbers))
-    forgotten = np.exp(-course.period / numbers[3])
-    drift = np.empty((count, samples))
-    drift[:, 0] = steps[:, 0]
-    for k in range(1, samples):
-        drift[:, k] = 0.0 if course.stops[k] else forgotten * drift[:, k - 1] + steps[:, k]
-    return course.weight * (drift + rng.normal(0.0, np.sqrt(numbers[0]), (count, samples)))
+    total = rng.normal(0.0, np.sqrt(numbers[0]), (count, samples))
+    for kept, begun in parts_of(course, numbers):
+        new = rng.normal(size=(count, samples)) * np.sqrt(begun)
+        now = np.zeros(count)
+        for k in range(samples):
+            now = np.zeros(count) if k and course.stops[k] else kept * now + new[:, k]
+            total[:, k] += now
+    return course.weight * total

@@ -5,14 +5,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import statsmodels.api as sm
-from made_errors import NUMBERS, SENSOR, course_of, covariance, drawn, model_of_errors, reach, steps_of, stopping
+from made_errors import (
+    DRIFTING,
+    LASTING,
+    SENSOR,
+    course_of,
+    covariance,
+    drawn,
+    drift_covariance,
+    model_of_errors,
+    stopping,
+)
 from made_logs import HYDRAULIC, TRUTH, noisy, simulate_log, stepped
 from scipy.stats import multivariate_normal
 
 from hydroid import load_settings
 from hydroid.posterior.error_model import (
     LEAST_NOISE,
-    LONGEST,
+    SHORTEST,
     at_stops,
     likelihood_at,
     make_error_model,
@@ -21,14 +31,16 @@ from hydroid.posterior.error_model import (
 )
 from hydroid.problem.problem import Problem
 
-RELAXING = np.array([*NUMBERS[:3], 0.8])
-
 
 def courses(samples: int) -> dict[str, object]:
-    return {"plain": course_of(samples), "weighted": course_of(samples, weight=3.0), "stops": stopping(samples)}
+    return {
+        "plain": course_of(samples),
+        "weighted": course_of(samples, weight=3.0),
+        "stops": stopping(samples),
+    }
 
 
-EACH = [(name, numbers) for name in courses(1) for numbers in (NUMBERS, RELAXING)]
+EACH = [(name, numbers) for name in courses(1) for numbers in (DRIFTING, LASTING)]
 each_course = pytest.mark.parametrize(("name", "numbers"), EACH)
 
 
@@ -79,7 +91,7 @@ def test_the_density_is_that_of_a_normal_vector_with_the_dense_covariance(name, 
 @each_course
 def test_a_scatter_is_that_of_the_dense_product(name, numbers):
     course, rng = courses(50)[name], np.random.default_rng(4)
-    fitted = model_of_errors([course], np.array([2 * SENSOR, 1e-6, 0.0, 2.0]))
+    fitted = model_of_errors([course], np.array([2 * SENSOR, 1e-6, 0.0, 1e-6, 1.0]))
     filtered = fitted.innovations(course.weight * np.eye(50)).T  # (T, T): of errors to innovations
     rows = rng.normal(size=(3, 50))
     expected = rows @ filtered @ covariance(course, numbers) @ filtered.T @ rows.T
@@ -94,7 +106,7 @@ def test_a_scatter_is_that_of_the_dense_product(name, numbers):
 def test_a_drifts_variance_is_that_of_simulated_drifts(name, numbers):
     course = courses(200)[name]
     found = model_of_errors([course], numbers).drift(course, 0)
-    expected = (reach(course, numbers) ** 2) @ steps_of(course, numbers)
+    expected = np.diag(drift_covariance(course, numbers))
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-18)
     count = 20_000
     errors = drawn(np.random.default_rng(5), course, numbers, count)
@@ -105,90 +117,95 @@ def test_a_drifts_variance_is_that_of_simulated_drifts(name, numbers):
 
 @pytest.mark.parametrize("readings", [1.0, 10.0])
 def test_a_drift_of_time_is_the_local_level_model_of_statsmodels(readings):
-    numbers = np.array([SENSOR, 2e-5, 0.0, LONGEST])
+    numbers = np.array([SENSOR, 2e-5, 0.0, 0.0, SHORTEST])
     course = course_of(400, readings=readings)
     row = drawn(np.random.default_rng(6), course, numbers)[0]
     other = sm.tsa.UnobservedComponents(row, "local level", loglikelihood_burn=0)
+    other.ssm.tolerance = 0.0  # its filter is not to stop where it is nearly steady
     other.ssm.initialize_known(np.zeros(1), np.array([[SENSOR / readings]]))
     expected = other.loglike([SENSOR, 2e-5 * course.period])
     model = model_of_errors([course], numbers)
     found = model.log_density(model.innovations(row[None])[0]).sum()
-    assert found == pytest.approx(expected, rel=1e-5)  # ours is forgotten within hours
+    assert found == pytest.approx(expected, rel=1e-9)
     steady = whitened(row[None], course.period, SENSOR, 2e-5)[0]
     start = model_of_errors([replace(course, readings=np.inf)], numbers)
-    np.testing.assert_allclose(steady, start.innovations(row[None])[0], rtol=1e-3)
+    np.testing.assert_allclose(steady, start.innovations(row[None])[0], rtol=1e-9)
 
 
-@pytest.mark.parametrize("weight", [1.0, 3.0])
-def test_the_numbers_are_recovered_from_long_records(weight):
-    """20 sets of five logs of 100 s: each number's mean is the truth, within four standard errors."""
+def test_the_numbers_are_recovered_from_long_records():
+    """12 sets of five logs of 100 s: each number's mean is the truth, within four standard errors."""
     rng = np.random.default_rng(7)
-    logs = [course_of(2000, 2000 * i, weight) for i in range(5)]
-    found = np.array(
-        [
-            model_of_errors(logs).estimated(np.concatenate([drawn(rng, one, NUMBERS)[0] for one in logs])).numbers[0]
-            for _ in range(20)
-        ]
-    )
-    np.testing.assert_array_equal(found[:, 3], LONGEST)
-    for values, true in zip(found.T[:3], NUMBERS[:3], strict=True):
+    logs = [course_of(2000, 2000 * i, weight=3.0) for i in range(5)]
+    found = []
+    for _ in range(12):
+        row = np.concatenate([drawn(rng, one, LASTING)[0] for one in logs])
+        found.append(model_of_errors(logs, LASTING).estimated(row).numbers[0])
+    for values, true in zip(np.transpose(found), LASTING, strict=True):
         error = np.std(values) / np.sqrt(len(values))
         assert abs(np.mean(values) - true) < 4 * error
         assert np.std(values) < 0.6 * true
 
 
-def test_a_relaxation_is_recovered_and_a_given_sensor_noise_stays():
-    rng = np.random.default_rng(8)
-    numbers = np.array([SENSOR, 2e-5, 0.0, 0.8])
-    logs = [course_of(4000, 4000 * i) for i in range(5)]
-    row = np.concatenate([drawn(rng, one, numbers)[0] for one in logs])
-    found = model_of_errors(logs, stays=False).estimated(row).numbers[0]
-    np.testing.assert_allclose(found[[0, 1, 3]], numbers[[0, 1, 3]], rtol=0.15)
-    stated = np.array([9 * SENSOR, 0.0, 0.0, LONGEST])
-    held = model_of_errors(logs, stated, given=True).estimated(row).numbers[0]
+def test_what_is_given_stays_and_nothing_else():
+    course = course_of(2000)
+    row = drawn(np.random.default_rng(8), course, LASTING)[0]
+    stated = np.array([9 * SENSOR, 0.0, 0.0, 0.0, SHORTEST])
+    held = model_of_errors([course], stated, given=True).estimated(row).numbers[0]
     assert held[0] == pytest.approx(9 * SENSOR, rel=1e-12)
+    assert model_of_errors([course], stated).estimated(row).numbers[0, 0] == pytest.approx(SENSOR, rel=0.2)
 
 
-def test_the_numbers_are_most_likely_from_wherever_the_search_starts():
-    rng = np.random.default_rng(9)
+@pytest.mark.parametrize(
+    "before",
+    [
+        DRIFTING,
+        [SENSOR, 1e-5, 1e-14, 1e-14, 0.05],
+        [SENSOR, 1e-14, 1e-3, 1e-14, 0.05],
+        [1e-3, 1e-14, 1e-14, 1e-2, 2.0],
+        [SENSOR / 100, 1e-14, 1e-14, 1e-4, 0.05],
+    ],
+)
+@pytest.mark.parametrize("lasting", [0.0, 2e-5])
+def test_the_numbers_are_the_most_likely_from_whatever_numbers_before(before, lasting):
+    """A number that was none before grows again where the errors ask for it."""
+    rng, true = np.random.default_rng(9), np.array([SENSOR, 2e-6, 3e-5, lasting, 0.5])
     logs = [course_of(2000, 2000 * i) for i in range(3)]
-    row = np.concatenate([drawn(rng, one, NUMBERS)[0] for one in logs])
+    row = np.concatenate([drawn(rng, one, true)[0] for one in logs])
 
     def cost(model) -> float:
         return -model.log_density(model.innovations(row[None])[0]).sum()
 
-    found = model_of_errors(logs).estimated(row)
-    least = cost(found)
-    assert least <= cost(model_of_errors(logs)) + 1e-6  # the truth
-    for factors in (0.9, 1.1):
-        for i in range(3):
-            numbers = found.numbers.copy()
-            numbers[0, i] *= factors
-            assert cost(replace(found, numbers=numbers)) > least
-    before = np.array([100 * SENSOR, 1e-3, 1e-2, LONGEST])
-    again = model_of_errors(logs, before).estimated(row)
-    assert cost(again) == pytest.approx(least, abs=0.1)
+    found = model_of_errors(logs, np.array(before)).estimated(row)
+    assert cost(found) < cost(model_of_errors(logs, true))
+    from_truth = model_of_errors(logs, true).estimated(row)
+    assert cost(found) == pytest.approx(cost(from_truth), abs=0.5)
 
 
 def test_white_noise_alone_has_its_mean_square_and_no_drift():
     rng = np.random.default_rng(10)
     course = replace(course_of(1000, weight=2.0), used=np.arange(1000) % 2 == 0)
     row = 2.0 * rng.normal(0.0, 0.01, 1000)
-    white = model_of_errors([course]).white(row)
+    white = model_of_errors([course], DRIFTING).white(row)
     assert white.numbers[0, 0] == pytest.approx(np.mean((row[::2] / 2.0) ** 2))
-    assert not white.numbers[0, 1:3].any()
-    np.testing.assert_allclose(white.innovations(row[None])[0, ::2], row[::2] / np.sqrt(np.mean(row[::2] ** 2)))
-    quiet = model_of_errors([course]).white(1e-9 * row)
+    assert not white.numbers[0, 1:4].any()
+    np.testing.assert_allclose(
+        white.innovations(row[None])[0, ::2], row[::2] / np.sqrt(np.mean(row[::2] ** 2))
+    )
+    quiet = model_of_errors([course], DRIFTING).white(1e-9 * row)
     assert quiet.numbers[0, 0] == pytest.approx(LEAST_NOISE["angle"] ** 2)
-    estimated = model_of_errors([course]).estimated(row).numbers[0]
-    assert estimated[0] == pytest.approx(1e-4, rel=0.15)
-    assert estimated[1] * 50.0 < 0.1 * 1e-4  # after all of the log
+    model = model_of_errors([course], DRIFTING).estimated(row)
+    sensor, rate, way, lasting, _ = model.numbers[0]
+    # what lasts no longer than from sample to sample is as good as noise
+    assert sensor + lasting == pytest.approx(1e-4, rel=0.15)
+    assert rate * 50.0 + way * course.way.sum() < 0.1 * 1e-4  # after all of the log
+    densities = [one.log_density(one.innovations(row[None])[0]).sum() for one in (white, model)]
+    assert 0.0 <= densities[1] - densities[0] < 8.0  # chi-square of four numbers more
 
 
 def test_samples_left_out_are_as_if_they_had_not_been_measured():
     course, rng = course_of(200), np.random.default_rng(11)
-    model, out = model_of_errors([course]), np.arange(200) >= 120
-    row = drawn(rng, course, NUMBERS)[0]
+    model, out = model_of_errors([course], DRIFTING), np.arange(200) >= 120
+    row = drawn(rng, course, DRIFTING)[0]
     less = model.without(out)
     np.testing.assert_array_equal(less.used, ~out)
     changed = np.where(out, 100.0, row)
@@ -222,7 +239,6 @@ def test_an_error_model_of_a_problem_has_the_start_of_the_log_and_the_noise_of_t
     model = make_error_model(held)
     assert model.given.tolist() == [True]
     assert np.degrees(np.sqrt(model.numbers[0, 0])) == pytest.approx(0.3)
-    assert model.stays.tolist() == [True]  # a joint on a valve integrates
     assert not make_error_model(free).given.any()
     rows = np.random.default_rng(12).normal(size=len(log.time))
     assert np.degrees(np.sqrt(model.estimated(rows).numbers[0, 0])) == pytest.approx(0.3)
@@ -231,14 +247,15 @@ def test_an_error_model_of_a_problem_has_the_start_of_the_log_and_the_noise_of_t
     np.testing.assert_array_equal(make_error_model(slower).used, recorded)
 
 
-def test_stage_1_takes_its_errors_for_white_noise_and_forgets_a_drift():
+def test_stage_1_takes_its_errors_for_white_noise():
     settings = load_settings("article-mech")
-    log = noisy(simulate_log(settings, stepped(settings, TRUTH, [60.0, -40.0]), TRUTH), 0.1, exact_start=False)
+    log = noisy(
+        simulate_log(settings, stepped(settings, TRUTH, [60.0, -40.0]), TRUTH), 0.1, exact_start=False
+    )
     problem = Problem(settings, [log])
     theta = problem.parameters.vector(TRUTH, "truth")
     likelihood = likelihood_at(problem, theta)
-    assert not likelihood.errors.numbers[:, 1:3].any()
-    assert likelihood.errors.stays.tolist() == [False]
+    assert not likelihood.errors.numbers[:, 1:4].any()
     rms = np.sqrt(np.mean(problem.output_errors(theta[None]) ** 2))
     assert np.sqrt(likelihood.errors.numbers[0, 0]) == pytest.approx(rms)
 

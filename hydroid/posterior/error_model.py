@@ -49,6 +49,8 @@ SHORTEST, LONGEST = 0.05, 2.0
 """time constants of a lasting error [s]: what is shorter is noise, and what is longer is drift (ours)"""
 NONE = 1e-12
 """growth of a drift, as a part of the residual's mean square, that counts as none"""
+LEAST_GUESS = 0.01
+"""part of the guess that a number begins with at least"""
 WAY_OVER = 0.25
 """time over which a way is measured [s]: the sensor's noise is no way"""
 AT_STOP = 0.002
@@ -342,13 +344,13 @@ def _model(course: Course, numbers: Array) -> tuple[Array, Array]:
     return carry, step
 
 
-def _most_likely(
-    pairs: Sequence[tuple[Course, Array]], numbers: Array, least: float, given: bool
-) -> Array:
+def _most_likely(pairs: Sequence[tuple[Course, Array]], numbers: Array, least: float, given: bool) -> Array:
     """Return the most likely NUMBERS of one signal's errors, each of shape (T,), with their courses.
 
     `least` is the smallest variance of the sensor's noise, which stays where it is `given`. The search is over
-    logarithms, from the numbers before; without any, from two guesses: mostly noise, and mostly drift.
+    logarithms. It starts from a guess that is mostly noise, and from the numbers before; without any, from a
+    guess that is mostly drift. A number that was next to none is raised first (`LEAST_GUESS`): on the scale of
+    logarithms nothing would tell that it should grow.
     """
     square = float(np.mean(np.concatenate([error[course.used] for course, error in pairs]) ** 2))
     square = max(square, least)
@@ -367,7 +369,8 @@ def _most_likely(
     steady = np.array([0.5, 0.1 / seconds, 0.1 / way, 0.1, 0.0]) * square
     drifting = np.array([1e-3, 10 / seconds, 10 / way, 1e-2, 0.0]) * square
     steady[4] = drifting[4] = 0.3
-    starts = [numbers] if numbers[1:4].any() else [steady, drifting]
+    before = np.maximum(numbers, LEAST_GUESS * steady)
+    starts = [steady, before if numbers[1:4].any() else drifting]
     ended = list[OptimizeResult]()
     for start in starts:
         begin = np.clip(np.log(np.maximum(start, 1e-300)), *bounds.T)
@@ -391,9 +394,7 @@ def whitened(rows: Array, period: float, sensor: float, rate: float) -> Array:
 
 
 @njit(cache=True)
-def _gains(
-    used: Mask, sensor: float, start: float, step: Array, carry: Array
-) -> tuple[Array, Array]:
+def _gains(used: Mask, sensor: float, start: float, step: Array, carry: Array) -> tuple[Array, Array]:
     """Kalman gains, (2, T), and 1 over the standard deviation of the innovations, (T,); 0 if not used."""
     samples = len(used)
     gain = np.zeros((2, samples))

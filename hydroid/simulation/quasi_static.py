@@ -29,16 +29,18 @@ from numba import njit, types
 from hydroid.hydraulics.cylinder import bent, filling, rod
 from hydroid.hydraulics.elementwise import compilable
 from hydroid.hydraulics.joint import mean_opening
-from hydroid.hydraulics.kernel import SOURCE, Plugin, make_pad
+from hydroid.hydraulics.kernel import Plugin, make_pad, source_key
 from hydroid.hydraulics.pump import begin_line, come_up, delivery
 from hydroid.hydraulics.records import LINEAR
 from hydroid.hydraulics.valve import MARGIN
+from hydroid.simulation import rollout
 from hydroid.simulation.rollout import mujoco_function, write_sample
 
 _kinematics = mujoco_function("mj_kinematics", types.intp, types.intp)
 _com_pos = mujoco_function("mj_comPos", types.intp, types.intp)
 _rne = mujoco_function("mj_rne", types.intp, types.intp, types.int32, types.intp)
 
+SOURCE = source_key(rollout.__file__)
 ITERATIONS = 30  # for the line's pressure at most; three to five suffice
 LEAST_LEVER = 1e-6  # moment arm below which a cylinder stands at its dead centre [m]
 SETTLED = 1e-9  # part of the pump's flow, or of its pressure, that may be left when they end

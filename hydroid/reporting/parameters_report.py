@@ -147,28 +147,28 @@ def speed_section(settings: FitSettings, summary: FitSummary, logs: Sequence[Log
     return Section("Speeds", plots=(Plot("speed", text, draw),), folded=True) if curves else None
 
 
+def fitted_errors(run: Record) -> list[float | None]:
+    """Return the error of each compared joint on the fitted logs [deg], or [mm]; None where it diverged."""
+    errors: list[float | None] = []
+    for one in run.summary.verdict:
+        unit = 1e3 * np.radians(1.0) if one.slides else 1.0
+        errors.append(None if one.fitted_deg is None else float(unit * one.fitted_deg))
+    return errors
+
+
 def merged_tables(runs: Sequence[Record]) -> dict[str, Table]:
     """Return the tables `spread` and `runs` of runs that differ in their seeds only, the best run first."""
     runs = sorted(runs, key=lambda run: run.rms_deg)
     best = runs[0].summary.estimate
     units = {f"error of {one.name}": "mm" if one.slides else "deg" for one in runs[0].summary.verdict}
     units |= {name: one.unit for name, one in best.items()}
-    columns = np.array(
-        [
-            [
-                (one.fitted_deg or 0.0) * (1e3 * np.radians(1.0) if one.slides else 1.0)
-                for one in run.summary.verdict
-            ]
-            + [run.summary.values[name] for name in best]
-            for run in runs
-        ]
-    )
-    spread = np.quantile(columns, [0.5, 0, 0.25, 0.75, 1], axis=0).T.tolist()
-    rows = [
-        (name, unit, *row, status(best[name]) if name in best else "")
-        for (name, unit), row in zip(units.items(), spread, strict=True)
-    ]
-    each = [(run.folder, run.seed, *row) for run, row in zip(runs, columns.tolist(), strict=True)]
+    columns = [[*fitted_errors(run), *(run.summary.values[name] for name in best)] for run in runs]
+    rows: list[tuple[Any, ...]] = []
+    for (name, unit), column in zip(units.items(), zip(*columns, strict=True), strict=True):
+        known = [value for value in column if value is not None]  # a fit that diverged has no error
+        spread = np.quantile(known, [0.5, 0, 0.25, 0.75, 1]).tolist() if known else [None] * 5
+        rows.append((name, unit, *spread, status(best[name]) if name in best else ""))
+    each = [(run.folder, run.seed, *row) for run, row in zip(runs, columns, strict=True)]
     header = "run", "seed", *(f"{name} [{unit}]" for name, unit in units.items())
     return {
         "spread": Table(f"{len(runs)} runs", SPREAD, tuple(rows), optional=SPREAD[4:6]),

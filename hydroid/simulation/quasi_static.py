@@ -14,8 +14,8 @@ actuators share the pump's line, whose pressure P satisfies one equation, Σ Q_i
 
 Commands, delays, coils and plungers are those of the dynamic rollout, law by law. Steps are long: what is
 integrated is the angle alone, with load and lever arm taken at the middle of the step. Joints without an
-actuator stand still. Leakage is left out, so nothing sags, and so is the anti-cavitation valve. Of oil and inertia a joint may have what a log
-shows of both, a natural frequency and a damping ratio (`overshoot`).
+actuator stand still. Leakage is left out, so nothing sags, and so is the anti-cavitation valve. Of oil and
+inertia a joint may have what a log shows of both, a natural frequency and a damping ratio (`overshoot`).
 """
 
 # pyright: reportMissingParameterType=false

@@ -1,5 +1,7 @@
 """A telescope: a joint that slides, with its cylinder along it."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from arms import MODELS, posed
@@ -65,3 +67,25 @@ def test_areas_delay_and_mass_are_recovered(settings: FitSettings) -> None:
     logs = [step_log(np.array([boom, 0.4]), levels, dwell=0.8) for boom in (1.2, 0.0)]
     start = {"area_A": 3000.0, "area_B": 1800.0, "delay": 0.05, "M_telescope": 250.0}
     assert_recovered(recover(settings, logs, TRUTH, start), settings, TRUTH)
+
+
+@pytest.mark.parametrize(
+    ("quantity", "unit"), [("area", "mm²"), ("area_a", "mm²"), ("dry_friction", "N"), ("damping", "N·s/m")]
+)
+def test_a_rotary_actuator_on_a_slide_has_the_units_of_a_slide(
+    tmp_path: Path, quantity: str, unit: str
+) -> None:
+    text = (MODELS / "crane.yaml").read_text().replace("model: crane.xml", f"model: {MODELS / 'crane.xml'}")
+    lines = [line for line in text.splitlines() if not line.startswith("  telescope: {kind: linear")]
+    place = next(i for i, line in enumerate(lines) if line.startswith("actuators:")) + 1
+    lines.insert(place, "  telescope: {kind: rotary, displacement: 3000, max_opening: 6}")
+    (tmp_path / "crane.yaml").write_text("\n".join(lines))
+    one = {"quantity": quantity, "joints": ["telescope"], "nominal": 10.0, "within": 2}
+    changes = {
+        "arm": str(tmp_path / "crane.yaml"),
+        "outputs": [2],
+        "start_pose": "up",
+        "parameters": {"p": one},
+    }
+    (found,) = hydroid.load_settings("fit-hyd", changes).parameter_set().parameters
+    assert found.unit == unit

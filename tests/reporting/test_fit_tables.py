@@ -3,12 +3,14 @@
 from dataclasses import replace
 
 import pytest
-from report_fits import MODEL, make_fit, make_problem, make_uncertainty
+from report_fits import MODEL, make_fit, make_problem, make_record, make_uncertainty
 
+from hydroid.estimate import JointVerdict
 from hydroid.findings import Finding
 from hydroid.fitting.summary import summarise
 from hydroid.reporting.page import Table, log_names
-from hydroid.reporting.parameters_report import parameter_table
+from hydroid.reporting.parameters_report import fitted_errors, merged_tables, parameter_table
+from hydroid.run.record import Record
 
 
 def column(table: Table, name: str) -> list:
@@ -64,3 +66,16 @@ def test_names_of_logs_are_different_short_and_printable(sources: list[str]):
     names = log_names(sources)
     assert len({*names.values()}) == len(sources)
     assert all(name.isprintable() and len(name) <= 50 for name in names.values())
+
+
+def test_a_run_that_diverged_has_no_error_and_the_others_have_a_spread():
+    problem = make_problem()
+    whole = make_record(problem, make_fit(problem))
+    runs: list[Record] = []
+    for error in 0.7, None:
+        verdict = JointVerdict(joint=2, name="shoulder", verdict="", fitted_deg=error, tolerance_deg=1.0)
+        runs.append(replace(whole, summary=whole.summary.changed({"verdict": (verdict,)})))
+    assert [fitted_errors(run) for run in runs] == [[0.7], [None]]
+    tables = merged_tables(runs)
+    assert [row[2] for row in tables["runs"].rows] == [0.7, None]
+    assert tables["spread"].rows[0][2:7] == (0.7,) * 5

@@ -1,16 +1,16 @@
-"""One joint on the test bench: weighed, and driven by itself with its command stepped and held.
+"""One joint on the test bench: weighed in a pose, moved steadily there, and driven from it with a step.
 
 All other joints are locked. Speeds are in the direction of the command. Events between two samples are
 interpolated, so that everything is smooth in the parameters, and differences give its derivatives.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from hydroid.arm.model import load_model
 from hydroid.arrays import Array, record
+from hydroid.hydraulics.records import Records
 from hydroid.log import Log
 from hydroid.mjcf import quiet_mujoco
 from hydroid.settings.cylinder import LinearActuator
@@ -18,6 +18,9 @@ from hydroid.settings.fit import FitSettings
 from hydroid.simulation import Candidates, Simulation
 from hydroid.simulation.rollout import SteppedArm
 from hydroid.simulation.scenario import Scenario
+from hydroid.simulation.steady import steady_velocity
+
+LASTS = 3.0  # how long a step of the command is held [s]
 
 
 @record
@@ -36,7 +39,13 @@ class Bench:
     @property
     def unit(self) -> tuple[float, str]:
         """What 1 rad, or 1 m of a joint that slides, is in the unit of quantities."""
-        return (1e3, "mm") if self.settings.arm.joints[self.joint - 1].slides else (np.degrees(1.0), "deg")
+        return unit_of_joint(self.settings, self.joint)
+
+    @property
+    def pose(self) -> str:
+        """The angle at which the joint is tested, in words."""
+        factor, unit = self.unit
+        return f"{factor * self.angle:.0f} {unit}"
 
     @property
     def sense(self) -> float:
@@ -44,38 +53,46 @@ class Bench:
         actuator = self.settings.arm.joints[self.joint - 1].actuator
         return np.sign(actuator.moment_arm(self.angle)) if isinstance(actuator, LinearActuator) else 1.0
 
-    def weigh(self, candidates: Candidates) -> tuple[Array, Array]:
-        """Return gravity's torque [N·m] and the joint's inertia [kg·m²] at its angle, shape (n,) each."""
-        torque, inertia = np.empty((2, len(candidates)))
+    def weigh(self, candidates: Candidates) -> tuple[Array, Array, Array]:
+        """Return what holds the joint at its angle: gravity's torque, and that with springs [N·m]; and its
+        inertia [kg·m²]; shape (n,) each.
+
+        Springs are slack where the first log starts.
+        """
+        gravity, load, inertia = np.empty((3, len(candidates)))
         arm, values = SteppedArm(self.scenario.arm.model), self.scenario.values(candidates)
         with quiet_mujoco():
             for row in range(len(candidates)):
-                arm.start(values, [row], np.array([self.angle]))
-                torque[row], inertia[row] = arm.data.qfrc_bias[0], arm.data.M[0]
-        return torque, inertia
+                load[row] = arm.start(values, [row], np.array([self.angle]))[0]
+                gravity[row], inertia[row] = arm.data.qfrc_bias[0], arm.data.M[0]
+        return gravity, load, inertia
 
-    def movement(self, command: float) -> "Movement":
-        """Return the movement of 1.2 s from the joint's angle."""
-        return Movement(self, command, self.angle, max(round(1.2 / self.period), 2))
+    def steady(self, candidates: Candidates, commands: Array, load: Array) -> Array:
+        """Return the joint's speeds at its angle under m commands [%] that are held, (n, m), unit per s.
+
+        They are those of `hydroid.simulation.steady`, positive where its angle grows. `load` is what
+        `weigh` says, springs included, shape (n,).
+        """
+        joint: Records = candidates.joints[:, self.joint - 1]  # pyright: ignore[reportAssignmentType]
+        angle = np.full(len(candidates), self.angle)
+        quasi_static = self.settings.quasi_static
+        return self.unit[0] * steady_velocity(joint, angle, load, commands, quasi_static=quasi_static)
+
+    def step(self, command: float) -> "Movement":
+        """Return the movement from the joint's angle under a command [%]."""
+        return Movement(self, command, max(round(LASTS / self.period), 2))
 
 
 @record
 class Movement:
-    """A step of the command [%] from an angle [rad], held for some samples.
+    """A step of the command [%] from rest at the bench's angle, held for some samples.
 
-    Speeds are in the direction of the command, in `Bench.unit` per second; the one at the end is the mean
-    over a tenth of a second.
+    Speeds are in the direction of the command, in `Bench.unit` per second.
     """
 
     bench: Bench
     command: float
-    start: float
     samples: int
-
-    @property
-    def window(self) -> int:
-        """Samples in the last tenth of a second."""
-        return max(round(0.1 / self.bench.period), 1)
 
     @property
     def sign(self) -> float:
@@ -85,25 +102,20 @@ class Movement:
     def angles(self, candidates: Candidates) -> Array:
         """Return the angles of n candidates from rest, shape (n, 1 + samples) [rad].
 
-        Springs are slack where the first log starts.
+        They are the joint's as its sensor reads them, late but to scale. Springs are slack where the first
+        log starts.
         """
-        settings = self.bench.settings
+        settings, to_scale = self.bench.settings, candidates.joints.copy()
+        to_scale["sensor_scale"] = 1.0
         commands = np.full((self.samples * settings.simulation.steps, 1), self.command)
-        scenario = self.bench.scenario.restarted(np.array([self.start]), commands)
-        return Simulation(scenario, settings.substeps).simulate(candidates).angle[:, :, 0]
+        scenario = self.bench.scenario.restarted(np.array([self.bench.angle]), commands)
+        moved = Candidates(to_scale, candidates.mass)
+        return Simulation(scenario, settings.substeps).simulate(moved).angle[:, :, 0]
 
     def speeds(self, candidates: Candidates) -> Array:
         """Return speeds between samples, shape (n, samples)."""
         factor = self.sign * self.bench.unit[0] / self.bench.period
         return factor * np.diff(self.angles(candidates), axis=1)
-
-    def end(self, speeds: Array) -> Array:
-        """Return the speed at the end of speeds, shape (n, samples): shape (n,)."""
-        return speeds[:, -self.window :].mean(axis=1)
-
-    def speed(self, candidates: Candidates) -> Array:
-        """Return the speed at the end, shape (n,)."""
-        return self.end(self.speeds(candidates))
 
     def reaches(self, speeds: Array, level: Array) -> Array:
         """Return when speeds, shape (n, samples), first reach a level, shape (n,) [s]; NaN where never."""
@@ -115,33 +127,20 @@ class Movement:
             time = times[k] + (times[k + 1] - times[k]) * (level - before) / (after - before)
         return np.where(over.any(axis=1), self.bench.period * time, np.nan)
 
-    def through_pose(self, estimate: Candidates) -> "Movement":
-        """Return the movement in which one candidate passes the joint's angle in the middle of the window.
 
-        It starts as long before as this one lasts, or at the joint's stop and is shorter.
-        """
-        half, angle, i, move = self.window // 2, self.bench.angle, self.bench.joint - 1, self
-        arm, margin = self.bench.settings.arm, np.radians(1.0)
-        low, high = min(arm.lower[i] + margin, angle), max(arm.upper[i] - margin, angle)
-        turned = self.angles(estimate)[0]
-        for _ in range(3):  # each correction leaves a tenth of the error or less
-            if not np.isfinite(turned).all():
-                return self
-            start = move.start + angle - turned[self.samples - half]
-            move = replace(move, start=min(max(start, low), high))
-            turned = move.angles(estimate)[0]
-        passed = self.sign * (turned - angle) >= 0
-        last = passed.argmax() + half if passed.any() else self.samples
-        return replace(move, samples=min(max(last, self.window + 1), self.samples))
+def unit_of_joint(settings: FitSettings, joint: int) -> tuple[float, str]:
+    """What 1 rad, or 1 m of a joint that slides, is in the unit of its quantities."""
+    return (1e3, "mm") if settings.arm.joints[joint - 1].slides else (np.degrees(1.0), "deg")
 
 
 def make_bench(settings: FitSettings, logs: Sequence[Log], joint: int) -> Bench:
     """Return a joint at the middle of its logged travel; the other joints are as the first log starts."""
     arm, pose, period = settings.arm, logs[0].start, logs[0].period
     angles = np.concatenate([log.angle[:, joint - 1] for log in logs])
-    middle = np.radians(np.round(np.degrees((angles.min() + angles.max()) / 2)))
+    factor = unit_of_joint(settings, joint)[0]
+    middle = np.round(factor * (angles.min() + angles.max()) / 2) / factor  # as words say it
     command, still = np.zeros((2, len(pose))), np.tile(pose, (2, 1))
     rest = Log("a test movement", np.array([0.0, period]), command, still, period)
     alone = settings.simulation.changed({"other_joints": "locked"})
     scenario = Scenario(load_model(arm), arm, rest, [joint - 1], alone)
-    return Bench(settings, joint, middle, period, scenario)
+    return Bench(settings, joint, float(middle), period, scenario)

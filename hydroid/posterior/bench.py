@@ -18,7 +18,7 @@ from hydroid.settings.fit import FitSettings
 from hydroid.simulation import Candidates, Simulation
 from hydroid.simulation.rollout import SteppedArm
 from hydroid.simulation.scenario import Scenario
-from hydroid.simulation.steady import steady_velocity
+from hydroid.simulation.steady import NEAR, steady_velocity
 
 LASTS = 3.0  # how long a step of the command is held [s]
 
@@ -53,30 +53,38 @@ class Bench:
         actuator = self.settings.arm.joints[self.joint - 1].actuator
         return np.sign(actuator.moment_arm(self.angle)) if isinstance(actuator, LinearActuator) else 1.0
 
-    def weigh(self, candidates: Candidates) -> tuple[Array, Array, Array]:
-        """Return what holds the joint at its angle: gravity's torque, and that with springs [N·m]; and its
-        inertia [kg·m²]; shape (n,) each.
-
-        Springs are slack where the first log starts.
-        """
-        gravity, load, inertia = np.empty((3, len(candidates)))
+    def weigh(self, candidates: Candidates) -> tuple[Array, Array]:
+        """Return gravity's torque [N·m] and the joint's inertia [kg·m²] at its angle, shape (n,) each."""
+        torque, inertia = np.empty((2, len(candidates)))
         arm, values = SteppedArm(self.scenario.arm.model), self.scenario.values(candidates)
         with quiet_mujoco():
             for row in range(len(candidates)):
-                load[row] = arm.start(values, [row], np.array([self.angle]))[0]
-                gravity[row], inertia[row] = arm.data.qfrc_bias[0], arm.data.M[0]
-        return gravity, load, inertia
+                arm.start(values, [row], np.array([self.angle]))
+                torque[row], inertia[row] = arm.data.qfrc_bias[0], arm.data.M[0]
+        return torque, inertia
 
-    def steady(self, candidates: Candidates, commands: Array, load: Array) -> Array:
+    def loads(self, candidates: Candidates) -> Array:
+        """Return what holds the joint at its angle and NEAR before and behind it [N·m], shape (n, 3).
+
+        Springs are slack where the first log starts.
+        """
+        load = np.empty((len(candidates), 3))
+        arm, values = SteppedArm(self.scenario.arm.model), self.scenario.values(candidates)
+        with quiet_mujoco():
+            for row in range(len(candidates)):
+                for place in range(3):
+                    pose = np.array([self.angle + (place - 1) * NEAR])
+                    load[row, place] = arm.start(values, [row], pose)[0]
+        return load
+
+    def steady(self, candidates: Candidates, commands: Array, loads: Array) -> Array:
         """Return the joint's speeds at its angle under m commands [%] that are held, (n, m), unit per s.
 
-        They are those of `hydroid.simulation.steady`, positive where its angle grows. `load` is what
-        `weigh` says, springs included, shape (n,).
+        They are those of `hydroid.simulation.steady`, positive where its angle grows. `loads` are its.
         """
         joint: Records = candidates.joints[:, self.joint - 1]  # pyright: ignore[reportAssignmentType]
-        angle = np.full(len(candidates), self.angle)
         quasi_static = self.settings.quasi_static
-        return self.unit[0] * steady_velocity(joint, angle, load, commands, quasi_static=quasi_static)
+        return self.unit[0] * steady_velocity(joint, self.angle, loads, commands, quasi_static=quasi_static)
 
     def step(self, command: float) -> "Movement":
         """Return the movement from the joint's angle under a command [%]."""

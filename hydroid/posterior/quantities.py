@@ -37,7 +37,7 @@ NaN where one is undefined"""
 
 Measure = Callable[[Candidates], Measured]
 Test = Callable[[Candidates, Array], Measured]
-"""measures n candidates that a torque holds [N·m], shape (n,)"""
+"""measures n candidates with the loads of `Bench.loads`"""
 
 
 Quantities = tuple[dict[str, QuantityEstimate], dict[str, CurveEstimate]]
@@ -102,10 +102,11 @@ def joint_measure(bench: Bench, estimate: Candidates) -> Measure:
         tests, further = [direction_test(bench, estimate, *name) for name in names], oil
 
     def measure(candidates: Candidates) -> Measured:
-        torque, load, inertia = bench.weigh(candidates)
+        loads = bench.loads(candidates) if tests else np.empty((0, 3))
+        torque, inertia = bench.weigh(candidates)
         word, of = ("force", "N") if bench.unit[1] == "mm" else ("torque", "N·m")
         for test in tests:
-            yield from test(candidates, load)
+            yield from test(candidates, loads)
         yield from further(bench, candidates, inertia)
         yield Column("gravity_torque_at_pose", f"gravity {word} at {bench.pose}", of, False), torque
 
@@ -170,7 +171,7 @@ def direction_test(bench: Bench, estimate: Candidates, sign: float, ending: str,
     `sign` is that of the commands; `ending` and `word` stand at the end of names and labels.
     """
     commands, (factor, unit) = sign * np.array(COMMANDS), bench.unit
-    reached = sign * bench.sense * bench.steady(estimate, commands, bench.weigh(estimate)[1])[0]
+    reached = sign * bench.sense * bench.steady(estimate, commands, bench.loads(estimate))[0]
     # the smallest command from 50 % that clearly moves the joint, or the largest
     clear = (
         u for u, speed in zip(COMMANDS, reached, strict=True) if u >= 50.0 and speed > ONSET * reached[-1]
@@ -178,8 +179,8 @@ def direction_test(bench: Bench, estimate: Candidates, sign: float, ending: str,
     rise = next(clear, 100.0)
     step, opens_later = bench.step(sign * rise), valve_opens(bench, estimate, sign)[1][0] > 0.0
 
-    def measure(candidates: Candidates, load: Array) -> Measured:
-        steady = bench.steady(candidates, commands, load)
+    def measure(candidates: Candidates, loads: Array) -> Measured:
+        steady = bench.steady(candidates, commands, loads)
         for u, velocity in zip(commands.tolist(), steady.T, strict=True):
             yield Column("speed", f"speed at {bench.pose}", f"{unit}/s", False, u), velocity
         speed = dict(zip(COMMANDS, sign * bench.sense * steady.T, strict=True))

@@ -14,6 +14,9 @@ from hydroid.arm.model import load_model
 from hydroid.fitting.validation import Prediction
 from hydroid.fitting.verdict import judge
 from hydroid.log import Log
+from hydroid.posterior.bench import make_bench
+from hydroid.posterior.quantities import joint_measure
+from hydroid.problem.bindings import Bindings
 from hydroid.reporting.predictions import validation_page
 from hydroid.settings.fit import FitSettings
 
@@ -89,3 +92,18 @@ def test_a_rotary_actuator_on_a_slide_has_the_units_of_a_slide(
     }
     (found,) = hydroid.load_settings("fit-hyd", changes).parameter_set().parameters
     assert found.unit == unit
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_its_flow_is_area_times_speed_and_its_pose_is_said_in_mm(settings: FitSettings, sign: float) -> None:
+    log = step_log(settings.arm.pose("up"), {2: [50.0]})
+    log.angle[-1, 1] += 0.5
+    bench = make_bench(settings, [log], 2)
+    assert bench.angle == pytest.approx(1e-3 * float(bench.pose.removesuffix(" mm")), abs=1e-12)
+    estimate = Bindings(settings).candidates(settings.parameter_set().vector(TRUTH, "truth")[None])
+    found = {column.label: float(value[0]) for column, value in joint_measure(bench, estimate)(estimate)}
+    area = TRUTH["area_A" if sign > 0 else "area_B"] * 1e-6
+    word = "raising" if sign > 0 else "lowering"
+    speed = found[f"speed at 100 % command and {bench.pose}, {word}"] * 1e-3
+    flow = found[f"flow at 100 % command and {bench.pose}, {word}"]
+    assert flow == pytest.approx(6e4 * area * speed, rel=1e-9)

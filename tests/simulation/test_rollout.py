@@ -11,7 +11,7 @@ import pytest
 
 from hydroid.hydraulics import kernel
 from hydroid.settings import linkage
-from hydroid.simulation import openings, quasi_static, rollout
+from hydroid.simulation import openings, quasi_static, rollout, steady
 from hydroid.simulation.rollout import SteppedArm
 
 ARM = "<mujoco><worldbody><body><joint/><geom size='1'/></body></worldbody></mujoco>"
@@ -62,6 +62,7 @@ def inlined(function: FunctionType, seen: set[FunctionType]) -> Iterator[Path]:
         (rollout.roll, []),
         (quasi_static.roll_quasi_static, [rollout]),
         (openings._open, []),  # pyright: ignore[reportPrivateUsage]
+        (steady._steady, [rollout, quasi_static]),  # pyright: ignore[reportPrivateUsage]
     ],
 )
 def test_numbas_cache_is_keyed_by_every_file_that_a_function_takes_code_in_from(compiled, more):

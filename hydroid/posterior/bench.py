@@ -20,8 +20,6 @@ from hydroid.simulation.rollout import SteppedArm
 from hydroid.simulation.scenario import Scenario
 from hydroid.simulation.steady import NEAR, steady_velocity
 
-LASTS = 3.0  # how long a step of the command is held [s]
-
 
 @record
 class Bench:
@@ -39,7 +37,7 @@ class Bench:
     @property
     def unit(self) -> tuple[float, str]:
         """What 1 rad, or 1 m of a joint that slides, is in the unit of quantities."""
-        return unit_of_joint(self.settings, self.joint)
+        return (1e3, "mm") if self.settings.arm.joints[self.joint - 1].slides else (np.degrees(1.0), "deg")
 
     @property
     def pose(self) -> str:
@@ -86,9 +84,9 @@ class Bench:
         quasi_static = self.settings.quasi_static
         return self.unit[0] * steady_velocity(joint, self.angle, loads, commands, quasi_static=quasi_static)
 
-    def step(self, command: float) -> "Movement":
+    def movement(self, command: float, seconds: float = 1.2) -> "Movement":
         """Return the movement from the joint's angle under a command [%]."""
-        return Movement(self, command, max(round(LASTS / self.period), 2))
+        return Movement(self, command, max(round(seconds / self.period), 2))
 
 
 @record
@@ -136,17 +134,13 @@ class Movement:
         return np.where(over.any(axis=1), self.bench.period * time, np.nan)
 
 
-def unit_of_joint(settings: FitSettings, joint: int) -> tuple[float, str]:
-    """What 1 rad, or 1 m of a joint that slides, is in the unit of its quantities."""
-    return (1e3, "mm") if settings.arm.joints[joint - 1].slides else (np.degrees(1.0), "deg")
-
-
 def make_bench(settings: FitSettings, logs: Sequence[Log], joint: int) -> Bench:
     """Return a joint at the middle of its logged travel; the other joints are as the first log starts."""
     arm, pose, period = settings.arm, logs[0].start, logs[0].period
     angles = np.concatenate([log.angle[:, joint - 1] for log in logs])
-    factor = unit_of_joint(settings, joint)[0]
-    middle = np.round(factor * (angles.min() + angles.max()) / 2) / factor  # as words say it
+    middle = (angles.min() + angles.max()) / 2  # then as words say it
+    slides = arm.joints[joint - 1].slides
+    middle = np.round(1e3 * middle) / 1e3 if slides else np.radians(np.round(np.degrees(middle)))
     command, still = np.zeros((2, len(pose))), np.tile(pose, (2, 1))
     rest = Log("a test movement", np.array([0.0, period]), command, still, period)
     alone = settings.simulation.changed({"other_joints": "locked"})

@@ -160,8 +160,9 @@ def actuator(bench: Bench, candidates: Candidates) -> tuple[Records, Array, Arra
 
 
 COMMANDS = (5.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0, 100.0)  # of the curve of speed [%]
+LASTS = 3.0  # how long the step is held in which dead time and time constant are sought [s]
 ONSET, RISEN = 0.1, 1.0 - np.exp(-1.0)
-"""parts of the final speed: it takes the dead time to reach the first, and from there the time constant to
+"""parts of the steady speed: it takes the dead time to reach the first, and from there the time constant to
 reach the second"""
 
 
@@ -177,7 +178,7 @@ def direction_test(bench: Bench, estimate: Candidates, sign: float, ending: str,
         u for u, speed in zip(COMMANDS, reached, strict=True) if u >= 50.0 and speed > ONSET * reached[-1]
     )
     rise = next(clear, 100.0)
-    step, opens_later = bench.step(sign * rise), valve_opens(bench, estimate, sign)[1][0] > 0.0
+    step, opens_later = bench.movement(sign * rise, LASTS), valve_opens(bench, estimate, sign)[1][0] > 0.0
 
     def measure(candidates: Candidates, loads: Array) -> Measured:
         steady = bench.steady(candidates, commands, loads)

@@ -91,6 +91,19 @@ class FitSettings(Settings):
             values = {**values, "parameters": entries}
         return {**values, "arm": arm}
 
+    @model_validator(mode="before")
+    @classmethod
+    def _one_model_without_hydraulics(cls, values: Any) -> Any:
+        """Take stage 1 for dynamic, whatever `simulation.model` says of stage 2: its steps follow from it."""
+        if not isinstance(values, dict) or values.get("stage", "mech") != "mech":
+            return values
+        simulation = values.get("simulation")
+        if isinstance(simulation, SimulationSettings):
+            simulation = simulation.model_dump()
+        if not isinstance(simulation, dict) or simulation.get("model") not in ("quasi-static", "ladder"):
+            return values
+        return {**values, "simulation": {**simulation, "model": "dynamic"}}
+
     @model_validator(mode="after")
     def _of_the_stage(self) -> "FitSettings":
         if self.joint_refinement and self.simulation.model == "ladder":

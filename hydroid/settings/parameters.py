@@ -155,11 +155,12 @@ def _default_bounds(own: ParameterSettings, prior: Prior | None) -> tuple[float,
 
 
 def _unit(arm: Arm, own: ParameterSettings) -> str:
-    """The unit of a parameter; joints that slide, and areas of rotary actuators, have their own."""
-    if own.quantity in MECHANICAL and own.joints and {*own.joints} <= {*arm.slides}:
+    """The unit of a parameter; joints that slide, and rotary actuators that turn, have their own."""
+    sliding = bool(own.joints) and {*own.joints} <= {*arm.slides}
+    if own.quantity in MECHANICAL and sliding:
         return own.unit.replace("N·m", "N").replace("rad", "m")
     actuators = _actuators(arm, own) if own.joints else []
-    rotary = bool(actuators) and all(isinstance(one, RotaryActuator) for one in actuators)
+    rotary = bool(actuators) and all(isinstance(one, RotaryActuator) for one in actuators) and not sliding
     sized = own.quantity in ("area", "area_a", "area_b", "dry_friction")
     return {"mm²": "cm³/rad", "N": "N·m"}[own.unit] if rotary and sized else own.unit
 

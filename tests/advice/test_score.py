@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from hydroid.posterior.noise import Noise, fit_noise
 from linear_problem import ar1
 from numpy.testing import assert_allclose
 
 from hydroid.advice.growth import Explained, holm
-from hydroid.posterior.noise import Noise, fit_noise
 
 SAMPLES = 1000
 

@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from arms import BOOM
+from hydroid.advice.left_out import refitted
 from made_logs import noisy, stepped
 from two_joints import PARAMETERS, PERIOD, drive, two_joints
 
 from hydroid import load_settings
 from hydroid.advice.growth import promising, score_terms
-from hydroid.advice.left_out import refitted
 from hydroid.advice.suggestions import advice, next_actions
 from hydroid.advice.terms import terms
 from hydroid.log import Log

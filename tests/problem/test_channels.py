@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from arms import posed
+from hydroid.posterior.noise import error_level, fit_noise
 from made_logs import HYDRAULIC, TRUTH, simulate_log, step_log
 
 from hydroid import fit, load_settings, read_logs
 from hydroid.arm.model import add_payload
 from hydroid.errors import SettingsError
 from hydroid.log import check_log, write_log
-from hydroid.posterior.noise import error_level, fit_noise
 from hydroid.problem.problem import Problem
 
 MECHANICAL = {name: value for name, value in TRUTH.items() if name != "K"}

@@ -24,6 +24,7 @@ class Log:
         period: [s].
         pressure: of chambers A and B [Pa], shape (T, J, 2), NaN where unmeasured; None: the log has none.
         rest: samples before the first command of the recording; None: before the first one in `command`.
+        pose: in which joints stand that are not measured [rad], shape (J,); None: it is not known.
     """
 
     source: str
@@ -33,6 +34,7 @@ class Log:
     period: float
     pressure: Array | None = None
     rest: int | None = None
+    pose: Array | None = None
 
     @property
     def joints(self) -> int:
@@ -50,6 +52,14 @@ class Log:
         return ~np.isnan(self.angle[0])
 
     @property
+    def posed(self) -> Array:
+        """Angles of all joints [rad], shape (T, J): of those that are not measured that of `pose`."""
+        return self._with_pose(self.angle)
+
+    def _with_pose(self, angle: Array) -> Array:
+        return angle if self.pose is None else np.where(self.measured, angle, self.pose)
+
+    @property
     def duration(self) -> float:
         """Time of the last sample [s]."""
         return float(self.time[-1])
@@ -61,12 +71,12 @@ class Log:
 
     @property
     def start(self) -> Array:
-        """The start pose [rad], shape (J,): the mean of the angles while the arm still rests.
+        """The start pose [rad], shape (J,): the mean of the angles while the arm still rests, or `pose`.
 
         A simulation starts there, and an error of its start stays in the whole response. A command moves
         nothing before the sample after it; of a log that begins with a command the first sample must do.
         """
-        return self._mean_at_rest(self.angle)
+        return self._with_pose(self._mean_at_rest(self.angle))
 
     @property
     def start_pressure(self) -> Array:

@@ -42,7 +42,9 @@ def read_logs(
     pose = settings.arm.pose(settings.start_pose)
     for source in as_list(logs):
         if isinstance(source, Log):
-            read.append(source if source.measured.all() or source.pose is not None else replace(source, pose=pose))
+            read.append(
+                source if source.measured.all() or source.pose is not None else replace(source, pose=pose)
+            )
             continue
         log, more = check_file(Path(source), settings, repair=repair, angles=angles)
         if log is None:

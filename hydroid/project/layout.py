@@ -69,7 +69,7 @@ def find_layout(table: Table | None, arm: Arm, order: Sequence[str]) -> Layout:
         reasons.append(f"the log cannot be used as it is: {findings[0]}")
         log, _ = check_log(Path(table.source), settings, free, repair=True)
     motions = {joint: motion_of(log, joint) for joint in measured} if log else {}
-    wrong = [j for j, m in motions.items() if (m.straight if j in arm.backward else m.turned)]
+    wrong = [j for j, m in motions.items() if m.contradicts(backward=j in arm.backward)]
     for joint, motion in motions.items():
         reasons += _remarks(motion, arm.joints[joint - 1], joint in wrong)
         if joint in wrong:

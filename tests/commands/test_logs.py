@@ -18,7 +18,9 @@ UNMEASURED = {"log.joints.3.angle": None}
 
 
 def settings(**changes: object) -> FitSettings:
-    own = {f"parameters.own_{j}": {"quantity": "overlap", "joints": [j], "bounds": [0.0, 0.8]} for j in (2, 4)}
+    own = {
+        f"parameters.own_{j}": {"quantity": "overlap", "joints": [j], "bounds": [0.0, 0.8]} for j in (2, 4)
+    }
     return load_settings("fit-hyd", {"outputs": [2, 4], "start_pose": "study", **own, **changes})
 
 

@@ -150,7 +150,9 @@ def test_one_time_with_two_values_is_refused_and_a_message_that_came_twice_is_no
             time = 0.02 * k
             bag.write("/valves/command", START + time, bag.array(np.zeros(2)))
             for late in (0.0, 0.001):  # as of a relay
-                bag.write("/joint_states", START + time + late, bag.joints(START + time, NAMES, position(time)))
+                bag.write(
+                    "/joint_states", START + time + late, bag.joints(START + time, NAMES, position(time))
+                )
     assert len(read(twice, VOLTS, RANGES)[0].time) == 200
 
 

@@ -30,7 +30,7 @@ def read_logs(
 
     Args:
         logs: files, or logs that were read before; one or several.
-        settings: of the fit; joints that a log does not measure stand in its `start_pose`.
+        settings: of the fit; joints that a log does not measure are taken to stand in its `start_pose`.
         repair: fill holes up to `log.repair_s`.
         angles: whether the compared joints must be measured.
 
@@ -39,16 +39,18 @@ def read_logs(
     """
     read: list[Log] = []
     findings: list[LogFinding] = []
+    pose = settings.arm.pose(settings.start_pose)
     for source in as_list(logs):
         if isinstance(source, Log):
-            read.append(source)
+            read.append(
+                source if source.measured.all() or source.pose is not None else replace(source, pose=pose)
+            )
             continue
         log, more = check_file(Path(source), settings, repair=repair, angles=angles)
         if log is None:
             raise more[0].error()
         findings += more
-        pose = np.where(log.measured, log.angle, settings.arm.pose(settings.start_pose))
-        read.append(replace(log, angle=pose))
+        read.append(replace(log, pose=pose))
     for level, line in grouped(findings):
         LOGGER.log(logging.WARNING if level == "warning" else NOTE, "%s: %s", level, line)
     return read
@@ -122,8 +124,9 @@ def read_arms(
     def read(columns: LogSettings) -> Log:
         layout = {"log": columns} | ({"outputs": ()} if angles else {})
         (one,) = read_logs(log, settings.changed(layout), repair=repair, angles=angles)
-        stand = one.angle if pose is None else np.zeros_like(one.angle) + settings.arm.pose(pose)
-        return replace(one, angle=stand)
+        if pose is None:
+            return one
+        return replace(one, angle=np.full_like(one.angle, np.nan), pose=settings.arm.pose(pose))
 
     if any(name.startswith(tuple(f"{side}_" for side in SIDES)) for name in names):
         return {side: read(columns.of_arm(side)) for side in moving}

@@ -174,7 +174,7 @@ def _collisions(logs: "dict[str, Log]", settings: "FitSettings") -> "Result[Clea
 
     machine = load_machine(settings.arm, pair=ALONE not in logs)
     rest = settings.arm.pose(settings.start_pose)
-    angle = machine.joined({side: log.angle for side, log in logs.items()}, rest)
+    angle = machine.joined({side: log.posed for side, log in logs.items()}, rest)
     result = machine.checker.clearance(next(iter(logs.values())).time, angle)
     nearest = result.distance.argmin()
     content = {

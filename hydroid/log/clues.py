@@ -35,6 +35,10 @@ def likely_range(values: Array, negative: Array | None = None) -> CommandRange |
     """
     if negative is not None:
         both = np.stack([values, negative])
+        both = both[:, ~np.isnan(both).any(axis=0)]
+        if not both.size:
+            return None
+        values, negative = both
         at_rest = np.mean((abs(both - 4) <= 0.48).any(axis=0))
         if both.min() >= 3.52 and both.max() <= 20.48 and at_rest > 0.95:
             return CommandRange("4 to 20 mA on each side", 6.25, -25.0)

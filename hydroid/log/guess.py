@@ -171,7 +171,8 @@ def _by_joint(
 
 def _command(table: Table, columns: Sequence[_Column]) -> tuple[Plain, str]:
     names = [column.name for column in columns]
-    likely = likely_range(*np.nan_to_num(table.read([Signal(name, "command") for name in names]).values.T))
+    signals = [Signal(name, "command", rest=np.nan) for name in names]
+    likely = likely_range(*table.read(signals).values.T)
     entry: Plain = {"column": names[0] if len(names) == 1 else names}
     if likely is None or "%" in (columns[0].unit, likely.name):
         return entry, f"{' and '.join(names)}: command in %"

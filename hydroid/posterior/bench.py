@@ -137,7 +137,8 @@ class Movement:
 def make_bench(settings: FitSettings, logs: Sequence[Log], joint: int) -> Bench:
     """Return a joint at the middle of its logged travel; the other joints are as the first log starts."""
     arm, pose, period = settings.arm, logs[0].start, logs[0].period
-    angles = np.concatenate([log.angle[:, joint - 1] for log in logs])
+    shown = [log for log in logs if log.measured[joint - 1]] or logs
+    angles = np.concatenate([log.posed[:, joint - 1] for log in shown])
     middle = (angles.min() + angles.max()) / 2  # then as words say it
     slides = arm.joints[joint - 1].slides
     middle = np.round(1e3 * middle) / 1e3 if slides else np.radians(np.round(np.degrees(middle)))

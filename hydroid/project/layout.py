@@ -91,7 +91,7 @@ def find_layout(
         idle = [names[j - 1] for j in driven if not any(log.driven[j - 1] for log in logs)]
         driven = [joint for joint in driven if names[joint - 1] not in idle]
         reasons += [f"{listed(idle)}: no command in the logs, so not compared"] if idle else []
-    wrong = [j for j, m in motions.items() if (m.straight if j in arm.backward else m.turned)]
+    wrong = [j for j, m in motions.items() if m.contradicts(backward=j in arm.backward)]
     for joint, motion in motions.items():
         reasons += _remarks(motion, arm.joints[joint - 1], joint in wrong)
         if joint in wrong:

@@ -172,11 +172,12 @@ def direction_test(bench: Bench, estimate: Candidates, sign: float, ending: str,
     `sign` is that of the commands; `ending` and `word` stand at the end of names and labels.
     """
     commands, (factor, unit) = sign * np.array(COMMANDS), bench.unit
-    reached = sign * bench.sense * bench.steady(estimate, commands, bench.loads(estimate))[0]
-    # the smallest command from 50 % that clearly moves the joint, or the largest
-    clear = (
-        u for u, speed in zip(COMMANDS, reached, strict=True) if u >= 50.0 and speed > ONSET * reached[-1]
+    towards = sign * bench.sense
+    planned = dict(
+        zip(COMMANDS, towards * bench.steady(estimate, commands, bench.loads(estimate))[0], strict=True)
     )
+    # the smallest command from 50 % that clearly moves the joint, or the largest
+    clear = (u for u, speed in planned.items() if u >= 50.0 and speed > ONSET * planned[100.0])
     rise = next(clear, 100.0)
     step, opens_later = bench.movement(sign * rise, LASTS), valve_opens(bench, estimate, sign)[1][0] > 0.0
 
@@ -184,26 +185,27 @@ def direction_test(bench: Bench, estimate: Candidates, sign: float, ending: str,
         steady = bench.steady(candidates, commands, loads)
         for u, velocity in zip(commands.tolist(), steady.T, strict=True):
             yield Column("speed", f"speed at {bench.pose}", f"{unit}/s", False, u), velocity
-        speed = dict(zip(COMMANDS, sign * bench.sense * steady.T, strict=True))
+        speed = dict(zip(COMMANDS, towards * steady.T, strict=True))
         gain = (speed[60.0] - speed[40.0]) / (60.0 - 40.0)
         run = step.speeds(candidates)
         onset, risen = (step.reaches(run, part * speed[rise]) for part in (ONSET, RISEN))
         c, _, arm = actuator(bench, candidates)
         flow = 6e4 * (c.a if sign > 0 else c.b).area * np.abs(arm) * speed[100.0] / factor
-        rows = [
-            *(
-                (f"speed_{u}", f"speed at {u} % command and {bench.pose}", f"{unit}/s", speed[u])
-                for u in (50, 100)
-            ),
-            ("gain", f"gain between command and speed at {bench.pose}", f"{unit}/s per %", gain),
-            ("dead_time", f"dead time at {rise:g} % command", "s", onset),
-            ("time_constant", f"time constant at {rise:g} % command", "s", risen - onset),
-            ("full_flow", f"flow at 100 % command and {bench.pose}", "L/min", flow),
+        pose = bench.pose
+        rows = [  # each with the command that must move the joint
+            (50.0, "speed_50", f"speed at 50 % command and {pose}", f"{unit}/s", speed[50.0]),
+            (100.0, "speed_100", f"speed at 100 % command and {pose}", f"{unit}/s", speed[100.0]),
+            (60.0, "gain", f"gain between command and speed at {pose}", f"{unit}/s per %", gain),
+            (rise, "dead_time", f"dead time at {rise:g} % command", "s", onset),
+            (rise, "time_constant", f"time constant at {rise:g} % command", "s", risen - onset),
+            (100.0, "full_flow", f"flow at 100 % command and {pose}", "L/min", flow),
         ]
+        for u, name, label, own_unit, value in rows:
+            if planned[u] != 0.0:
+                yield Column(f"{name}_{ending}", f"{label}, {word}", own_unit), value
         if opens_later:
-            rows.append(("dead_band", "dead band", "%", np.add(*valve_opens(bench, candidates, sign))))
-        for name, label, own_unit, value in rows:
-            yield Column(f"{name}_{ending}", f"{label}, {word}", own_unit), value
+            band = np.add(*valve_opens(bench, candidates, sign))
+            yield Column(f"dead_band_{ending}", f"dead band, {word}", "%"), band
 
     return measure
 

@@ -114,6 +114,16 @@ def test_a_dead_band_that_is_a_parameter_is_no_quantity_beside_it(quasi_static: 
     assert (speeds != 0.0).tolist() == [False, True, False, True]
 
 
+def test_what_a_joint_does_that_its_command_does_not_move_is_not_stated():
+    changes = {"hydraulics.dead_band_a": 60.0, "hydraulics.dead_band_b": 45.0, "hydraulics.leakage": 0.0}
+    found = measured(*shoulder_bench(model(**changes)))
+    stated = {name for name in found if name.endswith(("positive", "negative"))}
+    still = {"joint2_speed_50_positive", "joint2_gain_positive"}
+    assert not still & stated
+    assert {"joint2_speed_100_positive", "joint2_speed_50_negative", "joint2_gain_negative"} <= stated
+    assert found["joint2_speed"][16] == 0.0  # of the curve, at 50 %
+
+
 def test_a_dead_band_and_an_overlap_add_up_to_one():
     both = {"hydraulics.dead_band_a": 20.0, "hydraulics.overlap_a": 0.5}
     bench, estimate = shoulder_bench(model(**both))

@@ -156,7 +156,7 @@ def problem_of(model: IdentifiedModel, logs: LogSources, *, repair: bool) -> "Pr
     from hydroid.problem.problem import Problem
 
     problem = Problem(model.settings, read)
-    if not np.isfinite(problem.residuals(model.theta[None])).all():
+    if not np.isfinite(problem.output_errors(model.theta[None])).all():
         raise RunError("the simulation diverged with these parameters", model.source)
     return problem
 

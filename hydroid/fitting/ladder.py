@@ -6,7 +6,7 @@ converged, so that ends early on the way (`FIRM`). What is kept at the end is re
 settings.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Protocol
 
@@ -15,7 +15,7 @@ import numpy as np
 from hydroid.arrays import Array, record
 from hydroid.fitting.checkpoints import Checkpoints
 from hydroid.fitting.left_out import LeftOut, gain, is_better, parts, predict_parts
-from hydroid.fitting.refinement import Refinement, refine
+from hydroid.fitting.refinement import Refinement, refine, refine_from_afar
 from hydroid.fitting.step import Step, step_of
 from hydroid.posterior.error_model import Likelihood, likelihood_at, make_likelihood
 from hydroid.posterior.linear import estimate_box
@@ -154,7 +154,9 @@ class Ladder:
             theta = own.parameters.from_unit(first.point)
             if first.negative_log > before:
                 return
-        result = self._refined(likelihood, theta, settings, step.changed(phase="on the way"))
+        # what a search ended at may be far from an optimum
+        how = refine if if_better else refine_from_afar
+        result = self._refined(likelihood, theta, settings, step.changed(phase="on the way"), how)
         if self._late and if_better:
             return
         new = self._measured(own, result, step)
@@ -200,9 +202,14 @@ class Ladder:
         return predict_parts(problem, starts, refit)
 
     def _refined(
-        self, likelihood: Likelihood, theta: Array, settings: RefinementSettings, step: Step
+        self,
+        likelihood: Likelihood,
+        theta: Array,
+        settings: RefinementSettings,
+        step: Step,
+        how: Callable[..., Refinement] = refine,
     ) -> Refinement:
-        result = refine(likelihood, theta, settings, self._watch.refining, self._checkpoints, step)
+        result = how(likelihood, theta, settings, self._watch.refining, self._checkpoints, step)
         self._late |= result.ending is Ending.TIME
         return result
 

@@ -21,7 +21,7 @@ from numpy.random import Generator
 
 from hydroid.fitting.baselines import NAMES, fit_baselines
 from hydroid.fitting.checkpoints import Checkpoints, Memo
-from hydroid.fitting.refinement import Refining, refine
+from hydroid.fitting.refinement import Refining, refine_from_afar
 from hydroid.fitting.step import Step
 from hydroid.parameters import Array
 from hydroid.posterior.bench import make_bench
@@ -116,7 +116,7 @@ class Multistart:
         cost = np.inf
         for number, part in enumerate(self._parts(problem), 1):
             before = self._memo.simulated
-            result = refine(
+            result = refine_from_afar(
                 make_likelihood(part),
                 theta,
                 self.settings,

@@ -45,7 +45,7 @@ with the way [rad²/rad], variance of the lasting error [rad²], and its time co
 LEAST_NOISE = {"angle": np.deg2rad(0.01), "pressure_a": 1e4, "pressure_b": 1e4}
 """smallest standard deviation of a sensor's noise that a residual can show [rad, Pa]: no potentiometer or
 gauge is better (ours)"""
-SHORTEST, LONGEST = 0.05, 2.0
+SHORTEST, LONGEST = 0.05, 30.0
 """time constants of a lasting error [s]: what is shorter is noise, and what is longer is drift (ours)"""
 NONE = 1e-12
 """growth of a drift, as a part of the residual's mean square, that counts as none"""
@@ -265,10 +265,13 @@ class Likelihood:
     Attributes:
         problem: whose output errors these are.
         errors: the model of these errors.
+        white: whether they are taken for white noise: in stage 1, which is fitted by output errors as in the
+            article, and on the way from afar.
     """
 
     problem: Problem
     errors: ErrorModel
+    white: bool
 
     def innovations(self, theta: Array) -> Array:
         """Return innovations [1] of theta, shape (n, P): (n, R); NaN where a simulation diverged."""
@@ -283,18 +286,14 @@ class Likelihood:
         return 0.5 * float(rows @ rows) - float(self.errors.log_scale.sum())
 
     def estimated(self, errors: Array) -> "Likelihood":
-        """Return the likelihood for what weighted output errors, (R,), show of their model.
-
-        Stage 1 takes them for white noise: it is fitted by output errors, as in the article.
-        """
-        drifts = self.problem.settings.stage == "hyd"
-        model = self.errors.estimated(errors) if drifts else self.errors.white(errors)
+        """Return the likelihood for what weighted output errors, (R,), show of their model."""
+        model = self.errors.white(errors) if self.white else self.errors.estimated(errors)
         return replace(self, errors=model)
 
 
 def make_likelihood(problem: Problem) -> Likelihood:
     """Return the likelihood of a problem whose errors are still to be estimated."""
-    return Likelihood(problem, make_error_model(problem))
+    return Likelihood(problem, make_error_model(problem), problem.settings.stage == "mech")
 
 
 def likelihood_at(problem: Problem, theta: Array, numbers: Array | None = None) -> Likelihood:

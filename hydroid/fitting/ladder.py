@@ -115,6 +115,9 @@ class Ladder:
                 if term not in terms:
                     with_term = self._step.changed(terms=(*self._step.terms, term))
                     self._rung(whole, with_term, on_the_way, if_better=True)
+        if self._step.model == "dynamic":
+            for term in self._step.terms:
+                self._try_without(whole, term, on_the_way)
         if climbs:
             kept = self.kept
             last = self._refined(make_likelihood(self.problem), kept.theta, refinement, self._step)
@@ -174,6 +177,25 @@ class Ladder:
         if not self._late and is_better(with_it, without):
             self._left_out[step.estimate] = with_it
             self._keep(own, new, step)
+
+    def _try_without(self, whole: Problem, term: str, settings: RefinementSettings) -> None:
+        """Drop a term that was kept below, unless this model foretells clearly better with it.
+
+        A term may have stood for what only a richer model has.
+        """
+        if self._late:
+            return
+        step = self._step.changed(terms=tuple(one for one in self._step.terms if one != term))
+        own = whole.varied(whole.settings.of_estimate(step.estimate))
+        parameters, before = own.parameters, self.problem.parameters
+        theta = parameters.started(before.mapping(self.kept.theta))
+        result = self._refined(make_likelihood(own), theta, settings, step.changed(phase="on the way"))
+        with_it = self._parts_left_out(settings)
+        starts = np.array([parameters.started(before.mapping(one)) for one in with_it.thetas])
+        without = self._predicted(own, starts, step, settings)
+        if not self._late and not is_better(with_it, without):
+            self._left_out[step.estimate] = without
+            self._keep(own, self._measured(own, result, step), step)
 
     def _is_white(self) -> bool:
         """Whether the innovations of the estimate that is kept are white."""

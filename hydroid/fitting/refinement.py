@@ -71,9 +71,9 @@ def refine(
             if progress(what, now.evaluations, _rms_error(likelihood, now)):
                 break
             if not len(now.jacobian):
+                keep(now.arrays)  # a resumed refinement estimates the errors here, too
                 now = _with_new_numbers(likelihood, now)
                 rows = _rows(likelihood, now)
-                keep(now.arrays)
             now = step(now, rows, settings)
             moved = True
             if now.ending.converged:  # unless its errors are others by now

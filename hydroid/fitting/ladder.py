@@ -75,7 +75,7 @@ class Watcher(Protocol):
         """Take a row of HISTORY; return whether the search is to end."""
 
     def refining(self, step: Step, simulated: int, rms: float) -> bool | None:
-        """Take a step, its number of simulations, and its rms error [rad] so far; return whether it is to end."""
+        """Take a step, its number of simulations, and its rms error [rad]; return whether it is to end."""
 
 
 class Ladder:

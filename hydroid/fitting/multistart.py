@@ -39,7 +39,8 @@ COST = itemgetter(0)  # of a negative log-likelihood and the theta that it is of
 class Multistart:
     """Least squares from one random start after the other: a search whose chromosomes are theta.
 
-    Its objective is the negative log-likelihood, priors included. A start depends on the seed and its number alone.
+    Its objective is the negative log-likelihood, priors included. A start depends on the seed and its number
+    alone.
 
     Args:
         problem: what is minimised.

@@ -17,8 +17,8 @@ likelihood.
 
 A Kalman filter turns the residual into *innovations*: what the past of the log does not foretell of each
 sample (L. Ljung, *System Identification*, 1999, chapters 3, 7 and 14). Divided by their standard deviation
-they are white with variance 1. The filter's gains depend on the measured way, not on θ: the filter is a linear
-map of the residual, and least squares of innovations is maximum likelihood.
+they are white with variance 1. The filter's gains depend on the measured way, not on θ: the filter is a
+linear map of the residual, and least squares of innovations is maximum likelihood.
 
 Stage 1 puts a gain in place of the hydraulics, and the article fits it by output errors. Its least squares
 weighs them as white noise (`ErrorModel.white`); its covariance is that of the errors as they are.
@@ -282,7 +282,7 @@ class Likelihood:
         return np.hstack([self.innovations(theta), self.problem.priors.scores(theta)])
 
     def negative_log(self, rows: Array) -> float:
-        """Return the negative logarithm of likelihood and priors, from a row of `rows`, but for a constant."""
+        """Return the negative logarithm of likelihood and priors of a row of `rows`, but for a constant."""
         return 0.5 * float(rows @ rows) - float(self.errors.log_scale.sum())
 
     def estimated(self, errors: Array) -> "Likelihood":
@@ -346,10 +346,10 @@ def _model(course: Course, numbers: Array) -> tuple[Array, Array]:
 def _most_likely(pairs: Sequence[tuple[Course, Array]], numbers: Array, least: float, given: bool) -> Array:
     """Return the most likely NUMBERS of one signal's errors, each of shape (T,), with their courses.
 
-    `least` is the smallest variance of the sensor's noise, which stays where it is `given`. The search is over
-    logarithms. It starts from a guess that is mostly noise, and from the numbers before; without any, from a
-    guess that is mostly drift. A number that was next to none is raised first (`LEAST_GUESS`): on the scale of
-    logarithms nothing would tell that it should grow.
+    `least` is the smallest variance of the sensor's noise, which stays where it is `given`. The search is
+    over logarithms. It starts from a guess that is mostly noise, and from the numbers before; without any,
+    from a guess that is mostly drift. A number that was next to none is raised first (`LEAST_GUESS`): on the
+    scale of logarithms nothing would tell that it should grow.
     """
     square = float(np.mean(np.concatenate([error[course.used] for course, error in pairs]) ** 2))
     square = max(square, least)
@@ -384,7 +384,7 @@ def _negative_log_likelihood(course: Course, error: Array, numbers: Array) -> fl
 
 
 def whitened(rows: Array, period: float, sensor: float, rate: float) -> Array:
-    """Return the innovations of rows [rad], (n, T), for a sensor's variance and a drift that grows with time."""
+    """Return innovations of rows [rad], (n, T), for a sensor's variance and a drift that grows with time."""
     samples = rows.shape[1]
     everywhere = np.ones(samples, dtype=np.bool_)
     course = Course(slice(0), 1.0, period, np.zeros(samples), ~everywhere, np.inf, everywhere)
@@ -507,7 +507,7 @@ def _variances(start: float, step: Array, carry: Array) -> Array:
 
 @njit(cache=True)
 def _summed_ahead(rows: Array, carry: Array) -> Array:
-    """What an error of 1 at each sample adds to products with rows, (p, T): the sums of all that it reaches."""
+    """What an error of 1 at each sample adds to products with rows, (p, T): sums of all that it reaches."""
     result = np.empty_like(rows)
     for i in range(len(rows)):
         total = 0.0

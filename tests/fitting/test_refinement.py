@@ -58,12 +58,18 @@ def test_an_interrupted_refinement_goes_on_without_loss(problem, tmp_path, limit
     assert whole.evaluations == problem.simulated
     problem.simulated = 0
     with pytest.raises(KeyboardInterrupt):
-        refine(make_likelihood(problem), begin(problem), SHORT, stop_after(limit), CheckpointFile(file, "a"), ONE)
-    parts = refine(make_likelihood(problem), begin(problem), SHORT, lambda *_: None, CheckpointFile(file, "a"), ONE)
+        refine(
+            make_likelihood(problem), begin(problem), SHORT, stop_after(limit), CheckpointFile(file, "a"), ONE
+        )
+    parts = refine(
+        make_likelihood(problem), begin(problem), SHORT, lambda *_: None, CheckpointFile(file, "a"), ONE
+    )
     assert equal(parts, whole)
     simulated = problem.simulated
     assert simulated < whole.evaluations + limit + 12  # the steps since the last Jacobian are repeated
-    again = refine(make_likelihood(problem), begin(problem), SHORT, lambda *_: None, CheckpointFile(file, "a"), ONE)
+    again = refine(
+        make_likelihood(problem), begin(problem), SHORT, lambda *_: None, CheckpointFile(file, "a"), ONE
+    )
     assert equal(again, whole)
     assert problem.simulated == simulated  # the result itself is kept
 
@@ -72,4 +78,6 @@ def test_another_refinement_has_a_checkpoint_of_its_own(problem, tmp_path):
     checkpoints = CheckpointFile(tmp_path / "refinement.npz", "a")
     refine(make_likelihood(problem), begin(problem), SHORT, lambda *_: None, checkpoints, ONE)
     other = refine(make_likelihood(problem), 1.1 * begin(problem), SHORT, lambda *_: None, checkpoints, OTHER)
-    assert equal(other, refine(make_likelihood(problem), 1.1 * begin(problem), SHORT, lambda *_: None, {}, ONE))
+    assert equal(
+        other, refine(make_likelihood(problem), 1.1 * begin(problem), SHORT, lambda *_: None, {}, ONE)
+    )

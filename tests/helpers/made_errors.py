@@ -23,7 +23,7 @@ def course_of(samples: int, first: int = 0, weight: float = 1.0, **changes) -> C
 
 
 def stopping(samples: int) -> Course:
-    """Stops at the start, in the middle and at the end, samples that do not count, and a start that is read."""
+    """Stops at the start, in the middle and at the end, samples that do not count, a start that is read."""
     stops, used = np.zeros(samples, dtype=bool), np.ones(samples, dtype=bool)
     stops[:3] = stops[samples // 2 : samples // 2 + 5] = stops[-2:] = True
     used[::3] = False

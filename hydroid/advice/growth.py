@@ -12,7 +12,8 @@ The statistic is the score of C. R. Rao (1948), a standard normal variable where
 
     z = -d' r / |d'|.
 
-The change of the quantity that would explain most is a = -d' r / |d'|². It raises the log-likelihood by z² / 2.
+The change of the quantity that would explain most is a = -d' r / |d'|². It raises the log-likelihood by
+z² / 2.
 """
 
 import math

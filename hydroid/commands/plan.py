@@ -90,8 +90,8 @@ def suggest(
     ):
         findings = (Finding("fails unseen", "warning", bad), *findings)
     note = (
-        f"Of {content['tested']} quantities that the fit holds. promised: rise of the log-likelihood by freeing "
-        "it. "
+        f"Of {content['tested']} quantities that the fit holds. promised: rise of the log-likelihood by "
+        "freeing it. "
     )
     terms = [
         term

@@ -181,7 +181,7 @@ def open_bag(path: Path, settings: LogSettings) -> BagTable:
 
 
 def _set_back(path: Path) -> dict[str, tuple[int, float, float]]:
-    """Return the topics of a ROS 2 bag whose recorder's clock went back: message, its time and the one before.
+    """Return topics of a ROS 2 bag whose recorder's clock went back: message, its time and the one before.
 
     rosbags sorts messages by their time [s], which would interleave what was recorded one after the other.
     """

@@ -42,7 +42,7 @@ def likely_range(values: Array, negative: Array | None = None) -> CommandRange |
         at_rest = np.mean((abs(both - 4) <= 0.48).any(axis=0))
         if both.min() >= 3.52 and both.max() <= 20.48 and at_rest > 0.95:
             return CommandRange("4 to 20 mA on each side", 6.25, -25.0)
-        values = values - negative
+        values = both[0] - both[1]
     values = values[~np.isnan(values)]
     if not values.any():
         return None

@@ -120,7 +120,7 @@ def at_stops(angle: Array, ends: tuple[float, float], period: float) -> Mask:
         return np.zeros(len(angle), dtype=bool)
     there = (angle < lower + margin) | (angle > upper - margin)
     window = 2 * max(round(0.5 * WAY_OVER / period), 1) + 1
-    return np.asarray(binary_erosion(there, np.ones(window, dtype=bool), border_value=1))
+    return binary_erosion(there, np.ones(window, dtype=bool), border_value=1).astype(np.bool_)
 
 
 @record

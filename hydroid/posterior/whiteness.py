@@ -1,7 +1,8 @@
 """Whether innovations are white: what else is left of an error is the model's, not the sensor's.
 
 The error of a joint lasts until the autocorrelation of its innovations, over all logs, has fallen to 1/e of
-that between two samples, or below `FAINT`. Of a first-order process that is its time constant, however much white
+that between two samples, or below `FAINT`. Of a first-order process that is its time constant, however
+much white
 noise is added. It is said only where the innovations are not white (G. M. Ljung and G. E. P. Box, 1978), and
 clearly so: with thousands of samples the test alone finds what does not matter.
 """

@@ -1,4 +1,5 @@
-"""What commands read: angles that are not measured stay unmeasured, though the simulation has a start pose."""
+"""What commands read: angles that are not measured stay unmeasured, though the simulation has a
+start pose."""
 
 from pathlib import Path
 
@@ -49,7 +50,8 @@ def test_a_log_that_was_read_elsewhere_has_a_start_pose_too() -> None:
 
 
 def test_what_needs_the_motion_of_driven_joints_leaves_out_logs_that_lack_it() -> None:
-    """The start of a joint is open, joints are fitted alone and columns compared only where it is measured."""
+    """The start of a joint is open, joints are fitted alone and columns compared only where it is
+    measured."""
     log, fit = read(**UNMEASURED)
     problem, whole = Problem(fit, [log]), Problem(settings(), [read()[0]])
     assert 3 in whole.started(whole.logs[0])

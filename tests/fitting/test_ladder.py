@@ -88,7 +88,7 @@ class Hurried(Silent):
     def __init__(self, calls):
         self.calls = calls
 
-    def refining(self, name, simulated, rms):
+    def refining(self, step, simulated, rms):
         self.calls -= 1
         return self.calls < 0
 

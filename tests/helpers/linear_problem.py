@@ -96,6 +96,7 @@ def dense_covariance(problem, numbers):
 def most_likely(problem, rounds=4):
     """The estimate by generalised least squares, with the error model of its errors, again and again."""
     theta = least_squares(problem.columns, problem.measured)
+    model = make_error_model(problem)
     for _ in range(rounds):
         model = likelihood_at(problem, theta).errors
         theta = least_squares(

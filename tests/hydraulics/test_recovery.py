@@ -102,8 +102,8 @@ CASES = {
 
 CURVED = pytest.mark.xfail(
     strict=True,
-    reason="the two trade along a curved valley: the truth is as likely as the estimate (1.5 in log-likelihood), "
-    "but linear intervals are too narrow",
+    reason="the two trade along a curved valley: the truth is as likely as the estimate (1.5 in "
+    "log-likelihood), but linear intervals are too narrow",
 )
 
 

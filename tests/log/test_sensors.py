@@ -1,4 +1,5 @@
-"""Faults of a sensor are told from motion: no joint leaps within a sample, and a good log is free of findings."""
+"""Faults of a sensor are told from motion: no joint leaps within a sample, and a good log is
+free of findings."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -6,7 +6,6 @@ complete fit has found.
 
 import json
 import shlex
-import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -41,7 +40,7 @@ class Followed:
 def followed(folder: Path, rng: Generator) -> Iterator[Followed]:
     """Yield a machine with a random term left out, where there is one, and the complete one.
 
-    What was found is kept in the folder, and taken from there.
+    What was found is kept in the folder, and taken from there; a run that was stopped is resumed.
     """
     runs = folder / "mine" / "runs"
     candidates = clear_terms(load_record(runs / "fit"))
@@ -69,8 +68,7 @@ def fit_without(folder: Path, term: str) -> Path:
     lines = (mine / "fit.yaml").read_text().splitlines(keepends=True)
     config = mine / "without.yaml"
     config.write_text("".join(line for line in lines if not line.startswith(f"  {term}: ")))
-    shutil.rmtree(out, ignore_errors=True)
-    hydroid.fit_hyd(fitted, config=config, out=out)
+    hydroid.fit_hyd(fitted, config=config, out=out, resume=True)
     hydroid.validate([unseen], fit=out)
     return out
 
@@ -83,8 +81,7 @@ def follow(folder: Path, fit: Path, left_out: str) -> Followed:
         return Followed(left_out, [], before, before)
     words = shlex.split(terms[0]["command"])
     out = Path(words[-1])
-    shutil.rmtree(out, ignore_errors=True)
-    subprocess.run([sys.executable, "-m", *words, "--quiet"], check=True)
+    subprocess.run([sys.executable, "-m", *words, "--resume", "--quiet"], check=True)
     hydroid.validate(sorted(folder.glob("log_*.csv"))[-1:], fit=out)
     return Followed(left_out, [term["name"] for term in terms], before, unseen_deg(out))
 

@@ -253,8 +253,9 @@ def main() -> None:
             row(number, f"refused: {error}", *[""] * (len(RUNGS) + 7))
         else:
             show(found[-1])
-    if found:
-        show_totals(found, given.machines)
+    if not found:
+        return
+    show_totals(found, given.machines)
     if given.exact:
         show_exact(found[: given.exact])
     if given.follow:

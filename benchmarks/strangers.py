@@ -18,6 +18,7 @@ import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from subprocess import CalledProcessError
 from typing import Any
 
 import numpy as np
@@ -35,6 +36,7 @@ from hydroid.run.record import load_record
 
 RUNGS = (*BASELINES, "the fit")
 TERMS = {"pump": slice(1), "oil": slice(1, 2), "early lags": slice(2, None)}  # in `Machine.terms`
+FALLS, RISES, NOTHING = "falls", "rises", "nothing named"
 
 
 @dataclass(frozen=True)
@@ -154,32 +156,43 @@ def show(one: Found) -> None:
     end, machine = one.end, one.case.machine
     terms = [] if machine is None else [machine.terms, end.terms]
     shown = ", ".join("".join(np.where(of, "y", "-")) for of in terms)
-    errors = map(figures, (*end.errors, one.floor, one.ratio, one.case.good))
+    floors = ("", "") if machine is None else (figures(one.floor), figures(one.ratio))
+    cells = *map(figures, end.errors), *floors, figures(one.case.good), end.blamed or "", end.kept, shown
     inside = " ".join(f"{part:.0f}" for part in end.inside)
-    row(one.case.name, *errors, end.blamed or "", end.kept, shown, inside, SPENT.format(*end.seconds))
+    row(one.case.name, *cells, inside, SPENT.format(*end.seconds))
 
 
 def show_totals(found: Sequence[Found], machines: int) -> None:
     """Print what all machines have in common; those that were refused are not good."""
     print()
-    known = [one for one in found if one.case.machine is not None]
-    if known:
+    if known := [one for one in found if one.case.machine is not None]:
         show_ratio("unseen error over the floor", np.concatenate([one.ratio for one in known]))
-    for what, part in TERMS.items() if known else ():
-        true = np.concatenate([one.case.machine.terms[part] for one in known if one.case.machine])
-        kept = np.concatenate([one.end.terms[part] for one in known])
-        counts = np.sum(true & kept), np.sum(true & ~kept), np.sum(kept & ~true)
-        print("{}: {} found, {} missed, {} added where there is none ({})".format(what, *counts, len(true)))
-    sizes = np.concatenate([np.full(len(one.floor), len(one.end.unseen.time)) for one in found])
-    inside = np.concatenate([one.end.inside for one in found])
-    banded = np.isfinite(inside)
-    share = np.average(inside[banded], weights=sizes[banded])
-    print(f"inside the 95 % bands: {share:.1f} % of the unseen samples")
+        show_terms(known)
+    show_inside(found)
     print(f"{sum(one.silent for one in found)} with a missed joint that the verdict does not name")
     good = np.sum([one.within.all(axis=1) for one in found], axis=0)
     rungs = ", ".join(f"{rung} {count}" for rung, count in zip(RUNGS, good, strict=True))
     middle = SPENT.format(*np.median([one.end.seconds for one in found], axis=0))
     print(f"good of {machines}: {rungs}; refused {machines - len(found)}; median time {middle}")
+
+
+def show_terms(found: Sequence[Found]) -> None:
+    """Print how many terms of random machines were found, missed, and added where there is none."""
+    for what, part in TERMS.items():
+        true = np.concatenate([one.case.machine.terms[part] for one in found if one.case.machine])
+        kept = np.concatenate([one.end.terms[part] for one in found])
+        counts = np.sum([true & kept, true & ~kept, kept & ~true], axis=1)
+        print("{}: {} found, {} missed, {} added where there is none ({})".format(what, *counts, len(true)))
+
+
+def show_inside(found: Sequence[Found]) -> None:
+    """Print the share of all unseen samples that the bands hold; a fit that diverged has none."""
+    inside = np.concatenate([one.end.inside for one in found])
+    samples = np.concatenate([np.full(len(one.end.inside), len(one.end.unseen.time)) for one in found])
+    banded = np.isfinite(inside)
+    if banded.any():
+        share = np.average(inside[banded], weights=samples[banded])
+        print(f"inside the 95 % bands: {share:.1f} % of the unseen samples")
 
 
 def show_ratio(what: str, ratio: Array) -> None:
@@ -217,24 +230,36 @@ def exact_errors(one: Found) -> tuple[Array, float]:
 
 def show_followed(found: Sequence[Found], seed: int) -> None:
     """Print what became of the unseen errors where `hydroid suggest` was followed."""
-    table("machine | left out | named | unseen, complete | before | after | over the floor | followed")
-    ends = list[tuple[Followed, str]]()
+    table("machine | left out | named | unseen, complete | before | after | over the floor | unseen error")
+    words = {"a term left out": list[str](), "nothing left out": list[str]()}
     for one in found:
-        for left in followed(one.case.folder, np.random.default_rng([seed, int(one.case.name), 1])):
-            before, after = (
-                np.sqrt(np.mean((np.array(error, float) / one.floor) ** 2))
-                for error in (left.before, left.after)
-            )
-            word = "nothing named" if not left.named else "falls" if after < before else "rises"
-            ends.append((left, word))
-            columns = map(figures, (one.end.errors[-1], np.array(left.before), np.array(left.after)))
-            change = f"{before:.2f} to {after:.2f}"
-            row(one.case.name, left.left_out, " ".join(left.named), *columns, change, word)
+        rng = np.random.default_rng([seed, int(one.case.name), 1])
+        try:
+            for case in followed(one.case.folder, rng):
+                word = show_case(one, case)
+                words["a term left out" if case.left_out else "nothing left out"].append(word)
+        except (hydroid.HydroidError, CalledProcessError) as error:
+            row(one.case.name, f"refused: {error}", *[""] * 6)
     print()
-    for what, complete in (("a term left out", False), ("nothing left out", True)):
-        words = [word for left, word in ends if (left.left_out == "") == complete]
-        counts = ", ".join(f"{words.count(word)} {word}" for word in ("falls", "rises", "nothing named"))
-        print(f"{what}, of {len(words)}: {counts}")
+    for what, every in words.items():
+        counts = ", ".join(f"{word} {every.count(word)}" for word in (FALLS, RISES, NOTHING))
+        print(f"{what}, of {len(every)}: {counts}")
+
+
+def show_case(one: Found, case: Followed) -> str:
+    """Print a row, and return what became of the unseen error: of its ratio to the floor, rms over joints."""
+    before, after = np.array(case.before), np.array(case.after)
+    worth = [np.sqrt(np.mean((error / one.floor) ** 2)) for error in (before, after)]
+    if not case.named:
+        word = NOTHING
+    else:
+        # a fit that diverged has no error
+        old, new = np.nan_to_num(worth, nan=np.inf)
+        word = FALLS if new < old else RISES
+    change = "{:.2f} to {:.2f}".format(*worth)
+    errors = map(figures, (one.end.errors[-1], before, after))
+    row(one.case.name, case.left_out, " ".join(case.named), *errors, change, word)
+    return word
 
 
 def main() -> None:

@@ -64,29 +64,30 @@ def clear_terms(complete: Record) -> list[str]:
 def fit_without(folder: Path, term: str) -> Path:
     """Fit a machine whose settings lack a term, and return the run."""
     mine, out = folder / "mine", folder / "mine" / "runs" / "without"
-    *fitted, unseen = sorted(folder.glob("log_*.csv"))
+    fitted = sorted(folder.glob("log_*.csv"))[:-1]
     lines = (mine / "fit.yaml").read_text().splitlines(keepends=True)
     config = mine / "without.yaml"
     config.write_text("".join(line for line in lines if not line.startswith(f"  {term}: ")))
     hydroid.fit_hyd(fitted, config=config, out=out, resume=True)
-    hydroid.validate([unseen], fit=out)
     return out
 
 
 def follow(folder: Path, fit: Path, left_out: str) -> Followed:
     """Run the first command that `hydroid suggest` prints about a run."""
     terms = [term for term in hydroid.suggest(fit=fit).plain()["terms"] if "command" in term]
-    before = unseen_deg(fit)
+    before = unseen_deg(folder, fit)
     if not terms:
         return Followed(left_out, [], before, before)
     words = shlex.split(terms[0]["command"])
     out = Path(words[-1])
     subprocess.run([sys.executable, "-m", *words, "--resume", "--quiet"], check=True)
-    hydroid.validate(sorted(folder.glob("log_*.csv"))[-1:], fit=out)
-    return Followed(left_out, [term["name"] for term in terms], before, unseen_deg(out))
+    return Followed(left_out, [term["name"] for term in terms], before, unseen_deg(folder, out))
 
 
-def unseen_deg(run: Path) -> list[float]:
-    """Rms errors of a run's unseen log by joint [deg]; NaN if it diverged."""
-    errors = [one.unseen_deg for one in load_record(run).verdict]
-    return [float("nan") if error is None else error for error in errors]
+def unseen_deg(folder: Path, run: Path) -> list[float]:
+    """Rms errors of a run on the machine's last log by joint [deg]; NaN if it diverged."""
+    unseen = sorted(folder.glob("log_*.csv"))[-1]
+    hydroid.validate([unseen], fit=run, out=folder / "mine" / "runs" / f"validation_of_{run.name}")
+    verdict = load_record(run).verdict
+    assert all(one.unseen_logs for one in verdict), f"{run} has no validation"
+    return [float("nan") if one.unseen_deg is None else one.unseen_deg for one in verdict]

@@ -1,6 +1,6 @@
 """Do the tests of assumptions name a planted error, and are they silent where nothing is wrong?
 
-The logs of each machine of strangers.py are tested with the arm as it is, and with the axis of one joint
+The logs of each machine of stranger.py are tested with the arm as it is, and with the axis of one joint
 turned round, a sign error (docs/measured.md). It is named where that joint is among those that are doubted.
 """
 
@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 from common import options, row, table
-from strangers import Machine, urdf, write_machine
+from stranger import Machine, urdf, write_machine
 
 import hydroid
 from hydroid.advice.assumptions import doubts

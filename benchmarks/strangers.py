@@ -1,231 +1,101 @@
 """Forty machines that hydroid has not seen, through the commands that `hydroid init` prints.
 
-Every machine is random (`Machine`). Its equations and integrator are those of this file: nothing of hydroid
-simulates it. It is recorded three times as with sticks, with jitter; two logs are fitted, and the third is
-predicted. Good is an rms error on every joint of at most twice the noise plus 2 % of its travel. A joint that
-is not good must be named by the verdict, whose baselines stand beside the fit. Terms (y) are a pump, oil, and
-of each joint a lag before the dead band. --worlds --machines 12: the arms of tests/helpers/worlds.py.
---stored runs nothing, and prints the rows of what lies in --folder, of the same --seed.
+Every machine is random, with equations and an integrator of its own (stranger.py). Two logs are fitted, and
+the third is predicted. The floor is what the true machine errs by there under the logged commands; an error
+is judged by its ratio to the floor. Good is an rms error on every joint of at most twice the noise plus 2 %
+of its travel; a joint that is not good must be named by the verdict, whose baselines stand beside the fit.
+Terms (y) are a pump, oil, and of each joint a lag before the dead band.
+
+--exact N: also fits the own equations of the first N of these machines, from the truth (exact_fit.py).
+--follow N: also leaves a term out of the first N, and follows what `hydroid suggest` says (followed.py).
+--worlds --machines 12: the arms of tests/helpers/worlds.py instead, which have no floor.
+--stored fits nothing again: it takes what lies in --folder, of the same --seed. So machines can be run in
+parts, by --first, and be printed together.
 """
 
+import json
 import shutil
-from functools import partial
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from subprocess import CalledProcessError
 from typing import Any
 
 import numpy as np
 from common import SPENT, Clock, options, row, table
-from numba import njit
-from numpy.random import Generator
-from robots import LIMIT, body, joint
+from exact_fit import exact_fit, respond
+from followed import Followed, followed
+from stranger import Machine, errors, floor, read_recording, rms_deg, urdf, write_machine
 from worlds import NOISE_DEG, NOISE_M, WORLDS, write_log
 
 import hydroid
 from hydroid.arrays import Array
 from hydroid.fitting.baselines import NAMES as BASELINES
+from hydroid.log import Log
 from hydroid.run.record import load_record
 
-STEP = 0.002
-"""of the integration [s]"""
-GRAVITY = 9.81
-NAMES = ("swing", "boom", "arm", "bucket", "wrist", "tool")
 RUNGS = (*BASELINES, "the fit")
 TERMS = {"pump": slice(1), "oil": slice(1, 2), "early lags": slice(2, None)}  # in `Machine.terms`
+FALLS, RISES, NOTHING = "falls", "rises", "nothing named"
 
 
-class Machine:
-    """A random machine of J joints; a `vertical` axis only swings, the others lift for positive angles.
+@dataclass(frozen=True)
+class Case:
+    """A machine in its folder; good errors by joint [deg], (J,). One of the world's arms has no `machine`."""
 
-    length [m], mass [kg]: of the links, (J,). ends: of the joints' ranges [rad], (J, 2). full: speed at full
-    command without load in both directions [rad/s], (J, 2). dead [%], exponent: (J, 2). delay, lag [s], (J,).
-    early: whether the lag is before the dead band. load: torque of gravity at which a joint stands still
-    [N·m], (J,); friction: the same as a part of it. lever: change of the moment arm over the range, 0 of a
-    rotary actuator, (J,). droop: fall of the supply at the pump's full flow, 0 without a shared pump. draw:
-    flow of each direction at full speed, as a part of the pump's, (J, 2). stiff: square of the frequency of
-    oil and inertia [rad²/s²], (J,), 0: unseen; ratio: its damping ratio. noise [rad], rate [Hz]: of the logs.
+    name: str
+    folder: Path
+    good: Array
+    machine: Machine | None = None
+
+
+class Ending:
+    """What the commands left in a machine's folder.
+
+    errors: unseen rms errors of each of RUNGS [deg], (4, J). inside: share of the unseen samples inside the
+    bands [%], (J,). unseen: the log, as hydroid reads it. blamed: joints that the verdict does not call
+    predicted, from 1. kept: name of the estimate. terms: as `Machine.terms`; the larger lag counts. seconds:
+    wall and CPU time.
     """
 
-    def __init__(self, rng: Generator, number: int) -> None:
-        joints = int(rng.integers(3, 7))
-        swings = joints > 3 or rng.random() < 0.5
-        chain = slice(0 if swings else 1, joints + (not swings))
-        self.names, self.joints = NAMES[chain], joints
-        size = 10 ** rng.uniform(np.log10(0.2), np.log10(20))  # t
-        self.length = 2.2 * size ** (1 / 3) * np.array([0.3, 1.0, 0.7, 0.35, 0.3, 0.25, 0.25])[chain]
-        self.mass = 1000 * size * np.array([0.45, 0.12, 0.07, 0.04, 0.02, 0.015, 0.015])[chain]
-        ranges = {"swing": (-120, 120), "boom": (-30, 60), "arm": (-140, -25), "bucket": (-120, 30)}
-        self.ends = np.radians([ranges.get(name, (-60, 60)) for name in self.names])
-        self.vertical = np.array([name == "swing" for name in self.names])
-        self.full = np.radians(rng.uniform(8, 40, (joints, 1))) * rng.uniform(0.7, 1.4, (joints, 2))
-        self.dead = np.clip(rng.choice([5.0, 20.0, 40.0]) + rng.normal(0, 4, (joints, 2)), 0, 60)
-        exponent = rng.uniform(0.7, 3.0, (joints, 1)) * rng.uniform(0.9, 1.1, (joints, 2))
-        self.exponent = np.clip(exponent, 0.7, 3.0)
-        self.draw = np.tile(rng.uniform(0.2, 0.6, (joints, 1)), (1, 2))
-        if rng.random() < 1 / 3:
-            self.draw *= rng.uniform(0.3, 1.0, (joints, 2))
-        own = gravity_torque(self.ends.mean(axis=1), self.vertical, self.length, self.mass)
-        reach = np.maximum(np.abs(own), 0.3 * GRAVITY * self.mass * self.length)
-        self.delay = np.full(joints, rng.uniform(0, 0.4)) * rng.uniform(0.8, 1.0, joints)
-        self.lag = rng.uniform(0.02, 0.25, joints)
-        self.early = rng.random(joints) < 0.3
-        self.load = reach * rng.uniform(2, 5, joints)
-        self.friction = rng.uniform(0, 0.1, joints)
-        straight = self.vertical | (rng.random(joints) < 0.4)
-        self.lever = np.where(straight, 0.0, rng.uniform(0.1, 0.4, joints))
-        self.droop = float(rng.uniform(0.2, 0.6)) if number % 2 == 0 else 0.0
-        visible = number % 4 < 2
-        self.stiff = (2 * np.pi * rng.uniform(0.8, 4.0, joints)) ** 2 if visible else np.zeros(joints)
-        self.ratio = rng.uniform(0.1, 0.6, joints)
-        self.noise = np.radians(10 ** rng.uniform(np.log10(0.02), np.log10(0.2)))
-        self.rate = float(rng.choice([10, 20, 50, 100]))
+    def __init__(self, folder: Path) -> None:
+        record = load_record(folder / "mine" / "runs" / "fit")
+        rows = [one.baselines_deg | {RUNGS[-1]: one.unseen_deg} for one in record.verdict]
+        self.errors = np.array([[one.get(rung) for one in rows] for rung in RUNGS], float)
+        self.inside = np.array([one.inside_percent for one in record.verdict], float)
+        (prediction,) = record.validations.values()
+        self.unseen: Log = prediction.log
+        self.blamed = [one.joint for one in record.verdict if one.verdict != "predicts"]
+        self.kept, values = str(record.summary.final), record.summary.values
+        early = [values.get(f"pilot_{v.name}", 0) > values.get(f"lag_{v.name}", 0) for v in record.verdict]
+        self.terms = np.array(["pump" in self.kept, "oil" in self.kept or "dynamic" in self.kept, *early])
+        self.seconds = np.loadtxt(folder / "seconds.txt")
+
+
+@dataclass(frozen=True)
+class Found:
+    """A machine with what the commands left; its floor [deg], (J,), is NaN where there is none."""
+
+    case: Case
+    end: Ending
+    floor: Array
 
     @property
-    def terms(self) -> Any:
-        """Whether a shared pump, oil, and each joint's lag before its dead band show, (2 + J,)."""
-        return np.array([self.droop > 0, self.stiff.any(), *self.early])
+    def ratio(self) -> Array:
+        """Unseen error over the floor by joint, (J,); infinite where the fit diverged."""
+        error = np.nan_to_num(self.end.errors[-1], nan=np.inf)
+        return error / self.floor
 
-    def simulate(self, command: Array, start: Array) -> Array:
-        """Angles [rad], (T, J), under commands of STEP [s] and %, (T, J)."""
-        sided = (*self.ends.T, *self.full.T, *self.dead.T, *self.exponent.T, *self.draw.T)
-        single = (self.length, self.mass, self.lag, self.early, self.load, self.friction, self.lever)
-        numbers = np.array([*single, self.stiff, self.ratio, *sided], float)
-        late = np.round(self.delay / STEP).astype(np.int64)
-        return integrate(np.ascontiguousarray(command), start, late, self.vertical, numbers, self.droop)
+    @property
+    def within(self) -> Any:
+        """Whether each of RUNGS is good on each joint, (4, J); no error that is NaN is: it diverged."""
+        return self.end.errors <= self.case.good
 
-
-@njit(cache=True)
-def gravity_torque(angle: Array, vertical: Any, length: Array, mass: Array) -> Array:
-    """Torque that holds each joint [N·m], (J,): a planar chain, each link's mass in its middle."""
-    pitch, carried, moment = 0.0, 0.0, 0.0
-    along, torque = np.zeros(len(angle)), np.zeros(len(angle))
-    for j in range(len(angle)):
-        pitch += 0.0 if vertical[j] else angle[j]
-        along[j] = 0.0 if vertical[j] else length[j] * np.cos(pitch)
-    for j in range(len(angle) - 1, -1, -1):
-        moment += along[j] * (0.5 * mass[j] + carried)
-        carried += mass[j]
-        torque[j] = 0.0 if vertical[j] else GRAVITY * moment
-    return torque
-
-
-@njit(cache=True)
-def opening(signal: float, dead: Array, exponent: Array) -> float:
-    """Part of the full speed, with its sign, that a signal [%] asks for."""
-    side = 0 if signal >= 0 else 1
-    beyond = max(abs(signal) - dead[side], 0.0) / (100.0 - dead[side])
-    return np.sign(signal) * beyond ** exponent[side]
-
-
-@njit(cache=True)
-def speeds(supply: float, part: Array, lift: Array, friction: Array, turn: Array) -> Array:
-    """Part of each joint's full speed at a supply pressure, (J,)."""
-    against = np.sign(part) * lift + friction * np.abs(np.sign(part))
-    return np.abs(part) * np.sqrt(np.maximum(supply - against, 0.0)) * turn
-
-
-@njit(cache=True)
-def integrate(command: Array, start: Array, late: Any, vertical: Any, numbers: Array, droop: float) -> Array:
-    """Angles [rad], (T, J), under commands of STEP [s] and %, (T, J); `numbers` as in `Machine.simulate`."""
-    steps, joints = command.shape
-    length, mass, lag, early, load, friction, lever, stiff, ratio, lower, upper = numbers[:11]
-    full, dead, exponent, draw = numbers[11:13], numbers[13:15], numbers[15:17], numbers[17:19]
-    angle, found = start.copy(), np.empty((steps, joints))
-    held, speed, force = np.zeros(joints), np.zeros(joints), np.zeros(joints)
-    part, turn, lift = np.zeros(joints), np.zeros(joints), np.zeros(joints)
-    for k in range(steps):
-        found[k] = angle
-        torque = gravity_torque(angle, vertical, length, mass)
-        for j in range(joints):
-            u = command[k - late[j], j] if k >= late[j] else 0.0
-            target = u if early[j] else opening(u, dead[:, j], exponent[:, j])
-            held[j] += (target - held[j]) * (1.0 - np.exp(-STEP / lag[j]))
-            part[j] = opening(held[j], dead[:, j], exponent[:, j]) if early[j] else held[j]
-            middle = (angle[j] - 0.5 * (lower[j] + upper[j])) / (upper[j] - lower[j])
-            turn[j] = 1.0 / (1.0 - lever[j] * (2.0 * middle) ** 2)
-            lift[j] = torque[j] * turn[j] / load[j]  # what turns faster holds less
-        low, high, supply = 0.0, 1.0, 1.0
-        if droop > 0:
-            for _ in range(30):
-                supply = 0.5 * (low + high)
-                rate, taken = speeds(supply, part, lift, friction, turn), 0.0
-                for j in range(joints):
-                    taken += rate[j] / turn[j] * draw[0 if part[j] >= 0 else 1, j]
-                low, high = (supply, high) if 1.0 - droop * taken > supply else (low, supply)
-        rate = speeds(supply, part, lift, friction, turn)
-        for j in range(joints):
-            wanted = np.sign(part[j]) * full[0 if part[j] >= 0 else 1, j] * rate[j]
-            if stiff[j] > 0:  # oil: a spring between what the valve lets through and the arm
-                force[j] += STEP * stiff[j] * (wanted - speed[j])
-                speed[j] += STEP * (force[j] - 2.0 * ratio[j] * np.sqrt(stiff[j]) * (speed[j] - wanted))
-            else:
-                speed[j] = wanted
-            angle[j] += STEP * speed[j]
-            if angle[j] < lower[j] or angle[j] > upper[j]:
-                angle[j], speed[j], force[j] = min(max(angle[j], lower[j]), upper[j]), 0.0, 0.0
-    return found
-
-
-def stick(rng: Generator, m: Machine, seconds: float) -> tuple[Array, Array]:
-    """Commands as a person gives them, kept off the stops, with the angles that follow."""
-    steps, (lower, upper) = round(seconds / STEP), m.ends.T
-    start, margin = lower + (upper - lower) * rng.uniform(0.35, 0.65, m.joints), 0.04 * (upper - lower)
-    command, angle, block = np.zeros((steps, m.joints)), np.tile(start, (steps, 1)), round(10.0 / STEP)
-    for first in range(0, steps, block):
-        last = min(first + block, steps)
-        trial, moved = command, angle
-        for _ in range(12):
-            trial = command.copy()
-            for j in range(m.joints):
-                k = first or round(1.0 / STEP)
-                while k < last:
-                    hold = round(rng.uniform(0.5, 3.0) / STEP)
-                    level = rng.choice([-1, 1]) * rng.uniform(0.3, 1.0) * 100 if rng.random() < 0.6 else 0.0
-                    ramp = min(round(rng.uniform(0.05, 0.5) / STEP), hold)
-                    end = min(k + hold, last)
-                    part = np.minimum(np.arange(1, end - k + 1) / max(ramp, 1), 1.0)
-                    trial[k:end, j] = trial[k - 1, j] + (level - trial[k - 1, j]) * part
-                    k = end
-            for again in (True, False):
-                moved = m.simulate(trial[:last], start)
-                bad = np.any((moved < lower + margin) | (moved > upper - margin), axis=0)
-                if again and bad.any():
-                    trial[first:last, bad] *= rng.uniform(-1.0, 0.6)
-            if not bad.any():
-                break
-        command, angle[:last] = trial, moved
-    return command, angle
-
-
-def write_machine(folder: Path, m: Machine, rng: Generator) -> list[Path]:
-    """Write the URDF and three logs; the last is the unseen one."""
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "robot.urdf").write_text(urdf(m))
-    logs = [folder / f"log_{number}.csv" for number in (1, 2, 3)]
-    header = ["time_s", *(f"u_{n}_pct" for n in m.names), *(f"q_{n}_deg" for n in m.names)]
-    for path in logs:
-        command, angle = stick(rng, m, 60.0 if path is logs[-1] else float(rng.uniform(40, 120)))
-        times = np.arange(0, len(command) * STEP - STEP, 1 / m.rate)
-        times[1:] += rng.uniform(-0.1, 0.1, len(times) - 1) / m.rate
-        at = np.minimum(np.round(times / STEP).astype(int), len(command) - 1)
-        noisy = np.degrees(angle[at] + rng.normal(0, m.noise, (len(at), m.joints)))
-        table = np.column_stack([at * STEP, command[at], noisy])
-        np.savetxt(path, table, delimiter=",", header=",".join(header), comments="", fmt="%.4f")
-    return logs
-
-
-def urdf(m: Machine, turned: int | None = None) -> str:
-    """The machine as its maker's CAD exports it; the axis of joint `turned` (from 0) is turned round."""
-    text, parent, x = '<robot name="stranger"><link name="base"/>', "base", 0.0
-    for j, name in enumerate(m.names):
-        wide, vertical = 0.15 * m.length[j], m.vertical[j]
-        long, reach = (wide, 0.0) if vertical else (m.length[j], m.length[j])
-        middle, shape = f"{reach / 2} 0 0", f'<box size="{long} {wide} {wide}"/>'
-        text += body(f"{name}_link", (long, wide, wide), m.mass[j], shape, centre=middle, seen=middle)
-        axis = "0 0 1" if vertical else "0 1 0" if j == turned else "0 -1 0"
-        limit = LIMIT.format(*m.ends[j])
-        text += joint(name, parent, f"{name}_link", at=f"{x} 0 0", axis=axis, limit=limit)
-        parent, x = f"{name}_link", reach
-    return f"{text}</robot>\n"
+    @property
+    def silent(self) -> bool:
+        """Whether a joint is not good, and the verdict does not name it."""
+        missed = 1 + np.flatnonzero(~self.within[-1])
+        return not {*missed.tolist()} <= {*self.end.blamed}
 
 
 def run_commands(folder: Path, robot: Path) -> None:
@@ -237,38 +107,19 @@ def run_commands(folder: Path, robot: Path) -> None:
     np.savetxt(folder / "seconds.txt", clock.seconds)
 
 
-class Ending:
-    """What the commands left in a machine's folder.
-
-    errors: unseen rms errors of each of RUNGS [deg], (4, J). blamed: joints that the verdict does not call
-    predicted, from 1. kept: name of the estimate. terms: as `Machine.terms`; the larger lag counts. seconds:
-    wall and CPU time.
-    """
-
-    def __init__(self, folder: Path) -> None:
-        record = load_record(folder / "mine" / "runs" / "fit")
-        rows = [one.baselines_deg | {RUNGS[-1]: one.unseen_deg} for one in record.verdict]
-        self.errors = np.array([[one.get(rung) for one in rows] for rung in RUNGS], float)
-        self.blamed = [one.joint for one in record.verdict if one.verdict != "predicts"]
-        self.kept, values = str(record.summary.final), record.summary.values
-        early = [values.get(f"pilot_{v.name}", 0) > values.get(f"lag_{v.name}", 0) for v in record.verdict]
-        self.terms = np.array(["pump" in self.kept, "oil" in self.kept or "dynamic" in self.kept, *early])
-        self.seconds = np.loadtxt(folder / "seconds.txt")
-
-
-def stranger(seed: int, number: int, folder: Path, *, stored: bool) -> tuple[str, Array, Any]:
-    """Run a random machine: its name, the errors that are good [deg], (J,), and its terms."""
+def stranger(seed: int, number: int, folder: Path, *, stored: bool) -> Case:
+    """Run a random machine."""
     rng = np.random.default_rng([seed, number])
     machine = Machine(rng, number)
     if not stored:
         write_machine(folder, machine, rng)
         run_commands(folder, folder / "robot.urdf")
     assert (folder / "robot.urdf").read_text() == urdf(machine), "it is of another --seed"
-    travel = np.ptp(np.loadtxt(folder / "log_3.csv", delimiter=",", skiprows=1)[:, -machine.joints :], axis=0)
-    return str(number), 2 * np.degrees(machine.noise) + 0.02 * travel, machine.terms
+    travel = np.ptp(np.degrees(read_recording(folder / "log_3.csv").angle), axis=0)
+    return Case(str(number), folder, 2 * np.degrees(machine.noise) + 0.02 * travel, machine)
 
 
-def world(number: int, folder: Path, *, stored: bool) -> tuple[str, Array, Any]:
+def world(number: int, folder: Path, *, stored: bool) -> Case:
     """Run one of the twelve arms as the world has them; errors are good up to twice the noise."""
     name, one = [*WORLDS.items()][number]
     if not stored:
@@ -277,39 +128,164 @@ def world(number: int, folder: Path, *, stored: bool) -> tuple[str, Array, Any]:
             write_log(one, folder / f"log_{k}.csv", 60.0, k)
         run_commands(folder, one.write(one, folder))
     noise = [np.degrees(NOISE_M) if j == "telescope" else NOISE_DEG for j in one.joints]
-    return name, 2 * np.array(noise), None
+    return Case(name, folder, 2 * np.array(noise))
+
+
+def run(given: Any, number: int) -> Found:
+    """Run a machine, or take it from its folder, and judge it."""
+    folder = Path(given.folder) / f"{number:02d}"
+    if not given.stored:
+        shutil.rmtree(folder, ignore_errors=True)
+    if given.worlds:
+        case = world(number, folder, stored=given.stored)
+    else:
+        case = stranger(given.seed, number, folder, stored=given.stored)
+    end = Ending(folder)
+    if case.machine is None:
+        return Found(case, end, np.full(len(case.good), np.nan))
+    log, recording = end.unseen, read_recording(folder / "log_3.csv")
+    return Found(case, end, floor(case.machine, recording, log.time, log.angle))
+
+
+def figures(values: Array) -> str:
+    return " ".join(f"{value:.2f}" for value in values)
+
+
+def show(one: Found) -> None:
+    """Print a machine's row."""
+    end, machine = one.end, one.case.machine
+    terms = [] if machine is None else [machine.terms, end.terms]
+    shown = ", ".join("".join(np.where(of, "y", "-")) for of in terms)
+    floors = ("", "") if machine is None else (figures(one.floor), figures(one.ratio))
+    cells = *map(figures, end.errors), *floors, figures(one.case.good), end.blamed or "", end.kept, shown
+    inside = " ".join(f"{part:.0f}" for part in end.inside)
+    row(one.case.name, *cells, inside, SPENT.format(*end.seconds))
+
+
+def show_totals(found: Sequence[Found], machines: int) -> None:
+    """Print what all machines have in common; those that were refused are not good."""
+    print()
+    if known := [one for one in found if one.case.machine is not None]:
+        show_ratio("unseen error over the floor", np.concatenate([one.ratio for one in known]))
+        show_terms(known)
+    show_inside(found)
+    print(f"{sum(one.silent for one in found)} with a missed joint that the verdict does not name")
+    good = np.sum([one.within.all(axis=1) for one in found], axis=0)
+    rungs = ", ".join(f"{rung} {count}" for rung, count in zip(RUNGS, good, strict=True))
+    middle = SPENT.format(*np.median([one.end.seconds for one in found], axis=0))
+    print(f"good of {machines}: {rungs}; refused {machines - len(found)}; median time {middle}")
+
+
+def show_terms(found: Sequence[Found]) -> None:
+    """Print how many terms of random machines were found, missed, and added where there is none."""
+    for what, part in TERMS.items():
+        true = np.concatenate([one.case.machine.terms[part] for one in found if one.case.machine])
+        kept = np.concatenate([one.end.terms[part] for one in found])
+        counts = np.sum([true & kept, true & ~kept, kept & ~true], axis=1)
+        print("{}: {} found, {} missed, {} added where there is none ({})".format(what, *counts, len(true)))
+
+
+def show_inside(found: Sequence[Found]) -> None:
+    """Print the share of all unseen samples that the bands hold; a fit that diverged has none."""
+    inside = np.concatenate([one.end.inside for one in found])
+    samples = np.concatenate([np.full(len(one.end.inside), len(one.end.unseen.time)) for one in found])
+    banded = np.isfinite(inside)
+    if banded.any():
+        share = np.average(inside[banded], weights=samples[banded])
+        print(f"inside the 95 % bands: {share:.1f} % of the unseen samples")
+
+
+def show_ratio(what: str, ratio: Array) -> None:
+    high = np.quantile(ratio, 0.9, method="higher")  # an infinite one allows no mean of two
+    print(f"{what}: median {np.median(ratio):.2f}, 90th percentile {high:.2f} ({len(ratio)} joints)")
+
+
+def show_exact(found: Sequence[Found]) -> None:
+    """Print what exact estimators leave of the unseen logs, beside the fit."""
+    table("machine | floor | exact, unseen | the fit, unseen | exact over the floor | the fit over it | CPU")
+    ratios = list[Array]()
+    for one in found:
+        exact, seconds = exact_errors(one)
+        ratios.append(exact / one.floor)
+        columns = one.floor, exact, one.end.errors[-1], ratios[-1], one.ratio
+        row(one.case.name, *map(figures, columns), f"{seconds:.0f} s")
+    print()
+    show_ratio("exact estimators over the floor", np.concatenate(ratios))
+    show_ratio("the fits of these machines over it", np.concatenate([one.ratio for one in found]))
+
+
+def exact_errors(one: Found) -> tuple[Array, float]:
+    """Unseen rms errors of an exact estimator [deg], (J,), and its CPU time [s]; kept in the folder."""
+    store, truth = one.case.folder / "exact.json", one.case.machine
+    assert truth is not None
+    if not store.is_file():
+        clock = Clock()
+        *fitted, unseen = map(read_recording, sorted(one.case.folder.glob("log_*.csv")))
+        angles = respond(exact_fit(truth, fitted), unseen)
+        error = rms_deg(errors(angles, one.end.unseen.time, one.end.unseen.angle))
+        store.write_text(json.dumps([error.tolist(), clock.seconds[1]]))
+    error, seconds = json.loads(store.read_text())
+    return np.array(error), seconds
+
+
+def show_followed(found: Sequence[Found], seed: int) -> None:
+    """Print what became of the unseen errors where `hydroid suggest` was followed."""
+    table("machine | left out | named | unseen, complete | before | after | over the floor | unseen error")
+    words = {"a term left out": list[str](), "nothing left out": list[str]()}
+    for one in found:
+        rng = np.random.default_rng([seed, int(one.case.name), 1])
+        try:
+            for case in followed(one.case.folder, rng):
+                word = show_case(one, case)
+                words["a term left out" if case.left_out else "nothing left out"].append(word)
+        except (hydroid.HydroidError, CalledProcessError) as error:
+            row(one.case.name, f"refused: {error}", *[""] * 6)
+    print()
+    for what, every in words.items():
+        counts = ", ".join(f"{word} {every.count(word)}" for word in (FALLS, RISES, NOTHING))
+        print(f"{what}, of {len(every)}: {counts}")
+
+
+def show_case(one: Found, case: Followed) -> str:
+    """Print a row, and return what became of the unseen error: of its ratio to the floor, rms over joints."""
+    before, after = np.array(case.before), np.array(case.after)
+    worth = [np.sqrt(np.mean((error / one.floor) ** 2)) for error in (before, after)]
+    if not case.named:
+        word = NOTHING
+    else:
+        # a fit that diverged has no error
+        old, new = np.nan_to_num(worth, nan=np.inf)
+        word = FALLS if new < old else RISES
+    change = "{:.2f} to {:.2f}".format(*worth)
+    errors = map(figures, (one.end.errors[-1], before, after))
+    row(one.case.name, case.left_out, " ".join(case.named), *errors, change, word)
+    return word
+
+
+def main() -> None:
+    numbers = {"machines": 40, "first": 0, "seed": 1, "exact": 0, "follow": 0}
+    given = options(__doc__, **numbers, worlds=False, stored=False, folder="build/strangers")
+    if given.worlds and (given.exact or given.follow):
+        raise SystemExit("--exact and --follow are of random machines, not of --worlds")
+    rungs = " | ".join(RUNGS)
+    judged = "floor | ratio | good at most | named joints | kept | terms, true and kept | inside [%] | time"
+    table(f"machine | {rungs} | {judged}")
+    found = list[Found]()
+    for number in range(given.first, given.first + given.machines):
+        try:
+            found.append(run(given, number))
+        except (hydroid.HydroidError, FileNotFoundError) as error:
+            row(number, f"refused: {error}", *[""] * (len(RUNGS) + 7))
+        else:
+            show(found[-1])
+    if not found:
+        return
+    show_totals(found, given.machines)
+    if given.exact:
+        show_exact(found[: given.exact])
+    if given.follow:
+        show_followed(found[: given.follow], given.seed)
 
 
 if __name__ == "__main__":
-    numbers = {"machines": 40, "first": 0, "seed": 1}
-    given = options(__doc__, **numbers, worlds=False, stored=False, folder="build/strangers")
-    if not given.stored:
-        shutil.rmtree(given.folder, ignore_errors=True)
-    make = world if given.worlds else partial(stranger, given.seed)
-    good, silent, terms, times = np.zeros(len(RUNGS), int), 0, list[Any](), list[Array]()
-    table(f"machine | {' | '.join(RUNGS)} | good at most | named joints | kept | terms, true and kept | time")
-    for number in range(given.first, given.first + given.machines):
-        folder = Path(given.folder) / f"{number:02d}"
-        try:
-            name, most, true = make(number, folder, stored=given.stored)
-            end = Ending(folder)
-        except (hydroid.HydroidError, FileNotFoundError) as error:
-            row(number, f"refused: {error}", *[""] * (len(RUNGS) + 4))
-            continue
-        within = end.errors <= most  # not where it is NaN: it diverged
-        missed, both = 1 + np.flatnonzero(~within[-1]), [] if true is None else [true, end.terms]
-        good, silent = good + within.all(axis=1), silent + bool({*missed.tolist()} - {*end.blamed})
-        terms, times = terms + [np.array(both)] * bool(both), [*times, end.seconds]
-        figures = (" ".join(f"{x:.2f}" for x in one) for one in (*end.errors, most))
-        shown = ["".join(np.where(one, "y", "-")) for one in both]
-        cells = (*figures, end.blamed or "", end.kept, ", ".join(shown))
-        row(name, *cells, SPENT.format(*end.seconds))
-    print()
-    for what, part in TERMS.items() if terms else ():
-        true, kept = np.hstack([one[:, part] for one in terms])
-        found, missed, added = np.sum([true & kept, true & ~kept, kept & ~true], axis=1)
-        print(f"{what}: {found} found, {missed} missed, {added} added where there is none ({len(true)})")
-    rungs = ", ".join(f"{rung} {count}" for rung, count in zip(RUNGS, good, strict=True))
-    print(f"{silent} with a missed joint that the verdict does not name")
-    middle = SPENT.format(*np.median(times, axis=0)) if times else ""
-    print(f"good of {given.machines}: {rungs}; median time {middle}")
+    main()

@@ -23,6 +23,7 @@ from worlds import NOISE_DEG, NOISE_M, WORLDS, write_log
 import hydroid
 from hydroid.arrays import Array
 from hydroid.fitting.baselines import NAMES as BASELINES
+from hydroid.joint_verdict import Verdict
 from hydroid.run.record import load_record
 
 STEP = 0.002
@@ -249,7 +250,7 @@ class Ending:
         record = load_record(folder / "mine" / "runs" / "fit")
         rows = [one.baselines_deg | {RUNGS[-1]: one.unseen_deg} for one in record.verdict]
         self.errors = np.array([[one.get(rung) for one in rows] for rung in RUNGS], float)
-        self.blamed = [one.joint for one in record.verdict if one.verdict != "predicts"]
+        self.blamed = [one.joint for one in record.verdict if one.verdict is not Verdict.PREDICTS]
         self.kept, values = str(record.summary.final), record.summary.values
         early = [values.get(f"pilot_{v.name}", 0) > values.get(f"lag_{v.name}", 0) for v in record.verdict]
         self.terms = np.array(["pump" in self.kept, "oil" in self.kept or "dynamic" in self.kept, *early])

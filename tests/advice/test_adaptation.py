@@ -9,10 +9,10 @@ from two_joints import PARAMETERS, PERIOD, TRUTH, drive, two_joints
 import hydroid
 from hydroid.advice.adaptation import adapted, load_findings, steps
 from hydroid.errors import SettingsError
-from hydroid.estimate import JointVerdict
 from hydroid.fitting.baselines import NAMES
 from hydroid.fitting.verdict import behind
 from hydroid.identified_model import identified
+from hydroid.joint_verdict import JointVerdict
 from hydroid.progress import no_progress
 
 SLOWER = TRUTH | {"flow": 90.0}

@@ -15,9 +15,10 @@ import pytest
 from report_fits import make_fit, make_prediction, make_problem, make_record
 
 from hydroid.errors import RunError
-from hydroid.estimate import FitSummary, JointVerdict
+from hydroid.estimate import FitSummary
 from hydroid.fitting.search import HISTORY
 from hydroid.fitting.verdict import judge
+from hydroid.joint_verdict import JointVerdict
 from hydroid.reporting.page import Page, Section, Table
 from hydroid.reporting.page_file import html, write_figures, write_page, write_tables
 from hydroid.reporting.predictions import fit_page, validation_page

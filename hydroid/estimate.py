@@ -1,6 +1,7 @@
 """`estimate.yaml`: what a fit found, as plain values; `--json` of a fit prints the same."""
 
 import math
+import os
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -16,6 +17,8 @@ from hydroid.settings.load import JointNumber, NotNegative, Positive, Settings, 
 
 Interval = tuple[float | None, float | None]  # its ends; null: it has no limit there
 NAME = "estimate.yaml"  # name of the file in a run folder and beside a saved plant
+DESCRIPTION = "run.json"
+"""name of the file that describes a run: versions, seed, hashes of its logs and files, status, seconds"""
 
 
 class ParameterEstimate(Settings):
@@ -131,19 +134,23 @@ class AngleError(Settings):
     """growth of the drift's variance with time [deg²/s]"""
     drift_per_way: NotNegative
     """growth of the drift's variance with the way travelled [deg²/deg]"""
-    relaxation_s: Positive
-    """time in which the drift is forgotten [s]"""
+    lasting_deg: NotNegative
+    """standard deviation of an error that lasts for a moment [deg]"""
+    lasting_s: Positive
+    """time constant of that error [s]"""
     after_10_s_deg: NotNegative
-    """standard deviation of a prediction 10 s ahead, whatever the parameters, at the logs' mean speed [deg]"""
+    """standard deviation of a prediction 10 s ahead, whatever the parameters, at the logs' mean speed [deg]
+    """
     lasts_s: NotNegative = 0.0
     """time for which what is left of the error lasts [s]; 0: it is as the error model says"""
 
     @property
-    def numbers(self) -> tuple[float, float, float, float]:
+    def numbers(self) -> tuple[float, ...]:
         """The numbers of the error model in rad and s."""
         degree = math.radians(1.0)
         drifts = degree**2 * self.drift_per_s, degree * self.drift_per_way
-        return (degree * self.sensor_deg) ** 2, *drifts, self.relaxation_s
+        lasting = (degree * self.lasting_deg) ** 2
+        return (degree * self.sensor_deg) ** 2, *drifts, lasting, self.lasting_s
 
 
 class FitSummary(Settings):
@@ -208,9 +215,10 @@ def read_estimate(source: Path) -> tuple[Path, Plain, FitSummary | None]:
     Returned are the file, its values, unchecked where they are not an estimate's, and the estimate where
     there is one.
     """
-    file = source / NAME if source.is_dir() else source
-    if source.is_dir() and not is_file(file):
-        begun = is_file(source / "run.json")
+    folder = os.path.isdir(source)  # Path's own raises for a name that no folder can have
+    file = source / NAME if folder else source
+    if folder and not is_file(file):
+        begun = is_file(source / DESCRIPTION)
         hint = "resume the fit" if begun else "name a run folder, a folder of Plant.save or a YAML file"
         raise RunError("holds no estimate" + (" yet" if begun else ""), source, hint)
     content, lines = read_yaml(file)

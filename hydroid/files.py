@@ -1,6 +1,7 @@
 """Files: written so that they appear completely or not at all, and those that hydroid ships."""
 
 import csv
+import errno
 import io
 import os
 import signal
@@ -15,8 +16,8 @@ from hydroid.errors import RunError, SettingsError
 
 Plain = dict[str, Any]  # a mapping as YAML and JSON hold it
 PART = ".part"  # suffix of a file that is being written
-NOTICES = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGUSR1") if hasattr(signal, name))
-"""signals by which a cluster says that time is nearly up"""
+NOTICES = tuple(getattr(signal, n) for n in ("SIGTERM", "SIGUSR1", "SIGHUP") if hasattr(signal, n))
+"""signals by which a cluster says that time is nearly up, and a terminal that it is closed"""
 
 
 @contextmanager
@@ -56,25 +57,40 @@ def write_atomic(path: Path, content: str | bytes, *, keep: Path | None = None) 
     The content, text as UTF-8, reaches the disk before the file gets its name, so a power cut leaves the old
     file or the new one. A killed process may leave a hidden file with the suffix PART. `keep` is a path in
     the same folder to which the old file, if any, is moved first: after a crash between the two renamings
-    only it exists. Raises RunError: the folder cannot be written, or the disk is full.
+    only it exists. Raises RunError: the folder cannot be written, the disk is full, or the path is that of a
+    folder, a pipe or a device, which a file would replace.
     """
-    temporary = path.parent / f".{path.name}.{token_hex(4)}{PART}"
+    place = Path(os.path.realpath(path))  # a link stays, and what it leads to is written
+    if os.path.exists(path) and not is_file(path):
+        raise RunError("cannot be written (it is no file)", path, "name another file")
+    temporary = place.parent / f".{place.name}.{token_hex(4)}{PART}"
     try:
         with writing(path):
-            path.parent.mkdir(parents=True, exist_ok=True)
+            place.parent.mkdir(parents=True, exist_ok=True)
             with temporary.open("xb") as file:
                 file.write(content.encode() if isinstance(content, str) else content)
                 file.flush()
                 os.fsync(file.fileno())
-            if keep is not None and path.exists():
-                path.replace(keep)
-            temporary.replace(path)
+            if keep is not None and place.exists():
+                place.replace(keep)
+            temporary.replace(place)
     finally:
         with suppress(OSError):  # it has its name by now, or was never made
             temporary.unlink()
 
 
 is_file = os.path.isfile  # Path's own raises for a name that no file can have
+
+
+def read_file(path: Path, most: int | None = None) -> bytes:
+    """Return the bytes of a file, of a longer one the first `most`.
+
+    Raises OSError: it cannot be read, or is a pipe or a device, which may never end.
+    """
+    if os.path.exists(path) and not (is_file(path) or path.is_dir()):
+        raise OSError(errno.EINVAL, "it is no file", str(path))
+    with path.open("rb") as file:
+        return file.read(-1 if most is None else most)
 
 
 def csv_text(rows: Iterable[Iterable[Any]]) -> str:

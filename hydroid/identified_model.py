@@ -1,12 +1,17 @@
 """An estimate with its settings: from a run folder, a saved plant, a file of values, or nominal values."""
 
+import hashlib
+import json
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from hydroid.arrays import Array, record
-from hydroid.estimate import NAME, FitSummary, ParameterEstimate, read_estimate
-from hydroid.files import find_config, is_file, write_atomic, yaml_text
+from hydroid.errors import RunError
+from hydroid.estimate import DESCRIPTION, NAME, FitSummary, ParameterEstimate, read_estimate
+from hydroid.files import find_config, is_file, read_file, write_atomic, yaml_text
+from hydroid.progress import LOGGER
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load
 
@@ -76,17 +81,37 @@ def load_identified(
     Args:
         source: a run folder, the folder of a saved plant, an `estimate.yaml`, or a YAML file of values by
             name; None: no values.
-        config: settings, a path or a shipped name; left out: those beside the estimate, or those shipped.
+        config: settings, a path or a shipped name; left out: those beside the estimate. A file of values
+            without settings beside it has those that are shipped.
         nominal: take parameters without a value as the settings and the arm's file have them.
 
     Raises:
-        RunError: the folder holds no estimate.
+        RunError: the folder holds no estimate, or a fit's settings are not beside its estimate.
         SettingsError: a file that cannot be read, a parameter that is unknown, or missing and not `nominal`.
     """
+    if source is not None and config is None:
+        warn_of_changes(Path(source))
+    return read_identified(source, config, overrides, nominal=nominal)
+
+
+def read_identified(
+    source: str | Path | None,
+    config: str | Path | None = None,
+    overrides: Mapping[str, Any] | None = None,
+    *,
+    nominal: bool = False,
+) -> IdentifiedModel:
+    """Read as `load_identified` does, without a word on what was changed."""
     file, values, summary = (None, {}, None) if source is None else read_estimate(Path(source))
     beside = file and file.parent / CONFIG
-    shipped = "fit-hyd" if nominal else "fit-mech"
-    chosen = config or (beside if beside and is_file(beside) else shipped)
+    if beside and is_file(beside):
+        own = beside
+    elif summary is None or config is not None:
+        own = "fit-hyd" if nominal else "fit-mech"
+    else:
+        what = f"is missing, and {NAME} says nothing without the settings of its fit"
+        raise RunError(what, beside, "put it back, or name the run folder")
+    chosen = config or own
     settings = load(find_config(chosen), FitSettings, overrides)
     if config is None and summary is not None:
         settings = settings.of_estimate(summary.final)
@@ -97,6 +122,38 @@ def load_identified(
     origin = str(file or chosen)
     theta = settings.parameter_set().vector(values, origin)
     return IdentifiedModel(settings, theta, origin, summary, tuple(missing))
+
+
+def own_hashes(folder: Path) -> dict[str, str]:
+    """Return hashes of the settings and the model in a run folder, by file."""
+    files = [folder / name for name in (CONFIG, ARM, MODEL)]
+    files += sorted((folder / MODEL).parent.glob("meshes/*"))
+    return {f.relative_to(folder).as_posix(): file_hash(f) for f in files if f.is_file()}
+
+
+def warn_of_changes(source: Path) -> None:
+    """Say which files of a run, given by its folder or its estimate, are not as its fit left them."""
+    folder = source if os.path.isdir(source) else source.parent
+    for name in changed_files(folder):
+        text = "warning: %s: is not as the fit left it; put it back, or fit again"
+        LOGGER.warning(text, folder / name)
+
+
+def changed_files(folder: Path) -> list[str]:
+    """Return the files of a run folder that are not what its fit wrote; none of a folder that is no run's."""
+    try:
+        run = json.loads(read_file(folder / DESCRIPTION))
+        written = {**run["files"]} | ({NAME: run["estimate"]} if "estimate" in run else {})
+    except (OSError, ValueError, RecursionError, KeyError, TypeError):
+        return []  # whoever needs the description says what is wrong with it
+    there = own_hashes(folder) | {NAME: file_hash(folder / NAME)}
+    return [name for name, known in written.items() if there.get(name) != known]
+
+
+def file_hash(*files: Path) -> str:
+    """Return one hash of the content of files; those that are not there count as empty."""
+    contents = (read_file(file) for file in files if is_file(file))
+    return hashlib.sha256(b"".join(contents)).hexdigest()
 
 
 def start_values(settings: FitSettings) -> IdentifiedModel:

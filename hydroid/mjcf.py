@@ -6,15 +6,18 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import mujoco
+import numpy as np
 
 from hydroid.errors import ModelError, RunError
 from hydroid.files import is_file, write_atomic
+from hydroid.robot_xml import read_robot
 
 
 def read_mjcf(path: Path) -> mujoco.MjSpec:
-    """Read an MJCF whose joints turn or slide, each alone on its body."""
+    """Read an MJCF whose joints turn or slide, each alone on its body, and whose numbers are finite."""
     if not is_file(path):
         raise ModelError("no such model", path)
+    read_robot(path)  # MuJoCo takes a NaN for what it likes
     with mujoco_errors(path):
         spec = mujoco.MjSpec.from_file(str(path))
     if not spec.joints:
@@ -27,6 +30,15 @@ def read_mjcf(path: Path) -> mujoco.MjSpec:
             raise ModelError(f"joint {joint.name!r} must be a hinge or a slide, alone on its body", path)
     if spec.equalities:
         raise ModelError("has equality constraints, which hydroid does not simulate", path)
+    lifted = [body.name for body in spec.bodies if body.gravcomp]
+    if lifted:
+        what = f"body {lifted[0]!r} has gravcomp: hydroid does not simulate what takes its weight away"
+        raise ModelError(what, path, "take gravcomp out")
+    if spec.option.density or spec.option.viscosity:
+        raise ModelError("has a density or viscosity of the air, which hydroid does not simulate", path)
+    for joint in spec.joints:
+        if not np.isfinite(joint.range).all():  # both, or `read_robot` refuses it
+            joint.limited, joint.range = mujoco.mjtLimited.mjLIMITED_FALSE, [0.0, 0.0]
     return spec
 
 

@@ -29,7 +29,7 @@ def predict_log(model: IdentifiedModel, log: Log) -> Log:
     settings = model.settings
     passive = settings.simulation.other_joints == "passive"
     moving = [j for j in range(log.joints) if passive or log.driven[j]]
-    angle = log.angle.copy()
+    angle = log.posed.copy()
     if settings.simulation.other_joints == "locked":
         angle[:] = log.start
     hydraulic = log.driven & (settings.stage == "hyd")

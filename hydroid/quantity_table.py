@@ -44,8 +44,8 @@ class Quantity(NamedTuple):
 
     @property
     def factor(self) -> float:
-        """What turns a value in `unit` into SI."""
-        return UNITS[self.unit.lower()].factor if self.unit.lower() in UNITS else 1.0
+        """What turns a value in `unit` into SI, but for the command's %; 1 of a plain number."""
+        return UNITS[self.unit.lower()].factor if self.unit else 1.0
 
     @property
     def positive(self) -> bool:
@@ -74,13 +74,17 @@ class Quantity(NamedTuple):
             )
 
 
-def _quantity(name: str, row: Plain) -> Quantity:
+def quantity(name: str, row: Plain) -> Quantity:
+    """Return the quantity of one row; ValueError if `units.yaml` lacks its unit."""
     values: Plain = {key: tuple(value) if isinstance(value, list) else value for key, value in row.items()}
-    return Quantity(name, **values)
+    made = Quantity(name, **values)
+    if made.unit and made.unit.lower() not in UNITS:
+        raise ValueError(f"quantities.yaml: {name}: units.yaml has no unit {made.unit}")
+    return made
 
 
 _GROUPS = {
-    group: tuple(map(_quantity, rows, rows.values())) for group, rows in read_table("quantities.yaml").items()
+    group: tuple(map(quantity, rows, rows.values())) for group, rows in read_table("quantities.yaml").items()
 }
 
 ROWS = tuple(chain(*_GROUPS.values()))  # the one table

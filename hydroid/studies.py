@@ -28,7 +28,7 @@ from hydroid.fitting.fit import fit
 from hydroid.log import Log
 from hydroid.problem.problem import Problem
 from hydroid.progress import LOGGER, NOTE, Progress
-from hydroid.run.folder import VERSIONS, deciding, digest, model_hash, samples_hash
+from hydroid.run.folder import VERSIONS, deciding, digest, log_hash, model_hash
 from hydroid.search.pareto import segment_best
 from hydroid.settings.fit import FitSettings, StudySettings, cell_settings
 from hydroid.settings.load import load
@@ -52,7 +52,7 @@ class Task:
                 "versions": VERSIONS,
                 "settings": deciding(self.settings),
                 "model": model_hash(self.settings.arm),
-                "logs": [samples_hash(log) for log in self.logs],
+                "logs": [log_hash(log, self.settings) for log in self.logs],
             }
         )[:24]
 

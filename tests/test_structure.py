@@ -12,18 +12,8 @@ imports = runpy.run_path(str(ROOT.parent / "benchmarks" / "structure.py"))["impo
 # a package may import packages of a lower layer, and itself
 LAYERS = [
     {"arrays", "errors"},
-    {
-        "files",
-        "findings",
-        "joint_verdict",
-        "mjcf",
-        "parameters",
-        "progress",
-        "quantity_table",
-        "settings",
-        "units",
-        "words",
-    },
+    {"files", "findings", "mjcf", "parameters", "progress", "quantity_table", "robot_xml"}
+    | {"joint_verdict", "settings", "units", "words"},
     {"estimate"},
     {"identified_model"},
     {"log", "arm", "hydraulics"},

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.signal import find_peaks
 
 from hydroid.parameters import Array
+from hydroid.posterior.error_model import likelihood_at
 from hydroid.posterior.linear import linearised
 from hydroid.posterior.uncertainty import WEAK_ABOVE
 from hydroid.problem.problem import Problem
@@ -33,7 +34,8 @@ class Directions:
     def __init__(self, problem: Problem, truth: Mapping[str, float]) -> None:
         self.parameters = problem.parameters
         self.truth = self.parameters.vector(truth, "truth")
-        self.slopes = linearised(problem, self.truth).slopes
+        likelihood = likelihood_at(problem, self.truth)
+        self.slopes = likelihood.errors.errors(linearised(likelihood, self.truth).slopes)
         self.axes = determined(self.slopes)
         self.names = [n for n, free in zip(self.parameters.names, self.parameters.free, strict=True) if free]
 

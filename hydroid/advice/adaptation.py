@@ -15,10 +15,9 @@ from hydroid.advice.suggestions import refitted
 from hydroid.errors import SettingsError
 from hydroid.files import Plain
 from hydroid.findings import Finding
-from hydroid.fitting.left_out import LeftOut, gain, is_better, parts, predict_parts
+from hydroid.fitting.left_out import LeftOut, density_of, gain, is_better, parts, predict_parts
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
-from hydroid.posterior.error_model import likelihood_at
 from hydroid.problem.problem import Problem
 from hydroid.progress import Progress
 from hydroid.settings.fit import FitSettings
@@ -92,10 +91,8 @@ def steps(
 def _as_it_is(problem: Problem, model: IdentifiedModel) -> LeftOut:
     """Return what a model that is not fitted to them makes of the parts of the logs."""
     errors = problem.output_errors(model.theta[None])[0]
-    judge = likelihood_at(problem, model.theta).errors
-    density = judge.log_density(judge.innovations(errors[None])[0])
-    density[~np.isfinite(density)] = -np.inf
-    return LeftOut(problem, np.tile(model.theta, (len(np.unique(parts(problem))), 1)), errors, density)
+    thetas = np.tile(model.theta, (len(np.unique(parts(problem))), 1))
+    return LeftOut(problem, thetas, errors, density_of(problem, errors))
 
 
 def load_findings(settings: FitSettings) -> tuple[Finding, ...]:

@@ -165,7 +165,7 @@ class ExperimentSimulator:
         if not np.isfinite(slopes).all():
             return DIVERGED
         each = np.moveaxis(slopes.reshape(len(slopes), -1, len(self._outputs)), -1, 0)
-        gained = measured(self._settings.design, each, self._settings.log.period_s)
+        gained = measured(self._settings.design, [*each], self._settings.log.period_s)
         return Trial(experiment, gained, replace(experiment.log(self._settings), angle=angle))
 
     def _simulate(self, experiment: Experiment, theta: Array) -> Array:

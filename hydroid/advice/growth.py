@@ -12,7 +12,8 @@ The statistic is the score of C. R. Rao (1948), a standard normal variable where
 
     z = -d' r / |d'|.
 
-The change of the quantity that would explain most is a = -d' r / |d'|², and raises the log-likelihood by z² / 2.
+The change of the quantity that would explain most is a = -d' r / |d'|². It raises the log-likelihood by
+z² / 2.
 """
 
 import math
@@ -33,7 +34,8 @@ class Score:
     """Statistic z of one change of the model, positive where the change lowers the error.
 
     By the linear approximation the `amount` of it that lowers the error most raises the log-likelihood by
-    `gain`. `strength` is the statistic that the whole change would have without noise: what can be seen at all.
+    `gain`. `strength` is the statistic that the whole change would have without noise: what can be seen at
+    all.
     """
 
     statistic: float

@@ -19,7 +19,7 @@ from hydroid.estimate import finite
 from hydroid.files import Plain
 from hydroid.findings import Finding
 from hydroid.fitting.left_out import LeftOut, gain, is_better, parts, predict_parts
-from hydroid.fitting.refinement import Refinement, refine
+from hydroid.fitting.refinement import Refinement, refine_from_afar
 from hydroid.fitting.step import Step
 from hydroid.fitting.summary import angle_errors
 from hydroid.posterior.error_model import Likelihood
@@ -96,7 +96,9 @@ def advice(
 
 def refitted(likelihood: Likelihood, theta: Array, without: int) -> Refinement:
     """Refine an estimate for a comparison on parts left out; nothing is shown or stored of it."""
-    return refine(likelihood, theta, COMPARED, lambda *_: False, {}, Step("compared", without=without))
+    return refine_from_afar(
+        likelihood, theta, COMPARED, lambda *_: False, {}, Step("compared", without=without)
+    )
 
 
 def improvement(after: LeftOut, before: LeftOut) -> dict[str, tuple[float, float]]:

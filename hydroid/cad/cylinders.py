@@ -15,13 +15,14 @@ import mujoco
 import numpy as np
 
 from hydroid.arrays import Array, record
-from hydroid.cad.repair import compiled
-from hydroid.cad.source import Notes
+from hydroid.cad.repair import bare_model
+from hydroid.cad.source import Notes, word
 from hydroid.files import Plain
 from hydroid.settings.linkage import FourBar, four_bar
 
-PARTS = {"rod", "piston", "cylinder", "cyl", "ram", "tube", "barrel"}
+PARTS = {"rod", "piston", "cylinder", "cyl", "ram", "tube", "barrel", "anchor", "clevis", "trunnion"}
 """words in the names of a cylinder's links and joints"""
+ENDS = "parent", "child"  # of the sites that show where a cylinder is pinned
 
 
 @record
@@ -39,18 +40,12 @@ class _Pin:
 def take_cylinders(spec: mujoco.MjSpec, notes: Notes) -> dict[str, Plain]:
     """Hold the links of cylinders and return what an arm's file says of them, by the joint that they move.
 
-    Pivots become sites of the links. A joint needs limits, or its cylinder might pass a dead centre.
+    Pivots become sites of the links. A joint needs limits, or its cylinder might pass a dead centre. The
+    constraints that close the loops of what is held are deleted; others stay.
     """
     if not any(one.type == mujoco.mjtEq.mjEQ_CONNECT for one in spec.equalities):
         return {}
-    bare = spec.copy()  # where bodies are is all that counts, not what the file says of their inertias
-    bare.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
-    meshed = [geom for geom in bare.geoms if geom.meshname]
-    for part in (*meshed, *bare.meshes, *bare.keys, *bare.actuators, *bare.tendons):
-        bare.delete(part)
-    model = compiled(bare)
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
+    _, data = bare_model(spec, notes.path)
     pins, helpers, found = _pins(spec, data), set[str](), dict[str, Plain]()
     for slide in [joint for joint in spec.joints if joint.type == mujoco.mjtJoint.mjJNT_SLIDE]:
         rod, tube = slide.parent.name, slide.parent.parent.name
@@ -68,7 +63,7 @@ def take_cylinders(spec: mujoco.MjSpec, notes: Notes) -> dict[str, Plain]:
                 if not links:
                     carrier = joint.parent.parent.name
                     ends = (foot, eye) if foot.other(tube) == carrier else (eye, foot)
-                    places = zip(("parent", "child"), ends, (carrier, joint.parent.name), strict=True)
+                    places = zip(ENDS, ends, (carrier, joint.parent.name), strict=True)
                     for end, pin, body in places:
                         place = data.body(body).xmat.reshape(3, 3).T @ (pin.at - data.body(body).xpos)
                         spec.body(body).add_site(name=f"{joint.name}_pivot_{end}", pos=place)
@@ -76,7 +71,36 @@ def take_cylinders(spec: mujoco.MjSpec, notes: Notes) -> dict[str, Plain]:
     for name in helpers:  # and all that hangs on them
         for joint in spec.body(name).find_all("joint"):
             spec.delete(joint)
+    for one in [one for one in spec.equalities if helpers.intersection(ends_of(spec, one))]:
+        spec.delete(one)
     return found
+
+
+def take_sites(spec: mujoco.MjSpec, notes: Notes) -> dict[str, Plain]:
+    """Return what an arm's file says of the cylinders that pairs of sites show, by joint.
+
+    The sites are called JOINT_pivot_parent and JOINT_pivot_child; the name of the joint may lack its ending
+    `_joint`, or be that of the link, and is completed.
+    """
+    found, sites = dict[str, Plain](), {word(site.name): site for site in spec.sites}
+    for joint in spec.joints:
+        for name in (joint.name, joint.name.removesuffix("_joint"), joint.parent.name):
+            pair = [sites[f"{name}_pivot_{end}"] for end in ENDS if f"{name}_pivot_{end}" in sites]
+            if len(pair) == len(ENDS):
+                for site, end in zip(pair, ENDS, strict=True):
+                    site.name = f"{joint.name}_pivot_{end}"
+                found[joint.name] = {"kind": "linear"}
+                notes.add("sites of the file give these joints' pivots", joint.name)
+                break
+    return found
+
+
+def ends_of(spec: mujoco.MjSpec, constraint: Any) -> tuple[str, str]:
+    """Return the names of the two bodies, or joints, that a constraint ties to each other."""
+    ends = constraint.name1, constraint.name2
+    if constraint.objtype == mujoco.mjtObj.mjOBJ_SITE:
+        ends = tuple(spec.site(name).parent.name for name in ends)
+    return ends[0], ends[1] or "world"
 
 
 def is_part_of_cylinder(joint: mujoco.MjsJoint) -> bool:

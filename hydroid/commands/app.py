@@ -3,7 +3,9 @@
 A command's module is imported when the command is called, so that `--help` answers at once.
 """
 
+import errno
 import inspect
+import os
 import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,7 +16,7 @@ from typer.core import TyperGroup
 import hydroid
 from hydroid.commands.console import log_lines, program, show, show_error
 from hydroid.commands.progress import VISIBLE, listen, stopped
-from hydroid.errors import HydroidError, Stopped
+from hydroid.errors import HydroidError, RunError, Stopped
 
 if TYPE_CHECKING:
     from typer.core import TyperCommand
@@ -49,6 +51,10 @@ PLAIN: Any = {"add_completion": False, "rich_markup_mode": None, "pretty_excepti
 """of typer's apps; plain help: importing rich would triple the time it takes"""
 
 
+SYSTEM = (errno.ENAMETOOLONG, errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EIO, errno.EMFILE)
+"""what a system refuses that no program can help"""
+ONE_THREAD = ("OPENBLAS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+"""what keeps linear algebra from sums over several threads, whose last bits depend on how many there are"""
 VERBOSE = "Also print all tables, findings, and the lines that go to run.log."
 
 
@@ -131,10 +137,12 @@ def _root(  # pyright: ignore[reportUnusedFunction]  # typer calls it
 
 def main() -> None:
     """Run a command: exit 0 when it is done, 2 for an error of the input, 130 when it was stopped."""
-    listen()
     code, kept = 0, None
-    group: Any = typer.main.get_command(app)
+    for variable in ONE_THREAD:  # numpy is not imported yet
+        os.environ.setdefault(variable, "1")
     try:
+        listen()
+        group: Any = typer.main.get_command(app)
         with group.make_context(program(), sys.argv[1:] or ["--help"]) as context:
             group.invoke(context)
     except typer.Exit as end:
@@ -146,6 +154,9 @@ def main() -> None:
     except Exception as error:
         if isinstance(error, HydroidError) or hasattr(error, "format_message"):
             show_error(error)
+            code = 2
+        elif isinstance(error, OSError) and error.errno in SYSTEM:
+            show_error(RunError(f"cannot be used ({error.strerror})", error.filename or "the system"))
             code = 2
         elif stopped():  # what the interrupt met may have made another error of it
             code = 130

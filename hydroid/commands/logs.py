@@ -30,7 +30,7 @@ def read_logs(
 
     Args:
         logs: files, or logs that were read before; one or several.
-        settings: of the fit; joints that a log does not measure stand in its `start_pose`.
+        settings: of the fit; joints that a log does not measure are taken to stand in its `start_pose`.
         repair: fill holes up to `log.repair_s`.
         angles: whether the compared joints must be measured.
 
@@ -39,16 +39,18 @@ def read_logs(
     """
     read: list[Log] = []
     findings: list[LogFinding] = []
+    pose = settings.arm.pose(settings.start_pose)
     for source in as_list(logs):
         if isinstance(source, Log):
-            read.append(source)
+            read.append(
+                source if source.measured.all() or source.pose is not None else replace(source, pose=pose)
+            )
             continue
         log, more = check_file(Path(source), settings, repair=repair, angles=angles)
         if log is None:
             raise more[0].error()
         findings += more
-        pose = np.where(log.measured, log.angle, settings.arm.pose(settings.start_pose))
-        read.append(replace(log, angle=pose))
+        read.append(replace(log, pose=pose))
     for level, line in grouped(findings):
         LOGGER.log(logging.WARNING if level == "warning" else NOTE, "%s: %s", level, line)
     return read
@@ -57,7 +59,11 @@ def read_logs(
 def check_file(
     path: Path, settings: FitSettings, *, repair: bool, angles: bool = True
 ) -> tuple[Log | None, list[LogFinding]]:
-    """Read a log as the settings map it; None if it cannot be used."""
+    """Read a log as the settings map it; None if it cannot be used.
+
+    A bag that is given as `.` or `..` has its folder's name: by names payloads and groups find their logs.
+    """
+    path = path.resolve() if path.name in ("", "..") else path
     arm, outputs = settings.arm, settings.outputs if angles else None
     return check_log(path, settings.log, arm.ranges, outputs=outputs, backward=arm.backward, repair=repair)
 
@@ -118,8 +124,9 @@ def read_arms(
     def read(columns: LogSettings) -> Log:
         layout = {"log": columns} | ({"outputs": ()} if angles else {})
         (one,) = read_logs(log, settings.changed(layout), repair=repair, angles=angles)
-        stand = one.angle if pose is None else np.zeros_like(one.angle) + settings.arm.pose(pose)
-        return replace(one, angle=stand)
+        if pose is None:
+            return one
+        return replace(one, angle=np.full_like(one.angle, np.nan), pose=settings.arm.pose(pose))
 
     if any(name.startswith(tuple(f"{side}_" for side in SIDES)) for name in names):
         return {side: read(columns.of_arm(side)) for side in moving}
@@ -134,7 +141,7 @@ def run_logs(folder: Path) -> list[Path]:
     from hydroid.run.folder import RunFolder
 
     logs = [Path(name) for name in RunFolder(folder).identity().get("logs", {})]
-    missing = [str(log) for log in logs if not log.is_file()]
+    missing = [str(log) for log in logs if not log.exists()]  # a bag is a folder
     if missing or not logs:
         raise RunError(f"its log {', '.join(missing)} is not there", folder, "name the log")
     return logs
@@ -142,10 +149,23 @@ def run_logs(folder: Path) -> list[Path]:
 
 def problem_of(model: IdentifiedModel, logs: LogSources, *, repair: bool) -> "Problem":
     """Return the estimation problem of a model and logs, or those of its run where none is given."""
-    read = read_logs(logs or run_logs(Path(model.source).parent), model.settings, repair=repair)
+    folder = Path(model.source).parent
+    read = read_logs(logs or run_logs(folder), model.settings, repair=repair)
+    if not logs:
+        _warn_of_changes(folder, read, model.settings)
     from hydroid.problem.problem import Problem
 
     problem = Problem(model.settings, read)
-    if not np.isfinite(problem.residuals(model.theta[None])).all():
+    if not np.isfinite(problem.output_errors(model.theta[None])).all():
         raise RunError("the simulation diverged with these parameters", model.source)
     return problem
+
+
+def _warn_of_changes(folder: Path, logs: Sequence[Log], settings: FitSettings) -> None:
+    """Say which logs of a run are no longer what it was fitted to."""
+    from hydroid.run.folder import RunFolder, log_hash
+
+    fitted = RunFolder(folder).identity().get("logs", {})
+    for log in logs:
+        if fitted.get(log.source) != log_hash(log, settings):
+            LOGGER.warning("warning: %s: is not what %s was fitted to", log.source, folder)

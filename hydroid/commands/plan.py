@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 TERMS = {
     "name": "quantity",
     "held": "held at",
-    "gain_percent": "promised [%]",
+    "gain": "promised",
     "freed": "freed",
     "verdict": "verdict",
 }
@@ -63,7 +63,7 @@ def suggest(
     Example: hydroid suggest --fit runs/hyd
 
         suggested = hydroid.suggest(fit="runs/a").plain()
-        print([(term["name"], term["gain_percent"]) for term in suggested["terms"]])
+        print([(term["name"], term["gain"]) for term in suggested["terms"]])
 
     Args:
         logs (LOG): Logs of commands and joint angles [default: those of the run].
@@ -88,8 +88,8 @@ def suggest(
     if bad := tuple(one.name for one in verdicts if one.unseen_logs and one.verdict.fails):
         findings = (Finding("fails unseen", "warning", bad), *findings)
     note = (
-        f"Of {content['tested']} quantities that the fit holds. promised: part of the rms error that freeing "
-        "it saves. "
+        f"Of {content['tested']} quantities that the fit holds. promised: rise of the log-likelihood by "
+        "freeing it. "
     )
     terms = [
         term

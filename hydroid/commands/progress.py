@@ -29,9 +29,13 @@ _stopped = False
 
 
 def listen() -> None:
-    """Turn the first of the notices into a KeyboardInterrupt: clusters repeat themselves."""
+    """Turn the first of the notices into a KeyboardInterrupt: clusters repeat themselves.
+
+    One that is ignored from the start, as `nohup` has it, stays ignored.
+    """
     for number in NOTICES:
-        signal.signal(number, _stop)
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, _stop)
 
 
 def stopped() -> bool:
@@ -102,9 +106,8 @@ class FitProgress(Progress):
         self._end = math.inf if budget is None else time.monotonic() + budget
         self._settings, search = settings, settings.search
         self._total = 1 + getattr(search, search.algorithm).generations
-        terms = settings.terms()
-        ladder = settings.simulation.model == "ladder"
-        self._rungs = ["start", "refined", *terms, *(["dynamic"] if ladder else [])]
+        self._terms, self._number = settings.terms(), 1
+        self._rungs = 2 + len(self._terms) + (settings.simulation.model == "ladder")
 
     def generation(self, row: "Array") -> bool:
         """Take a row of `fitting.search.HISTORY`; return whether time is up."""
@@ -128,11 +131,14 @@ class FitProgress(Progress):
 
     def _rung(self, step: "Step") -> str:
         """Return which step of how many it is, and what is done there."""
-        total = len(self._rungs)
+        total = self._rungs
         number = total  # in which what is kept is refined
         if step.phase or step.without or step.start:
-            named = [step.model, *step.terms]
-            number = max((self._rungs.index(one) + 1 for one in named if one in self._rungs), default=1)
+            models = {"start": 1, "refined": 2, "joint": 2, "dynamic": total}
+            terms = [number for number, term in enumerate(self._terms, 3) if term in step.terms]
+            number = max([models.get(step.model, 1), *terms])
+        # a rung is compared with the one below: that leads no step back
+        number = self._number = max(number, self._number)
         words = f"start {step.start}" if step.start else step.estimate
         words += " from nine numbers" if step.numbers else ""
         words += f" without part {step.without} of the logs" if step.without else ""

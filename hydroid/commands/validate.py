@@ -17,7 +17,10 @@ from hydroid.commands.inputs import (
 )
 from hydroid.commands.logs import read_logs
 from hydroid.files import Plain
-from hydroid.identified_model import IdentifiedModel
+from hydroid.identified_model import IdentifiedModel, warn_of_changes
+from hydroid.log import Log
+from hydroid.log.overlap import KNOWN, overlap
+from hydroid.progress import LOGGER
 from hydroid.words import listed, numbered
 
 if TYPE_CHECKING:
@@ -65,19 +68,17 @@ def validate(
     from hydroid.fitting.verdict import judge, standing_out
     from hydroid.reporting.predictions import draw, validation_page
     from hydroid.reporting.verdict_table import next_lines, next_step, ordered, verdict_lines
-    from hydroid.run.folder import log_hash
     from hydroid.run.record import fitted_by, keep_validation, run_of
 
     stated = {} if tolerance is None else {"tolerance_deg": tolerance}
     results, verdicts, own_logs = Plain(), Plain(), Plain()
     named = dict(zip(numbered(model.name for model in models), models, strict=True))
     for one, own, (name, model) in zip(given, read, named.items(), strict=True):
-        fitted, baselines, hashes = fitted_by(model)
+        fitted, baselines = fitted_by(model)
         if not isinstance(one, str | Path | IdentifiedModel):
-            fitted, baselines, hashes = one.predictions, one.baselines, {*map(log_hash, one.problem.logs)}
-        predictions = [
-            predicted(model, log, None if hashes is None else log_hash(log) not in hashes) for log in own
-        ]
+            fitted, baselines = one.predictions, one.baselines
+        known = [prediction.log for prediction in fitted]
+        predictions = [predicted(model, log, _unseen(log, known) if known else None) for log in own]
         kept = [replace(one, apart=apart) for one in predictions]
         if out is not None and (run := keep_validation(model, kept)):
             draw(run)
@@ -99,6 +100,16 @@ def validate(
     if seen := [one.log.source for one in results[best] if one.unseen is False]:
         lines.insert(1, f"The fit was made with {listed(seen, 3)}: that tests nothing.")
     return Result([*lines, *written(page, out)], content, every, page, details=[page.tables["errors"]])
+
+
+def _unseen(log: Log, fitted: Sequence[Log]) -> bool:
+    """Return whether a log is none of the fitted ones, in whatever file, and holds no large part of them."""
+    part = overlap(log, fitted)
+    if 0 < part < 1:
+        counts = "unseen" if part < KNOWN else "fitted"
+        text = "warning: %.0f %% of the motion in %s stands in the fitted logs: it counts as %s"
+        LOGGER.warning(text, 100 * part, log.source, counts)
+    return part < KNOWN
 
 
 @command
@@ -133,6 +144,8 @@ def report(
     if not merge:
         from hydroid.reporting.predictions import draw
 
+        for run in as_list(runs):
+            warn_of_changes(Path(run))
         files = [str(draw(run, figures=figures)) for run in as_list(runs)]
         return Result(files, {"files": files}, ())
     from hydroid.reporting.parameters_report import merged_tables

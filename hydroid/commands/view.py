@@ -82,7 +82,8 @@ def simulate(
     for number, (name, log) in enumerate(read.items()):
         predicted = predict_log(model, log)
         noise = np.random.default_rng(seed + number).normal(0.0, np.deg2rad(noise_deg), log.angle.shape)
-        logs[name] = replace(predicted, angle=predicted.angle + noise)
+        source = str(out or f"simulated {Path(log.source).name}")  # no longer the log of the commands
+        logs[name] = replace(predicted, angle=predicted.angle + noise, source=source)
     columns = model.settings.log
     if out is not None:
         write_logs(Path(out), [(log, columns.of_arm(n) if arm else columns) for n, log in logs.items()])
@@ -173,7 +174,7 @@ def _collisions(logs: "dict[str, Log]", settings: "FitSettings") -> "Result[Clea
 
     machine = load_machine(settings.arm, pair=ALONE not in logs)
     rest = settings.arm.pose(settings.start_pose)
-    angle = machine.joined({side: log.angle for side, log in logs.items()}, rest)
+    angle = machine.joined({side: log.posed for side, log in logs.items()}, rest)
     result = machine.checker.clearance(next(iter(logs.values())).time, angle)
     nearest = result.distance.argmin()
     content = {

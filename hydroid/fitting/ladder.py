@@ -6,7 +6,7 @@ converged, so that ends early on the way (`FIRM`). What is kept at the end is re
 settings.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Protocol
 
@@ -15,11 +15,12 @@ import numpy as np
 from hydroid.arrays import Array, record
 from hydroid.fitting.checkpoints import Checkpoints
 from hydroid.fitting.left_out import LeftOut, gain, is_better, parts, predict_parts
-from hydroid.fitting.refinement import Refinement, refine
+from hydroid.fitting.refinement import Refinement, refine, refine_from_afar
 from hydroid.fitting.step import Step, step_of
-from hydroid.posterior.error_model import Likelihood, make_likelihood
+from hydroid.posterior.error_model import Likelihood, likelihood_at, make_likelihood
 from hydroid.posterior.linear import estimate_box
 from hydroid.posterior.uncertainty import Uncertainty, uncertainty
+from hydroid.posterior.whiteness import lasting
 from hydroid.problem.problem import Problem
 from hydroid.search.descent import Ending
 from hydroid.settings.search import RefinementSettings
@@ -74,7 +75,7 @@ class Watcher(Protocol):
         """Take a row of HISTORY; return whether the search is to end."""
 
     def refining(self, step: Step, simulated: int, rms: float) -> bool | None:
-        """Take a step, its number of simulations, and its rms error [rad] so far; return whether it is to end."""
+        """Take a step, its number of simulations, and its rms error [rad]; return whether it is to end."""
 
 
 class Ladder:
@@ -114,6 +115,9 @@ class Ladder:
                 if term not in terms:
                     with_term = self._step.changed(terms=(*self._step.terms, term))
                     self._rung(whole, with_term, on_the_way, if_better=True)
+        if self._step.model == "dynamic":
+            for term in self._step.terms:
+                self._try_without(whole, term, on_the_way)
         if climbs:
             kept = self.kept
             last = self._refined(make_likelihood(self.problem), kept.theta, refinement, self._step)
@@ -146,12 +150,16 @@ class Ladder:
         likelihood = make_likelihood(own)
         before = self.refinements[start.name].negative_log if if_better else np.inf
         if own.settings.quasi_static != last.settings.quasi_static:
+            if self._is_white():  # there is nothing for a model that is slow to simulate
+                return
             few = settings.changed({"iterations": FIRST})
             first = self._refined(likelihood, theta, few, step.changed(phase="at first"))
             theta = own.parameters.from_unit(first.point)
             if first.negative_log > before:
                 return
-        result = self._refined(likelihood, theta, settings, step.changed(phase="on the way"))
+        # what a search ended at may be far from an optimum
+        how = refine if if_better else refine_from_afar
+        result = self._refined(likelihood, theta, settings, step.changed(phase="on the way"), how)
         if self._late and if_better:
             return
         new = self._measured(own, result, step)
@@ -169,6 +177,31 @@ class Ladder:
         if not self._late and is_better(with_it, without):
             self._left_out[step.estimate] = with_it
             self._keep(own, new, step)
+
+    def _try_without(self, whole: Problem, term: str, settings: RefinementSettings) -> None:
+        """Drop a term that was kept below, unless this model foretells clearly better with it.
+
+        A term may have stood for what only a richer model has.
+        """
+        if self._late:
+            return
+        step = self._step.changed(terms=tuple(one for one in self._step.terms if one != term))
+        own = whole.varied(whole.settings.of_estimate(step.estimate))
+        parameters, before = own.parameters, self.problem.parameters
+        theta = parameters.started(before.mapping(self.kept.theta))
+        result = self._refined(make_likelihood(own), theta, settings, step.changed(phase="on the way"))
+        with_it = self._parts_left_out(settings)
+        starts = np.array([parameters.started(before.mapping(one)) for one in with_it.thetas])
+        without = self._predicted(own, starts, step, settings)
+        if not self._late and not is_better(with_it, without):
+            self._left_out[step.estimate] = without
+            self._keep(own, self._measured(own, result, step), step)
+
+    def _is_white(self) -> bool:
+        """Whether the innovations of the estimate that is kept are white."""
+        likelihood = likelihood_at(self.problem, self.kept.theta, self.refinements[self.kept.name].numbers)
+        innovations = likelihood.innovations(self.kept.theta[None])[0]
+        return not any(lasting(likelihood.errors, innovations).values())
 
     def _keep(self, problem: Problem, estimate: Estimate, step: Step) -> None:
         self.problem, self.kept, self._step = problem, estimate, step
@@ -191,9 +224,14 @@ class Ladder:
         return predict_parts(problem, starts, refit)
 
     def _refined(
-        self, likelihood: Likelihood, theta: Array, settings: RefinementSettings, step: Step
+        self,
+        likelihood: Likelihood,
+        theta: Array,
+        settings: RefinementSettings,
+        step: Step,
+        how: Callable[..., Refinement] = refine,
     ) -> Refinement:
-        result = refine(likelihood, theta, settings, self._watch.refining, self._checkpoints, step)
+        result = how(likelihood, theta, settings, self._watch.refining, self._checkpoints, step)
         self._late |= result.ending is Ending.TIME
         return result
 

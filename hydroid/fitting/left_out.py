@@ -13,7 +13,7 @@ import numpy as np
 from hydroid.arrays import Array, Ints, record
 from hydroid.estimate import finite
 from hydroid.fitting.refinement import Refinement
-from hydroid.posterior.error_model import Likelihood, likelihood_at, make_likelihood
+from hydroid.posterior.error_model import Likelihood, make_error_model, make_likelihood
 from hydroid.problem.problem import Problem
 
 BLOCK = 5.0
@@ -59,7 +59,6 @@ def predict_parts(problem: Problem, starts: Array, refit: Refit) -> LeftOut:
     several = len(problem.logs) > 1
     thetas = np.empty((len(np.unique(number)), len(problem.parameters.names)))
     errors = np.full(number.size, np.nan)
-    density = np.full(number.size, -np.inf)
     for g, start in enumerate(starts):
         out = number == g
         rest = _of_logs(problem, ~out) if several else problem
@@ -69,13 +68,21 @@ def predict_parts(problem: Problem, starts: Array, refit: Refit) -> LeftOut:
         end = refit(likelihood, start, g + 1)
         thetas[g] = problem.parameters.from_unit(end.point)
         unseen = _of_logs(problem, out) if several else problem
-        judge = likelihood_at(unseen, thetas[g], end.numbers)
         row = unseen.output_errors(thetas[g][None])[0]
-        seen = slice(None) if several else out
-        errors[out] = row[seen]
-        density[out] = judge.errors.log_density(judge.errors.innovations(row[None])[0])[seen]
-    density[~np.isfinite(density)] = -np.inf
-    return LeftOut(problem, thetas, errors, density)
+        errors[out] = row if several else row[out]
+    return LeftOut(problem, thetas, errors, density_of(problem, errors))
+
+
+def density_of(problem: Problem, errors: Array) -> Array:
+    """Return the logarithm of each sample's density, (R,), by the error model that predictions show, (R,).
+
+    A fit to few logs is too sure of itself: by its own numbers a part that it errs on by degrees would be
+    impossible, and one such part would decide. So how far predictions err is judged by what they show.
+    """
+    if not np.isfinite(errors).all():
+        return np.full(errors.size, -np.inf)
+    model = make_error_model(problem).estimated(errors)
+    return model.log_density(model.innovations(errors[None])[0])
 
 
 def parts(problem: Problem) -> Ints:

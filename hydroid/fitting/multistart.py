@@ -21,7 +21,7 @@ from numpy.random import Generator
 
 from hydroid.fitting.baselines import NAMES, fit_baselines
 from hydroid.fitting.checkpoints import Checkpoints, Memo
-from hydroid.fitting.refinement import Refining, refine
+from hydroid.fitting.refinement import Refining, refine_from_afar
 from hydroid.fitting.step import Step
 from hydroid.parameters import Array
 from hydroid.posterior.bench import make_bench
@@ -39,7 +39,8 @@ COST = itemgetter(0)  # of a negative log-likelihood and the theta that it is of
 class Multistart:
     """Least squares from one random start after the other: a search whose chromosomes are theta.
 
-    Its objective is the negative log-likelihood, priors included. A start depends on the seed and its number alone.
+    Its objective is the negative log-likelihood, priors included. A start depends on the seed and its number
+    alone.
 
     Args:
         problem: what is minimised.
@@ -116,7 +117,7 @@ class Multistart:
         cost = np.inf
         for number, part in enumerate(self._parts(problem), 1):
             before = self._memo.simulated
-            result = refine(
+            result = refine_from_afar(
                 make_likelihood(part),
                 theta,
                 self.settings,

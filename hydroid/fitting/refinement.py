@@ -15,9 +15,10 @@ from hydroid.search.least_squares import step
 from hydroid.settings.search import RefinementSettings
 
 SETTLED = 1.0
-"""gain of the log-likelihood below which the numbers of the error model stay as they are"""
-MAX_NOISES = 12
-"""times at most that these numbers are estimated"""
+"""gain of the log-likelihood below which the numbers of the error model stay as they are: so they settle"""
+
+ROUGH = 1e-3
+"""gain below which a least squares of output errors ends that is to lead near an optimum"""
 
 Refining = Callable[[Step, int, float], bool | None]
 """takes a step of the fit, its number of simulations, and its rms error [rad] so far; returns
@@ -29,14 +30,12 @@ class Refinement(Descent):
     """A descent over innovations, then the priors' scores.
 
     Attributes:
-        numbers: of the error model, shape (S, 4).
+        numbers: of the error model, shape (S, 5).
         negative_log: of likelihood and priors at the point: what starts are compared by.
-        noises: how often the numbers were estimated.
     """
 
     numbers: Array
     negative_log: float = np.inf
-    noises: int = 1
 
 
 def refine(
@@ -72,9 +71,9 @@ def refine(
             if progress(what, now.evaluations, _rms_error(likelihood, now)):
                 break
             if not len(now.jacobian):
+                keep(now.arrays)  # a resumed refinement estimates the errors here, too
                 now = _with_new_numbers(likelihood, now)
                 rows = _rows(likelihood, now)
-                keep(now.arrays)
             now = step(now, rows, settings)
             moved = True
             if now.ending.converged:  # unless its errors are others by now
@@ -87,6 +86,36 @@ def refine(
         now = replace(now, ending=Ending.TIME)
     LOGGER.info("%s, %d parameters: %s", name, now.point.size, now)
     return now
+
+
+def refine_from_afar(
+    likelihood: Likelihood,
+    theta: Array,
+    settings: RefinementSettings,
+    progress: Refining,
+    checkpoints: Checkpoints,
+    what: Step,
+) -> Refinement:
+    """Improve an estimate that may be far off, as `refine` does.
+
+    There an error model takes what the parameters have not explained yet for drift, and the two may settle
+    for that. Output errors know no drift. So a rough least squares of output errors comes first, and the
+    better of both points is where the refinement begins.
+    """
+    if likelihood.white:
+        return refine(likelihood, theta, settings, progress, checkpoints, what)
+    rough = settings.changed({"gain_tolerance": max(settings.gain_tolerance, ROUGH)})
+    output_errors = replace(likelihood, white=True)
+    afar = what.changed(phase="from afar")
+    first = refine(output_errors, theta, rough, progress, checkpoints, afar)
+    if first.ending is Ending.TIME:
+        return first
+    near = likelihood.problem.parameters.from_unit(first.point)
+    begun = [_begun(likelihood, likelihood.problem.parameters.to_unit(one)) for one in (theta, near)]
+    costs = [_at(likelihood, one).negative_log(one.residual) if not one.ended else np.inf for one in begun]
+    best = near if costs[1] <= costs[0] else theta
+    result = refine(likelihood, best, settings, progress, checkpoints, what)
+    return replace(result, evaluations=result.evaluations + first.evaluations + 2)
 
 
 def _begun(likelihood: Likelihood, unit: Array) -> Refinement:
@@ -106,8 +135,6 @@ def _with_new_numbers(likelihood: Likelihood, now: Refinement) -> Refinement:
 
     One that had converged then goes on.
     """
-    if now.noises == MAX_NOISES:
-        return now
     problem, before = likelihood.problem, _at(likelihood, now)
     errors = problem.output_errors(problem.parameters.from_unit(now.point[None]))
     after = before.estimated(errors[0])
@@ -127,7 +154,6 @@ def _with_new_numbers(likelihood: Likelihood, now: Refinement) -> Refinement:
         slow=0,
         ending=Ending.UNDER_WAY,
         numbers=after.errors.numbers,
-        noises=now.noises + 1,
     )
 
 

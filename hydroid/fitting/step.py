@@ -3,8 +3,9 @@
 from dataclasses import dataclass, replace
 from typing import Literal
 
-Phase = Literal["", "at first", "on the way"]
-"""of a rung: to see whether it is likely at all, to see whether it is better, or to the end (no words)"""
+Phase = Literal["", "from afar", "at first", "on the way"]
+"""of a rung: by output errors, to see whether it is likely at all, to see whether it is better,
+or to the end (no words)"""
 
 
 @dataclass(frozen=True)

@@ -98,12 +98,13 @@ def angle_errors(known: Uncertainty) -> dict[str, AngleError]:
     result = dict[str, AngleError]()
     for i, signal in enumerate(errors.signals):
         if signal.quantity == "angle":
-            sensor, rate, way, relaxation = errors.numbers[i].tolist()
+            sensor, rate, way, lasting_square, time = errors.numbers[i].tolist()
             result[f"q{signal.joint}"] = AngleError(
                 sensor_deg=np.degrees(np.sqrt(sensor)),
                 drift_per_s=np.degrees(np.degrees(rate)),
                 drift_per_way=np.degrees(way),
-                relaxation_s=relaxation,
+                lasting_deg=np.degrees(np.sqrt(lasting_square)),
+                lasting_s=time,
                 after_10_s_deg=np.degrees(_deviation_ahead(errors, i, 10.0)),
                 lasts_s=lasts[signal.joint],
             )
@@ -112,11 +113,10 @@ def angle_errors(known: Uncertainty) -> dict[str, AngleError]:
 
 def _deviation_ahead(errors: ErrorModel, i: int, seconds: float) -> float:
     """Standard deviation of a signal so many seconds ahead, at its mean speed in the logs [rad]."""
-    sensor, rate, way, relaxation = errors.numbers[i]
+    sensor, rate, way, lasting_square, _ = errors.numbers[i]
     courses = [course for course, own in zip(errors.courses, errors.of, strict=True) if own == i]
     speed = sum(course.way.sum() for course in courses) / sum(c.period * len(c.way) for c in courses)
-    grown = 0.5 * relaxation * -np.expm1(-2 * seconds / relaxation)
-    return np.sqrt(sensor + (rate + way * speed) * grown)
+    return np.sqrt(sensor + lasting_square + (rate + way * speed) * seconds)
 
 
 def fit_findings(fit: Fit) -> list[Finding]:

@@ -74,10 +74,13 @@ def _advance(c, side, z, asked: float, step: float, whole: bool) -> float:
         z.pilot = asked + (z.pilot - asked) * keep
         z.drive = drive(side_voltage(beyond, part, side.onset, side.dead_band), c)
     before, speed = z.stroke, z.speed
-    if speed == 0.0 and z.drive == driven:
+    balanced = before > 0.0 or z.drive == 0.0  # a coil pulls a plunger off its seat again
+    if balanced and speed == 0.0 and z.drive == driven:
         return before
     z.stroke, z.speed = plunger_step((before, speed), z.drive, side.plunger_damping, step, weight, c)
-    if abs(speed) < STILL and abs(z.speed) < STILL:
+    # in a short part of a step no plunger is fast, even if a new command pulls it
+    steady = whole or z.drive == driven
+    if steady and abs(speed) < STILL and abs(z.speed) < STILL:
         z.speed = 0.0
     return 0.5 * (before + z.stroke)
 

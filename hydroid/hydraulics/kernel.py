@@ -44,9 +44,22 @@ from hydroid.settings import linkage
 RAMP_TORQUE, RAMP_WAY = 1.0 / 6.0, 1.0 / 2.0
 """means of t²/2 and t over a unit step: what a velocity error growing from 0 to 1 does to oil and way"""
 
-# numba keys its cache on one file; as a default argument, the text of all these files is part of the key
-_FILES = [*sorted(Path(__file__).parent.glob("*.py")), Path(linkage.__file__)]
-SOURCE = int.from_bytes(hashlib.sha256(b"".join(p.read_bytes() for p in _FILES)).digest()[:7])
+
+def source_key(*more: str | None) -> int:
+    """Return a number that changes with the text of the hydraulics' files, and of `more` files.
+
+    Numba keys its cache on one file only. As a default argument of a compiled function, this number makes all
+    files part of the key from which the function takes code in.
+    """
+    files = [
+        *sorted(Path(__file__).parent.glob("*.py")),
+        Path(linkage.__file__),
+        *map(Path, filter(None, more)),
+    ]
+    return int.from_bytes(hashlib.sha256(b"".join(file.read_bytes() for file in files)).digest()[:7])
+
+
+SOURCE = source_key()
 
 
 @compilable

@@ -95,6 +95,7 @@ def coil_force(drive, stroke, gap) -> Any:
     return drive / (reach * reach)
 
 
+@compilable
 def resting_stroke(drive, gap, stiffness) -> Any:
     """Stroke [m] where spring and coil balance: K x (x + δ)² = k i².
 

@@ -1,112 +1,26 @@
-"""Formats of logs besides CSV -> a table: .mat (v4 to v7 by scipy, v7.3 by h5py), Parquet by pyarrow, bags.
+"""Formats of arrays -> a table: .mat (v4 to v7 by scipy, v7.3 by h5py), Parquet by pyarrow; all formats.
 
 Of a .mat a vector is a column of the variable's name; column k of a matrix is `name[k]`, from 1, and its
 longer axis is the time; fields of structs follow after a dot; element k of a cell array is `name[k]`.
-
-ROS 1 and 2 bags and MCAP are read by rosbags: channels with clocks of their own, brought to one.
-
-A column is a topic and a field: `/joint_states.position[boom]`. What stands in brackets is a name in the
-message's `name` field (as in sensor_msgs/JointState), or else a number, counted from 1. Each message has the
-time of its header's stamp, or else that of its recording. All channels are resampled to the period of the
-settings, over the time that all interpolated ones have: angles are interpolated, commands held. The time
-column has the name that the settings give it.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import fields, is_dataclass
-from numbers import Real
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hydroid.arrays import record
 from hydroid.errors import LogError
-from hydroid.log.repair import hold
-from hydroid.log.table import Recording, Signal, Table, format_library
+from hydroid.log.bags import open_bag
+from hydroid.log.table import Table, format_library
 from hydroid.settings.log import LogSettings
 from hydroid.words import listed
 
 
-@record
-class BagTable(Table):
-    """The channels of a bag, by name: values by the time of their messages [ns]; rows are at `period` [s]."""
-
-    channels: Mapping[str, Mapping[int, float]]
-    period: float
-
-    def read(self, signals: Sequence[Signal]) -> Recording:
-        """Read columns; those that share no time are refused."""
-        time, *names = self.names
-        held = {s.name: s.kind == "command" for s in signals if s.name != time}
-        held = held or {max(names, key=lambda name: len(self.channels[name])): False}
-        at = {name: np.array(sorted(self.channels[name])) for name in held}
-        smooth = [at[name] for name in held if not held[name] and len(at[name]) > 1] or [*at.values()]
-        start, end = max(int(times[0]) for times in smooth), min(int(times[-1]) for times in smooth)
-        if end - start < self.period * 1e9:
-            hint = "record them together, with one clock"
-            raise LogError("the channels have no common time", self.source, hint)
-        grid = self.period * np.arange(int((end - start) / (1e9 * self.period) + 1e-6) + 1, dtype=np.float64)
-        columns = {time: grid}
-        for name, times in at.items():
-            values = np.array([self.channels[name][key] for key in times.tolist()])
-            seconds = (times - start) / 1e9
-            if held[name] or len(times) == 1:
-                columns[name] = hold(seconds, values[:, None], grid, grid[1])[:, 0]
-                continue
-            after = np.searchsorted(seconds, grid - 1e-9).clip(1, len(seconds) - 1)
-            # a hole is longer than 0.1 s, or than three usual steps of the topic if these are longer
-            far = np.diff(seconds)[after - 1] > max(0.1, 3 * np.median(np.diff(seconds)))
-            between = (grid > seconds[after - 1] + 1e-9) & (grid < seconds[after] - 1e-9)
-            columns[name] = np.where(far & between, np.nan, np.interp(grid, seconds, values))
-        topics = ", ".join(sorted({name.partition(".")[0] for name in held}))
-        remarks = (f"{topics}: resampled to {self.period:g} s",)
-        return Table(source=self.source, names=self.names, columns=columns, remarks=remarks).read(signals)
-
-
-def open_bag(path: Path, _data: bytes, settings: LogSettings) -> BagTable:
-    """Read the channels of a bag."""
-    channels = dict[str, dict[int, float]]()
-    with format_library("rosbags.highlevel", "ros", path, "a bag") as rosbags:
-        from rosbags.typesys import Stores, get_typestore
-
-        latest = get_typestore(Stores.LATEST)  # for bags that do not hold their definitions
-        with rosbags.AnyReader([path], default_typestore=latest) as reader:
-            for connection, recorded, data in reader.messages():
-                if len(data) > 20_000:
-                    continue  # an image or a point cloud
-                message = reader.deserialize(data, connection.msgtype)
-                stamp = getattr(getattr(message, "header", None), "stamp", None)
-                at = 0 if stamp is None else int(stamp.sec) * 10**9 + int(stamp.nanosec)
-                for name, number in _numbers(message, f"{connection.topic}."):
-                    channels.setdefault(name, {}).setdefault(at or recorded, number)
-    if not channels:
-        raise LogError("holds no channel of numbers", path)
-    names = settings.time.column, *channels
-    return BagTable(source=str(path), names=names, channels=channels, period=settings.period_s)
-
-
-def _numbers(message: Any, prefix: str) -> Iterator[tuple[str, float]]:
-    """Yield the numbers of a message by name, without those of its header; of an array the first 64."""
-    labels = getattr(message, "name", None)
-    for slot in fields(message):
-        value, name = getattr(message, slot.name), prefix + slot.name
-        parts = {name: value} if slot.name != "header" else {}
-        if isinstance(value, np.ndarray | list):
-            named = isinstance(labels, list) and len(labels) == len(value)
-            keys: Any = labels if named else range(1, len(value) + 1)
-            parts = {f"{name}[{key}]": part for key, part in zip(keys, value[:64], strict=False)}
-        for key, part in parts.items():
-            if isinstance(part, Real | np.bool_):
-                yield key, float(part)
-            elif is_dataclass(part):
-                yield from _numbers(part, f"{key}.")
-
-
-def open_mat(path: Path, data: bytes, _settings: LogSettings) -> Table:
+def open_mat(path: Path, _settings: LogSettings) -> Table:
     """Read all variables of a file, which is HDF5 from version 7.3 on."""
-    hdf5 = HDF5 in data[:520]
+    hdf5 = HDF5 in first_bytes(path)
     package = "h5py" if hdf5 else "scipy.io"
     with format_library(package, "mat", path, "a MATLAB file") as library:
         if hdf5:
@@ -124,7 +38,7 @@ def open_mat(path: Path, data: bytes, _settings: LogSettings) -> Table:
     return Table(source=str(path), names=tuple(columns), columns=columns)
 
 
-def open_parquet(path: Path, _data: bytes, _settings: LogSettings) -> Table:
+def open_parquet(path: Path, _settings: LogSettings) -> Table:
     """Read all columns of a file."""
     with format_library("pyarrow.parquet", "parquet", path, "Parquet") as parquet:
         table = parquet.read_table(str(path))
@@ -157,6 +71,12 @@ def _without_hdf5(item: Any) -> Any:
     return None if text or item.dtype.kind not in "fiub" else np.asarray(item[()]).T
 
 
+def first_bytes(path: Path) -> bytes:
+    """Return as many as tell the format of a file."""
+    with path.open("rb") as file:
+        return file.read(520)  # MATLAB's HDF5 begins at 512
+
+
 HDF5 = b"\x89HDF\r\n\x1a\n"
 BINARY = {
     "Parquet": (open_parquet, (b"PAR1",)),
@@ -164,7 +84,7 @@ BINARY = {
     "MCAP": (open_bag, (b"\x89MCAP0",)),
     ".mat": (open_mat, (b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file", HDF5)),
 }
-"""by a format's name: what reads a file, its bytes and the log's settings, and how such files begin; a name
-that is an ending marks a file as well, and comes last: the bytes count first"""
+"""by a format's name: what reads a file with the log's settings, and how such files begin; a name that is an
+ending marks a file as well, and comes last: the bytes count first"""
 FORMATS = listed(["CSV", *BINARY])
 """all formats that are read, for `--help` and messages"""

@@ -9,15 +9,18 @@ import numpy as np
 from hydroid.arrays import Array
 from hydroid.log.clues import CLUES, column_unit, likely_range
 from hydroid.log.log import Log, LogFinding, log_finding
-from hydroid.log.motion import driven_joints, motion_of
+from hydroid.log.motion import END, driven_joints, motion_of
 from hydroid.log.repair import GAP, sample_period
+from hydroid.log.sensors import check_sensors
 from hydroid.log.table import Recording, Signal
 from hydroid.settings.arm import Arm
 from hydroid.settings.log import LogSettings
 from hydroid.units import UNITS, likely_time_unit, way
 
+SMALL = ("±1", "±10 V")
+"""ranges of commands whose numbers are possible commands in %, too"""
 DEGREE = UNITS["deg"].factor
-END = 0.02  # part of a joint's travel that counts as its end
+FULL = 50.0  # [%], which most joints' commands reach where single ones of 10 are in another range
 
 
 def check_recording(recording: Recording, settings: LogSettings, *, repaired: bool) -> Iterator[LogFinding]:
@@ -36,6 +39,7 @@ def check_recording(recording: Recording, settings: LogSettings, *, repaired: bo
     yield from _time(recording, settings, longest if repaired else 0.0)
     yield from _values(recording)
     yield from _units(recording)
+    yield from check_sensors(recording)
 
 
 def _time(recording: Recording, settings: LogSettings, repaired: float) -> Iterator[LogFinding]:
@@ -142,15 +146,24 @@ def check_motion(
         if kind == "command" and command == 0 and joint in outputs and not undriven:
             yield warning("command is constant", signal)
     # of commands within 10 %, although joints move well; else they may be small commands in %
-    small = common and common.name in ("±1", "±10 V") and any(m.travel > 3 for m in motions.values())
+    small = common and common.name in SMALL and any(m.travel > 3 for m in motions.values())
+    usual = np.median([np.abs(log.command[:, joint - 1]).max() for joint in motions]) if motions else 0.0
     for joint, motion in motions.items():
         command, angle = of["command", joint], of["angle", joint]
         likely = common if small else likely_range(log.command[:, joint - 1])
         if likely and (small or (likely.offset and command.low < 0)):
             yield warning("range", command, **likely.remedy(command.gain, command.offset))
+        elif likely and likely.name in SMALL and usual > FULL and motion.travel > 3:
+            yield warning("range of one", command, **likely.remedy(command.gain, command.offset))
         (path, against), slides = motion.directed, angle.unit != "deg"
-        if motion.turned and joint not in backward:
-            yield warning("turned", command, path=way(path, slides=slides), against=against)
+        if motion.contradicts(backward=joint in backward):
+            kind, part = ("straight", 1 - against) if joint in backward else ("turned", against)
+            scale = f"{-command.gain:g}"
+            yield warning(kind, command, path=way(path, slides=slides), part=part, scale=scale)
+        if span := motion.frozen:
+            over = span[1] > log.duration - 1.5 * log.period
+            when = f"from {span[0]:.4g} s on" if over else f"from {span[0]:.4g} to {span[1]:.4g} s"
+            yield warning("frozen", angle, when=when)
         if motion.push > 300 and 0 < motion.travel < 2:
             yield warning("no motion", angle, most=way(motion.travel, slides=slides))
         if ahead := motion.ahead:

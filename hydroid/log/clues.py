@@ -35,10 +35,14 @@ def likely_range(values: Array, negative: Array | None = None) -> CommandRange |
     """
     if negative is not None:
         both = np.stack([values, negative])
+        both = both[:, ~np.isnan(both).any(axis=0)]
+        if not both.size:
+            return None
+        values, negative = both
         at_rest = np.mean((abs(both - 4) <= 0.48).any(axis=0))
         if both.min() >= 3.52 and both.max() <= 20.48 and at_rest > 0.95:
             return CommandRange("4 to 20 mA on each side", 6.25, -25.0)
-        values = values - negative
+        values = both[0] - both[1]
     values = values[~np.isnan(values)]
     if not values.any():
         return None
@@ -82,11 +86,22 @@ def kind_of(name: str, unit: Unit | None) -> str:
     return next(named, "command" if direction(name)[0] else "other")
 
 
+def own_part(name: str) -> str:
+    """Return what a column has for itself: of `/CalibratedJointVals3.position[Boom]` Boom, else its name.
+
+    What stands before the brackets names the topic of a bag, whose columns share it.
+    """
+    inside = re.fullmatch(r"/.*\[([^\[\]]*)\]", name)
+    return inside[1] if inside and unit_of(inside[1]) is None else name
+
+
 def joint_of(name: str, joints: Sequence[str]) -> int | None:
     """Return the number [from 1] of the only joint whose name a column's name holds; None: of none.
 
     Words of three letters and more may be cut short: `tele1_cmd` is the telescope's.
     """
+    if (own := own_part(name)) != name and (hit := joint_of(own, joints)):
+        return hit
     there = {*words(name)} - {"joint", "link"}
     exact = [{*words(joint)} - {"joint", "link"} for joint in joints]
     alike = [own.union(*(group for group in CLUES["same"] if own & {*group})) for own in exact]
@@ -100,7 +115,7 @@ def joint_of(name: str, joints: Sequence[str]) -> int | None:
 
 def number_in(name: str) -> int | None:
     """Return the last number in a column's name; None: it has none."""
-    numbers = [int(word) for word in words(name) if word.isdecimal()]
+    numbers = [int(word) for word in words(own_part(name)) if word.isdecimal()]
     return numbers[-1] if numbers and numbers[-1] < 100 else None
 
 

@@ -27,8 +27,9 @@ csv.field_size_limit(2**31 - 1)  # a longer cell is no number, which is said, wi
 IS_CSV = f"formats of logs are {FORMATS}; a CSV file has a header and one row per sample"
 
 
-def open_csv(path: Path, data: bytes) -> Table:
-    """Find the table in a file's bytes."""
+def open_csv(path: Path) -> Table:
+    """Find the table in a file."""
+    data = path.read_bytes()
     lines = _decode(path, data).replace("\r\n", "\n").replace("\r", "\n").split("\n")
     content = [k for k, line in enumerate(lines) if _is_content(line)]
     if not content:

@@ -87,12 +87,17 @@ def guess_columns(
         "time": {"column": time.name, "unit": unit},
         "command": None,
         "angle": None,
-        "period_s": min(PERIODS, key=lambda p: max(p, step) / max(min(p, step), 1e-9)),
+        "period_s": nearest_period(step),
         "joints": entries,
     }
     unused = tuple(name for name in table.names if name and name not in used)
     reasons += [f"not used: {listed(unused)}"] if unused else []
     return ColumnGuess(log, tuple(reasons), unused)
+
+
+def nearest_period(step: float) -> float:
+    """Return the usual period that is most like a log's [s]."""
+    return min(PERIODS, key=lambda p: max(p, step) / max(min(p, step), 1e-9))
 
 
 def _columns(table: Table, names: Sequence[str]) -> Iterator[_Column]:
@@ -166,7 +171,8 @@ def _by_joint(
 
 def _command(table: Table, columns: Sequence[_Column]) -> tuple[Plain, str]:
     names = [column.name for column in columns]
-    likely = likely_range(*np.nan_to_num(table.read([Signal(name, "command") for name in names]).values.T))
+    signals = [Signal(name, "command", rest=np.nan) for name in names]
+    likely = likely_range(*table.read(signals).values.T)
     entry: Plain = {"column": names[0] if len(names) == 1 else names}
     if likely is None or "%" in (columns[0].unit, likely.name):
         return entry, f"{' and '.join(names)}: command in %"

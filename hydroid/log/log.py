@@ -26,6 +26,7 @@ class Log:
         rest: samples before the first command of the recording; None: before the first one in `command`.
         recorded: samples that stand in for a row of the file, shape (T,): angles of the others lie between
             two rows, and say nothing new. None: all do.
+        pose: in which joints stand that are not measured [rad], shape (J,); None: it is not known.
     """
 
     source: str
@@ -36,6 +37,7 @@ class Log:
     pressure: Array | None = None
     rest: int | None = None
     recorded: Mask | None = None
+    pose: Array | None = None
 
     @property
     def joints(self) -> int:
@@ -53,6 +55,14 @@ class Log:
         return ~np.isnan(self.angle[0])
 
     @property
+    def posed(self) -> Array:
+        """Angles of all joints [rad], shape (T, J): of those that are not measured that of `pose`."""
+        return self._with_pose(self.angle)
+
+    def _with_pose(self, angle: Array) -> Array:
+        return angle if self.pose is None else np.where(self.measured, angle, self.pose)
+
+    @property
     def duration(self) -> float:
         """Time of the last sample [s]."""
         return float(self.time[-1])
@@ -64,12 +74,12 @@ class Log:
 
     @property
     def start(self) -> Array:
-        """The start pose [rad], shape (J,): the mean of the angles while the arm still rests.
+        """The start pose [rad], shape (J,): the mean of the angles while the arm still rests, or `pose`.
 
         A simulation starts there, and an error of its start stays in the whole response. A command moves
         nothing before the sample after it; of a log that begins with a command the first sample must do.
         """
-        return self._mean_at_rest(self.angle)
+        return self._with_pose(self._mean_at_rest(self.angle))
 
     @property
     def start_pressure(self) -> Array:

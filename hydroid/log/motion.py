@@ -10,6 +10,10 @@ from hydroid.log.log import Log
 QUICK, SLOW = 0.05, 0.25  # standard deviations of the Gaussians [s]; the slow one leaves no sensor noise
 LEAST_PATH = 3.0  # [deg] that tell a direction
 AGAINST = 0.75  # of the path goes against the command: it is logged the other way around
+END = 0.02  # part of a joint's travel that counts as its end
+MOVING = 0.2  # part of a joint's speed above which it moves
+LEAST_PUSH, LEAST_FROZEN = 20.0, 0.75
+"""command [%], and how long it must last [s], that would move a joint whose angle does not change"""
 
 
 @record
@@ -51,16 +55,15 @@ class JointMotion:
         against = np.abs(steps[strong & (steps * command < 0)]).sum()
         return (path, against / path) if path >= LEAST_PATH else (path, 0.0)
 
-    @property
-    def turned(self) -> bool:
-        """Whether a positive command turns it to negative angles: one is logged the other way around."""
-        return self.directed[1] > AGAINST
+    def contradicts(self, *, backward: bool) -> bool:
+        """Whether it clearly moves against the direction that the arm gives to a positive command.
 
-    @property
-    def straight(self) -> bool:
-        """Whether it clearly moves with its command."""
+        That is to negative angles of a joint that is `backward`, and else to positive ones.
+        """
         path, against = self.directed
-        return path >= LEAST_PATH and against < 1 - AGAINST
+        if backward:
+            return path >= LEAST_PATH and against < 1 - AGAINST
+        return against > AGAINST
 
     @cached_property
     def likely_lag(self) -> float:
@@ -103,6 +106,31 @@ class JointMotion:
         push, fast = sign * command * np.sign(command @ speed), np.abs(speed)
         enough = 0.99 * np.median(np.abs(command[fast >= 0.1 * fast.max()]))
         return np.stack([angle, command])[:, (fast < 0.03 * fast.max()) & (push > enough)]
+
+    @cached_property
+    def frozen(self) -> tuple[float, float] | None:
+        """From when to when its angle stands to the last digit although it is driven [s]; None: it does not.
+
+        By commands that else move it, and not at an end of its travel, unless they push it off there too; for
+        much longer than its sensor gives the same reading elsewhere.
+        """
+        angle, command, period = self.log.angle[:, self.joint - 1], self._logged, self.log.period
+        steps = np.abs(np.diff(angle))
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], steps == 0, [0]])))
+        begins, ends = edges[::2], edges[1::2]
+        moves = np.abs(command[:-1])[steps > MOVING * np.percentile(steps, 95)]
+        if not len(begins) or not len(moves):
+            return None
+        enough = max(LEAST_PUSH, np.percentile(moves, 25))
+        longest = int(np.argmax(ends - begins))
+        begin, end = int(begins[longest]), int(ends[longest])
+        other = np.delete(ends - begins, longest).max(initial=0)
+        pushes = command[begin:end][np.abs(command[begin:end]) >= enough]
+        place = (angle[begin] - angle.min()) / np.ptp(angle)
+        at_end = not END < place < 1 - END and np.all(np.sign(pushes) == np.sign(pushes[:1]))
+        if at_end or len(pushes) * period < LEAST_FROZEN or end - begin < 3 * other:
+            return None
+        return begin * period, end * period
 
     @property
     def _logged(self) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 
 from hydroid.errors import LogError
 from hydroid.files import csv_text, write_atomic
-from hydroid.log.binary import BINARY
+from hydroid.log.binary import BINARY, first_bytes
 from hydroid.log.checks import check_motion, check_recording
 from hydroid.log.csv import open_csv
 from hydroid.log.log import Log, LogFinding, by_level, log_finding
@@ -35,14 +35,21 @@ def open_table(path: Path, settings: LogSettings = DEFAULT) -> Table:
     """
     try:
         # a ROS 2 bag is a folder
-        data = b"#ROSBAG V" if (path / "metadata.yaml").is_file() else path.read_bytes()
+        data = b"#ROSBAG V" if (path / "metadata.yaml").is_file() else _first_bytes(path)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise LogError(f"cannot be read ({reason})", path) from None
     for name, (reader, starts) in BINARY.items():
         if data.startswith(starts) or path.suffix.lower() == name:
-            return reader(path, data, settings)
-    return open_csv(path, data)
+            return reader(path, settings)
+    return open_csv(path)
+
+
+def _first_bytes(path: Path) -> bytes:
+    """Return the first bytes of a regular file: to open a pipe would wait for its writer."""
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise LogError("is no file, but a pipe or a device", path, "write the log to a file first")
+    return first_bytes(path)
 
 
 def check_log(

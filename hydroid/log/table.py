@@ -30,6 +30,7 @@ class Signal:
     `name` is that in the header, `kind` time, command, angle or pressure, `joint` a number from 1, or 0 for
     the time, `owner` the joint's name. `part` is 0, or 1 for the column of a command's negative direction and
     of the pressure in chamber B. `unit` is the one to be read: %, deg, mm of a joint that slides, or bar.
+    `rest` is the value of a command before its first message, in a format of messages.
     """
 
     name: str
@@ -42,6 +43,7 @@ class Signal:
     high: float = np.inf
     unit: str = ""
     owner: str = ""
+    rest: float = 0.0
 
     def __str__(self) -> str:
         return f"{self.kind} of joint {self.owner}" if self.joint else self.kind
@@ -164,6 +166,18 @@ def _as_numbers(cells: NDArray[Any]) -> tuple[Array, bool]:
     seconds = np.full(len(cells), np.nan)
     seconds[there] = (ticks - ticks[:1]) / 1e9
     return seconds, True
+
+
+MOST_NUMBERS = 30_000_000
+"""that are read of one log: hours of it, and about 1 GB of memory until it is resampled"""
+
+
+def refuse_large(source: str, rows: int, columns: int) -> None:
+    """Raise a LogError where a log is too long for the memory of a usual computer."""
+    if rows * columns > MOST_NUMBERS:
+        most = MOST_NUMBERS // columns
+        what = f"has {rows:,} rows, of which {columns} columns are read; at most {most:,} can be"
+        raise LogError(what, source, "cut it, or record at a lower rate")
 
 
 @contextmanager

@@ -1,21 +1,24 @@
-"""The error of a model: the sensor's noise, and a drift that grows with time and with the way travelled.
+"""The error of a model: sensor's noise, errors that last for a moment, and a drift that grows with the way.
 
-A joint on a valve integrates. A command that changes between two samples, oil that warms, a spool that sticks:
-each moves all that follows in a log by a little. So what a perfect model leaves of a measured signal y is not
+A joint on a valve integrates. A command that changes between two samples, oil that warms, a spool that
+sticks: each moves all that follows in a log by a little. So what a model leaves of a measured signal y is not
 white noise but
 
-    y_k = ŷ_k(θ) + d_k + v_k,    d_{k+1} = φ d_k + w_k,
-    Var v = σ²,    Var w_k = (rate) h + (way) |Δy_k|,    φ = exp(-h / relaxation),
+    y_k = ŷ_k(θ) + d_k + c_k + v_k,      Var v = σ²,
+    d_{k+1} = d_k + w_k,                 Var w_k = (rate) h + (way) |Δy_k|,
+    c_{k+1} = ρ c_k + n_k,               Var c = (lasting), ρ = exp(-h / (time)).
 
-the local-level model (A. C. Harvey, *Forecasting, Structural Time Series Models and the Kalman Filter*, 1989),
-whose drift d starts as uncertain as the start angle, and is 0 where the joint stands at a stop. Its four
-numbers are those of a joint's angle, or of a chamber's pressure, in all logs. They follow from the residual by
-maximum likelihood.
+The drift d is the local-level model (A. C. Harvey, *Forecasting, Structural Time Series Models and the Kalman
+Filter*, 1989); it begins as uncertain as the start angle. The lasting error c is what a model that is not
+quite right does besides, such as an arm that rings where the model does not: without it the drift would have
+to follow it, and nothing slow would count. Both are 0 where the joint stands at a stop. The five numbers are
+those of a joint's angle, or of a chamber's pressure, in all logs. They follow from the residual by maximum
+likelihood.
 
-A scalar Kalman filter turns the residual into *innovations*: what the past of the log does not foretell of
-each sample (L. Ljung, *System Identification*, 1999, chapters 3, 7 and 14). Divided by their standard
-deviation they are white with variance 1. The filter's gain depends on the measured way, not on θ: the filter
-is a linear map of the residual, and least squares of innovations is maximum likelihood.
+A Kalman filter turns the residual into *innovations*: what the past of the log does not foretell of each
+sample (L. Ljung, *System Identification*, 1999, chapters 3, 7 and 14). Divided by their standard deviation
+they are white with variance 1. The filter's gains depend on the measured way, not on θ: the filter is a
+linear map of the residual, and least squares of innovations is maximum likelihood.
 
 Stage 1 puts a gain in place of the hydraulics, and the article fits it by output errors. Its least squares
 weighs them as white noise (`ErrorModel.white`); its covariance is that of the errors as they are.
@@ -29,25 +32,25 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 from scipy.ndimage import binary_erosion
-from scipy.optimize import minimize
+from scipy.optimize import OptimizeResult, minimize
 
 from hydroid.arrays import Array, Mask, record
 from hydroid.log import Log
 from hydroid.problem.channels import Channel
 from hydroid.problem.problem import Problem
 
-NUMBERS = ("sensor", "rate", "way", "relaxation")
+NUMBERS = ("sensor", "rate", "way", "lasting", "time")
 """of an error: variance of the sensor's noise [rad²], growth of the drift's variance with time [rad²/s] and
-with the way travelled [rad²/rad], and the time in which the drift is forgotten [s]; pressures in Pa for rad"""
+with the way [rad²/rad], variance of the lasting error [rad²], and its time constant [s]; pressures in Pa"""
 LEAST_NOISE = {"angle": np.deg2rad(0.01), "pressure_a": 1e4, "pressure_b": 1e4}
 """smallest standard deviation of a sensor's noise that a residual can show [rad, Pa]: no potentiometer or
 gauge is better (ours)"""
-LONGEST = 1e4
-"""relaxation of a drift that is never forgotten [s]"""
-SHORTEST = 0.05
-"""shortest relaxation of a drift [s]: what is forgotten sooner is noise"""
+SHORTEST, LONGEST = 0.05, 30.0
+"""time constants of a lasting error [s]: what is shorter is noise, and what is longer is drift (ours)"""
 NONE = 1e-12
 """growth of a drift, as a part of the residual's mean square, that counts as none"""
+LEAST_GUESS = 0.01
+"""part of the guess that a number begins with at least"""
 WAY_OVER = 0.25
 """time over which a way is measured [s]: the sensor's noise is no way"""
 AT_STOP = 0.002
@@ -117,7 +120,7 @@ def at_stops(angle: Array, ends: tuple[float, float], period: float) -> Mask:
         return np.zeros(len(angle), dtype=bool)
     there = (angle < lower + margin) | (angle > upper - margin)
     window = 2 * max(round(0.5 * WAY_OVER / period), 1) + 1
-    return np.asarray(binary_erosion(there, np.ones(window, dtype=bool), border_value=1))
+    return binary_erosion(there, np.ones(window, dtype=bool), border_value=1).astype(np.bool_)
 
 
 @record
@@ -126,11 +129,10 @@ class ErrorModel:
 
     Attributes:
         signals: S different ones.
-        numbers: NUMBERS of each, shape (S, 4).
+        numbers: NUMBERS of each, shape (S, 5).
         courses: of each channel.
         of: the index of each channel's signal.
         given: whether the settings give the sensor's noise, shape (S,).
-        stays: whether the drift is never forgotten, shape (S,).
     """
 
     signals: tuple[Signal, ...]
@@ -138,30 +140,30 @@ class ErrorModel:
     courses: tuple[Course, ...]
     of: tuple[int, ...]
     given: Mask
-    stays: Mask
 
     @cached_property
-    def _filters(self) -> list[tuple[Array, Array, Array]]:
-        """Gain, carry and scale of each channel's filter, each of shape (T,)."""
-        return [_filter(course, self.numbers[i]) for course, i in zip(self.courses, self.of, strict=True)]
+    def _filters(self) -> list["Filter"]:
+        """Of each channel."""
+        pairs = zip(self.courses, self.of, strict=True)
+        return [make_filter(course, self.numbers[i]) for course, i in pairs]
 
     def innovations(self, errors: Array) -> Array:
         """Return the innovations [1] of weighted output errors, (n, R): 0 where a sample does not count."""
         result = np.empty(errors.shape)
-        for course, (gain, carry, scale) in zip(self.courses, self._filters, strict=True):
+        for course, one in zip(self.courses, self._filters, strict=True):
             part = np.ascontiguousarray(errors[:, course.rows]) / course.weight
-            result[:, course.rows] = _innovations(part, gain, carry, scale)
+            result[:, course.rows] = _innovations(part, *one)
         return result
 
     def errors(self, innovations: Array) -> Array:
         """Return the weighted output errors, (n, R), that leave these innovations.
 
-        Of samples that do not count it is the drift that those before foretell.
+        Of samples that do not count it is what those before foretell.
         """
         result = np.empty(innovations.shape)
-        for course, (gain, carry, scale) in zip(self.courses, self._filters, strict=True):
+        for course, one in zip(self.courses, self._filters, strict=True):
             part = np.ascontiguousarray(innovations[:, course.rows])
-            result[:, course.rows] = course.weight * _errors(part, gain, carry, scale)
+            result[:, course.rows] = course.weight * _errors(part, *one)
         return result
 
     @cached_property
@@ -177,7 +179,7 @@ class ErrorModel:
     @cached_property
     def log_scale(self) -> Array:
         """Logarithm of each sample's density at an innovation of 0, shape (R,); 0 where it does not count."""
-        scales = np.concatenate([scale for _, _, scale in self._filters])
+        scales = np.concatenate([one.scale for one in self._filters])
         scales[~self.used] = 1.0
         return np.where(self.used, np.log(scales) - 0.5 * np.log(2 * np.pi), 0.0)
 
@@ -195,22 +197,21 @@ class ErrorModel:
                 if own == i
             ]
             least = LEAST_NOISE[signal.quantity] ** 2
-            held = np.array([self.given[i], False, False, self.stays[i]])
-            numbers[i] = _most_likely(pairs, self.numbers[i], least, held)
+            numbers[i] = _most_likely(pairs, self.numbers[i], least, bool(self.given[i]))
         return replace(self, numbers=numbers)
 
     def white(self, errors: Array) -> "ErrorModel":
         """Return the model that takes errors, (R,), for white noise alone, but for the starts."""
         numbers = np.zeros_like(self.numbers)
-        numbers[:, 3] = LONGEST
+        numbers[:, 4] = SHORTEST
         for i, signal in enumerate(self.signals):
             parts = [
                 errors[course.rows][course.used] / course.weight
                 for course, own in zip(self.courses, self.of, strict=True)
                 if own == i
             ]
-            shown = float(np.mean(np.concatenate(parts) ** 2))
-            numbers[i, 0] = self.numbers[i, 0] if self.given[i] else max(shown, LEAST_NOISE[signal.quantity] ** 2)
+            shown = max(float(np.mean(np.concatenate(parts) ** 2)), LEAST_NOISE[signal.quantity] ** 2)
+            numbers[i, 0] = self.numbers[i, 0] if self.given[i] else shown
         return replace(self, numbers=numbers)
 
     def scatter(self, channel: int, rows: Array, fitted: "ErrorModel") -> Array:
@@ -219,23 +220,25 @@ class ErrorModel:
         The innovations are those by the model that was `fitted`; `rows`, (p, T), are of the channel.
         """
         course, i = self.courses[channel], self.of[channel]
-        sensor, rate, way, relaxation = self.numbers[i]
-        gain, carry, scale = fitted._filters[channel]
-        on_errors = _adjoint(np.ascontiguousarray(rows), gain, carry, scale)
-        # the errors are sensor's noise, steps of the drift, and the start: each reaches what comes after it
-        carry = _carry(course, relaxation)
-        ahead = _summed_ahead(on_errors, carry)
-        step = np.sqrt(rate * course.period + way * course.way)
-        later = ahead[:, 1:] * np.where(course.stops[1:], 0.0, step[:-1])
-        start = ahead[:, :1] * np.sqrt(sensor / course.readings)
-        parts = np.hstack([np.sqrt(sensor) * on_errors, later, start])
-        return parts @ parts.T
+        own = make_filter(course, self.numbers[i])
+        on_errors = _adjoint(np.ascontiguousarray(rows), *fitted._filters[channel])
+        # sensor's noise, the start, and steps of drift and lasting error: each reaches what comes after it
+        drift = _summed_ahead(on_errors, own.carry[0])
+        lasting = _summed_ahead(on_errors, own.carry[1])
+        free = np.where(course.stops[1:], 0.0, 1.0)
+        parts = [
+            np.sqrt(self.numbers[i, 0]) * on_errors,
+            drift[:, :1] * np.sqrt(self.numbers[i, 0] / course.readings),
+            drift[:, 1:] * np.sqrt(own.step[0, :-1]) * free,
+            lasting[:, 1:] * np.sqrt(own.step[1, :-1]) * free,
+        ]
+        return sum((part @ part.T for part in parts), np.zeros((len(rows), len(rows))))
 
     def drift(self, course: Course, i: int) -> Array:
-        """Return the variance of signal i's drift from the start of a course on [rad², Pa²], shape (T,)."""
-        sensor, rate, way, relaxation = self.numbers[i]
-        step = rate * course.period + way * course.way
-        return _variances(sensor / course.readings, step, _carry(course, relaxation))
+        """Return the variance of signal i's drift and lasting error from the start of a course on, (T,)."""
+        own = make_filter(course, self.numbers[i])
+        start = float(self.numbers[i, 0]) / course.readings
+        return _variances(start, own.step[0], own.carry[0]) + _variances(0.0, own.step[1], own.carry[1])
 
 
 def make_error_model(problem: Problem) -> ErrorModel:
@@ -245,16 +248,14 @@ def make_error_model(problem: Problem) -> ErrorModel:
     signals = tuple(dict.fromkeys(of_channel))
     numbers = np.zeros((len(signals), len(NUMBERS)))
     noises = [objective.noise_of(s.joint) if s.quantity == "angle" else None for s in signals]
-    # a hydraulic joint integrates; a pressure, or a joint on a gain and a spring, does not
-    stays = [s.quantity == "angle" and problem.settings.stage == "hyd" for s in signals]
     for i, signal in enumerate(signals):
         noise = noises[i]
         numbers[i, 0] = LEAST_NOISE[signal.quantity] ** 2 if noise is None else np.deg2rad(noise) ** 2
-        numbers[i, 3] = LONGEST
+        numbers[i, 4] = SHORTEST
     courses = tuple(make_course(channel, logs[channel.log], problem) for channel in channels)
     given = np.array([noise is not None for noise in noises])
     of = tuple(map(signals.index, of_channel))
-    return ErrorModel(signals, numbers, courses, of, given, np.array(stays))
+    return ErrorModel(signals, numbers, courses, of, given)
 
 
 @record
@@ -264,10 +265,13 @@ class Likelihood:
     Attributes:
         problem: whose output errors these are.
         errors: the model of these errors.
+        white: whether they are taken for white noise: in stage 1, which is fitted by output errors as in the
+            article, and on the way from afar.
     """
 
     problem: Problem
     errors: ErrorModel
+    white: bool
 
     def innovations(self, theta: Array) -> Array:
         """Return innovations [1] of theta, shape (n, P): (n, R); NaN where a simulation diverged."""
@@ -278,28 +282,24 @@ class Likelihood:
         return np.hstack([self.innovations(theta), self.problem.priors.scores(theta)])
 
     def negative_log(self, rows: Array) -> float:
-        """Return the negative logarithm of likelihood and priors, from a row of `rows`, but for a constant."""
+        """Return the negative logarithm of likelihood and priors of a row of `rows`, but for a constant."""
         return 0.5 * float(rows @ rows) - float(self.errors.log_scale.sum())
 
     def estimated(self, errors: Array) -> "Likelihood":
-        """Return the likelihood for what weighted output errors, (R,), show of their model.
-
-        Stage 1 takes them for white noise: it is fitted by output errors, as in the article.
-        """
-        drifts = self.problem.settings.stage == "hyd"
-        model = self.errors.estimated(errors) if drifts else self.errors.white(errors)
+        """Return the likelihood for what weighted output errors, (R,), show of their model."""
+        model = self.errors.white(errors) if self.white else self.errors.estimated(errors)
         return replace(self, errors=model)
 
 
 def make_likelihood(problem: Problem) -> Likelihood:
     """Return the likelihood of a problem whose errors are still to be estimated."""
-    return Likelihood(problem, make_error_model(problem))
+    return Likelihood(problem, make_error_model(problem), problem.settings.stage == "mech")
 
 
 def likelihood_at(problem: Problem, theta: Array, numbers: Array | None = None) -> Likelihood:
     """Return the likelihood of a problem with the errors that it shows at theta, shape (P,).
 
-    With `numbers`, (S, 4), these are taken.
+    With `numbers`, (S, 5), these are taken.
     """
     likelihood = make_likelihood(problem)
     if numbers is not None:
@@ -307,152 +307,196 @@ def likelihood_at(problem: Problem, theta: Array, numbers: Array | None = None) 
     return likelihood.estimated(problem.output_errors(theta[None])[0])
 
 
-def _most_likely(
-    pairs: Sequence[tuple[Course, Array]], numbers: Array, least: float, held: Mask
-) -> Array:
+class Filter(NamedTuple):
+    """A Kalman filter of one channel: arrays over its T samples.
+
+    gain: of drift and lasting error, shape (2, T). carry: part of each that reaches the next sample, (2, T).
+    scale: 1 over the standard deviation of the innovation, (T,); 0 where a sample does not count.
+    step: variance of what is added to each before the next sample, (2, T).
+    """
+
+    gain: Array
+    carry: Array
+    scale: Array
+    step: Array
+
+
+def make_filter(course: Course, numbers: Array) -> Filter:
+    """Return the filter of a course by NUMBERS, shape (5,)."""
+    carry, step = _model(course, numbers)
+    sensor = float(numbers[0])
+    gain, scale = _gains(course.used, sensor, sensor / course.readings, step, carry)
+    return Filter(gain, carry, scale, step)
+
+
+def _model(course: Course, numbers: Array) -> tuple[Array, Array]:
+    """Return carry and step of drift and lasting error: both end where the joint stands at a stop then."""
+    _, rate, way, lasting, time = numbers.tolist()
+    samples = len(course.way)
+    kept = np.exp(-course.period / time)
+    carry = np.ones((2, samples))
+    carry[1] = kept
+    carry[:, :-1][:, course.stops[1:]] = 0.0
+    step = np.empty((2, samples))
+    step[0] = rate * course.period + way * course.way
+    step[1] = lasting * (1.0 - kept**2)
+    return carry, step
+
+
+def _most_likely(pairs: Sequence[tuple[Course, Array]], numbers: Array, least: float, given: bool) -> Array:
     """Return the most likely NUMBERS of one signal's errors, each of shape (T,), with their courses.
 
-    `least` is the smallest variance of the sensor's noise; numbers that are `held`, (4,), stay.
-    The search is over logarithms. It starts from the numbers before and from two guesses: mostly noise, and
-    mostly drift.
+    `least` is the smallest variance of the sensor's noise, which stays where it is `given`. The search is
+    over logarithms. It starts from a guess that is mostly noise, and from the numbers before; without any,
+    from a guess that is mostly drift. A number that was next to none is raised first (`LEAST_GUESS`): on the
+    scale of logarithms nothing would tell that it should grow.
     """
     square = float(np.mean(np.concatenate([error[course.used] for course, error in pairs]) ** 2))
     square = max(square, least)
     seconds = sum(course.period * len(error) for course, error in pairs) / len(pairs)
-    way = sum(float(course.way.sum()) for course, _ in pairs) / len(pairs)
-    way = max(way, 1e-3)
-    lower = np.array([least, NONE * square, NONE * square, SHORTEST])
-    upper = np.array([square * 4, square * 100, square * 1e4, LONGEST])
-    lower[held] = upper[held] = numbers[held]
+    way = max(sum(float(course.way.sum()) for course, _ in pairs) / len(pairs), 1e-3)
+    lower = np.array([least, NONE * square, NONE * square, NONE * square, SHORTEST])
+    upper = np.array([square * 4, square * 100, square * 1e4, square * 4, LONGEST])
+    if given:
+        lower[0] = upper[0] = numbers[0]
     bounds = np.log(np.stack([lower, upper], axis=1))
 
     def cost(logarithms: Array) -> float:
         values = np.exp(logarithms)
         return sum(_negative_log_likelihood(course, error, values) for course, error in pairs)
 
-    steady = np.array([0.5 * square, 0.1 * square / seconds, 0.1 * square / way, LONGEST / 10])
-    drifting = np.array([1e-3 * square, 10 * square / seconds, 10 * square / way, LONGEST / 10])
-    starts = [steady, drifting]
-    if numbers[1:3].any():
-        starts = [numbers, steady]
-    best = None
+    steady = np.array([0.5, 0.1 / seconds, 0.1 / way, 0.1, 0.0]) * square
+    drifting = np.array([1e-3, 10 / seconds, 10 / way, 1e-2, 0.0]) * square
+    steady[4] = drifting[4] = 0.3
+    before = np.maximum(numbers, LEAST_GUESS * steady)
+    starts = [steady, before if numbers[1:4].any() else drifting]
+    ended = list[OptimizeResult]()
     for start in starts:
         begin = np.clip(np.log(np.maximum(start, 1e-300)), *bounds.T)
-        ended = minimize(cost, begin, method="L-BFGS-B", bounds=bounds, options={"maxiter": 60})
-        if best is None or ended.fun < best.fun:
-            best = ended
-    assert best is not None
-    return np.exp(best.x)
+        ended.append(minimize(cost, begin, method="L-BFGS-B", bounds=bounds, options={"maxiter": 60}))
+    return np.exp(min(ended, key=lambda one: one.fun).x)
 
 
 def _negative_log_likelihood(course: Course, error: Array, numbers: Array) -> float:
-    sensor, rate, way, relaxation = numbers.tolist()
-    step = rate * course.period + way * course.way
-    return _cost(error, course.used, sensor, sensor / course.readings, step, _carry(course, relaxation))
-
-
-def _carry(course: Course, relaxation: float) -> Array:
-    """Part of the drift that reaches the next sample, shape (T,): none where the joint is at a stop then."""
-    carry = np.full(len(course.way), np.exp(-course.period / relaxation))
-    carry[:-1][course.stops[1:]] = 0.0
-    return carry
-
-
-def _filter(course: Course, numbers: Array) -> tuple[Array, Array, Array]:
-    """Return gain, carry and scale (1 over the innovation's standard deviation), each of shape (T,)."""
-    sensor, rate, way, relaxation = numbers.tolist()
-    step = rate * course.period + way * course.way
-    carry = _carry(course, relaxation)
-    gain, scale = _gains(course.used, sensor, sensor / course.readings, step, carry)
-    return gain, carry, scale
+    carry, step = _model(course, numbers)
+    sensor = float(numbers[0])
+    return _cost(error, course.used, sensor, sensor / course.readings, step, carry)
 
 
 def whitened(rows: Array, period: float, sensor: float, rate: float) -> Array:
-    """Return the innovations of rows [rad], (n, T), for a sensor's variance and a drift that grows with time."""
+    """Return innovations of rows [rad], (n, T), for a sensor's variance and a drift that grows with time."""
     samples = rows.shape[1]
-    carry = np.ones(samples)
-    step = np.full(samples, rate * period)
-    gain, scale = _gains(np.ones(samples, dtype=np.bool_), sensor, 0.0, step, carry)
-    return _innovations(np.ascontiguousarray(rows), gain, carry, scale)
+    everywhere = np.ones(samples, dtype=np.bool_)
+    course = Course(slice(0), 1.0, period, np.zeros(samples), ~everywhere, np.inf, everywhere)
+    numbers = np.array([sensor, rate, 0.0, 0.0, SHORTEST])
+    return _innovations(np.ascontiguousarray(rows), *make_filter(course, numbers))
 
 
 @njit(cache=True)
 def _gains(used: Mask, sensor: float, start: float, step: Array, carry: Array) -> tuple[Array, Array]:
-    """Kalman gains, and 1 over the standard deviation of the innovations, each of shape (T,); 0 if not used."""
-    gain = np.zeros(len(step))
-    scale = np.zeros(len(step))
-    variance = start
-    for k in range(len(step)):
+    """Kalman gains, (2, T), and 1 over the standard deviation of the innovations, (T,); 0 if not used."""
+    samples = len(used)
+    gain = np.zeros((2, samples))
+    scale = np.zeros(samples)
+    drift, lasting, both = start, 0.0, 0.0  # covariance of the two
+    for k in range(samples):
         if used[k]:
-            total = variance + sensor
-            gain[k] = variance / total
+            total = drift + 2.0 * both + lasting + sensor
+            first = (drift + both) / total
+            second = (lasting + both) / total
+            gain[0, k] = first
+            gain[1, k] = second
             scale[k] = 1.0 / np.sqrt(total)
-            variance *= 1.0 - gain[k]
-        # at a stop the drift ends: nothing is added to it either
-        variance = carry[k] ** 2 * variance + step[k] if carry[k] > 0.0 else 0.0
+            drift, lasting, both = (
+                drift - first * first * total,
+                lasting - second * second * total,
+                both - first * second * total,
+            )
+        if carry[0, k] > 0.0:
+            drift += step[0, k]
+            lasting = carry[1, k] ** 2 * lasting + step[1, k]
+            both *= carry[1, k]
+        else:  # at a stop nothing is added either
+            drift, lasting, both = 0.0, 0.0, 0.0
     return gain, scale
 
 
 @njit(cache=True)
-def _innovations(errors: Array, gain: Array, carry: Array, scale: Array) -> Array:
+def _innovations(errors: Array, gain: Array, carry: Array, scale: Array, step: Array) -> Array:
     """Innovations over their standard deviation, (n, T), of errors, (n, T)."""
     result = np.empty_like(errors)
     for i in range(len(errors)):
-        drift = 0.0
+        drift, lasting = 0.0, 0.0
         for k in range(errors.shape[1]):
-            new = errors[i, k] - drift
+            new = errors[i, k] - drift - lasting
             result[i, k] = new * scale[k]
-            drift = carry[k] * (drift + gain[k] * new)
+            drift = carry[0, k] * (drift + gain[0, k] * new)
+            lasting = carry[1, k] * (lasting + gain[1, k] * new)
     return result
 
 
 @njit(cache=True)
-def _adjoint(rows: Array, gain: Array, carry: Array, scale: Array) -> Array:
+def _adjoint(rows: Array, gain: Array, carry: Array, scale: Array, step: Array) -> Array:
     """Rows that give the same products with errors as `rows`, (p, T), with their innovations."""
     result = np.empty_like(rows)
     for i in range(len(rows)):
-        later = 0.0
+        drift, lasting = 0.0, 0.0
         for k in range(rows.shape[1] - 1, -1, -1):
-            result[i, k] = scale[k] * rows[i, k] + carry[k] * gain[k] * later
-            later = carry[k] * later - result[i, k]
+            new = scale[k] * rows[i, k]
+            new += carry[0, k] * gain[0, k] * drift + carry[1, k] * gain[1, k] * lasting
+            result[i, k] = new
+            drift = carry[0, k] * drift - new
+            lasting = carry[1, k] * lasting - new
     return result
 
 
 @njit(cache=True)
-def _errors(innovations: Array, gain: Array, carry: Array, scale: Array) -> Array:
+def _errors(innovations: Array, gain: Array, carry: Array, scale: Array, step: Array) -> Array:
     """The errors, (n, T), that leave these innovations, (n, T)."""
     result = np.empty_like(innovations)
     for i in range(len(innovations)):
-        drift = 0.0
+        drift, lasting = 0.0, 0.0
         for k in range(innovations.shape[1]):
             new = innovations[i, k] / scale[k] if scale[k] > 0.0 else 0.0
-            result[i, k] = new + drift
-            drift = carry[k] * (drift + gain[k] * new)
+            result[i, k] = new + drift + lasting
+            drift = carry[0, k] * (drift + gain[0, k] * new)
+            lasting = carry[1, k] * (lasting + gain[1, k] * new)
     return result
 
 
 @njit(cache=True)
 def _cost(error: Array, used: Mask, sensor: float, start: float, step: Array, carry: Array) -> float:
     """Negative log-likelihood of an error, (T,), but for a constant."""
-    variance = start
-    drift = 0.0
-    cost = 0.0
+    drift, lasting, both = start, 0.0, 0.0
+    drifted, lasted, cost = 0.0, 0.0, 0.0
     for k in range(len(error)):
         if used[k]:
-            total = variance + sensor
-            new = error[k] - drift
+            total = drift + 2.0 * both + lasting + sensor
+            new = error[k] - drifted - lasted
             cost += 0.5 * (new * new / total + np.log(total))
-            gain = variance / total
-            drift += gain * new
-            variance *= 1.0 - gain
-        drift *= carry[k]
-        variance = carry[k] ** 2 * variance + step[k] if carry[k] > 0.0 else 0.0
+            first = (drift + both) / total
+            second = (lasting + both) / total
+            drifted += first * new
+            lasted += second * new
+            drift, lasting, both = (
+                drift - first * first * total,
+                lasting - second * second * total,
+                both - first * second * total,
+            )
+        if carry[0, k] > 0.0:
+            drift += step[0, k]
+            lasting = carry[1, k] ** 2 * lasting + step[1, k]
+            both *= carry[1, k]
+        else:
+            drift, lasting, both = 0.0, 0.0, 0.0
+        drifted *= carry[0, k]
+        lasted *= carry[1, k]
     return cost
 
 
 @njit(cache=True)
 def _variances(start: float, step: Array, carry: Array) -> Array:
-    """Variance of a drift that nothing is measured of, (T,)."""
+    """Variance of a part of the error that nothing is measured of, (T,)."""
     result = np.empty(len(step))
     variance = start
     for k in range(len(step)):
@@ -463,7 +507,7 @@ def _variances(start: float, step: Array, carry: Array) -> Array:
 
 @njit(cache=True)
 def _summed_ahead(rows: Array, carry: Array) -> Array:
-    """What a drift of 1 at each sample adds to products with rows, (p, T): the sums of all that it reaches."""
+    """What an error of 1 at each sample adds to products with rows, (p, T): sums of all that it reaches."""
     result = np.empty_like(rows)
     for i in range(len(rows)):
         total = 0.0

@@ -37,8 +37,9 @@ class Profile:
 def profile(problem: Problem, uncertainty: Uncertainty, name: str) -> Profile:
     """Hold a parameter at several values and fit the others, each time from the neighbour's result.
 
-    The rise of the sum of squares is the deviance. Stage 1 minimises output errors, whose sum of squares is no
-    likelihood: it is scaled so that its curvature is the estimate's variance (L. Pace, A. Salvan, N. Sartori,
+    The rise of the sum of squares is the deviance. Stage 1 minimises output errors, whose sum of squares is
+    no likelihood: it is scaled so that its curvature is the estimate's variance (L. Pace, A. Salvan, N.
+    Sartori,
     2011).
     """
     parameters, linear, theta = problem.parameters, uncertainty.linear, uncertainty.theta

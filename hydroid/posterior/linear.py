@@ -21,8 +21,8 @@ NO_EFFECT_BELOW = 1e-6
 class Linear:
     """Derivatives at an estimate by relative changes of the p parameters that vary, of P.
 
-    Innovations, the M priors' scores and the weak priors of the p parameters stand in one row; its derivatives
-    are J = V D U. All have a variance of 1.
+    Innovations, the M priors' scores and the weak priors of the p parameters stand in one row; its
+    derivatives are J = V D U. All have a variance of 1.
 
     Attributes:
         box: the estimate, its bounds, what a relative change of 1 is, and which parameters vary.

@@ -9,6 +9,7 @@ from hydroid.arrays import Array
 from hydroid.estimate import CurveEstimate, Interval, QuantityEstimate, finite, finite_ends
 from hydroid.hydraulics.cylinder import rod_motion, volume
 from hydroid.hydraulics.records import LINEAR, Records, coefficients
+from hydroid.hydraulics.solenoid import FULL_SCALE, drive, resting_stroke
 from hydroid.posterior.bench import Bench, make_bench
 from hydroid.posterior.uncertainty import Uncertainty
 from hydroid.problem.problem import Problem
@@ -35,6 +36,8 @@ NaN where one is undefined"""
 
 
 Measure = Callable[[Candidates], Measured]
+Test = Callable[[Candidates, Array], Measured]
+"""measures n candidates with the loads of `Bench.loads`"""
 
 
 Quantities = tuple[dict[str, QuantityEstimate], dict[str, CurveEstimate]]
@@ -62,13 +65,13 @@ def quantities(problem: Problem, uncertainty: Uncertainty) -> Quantities:
         concerned = np.array([p.joints is None or joint in p.joints for p in parameters])
         positive = np.array([column.positive for column in columns])
         known = uncertainty.posterior.propagate(values, positive, concerned)
-        curve, given = list[tuple[float, float, Interval]](), True
+        curve, given, of_curve = list[tuple[float, float, Interval]](), True, ""
         for i in np.flatnonzero(np.isfinite(known.value)).tolist():
             (name, label, unit, _, command), value = columns[i], float(known.value[i])
             interval = finite_ends(known.interval[i])
             if command is not None:
                 curve.append((command, value, interval))
-                given = given and known.given[i]
+                given, of_curve = given and known.given[i], label
             elif not known.given[i]:
                 sd = finite(known.sd[i])
                 scalars[f"{named}_{name}"] = QuantityEstimate(
@@ -77,7 +80,7 @@ def quantities(problem: Problem, uncertainty: Uncertainty) -> Quantities:
         if not given:
             at, value, interval = zip(*sorted(curve), strict=True)
             curves[f"{named}_speed"] = CurveEstimate(
-                label="speed",
+                label=of_curve,
                 joint=joint,
                 unit=f"{bench.unit[1]}/s",
                 along="command [%]",
@@ -89,24 +92,23 @@ def quantities(problem: Problem, uncertainty: Uncertainty) -> Quantities:
 
 
 def joint_measure(bench: Bench, estimate: Candidates) -> Measure:
-    """Return what computes the quantities of one joint; test movements are planned at the estimate."""
-    tests, further = [], gain_model
+    """Return what computes the quantities of one joint; what is tested is planned at the estimate."""
+    tests, further = list[Test](), gain_model
     if bench.settings.stage == "hyd":
         torque, signs = bench.weigh(estimate)[0][0], ("positive", "negative")
         words = ("raising", "lowering") if torque * bench.sense > 0 else ("lowering", "raising")
         words = words if abs(torque) >= 1.0 else signs  # below 1 N·m no direction is called raising
         names = zip((1.0, -1.0), signs, words, strict=True)
-        tests, further = [speed_tests(bench, estimate, *name) for name in names], oil
+        tests, further = [direction_test(bench, estimate, *name) for name in names], oil
 
     def measure(candidates: Candidates) -> Measured:
+        loads = bench.loads(candidates) if tests else np.empty((0, 3))
         torque, inertia = bench.weigh(candidates)
-        factor, unit = bench.unit
-        word, of = ("force", "N") if unit == "mm" else ("torque", "N·m")
-        label = f"gravity {word} at {factor * bench.angle:.0f} {unit}"
+        word, of = ("force", "N") if bench.unit[1] == "mm" else ("torque", "N·m")
         for test in tests:
-            yield from test(candidates)
+            yield from test(candidates, loads)
         yield from further(bench, candidates, inertia)
-        yield Column("gravity_torque_at_pose", label, of, False), torque
+        yield Column("gravity_torque_at_pose", f"gravity {word} at {bench.pose}", of, False), torque
 
     return measure
 
@@ -158,55 +160,68 @@ def actuator(bench: Bench, candidates: Candidates) -> tuple[Records, Array, Arra
 
 
 COMMANDS = (5.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0, 100.0)  # of the curve of speed [%]
-MOVES = 0.02
-"""part of the speed at full command, added to that without a command, at which the joint begins to move"""
+LASTS = 3.0  # how long the step is held in which dead time and time constant are sought [s]
 ONSET, RISEN = 0.1, 1.0 - np.exp(-1.0)
-"""parts of the final speed: it takes the dead time to reach the first, and from there the time constant to
+"""parts of the steady speed: it takes the dead time to reach the first, and from there the time constant to
 reach the second"""
 
 
-def speed_tests(bench: Bench, estimate: Candidates, sign: float, ending: str, word: str) -> Measure:
-    """Return what measures a joint in a direction, planned so that the estimate ends at its angle.
+def direction_test(bench: Bench, estimate: Candidates, sign: float, ending: str, word: str) -> Test:
+    """Return what measures a joint in a direction.
 
     `sign` is that of the commands; `ending` and `word` stand at the end of names and labels.
     """
-    steps = {u: bench.movement(sign * u).through_pose(estimate) for u in COMMANDS}
-    reached = {u: step.speed(estimate)[0] for u, step in steps.items()}
+    commands, (factor, unit) = sign * np.array(COMMANDS), bench.unit
+    towards = sign * bench.sense
+    planned = dict(
+        zip(COMMANDS, towards * bench.steady(estimate, commands, bench.loads(estimate))[0], strict=True)
+    )
     # the smallest command from 50 % that clearly moves the joint, or the largest
-    rise = next((u for u in COMMANDS if u >= 50.0 and reached[u] > ONSET * reached[100.0]), 100.0)
-    # the dead band is enclosed to 0.25 %
-    rest = bench.movement(0.0)
-    level = MOVES * reached[100.0] + sign * rest.speed(estimate)[0]
-    above = next((u for u in COMMANDS if reached[u] > level), 0.0)
-    below = max((u for u in COMMANDS if u < above), default=0.0)
-    while above - below > 0.25:
-        middle = (below + above) / 2
-        moves = bench.movement(sign * middle).speed(estimate)[0] > level
-        below, above = (below, middle) if moves else (middle, above)
+    clear = (u for u, speed in planned.items() if u >= 50.0 and speed > ONSET * planned[100.0])
+    rise = next(clear, 100.0)
+    step, opens_later = bench.movement(sign * rise, LASTS), valve_opens(bench, estimate, sign)[1][0] > 0.0
 
-    def measure(candidates: Candidates) -> Measured:
-        unit = f"{bench.unit[1]}/s"
-        runs = {u: step.speeds(candidates) for u, step in steps.items()}
-        speed = {u: steps[u].end(run) for u, run in runs.items()}
-        for u, value in speed.items():
-            yield Column("speed", "speed", unit, False, sign * u), sign * bench.sense * value
+    def measure(candidates: Candidates, loads: Array) -> Measured:
+        steady = bench.steady(candidates, commands, loads)
+        for u, velocity in zip(commands.tolist(), steady.T, strict=True):
+            yield Column("speed", f"speed at {bench.pose}", f"{unit}/s", False, u), velocity
+        speed = dict(zip(COMMANDS, towards * steady.T, strict=True))
         gain = (speed[60.0] - speed[40.0]) / (60.0 - 40.0)
-        onset, risen = (steps[rise].reaches(runs[rise], part * speed[rise]) for part in (ONSET, RISEN))
-        rows = [
-            *((f"speed_{u}", f"speed at {u} % command", unit, speed[u]) for u in (50, 100)),
-            ("gain", "gain between command and speed", f"{unit} per %", gain),
-            ("dead_time", f"dead time at {rise:g} % command", "s", onset),
-            ("time_constant", f"time constant at {rise:g} % command", "s", risen - onset),
-        ]
-        if below > 0.0:
-            slow, fast = (bench.movement(sign * u).speed(candidates) for u in (below, above))
-            with np.errstate(all="ignore"):  # a joint that hardly moves has no dead band
-                part = (MOVES * speed[100.0] + sign * rest.speed(candidates) - slow) / (fast - slow)
-            rows.append(("dead_band", "dead band", "%", below + part * (above - below)))
+        run = step.speeds(candidates)
+        onset, risen = (step.reaches(run, part * speed[rise]) for part in (ONSET, RISEN))
         c, _, arm = actuator(bench, candidates)
-        flow = 6e4 * (c.a if sign > 0 else c.b).area * np.abs(arm) * np.radians(speed[100.0])
-        rows.append(("full_flow", "flow at 100 % command", "L/min", flow))
-        for name, label, own_unit, value in rows:
-            yield Column(f"{name}_{ending}", f"{label}, {word}", own_unit), value
+        flow = 6e4 * (c.a if sign > 0 else c.b).area * np.abs(arm) * speed[100.0] / factor
+        pose = bench.pose
+        rows = [  # each with the command that must move the joint
+            (50.0, "speed_50", f"speed at 50 % command and {pose}", f"{unit}/s", speed[50.0]),
+            (100.0, "speed_100", f"speed at 100 % command and {pose}", f"{unit}/s", speed[100.0]),
+            (60.0, "gain", f"gain between command and speed at {pose}", f"{unit}/s per %", gain),
+            (rise, "dead_time", f"dead time at {rise:g} % command", "s", onset),
+            (rise, "time_constant", f"time constant at {rise:g} % command", "s", risen - onset),
+            (100.0, "full_flow", f"flow at 100 % command and {pose}", "L/min", flow),
+        ]
+        for u, name, label, own_unit, value in rows:
+            if planned[u] != 0.0:
+                yield Column(f"{name}_{ending}", f"{label}, {word}", own_unit), value
+        if opens_later:
+            band = np.add(*valve_opens(bench, candidates, sign))
+            yield Column(f"dead_band_{ending}", f"dead band, {word}", "%"), band
 
     return measure
+
+
+def valve_opens(bench: Bench, candidates: Candidates, sign: float) -> tuple[Array, Array]:
+    """Return the parameter `dead_band` of a direction [%], and how much further its valve opens, (n,) each.
+
+    The pilot stage passes nothing up to the first. From there on the spool crosses its overlap, unless the
+    voltage at the smallest command has done it: then the second is not above 0.
+    """
+    c, *_ = actuator(bench, candidates)
+    side = c.a if sign > 0 else c.b
+    idle = resting_stroke(drive(0.0, c), c.gap, c.plunger_stiffness)
+    stroke = idle + side.overlap
+    with np.errstate(all="ignore"):  # of a coil without force
+        current = np.sqrt(c.plunger_stiffness * stroke / c.coil) * (stroke + c.gap)
+        voltage = FULL_SCALE * (current - c.current_min) / (c.current_max - c.current_min)
+        beyond = (voltage - side.onset) * (100.0 - side.dead_band) / (FULL_SCALE - side.onset)
+    return side.dead_band, np.where(voltage > FULL_SCALE, np.nan, beyond)

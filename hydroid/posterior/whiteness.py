@@ -1,15 +1,17 @@
-"""Whether innovations are white: what else is left of an error is the model's, not the sensor's or the drift's.
+"""Whether innovations are white: what else is left of an error is the model's, not the sensor's.
 
-A time in which the error of a joint lasts is that until the autocorrelation of its innovations, over all logs,
-has fallen below `FAINT`. It is said only where the innovations are not white (G. M. Ljung and G. E. P. Box,
-1978), and clearly so: with thousands of samples the test alone finds what does not matter.
+The error of a joint lasts until the autocorrelation of its innovations, over all logs, has fallen to 1/e of
+that between two samples, or below `FAINT`. Of a first-order process that is its time constant, however
+much white
+noise is added. It is said only where the innovations are not white (G. M. Ljung and G. E. P. Box, 1978), and
+clearly so: with thousands of samples the test alone finds what does not matter.
 """
 
 import numpy as np
 from scipy.stats import chi2
 
 from hydroid.arrays import Array
-from hydroid.posterior.error_model import ErrorModel
+from hydroid.posterior.error_model import Course, ErrorModel
 
 LONGEST = 5.0  # lag up to which innovations are compared [s]
 LEVEL = 0.01  # probability of the finding where innovations are white
@@ -25,20 +27,26 @@ def lasting(errors: ErrorModel, innovations: Array) -> dict[int, float]:
     """
     result = dict[int, float]()
     for i, signal in enumerate(errors.signals):
-        if signal.quantity != "angle":
-            continue
-        of_signal = [c for c, own in zip(errors.courses, errors.of, strict=True) if own == i]
-        period = of_signal[0].period
-        logs = [innovations[course.rows][course.used] for course in of_signal]
-        shortest = min(map(len, logs))
-        lags = max(min(round(LONGEST / period), shortest // 4), 1)
-        correlation = autocorrelation(logs, lags)
-        samples = sum(map(len, logs))
-        statistic = samples * float(np.sum(correlation**2))
-        white = chi2.sf(statistic, lags) > LEVEL or np.sum(correlation**2) < CLEAR
-        below = np.flatnonzero(np.append(correlation, 0.0) < FAINT)
-        result[signal.joint] = 0.0 if white else period * float(below[0])
+        if signal.quantity == "angle":
+            courses = [course for course, own in zip(errors.courses, errors.of, strict=True) if own == i]
+            result[signal.joint] = _lasting(courses, innovations)
     return result
+
+
+def _lasting(courses: list[Course], innovations: Array) -> float:
+    """Return for how long what is left of one signal's error lasts [s]."""
+    logs = [innovations[course.rows][course.used] for course in courses]
+    samples, shortest = sum(map(len, logs)), min(map(len, logs))
+    # between those that count
+    period = sum(course.period * len(course.used) for course in courses) / max(samples, 1)
+    lags = max(min(round(LONGEST / period), shortest // 4), 1)
+    correlation = autocorrelation(logs, lags)
+    square = float(np.sum(correlation**2))
+    if chi2.sf(samples * square, lags) > LEVEL or square < CLEAR:
+        return 0.0
+    faint = max(FAINT, correlation[0] / np.e)
+    below = int(np.flatnonzero(np.append(correlation, 0.0) < faint)[0])
+    return period * max(below, 1)
 
 
 def autocorrelation(logs: list[Array], lags: int) -> Array:

@@ -1,15 +1,18 @@
 """What a log holds: its columns, and how the joints move in it."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from hydroid.arrays import record
-from hydroid.errors import LogError, SettingsError
+from hydroid.errors import LogError
 from hydroid.files import Plain
-from hydroid.log import JointMotion, Table, check_log, guess_columns, motion_of
+from hydroid.log import ColumnGuess, JointMotion, Log, Table, check_log, motion_of
 from hydroid.log.read import angle_margin
+from hydroid.project.columns import column_lines
+from hydroid.project.section import given_section, guessed_section, missing_column
 from hydroid.settings.arm import Arm, Joint
 from hydroid.settings.load import validate
 from hydroid.settings.log import LogSettings
@@ -20,13 +23,17 @@ REVERSED = (
     "(compare arm.png), set scale: -1 at its angle and not at its command: gravity follows the angle"
 )
 
+MOVED = 0.5  # travel from which a joint moves [deg]
+
 
 @record
 class Layout:
     """The columns of a log, as the `log` section of a fit's settings, and what its numbers say.
 
-    `outputs` are joints with a command and an angle, `motions` how the measured ones move, by number from 1;
-    `reasons` have a line for each column that is not `unused`; `followed`: a joint without a command moves.
+    `outputs` are joints that a log drives and measures, `motions` how the measured ones move, by number from
+    1; `reasons` have a line for each column that is not `unused`; `followed`: a joint that no command drives
+    moves. `missing` says which columns a person must name, in a section that is then no more than a start;
+    `candidates` are lines about what each could be.
     """
 
     section: Plain
@@ -35,52 +42,130 @@ class Layout:
     unused: tuple[str, ...]
     motions: Mapping[int, JointMotion]
     followed: bool
+    origin: str = "GUESSED from the log: check every line."
+    missing: str = ""
+    candidates: tuple[str, ...] = ()
 
 
-def find_layout(table: Table | None, arm: Arm, order: Sequence[str]) -> Layout:
+def find_layout(
+    table: Table | None,
+    arm: Arm,
+    order: Sequence[str] = (),
+    *,
+    given: LogSettings | None = None,
+    others: Sequence[Path] = (),
+) -> Layout:
     """Guess the columns of a log, turn commands that act against the angle, and see how fast joints are.
 
     Without a log all joints have a command and an angle, and none is seen to move.
+
+    Args:
+        order: names of the arm's joints in the order of the log's numbers; none: the arm's order.
+        given: what a person says of the columns, which are not guessed then.
+        others: further logs of the same columns; a joint that one of them drives can be fitted.
+
+    Raises:
+        SettingsError: no joint has one of the names.
+        LogError: no column holds numbers, `given` does not fit the log, or no joint is driven and moves.
     """
     if table is None:
         every = range(1, len(arm.joints) + 1)
         return Layout({"period_s": 0.01, "joints": {}}, tuple(every), (), (), {}, followed=False)
-    names = arm.joint_names
-    for name in order:
-        if name not in names:
-            raise SettingsError(f"no joint {name!r}", "--joints", f"the arm's joints: {', '.join(names)}")
-    places = [names.index(name) for name in order or names]
-    slides = [k for k, place in enumerate(places, 1) if arm.joints[place].slides]
-    links = [arm.link_names[place] for place in places]
-    section, guessed, unused = guess_columns(table, order or names, links=links, slides=slides)
-    # A slow log is simulated in two steps a sample; what a fast one adds is not seen on such machines.
-    period = section["period_s"]
-    section["period_s"] = max(period, 0.02) if period < 0.03 else 0.02 if period < 0.1 else 0.05
-    entries = {places[k - 1] + 1: entry for k, entry in section["joints"].items()}
-    section["joints"], reasons = dict(sorted(entries.items())), [*guessed]
-    measured = [joint for joint, entry in section["joints"].items() if entry["angle"]]
-    if not measured:
-        hint = f"rename them, or write the log section by hand; columns: {', '.join(table.names)}"
-        raise LogError("has no column that looks like an angle", table.source, hint)
-    free = dict.fromkeys(names, (-np.inf, np.inf))
-    settings = validate(section, LogSettings, table.source)
-    log, findings = check_log(Path(table.source), settings, free)
-    if log is None:
-        reasons.append(f"the log cannot be used as it is: {findings[0]}")
-        log, _ = check_log(Path(table.source), settings, free, repair=True)
-    motions = {joint: motion_of(log, joint) for joint in measured} if log else {}
-    wrong = [j for j, m in motions.items() if (m.straight if j in arm.backward else m.turned)]
+    guess = (
+        ColumnGuess(given_section(table, arm, given), (), ()) if given else guessed_section(table, arm, order)
+    )
+    section, reasons = guess.log, [*guess.reasons]
+    if missing := missing_column(section):
+        if given is not None:
+            raise LogError(
+                missing.replace("looks like", "is given as"), table.source, "correct the log section"
+            )
+        return _skeleton(table, arm, guess, missing)
+    entries, names = section["joints"], arm.joint_names
+    measured = [joint for joint, entry in entries.items() if entry["angle"]]
+    logs = _read(table, section, arm, others, reasons, strict=given is not None)
+    motions = {joint: motion_of(logs[0], joint) for joint in measured} if logs else {}
+    driven = [joint for joint in measured if entries[joint]["command"] is not None]
+    if logs:
+        _refuse_rest(table, driven, logs, names)
+        idle = [names[j - 1] for j in driven if not any(log.driven[j - 1] for log in logs)]
+        driven = [joint for joint in driven if names[joint - 1] not in idle]
+        reasons += [f"{listed(idle)}: no command in the logs, so not compared"] if idle else []
+    wrong = [j for j, m in motions.items() if m.contradicts(backward=j in arm.backward)]
     for joint, motion in motions.items():
         reasons += _remarks(motion, arm.joints[joint - 1], joint in wrong)
         if joint in wrong:
             entries[joint]["command"] = turned(entries[joint]["command"])
     reasons += [REVERSED] if wrong else []
-    driven = [joint for joint in measured if entries[joint]["command"] is not None]
     for what in "angle", "command":
         lacking = [name for place, name in enumerate(names, 1) if not entries.get(place, {}).get(what)]
         reasons += [f"no {what} found for {listed(lacking)}"] if lacking else []
     followed = any(m.travel > 1 for joint, m in motions.items() if joint not in driven)  # [deg]
-    return Layout(section, tuple(driven or measured), tuple(reasons), unused, motions, followed)
+    made = Layout(section, tuple(driven), tuple(reasons), guess.unused, motions, followed)
+    return made if given is None else replace(made, origin="As you gave them, compared with the log.")
+
+
+def _skeleton(table: Table, arm: Arm, guess: ColumnGuess, missing: str) -> Layout:
+    """Return a layout that a person completes: all joints, with placeholders for what is not known."""
+    section = guess.log
+    entries = {
+        joint: dict(section["joints"].get(joint, {"command": None, "angle": None}))
+        for joint in range(1, len(arm.joints) + 1)
+    }
+    for joint, entry in entries.items():
+        unit = "m" if arm.joints[joint - 1].slides else "deg"
+        entry["command"] = entry["command"] or {"column": "COMMAND", "scale": 1}
+        entry["angle"] = entry["angle"] or {"column": "ANGLE", "unit": unit}
+    section = {"time": {"column": "TIME", "unit": "s"}, "command": None, "angle": None} | section
+    section["joints"] = entries
+    lines = column_lines(table)
+    return Layout(
+        section, tuple(entries), guess.reasons, (), {}, followed=False, missing=missing, candidates=lines
+    )
+
+
+def _read(
+    table: Table,
+    section: Plain,
+    arm: Arm,
+    others: Sequence[Path],
+    reasons: list[str],
+    *,
+    strict: bool,
+) -> list[Log]:
+    """Read logs by a section; an error of the first one is a reason, or ends the command if `strict`."""
+    free = dict.fromkeys(arm.joint_names, (-np.inf, np.inf))
+    settings, logs = validate(section, LogSettings, table.source), list[Log]()
+    for path in (Path(table.source), *others):
+        log, findings = check_log(path, settings, free)
+        if log is None:
+            if strict:
+                raise findings[0].error()
+            reasons.append(f"the log cannot be used as it is: {findings[0]}")
+            log, _ = check_log(path, settings, free, repair=True)
+        if log is None and path == Path(table.source):
+            return []  # what its joints do is not known
+        logs += [log] if log else []
+    return logs
+
+
+def _refuse_rest(table: Table, driven: Sequence[int], logs: Sequence[Log], names: Sequence[str]) -> None:
+    """Refuse logs in which no joint is driven and moves: nothing can be fitted to them."""
+    travels = dict[int, float]()
+    for joint in driven:
+        moved = [motion_of(log, joint).travel for log in logs if log.driven[joint - 1]]
+        if moved:
+            travels[joint] = max(moved)
+    if any(travel > MOVED for travel in travels.values()):
+        return
+    hint = (
+        "give a log in which it is; or write the project without --log, correct `log` in its fit.yaml, and "
+    )
+    hint += "go on with --config"
+    what = "no command is ever given"
+    if travels:
+        what = f"{listed([names[joint - 1] for joint in travels])} driven, but nothing moves"
+    raise LogError(f"no joint is driven and moves: {what}", table.source, hint)
 
 
 def _remarks(motion: JointMotion, joint: Joint, wrong: bool) -> Iterator[str]:

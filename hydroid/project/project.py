@@ -3,36 +3,38 @@
 import os
 import shlex
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from hydroid.arrays import record
 from hydroid.cad.importer import ImportedArm, import_arm
-from hydroid.cad.source import MESHES
-from hydroid.errors import SettingsError
+from hydroid.cad.meshes import MESHES
+from hydroid.errors import HydroidError, SettingsError
 from hydroid.files import fill_template, undisturbed, write_atomic, writing
 from hydroid.log import open_table
-from hydroid.project.layout import find_layout
+from hydroid.project.layout import Layout, find_layout
 from hydroid.project.texts import JointSize, arm_text, fit_text, joint_sizes
 from hydroid.reporting.figure import arm_picture
 from hydroid.settings.arm import Arm, load_arm
 from hydroid.settings.document import read_yaml
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.linkage import RotaryActuator
-from hydroid.settings.load import validate
+from hydroid.settings.load import load, validate
 from hydroid.words import listed
 
 ARM, MODEL, PICTURE = "arm.yaml", "arm.xml", "arm.png"
-FIT, STEPS = "fit.yaml", "next-steps.md"
-FILES = (ARM, MODEL, PICTURE, FIT, STEPS, MESHES)
+FIT, STEPS, OLD = "fit.yaml", "next-steps.md", "fit.old.yaml"
+FILES = (ARM, MODEL, PICTURE, FIT, STEPS, OLD, MESHES)
 
 
 @record
 class Project:
     """A project that was written: its folder, and the names of its files and folders there.
 
-    `notes`: what the import assumed; `columns`: what each of the log is taken for; `unused`: the others.
+    `notes`: what the import assumed; `columns`: what each of the log is taken for; `unused`: the others;
+    `missing`: which columns of the log a person must name in the settings, empty if none.
     """
 
     folder: Path
@@ -41,54 +43,125 @@ class Project:
     columns: tuple[str, ...]
     unused: tuple[str, ...]
     commands: tuple[str, ...]
+    missing: str = ""
 
 
 def write_project(
     folder: Path, robot: Path | None, logs: Sequence[Path], joints: Sequence[str], **options: Any
 ) -> Project:
     """Write a project to a folder, new or with other things in it (`hydroid.init` says what is given)."""
-    taken = [name for name in FILES if os.path.lexists(folder / name)]
-    if not options.pop("force", False) and taken:
-        hint = "name another folder, or replace the project's files with --force"
-        raise SettingsError(f"holds {taken[0]} already", folder, hint)
+    _refuse_replacing(folder, FILES, force=options.pop("force", False))
     table = open_table(logs[0]) if logs else None
     imported, reference, own = None, ARM, None
     if robot is not None and robot.suffix.lower() in (".yaml", ".yml"):
-        own, reference = robot, Path(os.path.relpath(robot.resolve(), folder.resolve())).as_posix()
+        own, reference = robot, _seen_from(folder, robot)
     elif robot is not None:
         imported = import_arm(robot, table.names if table else (), **options)
-    with _stage(folder) as hidden:
-        stage = Path(hidden)
+    with _stage(folder) as stage, _of_the_project(stage, folder, robot):
         arm = load_arm(own) if own else _write_arm(stage, imported)
-        layout = find_layout(table, arm, joints)
+        layout = find_layout(table, arm, joints, others=_fitted(logs)[1:])
         sizes = joint_sizes(arm, {j: m.speed for j, m in layout.motions.items()})
         if imported is not None:
             arm = _write_arm(stage, imported, arm, sizes)
-        caption = f"{arm.name}, all joints at or near 0: does it look and turn like yours?"
-        write_atomic(stage / PICTURE, arm_picture(arm, caption)[0])
-        write_atomic(stage / FIT, fit_text(arm, layout, sizes, str(folder / FIT), reference))
-        # what is written can be read
-        validate(read_yaml(stage / FIT)[0] | {"arm": arm}, FitSettings, FIT)
-        # of several logs the last is kept to validate on, of one none is
-        names = [shlex.quote(str(log)) for log in logs or ("LOG.csv", "OTHER.csv")]
-        fitted, other = " ".join(names[:-1] or names), names[-1] if names[1:] else "OTHER.csv"
-        home = shlex.quote(str(folder))
-        config, run = f"--config {home}/fit.yaml", f"{home}/runs/fit"
-        steps = (
-            f"hydroid check {' '.join(names)} {config}",
-            f"hydroid fit-hyd {fitted} {config} --out {run}",
-            f"hydroid validate {other} --fit {run} --out {home}/runs/validation",
-            f"hydroid suggest {fitted} --fit {run} --out {home}/runs/suggestions",
-        )
         notes = [*imported.notes] if imported else []
         guessed = [joint.name for joint in arm.joints if isinstance(joint.actuator, RotaryActuator)]
         if imported and guessed:
             what = "no cylinder is known. A stand-in predicts angles; its pressures and forces mean nothing"
             notes.append(f"{listed(guessed)}: {what}")
-        told = {"steps": steps, "notes": notes, "reasons": layout.reasons}
-        write_atomic(stage / STEPS, fill_template("project/next-steps.md.j2", name=arm.name, **told))
-        written = _move(stage, folder)
-    return Project(folder, written, tuple(notes), layout.reasons, layout.unused, steps)
+        steps = _steps(folder, logs, layout)
+        text = fit_text(arm, layout, sizes, str(folder / FIT), reference, steps[0])
+        _write_settings(stage, arm, text)
+        return _finished(stage, folder, arm.name, layout, notes, steps)
+
+
+def go_on(folder: Path | None, config: Path, logs: Sequence[Path], *, force: bool) -> Project:
+    """Write the settings anew, with starts from the logs, whose columns a person has named in `config`.
+
+    Its arm stays as it is. Settings that are replaced are kept as OLD.
+    """
+    values, _ = read_yaml(config)
+    if not values.get("log"):
+        hint = "name the log's columns there: take the comment signs of its lines away"
+        raise SettingsError("has no log section", config, hint)
+    if not logs:
+        raise SettingsError("needs the log", "--config", "give --log LOG")
+    settings, folder = load(config, FitSettings), folder or config.parent
+    arm, home = settings.arm, config.resolve() == (folder / FIT).resolve()
+    _refuse_replacing(folder, (FIT, STEPS, PICTURE), force=force or home)
+    table = open_table(logs[0], settings.log)
+    layout = find_layout(table, arm, given=settings.log, others=_fitted(logs)[1:])
+    sizes = joint_sizes(arm, {j: m.speed for j, m in layout.motions.items()})
+    steps = _steps(folder, logs, layout)
+    text = fit_text(arm, layout, sizes, str(folder / FIT), _seen_from(folder, Path(arm.where)), steps[0])
+    with _stage(folder) as stage, _of_the_project(stage, folder, config):
+        if home:
+            write_atomic(stage / OLD, config.read_bytes())
+        _write_settings(stage, arm, text)
+        return _finished(stage, folder, arm.name, layout, (), steps)
+
+
+def _refuse_replacing(folder: Path, names: Sequence[str], *, force: bool) -> None:
+    taken = [name for name in names if os.path.lexists(folder / name)]
+    if taken and not force:
+        hint = "name another folder, or replace the project's files with --force"
+        raise SettingsError(f"holds {taken[0]} already", folder, hint)
+
+
+def _seen_from(folder: Path, file: Path) -> str:
+    return Path(os.path.relpath(file.resolve(), folder.resolve())).as_posix()
+
+
+def _fitted(logs: Sequence[Path]) -> Sequence[Path]:
+    """Return the logs that are fitted: of several the last is kept to validate on."""
+    return logs[:-1] or logs
+
+
+def _steps(folder: Path, logs: Sequence[Path], layout: Layout) -> tuple[str, ...]:
+    """Return the commands that come next."""
+    names = [shlex.quote(str(log)) for log in logs or ("LOG.csv", "OTHER.csv")]
+    fitted, other = " ".join(names[:-1] or names), names[-1] if names[1:] else "OTHER.csv"
+    home = shlex.quote(str(folder))
+    config, run = f"--config {home}/fit.yaml", f"{home}/runs/fit"
+    if layout.missing:
+        return (" ".join([f"hydroid init {config}", *(f"--log {name}" for name in names)]),)
+    return (
+        f"hydroid check {' '.join(names)} {config}",
+        f"hydroid fit-hyd {fitted} {config} --out {run}",
+        f"hydroid validate {other} --fit {run} --out {home}/runs/validation",
+        f"hydroid suggest {fitted} --fit {run} --out {home}/runs/suggestions",
+    )
+
+
+def _write_settings(stage: Path, arm: Arm, text: str) -> None:
+    """Write the settings of a fit, which can be read, and the picture of the arm."""
+    write_atomic(stage / FIT, text)
+    validate(read_yaml(stage / FIT)[0] | {"arm": arm}, FitSettings, FIT)
+    caption = f"{arm.name}, all joints at or near 0: does it look and turn like yours?"
+    write_atomic(stage / PICTURE, arm_picture(arm, caption)[0])
+
+
+def _finished(
+    stage: Path, folder: Path, name: str, layout: Layout, notes: Sequence[str], steps: tuple[str, ...]
+) -> Project:
+    """Write the next steps, and move all to the folder."""
+    told = {"steps": steps, "notes": notes, "reasons": layout.reasons, "missing": layout.missing}
+    write_atomic(stage / STEPS, fill_template("project/next-steps.md.j2", name=name, **told))
+    written = _move(stage, folder)
+    return Project(
+        folder, written, tuple(notes), layout.reasons, layout.unused, steps, missing=layout.missing
+    )
+
+
+@contextmanager
+def _of_the_project(stage: Path, folder: Path, source: Path | None) -> Generator[None]:
+    """Let errors name the source in place of a file that was to be written and is gone."""
+    try:
+        yield
+    except HydroidError as error:
+        if str(stage) not in str(error):
+            raise
+        what, hint = (text.replace(str(stage), str(folder)) for text in (error.what, error.hint))
+        raise type(error)(what, source or folder, hint) from None
 
 
 def _write_arm(
@@ -104,11 +177,14 @@ def _write_arm(
     return load_arm(stage / ARM)
 
 
-def _stage(folder: Path) -> tempfile.TemporaryDirectory[str]:
+@contextmanager
+def _stage(folder: Path) -> Generator[Path]:
     """A folder beside the project, or in it where it exists, that disappears."""
     home = next(filter(Path.is_dir, (folder.absolute(), *folder.absolute().parents)))
     with writing(folder):
-        return tempfile.TemporaryDirectory(prefix=".hydroid-init-", dir=home, ignore_cleanup_errors=True)
+        stage = tempfile.TemporaryDirectory(prefix=".hydroid-init-", dir=home, ignore_cleanup_errors=True)
+    with stage as name:
+        yield Path(name)
 
 
 def _move(stage: Path, folder: Path) -> tuple[str, ...]:

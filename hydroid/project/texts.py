@@ -15,7 +15,7 @@ from hydroid.cad.importer import ImportedArm
 from hydroid.files import Plain, fill_template, yaml_text
 from hydroid.hydraulics.valve import DENSITY
 from hydroid.project.layout import Layout
-from hydroid.settings.arm import Arm
+from hydroid.settings.arm import Arm, Joint
 from hydroid.settings.cylinder import LinearActuator
 from hydroid.settings.hydraulics import HydraulicSettings
 
@@ -24,6 +24,7 @@ VALVE_STEP = 0.002  # of valves and oil [s]
 DEAD = 0.8  # part of the command below which a joint seems to stand that its dead band is
 DRAG = 0.02  # part of the torque at the pump's pressure that damping takes at full speed
 RESPONSE = 0.1  # of a valve and its oil without any delay [s]
+USUAL_SPEED = 0.5  # of a joint of which no log tells its own [rad/s, m/s]
 LIFT = 2.0  # torque of a joint at the pump's pressure, over the largest that gravity asks of it
 
 
@@ -45,7 +46,7 @@ def joint_sizes(arm: Arm, speeds: Mapping[int, float]) -> tuple[JointSize, ...]:
 
     The displacement gives the torque at the pump's pressure; the opening gives the speed while the arm is
     lifted, and both edges lose the same; the damping holds the speed at full command. `speeds` are those that
-    a log shows, by number of the joint [rad/s, m/s]; 0.5 for the others.
+    a log shows, by number of the joint [rad/s, m/s]; USUAL_SPEED for the others.
     """
     model = load_model(arm).compile()
     data = mujoco.MjData(model)
@@ -59,14 +60,46 @@ def joint_sizes(arm: Arm, speeds: Mapping[int, float]) -> tuple[JointSize, ...]:
         # a joint without weight must give 1 rad/s² at least
         torque = np.maximum(torque, np.maximum(LIFT * abs(data.qfrc_bias), np.diag(inertia)))
     pressure, sizes = 1e5 * settings.supply_pressure, list[JointSize]()
-    through = settings.flow_coefficient * np.sqrt((1 - 1 / LIFT) * pressure / DENSITY)  # [m/s]
     for joint, most in enumerate(torque.tolist(), 1):
-        speed = max(speeds.get(joint, 0.5), 0.01)
-        oil, own, lever = 1e6 * most / pressure, arm.joints[joint - 1], 1.0
-        if isinstance(own.actuator, LinearActuator):
-            lever = np.abs(own.actuator.moment_arm(np.linspace(*own.limits, 50))).mean()
-        sizes.append(JointSize(oil, oil * speed / through, most / speed, speed, oil / lever))
+        speed = max(speeds.get(joint, USUAL_SPEED), 0.01)
+        oil, lever = 1e6 * most / pressure, _lever(arm.joints[joint - 1])
+        sizes.append(JointSize(oil, opening_at(oil, speed), most / speed, speed, oil / lever))
     return tuple(sizes)
+
+
+def opening_at(displacement: float, speed: float) -> float:
+    """Return the valve's opening [mm²] that lets a joint of a displacement [cm³/rad] move at a speed [rad/s].
+
+    Of a joint that slides [mm², m/s].
+    """
+    settings = HydraulicSettings()
+    pressure = 1e5 * settings.supply_pressure
+    through = settings.flow_coefficient * np.sqrt((1 - 1 / LIFT) * pressure / DENSITY)  # [m/s]
+    return displacement * speed / through
+
+
+def _lever(joint: Joint) -> float:
+    """Return the mean moment arm of a joint's cylinder [m]; 1 of other actuators."""
+    if not isinstance(joint.actuator, LinearActuator):
+        return 1.0
+    return np.abs(joint.actuator.moment_arm(np.linspace(*joint.limits, 50))).mean()
+
+
+def _opening(joint: Joint, speed: float) -> str:
+    """Return the nominal opening of a stand-in that was sized before a log told its joint's speed, as YAML.
+
+    Empty where the arm's file has another one: it holds.
+    """
+    own = joint.actuator
+    if own is None:
+        return ""
+    if isinstance(own, LinearActuator):
+        oil, opening = own.settings.area_a * _lever(joint), own.settings.max_opening
+    else:
+        oil, opening = own.displacement, own.max_opening
+    if not math.isclose(opening, opening_at(oil, USUAL_SPEED), rel_tol=0.01):
+        return ""
+    return f"nominal: {short(opening_at(oil, speed))}, "
 
 
 def arm_text(imported: ImportedArm, arm: Arm | None, sizes: Sequence[JointSize]) -> str:
@@ -105,10 +138,13 @@ def rounded(value: float) -> float:
     return float(f"{value:.3g}")
 
 
-def fit_text(arm: Arm, layout: Layout, sizes: Sequence[JointSize], file: str, arm_file: str) -> str:
+def fit_text(
+    arm: Arm, layout: Layout, sizes: Sequence[JointSize], file: str, arm_file: str, again: str = ""
+) -> str:
     """Return the settings of a fit of the whole chain.
 
-    `file` is their own name as a command takes it, and `arm_file` that of the arm as they name it.
+    `file` is their own name as a command takes it, and `arm_file` that of the arm as they name it; `again` is
+    the command that goes on once the columns are named.
     """
     joints, volumes = list[Plain](), list[float]()
     flows = {joint: 0.06 * sizes[joint - 1].displacement * sizes[joint - 1].speed for joint in layout.outputs}
@@ -125,6 +161,7 @@ def fit_text(arm: Arm, layout: Layout, sizes: Sequence[JointSize], file: str, ar
                 "name": name,
                 "linear": linear,
                 "lever": own.has("lever_slope"),
+                "opening": _opening(own, size.speed) if motion else "",
                 "damping": short(DRAG * size.damping),
                 "delay": min(max(motion.likely_lag - RESPONSE, 0.0), 0.9) if motion else 0.0,
                 "unit": "N·s/m" if own.slides else "N·m·s/rad",
@@ -133,11 +170,12 @@ def fit_text(arm: Arm, layout: Layout, sizes: Sequence[JointSize], file: str, ar
                 "dead": short(DEAD * min(max(motion.dead_band, 5.0), 40.0) if motion else 10.0),
             }
         )
-    period = layout.section["period_s"]
+    period = layout.section.get("period_s", 0.01)
     steps = math.ceil(period / LONGEST_STEP - 1e-9)
     return fill_template(
         "project/fit.yaml.j2",
         file=file,
+        again=again,
         arm=flow(arm_file),
         outputs=flow([one["name"] for one in joints]),
         layout=layout,

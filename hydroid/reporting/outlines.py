@@ -151,10 +151,10 @@ def moving_arm(
 ) -> MovingArm:
     """Return how an arm with joints of these names moves, at `most` moments or fewer."""
     log, compared = prediction.log, [joint - 1 for joint in prediction.joints]
-    simulated = log.angle.copy()
+    measured, simulated = log.posed, log.posed.copy()
     simulated[:, compared] = prediction.response
-    error = log.angle - simulated
-    moves = np.ptp(log.angle, axis=0) + np.abs(error).max(axis=0) > 1e-4  # [rad]
+    error = measured - simulated
+    moves = np.ptp(measured, axis=0) + np.abs(error).max(axis=0) > 1e-4  # [rad]
     moving = {0, *model.jnt_bodyid[moves].tolist()}
     roots: list[int] = []  # the body that each one turns with: itself, or one that carries it
     for body, parent in enumerate(model.body_parentid.tolist()):
@@ -162,7 +162,7 @@ def moving_arm(
     parts = sorted(set(roots))
     count = int(np.clip(RATE * np.ptp(log.time) + 1, 2, most))
     moments = np.unique(np.linspace(0, len(log.time) - 1, count).round().astype(int))
-    poses = np.stack([body_poses(model, angle[moments]) for angle in (log.angle, simulated)])
+    poses = np.stack([body_poses(model, angle[moments]) for angle in (measured, simulated)])
 
     view, start = sight(*VIEW), poses[1, 0]
     farthest_first = sorted(shapes(model), key=lambda one: -(one.placed(start) @ view[2]).mean())

@@ -143,7 +143,10 @@ def speed_section(settings: FitSettings, summary: FitSummary, logs: Sequence[Log
             panels.append(Panel(curve.along, f"speed [{curve.unit}]", tuple(marks), title, 250))
         return Chart(tuple(panels))
 
-    text = "Speeds in mid travel against command, with 95 % intervals. Grey: commands beyond the logs."
+    text = (
+        "Speeds of a settled motion through mid travel against command, with 95 % intervals. Grey: commands "
+        "beyond the logs."
+    )
     return Section("Speeds", plots=(Plot("speed", text, draw),), folded=True) if curves else None
 
 

@@ -6,18 +6,23 @@ Every file is checked before it is believed.
 import hashlib
 import io
 import json
+import math
+import zlib
 from collections import UserDict
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile, ZipFile
 
 import numpy as np
 
 from hydroid.errors import RunError
-from hydroid.files import Plain, undisturbed, write_atomic
+from hydroid.files import Plain, read_file, undisturbed, write_atomic
 from hydroid.fitting.checkpoints import Arrays
 from hydroid.progress import LOGGER
+
+LARGEST = 2**32  # bytes that a file may unpack to
 
 
 def pack(tree: object, *, compressed: bool = True) -> bytes:
@@ -43,17 +48,47 @@ def pack(tree: object, *, compressed: bool = True) -> bytes:
 
 
 def unpack(file: Path) -> Any:
-    """Read a tree that `pack` made, its dataclasses as mappings and its sequences as lists."""
-    packed = file.read_bytes()
+    """Read a tree that `pack` made, its dataclasses as mappings and its sequences as lists.
+
+    Raises OSError: the file cannot be read. ValueError: it is not what `pack` writes, or unpacks to
+    more than LARGEST.
+    """
+    packed = read_file(file)
     data, digest = packed[:-32], packed[-32:]
     if hashlib.sha256(data).digest() != digest:
         raise ValueError("checksum")
-    arrays = np.load(io.BytesIO(data), allow_pickle=False)
+    try:
+        arrays = _arrays(data)
 
-    def filled(value: Plain) -> Any:
-        return arrays[value["array"]] if value.keys() == {"array"} else value
+        def filled(value: Plain) -> Any:
+            return arrays[value["array"]] if value.keys() == {"array"} else value
 
-    return json.loads(arrays["content"].tobytes(), object_hook=filled)
+        return json.loads(arrays["content"].tobytes(), object_hook=filled)
+    except (KeyError, TypeError, EOFError, NotImplementedError, RecursionError, BadZipFile, zlib.error):
+        raise ValueError("content") from None
+
+
+def _arrays(data: bytes) -> dict[str, np.ndarray]:
+    """Return the arrays of an npz by name: numbers only, and none larger than the bytes that it has.
+
+    `np.load` makes room for what an array's header says before it looks at its bytes.
+    """
+    arrays: dict[str, np.ndarray] = {}
+    with ZipFile(io.BytesIO(data)) as archive:
+        if sum(member.file_size for member in archive.infolist()) > LARGEST:
+            raise ValueError("size")
+        for member in archive.infolist():
+            content = archive.read(member)
+            header = io.BytesIO(content)
+            if np.lib.format.read_magic(header) != (1, 0):
+                raise ValueError("format")
+            shape, columns_first, kind = np.lib.format.read_array_header_1_0(header)
+            values = np.frombuffer(content, kind, offset=header.tell())
+            if values.size != math.prod(shape):
+                raise ValueError("shape")
+            ordered = values.reshape(shape, order="F" if columns_first else "C")
+            arrays[member.filename.removesuffix(".npy")] = ordered.copy(order="K")
+    return arrays
 
 
 class CheckpointFile(UserDict[str, Arrays]):
@@ -84,6 +119,8 @@ class CheckpointFile(UserDict[str, Arrays]):
     def _read(self, file: Path, *before: Path) -> dict[str, Arrays]:
         try:
             content = unpack(file)
+            if not (isinstance(content, dict) and _are_parts(content.get("parts"))):
+                raise ValueError("content")
         except (ValueError, OSError) as error:
             if not before:
                 hint = "remove the run's checkpoints to begin again from the seed"
@@ -92,6 +129,14 @@ class CheckpointFile(UserDict[str, Arrays]):
             LOGGER.warning("%s: is damaged; going on from the checkpoint before it", file)
             file.replace(file.with_suffix(f".damaged{file.suffix}"))
             return earlier
-        if content["run"] != self._run:
+        if content.get("run") != self._run:
             raise RunError("is another run's", file, "put the run's own checkpoint back")
         return content["parts"]
+
+
+def _are_parts(parts: Any) -> bool:
+    """Return whether what a file holds are arrays by name, by part of a fit."""
+    return isinstance(parts, dict) and all(
+        isinstance(arrays, dict) and all(isinstance(one, np.ndarray) for one in arrays.values())
+        for arrays in parts.values()
+    )

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import os
 import platform
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
@@ -9,14 +10,19 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from hydroid.arm.model import load_model
 from hydroid.arrays import record
 from hydroid.errors import RunError, Stopped
-from hydroid.estimate import write_estimate
-from hydroid.files import PART, Plain, is_file, write_atomic
-from hydroid.identified_model import ARM, CONFIG, MODEL, IdentifiedModel, portable, write_settings
+from hydroid.estimate import DESCRIPTION, NAME, write_estimate
+from hydroid.files import PART, Plain, is_file, read_file, write_atomic
+from hydroid.identified_model import (
+    MODEL,
+    IdentifiedModel,
+    file_hash,
+    own_hashes,
+    portable,
+    write_settings,
+)
 from hydroid.log import Log
 from hydroid.plant import Plant
 from hydroid.progress import LOGGER
@@ -24,10 +30,7 @@ from hydroid.run.archive import CheckpointFile
 from hydroid.run.process import LOCK, locked, run_log
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
-
-DESCRIPTION = "run.json"
-"""name of the file that describes the run: versions, seed, hashes of its logs and files, status, seconds"""
-
+from hydroid.words import numbered
 
 VERSIONS = {name: version(name) for name in ("hydroid", "mujoco", "numpy")}
 """those that a result is of"""
@@ -35,10 +38,11 @@ VERSIONS = {name: version(name) for name in ("hydroid", "mujoco", "numpy")}
 
 def identity(settings: FitSettings, logs: Sequence[Log]) -> Plain:
     """Return versions, the settings that decide, and hashes of the logs and of the arm's model."""
+    hashes = [log_hash(log, settings) for log in logs]
     return VERSIONS | {
         "python": platform.python_version(),
         "seed": settings.search.seed,
-        "logs": {log.source: log_hash(log) for log in logs},
+        "logs": dict(zip(numbered(log.source for log in logs), hashes, strict=True)),
         "origin": model_hash(settings.arm),
         "settings": deciding(settings),
     }
@@ -70,28 +74,29 @@ def difference(run: Mapping[str, Any], other: Mapping[str, Any], but: str = "") 
     return "" if run.get("origin") == other.get("origin") else "has another model of the arm"
 
 
-def own_hashes(folder: Path) -> dict[str, str]:
-    """Return hashes of the settings and the model in a run folder, by file."""
-    files = [folder / name for name in (CONFIG, ARM, MODEL)]
-    files += sorted((folder / MODEL).parent.glob("meshes/*"))
-    return {f.relative_to(folder).as_posix(): _file_hash(f) for f in files if f.is_file()}
-
-
 def model_hash(arm: Arm) -> str:
     """Return the hash of the arm's MJCF and of its meshes."""
     spec = load_model(arm)
     folder = Path(spec.modelfiledir) / spec.meshdir
-    return _file_hash(arm.model, *(folder / mesh.file for mesh in spec.meshes if mesh.file))
+    return file_hash(arm.model, *(folder / mesh.file for mesh in spec.meshes if mesh.file))
 
 
-def log_hash(log: Log) -> str:
-    """Return the hash of the log's file, or of its samples where it has none."""
-    return _file_hash(Path(log.source)) if is_file(log.source) else samples_hash(log)
+def log_hash(log: Log, settings: FitSettings) -> str:
+    """Return the hash of all of a log that decides a result: samples, and what its name stands for.
+
+    A file that was moved or saved again is the same log, and one that was repaired is another.
+    """
+    name = Path(log.source).name
+    named = repr((settings.payloads.get(name), settings.log.group_of(name)))
+    return hashlib.sha256(samples(log) + named.encode()).hexdigest()
 
 
-def samples_hash(log: Log) -> str:
-    """Return the hash of a log's samples, wherever they are from."""
-    return hashlib.sha256(np.column_stack([log.time, log.command, log.angle]).tobytes()).hexdigest()
+def samples(log: Log) -> bytes:
+    """Return the digest of a log's samples, wherever they are from."""
+    content = hashlib.sha256(repr((log.period, log.rest, log.angle.shape)).encode())
+    for signal in (log.time, log.command, log.angle, log.pressure):
+        content.update(b"" if signal is None else signal.tobytes())
+    return content.digest()
 
 
 def digest(content: Plain) -> str:
@@ -99,8 +104,9 @@ def digest(content: Plain) -> str:
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
-def _file_hash(*files: Path) -> str:
-    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
+def _names(values: Any) -> bool:
+    """Return whether values as JSON holds them are texts by name."""
+    return isinstance(values, dict) and all(isinstance(value, str) for value in values.values())
 
 
 def _flat(values: Any, prefix: str = "") -> Plain:
@@ -119,13 +125,13 @@ class RunFolder:
     @property
     def exists(self) -> bool:
         """Whether a run has begun here."""
-        return (self.path / DESCRIPTION).is_file()
+        return is_file(self.path / DESCRIPTION)
 
     @contextmanager
     def owned(self) -> Generator[None]:
         """Hold the folder against other processes, and write the `hydroid` logger's lines to `run.log`."""
         # it is the run's if it is empty, or holds a run's description or at least its lock
-        other = self.path.exists() and not (self.exists or (self.path / LOCK).exists())
+        other = os.path.exists(self.path) and not (self.exists or (self.path / LOCK).exists())
         if other and (not self.path.is_dir() or any(self.path.iterdir())):
             raise RunError("exists and holds no run", self.path, "choose another folder with --out")
         with locked(self.path), run_log(self.path / "run.log"):
@@ -172,11 +178,11 @@ class RunFolder:
         """Read the run's description."""
         file = self.path / DESCRIPTION
         try:
-            content = json.loads(file.read_bytes())
+            content = json.loads(read_file(file))
         except (OSError, ValueError, RecursionError) as error:
             what = f"cannot be read as a run ({getattr(error, 'strerror', None) or 'it is damaged'})"
             raise RunError(what, file, "name a folder that a fit has made") from None
-        if not (isinstance(content, dict) and isinstance(content.get("logs", {}), dict)):
+        if not (isinstance(content, dict) and all(_names(content.get(key, {})) for key in ("logs", "files"))):
             raise RunError("is not a run's description", file)
         return content
 
@@ -189,6 +195,8 @@ class RunFolder:
 
     def status(self, word: str, **more: Any) -> None:
         """Record whether the run is running, interrupted or done, and more about it."""
+        if is_file(self.path / NAME):
+            more["estimate"] = file_hash(self.path / NAME)
         self._describe(self.identity() | {"status": word} | more)
 
     def interrupt(self) -> str:
@@ -202,7 +210,8 @@ class RunFolder:
     def checkpoints(self) -> CheckpointFile:
         """Return what the run's search and refinements have stored, by name."""
         # what does not change while the run goes on
-        fixed = {key: value for key, value in self.identity().items() if key not in ("status", "seconds")}
+        course = ("status", "seconds", "estimate")
+        fixed = {key: value for key, value in self.identity().items() if key not in course}
         return CheckpointFile(self.path / "checkpoint.npz", digest(fixed))
 
     def _describe(self, content: Plain) -> None:

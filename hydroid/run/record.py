@@ -7,10 +7,12 @@ A validation stores each unseen log as VALIDATIONS/NAME/result.npz in the folder
 """
 
 import glob
+import hashlib
 import math
 import os
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cache, cached_property
 from itertools import pairwise
 from pathlib import Path
@@ -25,16 +27,19 @@ from hydroid.files import write_atomic
 from hydroid.fitting.fit import Fit
 from hydroid.fitting.validation import Prediction
 from hydroid.fitting.verdict import Baselines, judge
-from hydroid.identified_model import IdentifiedModel, load_identified
+from hydroid.identified_model import IdentifiedModel, read_identified
 from hydroid.joint_verdict import JointVerdict
+from hydroid.log import Log
 from hydroid.progress import LOGGER
 from hydroid.run.archive import pack, unpack
-from hydroid.run.folder import RunFolder, difference
+from hydroid.run.folder import RunFolder, difference, samples
 from hydroid.settings.fit import FitSettings
-from hydroid.words import distinct
+from hydroid.words import numbered
 
 RESULT, VALIDATIONS = "result.npz", "validations"
 """names of the file of arrays, and of the folder of unseen logs"""
+LONGEST_NAME = 60
+"""characters of a log's name in that of its validation; file systems take 255 bytes"""
 
 T = TypeVar("T")
 
@@ -114,47 +119,82 @@ def run_of(model: IdentifiedModel) -> Path | None:
 
 
 def keep_validation(model: IdentifiedModel, predictions: Sequence[Prediction]) -> Path | None:
-    """Store predictions of unseen logs, under the logs' names, in the run that a model is from; return it.
+    """Store predictions of unseen logs in the run that a model is from; return it.
 
-    Nothing is stored of a model that is from no run, or whose settings are not the run's. A log that was
-    validated before is replaced.
+    Nothing is stored of a model that is from no run, or whose settings are not the run's. What was stored of
+    the same file before is replaced.
     """
     folder, unseen = run_of(model), [p for p in predictions if p.unseen]
-    if folder is None or not unseen or load_identified(folder).settings != model.settings:
+    if folder is None or not unseen or read_identified(folder).settings != model.settings:
         return None
-    taken: set[str] = set()
     for one in unseen:
-        name = distinct(re.sub(r"[^A-Za-z0-9._-]+", "_", Path(one.log.source).name), taken)
-        write_atomic(folder / VALIDATIONS / name / RESULT, pack(one))
+        write_atomic(folder / VALIDATIONS / validation_name(one.log) / RESULT, pack(one))
     return folder
 
 
-def fitted_by(model: IdentifiedModel) -> tuple[Sequence[Prediction], Baselines, set[str] | None]:
-    """Return what a model's run made of its logs, the baselines, and the logs' hashes, if there is one."""
+def validation_name(log: Log) -> str:
+    """Return the name of a log's folder among the validations: its file's, and a digest of the file's place.
+
+    Of a log that is no file the digest is that of its samples.
+    """
+    there = os.path.exists(log.source)
+    place = Path(os.path.realpath(log.source)) if there else Path(log.source)
+    key = os.fsencode(place) if there else samples(log)
+    name = re.sub(r"[^\w.-]+", "_", place.name).strip(".")[:LONGEST_NAME]
+    return f"{name or 'log'}-{hashlib.sha256(key).hexdigest()[:8]}"
+
+
+def fitted_by(model: IdentifiedModel) -> tuple[Sequence[Prediction], Baselines]:
+    """Return what a model's run made of its logs, and the baselines; nothing if it is from no run."""
     if (folder := run_of(model)) is None:
-        return (), {}, None
+        return (), {}
     result = _read(folder / RESULT, FitResult)
-    return result.fitted, result.baselines, {*RunFolder(folder).identity().get("logs", {}).values()}
+    return result.fitted, result.baselines
 
 
 def load_record(folder: str | Path) -> Record:
-    """Read a finished run."""
+    """Read a finished run. A validation that cannot be read is left out, with a warning.
+
+    Logs of one name have different ones there: `log.csv` and `log.csv (2)`.
+    """
     path = Path(folder)
-    identity, model = RunFolder(path).identity(), load_identified(path)
-    files = sorted(path.glob(f"{VALIDATIONS}/*/{RESULT}"))
-    unseen = {file.parent.name: _read(file, Prediction) for file in files}
+    identity, model = RunFolder(path).identity(), read_identified(path)
     result = _read(path / RESULT, FitResult)
-    return Record(str(folder), identity, model.settings, model.summarise(), result, unseen)
+    unseen = _validations(path)
+    every = [*result.fitted, *unseen.values()]
+    sources = numbered(one.log.source for one in every)
+    named = [
+        replace(one, log=replace(one.log, source=source)) for one, source in zip(every, sources, strict=True)
+    ]
+    count = len(result.fitted)
+    validations = dict(zip(unseen, named[count:], strict=True))
+    result = replace(result, fitted=tuple(named[:count]))
+    return Record(str(folder), identity, model.settings, model.summarise(), result, validations)
 
 
-def _read(file: Path, kind: type[T]) -> T:
+def _validations(folder: Path) -> dict[str, Prediction]:
+    """Read the validations of a run, by their folders' names; a copy of a log counts once."""
+    unseen, known = dict[str, Prediction](), set[bytes]()
+    for file in sorted(folder.glob(f"{VALIDATIONS}/*/{RESULT}")):
+        try:
+            one = _read(file, Prediction, "validate again")
+        except RunError as error:
+            LOGGER.warning("left out: %s", error)
+            continue
+        if (content := samples(one.log)) not in known:
+            known.add(content)
+            unseen[file.parent.name] = one
+    return unseen
+
+
+def _read(file: Path, kind: type[T], hint: str = "fit again with this version") -> T:
     try:
         return _adapter(kind).validate_python((unpack(file),))[0]
     except FileNotFoundError:
         raise RunError("holds no result", file.parent, "finish the fit: --resume") from None
     except (OSError, ValueError, KeyError, EOFError, ValidationError) as error:
         what = f"cannot be read ({type(error).__name__})"
-        raise RunError(what, file, "fit again with this version") from None
+        raise RunError(what, file, hint) from None
 
 
 @cache

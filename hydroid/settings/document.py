@@ -11,9 +11,12 @@ from typing import Any
 import yaml
 
 from hydroid.errors import SettingsError
+from hydroid.files import read_file
 
 Lines = dict[tuple[str, ...], int]  # line [1-based] of each key or item, by its path
 
+MOST_VALUES, MOST_CHARACTERS = 20_000, 2**20
+"""in one document"""
 _PLAIN = {
     "mapping values are not allowed": "there is a second ': ' in this line, or the line is indented too far",
     "\\t": "a line is indented by a tab; use spaces",
@@ -30,8 +33,7 @@ def read_yaml(path: Path) -> tuple[dict[str, Any], Lines]:
     """Read a file that holds one mapping."""
     most = 2**18
     try:
-        with path.open("rb") as file:
-            data = file.read(most + 1)
+        data = read_file(path, most + 1)
         text = data.decode("utf-8-sig")
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
@@ -46,10 +48,10 @@ def read_yaml(path: Path) -> tuple[dict[str, Any], Lines]:
 
 def read_document(text: str, source: object) -> tuple[Any, Lines]:
     """Read one YAML document."""
-    lines: Lines = {}
+    reader = _Reader(source)
     try:
         node = yaml.compose(text, Loader=yaml.BaseLoader)  # every scalar is text
-        return None if node is None else _value(node, (), lines, source), lines
+        return None if node is None else reader.value(node, ()), reader.lines
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         where = f"{source}, line {mark.line + 1}, column {mark.column + 1}" if mark else source
@@ -60,43 +62,57 @@ def read_document(text: str, source: object) -> tuple[Any, Lines]:
         raise SettingsError("is not YAML: it is nested too deeply", source) from None
 
 
-def _value(node: yaml.Node, path: tuple[str, ...], lines: Lines, source: object) -> Any:
-    """The value of a node; the lines of all that is in it are noted."""
-    where = f"{source}, line {node.start_mark.line + 1}"
-    if len(lines) >= 20_000:  # aliases count whenever they are used: a few lines cannot expand to billions
-        raise SettingsError("holds more than 20000 values", source)
-    if len(path) > 40:
-        raise SettingsError("is nested more than 40 deep", where)
-    kind = node.tag.removeprefix("tag:yaml.org,2002:")
-    if kind not in ("str", "seq", "map"):
-        raise SettingsError(f"a value of type {kind!r} is not allowed", where)
-    lines.setdefault(path, node.start_mark.line + 1)
-    if isinstance(node, yaml.ScalarNode):
-        return _scalar(node, where)
-    if isinstance(node, yaml.SequenceNode):
-        return [_value(item, (*path, str(index)), lines, source) for index, item in enumerate(node.value)]
-    values: dict[Any, Any] = {}
-    for key, item in node.value:
-        where = f"{source}, line {key.start_mark.line + 1}"
-        if not isinstance(key, yaml.ScalarNode):
-            raise SettingsError("a key must be plain text or a number", where)
-        name = _scalar(key, where)
-        place = (*path, str(name))  # 02 and 2 are the same joint
-        if place in lines:
-            raise SettingsError(f"{'.'.join(place)} occurs twice", where)
-        lines[place] = key.start_mark.line + 1
-        values[name] = _value(item, place, lines, source)
-    return values
+class _Reader:
+    """Turns nodes into values, and notes the lines of all that is in them.
 
+    What stands behind an alias counts whenever it is used: a few lines cannot expand to billions.
+    """
 
-def _scalar(node: yaml.ScalarNode, where: str) -> Any:
-    text = str(node.value)
-    if not all(c.isprintable() or c in "\t\n" for c in text):
-        raise SettingsError("a text contains characters that cannot be printed", where)
-    if node.style is not None:  # quoted, or a block of text
-        return text
-    if text.lower() in _WORDS:
-        return _WORDS[text.lower()]
-    if _INTEGER.fullmatch(text):
-        return int(text)
-    return float(re.sub(r"\.(?=[in])", "", text.lower())) if _NUMBER.fullmatch(text) else text
+    def __init__(self, source: object) -> None:
+        self.lines: Lines = {}
+        self._source, self._characters = source, 0
+
+    def value(self, node: yaml.Node, path: tuple[str, ...]) -> Any:
+        """Return the value of a node at a path of keys."""
+        if len(self.lines) >= MOST_VALUES:
+            raise SettingsError(f"holds more than {MOST_VALUES} values", self._source)
+        where = self._place(node)
+        if len(path) > 40:
+            raise SettingsError("is nested more than 40 deep", where)
+        kind = node.tag.removeprefix("tag:yaml.org,2002:")
+        if kind not in ("str", "seq", "map"):
+            raise SettingsError(f"a value of type {kind!r} is not allowed", where)
+        self.lines.setdefault(path, node.start_mark.line + 1)
+        if isinstance(node, yaml.ScalarNode):
+            return self._scalar(node)
+        if isinstance(node, yaml.SequenceNode):
+            return [self.value(item, (*path, str(index))) for index, item in enumerate(node.value)]
+        values: dict[Any, Any] = {}
+        for key, item in node.value:
+            if not isinstance(key, yaml.ScalarNode):
+                raise SettingsError("a key must be plain text or a number", self._place(key))
+            name = self._scalar(key)
+            place = (*path, str(name))  # 02 and 2 are the same joint
+            if place in self.lines:
+                raise SettingsError(f"{'.'.join(place)} occurs twice", self._place(key))
+            self.lines[place] = key.start_mark.line + 1
+            values[name] = self.value(item, place)
+        return values
+
+    def _place(self, node: yaml.Node) -> str:
+        return f"{self._source}, line {node.start_mark.line + 1}"
+
+    def _scalar(self, node: yaml.ScalarNode) -> Any:
+        text = str(node.value)
+        self._characters += len(text)
+        if self._characters > MOST_CHARACTERS:
+            raise SettingsError(f"holds more than {MOST_CHARACTERS} characters of text", self._source)
+        if not all(c.isprintable() or c in "\t\n" for c in text):
+            raise SettingsError("a text contains characters that cannot be printed", self._place(node))
+        if node.style is not None:  # quoted, or a block of text
+            return text
+        if text.lower() in _WORDS:
+            return _WORDS[text.lower()]
+        if _INTEGER.fullmatch(text):
+            return int(text)
+        return float(re.sub(r"\.(?=[in])", "", text.lower())) if _NUMBER.fullmatch(text) else text

@@ -1,5 +1,6 @@
 """Settings of a fit, one YAML file per job, from the log to the search; and of a study, which vary them."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from itertools import product
@@ -8,13 +9,13 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationInfo, model_validator
 
-from hydroid.errors import SettingsError
-from hydroid.files import find_config
+from hydroid.errors import HydroidError, SettingsError
+from hydroid.files import Plain, find_config
 from hydroid.parameters import ParameterSet
 from hydroid.quantity_table import MECHANICAL
 from hydroid.settings.arm import Arm, load_arm
 from hydroid.settings.hydraulics import HydraulicSettings
-from hydroid.settings.load import JointNumber, Positive, Settings, load, validate
+from hydroid.settings.load import ByJoint, Joints, Positive, Settings, load, validate
 from hydroid.settings.log import LogSettings
 from hydroid.settings.parameters import by_group, expanded, make_parameter
 from hydroid.settings.problem import ObjectiveSettings, ParameterSettings, PriorSettings, SimulationSettings
@@ -28,9 +29,9 @@ class FitSettings(Settings):
     """mech: the hydraulics are a gain; hyd: the whole chain from command to torque is simulated"""
     arm: Arm = "hydrolek"  # pyright: ignore[reportAssignmentType]
     """name of a shipped arm, or path of an arm's YAML file, relative to this file or to the working folder"""
-    outputs: Annotated[tuple[JointNumber, ...], Field(min_length=1)] = (2,)
+    outputs: Annotated[Joints, Field(min_length=1)] = (2,)
     """joints whose measured angle is compared"""
-    tolerance_deg: Positive | dict[JointNumber, Positive] | None = None
+    tolerance_deg: Positive | ByJoint[Positive] | None = None
     """rms error on unseen logs up to which joints are predicted [deg], of all or by joint; null: 2 % of their
     travel there"""
     start_pose: str = "home"
@@ -58,6 +59,15 @@ class FitSettings(Settings):
     """at the end, refine the parameters of both stages together: all that have bounds, fixed ones included"""
     design: DesignSettings = DesignSettings()
 
+    @classmethod
+    def names_of_joints(cls, values: Plain, folder: Path) -> tuple[str, ...]:
+        """Return the names of the arm's joints; empty where no arm can be read."""
+        arm = values.get("arm", cls.model_fields["arm"].default)
+        try:
+            return load_arm(arm, folder).joint_names if isinstance(arm, str) else ()
+        except HydroidError:
+            return ()
+
     @model_validator(mode="before")
     @classmethod
     def _named(cls, values: Any, info: ValidationInfo) -> Any:
@@ -80,6 +90,19 @@ class FitSettings(Settings):
             entries = by_group(expanded(names, compared, known), groups if isinstance(groups, dict) else ())
             values = {**values, "parameters": entries}
         return {**values, "arm": arm}
+
+    @model_validator(mode="before")
+    @classmethod
+    def _one_model_without_hydraulics(cls, values: Any) -> Any:
+        """Take stage 1 for dynamic, whatever `simulation.model` says of stage 2: its steps follow from it."""
+        if not isinstance(values, dict) or values.get("stage", "mech") != "mech":
+            return values
+        simulation = values.get("simulation")
+        if isinstance(simulation, SimulationSettings):
+            simulation = simulation.model_dump()
+        if not isinstance(simulation, dict) or simulation.get("model") not in ("quasi-static", "ladder"):
+            return values
+        return {**values, "simulation": {**simulation, "model": "dynamic"}}
 
     @model_validator(mode="after")
     def _of_the_stage(self) -> "FitSettings":
@@ -165,6 +188,7 @@ class FitSettings(Settings):
         return self.with_parameters(held).changed(changes)
 
 
+MOST_CELLS = 100_000  # of a study
 Changes = dict[str, Any]  # settings to replace, by dotted key, as `--set` has them
 
 
@@ -186,6 +210,8 @@ class StudySettings(Settings):
 
     def changes(self) -> dict[str, Changes]:
         """Return the settings that each cell replaces, by the cell's name."""
+        if math.prod(map(len, self.axes.values())) > MOST_CELLS:
+            raise SettingsError(f"make more than {MOST_CELLS} cells", "axes", "leave some out")
         options = [
             axis.items() if isinstance(axis, dict) else [(f"{key} {value}", {key: value}) for value in axis]
             for key, axis in self.axes.items()

@@ -1,7 +1,7 @@
 """YAML -> checked settings; every error names the file, the line, the setting and what is allowed."""
 
 import difflib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Self, TypeVar
 
@@ -35,6 +35,11 @@ class Settings(BaseModel):
 
     _of_yaml = model_validator(mode="before")(_with_tuples)
 
+    @classmethod
+    def names_of_joints(cls, values: Plain, folder: Path) -> tuple[str, ...]:
+        """Return the names of the joints that values of a file in a folder are about, if any."""
+        return ()
+
     def changed(self, changes: Mapping[str, Any]) -> Self:
         """Return the settings with values replaced by dotted key, such as `search.seed`; none is checked."""
         settings = self
@@ -60,6 +65,36 @@ def _number_of(key: Any, info: ValidationInfo) -> Any:
 
 JointNumber = Annotated[int, BeforeValidator(_number_of), Field(ge=1)]
 """of a joint of the arm, from 1; in a file its name will do"""
+
+
+def meant(key: Any, names: Sequence[str]) -> Any:
+    """Return the number of the joint that a key means, by its number or its name; any other key itself."""
+    if isinstance(key, str) and key.isascii() and key.isdecimal():
+        return int(key)
+    return names.index(key) + 1 if key in names else key
+
+
+def each_once(joints: Any, names: Sequence[str]) -> None:
+    """Raise ValueError where a joint occurs twice among joints, such as by its number and its name."""
+    taken = set[Any]()
+    for key in joints:
+        if (joint := meant(key, names)) in taken:
+            raise ValueError(f"joint {key} occurs twice")
+        taken.add(joint)
+
+
+def _each_once(joints: Any, info: ValidationInfo) -> Any:
+    arm = (info.context or {}).get("arm")
+    if isinstance(joints, dict | tuple) and all(isinstance(key, str | int) for key in joints):
+        each_once(joints, arm.joint_names if arm else ())
+    return joints
+
+
+T = TypeVar("T")
+ByJoint = Annotated[dict[JointNumber, T], BeforeValidator(_each_once)]
+"""values by joint"""
+Joints = Annotated[tuple[JointNumber, ...], BeforeValidator(_each_once)]
+"""joints, each once"""
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
 
@@ -67,16 +102,31 @@ S = TypeVar("S", bound=Settings)
 
 
 def load(path: Path, kind: type[S], overrides: Mapping[str, Any] | None = None) -> S:
-    """Read one YAML file as settings of a kind, with overrides by dotted key, joints by their numbers."""
+    """Read one YAML file as settings of a kind, with overrides by dotted key.
+
+    An override of a joint's settings finds them under its number and under its name.
+    """
     values, lines = read_yaml(path)
+    given = dict[str, str]()
+    names = kind.names_of_joints(values | dict(overrides or {}), path.parent) if overrides else ()
     for key, value in (overrides or {}).items():
-        (*folders, last), place = key.split("."), values
+        (*folders, last), place, parts = key.split("."), values, list[str]()
         for folder in folders:
-            place = place.setdefault(folder, {})
+            parts.append(part := _same_key(place, folder, names))
+            place = place.setdefault(part, {})
             if not isinstance(place, dict):
                 raise SettingsError(f"{folder} has no settings below it", f"--set {key}")
-        place[last] = value
-    return validate(values, kind, str(path), lines, sorted(overrides or ()), path.parent)
+        parts.append(part := _same_key(place, last, names))
+        place[part] = value
+        given[".".join(map(str, parts))] = key
+    return validate(values, kind, str(path), lines, given, path.parent)
+
+
+def _same_key(place: Plain, key: str, names: Sequence[str]) -> Any:
+    """Return the key by which a mapping has a setting, such as a joint's name for its number; or the key."""
+    if key in place:
+        return key
+    return next((one for one in place if meant(one, names) == meant(key, names)), key)
 
 
 def validate(
@@ -84,25 +134,26 @@ def validate(
     kind: type[S],
     source: str,
     lines: Lines | None = None,
-    overridden: list[str] | None = None,
+    overridden: Mapping[str, str] | None = None,
     folder: Path | None = None,
 ) -> S:
     """Check a mapping against `kind` and report its faults with their places, of many the first four.
 
-    Files that the settings name are first looked up in `folder`.
+    Files that the settings name are first looked up in `folder`. `overridden` are the keys that
+    `--set` gave, by those that they replace.
     """
     try:
         return kind.model_validate(values, context={"folder": folder, "source": source})
     except ValidationError as error:
-        # a setting that does not exist may be why another is missing
-        faults = sorted(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
+        faults = sorted(error.errors(), key=_rank)
     found = dict[str, str]()  # a value that is none of several types is one fault
     for fault in faults:
         key, problem = _explained(fault, kind)
         # the fault may lie in an override, below it, or in what it is a part of
-        near = (o for o in overridden or () if f"{key}.".startswith(f"{o}.") or o.startswith(f"{key}."))
-        if at := next(near, None):
-            name, where = key[len(at) + 1 :], f"--set {at}"
+        replaced = sorted(overridden or {})
+        near = (o for o in replaced if f"{key}.".startswith(f"{o}.") or o.startswith(f"{key}."))
+        if overridden and (at := next(near, None)):
+            name, where = key[len(at) + 1 :], f"--set {overridden[at]}"
         else:
             named = fault["type"] in ("extra_forbidden", "missing")  # the problem names the setting
             parts = tuple(key.split("."))
@@ -123,9 +174,24 @@ def parse_override(text: str) -> tuple[str, Any]:
     return key.strip(), read_document(value, f"--set {text}")[0]
 
 
+def _rank(fault: Any) -> int:
+    """Order faults: a setting that does not exist first, for it may be why another is missing.
+
+    Of a value of several types, the one that it has not comes last.
+    """
+    if fault["type"] == "extra_forbidden":
+        return 0
+    return 2 if fault["type"].endswith("_type") and any(map(_is_type, fault["loc"])) else 1
+
+
+def _is_type(part: Any) -> bool:
+    """Return whether pydantic means a type by a part of a place, not a setting."""
+    return isinstance(part, str) and (part.startswith("constrained-") or part.endswith("]"))
+
+
 def _explained(fault: Any, kind: type[Settings]) -> tuple[str, str]:
     """The dotted key of a setting, and what is wrong with it, from one of pydantic's faults."""
-    key = ".".join(str(part) for part in fault["loc"]).removesuffix(".[key]")
+    key = ".".join(str(part) for part in fault["loc"] if not _is_type(part))
     if fault["type"] == "missing":
         return key, f"setting {key!r} is missing"
     if fault["type"] == "extra_forbidden":

@@ -16,7 +16,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, Valida
 
 from hydroid.errors import SettingsError
 from hydroid.files import Plain
-from hydroid.settings.load import JointNumber, Settings
+from hydroid.settings.load import ByJoint, Settings
 from hydroid.words import listed
 
 JOINT = "{joint}"
@@ -125,7 +125,7 @@ class LogSettings(Settings):
     """columns of the angles; null: the log holds none"""
     pressure: Common = None
     """columns of the chamber pressures; null: the log holds none"""
-    joints: dict[JointNumber, JointColumns | None] = {}
+    joints: ByJoint[JointColumns | None] = {}
     """what differs for single joints, by joint; null: the log does not hold this joint"""
     period_s: Annotated[float, Field(ge=1e-4, le=1)] = 0.01
     """sample period to which logs are resampled [s]: angles are interpolated, held commands

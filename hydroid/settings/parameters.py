@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from hydroid.files import Plain
@@ -11,10 +11,12 @@ from hydroid.quantity_table import CHOICES, MECHANICAL, TARGETS
 from hydroid.settings.arm import Actuator, Arm
 from hydroid.settings.hydraulics import HydraulicSettings, actuator_values
 from hydroid.settings.linkage import RotaryActuator
+from hydroid.settings.load import each_once
 from hydroid.settings.log import OTHER
 from hydroid.settings.problem import ParameterSettings
 from hydroid.words import distinct
 
+MOST = 10_000  # parameters of all groups
 GROUP = "group"
 """what `per` says of a parameter that has an effect in each group"""
 
@@ -36,7 +38,7 @@ def expanded(parameters: Mapping[str, Any], compared: Any, arm: Arm | None) -> P
         key, kind = ("link", str) if quantity == "mass" else ("joints", int | str)
         if entry.get(key) is not None:
             what = "link or each: links" if key == "link" else "joints that share it or each: joints"
-            raise ValueError(f"{name}: give {what} that have their own, not both")
+            raise ValueError(f"parameters.{name}: give {what} that have their own, not both")
         every = arm.link_names if key == "link" and arm else compared
         places = every if each is True else each
         if not isinstance(places, list | tuple) or not all(isinstance(place, kind) for place in places):
@@ -44,6 +46,8 @@ def expanded(parameters: Mapping[str, Any], compared: Any, arm: Arm | None) -> P
             continue
         shared = {setting: value for setting, value in entry.items() if setting != "each"}
         names = dict(enumerate(arm.joint_names, 1)) if arm and key == "joints" else {}
+        if key == "joints":
+            _refuse(places, "outputs" if each is True else f"parameters.{name}.each", [*names.values()])
         numbers: Plain = {label: number for number, label in names.items()}
         places = [numbers.get(place, place) for place in places]
         if key == "joints" and len(places) == 1:
@@ -56,6 +60,16 @@ def expanded(parameters: Mapping[str, Any], compared: Any, arm: Arm | None) -> P
             own = distinct(re.sub(r"\W", "_", f"{name}_{label}"), taken)  # --set splits names at dots
             result[own] = shared | {key: place if key == "link" else [place]} | result.get(own, {})
     return result
+
+
+def _refuse(joints: Any, where: str, names: Sequence[str]) -> None:
+    """Raise ValueError where a joint occurs twice, or joints are more than there are."""
+    try:
+        each_once(joints, names)
+    except ValueError as error:
+        raise ValueError(f"{where}: {error}") from None
+    if names and len(joints) > len(names):
+        raise ValueError(f"{where}: {len(joints)} joints, but the arm has {len(names)}")
 
 
 def by_group(parameters: Mapping[str, Any], groups: Collection[str]) -> Plain:
@@ -72,6 +86,8 @@ def by_group(parameters: Mapping[str, Any], groups: Collection[str]) -> Plain:
             what = "per: group needs log.groups: {name: pattern}, none of them named group"
             raise ValueError(f"parameters.{name}: {what}")
         for group in (*groups, OTHER):
+            if len(result) >= MOST:
+                raise ValueError(f"parameters.{name}: more than {MOST} parameters")
             own = f"{name}_{group}"
             result[own] = entry | {"per": group} | result.get(own, {})
     return result
@@ -139,11 +155,12 @@ def _default_bounds(own: ParameterSettings, prior: Prior | None) -> tuple[float,
 
 
 def _unit(arm: Arm, own: ParameterSettings) -> str:
-    """The unit of a parameter; joints that slide, and areas of rotary actuators, have their own."""
-    if own.quantity in MECHANICAL and own.joints and {*own.joints} <= {*arm.slides}:
+    """The unit of a parameter; joints that slide, and rotary actuators that turn, have their own."""
+    sliding = bool(own.joints) and {*own.joints} <= {*arm.slides}
+    if own.quantity in MECHANICAL and sliding:
         return own.unit.replace("N·m", "N").replace("rad", "m")
     actuators = _actuators(arm, own) if own.joints else []
-    rotary = bool(actuators) and all(isinstance(one, RotaryActuator) for one in actuators)
+    rotary = bool(actuators) and all(isinstance(one, RotaryActuator) for one in actuators) and not sliding
     sized = own.quantity in ("area", "area_a", "area_b", "dry_friction")
     return {"mm²": "cm³/rad", "N": "N·m"}[own.unit] if rotary and sized else own.unit
 

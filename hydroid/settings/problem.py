@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from hydroid.quantity_table import CHOICES, MECHANICAL
-from hydroid.settings.load import JointNumber, NotNegative, Positive, Settings
+from hydroid.settings.load import ByJoint, Joints, NotNegative, Positive, Settings
 
 
 class ParameterSettings(Settings):
@@ -23,9 +23,9 @@ class ParameterSettings(Settings):
     quantity: str
     """gain, damping, stiffness, friction or mass; in stage 2 also any quantity of `hydraulics` and area_a,
     area_b, opening_a, opening_b, pivot_distance_1, pivot_distance_2, pivot_angle"""
-    joints: tuple[JointNumber, ...] | None = None
+    joints: Joints | None = None
     """joints that share the parameter; null: all"""
-    each: bool | tuple[JointNumber, ...] = False
+    each: bool | Joints = False
     """joints that have a parameter each, NAME_boom, NAME_arm, ...; true: those that are compared. With one
     joint the name stays as it is. Entries under NAME_boom change the boom's. Of a mass: links; true: all"""
     link: str | None = None
@@ -165,11 +165,11 @@ class ObjectiveSettings(Settings):
     """divide by the norm of the measured output of the same segment, equation (19)"""
     segments: Annotated[int, Field(ge=1, le=10_000)] = 8
     """number of segments of equal length, one objective each"""
-    weights: dict[JointNumber, Positive] = {}
+    weights: ByJoint[Positive] = {}
     """factor on the error of a joint's angle, by joint; 1 for joints that are not listed"""
     pressure_weight: NotNegative = 0.0
     """stage 2: factor that turns a chamber pressure's error into an angle's [deg/bar]; 0: angles only"""
-    noise_deg: Positive | dict[JointNumber, Positive] | None = None
+    noise_deg: Positive | ByJoint[Positive] | None = None
     """standard deviation of the white noise of measured angles, for all joints or by joint [deg]; null: it is
     estimated from the residuals, with its autocorrelation"""
 

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from hydroid.settings.load import JointNumber, NotNegative, Positive, Settings
+from hydroid.settings.load import Joints, NotNegative, Positive, Settings
 
 Rate = Annotated[float, Field(ge=0, le=1)]
 Count = Annotated[int, Field(ge=1)]
@@ -95,7 +95,7 @@ class DesignSettings(Settings):
 
     duration_s: Annotated[float, Field(ge=1, le=3600)] = 60.0
     """length of the experiment [s]"""
-    joints: Annotated[tuple[JointNumber, ...], Field(min_length=1)] | None = None
+    joints: Annotated[Joints, Field(min_length=1)] | None = None
     """joints that may be driven; null: the outputs"""
     poses: Annotated[tuple[str, ...], Field(min_length=1)] | Literal["any"] | None = None
     """names of the arm's poses to start from; any: also random ones within the ranges; null: all named

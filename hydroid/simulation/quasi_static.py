@@ -6,15 +6,16 @@ and A_out, k = C_q √(2/ρ), the load F (gravity, springs, dry friction against
     p_in = P − (v A_in/(k a_in))²,   p_out = p_T + (v A_out/(k a_out))²,   p_in A_in − p_out A_out = F + d v,
 
 which is a quadratic equation in v. A compensator (`hydroid.hydraulics.valve`) makes it another one; the
-slower of both speeds holds. Where the load overruns, p_in would fall below 0: the chamber then cavitates,
-and what leaves the other one governs. A load that the supply cannot lift is held. All actuators
-share the pump's line, whose pressure P satisfies one equation, Σ Q_i(P) = Q_P(P) of
+slower of both speeds holds, or that of the flow limit, v = Q_max/A_in, where it is slower still. Where the
+load overruns this speed, p_in would fall below 0: the chamber then cavitates, and what leaves the other one
+governs. So speed and pressures are continuous in the load. A load that the supply cannot lift is held. All
+actuators share the pump's line, whose pressure P satisfies one equation, Σ Q_i(P) = Q_P(P) of
 `hydroid.hydraulics.pump`, with Q_i the flow into the chamber times its `draw`.
 
 Commands, delays, coils and plungers are those of the dynamic rollout, law by law. Steps are long: what is
 integrated is the angle alone, with load and lever arm taken at the middle of the step. Joints without an
-actuator stand still. Leakage is left out, so nothing sags. Of oil and inertia a joint may have what a log
-shows of both, a natural frequency and a damping ratio (`overshoot`).
+actuator stand still. Leakage is left out, so nothing sags, and so is the anti-cavitation valve. Of oil and
+inertia a joint may have what a log shows of both, a natural frequency and a damping ratio (`overshoot`).
 """
 
 # pyright: reportMissingParameterType=false
@@ -28,16 +29,18 @@ from numba import njit, types
 from hydroid.hydraulics.cylinder import bent, filling, rod
 from hydroid.hydraulics.elementwise import compilable
 from hydroid.hydraulics.joint import mean_opening
-from hydroid.hydraulics.kernel import SOURCE, Plugin, make_pad
+from hydroid.hydraulics.kernel import Plugin, make_pad, source_key
 from hydroid.hydraulics.pump import begin_line, come_up, delivery
 from hydroid.hydraulics.records import LINEAR
 from hydroid.hydraulics.valve import MARGIN
+from hydroid.simulation import rollout
 from hydroid.simulation.rollout import mujoco_function, write_sample
 
 _kinematics = mujoco_function("mj_kinematics", types.intp, types.intp)
 _com_pos = mujoco_function("mj_comPos", types.intp, types.intp)
 _rne = mujoco_function("mj_rne", types.intp, types.intp, types.int32, types.intp)
 
+SOURCE = source_key(rollout.__file__)
 ITERATIONS = 30  # for the line's pressure at most; three to five suffice
 LEAST_LEVER = 1e-6  # moment arm below which a cylinder stands at its dead centre [m]
 SETTLED = 1e-9  # part of the pump's flow, or of its pressure, that may be left when they end
@@ -71,6 +74,8 @@ def rod_speed(c, w, supply: float) -> Any:
         if slower < speed:
             speed, rise = slower, fed * side.area * side.area / root
     flow = side.area * speed
+    if flow > c.flow_limit:
+        speed, flow, rise = c.flow_limit / side.area, c.flow_limit, 0.0
     if (drag + back * speed) * speed + c.tank_pressure * other.area + load < 0.0:  # cavitates
         falling = -c.tank_pressure * other.area - load
         speed = 2.0 * falling / (drag + np.sqrt(drag * drag + 4.0 * falling * back))
@@ -78,8 +83,6 @@ def rod_speed(c, w, supply: float) -> Any:
         rise = 0.5 * flow / supply
         if flow > c.flow_limit:
             flow, rise = c.flow_limit, 0.0
-    elif flow > c.flow_limit:
-        speed, flow, rise = c.flow_limit / side.area, c.flow_limit, 0.0
     return speed, side.draw * flow, side.draw * rise
 
 
@@ -123,10 +126,11 @@ def linkage(c, angle: float) -> Any:
 
 
 @compilable
-def store_oil(c, z, w, speed: float, angle: float) -> None:
-    """Store the oil and flows of a joint's chambers as `actuator.observe` reads them.
+def store_oil(c, z, w, speed: float, angle: float, supply: float) -> None:
+    """Store the oil and flows of a joint's chambers as `actuator.pressures` reads them.
 
-    A joint that stands has tank pressure in one chamber, and in the other what holds the load w.push [N].
+    A joint that stands has tank pressure in one chamber, and in the other what holds the load w.push [N]; or,
+    if its valve is open to a `supply` [Pa] that cannot lift the load, at least that pressure.
     """
     a, b, tank, edge = c.a.area, c.b.area, c.tank_pressure, c.conductance * abs(w.travel)
     sign = 1.0 if w.travel > 0.0 else -1.0
@@ -139,6 +143,10 @@ def store_oil(c, z, w, speed: float, angle: float) -> None:
         else:
             pressure_a = tank + (speed * a / (edge * c.a.return_)) ** 2
             pressure_b = (pressure_a * a + against - w.push) / b
+    elif w.travel > 0.0:
+        pressure_a = max(supply, (tank * b + w.push - w.thrust) / a)
+    elif w.travel < 0.0:
+        pressure_b = max(supply, (tank * a - w.push - w.thrust) / b)
     out = linkage(c, angle)[0]
     fill_a, fill_b = out * a / c.dead_volume, -out * b / c.dead_volume
     if c.kind == LINEAR:
@@ -234,5 +242,5 @@ def roll_quasi_static(arm, plugin: Plugin, state, course, record, source: int = 
                 z.turning, z.surge = 0.0, 0.0
             arm.angle[place], z.velocity = after, (after - z.angle) / period
             if observed:
-                store_oil(c, z, w, speed, after)
+                store_oil(c, z, w, speed, after, supply)
         write_sample(arm, record, state, k)

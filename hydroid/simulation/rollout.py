@@ -12,7 +12,6 @@ raising; a model that gets through `SteppedArm.start` has none to expect.
 
 import ctypes
 import logging
-import threading
 from collections.abc import Callable, Sequence
 from copy import copy
 from functools import cache
@@ -123,7 +122,8 @@ class SteppedArm:
         self._armature = own = model.dof_armature.copy()
         self._inertia = model.stat.meaninertia
         self._handles = Handles(
-            *_addresses(m, d),
+            m._address,  # pyright: ignore[reportPrivateUsage]  # of the bindings: no callback is needed
+            d._address,  # pyright: ignore[reportPrivateUsage]
             d.qpos,
             d.qvel,
             d.M,
@@ -176,22 +176,6 @@ class SteppedArm:
         `state` is its actuators', (J,) of JOINT_STATE: steps change it.
         """
         self._roll(self._handles, plugin, state, course, record)
-
-
-def _addresses(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[int, int]:
-    """Where MuJoCo keeps a model and its data: it tells every physics callback."""
-    addresses: dict[int, tuple[int, int]] = {}
-
-    @ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
-    def passive(m: int, d: int) -> None:
-        addresses[threading.get_ident()] = (m, d)  # other threads may be stepping
-
-    mujoco.set_mjcb_passive(passive)
-    try:
-        mujoco.mj_forward(model, data)
-    finally:
-        mujoco.set_mjcb_passive(None)
-    return addresses[threading.get_ident()]
 
 
 @compilable

@@ -54,7 +54,7 @@ class Prescribed:
         self.columns = columns
         self.damping, self.stiffness = 2 * SERVO * armature, SERVO**2 * armature
         step = log.period / settings.steps
-        motion = smooth(log.angle[:, joints], settings.measured_cutoff_hz * log.period)
+        motion = smooth(log.posed[:, joints], settings.measured_cutoff_hz * log.period)
         samples = np.arange((len(motion) - 1) * settings.steps + 1) * step
         fine = np.empty((len(samples), len(joints)))
         for k, angle in enumerate(motion.T):

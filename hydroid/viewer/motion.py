@@ -41,14 +41,14 @@ def simulated_motion(model: IdentifiedModel, logs: Mapping[str, Log]) -> Motion:
         (log.angle - simulated[side])[:, log.driven & _moves(log.angle)].ravel() for side, log in logs.items()
     ]
     rest, error = arm.pose(model.settings.start_pose), np.concatenate(errors)
-    moved = {side: log.angle for side, log in logs.items() if _moves(log.angle).any()}
+    moved = {side: log.posed for side, log in logs.items() if _moves(log.angle).any()}
     measured = machine.joined(simulated | moved, rest) if moved else None
     size = np.degrees(rms(error)) if error.size else np.nan
     return Motion(machine, first.time, machine.joined(simulated, rest), measured, size)
 
 
 def _moves(angle: Array) -> Mask:
-    """Which angles, shape (T, J), are of a motion, (J,); a log of commands stands in its start pose."""
+    """Which measured angles, shape (T, J), move, (J,)."""
     return np.nan_to_num(np.ptp(angle, axis=0)) > 0
 
 

@@ -7,7 +7,7 @@ from made_logs import TRUTH, simulate_log
 from two_joints import PARAMETERS, TRUTH as OIL, two_joints
 
 from hydroid import load_settings
-from hydroid.advice.design import Design, design, forecast, measured, sensor_noise, typical
+from hydroid.advice.design import Design, design, forecast, measured, typical
 from hydroid.advice.experiment import violation
 from hydroid.arm.model import CollisionChecker, load_machine
 from hydroid.errors import SettingsError
@@ -123,16 +123,20 @@ def test_the_forecast_is_what_a_fit_to_the_same_log_knows(designed: tuple[FitSet
 
 
 def test_the_information_of_least_squares_has_the_closed_form():
-    rows = np.random.default_rng(0).normal(size=(3, 500))
-    white = sensor_noise(DesignSettings(noise_deg=0.1), 500, 0.01)
-    gained = measured([(rows, white)])
-    np.testing.assert_allclose(gained.T @ gained, rows @ rows.T / np.radians(0.1) ** 2, rtol=1e-6)
-    slow = sensor_noise(DesignSettings(noise_deg=0.1, noise_correlation_s=0.1), 500, 0.01)
-    inverse, gained = np.linalg.inv(rows @ rows.T), measured([(rows, slow)])
-    covariance = inverse @ slow.covariance_of(rows) @ inverse
-    np.testing.assert_allclose(np.linalg.inv(gained.T @ gained), covariance, rtol=1e-6)
+    """White noise, and a drift beside it: by the inverse of the dense covariance."""
+    samples, period = 200, 0.01
+    rows = np.random.default_rng(0).normal(size=(3, samples))
+    for drift in 0.0, 0.5:
+        settings = DesignSettings(noise_deg=0.1, drift_deg=drift)
+        gained = measured(settings, [rows], period)
+        at = np.arange(samples)
+        grown = np.radians(drift) ** 2 / 10.0 * period * np.minimum(at[:, None], at)
+        covariance = np.radians(0.1) ** 2 * np.eye(samples) + grown
+        information = rows @ np.linalg.solve(covariance, rows.T)
+        np.testing.assert_allclose(gained.T @ gained, information, rtol=1e-6)
     rows[2] = 0.0  # what a signal does not depend on stays unknown, and hides nothing
-    assert np.abs(measured([(rows, slow)])[:, 2]).max() < 1e-9
+    gained = measured(settings, [rows], period)
+    assert np.linalg.norm(gained[:, 2]) < 1e-3 * np.linalg.norm(gained[:, 0])
 
 
 def test_what_no_experiment_moves_hides_nothing_else(tmp_path):

@@ -158,7 +158,7 @@ WRONG = [
     (SAME, cylinder(triangle={"a": 1, "b": 0.5, "theta0": 90}), "pivots take the place of triangle"),
     (SAME, cylinder(four_bar=FOUR_BAR), "four_bar needs a triangle"),
     (('range="-60 60"', ""), cylinder(), "tilt: a joint without limits needs a rotary actuator"),
-    (("</mujoco>", ""), {}, "XML parse error"),
+    (("</mujoco>", ""), {}, "cannot be read as XML"),
     (('range="-20 60"', 'range="-20"'), {}, "does not have enough data"),
     (('axis="0 -1 0"', 'type="ball"'), {}, "must be a hinge or a slide"),
     (('<joint name="tilt"', '<joint name="extra"/><joint name="tilt"'), {}, "alone on its body"),

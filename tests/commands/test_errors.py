@@ -61,6 +61,12 @@ WRONG = [
     ("view . -o a.mp4", "log", "cannot be read"),
     ("convert {log} --out {log}", "settings", "would overwrite the log"),
     ("init mine --arm none.urdf", "settings", "no such file"),
+    ("simulate {log} --fit {long}", "settings", "cannot be read (File name too long)"),
+    ("fit-mech {log} --out {long}", "run", "cannot be written (File name too long)"),
+    ("convert {log} --out {long}", "run", "cannot be written (File name too long)"),
+    ("init {long} --log {log}", "run", "cannot be used (File name too long)"),
+    ("report {long}", "run", "cannot be read as a run (File name too long)"),
+    ("study {long}", "settings", "cannot be read (File name too long)"),
     ("nonsense", "usage", "nonsense"),
 ]
 """a command, the kind of its error, and what it says"""
@@ -70,7 +76,7 @@ WRONG = [
 def test_what_the_user_can_correct_is_one_line_and_exit_2(hydroid_cli, tmp_path, command, kind, says):
     for name, text in FILES.items():
         (tmp_path / name).write_text(text)
-    words = command.format(log=LOG, root=ROOT).split()
+    words = command.format(log=LOG, root=ROOT, long="x" * 300).split()
     plain = hydroid_cli(*words, code=2)
     assert says in plain.err
     asides = ("note:", "compiling", "left out:")

@@ -31,13 +31,13 @@ def test_several_logs_and_outputs_are_one_long_error():
     short = log.first(1.99)
     problem = Problem(one.settings, [log, short])
     truth = problem.parameters.vector(TRUTH, "truth")[None]
-    residuals = problem.residuals(truth * 1.1)
-    assert residuals.shape == (1, 2 * (500 + 200))
+    errors = problem.output_errors(truth * 1.1)
+    assert errors.shape == (1, 2 * (500 + 200))
     assert problem.bounds.shape == (2 * 2 * 3, 2)
     assert (np.diff(problem.bounds, axis=1) > 0).all()
-    alone = Problem(one.settings, [short]).residuals(truth * 1.1)
-    np.testing.assert_array_equal(residuals[:, 1000:], alone)
-    np.testing.assert_allclose(problem.residuals(truth), 0, atol=1e-12)
+    alone = Problem(one.settings, [short]).output_errors(truth * 1.1)
+    np.testing.assert_array_equal(errors[:, 1000:], alone)
+    np.testing.assert_allclose(problem.output_errors(truth), 0, atol=1e-12)
 
 
 def test_identical_sets_are_simulated_once():

@@ -50,7 +50,7 @@ def test_a_lone_joint_feels_no_valve_but_its_own(problem):
     free = [n for n, free in zip(one.parameters.names, one.parameters.free, strict=True) if free]
     assert free == ["open_2", "overlap_2"]
     unit = np.full((1, 2), 0.3)
-    np.testing.assert_array_equal(*(p.residuals(p.parameters.from_unit(unit)) for p in (one, other)))
+    np.testing.assert_array_equal(*(p.output_errors(p.parameters.from_unit(unit)) for p in (one, other)))
 
 
 def test_a_lone_joint_moves_as_with_all_others(problem, truth):
@@ -66,7 +66,7 @@ def test_joints_that_follow_the_log_take_their_part_of_the_pump(problem, truth):
     """
     shared = make(**{"hydraulics.pump_flow": 1.2, "hydraulics.line_volume": 20.0})
     for joint in lone_joints(shared):
-        error = alone(shared, joint, truth).residuals(truth[None])
+        error = alone(shared, joint, truth).output_errors(truth[None])
         effect = (problem.logs[0].angle - shared.logs[0].angle)[:, joint - 1]
         assert np.rad2deg(np.sqrt(np.mean(effect**2))) > 1
         assert np.mean(error**2) < 0.25 * np.mean(effect**2)

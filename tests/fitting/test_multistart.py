@@ -39,8 +39,8 @@ def exact() -> Problem:
 def test_a_part_of_a_problem_is_the_same_problem_for_a_shorter_time(exact):
     theta = exact.theta(np.random.default_rng(1).random((1, len(exact.parameters.names))))
     part = exact.varied(exact.settings.changed({"objective.segments": 1}), [exact.logs[0].first(1.0)])
-    whole = exact.residuals(theta).reshape(2, -1)
-    np.testing.assert_array_equal(part.residuals(theta).reshape(2, -1), whole[:, :151])
+    whole = exact.output_errors(theta).reshape(2, -1)
+    np.testing.assert_array_equal(part.output_errors(theta).reshape(2, -1), whole[:, :151])
 
 
 def test_a_horizon_in_which_nothing_moves_is_left_out():
@@ -76,5 +76,5 @@ def test_a_resumed_search_ends_bit_for_bit_and_gains_no_more_on_noise_than_its_p
     # least squares: the estimate fits better than the truth, and by no more than seven parameters can
     best = refined(problem, whole.theta[0])
     both = np.stack([best, problem.parameters.vector(TRUTH, "truth")])
-    best, true = np.sum(problem.residuals(both) ** 2, axis=1) / np.deg2rad(0.02) ** 2
+    best, true = np.sum(problem.output_errors(both) ** 2, axis=1) / np.deg2rad(0.02) ** 2
     assert 0 < true - best < 24.3  # chi-square of 7 degrees of freedom, 0.999

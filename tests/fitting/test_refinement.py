@@ -6,6 +6,8 @@ from made_logs import TRUTH, noisy, stepped
 
 from hydroid import load_settings
 from hydroid.fitting.refinement import refine
+from hydroid.fitting.step import Step
+from hydroid.posterior.error_model import make_likelihood
 from hydroid.problem.problem import Problem
 from hydroid.run.archive import CheckpointFile
 from hydroid.search.descent import Descent
@@ -17,9 +19,9 @@ SHORT = RefinementSettings(iterations=6)
 class Counted(Problem):
     simulated = 0
 
-    def residuals(self, theta):
+    def output_errors(self, theta):
         self.simulated += len(theta)
-        return super().residuals(theta)
+        return super().output_errors(theta)
 
 
 @pytest.fixture(scope="module", params=["no prior", "a prior"])
@@ -27,6 +29,9 @@ def problem(request):
     priors = {} if request.param == "no prior" else {"link 3": {"of": "M3", "value": 22.0, "sd": 0.5}}
     settings = load_settings("article-mech", {"priors": priors})
     return Counted(settings, [noisy(stepped(settings, TRUTH, [60.0, -80.0]), 0.06, exact_start=False)])
+
+
+ONE, OTHER = Step("refined"), Step("refined", without=1)
 
 
 def begin(problem) -> np.ndarray:
@@ -38,7 +43,7 @@ def equal(one: Descent, other: Descent) -> bool:
 
 
 def stop_after(limit: int):
-    def progress(name: str, simulated: int, rms: float) -> None:
+    def progress(what: Step, simulated: int, rms: float) -> None:
         if simulated > limit:
             raise KeyboardInterrupt
 
@@ -49,22 +54,30 @@ def stop_after(limit: int):
 def test_an_interrupted_refinement_goes_on_without_loss(problem, tmp_path, limit):
     file = tmp_path / "refinement.npz"
     problem.simulated = 0
-    whole = refine(problem, begin(problem), SHORT, lambda *_: None, {}, "one")
+    whole = refine(make_likelihood(problem), begin(problem), SHORT, lambda *_: None, {}, ONE)
     assert whole.evaluations == problem.simulated
     problem.simulated = 0
     with pytest.raises(KeyboardInterrupt):
-        refine(problem, begin(problem), SHORT, stop_after(limit), CheckpointFile(file, "a"), "one")
-    parts = refine(problem, begin(problem), SHORT, lambda *_: None, CheckpointFile(file, "a"), "one")
+        refine(
+            make_likelihood(problem), begin(problem), SHORT, stop_after(limit), CheckpointFile(file, "a"), ONE
+        )
+    parts = refine(
+        make_likelihood(problem), begin(problem), SHORT, lambda *_: None, CheckpointFile(file, "a"), ONE
+    )
     assert equal(parts, whole)
     simulated = problem.simulated
     assert simulated < whole.evaluations + limit + 12  # the steps since the last Jacobian are repeated
-    again = refine(problem, begin(problem), SHORT, lambda *_: None, CheckpointFile(file, "a"), "one")
+    again = refine(
+        make_likelihood(problem), begin(problem), SHORT, lambda *_: None, CheckpointFile(file, "a"), ONE
+    )
     assert equal(again, whole)
     assert problem.simulated == simulated  # the result itself is kept
 
 
 def test_another_refinement_has_a_checkpoint_of_its_own(problem, tmp_path):
     checkpoints = CheckpointFile(tmp_path / "refinement.npz", "a")
-    refine(problem, begin(problem), SHORT, lambda *_: None, checkpoints, "one")
-    other = refine(problem, 1.1 * begin(problem), SHORT, lambda *_: None, checkpoints, "another")
-    assert equal(other, refine(problem, 1.1 * begin(problem), SHORT, lambda *_: None, {}, "one"))
+    refine(make_likelihood(problem), begin(problem), SHORT, lambda *_: None, checkpoints, ONE)
+    other = refine(make_likelihood(problem), 1.1 * begin(problem), SHORT, lambda *_: None, checkpoints, OTHER)
+    assert equal(
+        other, refine(make_likelihood(problem), 1.1 * begin(problem), SHORT, lambda *_: None, {}, ONE)
+    )

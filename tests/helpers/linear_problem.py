@@ -1,9 +1,15 @@
-"""Problems whose residuals are linear in their parameters: other libraries say what is right."""
+"""Problems whose errors are linear in their parameters: other libraries say what is right."""
+
+import itertools
 
 import numpy as np
+from made_errors import covariance
+from scipy.linalg import block_diag
 from scipy.signal import lfilter
 
+from hydroid.log import Log
 from hydroid.parameters import Parameter, ParameterSet
+from hydroid.posterior.error_model import SHORTEST, likelihood_at, make_error_model
 from hydroid.problem.channels import Channel
 from hydroid.problem.priors import Priors
 from hydroid.settings.fit import FitSettings
@@ -14,11 +20,15 @@ AR1 = np.exp(-0.01 / 0.15)  # correlation time 0.15 s at 100 Hz
 
 
 class Linear:
-    """A problem whose residuals are linear in its parameters: y - X theta, channel after channel."""
+    """A problem whose errors are linear in its parameters: y - X theta, log after log, 100 Hz.
 
-    def __init__(self, columns, measured, theta, *, fixed=(), known=None, unit=1.0, weights=(1.0,), **more):
+    The joint rests, as its error model sees it: it travels no way, and is at no stop.
+    """
+
+    def __init__(
+        self, columns, measured, theta, *, fixed=(), known=None, unit=1.0, logs=1, stage="hyd", **more
+    ):
         self.columns, self.measured, self.simulated = columns, measured, 0
-        self.leaves_start_open = self.afar = False
         names = "abcdefgh"[: len(theta)]
         self.parameters = ParameterSet(
             tuple(
@@ -27,24 +37,31 @@ class Linear:
             )
         )
         self.unit = unit
-        one = ParameterSettings(quantity="gain", bounds=(0.1, 1.0))
+        one = ParameterSettings(quantity="damping", bounds=(0.1, 1.0))
         how = {"segments": 1} | more
-        self.settings = FitSettings(parameters=dict.fromkeys(names, one), objective=how)
+        self.settings = FitSettings(
+            stage=stage, parameters=dict.fromkeys(names, one), objective=how, free_start=False
+        )
         statements = {k: PriorSettings(**v) for k, v in (known or {}).items()}
         self.priors = Priors(statements, self.parameters)
-        edges = np.linspace(0, len(measured), len(weights) + 1).astype(int)
+        edges = np.linspace(0, len(measured), logs + 1).astype(int)
+        ends = list(itertools.pairwise(edges))
+        self.logs = tuple(resting(b - a) for a, b in ends)
         self.channels = tuple(
-            Channel(i, 2, "angle", 0, measured[a:b], w, slice(a, b))
-            for i, (a, b, w) in enumerate(zip(edges[:-1], edges[1:], weights, strict=True))
+            Channel(i, 2, "angle", 0, np.zeros(b - a), 1.0, slice(a, b)) for i, (a, b) in enumerate(ends)
         )
-        self.weight = np.repeat(weights, np.diff(edges))
 
-    def unfiltered(self, residuals):
-        return residuals
+    def started(self, log):
+        return [2]
 
-    def residuals(self, theta):
+    def output_errors(self, theta):
         self.simulated += len(theta)
-        return self.weight * (self.measured - theta / self.unit @ self.columns)
+        return self.measured - theta / self.unit @ self.columns
+
+
+def resting(samples):
+    zeros = np.zeros((samples, 7))
+    return Log("rest.csv", np.arange(samples) * 0.01, zeros, zeros, 0.01)
 
 
 def slow(count, samples=1000, seed=0):
@@ -63,3 +80,26 @@ def least_squares(columns, measured):
 
 
 THETA = np.array([1.0, -2.0, 3.0])
+
+
+def white(deg):
+    """NUMBERS of an error that is known to be white noise of so many degrees, (1, 5)."""
+    return np.array([[(deg * DEG) ** 2, 0.0, 0.0, 0.0, SHORTEST]])
+
+
+def dense_covariance(problem, numbers):
+    """Of all errors of a problem, (R, R), by the numbers of its error model."""
+    errors = make_error_model(problem)
+    return block_diag(*(covariance(course, numbers) for course in errors.courses))
+
+
+def most_likely(problem, rounds=4):
+    """The estimate by generalised least squares, with the error model of its errors, again and again."""
+    theta = least_squares(problem.columns, problem.measured)
+    model = make_error_model(problem)
+    for _ in range(rounds):
+        model = likelihood_at(problem, theta).errors
+        theta = least_squares(
+            model.innovations(problem.columns), model.innovations(problem.measured[None])[0]
+        )
+    return theta, model.numbers

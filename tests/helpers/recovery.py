@@ -6,11 +6,13 @@ import numpy as np
 from made_logs import noisy, simulate_log
 
 import hydroid
-from hydroid.fitting.refinement import refine
+from hydroid.fitting.refinement import refine_from_afar
+from hydroid.fitting.step import Step
 from hydroid.fitting.summary import account
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
 from hydroid.posterior.band import Band, prediction_bands
+from hydroid.posterior.error_model import make_likelihood
 from hydroid.posterior.uncertainty import Uncertainty, uncertainty
 from hydroid.prediction import predict
 from hydroid.problem.problem import Problem
@@ -43,7 +45,7 @@ def recover(
 def refined(problem: Problem, start: np.ndarray, how: RefinementSettings | None = None) -> np.ndarray:
     """Where the refinement of an estimate ends, by default as the settings say, shape (P,)."""
     how = how or problem.settings.refinement or RefinementSettings()
-    result = refine(problem, start, how, lambda *_: None, {}, "refined")
+    result = refine_from_afar(make_likelihood(problem), start, how, lambda *_: None, {}, Step("refined"))
     return problem.parameters.from_unit(result.point)
 
 

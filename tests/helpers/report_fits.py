@@ -12,8 +12,8 @@ from hydroid.fitting.validation import Prediction, fitted
 from hydroid.fitting.verdict import baselines_of
 from hydroid.log import Log
 from hydroid.posterior.band import Band
+from hydroid.posterior.error_model import make_likelihood
 from hydroid.posterior.linear import Linear, estimate_box
-from hydroid.posterior.noise import problem_noise
 from hydroid.posterior.quantities import Quantities
 from hydroid.posterior.uncertainty import Uncertainty, uncertainty_from
 from hydroid.problem.problem import Problem
@@ -154,13 +154,13 @@ def make_uncertainty(
     waves = np.linalg.qr(rng.normal(size=(len(problem.measured), len(theta))))[0].T
     slopes = 100 * size[:, None] * waves * np.sqrt(len(problem.measured))
     free = problem.parameters.free
-    residual = rng.normal(0, np.deg2rad(0.1), len(problem.measured))
+    errors = rng.normal(0, np.deg2rad(0.1), len(problem.measured))
+    likelihood = make_likelihood(problem).estimated(errors)
     at = Linear(
         estimate_box(problem.parameters, theta),
-        residual,
-        np.nan_to_num(slopes[free]),
+        likelihood.errors.innovations(errors[None])[0],
+        likelihood.errors.innovations(np.nan_to_num(slopes[free])),
         np.zeros((free.sum(), 0)),
-        prior_weight=float(np.deg2rad(0.1)),
         diverging=np.isnan(slopes[free]).any(axis=1),
     )
-    return uncertainty_from(problem, at, problem_noise(problem, residual))
+    return uncertainty_from(likelihood, at)

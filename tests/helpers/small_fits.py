@@ -6,6 +6,7 @@ import numpy as np
 from made_logs import TRUTH, at_rest, noisy, simulate_log, stepped
 
 from hydroid import load_settings
+from hydroid.fitting.step import Step
 from hydroid.log import Log
 from hydroid.problem.problem import Problem
 from hydroid.settings.fit import FitSettings
@@ -31,7 +32,7 @@ class Watcher:
         if len(self.rows) == self.stop_at and self.simulations is None:
             raise KeyboardInterrupt
 
-    def refining(self, name: str, simulated: int, rms: float) -> None:
+    def refining(self, step: Step, simulated: int, rms: float) -> None:
         if self.simulations is not None and len(self.rows) == self.stop_at and simulated > self.simulations:
             raise KeyboardInterrupt
 

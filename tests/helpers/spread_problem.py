@@ -31,4 +31,4 @@ def random_candidates(problem: Problem, n: int) -> np.ndarray:
 
 def assert_same(spread: Problem, plain: Problem, theta: np.ndarray) -> None:
     np.testing.assert_array_equal(spread.evaluate(theta), plain.evaluate(theta))
-    np.testing.assert_array_equal(spread.residuals(theta), plain.residuals(theta))
+    np.testing.assert_array_equal(spread.output_errors(theta), plain.output_errors(theta))

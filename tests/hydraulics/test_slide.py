@@ -1,5 +1,7 @@
 """A telescope: a joint that slides, with its cylinder along it."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from arms import MODELS, posed
@@ -12,6 +14,9 @@ from hydroid.arm.model import load_model
 from hydroid.fitting.validation import Prediction
 from hydroid.fitting.verdict import judge
 from hydroid.log import Log
+from hydroid.posterior.bench import make_bench
+from hydroid.posterior.quantities import joint_measure
+from hydroid.problem.bindings import Bindings
 from hydroid.reporting.predictions import validation_page
 from hydroid.settings.fit import FitSettings
 
@@ -65,3 +70,40 @@ def test_areas_delay_and_mass_are_recovered(settings: FitSettings) -> None:
     logs = [step_log(np.array([boom, 0.4]), levels, dwell=0.8) for boom in (1.2, 0.0)]
     start = {"area_A": 3000.0, "area_B": 1800.0, "delay": 0.05, "M_telescope": 250.0}
     assert_recovered(recover(settings, logs, TRUTH, start), settings, TRUTH)
+
+
+@pytest.mark.parametrize(
+    ("quantity", "unit"), [("area", "mm²"), ("area_a", "mm²"), ("dry_friction", "N"), ("damping", "N·s/m")]
+)
+def test_a_rotary_actuator_on_a_slide_has_the_units_of_a_slide(
+    tmp_path: Path, quantity: str, unit: str
+) -> None:
+    text = (MODELS / "crane.yaml").read_text().replace("model: crane.xml", f"model: {MODELS / 'crane.xml'}")
+    lines = [line for line in text.splitlines() if not line.startswith("  telescope: {kind: linear")]
+    place = next(i for i, line in enumerate(lines) if line.startswith("actuators:")) + 1
+    lines.insert(place, "  telescope: {kind: rotary, displacement: 3000, max_opening: 6}")
+    (tmp_path / "crane.yaml").write_text("\n".join(lines))
+    one = {"quantity": quantity, "joints": ["telescope"], "nominal": 10.0, "within": 2}
+    changes = {
+        "arm": str(tmp_path / "crane.yaml"),
+        "outputs": [2],
+        "start_pose": "up",
+        "parameters": {"p": one},
+    }
+    (found,) = hydroid.load_settings("fit-hyd", changes).parameter_set().parameters
+    assert found.unit == unit
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_its_flow_is_area_times_speed_and_its_pose_is_said_in_mm(settings: FitSettings, sign: float) -> None:
+    log = step_log(settings.arm.pose("up"), {2: [50.0]})
+    log.angle[-1, 1] += 0.5
+    bench = make_bench(settings, [log], 2)
+    assert bench.angle == pytest.approx(1e-3 * float(bench.pose.removesuffix(" mm")), abs=1e-12)
+    estimate = Bindings(settings).candidates(settings.parameter_set().vector(TRUTH, "truth")[None])
+    found = {column.label: float(value[0]) for column, value in joint_measure(bench, estimate)(estimate)}
+    area = TRUTH["area_A" if sign > 0 else "area_B"] * 1e-6
+    word = "raising" if sign > 0 else "lowering"
+    speed = found[f"speed at 100 % command and {bench.pose}, {word}"] * 1e-3
+    flow = found[f"flow at 100 % command and {bench.pose}, {word}"]
+    assert flow == pytest.approx(6e4 * area * speed, rel=1e-9)

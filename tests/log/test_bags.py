@@ -7,6 +7,7 @@ import pytest
 from log_files import faults, read
 from log_formats import BagWriter
 
+from hydroid.log import guess_columns, open_table
 from hydroid.settings.log import LogSettings
 
 KINDS = ("ros1", "ros2", "mcap")
@@ -79,7 +80,7 @@ def errors(path: Path, settings: LogSettings = SETTINGS) -> str:
 
 def test_a_gap_in_the_angles_is_a_fault(tmp_path: Path) -> None:
     path, _ = write(tmp_path, "ros2", gap=(4, 4.4))
-    assert "/joint_states.position[boom]: no value is there (and" in errors(path)
+    assert "0.42 s without a sample" in errors(path)
 
 
 def test_bad_bags_are_refused_in_one_line(tmp_path: Path) -> None:
@@ -92,3 +93,69 @@ def test_bad_bags_are_refused_in_one_line(tmp_path: Path) -> None:
     one, _ = write(tmp_path, "ros1")
     one.write_bytes(one.read_bytes()[:5000])
     assert "cannot be read as a bag" in errors(one)
+
+
+def two_topics(folder: Path, kind: str, commands: dict[float, float], clock=lambda time: time) -> Path:
+    """A bag of 4 s: angles every 0.02 s of a clock; commands [V] of joint 1 by their time."""
+    path = folder / ("log.bag" if kind == "ros1" else "log")
+    with BagWriter(path, kind) as bag:
+        for k in range(200):
+            time = 0.02 * k
+            bag.write("/joint_states", START + time, bag.joints(START + clock(time), NAMES, position(time)))
+            for volts in (value for at, value in commands.items() if time <= at < time + 0.02):
+                bag.write("/valves/command", START + time, bag.array(np.array([volts, 2.5])))
+    return path
+
+
+NAMES = ["boom", "stick"]
+VOLTS = SETTINGS.changed({"command.scale": 40.0, "command.offset": -100.0, "period_s": 0.02})
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_before_its_first_message_a_command_is_zero_percent_and_not_zero_volts(kind, tmp_path) -> None:
+    path = two_topics(tmp_path, kind, {1.0: 4.0, 2.0: 1.0})
+    log, _ = read(path, VOLTS, RANGES)
+    expected = np.select([log.time >= 2.0 - 1e-9, log.time >= 1.0 - 1e-9], [-60.0, 60.0], 0.0)
+    np.testing.assert_allclose(log.command[:, 0], expected, atol=1e-6)
+    np.testing.assert_allclose(log.command[:, 1], 0.0, atol=1e-9)
+
+
+def test_the_range_of_a_command_that_starts_late_is_guessed_from_its_messages(tmp_path: Path) -> None:
+    volts = {0.5 + 0.1 * k: 2.5 if k % 3 == 0 else 2.5 + 2.4 * np.sin(k) for k in range(30)}
+    table = open_table(two_topics(tmp_path, "ros2", volts))
+    (command,) = [entry["command"] for entry in guess_columns(table, NAMES).log["joints"].values()][:1]
+    assert (command["scale"], command["offset"]) == (40.0, -100.0)
+
+
+def test_a_clock_that_goes_back_is_refused(tmp_path: Path) -> None:
+    """The publisher's alone, or also the recorder's, whose messages rosbags would interleave."""
+    path = two_topics(tmp_path, "ros2", {0.0: 3.0}, lambda time: time if time < 2 else time - 1.005)
+    assert "topic /joint_states, message 101: time does not increase: 0.995 s follows 1.98" in errors(path)
+    with BagWriter(tmp_path / "recorder", "ros2") as bag:
+        for k in range(200):
+            time = 0.02 * k if k < 100 else 0.02 * k - 1.005
+            bag.write("/joint_states", START + time, bag.joints(START + time, NAMES, position(time)))
+            bag.write("/valves/command", START + time, bag.array(np.zeros(2)))
+    said = errors(tmp_path / "recorder")
+    assert "topic /valves/command, message 101: time does not increase: 0.995 s follows 1.98" in said
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_one_time_with_two_values_is_refused_and_a_message_that_came_twice_is_not(kind, tmp_path) -> None:
+    path = two_topics(tmp_path, kind, {0.0: 3.0}, lambda time: min(time, 3.0))
+    assert "topic /joint_states, message 152: time does not increase: 3 s follows 3 s" in errors(path)
+    twice = tmp_path / ("twice.bag" if kind == "ros1" else "twice")
+    with BagWriter(twice, kind) as bag:
+        for k in range(200):
+            time = 0.02 * k
+            bag.write("/valves/command", START + time, bag.array(np.zeros(2)))
+            for late in (0.0, 0.001):  # as of a relay
+                bag.write(
+                    "/joint_states", START + time + late, bag.joints(START + time, NAMES, position(time))
+                )
+    assert len(read(twice, VOLTS, RANGES)[0].time) == 200
+
+
+def test_a_wrong_stamp_does_not_fill_the_memory(tmp_path: Path) -> None:
+    path = two_topics(tmp_path, "mcap", {0.0: 3.0}, lambda time: time if time else 1e8 - START)
+    assert "rows, of which 1 columns are read; at most" in errors(path)

@@ -8,6 +8,7 @@ from log_files import read
 
 from hydroid.errors import LogError
 from hydroid.log import ColumnGuess, guess_columns, open_table
+from hydroid.log.clues import joint_of, number_in
 from hydroid.settings.log import LogSettings
 
 JOINTS = ("swing", "boom", "stick", "bucket")
@@ -86,3 +87,14 @@ def test_the_bare_name_of_a_joint_or_of_what_a_command_moves_is_an_angle(tmp_pat
 def test_no_time_is_an_error_that_lists_the_columns(tmp_path: Path) -> None:
     with pytest.raises(LogError, match="it has a and b"):
         guess(tmp_path, ["a", "b"], STEPS, SWEEP)
+
+
+def test_digits_in_a_topics_name_number_no_joint():
+    """`/CalibratedJointVals3.position[Boom]` is the boom's, and no column of a topic 3 is joint 3's."""
+    joints = ["swing", "boom", "stick", "bucket"]
+    for name, joint in (("Boom", 2), ("Stick", 3), ("2", None)):
+        assert joint_of(f"/CalibratedJointVals3.position[{name}]", joints) == joint
+    assert number_in("/CalibratedJointVals3.position[Boom]") is None
+    assert number_in("/CalibratedJointVals3.position[2]") == 2
+    assert number_in("/valve3/command.data") == 3
+    assert number_in("/valve3/angle [deg]") == 3

@@ -21,31 +21,42 @@ class Wrong:
     """One way in which logs are wrong.
 
     how: in words, for the table. said: level and words of the finding that must be there. make: the logs.
-    settings: of `log`.
+    settings: of `log`. config: that of the arm.
     """
 
     how: str
     said: str
     make: Callable[[], list[Table]]
     settings: Mapping[str, Any] = field(default_factory=dict)
+    config: str | Path = "fit-mech"
 
     def line(self, folder: Path) -> str:
         """Return the line of the finding that `hydroid check` says of the logs."""
         level, words = self.said.split(": ", 1)
         overrides = {f"log.{key}": value for key, value in self.settings.items()}
-        lines = hydroid.check(save(self, folder), set=overrides).lines
+        lines = hydroid.check(save(self, folder), config=self.config, set=overrides).lines
         return next(x for x in lines if x.startswith(level) and words in x).replace(f"{folder}/", "")
 
 
 def rig(name: str = "rig_all_joints_1", rows: int = 4000) -> Table:
     """A log of the virtual rig, by column, after one second of rest."""
-    path = RIG / f"{name}.csv"
-    values = np.loadtxt(path, delimiter=",", skiprows=1)[:rows]
+    table = load(RIG / f"{name}.csv")
+    values = np.stack([*table.values()], axis=1)[:rows]
     rest = np.repeat(values[:1], 100, axis=0)
     rest[:, 1:8] = 0.0
     values = np.vstack([rest, values])
     values[:, 0] = 0.01 * np.arange(len(values))
-    return dict(zip(path.read_text().partition("\n")[0].split(","), values.T, strict=True))
+    return dict(zip(table, values.T, strict=True))
+
+
+def load(path: Path) -> Table:
+    header = path.read_text().partition("\n")[0].split(",")
+    return dict(zip(header, np.loadtxt(path, delimiter=",", skiprows=1).T, strict=True))
+
+
+def dig() -> Table:
+    """A log of a real excavator, whose boom goes to negative angles by a positive command."""
+    return load(EXCAVATOR / "fit_01.csv")
 
 
 def of(prefix: str, change: Callable[[np.ndarray], np.ndarray], table: Table | None = None) -> list[Table]:
@@ -94,6 +105,36 @@ def holed(angle: np.ndarray) -> np.ndarray:
     return np.where(np.arange(len(angle)) == 700, np.nan, angle)
 
 
+def spiked(angle: np.ndarray) -> np.ndarray:
+    return angle + 25 * (np.arange(len(angle)) == 700)
+
+
+def dropped(angle: np.ndarray) -> np.ndarray:
+    at = np.arange(len(angle))
+    return np.where((at >= 700) & (at < 750), 0.0, angle)
+
+
+def shifted(angle: np.ndarray) -> np.ndarray:
+    return angle + 4 * (np.arange(len(angle)) >= 700)
+
+
+def renumbered() -> list[Table]:
+    """Three seconds are cut out, and the time counts on."""
+    (table,) = without(*range(900, 1200))
+    return [table | {"time_s": 0.01 * np.arange(len(table["time_s"]))}]
+
+
+def frozen(angle: np.ndarray) -> np.ndarray:
+    """From sample 253 on."""
+    return np.where(np.arange(len(angle)) < 253, angle, angle[253])
+
+
+def coarse(angle: np.ndarray) -> np.ndarray:
+    return 2 * np.round(angle / 2)
+
+
+EXCAVATOR = ROOT / "examples" / "excavator"
+EXCAVATED = EXCAVATOR / "fit.yaml"
 ROWS = np.insert(np.arange(4100), 900, 900)
 JITTER = 0.004 * np.sin(np.arange(4100))
 
@@ -101,6 +142,9 @@ JITTER = 0.004 * np.sin(np.arange(4100))
 WRONG = (
     Wrong("commands from −1 to 1", "warning: set log.command.scale: 100", lambda: of("u", lambda u: u / 100)),
     Wrong("commands in ±10 V", "warning: set log.command.scale: 10", lambda: of("u", lambda u: u / 10)),
+    Wrong(
+        "one command of several in ±10 V", "warning: unlike the others", lambda: of("u2", lambda u: u / 10)
+    ),
     Wrong("commands in ±1000", "error: set log.command.scale: 0.1", lambda: of("u", lambda u: u * 10)),
     Wrong("commands in 4 to 20 mA", "warning: offset: -150", lambda: of("u2", lambda u: 12 + 0.08 * u)),
     Wrong("a joystick of 0 to 5 V", "warning: offset: -100", lambda: of("u2", lambda u: 2.5 + 0.025 * u)),
@@ -116,6 +160,12 @@ WRONG = (
     Wrong("a clock in days, read as s", "error: unit: day", lambda: of("time", lambda t: t / 86400)),
     Wrong("an angle that counts the other way", "error: angle.scale: -1", lambda: of("q3", np.negative)),
     Wrong("a command wired the other way", "warning: moves against", lambda: of("u2", np.negative)),
+    Wrong(
+        "the same at a joint that turns to negative angles",
+        "warning: moves with its command",
+        lambda: of("u1", np.negative, dig()),
+        config=EXCAVATED,
+    ),
     Wrong("clocks that differ by 0.3 s", "warning: as no machine does", lambda: early(0.3)),
     Wrong("commands that are all 0", "warning: no joint is driven", lambda: of("u", np.zeros_like)),
     Wrong("a clock that jitters", "note: is resampled", lambda: of("time", lambda t: t + JITTER)),
@@ -124,6 +174,12 @@ WRONG = (
     Wrong("a sample that stands twice", "error: does not increase", lambda: of("", lambda v: v[ROWS])),
     Wrong("a cell that holds no number", "error: 'nan'", lambda: of("q2", holed)),
     Wrong("a dead sensor", "warning: never changes", lambda: of("q2", lambda q: np.full_like(q, q[0]))),
+    Wrong("a sensor that freezes", "warning: last digit", lambda: of("q1", frozen, dig()), config=EXCAVATED),
+    Wrong("a spike of 25 deg", "warning: jumps by 25", lambda: of("q2", spiked)),
+    Wrong("half a second of zeros", "warning: jumps by", lambda: of("q2", dropped)),
+    Wrong("a zero point that moves", "warning: jumps by", lambda: of("q2", shifted)),
+    Wrong("seconds cut out and renumbered", "warning: jumps by", renumbered),
+    Wrong("a sensor with steps of 2 deg", "note: in steps of 2 deg", lambda: of("q2", coarse)),
     Wrong("the angle of another joint", "warning: strong commands hardly move joint shoulder", exchanged),
     Wrong("an encoder that wraps", "note: wraps by 360", lambda: of("q6", lambda q: (q + 280) % 360 - 180)),
     Wrong("a misspelt column", "error: did you mean 'U2_pct'?", lambda: renamed("u2", "U2")),

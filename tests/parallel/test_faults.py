@@ -84,9 +84,9 @@ def test_only_the_candidate_that_kills_is_infeasible(two: DaskWorkers, tmp_path:
     assert memo.infeasible == 1
     np.testing.assert_array_equal(result[others], healthy[others])
     assert len((tmp_path / "deaths").read_text()) == 4  # two tries in its chunk, two alone
-    residuals = memo.problem.residuals(theta[2:5])
+    residuals = memo.problem.output_errors(theta[2:5])
     assert np.isnan(residuals[1]).all()
-    np.testing.assert_array_equal(residuals[::2], problem.residuals(theta[2:5:2]))
+    np.testing.assert_array_equal(residuals[::2], problem.output_errors(theta[2:5:2]))
 
 
 class Site:

@@ -7,6 +7,7 @@ from conftest import replaced
 from made_logs import HYDRAULIC, TRUTH, step_log
 
 from hydroid import load_settings
+from hydroid.hydraulics.records import Records
 from hydroid.hydraulics.solenoid import coil_current, resting_stroke, side_voltage
 from hydroid.identified_model import IdentifiedModel, identified
 from hydroid.plant import Plant
@@ -78,22 +79,82 @@ def test_a_symmetric_actuator_without_gravity_moves_alike_both_ways():
     assert found["joint6_dead_time_positive"] == pytest.approx(found["joint6_dead_time_negative"], rel=1e-6)
 
 
+def spool(c: Records, command: float, onset: float) -> float:
+    """Travel of a spool [m] under a command [%] without dead band."""
+    current = coil_current(side_voltage(command, 1.0, onset), c.current_max[0], c.current_min[0])
+    currents = np.array([current, c.current_min[0]])
+    moved, resting = resting_stroke(c.coil[0] * currents**2, c.gap[0], c.plunger_stiffness[0])
+    return float(moved - resting)
+
+
 def test_the_dead_band_is_the_command_that_moves_the_spool_over_its_overlap():
     changes = {"hydraulics.overlap_a": 0.5, "hydraulics.overlap_b": 0.3, "hydraulics.leakage": 0.0}
     bench, estimate = shoulder_bench(model(**changes))
     found, (c, *_) = measured(bench, estimate), actuator(bench, estimate)
-
-    def spool(command: float, onset: float) -> float:
-        current = coil_current(side_voltage(command, 1.0, onset), c.current_max[0], c.current_min[0])
-        currents = np.array([current, c.current_min[0]])
-        moved, resting = resting_stroke(c.coil[0] * currents**2, c.gap[0], c.plunger_stiffness[0])
-        return float(moved - resting)
-
     commands = np.linspace(1, 60, 1000)
-    for name, side in (("positive", c.a), ("negative", c.b)):
-        opens = np.interp(side.overlap[0], [spool(u, side.onset[0]) for u in commands], commands)
+    for sign, name, side in ((1.0, "positive", c.a), (-1.0, "negative", c.b)):
+        opens = np.interp(side.overlap[0], [spool(c, u, side.onset[0]) for u in commands], commands)
         (band,) = found[f"joint2_dead_band_{name}"]
-        assert opens < band < opens + 5.0  # 2 % of full speed needs a little more
+        assert band == pytest.approx(opens, abs=0.01)
+        load = bench.loads(estimate)
+        (still, moves) = bench.steady(estimate, sign * np.array([band - 0.01, band + 0.01]), load)[0]
+        assert still == 0.0
+        assert moves != 0.0
+
+
+@pytest.mark.parametrize("quasi_static", [False, True])
+def test_a_dead_band_that_is_a_parameter_is_no_quantity_beside_it(quasi_static: bool):
+    """The voltage at the smallest command opens the valve at once: only the parameter says where."""
+    changes = {"hydraulics.dead_band_a": 24.7, "hydraulics.dead_band_b": 31.0, "hydraulics.leakage": 0.0}
+    changes |= {"simulation.model": "quasi-static"} if quasi_static else {}
+    bench, estimate = shoulder_bench(model(**changes))
+    assert not [name for name in measured(bench, estimate) if "dead_band" in name]
+    load = bench.loads(estimate)
+    speeds = bench.steady(estimate, np.array([24.6, 24.8, -30.9, -31.1]), load)[0]
+    assert (speeds != 0.0).tolist() == [False, True, False, True]
+
+
+def test_what_a_joint_does_that_its_command_does_not_move_is_not_stated():
+    changes = {"hydraulics.dead_band_a": 60.0, "hydraulics.dead_band_b": 45.0, "hydraulics.leakage": 0.0}
+    found = measured(*shoulder_bench(model(**changes)))
+    stated = {name for name in found if name.endswith(("positive", "negative"))}
+    still = {"joint2_speed_50_positive", "joint2_gain_positive"}
+    assert not still & stated
+    assert {"joint2_speed_100_positive", "joint2_speed_50_negative", "joint2_gain_negative"} <= stated
+    assert found["joint2_speed"][16] == 0.0  # of the curve, at 50 %
+
+
+def test_a_dead_band_and_an_overlap_add_up_to_one():
+    both = {"hydraulics.dead_band_a": 20.0, "hydraulics.overlap_a": 0.5}
+    bench, estimate = shoulder_bench(model(**both))
+    found, (c, *_) = measured(bench, estimate), actuator(bench, estimate)
+    assert "joint2_dead_band_negative" not in found
+    commands = np.linspace(1, 100, 1000)
+    travels = [spool(c, u, c.a.onset[0]) for u in commands]
+    beyond = np.interp(c.a.overlap[0], travels, commands)  # of a pilot stage without dead band
+    assert found["joint2_dead_band_positive"] == [pytest.approx(20.0 + beyond * (100 - 20) / 100, abs=0.01)]
+
+
+@pytest.mark.parametrize("model_name", ["dynamic", "quasi-static"])
+def test_a_speed_is_that_of_the_settled_motion_of_a_joint_that_rings(model_name: str):
+    """On its oil it rings at 1 Hz, and yields to the load that changes on the way."""
+    soft = {"simulation.model": model_name, "hydraulics.leakage": 0.0, "hydraulics.bulk_modulus": 110.0}
+    soft |= {"parameters.D.fixed": 40.0, "hydraulics.oil_frequency": 0.9, "hydraulics.oil_damping": 0.2}
+    one = model(**soft)
+    bench, estimate = shoulder_bench(one)
+    found, plant = measured(bench, estimate)["joint2_speed"], Plant(one, joints=[2])
+    at_10 = found[12]
+    pose = one.settings.arm.pose("study")
+    pose[1] = bench.angle - np.radians(24.0)
+    plant.reset(pose)
+    angle = np.array([plant.step([0, 10.0, 0, 0, 0, 0, 0])[1] for _ in range(600)])
+    speed = np.degrees(np.gradient(angle, 0.01))
+    passes = int(np.argmax(angle >= bench.angle))
+    assert passes > 330
+    around = slice(passes - 100, passes + 100)  # two oscillations, which are nearly over
+    settled = np.polyfit(angle[around] - bench.angle, speed[around], 1)[1]
+    assert settled == pytest.approx(at_10, rel=0.015)
+    assert np.abs(speed[60:160] - settled).max() > 0.2 * settled
 
 
 def test_a_transport_delay_adds_to_the_dead_time_and_to_nothing_else(shoulder):
@@ -106,7 +167,7 @@ def test_a_transport_delay_adds_to_the_dead_time_and_to_nothing_else(shoulder):
 
 def test_the_natural_frequency_is_that_of_the_oscillation_after_a_step(shoulder):
     _, bench, estimate, found = shoulder
-    angle = Movement(bench, 5.0, bench.angle, 60).angles(estimate)[0]
+    angle = Movement(bench, 5.0, 60).angles(estimate)[0]
     speed = np.diff(angle) - np.linspace(0, 1, 60) * (angle[-1] - angle[-2])
     peaks = np.flatnonzero((speed[1:-1] > speed[:-2]) & (speed[1:-1] > speed[2:]))[:3]
     assert 1 / (np.diff(peaks).mean() * 0.01) == pytest.approx(found["joint2_natural_frequency"][0], rel=0.15)

@@ -11,7 +11,6 @@ from hydroid import fit, load_settings, read_logs
 from hydroid.arm.model import add_payload
 from hydroid.errors import SettingsError
 from hydroid.log import check_log, write_log
-from hydroid.posterior.noise import error_level, fit_noise
 from hydroid.problem.problem import Problem
 
 MECHANICAL = {name: value for name, value in TRUTH.items() if name != "K"}
@@ -29,12 +28,12 @@ def hydraulic():
     return settings, simulate_log(settings, log, TRUTH_2)
 
 
-def test_the_truth_leaves_no_residual_in_any_channel(hydraulic):
+def test_the_truth_leaves_no_error_in_any_channel(hydraulic):
     settings, log = hydraulic
     problem = Problem(settings, [log])
     assert [c.quantity for c in problem.channels] == ["angle", "pressure_a", "pressure_b"]
     truth = problem.parameters.vector(TRUTH_2, "truth")
-    rows = problem.residuals(truth[None])
+    rows = problem.output_errors(truth[None])
     assert rows.shape == (1, 3 * len(log.time))
     assert np.abs(rows).max() < 1e-12
     assert problem.evaluate(truth[None]).shape == (1, 3 + 2 + 1)
@@ -44,24 +43,10 @@ def test_a_pressure_error_counts_its_weight(hydraulic):
     settings, log = hydraulic
     off = replace(log, pressure=log.pressure + 3e5)
     problem = Problem(settings, [off])
-    rows = problem.residuals(problem.parameters.vector(TRUTH_2, "truth")[None])[0]
+    rows = problem.output_errors(problem.parameters.vector(TRUTH_2, "truth")[None])[0]
     for channel in problem.channels[1:]:
         assert np.rad2deg(rows[channel.rows]) == pytest.approx(0.1 * 3.0)
     assert problem.rms(rows[None])[0] < 1e-12  # the error of angles alone
-
-
-def test_errors_of_driven_angles_pass_the_prefilter_and_can_be_had_back(hydraulic):
-    settings, log = hydraulic
-    angle, pressure, _ = Problem(settings, [log]).channels
-    errors = np.random.default_rng(0).normal(size=(2, 6000))
-    np.testing.assert_allclose(angle.unfiltered(angle.filtered(errors)), errors, rtol=0, atol=1e-12)
-    assert np.array_equal(pressure.filtered(errors), errors)
-    assert angle.filtered(np.ones(6000))[-1] == pytest.approx(1.0)  # after a minute
-    assert np.abs(angle.filtered(np.resize([1.0, -1.0], 6000))[-1]) == pytest.approx(2.0)
-    level = error_level(angle, fit_noise(angle.filtered(errors[0])))
-    assert level == pytest.approx(np.std(errors[0]), rel=0.02)
-    stated = settings.changed({"objective.noise_deg": 0.1})
-    assert np.array_equal(Problem(stated, [log]).channels[0].filtered(errors), errors)  # white
 
 
 def test_pressures_do_not_change_the_angles(hydraulic):
@@ -90,12 +75,12 @@ def mechanical(**changes):
     return settings, log, TRUTH
 
 
-def test_weights_scale_the_residuals_of_their_joint():
+def test_weights_scale_the_errors_of_their_joint():
     settings, log, truth = mechanical(outputs=[2, 3])
     weighted, *_ = mechanical(outputs=[2, 3], **{"objective.weights": {3: 0.25}})
     one, other = Problem(settings, [log]), Problem(weighted, [log])
     theta = one.parameters.vector(truth, "truth")[None]
-    plain, scaled = one.residuals(theta)[0], other.residuals(theta)[0]
+    plain, scaled = one.output_errors(theta)[0], other.output_errors(theta)[0]
     shoulder, elbow = (c.rows for c in one.channels)
     assert np.array_equal(scaled[shoulder], plain[shoulder])
     assert scaled[elbow] == pytest.approx(0.25 * plain[elbow])

@@ -97,4 +97,4 @@ def test_a_refinement_weighs_priors_against_the_logs():
     truth = problem.parameters.vector(TRUTH, "truth")
     theta = refined(problem, 0.9 * truth, RefinementSettings(iterations=30))[None]
     assert theta[0, 3:].sum() == pytest.approx(30.0, abs=0.3)
-    assert np.rad2deg(problem.rms(problem.residuals(theta))[0]) < 0.105
+    assert np.rad2deg(problem.rms(problem.output_errors(theta))[0]) < 0.105

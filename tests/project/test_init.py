@@ -4,6 +4,7 @@ import json
 import re
 import runpy
 import shutil
+from collections.abc import Callable, Sequence
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 import robots
+from arms import MODELS
 from robots import LIMIT, link, write_robot
 from typer.testing import CliRunner
 
@@ -137,6 +139,133 @@ def test_an_error_leaves_nothing_behind(tmp_path: Path):
     with pytest.raises(ModelError, match="cannot be read as XML"):
         init(tmp_path / "new" / "mine", robot)
     assert sorted(tmp_path.rglob("*")) == before
+
+
+COLUMNS = dict(zip("abcdefg", ("time", *["command"] * 3, *["angle"] * 3), strict=True))
+
+
+def renamed(place: Path, log: Path, change: Callable[[list[list[str]]], object]) -> Path:
+    """Write a log of the machine with cells changed."""
+    rows = [line.split(",") for line in (place / "move_0.csv").read_text().splitlines()]
+    change(rows)
+    log.write_text("\n".join(",".join(row) for row in rows))
+    return log
+
+
+def named_by_letters(rows: list[list[str]]) -> None:
+    rows[0] = [*COLUMNS]
+
+
+def without_commands(rows: list[list[str]]) -> None:
+    rows[0] = [name.replace("valve [V]", "what") for name in rows[0]]
+
+
+def fill_in(path: Path, joints: Sequence[str]) -> None:
+    """Complete the skeleton as a person does who knows that b to d are valves [V], e to g angles [rad]."""
+    before, mark, rest = path.read_text().partition("# log:")
+    section, end, after = rest.partition("\n\n")
+    section = "\n".join(line.removeprefix("# ") for line in (mark + section).splitlines())
+    section = section.replace("TIME, unit: s", "a, unit: ms")
+    for joint, command, angle in zip(joints, "bcd", "efg", strict=True):
+        entry = f"{{command: {{column: {command}, scale: 10}}, angle: {{column: {angle}, unit: rad}}}}"
+        section = re.sub(rf"{joint}: .*", f"{joint}: {entry}", section)
+    path.write_text(before + section + end + after)
+
+
+def test_a_log_of_unknown_columns_gets_a_skeleton_and_goes_on_from_there(place: Path, tmp_path: Path):
+    """The settings are then those of a log whose columns `init` knows, from start to start."""
+    log = renamed(place, tmp_path / "log.csv", named_by_letters)
+    mine, robot = tmp_path / "mine", place / "digger/urdf/digger.urdf"
+    done = CliRunner().invoke(app, ["init", str(mine), "--arm", str(robot), "--log", str(log)])
+    assert done.exit_code == 2
+    assert (
+        "The log cannot be fitted yet: no column looks like a time. Complete the log section" in done.output
+    )
+    (again,) = re.findall(r"^  hydroid (init --config .*)$", done.output, re.MULTILINE)
+    text = (mine / "fit.yaml").read_text()
+    for name, kind in COLUMNS.items():
+        assert re.search(rf"^#   {name}: .* to .*; .*{kind} in", text, re.MULTILINE)
+    with pytest.raises(SettingsError, match=r"fit\.yaml: has no log section; name the log's columns there"):
+        hydroid.init(config=mine / "fit.yaml", log=log)
+    fill_in(mine / "fit.yaml", load_arm(mine / "arm.yaml").joint_names)
+    filled, arm = (mine / "fit.yaml").read_text(), (mine / "arm.yaml").read_bytes()
+    done = CliRunner().invoke(app, again.split())
+    assert done.exit_code == 0, done.output
+    assert (mine / "fit.old.yaml").read_text() == filled
+    assert (mine / "arm.yaml").read_bytes() == arm
+    init(tmp_path / "known", robot, [place / "move_0.csv"])
+    found, known = (hydroid.load_settings(tmp_path / name / "fit.yaml") for name in ("mine", "known"))
+    assert found.outputs == known.outputs
+    for joint in found.outputs:
+        assert found.log.columns("command", joint).scale == known.log.columns("command", joint).scale
+    starts = [
+        {one.name: (one.lower, one.upper) for one in settings.parameter_set().parameters}
+        for settings in (found, known)
+    ]
+    assert {*starts[0]} == {*starts[1]}
+    for name, values in starts[0].items():
+        assert values == pytest.approx(starts[1][name], rel=0.02), name
+
+
+def test_a_log_without_commands_is_no_log_to_fit(place: Path, tmp_path: Path):
+    log = renamed(place, tmp_path / "log.csv", without_commands)
+    done = hydroid.init(tmp_path / "mine", arm=place / "digger/urdf/digger.urdf", log=log)
+    assert done.exit_status == 2
+    assert done.result.missing == "no column looks like a command"
+    assert [step.split()[1] for step in done.result.commands] == ["init"]
+    text = (tmp_path / "mine/fit.yaml").read_text()
+    assert (
+        "#     boom_joint: {command: {column: COMMAND, scale: 1}, angle: {column: 'boom angle [rad]'" in text
+    )
+
+
+@pytest.mark.parametrize(
+    ("columns", "message"),
+    [
+        (slice(1, 4), "no joint is driven and moves: no command is ever given"),
+        (
+            slice(4, 7),
+            "no joint is driven and moves: swing_joint, boom_joint and stick_joint driven, but nothing",
+        ),
+    ],
+)
+def test_a_log_in_which_nothing_is_driven_and_moves_is_refused(place, tmp_path, columns, message):
+    def still(rows: list[list[str]]) -> None:
+        for row in rows[2:]:
+            row[columns] = rows[1][columns] if columns.start == 4 else ["0"] * 3
+        rows[1][columns] = rows[2][columns]
+
+    log = renamed(place, tmp_path / "log.csv", still)
+    with pytest.raises(LogError, match=message):
+        init(tmp_path / "mine", place / "digger/urdf/digger.urdf", [log])
+    assert not (tmp_path / "mine").exists()
+
+
+def test_a_joint_that_no_fitted_log_drives_is_not_compared(place: Path, tmp_path: Path):
+    def only_the_boom(rows: list[list[str]]) -> None:
+        for row in rows[1:]:
+            row[1] = row[3] = "0"
+
+    def not_the_swing(rows: list[list[str]]) -> None:
+        for row in rows[1:]:
+            row[1] = "0"
+
+    boom = renamed(place, tmp_path / "boom.csv", only_the_boom)
+    both = renamed(place, tmp_path / "both.csv", not_the_swing)
+    arm = place / "mine" / "arm.yaml"
+    made = init(tmp_path / "one", arm, [boom])
+    assert hydroid.load_settings(tmp_path / "one/fit.yaml").outputs == (2,)
+    assert "swing_joint and stick_joint: no command in the logs, so not compared" in made.columns
+    init(tmp_path / "two", arm, [boom, both, place / "move_1.csv"])
+    assert hydroid.load_settings(tmp_path / "two/fit.yaml").outputs == (2, 3)
+
+
+def test_an_error_names_no_file_that_is_gone(tmp_path: Path):
+    robot = MODELS / "bad_arms/inf_origin.urdf"
+    done = CliRunner().invoke(app, ["init", str(tmp_path / "mine"), "--arm", str(robot)])
+    assert isinstance(done.exception, ModelError)
+    assert ".hydroid-init-" not in str(done.exception)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_without_cad_there_is_a_template_that_runs(tmp_path: Path):

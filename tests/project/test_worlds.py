@@ -25,7 +25,9 @@ def test_an_arm_of_the_world_is_taken_as_it_is(name: str, tmp_path: Path) -> Non
     for start in world.said:
         assert [note for note in made.notes if note.startswith(start)], (start, made.notes)
     assert len(made.notes) <= 5
-    true = {link: 1200 * size**3 / 25 for link, size in SIZES.items()}
+    # boxes stand around a link that is hollow; a lost mesh leaves only the distances of the joints
+    boxes = world.density != 1200 and "<box" in world.shape
+    true = {link: (500 if boxes else 1200) * size**3 / 25 for link, size in SIZES.items()}
     for link, mass in settings.arm.mass_of.items():
         if link in true:
             assert np.abs(np.log(mass / true[link])) < np.log(6 if "lost" in name else 1.2)

@@ -84,7 +84,8 @@ def test_killed_runs_end_the_same(tmp_path: Path, kind: str):
 
 
 @pytest.mark.slow
-def test_a_clusters_notice_ends_a_run_with_its_checkpoint_and_a_second_run_is_refused(tmp_path: Path):
+@pytest.mark.parametrize("notice", ["SIGUSR1", "SIGHUP"])
+def test_a_notice_ends_a_run_with_its_checkpoint_and_a_second_run_is_refused(tmp_path: Path, notice: str):
     options = [*SHORT, "--set", "search.ga.generations=4000"]
     process = start(tmp_path, *options, out="run")
     wait_for(process, tmp_path / "run", "checkpoint.npz")
@@ -92,7 +93,7 @@ def test_a_clusters_notice_ends_a_run_with_its_checkpoint_and_a_second_run_is_re
     assert f"run: is in use by process {process.pid} on " in errors
     assert len(errors.splitlines()) == 1
     for _ in range(3):  # clusters repeat themselves
-        process.send_signal(signal.SIGUSR1)
+        process.send_signal(getattr(signal, notice))
         time.sleep(0.01)
     assert "--resume" in finish(process, 130)
     assert json.loads((tmp_path / "run" / "run.json").read_text())["status"] == "interrupted"

@@ -1,3 +1,5 @@
+import os
+import time
 from pathlib import Path
 
 import pytest
@@ -5,7 +7,7 @@ import pytest
 import hydroid
 from hydroid.errors import SettingsError
 from hydroid.problem.bindings import Bindings
-from hydroid.settings.fit import FitSettings
+from hydroid.settings.fit import FitSettings, StudySettings
 from hydroid.settings.load import load, parse_override
 from hydroid.settings.log import ColumnMap, LogSettings
 
@@ -108,6 +110,38 @@ def test_a_fault_in_an_override_names_the_override(tmp_path: Path, key: str, val
     assert str(caught.value).startswith(f"--set {key}: ")
 
 
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (MINIMAL + f"outputs: {[2] * 19_000}\n", "line 7: outputs: joint 2 occurs twice"),
+        (MINIMAL + f"outputs: {[*range(1, 19_000)]}\n", "outputs: 18999 joints, but the arm has 7"),
+        (f"a: &a {'x' * 10**5}\nb: [{', '.join(['*a'] * 4000)}]\n", "more than 1048576 characters of text"),
+    ],
+    ids=["the same joint", "too many joints", "aliases of long text"],
+)
+def test_what_would_take_minutes_is_refused_at_once(tmp_path: Path, text: str, says: str):
+    text = text.replace("gain,", "gain, each: true,")
+    began = time.monotonic()
+    with pytest.raises(SettingsError, match=says):
+        load(written(tmp_path, text), FitSettings)
+    assert time.monotonic() - began < 10
+
+
+def test_a_pipe_is_no_settings(tmp_path: Path):
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(SettingsError, match="it is no file"):
+        load(tmp_path / "pipe", FitSettings)
+    with pytest.raises(SettingsError, match="it is no file"):
+        hydroid.load_identified(tmp_path / "pipe")
+
+
+def test_a_study_of_more_cells_than_anyone_fits_is_refused(tmp_path: Path):
+    axes = {f"parameters.{name}.fixed": (1.0, 2.0) for name in "abcdefghijklmnopqrstuvwxyz"}
+    study = StudySettings(title="", base="fit-mech", logs=("a.csv",), axes=axes)
+    with pytest.raises(SettingsError, match="more than 100000 cells"):
+        study.changes()
+
+
 NAMED = """
 arm: ARM
 outputs: [swing, boom]
@@ -152,6 +186,61 @@ def test_joints_and_links_may_be_given_by_name(tmp_path):
 def test_an_unknown_name_is_refused_with_those_there_are(tmp_path, old, new, message):
     with pytest.raises(SettingsError, match=message):
         Bindings(hydroid.load_settings(written(tmp_path, NAMED.replace(old, new))))
+
+
+MAPPINGS = """
+arm: ARM
+outputs: [boom]
+tolerance_deg: {boom: 2}
+parameters: {D: {quantity: damping, bounds: [1, 10]}}
+log: {joints: {boom: {command: {column: lift}, angle: {unit: rad}}, 3: {angle: {unit: rad}}}}
+objective: {weights: {boom: 2}, noise_deg: {3: 0.1}}
+""".replace("ARM", str(Path(__file__).parents[2] / "examples" / "excavator" / "arm.yaml"))
+
+
+def test_an_override_finds_a_joint_by_its_name_and_by_its_number(tmp_path: Path):
+    path = written(tmp_path, MAPPINGS)
+    changes = {
+        "log.joints.2.command.scale": -1,
+        "log.joints.3.command.scale": 2,
+        "log.joints.arm.angle.scale": 3,
+        "tolerance_deg.2": 1,
+        "objective.weights.2": 5,
+        "objective.noise_deg.arm": 0.2,
+    }
+    settings = hydroid.load_settings(path, changes)
+    assert settings.log.columns("command", 2) == ColumnMap(("lift",), "%", scale=-1)
+    assert settings.log.columns("angle", 2) == ColumnMap(("q2_deg",), "rad")
+    assert settings.log.columns("command", 3) == ColumnMap(("u3_pct",), "%", scale=2)
+    assert settings.log.columns("angle", 3) == ColumnMap(("q3_deg",), "rad", scale=3)
+    assert settings.tolerance_deg == {2: 1}
+    assert settings.objective.weights == {2: 5}
+    assert settings.objective.noise_deg == {3: 0.2}
+
+
+@pytest.mark.parametrize("key", ["tolerance_deg.2", "objective.weights.2", "log.joints.2.command.scale"])
+def test_a_wrong_override_of_a_joint_is_named_as_it_was_given(tmp_path: Path, key: str):
+    with pytest.raises(SettingsError, match=f"--set {key}: must "):
+        hydroid.load_settings(written(tmp_path, MAPPINGS), {key: 0})
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("tolerance_deg: {boom: 2}", "tolerance_deg: {2: 1, boom: 2}", "line 4: tolerance_deg: joint boom"),
+        ("weights: {boom: 2}", "weights: {boom: 2, 2: 3}", "line 7: objective.weights: joint 2"),
+        ("noise_deg: {3: 0.1}", "noise_deg: {3: 0.1, arm: 1}", "line 7: objective.noise_deg: joint arm"),
+        ("{joints: {boom", "{joints: {2: null, boom", "line 6: log.joints: joint boom"),
+        ("[boom]", "[boom, 2]", "line 3: outputs: joint 2"),
+        ("damping", "damping, joints: [boom, 2]", "line 5: parameters.D.joints: joint 2"),
+        ("damping", "damping, each: [boom, 2]", "line 5: parameters.D.each: joint 2"),
+        ("objective:", "design: {joints: [2, boom]}\nobjective:", "line 7: design.joints: joint boom"),
+    ],
+)
+def test_a_joint_that_occurs_twice_is_refused(tmp_path: Path, old: str, new: str, says: str):
+    assert old in MAPPINGS
+    with pytest.raises(SettingsError, match=f"{says} occurs twice"):
+        hydroid.load_settings(written(tmp_path, MAPPINGS.replace(old, new)))
 
 
 def test_a_joint_inherits_what_it_does_not_say() -> None:

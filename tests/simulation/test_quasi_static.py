@@ -17,7 +17,7 @@ from hydroid.hydraulics.valve import DENSITY
 from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.problem import SimulationSettings
 from hydroid.simulation import Simulation
-from hydroid.simulation.quasi_static import overshoot
+from hydroid.simulation.quasi_static import overshoot, rod_speed
 from hydroid.simulation.scenario import Scenario
 
 SHOULDER, ROLL = 1, 3
@@ -112,6 +112,65 @@ def test_a_load_does_not_slow_a_compensated_valve(simulated, arm, model, command
     free, loaded = (way(1.0, part) for part in (0.4, 0.8))
     assert loaded == pytest.approx(free, rel=2e-3)
     assert abs(way(0.0, 0.8) / way(0.0, 0.4) - 1) > 0.02
+
+
+def cylinder(**values):
+    """A cylinder's COEFFICIENTS for `rod_speed`, with 1000 and 750 mm² [SI]."""
+    a, b = (SimpleNamespace(area=area, return_=1.5, draw=1.0) for area in (1000e-6, 750e-6))
+    each = {"conductance": 0.7 * np.sqrt(2 / DENSITY), "tank_pressure": 5e5}
+    return SimpleNamespace(a=a, b=b, **each, **values)
+
+
+@pytest.mark.parametrize("opening", [4e-7, -4e-7])
+@pytest.mark.parametrize("drag", [0.0, 2e4])
+@pytest.mark.parametrize("limit", [np.inf, 1e-5, 2e-6])
+@pytest.mark.parametrize("compensation", [0.0, 0.6, 1.0])
+def test_speed_flow_and_pressures_are_continuous_in_the_load(opening, drag, limit, compensation):
+    """From a load beyond the supply to one that overruns what the pump gives."""
+    c, supply = cylinder(flow_limit=limit, compensation=compensation), 150e5
+    inner, outer = (c.a, c.b) if opening > 0 else (c.b, c.a)
+
+    def under(load):
+        """Speed, flow from the pump, pressures of the chamber that fills and of the other."""
+        w = SimpleNamespace(travel=opening, push=np.sign(opening) * load, thrust=200.0, drag=drag)
+        speed, flow, _ = rod_speed(c, w, supply)
+        leaving = c.tank_pressure + (speed * outer.area / (c.conductance * 4e-7 * 1.5)) ** 2
+        entering = (leaving * outer.area + load + 200.0 + drag * speed) / inner.area
+        return speed, flow, entering if speed > 0.0 else supply, leaving
+
+    loads = np.linspace(1.6e4, -2e4, 4001)
+    speed, flow, entering, leaving = np.array([under(load) for load in loads]).T
+    assert speed[0] == 0.0
+    assert np.all(np.diff(speed) >= 0.0)
+    assert entering.min() > -1.0  # Pa: it cavitates instead
+    assert entering.max() < supply + 1.0
+    assert flow.max() <= limit * (1 + 1e-12)
+    fed = entering > 1.0
+    np.testing.assert_allclose(flow[fed], inner.area * speed[fed], rtol=1e-9)
+    assert not fed[-1]
+    for i, values in enumerate((speed, flow, entering, leaving)):
+        steps = np.abs(np.diff(values))
+        k = int(steps.argmax())  # a jump would stay as large between nearer loads; a root falls to 3 %
+        near = [under(load)[i] for load in np.linspace(loads[k], loads[k + 1], 1001)]
+        assert np.abs(np.diff(near)).max() < 0.1 * steps[k] + 1e-9 * np.ptp(values)
+
+
+@pytest.mark.parametrize("mass", [0.3, 1.0, 2.0])
+@pytest.mark.parametrize("limit", [1e-6, 4e-6])
+def test_both_models_agree_where_a_load_overruns_a_limited_flow(simulated, arm, mass, limit):
+    values = {"flow_limit": limit, "mass": mass * arm.masses, "return_a": 2.0, "opening_b": 2e-7}
+    values |= {"bulk_modulus": 1.6e10, "leakage": 1e-14, "damping": 0.0}
+    (quasi, slow, joints), (full, fast, _) = (
+        simulated({SHOULDER: -50}, 2.0, model, **values) for model in ("quasi-static", "dynamic")
+    )
+    speeds = [np.diff(angle[:, 0])[50:150].mean() for angle in (quasi, full)]
+    assert speeds[0] < 0.0
+    assert speeds[0] == pytest.approx(speeds[1], rel=0.01)
+    assert slow.pressure[50:150].min() >= 0.0
+    np.testing.assert_allclose(slow.pressure[100:150], fast.pressure[100:150], rtol=0.02, atol=1e5)
+    taken = -slow.flow[100, 0, 1]
+    assert taken >= limit * (1 - 1e-9)  # the load draws more than the pump gives, or as much
+    assert joints.area_b[SHOULDER] > 0
 
 
 @pytest.mark.parametrize("draw", [1.0, 0.6])

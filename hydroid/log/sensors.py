@@ -1,0 +1,69 @@
+"""Faults of a sensor or a logger that the readings of one angle show: leaps, and steps that are too coarse.
+
+A spike, a drop-out to zero, a zero point that shifts, and seconds that were cut out and renumbered all
+make an
+angle leap within one sample, as no joint moves: faster than it ever does elsewhere, and in between samples
+in which it hardly moves.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from hydroid.arrays import Array, Index
+from hydroid.log.log import LogFinding
+from hydroid.log.repair import GAP, sample_period
+from hydroid.log.table import Recording
+from hydroid.units import way
+
+LEAST_LEAP = np.radians(1.0)
+"""of an angle within one sample [rad]; positions [m] take the same number, about 17 mm"""
+LEAST_SPEED = np.radians(100.0)
+"""of a leap [rad/s, m/s]"""
+ABOVE_USUAL, ABOVE_NEAR = 3.0, 5.0
+"""how many times larger a leap is than nearly all steps of the log, and than the steps around it"""
+NEARLY_ALL = 99.5  # per cent
+COARSE = np.radians(0.5)
+"""steps of a sensor [rad] that hide how a joint starts and stops"""
+FEW_STEPS = 3  # a joint must pass, before their size counts
+
+
+def check_sensors(recording: Recording) -> Iterator[LogFinding]:
+    """Yield where angles leap, and which have coarse steps."""
+    time = recording.time
+    for signal, values in zip(recording.signals, recording.values.T, strict=True):
+        if signal.kind != "angle":
+            continue
+        slides = signal.unit not in ("", "deg")
+        rows = leaps(time, values)
+        if len(rows):
+            size = abs(values[rows[0]] - values[rows[0] - 1])
+            by = way(np.rad2deg(size), slides=slides)
+            yield recording.finding("warning", "leap", rows, signal, signal.owner, by=by)
+        step = resolution(values)
+        if step >= COARSE and np.nanmax(values) - np.nanmin(values) > FEW_STEPS * step:
+            by = way(np.rad2deg(step), slides=slides)
+            yield recording.finding("note", "coarse", (), signal, signal.owner, by=by)
+
+
+def leaps(time: Array, angle: Array) -> Index:
+    """Return the rows after leaps of an angle [rad], (R,), but for gaps in the time [s], (R,)."""
+    period = sample_period(time)
+    steps = np.abs(np.diff(angle))
+    whole = np.diff(time) <= GAP * period
+    steps = np.where(whole & np.isfinite(steps), steps, 0.0)
+    if len(steps) < 10:
+        return np.flatnonzero(steps < 0)
+    around = np.pad(steps, 4, "edge")
+    # a leap and the one back may be up to three samples apart: the largest step nearby does not count
+    near = np.sort([around[4 + k : 4 + k + len(steps)] for k in (-4, -3, -2, 2, 3, 4)], axis=0)[-2]
+    usual = np.percentile(steps, NEARLY_ALL)
+    least = max(LEAST_LEAP, LEAST_SPEED * period, ABOVE_USUAL * usual)
+    return 1 + np.flatnonzero((steps > least) & (steps > ABOVE_NEAR * near))
+
+
+def resolution(angle: Array) -> float:
+    """Return the smallest difference between readings [rad]; 0 where all are alike."""
+    differences = np.diff(np.unique(angle[np.isfinite(angle)]))
+    differences = differences[differences > 1e-9]  # but for rounding
+    return float(differences.min(initial=np.inf)) if len(differences) else 0.0

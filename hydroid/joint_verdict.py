@@ -54,7 +54,7 @@ class Outcome(StrEnum):
 class Comparison(Settings):
     """A fit and a simple model, compared over the same starts or logs (`fitting.comparison`)."""
 
-    outcome: Outcome
+    outcome: Outcome = Field(strict=False)
     """whether the fit is better or worse, or the logs do not tell"""
     difference_deg2: float | None = None
     """the fit's mean squared error minus the simple model's [deg²]; null: none, or the fit diverged"""
@@ -72,7 +72,7 @@ class JointVerdict(Settings):
     name: str
     slides: bool = False
     """whether it slides: 1 deg then stands for 17.5 mm"""
-    verdict: Verdict
+    verdict: Verdict = Field(strict=False)  # files hold its value
     beside: str | None = None
     """the simple model that the fit predicts no better than, or cannot be told from"""
     fitted_deg: float | None = None

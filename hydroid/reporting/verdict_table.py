@@ -9,6 +9,7 @@ from hydroid.estimate import FitSummary
 from hydroid.files import Plain
 from hydroid.findings import Finding
 from hydroid.fitting.baselines import NAMES
+from hydroid.fitting.comparison import LEAST_BLOCKS
 from hydroid.fitting.validation import HORIZONS, Prediction
 from hydroid.fitting.verdict import JUDGED, THE_FIT, WORSE
 from hydroid.joint_verdict import Comparison, JointVerdict, Verdict
@@ -75,7 +76,8 @@ def _row(one: JointVerdict, *, tested: bool) -> dict[str, Cell]:
     if not one.unseen_logs:
         return row
     whole = {THE_FIT: one.unseen_deg} | one.baselines_deg
-    row[WHOLE] = _beside_best(whole, one.compared_whole, one.slides)
+    # one log, or a few, cannot tell: the numbers stand there alone
+    row[WHOLE] = _beside_best(whole, one.compared_whole, one.slides, least=LEAST_BLOCKS)
     for i, seconds in enumerate(HORIZONS):
         errors = {name: errors[i] for name, errors in one.horizons_deg.items()}
         compared = {name: comparisons[i] for name, comparisons in one.compared.items()}
@@ -84,11 +86,14 @@ def _row(one: JointVerdict, *, tested: bool) -> dict[str, Cell]:
 
 
 def _beside_best(
-    errors: Mapping[str, float | None], compared: Mapping[str, Comparison], slides: bool
+    errors: Mapping[str, float | None],
+    compared: Mapping[str, Comparison],
+    slides: bool,
+    least: int = 0,
 ) -> str | None:
     """Return the fit's error beside that of the best simple model, as "2.1 (2.3) cannot be told".
 
-    Nothing where the logs are too short for the prediction time.
+    Nothing where the logs are too short for the prediction time; no word of fewer than `least` blocks.
     """
     simple = {name: error for name, error in errors.items() if name in compared and error is not None}
     if not simple:
@@ -100,7 +105,8 @@ def _beside_best(
     if fit is None:
         return f"diverged ({two_digits(scale * simple[best])}{unit})"
     ours, theirs = told_apart(scale * fit, scale * simple[best])
-    return f"{ours}{unit} ({theirs}) {compared[best].outcome}"
+    word = f" {compared[best].outcome}" if compared[best].blocks >= least else ""
+    return f"{ours}{unit} ({theirs}){word}"
 
 
 def _shown(error: float | None, slides: bool) -> Cell:
@@ -253,6 +259,20 @@ def next_step(
         and (one.unseen_deg or 0.0) > WORSE * (one.expected_deg or np.inf)
     ]:
         kind, command = "machine changed", f"hydroid adapt UNSEEN.csv --fit {run}"
+    elif joints := _too_short(verdicts):
+        kind, command = "test longer", f"hydroid validate OTHER.csv --fit {run}"
     else:
         kind, command = "look for terms", f"hydroid suggest --fit {run}"
     return Finding(kind, "note", tuple(joints), {"command": command})
+
+
+def _too_short(verdicts: Sequence[JointVerdict]) -> list[str]:
+    """Return the joints whose unseen logs are too short to tell; none where any joint is known to fail."""
+    if any(one.verdict.fails for one in verdicts):
+        return []
+    untold = [one for one in verdicts if one.verdict is Verdict.UNTOLD]
+    return [
+        one.name
+        for one in untold
+        if min((at.blocks for at in one.compared.get(one.beside or "", ())), default=0) < LEAST_BLOCKS
+    ]

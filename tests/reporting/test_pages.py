@@ -155,7 +155,7 @@ def test_errors_of_a_joint_that_slides_are_in_millimetres():
         {
             "slides": True,
             "baselines_deg": {"standing still": 2.0},
-            "compared_whole": {"standing still": Comparison(outcome=Outcome.BETTER)},
+            "compared_whole": {"standing still": Comparison(outcome=Outcome.BETTER, blocks=4)},
             "horizons_deg": {"the fit": (1.0, None, 1.0, 1.0, 1.0)},
         }
     )
@@ -195,7 +195,7 @@ def test_the_verdict_shows_each_time_beside_the_best_simple_model_and_digits_tha
         "1 s": "0.52 (0.60) cannot be told",
         "5 s": "2.91 (2.88) cannot be told",
         "10 s": "diverged (5)",
-        "whole logs": "3.0 (2.0) cannot be told",
+        "whole logs": "3.0 (2.0)",  # two logs tell nothing
         "fitted": "1",
     }
     assert lead({"a": [one]}).startswith("boom: cannot be told from nine numbers, over 2 unseen logs")
@@ -209,6 +209,8 @@ def test_the_verdict_shows_each_time_beside_the_best_simple_model_and_digits_tha
         ({}, ("predicts", "not tested"), "validate OTHER.csv --fit 'a b'"),
         ({}, ("predicts", "predicts"), "simulate COMMANDS.csv --fit 'a b'"),
         ({}, ("predicts", "does not fit"), "suggest --fit 'a b'"),
+        ({}, ("predicts", "cannot be told"), "validate OTHER.csv --fit 'a b'"),
+        ({}, ("does not fit", "cannot be told"), "suggest --fit 'a b'"),
     ],
 )
 def test_what_to_do_next_follows_from_the_verdicts(about, words, command):

@@ -18,7 +18,9 @@ from hydroid.search.descent import Ending
 from hydroid.settings.arm import Arm
 from hydroid.words import listed, told_apart, two_digits
 
-_FITTED = "rms errors in deg on the fitted logs; no others are tested. Last three columns: simple models."
+_FITTED = (
+    "rms errors in deg on the fitted logs: no unseen log tests the fit. Last three columns: simple models."
+)
 _TESTED = (
     "rms errors in deg (unseen logs: {count}) of the change over 1, 5 and 10 s, and over whole logs. In "
     "brackets: the best simple model, than which the fit is better, worse, or from which it cannot be told."

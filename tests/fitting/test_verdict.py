@@ -5,9 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 from hydroid import load_settings
 from hydroid.estimate import FitSummary
+from hydroid.files import yaml_text
 from hydroid.fitting.baselines import NAMES
 from hydroid.fitting.validation import HORIZONS, Prediction, errors_ahead
 from hydroid.fitting.verdict import behind, judge, standing_out
@@ -125,6 +127,13 @@ def test_a_fit_that_is_better_at_one_time_ahead_is_not_called_no_better():
     assert outcomes[1.0] is Outcome.WORSE
     assert outcomes[5.0] is outcomes[10.0] is Outcome.BETTER
     assert one.verdict is Verdict.ROUGHLY
+
+
+def test_a_file_holds_a_verdict_with_every_comparison():
+    summary = FitSummary(stage="hyd", estimate={}, verdict=(verdict(2.5, 4.9, kind="other"),))
+    again = FitSummary.model_validate(yaml.safe_load(yaml_text(summary.plain())))
+    assert again.verdict == summary.verdict
+    assert again.verdict[0].verdict is Verdict.UNTOLD
 
 
 def test_logs_that_are_too_short_for_any_time_ahead_are_compared_whole():

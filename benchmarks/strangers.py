@@ -31,6 +31,7 @@ from worlds import NOISE_DEG, NOISE_M, WORLDS, write_log
 import hydroid
 from hydroid.arrays import Array
 from hydroid.fitting.baselines import NAMES as BASELINES
+from hydroid.joint_verdict import Verdict
 from hydroid.log import Log
 from hydroid.run.record import load_record
 
@@ -65,7 +66,7 @@ class Ending:
         self.inside = np.array([one.inside_percent for one in record.verdict], float)
         (prediction,) = record.validations.values()
         self.unseen: Log = prediction.log
-        self.blamed = [one.joint for one in record.verdict if one.verdict != "predicts"]
+        self.blamed = [one.joint for one in record.verdict if one.verdict is not Verdict.PREDICTS]
         self.kept, values = str(record.summary.final), record.summary.values
         early = [values.get(f"pilot_{v.name}", 0) > values.get(f"lag_{v.name}", 0) for v in record.verdict]
         self.terms = np.array(["pump" in self.kept, "oil" in self.kept or "dynamic" in self.kept, *early])

@@ -22,9 +22,11 @@ from hydroid.estimate import FitSummary
 from hydroid.files import write_atomic
 from hydroid.fitting.baselines import NAMES
 from hydroid.fitting.validation import HORIZONS, Prediction
-from hydroid.reporting.verdict_table import verdict_table
+from hydroid.fitting.verdict import JUDGED, THE_FIT
+from hydroid.joint_verdict import Outcome
+from hydroid.reporting.verdict_table import WHOLE, column_of, verdict_table
 from hydroid.run.record import Record, load_record
-from hydroid.words import number
+from hydroid.words import listed, number
 
 ROOT = Path(__file__).parents[1]
 FILE = ROOT / "docs" / "figures.yaml"
@@ -32,14 +34,8 @@ PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), ROOT / "exam
 HEAD = "# Written by `make figures` from the runs of `make demo` and `make excavator`; pages state them.\n"
 MARKED = re.compile(r"(<!--=([\w. ]+)-->)(.*?)(<!--/-->)", re.DOTALL)
 JOINTS = (("rig", "shoulder"), *(("excavator", joint) for joint in ("boom", "arm", "bucket", "swing")))
-ROWS = {
-    "standing still": "standing still",
-    "a table of mean speeds, with a delay": "speed tables",
-    "nine numbers: dead band, exponent, speed and lag of each direction, and a delay": "nine numbers",
-    "hydroid, fitted logs": "fitted_deg",
-    "**hydroid, unseen logs**": "unseen_deg",
-}
-"""of the README's table: their names, and their keys"""
+TIMES = (*map(column_of, JUDGED), WHOLE)
+"""columns of the table of verdicts that the README's table has as rows"""
 
 Figures = dict[str, Any]
 
@@ -67,9 +63,11 @@ def _joints(record: Record) -> Figures:
     """Return what the verdict says of each joint, and the mean absolute errors [deg]."""
     joints, fitted, unseen = Figures(), record.result.fitted, [*record.validations.values()]
     shown = verdict_table({"": record.verdict})
-    for one, row in zip(record.verdict, shown.rows, strict=True):
+    for one, cells in zip(record.verdict, shown.rows, strict=True):
+        row = dict(zip(shown.header, cells, strict=True))
         joints[one.name] = {
-            "verdict": row[shown.header.index("verdict")],
+            "verdict": row["verdict"],
+            "beside": {name: row[name] for name in TIMES},
             "fitted_deg": _rounded(one.fitted_deg),
             "unseen_deg": _rounded(one.unseen_deg),
             "fitted_mae_deg": _mean_absolute(fitted, one.joint),
@@ -77,6 +75,10 @@ def _joints(record: Record) -> Figures:
             "inside_percent": _rounded(one.inside_percent),
             **{name: _rounded(error) for name, error in one.baselines_deg.items()},
             "ahead": {name: [*map(_rounded, errors)] for name, errors in one.horizons_deg.items()},
+            "compared": {
+                name: [comparison.outcome.value for comparison in comparisons]
+                for name, comparisons in one.compared.items()
+            },
         }
     return joints
 
@@ -107,40 +109,49 @@ def _rounded(value: float | None) -> float | None:
 def at_a_glance(figures: Figures) -> str:
     """Return the README's table."""
     lines = [["", "rig: shoulder", "excavator: boom", "arm", "bucket", "swing"], ["---"] * 6]
-    for name, key in ROWS.items():
-        errors = [_error(figures[machine][joint][key]) for machine, joint in JOINTS]
-        lines.append([name, *(f"**{error}**" if name.startswith("**") else error for error in errors)])
-    lines.append(["verdict", *(figures[machine][joint]["verdict"] for machine, joint in JOINTS)])
+    joints = [figures[machine][joint] for machine, joint in JOINTS]
+    lines.append(["verdict", *(one["verdict"] for one in joints)])
+    for name in TIMES:
+        of = name if name == WHOLE else f"after {name}"
+        lines.append([of, *(one["beside"][name] for one in joints)])
+    lines.append(["whole fitted logs", *(_error(one["fitted_deg"]) for one in joints)])
     return _table(lines)
 
 
 def ahead(figures: Figures) -> str:
     """Return the table of errors by prediction time."""
-    lines = [["after [s]", "", *(f"{seconds:g}" for seconds in HORIZONS)], ["---"] * (2 + len(HORIZONS))]
+    head = ["after [s]", "", *(f"{seconds:g}" for seconds in HORIZONS), WHOLE]
+    lines = [head, ["---"] * len(head)]
     for machine, joint in JOINTS:
-        by_model = figures[machine][joint]["ahead"]
-        simple = zip(*(by_model[name] for name in NAMES[1:]), strict=True)
-        lines.append([f"{machine}, {joint}", "hydroid", *map(_error, by_model["the fit"])])
-        pairs = ["; ".join(map(_error, pair)) for pair in simple]
+        one = figures[machine][joint]
+        by_model = one["ahead"]
+        own = [*by_model[THE_FIT], one["unseen_deg"]]
+        lines.append([f"{machine}, {joint}", "hydroid", *map(_error, own)])
+        simple = ([*by_model[name], one[name]] for name in NAMES[1:])
+        pairs = ["; ".join(map(_error, pair)) for pair in zip(*simple, strict=True)]
         lines.append(["", "table of speeds; nine numbers", *pairs])
     return _table(lines)
 
 
 def not_better(figures: Figures) -> str:
-    """Return the sentence on where a simple model errs less."""
-    found = list[str]()
+    """Return the sentence on where a simple model is better, or may be."""
+    times = [f"{seconds:g}" for seconds in JUDGED]
+    exceptions = list[str]()
     for machine, joint in JOINTS:
-        by_model = figures[machine][joint]["ahead"]
-        worse = [
-            f"{seconds:g}"
-            for seconds, own, *simple in zip(
-                HORIZONS, *map(by_model.get, ("the fit", *NAMES[1:])), strict=True
-            )
-            if own is None or own >= min(simple)
+        compared = figures[machine][joint]["compared"]
+        at = {outcome: list[str]() for outcome in Outcome}
+        for seconds in JUDGED:
+            outcomes = {compared[name][HORIZONS.index(seconds)] for name in NAMES[1:]}
+            # of several the one that says least for the fit
+            least = next(one for one in (Outcome.WORSE, Outcome.UNTOLD, Outcome.BETTER) if one in outcomes)
+            at[least].append(f"{seconds:g}")
+        exceptions += [
+            f"the {joint} after {listed(at[outcome])} s ({outcome})"
+            for outcome in (Outcome.UNTOLD, Outcome.WORSE)
+            if at[outcome]
         ]
-        found += [f"the {joint} after {' and '.join(worse)} s"] if worse else []
-    but = f", but for {', '.join(found)}" if found else ""
-    return f"Every joint is predicted better than by both simple models{but}."
+    but = f", but for {listed(exceptions)}" if exceptions else ""
+    return f"After {listed(times)} s every joint is predicted better than by both simple models{but}."
 
 
 def quantities(figures: Figures) -> str:

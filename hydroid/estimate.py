@@ -11,6 +11,7 @@ from hydroid.arrays import Array
 from hydroid.errors import RunError, SettingsError
 from hydroid.files import Plain, is_file, write_atomic, yaml_text
 from hydroid.findings import Finding
+from hydroid.joint_verdict import JointVerdict
 from hydroid.settings.document import read_yaml
 from hydroid.settings.load import JointNumber, NotNegative, Positive, Settings, validate
 
@@ -114,36 +115,6 @@ class CurveEstimate(Settings):
     value: tuple[float, ...]
     interval: tuple[Interval, ...]
     """95 % interval at each point by itself"""
-
-
-class JointVerdict(Settings):
-    """What a fit is worth for one joint; rms errors over the logs that drive it [deg], null if diverged."""
-
-    joint: int
-    """numbered from 1"""
-    name: str
-    slides: bool = False
-    """whether it slides: 1 deg then stands for 17.5 mm"""
-    verdict: str
-    """predicts, predicts roughly, predicts little, predicts no better than BASELINE, predicts worse than it
-    fits, does not fit, or not tested (`fitting.verdict` has the rules)"""
-    fitted_deg: float | None = None
-    """on the logs that it was fitted to"""
-    unseen_deg: float | None = None
-    """on logs that it was not fitted to; null: there are none"""
-    unseen_logs: int = 0
-    """how many of them drive the joint; if their error is null, its simulation diverged"""
-    tolerance_deg: float
-    """error up to which it predicts"""
-    inside_percent: float | None = None
-    """part of the samples of the unseen logs inside the 95 % bands; null: there are none"""
-    expected_deg: float | None = None
-    """what a fit of several logs expects of the unseen ones; null: of one log, or there are none"""
-    baselines_deg: dict[str, float] = {}
-    """of the baselines on the unseen logs, or on the fitted logs where there are no others"""
-    horizons_deg: dict[str, tuple[float | None, ...]] = {}
-    """rms error of the angle's change over 0.5, 1, 2, 5 and 10 s from starts all along the unseen logs, of
-    the fit and of the baselines; empty where there are none"""
 
 
 def _finding(value: Any) -> Any:

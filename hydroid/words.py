@@ -52,6 +52,17 @@ def two_digits(value: float) -> str:
     return f"{value:.0f}" if abs(value) >= 100 else f"{value:.2g}"
 
 
+def told_apart(first: float, second: float) -> tuple[str, str]:
+    """Write two numbers beside each other: two significant digits, three where two would tie."""
+    two = _significant(first, 2), _significant(second, 2)
+    return two if two[0] != two[1] else (_significant(first, 3), _significant(second, 3))
+
+
+def _significant(value: float, digits: int) -> str:
+    """Write significant digits, zeros among them, or all before the point."""
+    return f"{value:.0f}" if abs(value) >= 10**digits else f"{value:#.{digits}g}".rstrip(".")
+
+
 def plain(value: float) -> str:
     """Write at most six significant digits, without trailing zeros."""
     if not math.isfinite(value):

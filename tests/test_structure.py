@@ -13,7 +13,7 @@ imports = runpy.run_path(str(ROOT.parent / "benchmarks" / "structure.py"))["impo
 LAYERS = [
     {"arrays", "errors"},
     {"files", "findings", "mjcf", "parameters", "progress", "quantity_table", "robot_xml"}
-    | {"settings", "units", "words"},
+    | {"joint_verdict", "settings", "units", "words"},
     {"estimate"},
     {"identified_model"},
     {"log", "arm", "hydraulics"},

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from hydroid.findings import WORDS, Finding
-from hydroid.words import listed, printable
+from hydroid.words import listed, printable, told_apart
 
 ROOT = Path(__file__).parents[1] / "hydroid"
 
@@ -45,3 +45,18 @@ def test_a_long_list_ends_with_how_many_more():
     assert listed(list("abcdefg"), 4) == "a, b, c, d and 3 more"
     assert listed(list("abcde"), 4) == "a, b, c, d and e"
     assert listed([]) == ""
+
+
+@pytest.mark.parametrize(
+    ("pair", "shown"),
+    [
+        ((2.91, 3.08), ("2.9", "3.1")),
+        ((2.91, 2.88), ("2.91", "2.88")),
+        ((1.0, 2.0), ("1.0", "2.0")),
+        ((0.0791, 0.0794), ("0.0791", "0.0794")),
+        ((12.3, 140.0), ("12", "140")),
+        ((123.4, 123.1), ("123", "123")),
+    ],
+)
+def test_numbers_side_by_side_have_two_digits_and_three_where_two_would_tie(pair, shown):
+    assert told_apart(*pair) == shown

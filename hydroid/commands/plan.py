@@ -85,9 +85,7 @@ def suggest(
     with Progress() as progress:
         content, findings = advice(problem, uncertainty(problem, model.theta), run, progress)
     verdicts = load_record(finished).verdict if (finished := run_of(model)) else ()
-    if bad := tuple(
-        one.name for one in verdicts if one.unseen_logs and not one.verdict.endswith(("predicts", "roughly"))
-    ):
+    if bad := tuple(one.name for one in verdicts if one.unseen_logs and one.verdict.fails):
         findings = (Finding("fails unseen", "warning", bad), *findings)
     note = (
         f"Of {content['tested']} quantities that the fit holds. promised: rise of the log-likelihood by "

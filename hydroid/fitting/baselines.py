@@ -3,6 +3,10 @@
 Three models of one joint, fitted to logs in about a second: it does not move; a table of mean speeds with a
 delay; nine numbers: dead band, exponent, speed and lag of each direction, and one delay. A model of the arm
 must predict better than they do, and can start its own fit from them.
+
+They are fitted to angles, not to innovations as a model of the arm is (`posterior.error_model`). So simple a
+model errs far more than any noise, the error model takes all of that for drift, and what is left is a fit of
+speeds from sample to sample: it predicts 1 to 10 s worse (`make bench B=simple_models`).
 """
 
 from collections.abc import Iterator, Sequence
@@ -21,6 +25,10 @@ NAMES = ("standing still", "speed tables", "nine numbers")
 """of the baselines, the simplest first"""
 LONGEST_DELAY = 1.0
 """between a command and its motion [s]"""
+LOWER = (0.0, 0.0, 0.3, 0.3, -np.inf, -np.inf, 0.0, 0.0, 0.0)
+UPPER = (90.0, 90.0, 5.0, 5.0, np.inf, np.inf, 1.5, 1.5, LONGEST_DELAY)
+SCALE = (10.0, 10.0, 0.5, 0.5, 0.2, 0.2, 0.1, 0.1, 0.1)
+"""bounds and scales of nine numbers: those of `Baseline.numbers`, row by row, and the delay"""
 
 
 @record
@@ -99,14 +107,11 @@ def fit_baselines(logs: Sequence[Log], joint: int, limits: tuple[float, float]) 
     tables = (_mean_speeds(measured, still, delay) for delay in delays)
     table = min(tables, key=lambda model: np.mean(model.errors(measured) ** 2))
     # of the fits that start at the table of speeds with different exponents the best
-    lower = [0, 0, 0.3, 0.3, -np.inf, -np.inf, 0, 0, 0]
-    upper = [90, 90, 5, 5, np.inf, np.inf, 1.5, 1.5, LONGEST_DELAY]
-    scale = [10, 10, 0.5, 0.5, 0.2, 0.2, 0.1, 0.1, 0.1]
 
     def made(x: Array) -> Baseline:
         return replace(table, table=None, delay=float(x[8]), numbers=x[:8].reshape(4, 2))
 
-    fit = partial(least_squares, lambda x: made(x).errors(measured), bounds=(lower, upper), x_scale=scale)
+    fit = partial(least_squares, lambda x: made(x).errors(measured), bounds=(LOWER, UPPER), x_scale=SCALE)
     best = min((fit(start, max_nfev=10) for start in _starts(table)), key=lambda ended: ended.cost)
     numbers = made(fit(best.x, max_nfev=40).x)
     return dict(zip(NAMES, (still, table, numbers), strict=True))

@@ -5,23 +5,32 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from hydroid.estimate import FitSummary, JointVerdict
+from hydroid.estimate import FitSummary
 from hydroid.files import Plain
 from hydroid.findings import Finding
 from hydroid.fitting.baselines import NAMES
+from hydroid.fitting.comparison import LEAST_BLOCKS
 from hydroid.fitting.validation import HORIZONS, Prediction
-from hydroid.fitting.verdict import WORSE
-from hydroid.reporting.page import Cell, Given, Section, Table, short_name, shown
+from hydroid.fitting.verdict import JUDGED, THE_FIT, WORSE
+from hydroid.joint_verdict import Comparison, JointVerdict, Verdict
+from hydroid.reporting.page import Cell, Given, Section, Table, short_name
 from hydroid.search.descent import Ending
 from hydroid.settings.arm import Arm
-from hydroid.words import listed, two_digits
+from hydroid.words import listed, told_apart, two_digits
 
-_SIGNS = {"predicts": "✓", "predicts roughly": "!", "not tested": "?"}  # of verdicts; all others are a ✗
-_NOTE = "rms errors in deg (unseen logs: {count}). Last three columns: simple models on the {logs} logs."
+_FITTED = (
+    "rms errors in deg on the fitted logs: no unseen log tests the fit. Last three columns: simple models."
+)
+_TESTED = (
+    "rms errors in deg (unseen logs: {count}) of the change over 1, 5 and 10 s, and over whole logs. In "
+    "brackets: the best simple model, than which the fit is better, worse, or from which it cannot be told."
+)
 _RIVALS = (
     "Beside the fit stand simple models: no motion, mean speeds by command, and nine numbers (dead band, "
     "exponent, speed, lag)."
 )
+WHOLE = "whole logs"
+"""name of a column"""
 
 _LEFT_OUT = "By joint: the rms error [deg] on parts of the logs, each predicted by a fit without it."
 
@@ -29,21 +38,77 @@ Verdicts = Mapping[str, Sequence[JointVerdict]]  # by fit
 
 
 def verdict_table(fits: Verdicts) -> Table:
-    """Return the verdicts on each joint of each fit."""
-    columns = {name: name for name in ("fit", "joint", "verdict", "fitted", "unseen", *NAMES)}
-    rows: list[dict[str, Cell]] = []
-    for fit, verdicts in fits.items():
-        for one in verdicts:
-            errors = {"fitted": one.fitted_deg, "unseen": one.unseen_deg} | one.baselines_deg
-            row = {name: _shown(error, one.slides) for name, error in errors.items()}
-            row["unseen"] = row["unseen"] or ("diverged" if one.unseen_logs else np.nan)
-            verdict = f"{_SIGNS.get(one.verdict, '✗')} {one.verdict}"
-            rows.append(row | {"fit": short_name(fit), "joint": one.name, "verdict": verdict})
-    if len(fits) == 1:
-        del columns["fit"]
+    """Return the verdicts on each joint of each fit.
+
+    Where unseen logs test a joint, its errors stand beside those of the best simple model there.
+    """
     count = max(one.unseen_logs for verdicts in fits.values() for one in verdicts)
-    note = _NOTE.format(count=count, logs="unseen" if count else "fitted")
-    return Table.of("", columns, rows, note, NAMES[:2])
+    if count:
+        names = ("joint", "verdict", *map(column_of, JUDGED), WHOLE, "fitted")
+        optional = ("fitted", column_of(JUDGED[1]), WHOLE)
+        note = _TESTED.format(count=count)
+    else:
+        names = ("joint", "verdict", "fitted", *NAMES)
+        optional = NAMES[:2]
+        note = _FITTED
+    if len(fits) > 1:
+        names = ("fit", *names)
+    rows = [
+        _row(one, tested=bool(count)) | {"fit": short_name(fit)}
+        for fit, verdicts in fits.items()
+        for one in verdicts
+    ]
+    return Table.of("", {name: name for name in names}, rows, note, optional)
+
+
+def column_of(seconds: float) -> str:
+    """Return the name of the column of a prediction time."""
+    return f"{seconds:g} s"
+
+
+def _row(one: JointVerdict, *, tested: bool) -> dict[str, Cell]:
+    """Return a row of the table of verdicts by columns, where any joint is `tested` or none."""
+    row: dict[str, Cell] = {
+        "joint": one.name,
+        "verdict": f"{one.verdict.sign} {one.text}",
+        "fitted": _shown(one.fitted_deg, one.slides),
+    }
+    if not tested:
+        return row | {name: _shown(error, one.slides) for name, error in one.baselines_deg.items()}
+    if not one.unseen_logs:
+        return row
+    whole = {THE_FIT: one.unseen_deg} | one.baselines_deg
+    # one log, or a few, cannot tell: the numbers stand there alone
+    row[WHOLE] = _beside_best(whole, one.compared_whole, one.slides, least=LEAST_BLOCKS)
+    for i, seconds in enumerate(HORIZONS):
+        errors = {name: errors[i] for name, errors in one.horizons_deg.items()}
+        compared = {name: comparisons[i] for name, comparisons in one.compared.items()}
+        row[column_of(seconds)] = _beside_best(errors, compared, one.slides) if errors else None
+    return row
+
+
+def _beside_best(
+    errors: Mapping[str, float | None],
+    compared: Mapping[str, Comparison],
+    slides: bool,
+    least: int = 0,
+) -> str | None:
+    """Return the fit's error beside that of the best simple model, as "2.1 (2.3) cannot be told".
+
+    Nothing where the logs are too short for the prediction time; no word of fewer than `least` blocks.
+    """
+    simple = {name: error for name, error in errors.items() if name in compared and error is not None}
+    if not simple:
+        return None
+    best = min(simple, key=simple.__getitem__)
+    fit, scale, unit = errors[THE_FIT], 1.0, ""
+    if slides:
+        scale, unit = 1e3 * np.radians(1.0), " mm"
+    if fit is None:
+        return f"diverged ({two_digits(scale * simple[best])}{unit})"
+    ours, theirs = told_apart(scale * fit, scale * simple[best])
+    word = f" {compared[best].outcome}" if compared[best].blocks >= least else ""
+    return f"{ours}{unit} ({theirs}){word}"
 
 
 def _shown(error: float | None, slides: bool) -> Cell:
@@ -76,17 +141,22 @@ def verdict_sections(fits: Verdicts, *steps: Finding) -> tuple[Section, ...]:
 
 def horizon_section(fits: Verdicts) -> Section | None:
     """Return the rms error of each angle's change over some times, of fits and baselines, if known."""
-    rows = [
-        {"joint": one.name, "of": short_name(fit) if name == "the fit" and len(fits) > 1 else name}
-        | {str(ahead): _shown(e, one.slides) for ahead, e in zip(HORIZONS, errors, strict=True)}
-        for fit, verdicts in fits.items()
-        for one in verdicts
-        for name, errors in one.horizons_deg.items()
-    ]
-    columns = {"joint": "joint", "of": "of"} | {str(seconds): f"{seconds:g} s" for seconds in HORIZONS}
+    rows = list[dict[str, Cell]]()
+    for fit, verdicts in fits.items():
+        for one in verdicts:
+            whole = {THE_FIT: one.unseen_deg} | one.baselines_deg
+            for name, errors in one.horizons_deg.items():
+                of = short_name(fit) if name == THE_FIT and len(fits) > 1 else name
+                row: dict[str, Cell] = {"joint": one.name, "of": of}
+                for seconds, error in zip(HORIZONS, errors, strict=True):
+                    row[column_of(seconds)] = _shown(error, one.slides)
+                rows.append(row | {WHOLE: _shown(whole[name], one.slides)})
+    names = ("joint", "of", *map(column_of, HORIZONS), WHOLE)
+    columns = {name: name for name in names}
     note = (
         "rms error [deg] of how far the angle turns in this time, from starts every 2 s of the unseen logs. "
-        "Each is simulated from 2 s before, at the measured angles."
+        "Each is simulated from 2 s before, at the measured angles. Last column: of the angle, over whole "
+        "logs."
     )
     table = Table.of("Error by prediction time", columns, rows, note)
     return Section(table.title, tables={"horizons": table}, folded=True) if rows else None
@@ -113,7 +183,7 @@ def _error(one: JointVerdict) -> float:
 
 def _size(one: JointVerdict) -> float:
     """Return the error in parts of the tolerance; 0 of a joint that no log drives, which has none."""
-    driven = one.unseen_logs or one.fitted_deg is not None or one.verdict != "not tested"
+    driven = one.unseen_logs or one.fitted_deg is not None or one.verdict is not Verdict.UNTESTED
     return _error(one) / one.tolerance_deg if driven else 0.0
 
 
@@ -134,7 +204,7 @@ def lead(fits: Verdicts) -> str:
     of = f"{short_name(name)} is best. " if len(fits) > 1 else ""
     by_word: dict[str, list[str]] = {}
     for one in verdicts:
-        by_word.setdefault(one.verdict, []).append(one.name)
+        by_word.setdefault(one.text, []).append(one.name)
     said = "; ".join(f"{listed(names)}: {word}" for word, names in by_word.items())
     count = max(one.unseen_logs for one in verdicts)
     over = f", over {count} unseen log{'s' if count > 1 else ''}" if count else ""
@@ -159,10 +229,14 @@ def worst(verdicts: Sequence[JointVerdict]) -> str:
     one = max(verdicts, key=_size)
     if not np.isfinite(_error(one)):
         return f"Worst: {one.name}, whose simulation diverges."
-    errors = _error(one), one.tolerance_deg, min(one.baselines_deg.values(), default=np.nan)
-    error, good, simple = (f"{shown(_shown(e, one.slides))}{'' if one.slides else ' deg'}" for e in errors)
-    bar = f"good is up to {good} (by default 2 % of its travel)"
-    return f"Worst: {one.name}, {error}; {bar}, and simple models err by {simple} or more."
+    scale, unit = (1e3 * np.radians(1.0), "mm") if one.slides else (1.0, "deg")
+    good = f"{two_digits(scale * one.tolerance_deg)} {unit} (by default 2 % of its travel)"
+    # a joint without simple models has no logs either, and nothing beside it
+    error, least = told_apart(scale * _error(one), scale * min(one.baselines_deg.values(), default=0.0))
+    return (
+        f"Worst: {one.name}, {error} {unit}; good is up to {good}, and simple models err by {least} {unit} "
+        "or more."
+    )
 
 
 def next_step(
@@ -170,7 +244,7 @@ def next_step(
 ) -> Finding:
     """Return what to do after a fit in a run folder, which made `fitted` of its logs, with the command."""
     run, files = shlex.quote(folder), shlex.join(one.log.source for one in fitted)
-    joints = [one.name for one in verdicts if one.verdict == "not tested"]
+    joints = [one.name for one in verdicts if one.verdict is Verdict.UNTESTED]
     if summary.ending == Ending.TIME.value:
         command = f"hydroid fit-{summary.stage} {files} --config {run}/config.yaml --out {run} --resume"
         kind = "go on"
@@ -178,14 +252,29 @@ def next_step(
         kind, command = "fit the hydraulics", f"hydroid fit-hyd {files} --mech {run}"
     elif joints:
         kind, command = "predict unseen", f"hydroid validate OTHER.csv --fit {run}"
-    elif all(one.verdict == "predicts" for one in verdicts):
+    elif all(one.verdict is Verdict.PREDICTS for one in verdicts):
         kind, command = "use the machine", f"hydroid simulate COMMANDS.csv --fit {run}"
     elif joints := [
         one.name
         for one in verdicts
-        if one.verdict != "predicts" and (one.unseen_deg or 0.0) > WORSE * (one.expected_deg or np.inf)
+        if one.verdict is not Verdict.PREDICTS
+        and (one.unseen_deg or 0.0) > WORSE * (one.expected_deg or np.inf)
     ]:
         kind, command = "machine changed", f"hydroid adapt UNSEEN.csv --fit {run}"
+    elif joints := _too_short(verdicts):
+        kind, command = "test longer", f"hydroid validate OTHER.csv --fit {run}"
     else:
         kind, command = "look for terms", f"hydroid suggest --fit {run}"
     return Finding(kind, "note", tuple(joints), {"command": command})
+
+
+def _too_short(verdicts: Sequence[JointVerdict]) -> list[str]:
+    """Return the joints whose unseen logs are too short to tell; none where any joint is known to fail."""
+    if any(one.verdict.fails for one in verdicts):
+        return []
+    untold = [one for one in verdicts if one.verdict is Verdict.UNTOLD]
+    return [
+        one.name
+        for one in untold
+        if min((at.blocks for at in one.compared.get(one.beside or "", ())), default=0) < LEAST_BLOCKS
+    ]

@@ -22,12 +22,13 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from hydroid.arrays import Array, record
 from hydroid.errors import HydroidError, RunError
-from hydroid.estimate import NAME, FitSummary, JointVerdict
+from hydroid.estimate import NAME, FitSummary
 from hydroid.files import write_atomic
 from hydroid.fitting.fit import Fit
 from hydroid.fitting.validation import Prediction
 from hydroid.fitting.verdict import Baselines, judge
 from hydroid.identified_model import IdentifiedModel, read_identified
+from hydroid.joint_verdict import JointVerdict
 from hydroid.log import Log
 from hydroid.progress import LOGGER
 from hydroid.run.archive import pack, unpack

@@ -9,10 +9,10 @@ from two_joints import PARAMETERS, PERIOD, TRUTH, drive, two_joints
 import hydroid
 from hydroid.advice.adaptation import adapted, load_findings, steps
 from hydroid.errors import SettingsError
-from hydroid.estimate import JointVerdict
 from hydroid.fitting.baselines import NAMES
 from hydroid.fitting.verdict import behind
 from hydroid.identified_model import identified
+from hydroid.joint_verdict import JointVerdict, Verdict
 from hydroid.progress import no_progress
 
 SLOWER = TRUTH | {"flow": 90.0}
@@ -67,7 +67,7 @@ def test_a_load_is_said_to_be_a_payload_and_one_that_is_stated_moves_no_mass(tmp
 
 def test_an_adaptation_names_no_seed_which_it_does_not_have(tmp_path):
     settings = two_joints(tmp_path)
-    joint = JointVerdict(joint=1, name="lift", verdict="", fitted_deg=2, tolerance_deg=1)
+    joint = JointVerdict(joint=1, name="lift", verdict=Verdict.MISFIT, fitted_deg=2, tolerance_deg=1)
     bad = [joint.changed({"baselines_deg": {NAMES[-1]: 1.0}})]
     alone = adapted(identified(settings, TRUTH, "a fit"), ["flow"])
     assert (settings.seeded, alone.seeded) == (True, False)

@@ -144,7 +144,7 @@ def test_values_that_diverge_are_judged(short: Path, hydroid_cli: Run):
     passive = "--set=simulation.other_joints=passive"
     done = hydroid_cli("validate", short, "--fit=values.yaml", passive, "--json")
     (judged,) = json.loads(done.out)["verdict"]
-    assert judged["verdict"] == "predicts no better than standing still"
+    assert (judged["verdict"], judged["beside"]) == ("predicts no better", "standing still")
 
 
 def test_python_does_what_the_terminal_does_and_shows_it(short: Path, hydroid_cli: Run):

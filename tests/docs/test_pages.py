@@ -138,14 +138,19 @@ def test_figures_are_rounded_as_they_are_printed():
     assert re.sub(r"<!--.*?-->", "", shown) == "0.18 85 1.50 diverged"
 
 
-def test_the_sentence_names_where_a_simple_model_errs_less():
-    good = {"the fit": [1.0] * 5, "speed tables": [2.0] * 5, "nine numbers": [3.0] * 5}
-    bad = good | {"the fit": [2.5, 1.0, None, 1.0, 1.0]}
-    excavator = {joint: {"ahead": good} for joint in ("boom", "arm", "swing")} | {"bucket": {"ahead": bad}}
-    figures = {"rig": {"shoulder": {"ahead": good}}, "excavator": excavator}
+def test_the_sentence_names_where_a_simple_model_is_better_or_may_be():
+    good = {"speed tables": ["better"] * 5, "nine numbers": ["better"] * 5}
+    bad = good | {"nine numbers": ["worse", "worse", "worse", "cannot be told", "worse"]}
+    excavator = {joint: {"compared": good} for joint in ("boom", "arm", "swing")} | {
+        "bucket": {"compared": bad}
+    }
+    figures = {"rig": {"shoulder": {"compared": good}}, "excavator": excavator}
     sentence = FIGURES["PARTS"]["not better"]
-    assert sentence(figures).endswith("by both simple models, but for the bucket after 0.5 and 2 s.")
-    excavator["bucket"]["ahead"] = good
+    assert sentence(figures).endswith(
+        "by both simple models, but for the bucket after 5 s (cannot be told) and "
+        "the bucket after 1 and 10 s (worse)."
+    )
+    excavator["bucket"]["compared"] = good
     assert sentence(figures).endswith("than by both simple models.")
 
 

@@ -15,14 +15,16 @@ import pytest
 from report_fits import make_fit, make_prediction, make_problem, make_record
 
 from hydroid.errors import RunError
-from hydroid.estimate import FitSummary, JointVerdict
+from hydroid.estimate import FitSummary
 from hydroid.fitting.search import HISTORY
 from hydroid.fitting.verdict import judge
+from hydroid.joint_verdict import Comparison, JointVerdict, Outcome, Verdict
 from hydroid.reporting.page import Page, Section, Table
 from hydroid.reporting.page_file import html, write_figures, write_page, write_tables
 from hydroid.reporting.predictions import fit_page, validation_page
 from hydroid.reporting.verdict_table import (
     horizon_section,
+    lead,
     left_out_table,
     next_step,
     ordered,
@@ -149,10 +151,54 @@ def test_the_verdict_comes_first_and_is_not_tested_until_a_log_is_unseen():
 def test_errors_of_a_joint_that_slides_are_in_millimetres():
     problem = make_problem()
     (one,) = judge(problem.settings, [], {}, [make_prediction(problem.logs[0], error=0.02)])
-    slid = one.model_copy(update={"slides": True, "horizons_deg": {"the fit": (1.0, None, 1.0, 1.0, 1.0)}})
-    assert "20 mm" in verdict_table({"a": [slid]}).rows[0]
+    slid = one.changed(
+        {
+            "slides": True,
+            "baselines_deg": {"standing still": 2.0},
+            "compared_whole": {"standing still": Comparison(outcome=Outcome.BETTER, blocks=4)},
+            "horizons_deg": {"the fit": (1.0, None, 1.0, 1.0, 1.0)},
+        }
+    )
+    assert "20 mm (35) better" in verdict_table({"a": [slid]}).rows[0]
     section = horizon_section({"a": [slid]})
     assert section.tables["horizons"].rows[0][2:4] == ("17 mm", None)
+
+
+def test_the_verdict_shows_each_time_beside_the_best_simple_model_and_digits_that_tell():
+    outcomes = {
+        "speed tables": (Outcome.BETTER, Outcome.BETTER, Outcome.BETTER, Outcome.BETTER, Outcome.WORSE),
+        "nine numbers": (Outcome.UNTOLD, Outcome.UNTOLD, Outcome.UNTOLD, Outcome.UNTOLD, Outcome.BETTER),
+    }
+    one = JointVerdict(
+        joint=1,
+        name="boom",
+        verdict=Verdict.UNTOLD,
+        beside="nine numbers",
+        fitted_deg=1.0,
+        unseen_deg=3.0,
+        unseen_logs=2,
+        tolerance_deg=1.0,
+        baselines_deg={"speed tables": 2.0, "nine numbers": 4.0},
+        horizons_deg={
+            "the fit": (0.1, 0.52, 0.7, 2.91, None),
+            "speed tables": (0.2, 0.9, 1.0, 4.0, 5.0),
+            "nine numbers": (0.2, 0.6, 1.0, 2.88, 6.0),
+        },
+        compared={name: tuple(Comparison(outcome=o) for o in some) for name, some in outcomes.items()},
+        compared_whole={name: Comparison(outcome=Outcome.UNTOLD) for name in outcomes},
+    )
+    table = verdict_table({"a": [one]})
+    row = dict(zip(table.header, table.shown[0], strict=True))
+    assert row == {
+        "joint": "boom",
+        "verdict": "? cannot be told from nine numbers",
+        "1 s": "0.52 (0.60) cannot be told",
+        "5 s": "2.91 (2.88) cannot be told",
+        "10 s": "diverged (5)",
+        "whole logs": "3.0 (2.0)",  # two logs tell nothing
+        "fitted": "1",
+    }
+    assert lead({"a": [one]}).startswith("boom: cannot be told from nine numbers, over 2 unseen logs")
 
 
 @pytest.mark.parametrize(
@@ -163,10 +209,12 @@ def test_errors_of_a_joint_that_slides_are_in_millimetres():
         ({}, ("predicts", "not tested"), "validate OTHER.csv --fit 'a b'"),
         ({}, ("predicts", "predicts"), "simulate COMMANDS.csv --fit 'a b'"),
         ({}, ("predicts", "does not fit"), "suggest --fit 'a b'"),
+        ({}, ("predicts", "cannot be told"), "validate OTHER.csv --fit 'a b'"),
+        ({}, ("does not fit", "cannot be told"), "suggest --fit 'a b'"),
     ],
 )
 def test_what_to_do_next_follows_from_the_verdicts(about, words, command):
-    verdicts = [JointVerdict(joint=1, name="boom", verdict=word, tolerance_deg=1) for word in words]
+    verdicts = [JointVerdict(joint=1, name="boom", verdict=Verdict(word), tolerance_deg=1) for word in words]
     summary, (log,) = FitSummary(**{"stage": "hyd", "estimate": {}} | about), make_problem().logs
     step = next_step(summary, verdicts, "a b", [make_prediction(log)])
     assert step.numbers == {"command": f"hydroid {command}"}
@@ -174,10 +222,20 @@ def test_what_to_do_next_follows_from_the_verdicts(about, words, command):
 
 def test_the_worst_joint_is_that_which_errs_most_for_its_tolerance():
     boom, swing = (
-        JointVerdict(joint=1, name=name, verdict="predicts", unseen_deg=e, unseen_logs=1, tolerance_deg=good)
+        JointVerdict(
+            joint=1,
+            name=name,
+            verdict=Verdict.ROUGHLY,
+            unseen_deg=e,
+            unseen_logs=1,
+            tolerance_deg=good,
+            baselines_deg={"nine numbers": 2.04},
+        )
         for name, e, good in (("boom", 2.0, 1.0), ("swing", 3.0, 4.0))
     )
-    assert worst([swing, boom]).startswith("Worst: boom, 2 deg; good is up to 1 deg ")
+    said = worst([swing, boom])
+    assert said.startswith("Worst: boom, 2.00 deg; good is up to 1 deg ")
+    assert said.endswith("simple models err by 2.04 deg or more.")
     assert not worst([boom])
     diverged = boom.changed({"unseen_deg": None, "fitted_deg": 0.1})
     assert worst([swing, diverged]) == "Worst: boom, whose simulation diverges."
@@ -186,12 +244,13 @@ def test_the_worst_joint_is_that_which_errs_most_for_its_tolerance():
 
 def test_a_fit_that_fails_says_so_in_every_place():
     problem = make_problem()
-    log, fit = replace(problem.logs[0], source="b.csv"), make_fit(problem)
-    page = fit_page(make_record(problem, fit, {"b.csv": make_prediction(log, error=1.0)}))
+    log, fit = problem.logs[0], make_fit(problem)
+    unseen = {name: make_prediction(replace(log, source=name), error=1.0) for name in ("b", "c", "d", "e")}
+    page = fit_page(make_record(problem, fit, unseen))
     text = Reader(html(page)).text
     assert "✗ predicts no better than standing still" in text
     assert "✓" not in text
-    assert page.lead == "shoulder: predicts no better than standing still, over 1 unseen log."
+    assert page.lead == "shoulder: predicts no better than standing still, over 4 unseen logs."
 
 
 def test_a_validation_of_several_fits_shows_the_best_first_in_shared_charts():
@@ -230,7 +289,9 @@ def test_a_joint_that_only_a_later_fit_compares_is_shown():
 
 def test_the_best_fit_is_found_by_the_joints_that_all_compare():
     boom, swing = (
-        JointVerdict(joint=j, name=str(j), verdict="", unseen_deg=e, unseen_logs=1, tolerance_deg=1.0)
+        JointVerdict(
+            joint=j, name=str(j), verdict=Verdict.ROUGHLY, unseen_deg=e, unseen_logs=1, tolerance_deg=1.0
+        )
         for j, e in ((1, 2.0), (2, 3.0))
     )
     better = boom.changed({"unseen_deg": 1.0})

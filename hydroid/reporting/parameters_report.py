@@ -131,11 +131,8 @@ def error_section(settings: FitSettings, summary: FitSummary) -> Section | None:
         name, slides = arm.joint_names[joint - 1], arm.joints[joint - 1].slides
         unit, factor = ("mm", 1e3 * float(np.radians(1.0))) if slides else ("deg", 1.0)
         ahead = factor * error.after_10_s_deg
-        after.append(
-            f"{two_digits(ahead)} {unit} ({name})"
-            if len(settings.outputs) > 1
-            else f"{two_digits(ahead)} {unit}"
-        )
+        which = f" ({name})" if len(settings.outputs) > 1 else ""
+        after.append(f"{two_digits(ahead)} {unit}{which}")
         rows.append(
             {
                 "joint": name,
@@ -152,8 +149,8 @@ def error_section(settings: FitSettings, summary: FitSummary) -> Section | None:
         "moves a joint between the samples and beside the commands adds up."
     )
     note = (
-        "Standard deviations; after 10 s at the mean speed of the logs. What is left of an error and lasts is "
-        "the model's, not the sensor's; empty: it is no longer than from one sample to the next."
+        "Standard deviations; after 10 s at the mean speed of the logs. What is left and lasts is the model's "
+        "error, not the sensor's; empty: nothing lasts."
     )
     table = Table.of("", {name: name for name in rows[0]}, rows, note)
     return Section("How sure a prediction can be", text, tables={"prediction_errors": table})

@@ -149,8 +149,8 @@ def error_section(settings: FitSettings, summary: FitSummary) -> Section | None:
         "moves a joint between the samples and beside the commands adds up."
     )
     note = (
-        "Standard deviations; after 10 s at the mean speed of the logs. What is left and lasts is the model's "
-        "error, not the sensor's; empty: nothing lasts."
+        "Standard deviations; after 10 s at the mean speed of the logs. What is left and lasts is the error "
+        "of the model, not the sensor's; empty: nothing lasts."
     )
     table = Table.of("", {name: name for name in rows[0]}, rows, note)
     return Section("How sure a prediction can be", text, tables={"prediction_errors": table})

@@ -169,8 +169,8 @@ class ObjectiveSettings(Settings):
     """factor on the error of a joint's angle, by joint, in the searches and in stage 1; 1 for joints that are
     not listed. The refinement of stage 2 weighs each joint by its own error (docs/uncertainty.md)"""
     pressure_weight: NotNegative = 0.0
-    """stage 2: factor that turns a chamber pressure's error into an angle's in the searches [deg/bar]; 0: angles
-    only. Above 0 the refinement compares pressures, too, and weighs them by their own errors"""
+    """stage 2: factor that turns a chamber pressure's error into an angle's in the searches [deg/bar]; 0:
+    angles only. Above 0 the refinement compares pressures, too, and weighs them by their own errors"""
     noise_deg: Positive | ByJoint[Positive] | None = None
     """standard deviation of the sensor's noise of measured angles, for all joints or by joint [deg]; null: it
     is estimated from the residuals. The other parts of an error, such as drift, are always estimated"""

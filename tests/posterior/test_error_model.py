@@ -269,7 +269,8 @@ def test_weights_of_joints_count_in_stage_1():
     likelihood = likelihood_at(problem, 1.1 * theta[0])
     level = np.sqrt(np.mean(problem.output_errors(1.1 * theta) ** 2))
     for one in (theta, 1.2 * theta):
-        np.testing.assert_allclose(likelihood.innovations(one) * level, problem.output_errors(one), atol=1e-12)
+        errors = problem.output_errors(one)
+        np.testing.assert_allclose(likelihood.innovations(one) * level, errors, atol=1e-12)
     assert np.mean(likelihood.innovations(1.1 * theta) ** 2) == pytest.approx(1.0)
 
 

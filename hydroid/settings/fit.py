@@ -38,7 +38,7 @@ class FitSettings(Settings):
     """name of the arm's pose that joints without a measured angle hold"""
     free_start: bool = True
     """whether simulated angles may begin beside the truth, as far as the sensor's noise in the rest before
-    the first command allows: the drift of the errors begins as uncertain as that. false: the start is exact"""
+    the first command allows: the drift of the errors begins as uncertain as that. false: it is exact"""
     parameters: dict[str, ParameterSettings]
     """the parameters of the model by name, those to be estimated and those that are fixed"""
     scale: Literal["log", "linear"] = "log"

@@ -61,9 +61,14 @@ def tried(term: str, k: int, seconds: float) -> tuple[bool, bool, bool, float, f
     free = [row["name"] for row in content["terms"] if "command" in row]
     sides = (term, f"{term}_a", f"{term}_b")
     rows = [row for row in (content, *content["terms"]) if "left_out_deg" in row]
-    without, *freed = (max(row["left_out_deg"].values()) for row in rows if row.get("name", term) in sides)
+    without, *freed = (worst(row["left_out_deg"]) for row in rows if row.get("name", term) in sides)
     named = [name in sides for name in free]
     return any(named), any(named[:1]), bool(free), without, min(freed, default=np.nan)
+
+
+def worst(left_out: dict[str, float | None]) -> float:
+    """Return the largest error of a joint [deg]; infinite where a simulation diverged."""
+    return max(np.inf if error is None else error for error in left_out.values())
 
 
 if __name__ == "__main__":

@@ -100,20 +100,24 @@ def parts(problem: Problem) -> Ints:
 def gain(after: LeftOut, before: LeftOut) -> tuple[float, float]:
     """Return by how much one model foretells the parts better than another, and the standard error of that.
 
-    It is a difference of log-likelihoods. Both are of the same logs.
+    It is a difference of log-likelihoods. Both are of the same logs. The error is infinite where there is one
+    block only, or where either model cannot be simulated.
     """
     with np.errstate(invalid="ignore"):
         change = np.nan_to_num(after.density - before.density, nan=0.0, posinf=np.inf, neginf=-np.inf)
     sums = np.bincount(blocks(after.problem), change)
-    if not np.isfinite(sums).all():
+    if not np.isfinite(sums).all() or len(sums) < 2:
         return float(np.sum(sums)), np.inf
     return float(sums.sum()), float(np.sqrt(len(sums) * np.var(sums, ddof=1)))
 
 
 def is_better(after: LeftOut, before: LeftOut) -> bool:
-    """Whether one model foretells the parts better than another by more than the uncertainty of that."""
+    """Whether one model foretells the parts better than another by more than the uncertainty of that.
+
+    So does one that can be simulated where the other cannot.
+    """
     rise, error = gain(after, before)
-    return rise > CERTAIN * error
+    return rise > CERTAIN * error or rise == np.inf
 
 
 def blocks(problem: Problem) -> Ints:

@@ -78,6 +78,8 @@ def account(problem: Problem, known: Uncertainty) -> FitSummary:
     }
     findings = _parameter_findings(problem, estimate)
     findings += [Finding("logs disagree", "warning", logs.differing)] if logs.differing else []
+    errors = angle_errors(known)
+    findings += _lasting_findings(problem, errors)
     combinations = identifiability(problem, known).combinations
     # six of them: the table of directions has all
     findings += [Finding("combination", "note", tuple(one)) for one in combinations if len(one) > 1][:6]
@@ -86,7 +88,7 @@ def account(problem: Problem, known: Uncertainty) -> FitSummary:
         estimate=estimate,
         findings=tuple(sorted(findings, key=lambda finding: finding.level == "note")),
         covariance=known.posterior.stored(parameters),
-        errors=angle_errors(known),
+        errors=errors,
         left_out_deg={angle: tuple(errors) for angle, errors in logs.left_out.items()},
     )
 
@@ -149,6 +151,16 @@ def fit_findings(fit: Fit) -> list[Finding]:
     if lost:
         findings.append(Finding("quantities open", "note", tuple(lost)))
     return findings
+
+
+def _lasting_findings(problem: Problem, errors: Mapping[str, AngleError]) -> list[Finding]:
+    """Return the joints whose innovations are not white."""
+    names = problem.settings.arm.joint_names
+    return [
+        Finding("error lasts", "note", (names[joint - 1],), {"time": errors[f"q{joint}"].lasts_s})
+        for joint in problem.settings.outputs
+        if errors[f"q{joint}"].lasts_s > 0
+    ]
 
 
 def _parameter_findings(problem: Problem, estimate: Mapping[str, ParameterEstimate]) -> list[Finding]:

@@ -1,1 +1,1 @@
-"""What the logs say about an estimate: derivatives, noise, covariance, intervals, quantities, bands."""
+"""What the logs say about an estimate: errors and their likelihood, covariance, quantities, bands."""

@@ -2,10 +2,9 @@
 
 A predicted angle errs by the uncertainty of the parameters, by the delta method, by the sensor's noise, and
 by the drift of the error model, which grows from the start on with time and way. Where several logs were
-fitted,
-each of them is predicted without it (`left_out`): an error beyond all this is the model's, as far as the fit
-can know it. It is known from as many errors as there are logs, hence Student's t. What an unseen log shows
-beyond all this is a further error of the model.
+fitted, each of them is predicted without it (`left_out`): an error beyond all this is the model's, as far as
+the fit can know it. It is known from as many errors as there are logs, hence Student's t. What an unseen log
+shows beyond all this is a further error of the model.
 """
 
 from collections.abc import Sequence

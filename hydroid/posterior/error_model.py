@@ -200,18 +200,23 @@ class ErrorModel:
             numbers[i] = _most_likely(pairs, self.numbers[i], least, bool(self.given[i]))
         return replace(self, numbers=numbers)
 
-    def white(self, errors: Array) -> "ErrorModel":
-        """Return the model that takes errors, (R,), for white noise alone, but for the starts."""
+    def white(self, errors: Array, *, alike: bool = False) -> "ErrorModel":
+        """Return the model that takes errors, (R,), for white noise alone, but for the starts.
+
+        alike: weighted errors of all signals are equally large, so that weights count; else each signal's
+        are as large as they are.
+        """
         numbers = np.zeros_like(self.numbers)
         numbers[:, 4] = SHORTEST
+        shown = errors**2
+        common = float(np.mean(shown[self.used]))
         for i, signal in enumerate(self.signals):
-            parts = [
-                errors[course.rows][course.used] / course.weight
-                for course, own in zip(self.courses, self.of, strict=True)
-                if own == i
-            ]
-            shown = max(float(np.mean(np.concatenate(parts) ** 2)), LEAST_NOISE[signal.quantity] ** 2)
-            numbers[i, 0] = self.numbers[i, 0] if self.given[i] else shown
+            courses = [course for course, own in zip(self.courses, self.of, strict=True) if own == i]
+            own = np.concatenate([shown[course.rows][course.used] for course in courses])
+            square = common if alike else float(np.mean(own))
+            least = LEAST_NOISE[signal.quantity] ** 2
+            level = max(square / courses[0].weight ** 2, least)
+            numbers[i, 0] = self.numbers[i, 0] if self.given[i] else level
         return replace(self, numbers=numbers)
 
     def scatter(self, channel: int, rows: Array, fitted: "ErrorModel") -> Array:
@@ -287,8 +292,10 @@ class Likelihood:
 
     def estimated(self, errors: Array) -> "Likelihood":
         """Return the likelihood for what weighted output errors, (R,), show of their model."""
-        model = self.errors.white(errors) if self.white else self.errors.estimated(errors)
-        return replace(self, errors=model)
+        if not self.white:
+            return replace(self, errors=self.errors.estimated(errors))
+        alike = self.problem.settings.stage == "mech"  # as in the article
+        return replace(self, errors=self.errors.white(errors, alike=alike))
 
 
 def make_likelihood(problem: Problem) -> Likelihood:

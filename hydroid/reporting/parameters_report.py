@@ -14,7 +14,7 @@ from hydroid.reporting.chart import Chart, Mark, Panel
 from hydroid.reporting.page import Cell, Given, Plot, Section, Table
 from hydroid.run.record import Record
 from hydroid.settings.fit import FitSettings
-from hydroid.words import number
+from hydroid.words import listed, number, two_digits
 
 BEST_WITHIN = 0.3  # half of a 95 % interval, relative to the value, up to which a property counts as known
 ENDS = ("from", "to", "by log from", "by log to", "profile from", "profile to")
@@ -119,6 +119,41 @@ def quantity_section(settings: FitSettings, summary: FitSummary) -> Section | No
         "With 95 % intervals, which are right only if the model is right. estimate.yaml has all quantities."
     )
     return Section("What is known", text, cards=cards) if cards else None
+
+
+def error_section(settings: FitSettings, summary: FitSummary) -> Section | None:
+    """Return the section with the error model of each compared joint; none where the run has none."""
+    arm, rows, after = settings.arm, list[dict[str, Any]](), list[str]()
+    for joint in settings.outputs:
+        error = summary.errors.get(f"q{joint}")
+        if error is None:
+            continue
+        name, slides = arm.joint_names[joint - 1], arm.joints[joint - 1].slides
+        unit, factor = ("mm", 1e3 * float(np.radians(1.0))) if slides else ("deg", 1.0)
+        ahead = factor * error.after_10_s_deg
+        which = f" ({name})" if len(settings.outputs) > 1 else ""
+        after.append(f"{two_digits(ahead)} {unit}{which}")
+        rows.append(
+            {
+                "joint": name,
+                "unit": unit,
+                "sensor's noise": factor * error.sensor_deg,
+                "uncertain after 10 s": ahead,
+                "what is left lasts [s]": error.lasts_s or None,
+            }
+        )
+    if not rows:
+        return None
+    text = (
+        f"After 10 s of motion the prediction is uncertain by {listed(after)}, whatever the parameters: what "
+        "moves a joint between the samples and beside the commands adds up."
+    )
+    note = (
+        "Standard deviations; after 10 s at the mean speed of the logs. What is left and lasts is the error "
+        "of the model, not the sensor's; empty: nothing lasts."
+    )
+    table = Table.of("", {name: name for name in rows[0]}, rows, note)
+    return Section("How sure a prediction can be", text, tables={"prediction_errors": table})
 
 
 def speed_section(settings: FitSettings, summary: FitSummary, logs: Sequence[Log]) -> Section | None:

@@ -19,6 +19,7 @@ from hydroid.reporting.chart import SERIES, Chart, Mark, Panel, finite
 from hydroid.reporting.outlines import motion_section
 from hydroid.reporting.page import Page, Plot, Section, Table, log_names, short_name
 from hydroid.reporting.parameters_report import (
+    error_section,
     parameter_section,
     quantity_section,
     speed_section,
@@ -182,6 +183,7 @@ def fit_page(record: Record) -> Page:
         *verdict_sections(fits, next_step(summary, record.verdict, record.folder, fitted)),
         *prediction_sections([*record.validations.values(), *fitted], settings.arm, fits),
         quantity_section(settings, summary),
+        error_section(settings, summary),
         *unknown_sections(summary),
         parameter_section(settings, summary),
         speed_section(settings, summary, [one.log for one in fitted]),

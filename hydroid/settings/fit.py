@@ -37,8 +37,8 @@ class FitSettings(Settings):
     start_pose: str = "home"
     """name of the arm's pose that joints without a measured angle hold"""
     free_start: bool = True
-    """whether the start angles are open in the refinement and its intervals, as far as the noise of their
-    sensors in the rest before the first command allows"""
+    """whether simulated angles may begin beside the truth, as far as the sensor's noise in the rest before
+    the first command allows: the drift of the errors begins as uncertain as that. false: it is exact"""
     parameters: dict[str, ParameterSettings]
     """the parameters of the model by name, those to be estimated and those that are fixed"""
     scale: Literal["log", "linear"] = "log"

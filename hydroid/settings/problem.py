@@ -166,12 +166,14 @@ class ObjectiveSettings(Settings):
     segments: Annotated[int, Field(ge=1, le=10_000)] = 8
     """number of segments of equal length, one objective each"""
     weights: ByJoint[Positive] = {}
-    """factor on the error of a joint's angle, by joint; 1 for joints that are not listed"""
+    """factor on the error of a joint's angle, by joint, in the searches and in stage 1; 1 for joints that are
+    not listed. The refinement of stage 2 weighs each joint by its own error (docs/uncertainty.md)"""
     pressure_weight: NotNegative = 0.0
-    """stage 2: factor that turns a chamber pressure's error into an angle's [deg/bar]; 0: angles only"""
+    """stage 2: factor that turns a chamber pressure's error into an angle's in the searches [deg/bar]; 0:
+    angles only. Above 0 the refinement compares pressures, too, and weighs them by their own errors"""
     noise_deg: Positive | ByJoint[Positive] | None = None
-    """standard deviation of the white noise of measured angles, for all joints or by joint [deg]; null: it is
-    estimated from the residuals, with its autocorrelation"""
+    """standard deviation of the sensor's noise of measured angles, for all joints or by joint [deg]; null: it
+    is estimated from the residuals. The other parts of an error, such as drift, are always estimated"""
 
     def noise_of(self, joint: int) -> float | None:
         """Return the stated noise of a joint's angle [deg]."""

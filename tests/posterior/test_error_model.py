@@ -260,6 +260,20 @@ def test_stage_1_takes_its_errors_for_white_noise():
     assert np.sqrt(likelihood.errors.numbers[0, 0]) == pytest.approx(rms)
 
 
+def test_weights_of_joints_count_in_stage_1():
+    """Least squares of stage 1 minimises weighted output errors, whatever the errors of each joint."""
+    settings = load_settings("article-mech", {"outputs": [2, 3], "objective.weights": {3: 0.2}})
+    log = noisy(stepped(settings, TRUTH, [60.0, -40.0]), 0.1, exact_start=False)
+    problem = Problem(settings, [log])
+    theta = problem.parameters.vector(TRUTH, "truth")[None]
+    likelihood = likelihood_at(problem, 1.1 * theta[0])
+    level = np.sqrt(np.mean(problem.output_errors(1.1 * theta) ** 2))
+    for one in (theta, 1.2 * theta):
+        errors = problem.output_errors(one)
+        np.testing.assert_allclose(likelihood.innovations(one) * level, errors, atol=1e-12)
+    assert np.mean(likelihood.innovations(1.1 * theta) ** 2) == pytest.approx(1.0)
+
+
 def test_a_likelihood_adds_the_priors_scores_and_falls_as_its_rows_grow():
     problem = hydraulic(priors={"area": {"of": "A_A", "value": 900.0, "sd": 90.0}})
     likelihood, theta = make_likelihood(problem), problem.parameters.start[None]

@@ -2,13 +2,15 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
+from linear_problem import ar1
 from report_fits import MODEL, make_fit, make_problem, make_record, make_uncertainty
 
 from hydroid.findings import Finding
 from hydroid.fitting.summary import summarise
 from hydroid.reporting.page import Table, log_names
-from hydroid.reporting.parameters_report import merged_tables, parameter_table
+from hydroid.reporting.parameters_report import error_section, merged_tables, parameter_table
 
 FEWER = {name: bounds for name, bounds in MODEL.items() if name != "M2"}
 
@@ -56,6 +58,35 @@ def test_what_the_logs_move_far_from_its_prior_is_one_finding():
     fit = with_theta(make_fit(problem, effects=effects), problem, effects, K=0.1, D=300.0, M1=9.0)
     (finding,) = [one for one in summarise(problem, fit).findings if one.kind == "strained prior"]
     assert finding.what.endswith("in standard deviations: D (4.0 above) and K (3.0 below).")
+
+
+def test_how_sure_a_prediction_can_be_is_said_of_each_joint():
+    problem = make_problem(outputs=(2, 3))
+    summary = summarise(problem, make_fit(problem))
+    one = summary.errors["q2"].changed({"sensor_deg": 0.05, "after_10_s_deg": 1.234, "lasts_s": 0.0})
+    two = one.changed({"after_10_s_deg": 0.5, "lasts_s": 1.4})
+    section = error_section(problem.settings, summary.changed({"errors": {"q2": one, "q3": two}}))
+    assert section is not None
+    assert "uncertain by 1.2 deg (shoulder) and 0.5 deg (elbow), whatever the parameters" in section.text
+    table = section.tables["prediction_errors"]
+    assert table.rows == (("shoulder", "deg", 0.05, 1.234, None), ("elbow", "deg", 0.05, 0.5, 1.4))
+    assert error_section(problem.settings, summary.changed({"errors": {}})) is None
+
+
+def test_what_is_left_of_an_error_and_lasts_is_a_finding():
+    """Innovations of a second or so, where they should be white."""
+    problem = make_problem(samples=3000)
+    fit = make_fit(problem)
+    assert "error lasts" not in {one.kind for one in summarise(problem, fit).findings}
+    row = ar1(np.random.default_rng(1), len(problem.measured), np.exp(-0.01), 1.0)
+    linear = replace(fit.uncertainty.linear, innovations=row)
+    summary = summarise(problem, replace(fit, uncertainty=replace(fit.uncertainty, linear=linear)))
+    (finding,) = [one for one in summary.findings if one.kind == "error lasts"]
+    assert finding.level == "note"
+    time = summary.errors["q2"].lasts_s
+    assert time == pytest.approx(1.0, rel=0.5)
+    words = f"What is left of the shoulder's error lasts {time:.2g} s: the model errs, not the sensor."
+    assert finding.what == words
 
 
 def test_runs_of_several_seeds_have_no_value_where_there_is_none():

@@ -89,6 +89,12 @@ CASES = {
         | {"plunger_damping_a": (5, 500, 100, 60)},
         NOTHING, ({2: [15, -60, 25, 0, 40, -70, 60, 0, 20, -50, 90, -90, 30, 10]},), 0.8,
     ),
+    "the curve of a valve": Case(
+        {f"curve_{k}_a": (0.05, 100, true, 1) for k, true in enumerate((20.0, 0.5, 2.0, 0.4), start=1)}
+        | {"dead_band_a": (0, 40, 10, 14)},
+        {"opening_exponent": 1.4},
+        ({2: [13, 15, -50, 25, 20, -40, 40, 60, -70, 0, 75, 85, -80, 20, 100, -90, 30, 50, 14]},), 0.6,
+    ),
     "trapped pressure": Case(
         {"trapped_pressure": (0, 100, 25, 10), "dead_volume": (5, 300, 60, 40)},
         NOTHING, ({2: [25]}, {2: [50]}, {2: [100]}), pose=STOPPED,

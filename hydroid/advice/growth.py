@@ -80,7 +80,8 @@ def explained(problem: Problem, known: Uncertainty) -> Explained:
     """Return what a fit has explained at an estimate. Parameters at bounds are held."""
     linear = known.linear
     weak = np.zeros(len(linear.slopes))  # the estimate does not depend on the weak priors
-    left = np.concatenate([linear.innovations, problem.priors.scores(known.theta[None])[0], weak])
+    scores = problem.priors.weighed_at(known.theta)(known.theta[None])[0]
+    left = np.concatenate([linear.innovations, scores, weak])
     return Explained(linear.effects, left)
 
 

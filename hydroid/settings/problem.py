@@ -118,32 +118,50 @@ class PriorSettings(Settings):
       forearm:    {of: M5, value: 4.0, sd: 0.4}                          # a Gaussian prior
       balance:    {of: {M3: 1, M4: -2}, value: 0, sd: 0.5}               # M3 - 2 M4
       areas:      {ratio: [A_A, A_B], value: 1.333}                      # A_A / A_B
+      spool:      {of: {dead_A: 1, dead_B: -1}, value: 0, sd: 5, tails: heavy}    # alike, or not at all
+      curve:      {smooth: [curve_1, curve_2, curve_3, curve_4], sd: 0.3}         # no bend without a reason
     """
 
     of: str | tuple[str, ...] | dict[str, float] | None = None
     """a parameter, a list of parameters whose sum is meant, or a mapping of parameters to their factors"""
     ratio: tuple[str, str] | None = None
     """two parameters: the ratio of the first to the second is meant"""
-    value: float
-    """value of the combination, in the unit of the parameters"""
+    smooth: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
+    """positive parameters, such as the factors of a valve's curve: the ratios of neighbours, and the last
+    one, are 1 but for a scatter of their logarithms of about `sd`, which the logs may show to be much less
+    or much more"""
+    value: float | None = None
+    """value of the combination, in the unit of the parameters; of `smooth` there is none"""
     sd: Positive | None = None
     """standard deviation of the value; null: the constraint is exact"""
+    tails: Literal["normal", "heavy"] = "normal"
+    """heavy: the value may also be many standard deviations off, if the logs say so: Student's t with 2
+    degrees of freedom, of scale sd, in place of a normal distribution"""
 
     @model_validator(mode="after")
     def _one(self) -> "PriorSettings":
-        if (self.of is None) == (self.ratio is None):
+        given = [one for one in (self.of, self.ratio, self.smooth) if one is not None]
+        if len(given) != 1:
             raise ValueError(
-                "give either of: parameter, [parameters] or {parameter: factor}, or ratio: [a, b]"
+                "give either of: parameter, [parameters] or {parameter: factor}, or ratio: [a, b], "
+                "or smooth: [parameters]"
             )
-        if not any(self.factors.values()):
+        if (self.smooth is None) == (self.value is None):
+            raise ValueError("has no value" if self.smooth else "needs a value")
+        if self.sd is None and (self.smooth or self.tails == "heavy"):
+            raise ValueError("needs sd: without one it is exact")
+        if not self.smooth and not any(self.factors.values()):
             raise ValueError("names no parameter")
         return self
 
     @property
     def factors(self) -> dict[str, float]:
-        """Parameters with their factors; of a ratio those of a - value b, which is 0 where it holds."""
+        """Parameters with their factors; of a ratio those of a - value b, which is 0 where it holds.
+
+        Of `smooth` there are none.
+        """
         if self.ratio is not None:
-            return {self.ratio[0]: 1.0, self.ratio[1]: -self.value}
+            return {self.ratio[0]: 1.0, self.ratio[1]: -(self.value or 0.0)}
         if isinstance(self.of, str):
             return {self.of: 1.0}
         return self.of if isinstance(self.of, dict) else dict.fromkeys(self.of or (), 1.0)

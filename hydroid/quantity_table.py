@@ -101,3 +101,6 @@ TARGETS = {name: tuple(quantity.name for quantity in row.each()) for name, row i
 """the quantities that a name sets: itself, or both sides"""
 
 MECHANICAL = tuple(row.name for row in _GROUPS["mechanical"])  # the quantities that both stages have
+
+CURVE = tuple(row.name for row in _GROUPS["hydraulic"] if row.name.startswith("curve_"))
+"""the factors of a valve's curve, part by part"""

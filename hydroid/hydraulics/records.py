@@ -17,7 +17,7 @@ from hydroid.arrays import Mask, Structs
 from hydroid.hydraulics.elementwise import kept, ringing
 from hydroid.hydraulics.solenoid import curve_exists, force_curve, plunger_weight
 from hydroid.hydraulics.valve import KNOTS, conductance
-from hydroid.quantity_table import QUANTITIES, ROWS
+from hydroid.quantity_table import CURVE, QUANTITIES, ROWS
 from hydroid.settings.arm import Arm
 from hydroid.settings.cylinder import LinearActuator
 from hydroid.settings.hydraulics import HydraulicSettings, actuator_values
@@ -200,7 +200,7 @@ def coefficients(joints: Records, period: float = 0.01, substeps: int = 1) -> Re
         side["pilot_keep"] = kept(side["pilot_steps"])
         side["plunger_weight"] = plunger_weight(side.plunger_damping, period / substeps, table)
         side["has_notches"] = np.any([side[f"notch_{k}"] != 1.0 for k in (1, 2, 3, 4)], axis=0)
-        side["has_curve"] = np.any([side[f"curve_{k}"] != 1.0 for k in (1, 2, 3, 4)], axis=0)
+        side["has_curve"] = np.any([side[name] != 1.0 for name in CURVE], axis=0)
         for k, knot in enumerate(KNOTS, 1):
             side[f"knot_{k}"] = knot**side.opening_exponent
     return table

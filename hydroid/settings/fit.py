@@ -17,7 +17,7 @@ from hydroid.settings.arm import Arm, load_arm
 from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.load import ByJoint, Joints, Positive, Settings, load, validate
 from hydroid.settings.log import LogSettings
-from hydroid.settings.parameters import by_group, expanded, make_parameter
+from hydroid.settings.parameters import by_group, expanded, make_parameter, with_curves
 from hydroid.settings.problem import ObjectiveSettings, ParameterSettings, PriorSettings, SimulationSettings
 from hydroid.settings.search import DesignSettings, RefinementSettings, SearchSettings
 
@@ -88,7 +88,10 @@ class FitSettings(Settings):
             log = values.get("log")
             groups = log.get("groups") if isinstance(log, dict) else getattr(log, "groups", None)
             entries = by_group(expanded(names, compared, known), groups if isinstance(groups, dict) else ())
+            entries, priors = with_curves(entries, values.get("priors"))
             values = {**values, "parameters": entries}
+            if priors is not None:
+                values["priors"] = priors
         return {**values, "arm": arm}
 
     @model_validator(mode="before")

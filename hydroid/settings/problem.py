@@ -18,11 +18,14 @@ class ParameterSettings(Settings):
       M3:  {quantity: mass, link: link3, nominal: 20, sd: 1}           # weighed
       D:   {quantity: damping, each: true, bounds: [20, 5000]}         # D_boom, D_arm, ... of compared joints
       M:   {quantity: mass, each: true, within: 2}                     # M_link1, M_link2, ... of all links
+      C:   {quantity: curve_a, joints: [2]}                            # C_1 to C_4, and a prior C
     """
 
     quantity: str
     """gain, damping, stiffness, friction or mass; in stage 2 also any quantity of `hydraulics` and area_a,
-    area_b, opening_a, opening_b, pivot_distance_1, pivot_distance_2, pivot_angle"""
+    area_b, opening_a, opening_b, pivot_distance_1, pivot_distance_2, pivot_angle. curve_a, curve_b, or curve
+    for both: the factors NAME_1 to NAME_4 of the valve's curve, curve_1 to curve_4, whose `start` is a list;
+    they get bounds, and a prior NAME: smooth, of this `sd` (0.3)"""
     joints: Joints | None = None
     """joints that share the parameter; null: all"""
     each: bool | Joints = False

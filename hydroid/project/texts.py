@@ -13,7 +13,9 @@ import numpy as np
 from hydroid.arm.model import load_model
 from hydroid.cad.importer import ImportedArm
 from hydroid.files import Plain, fill_template, yaml_text
+from hydroid.fitting.speed_curve import EXPONENT, SpeedCurve, valve_start
 from hydroid.hydraulics.valve import DENSITY
+from hydroid.log import JointMotion
 from hydroid.project.layout import Layout
 from hydroid.settings.arm import Arm, Joint
 from hydroid.settings.cylinder import LinearActuator
@@ -22,6 +24,10 @@ from hydroid.settings.hydraulics import HydraulicSettings
 LONGEST_STEP = 0.025  # of MuJoCo [s], in a log of fewer samples
 VALVE_STEP = 0.002  # of valves and oil [s]
 DEAD = 0.8  # part of the command below which a joint seems to stand that its dead band is
+UNKNOWN_DEAD, MOST_DEAD = (
+    10.0,
+    85.0,
+)  # dead band of a joint that no log moves, and the largest to start at [%]
 DRAG = 0.02  # part of the torque at the pump's pressure that damping takes at full speed
 RESPONSE = 0.1  # of a valve and its oil without any delay [s]
 USUAL_SPEED = 0.5  # of a joint of which no log tells its own [rad/s, m/s]
@@ -85,10 +91,10 @@ def _lever(joint: Joint) -> float:
     return np.abs(joint.actuator.moment_arm(np.linspace(*joint.limits, 50))).mean()
 
 
-def _opening(joint: Joint, speed: float) -> str:
-    """Return the nominal opening of a stand-in that was sized before a log told its joint's speed, as YAML.
+def _opening(joint: Joint, speed: float, usual: float) -> str:
+    """Return the nominal opening of a direction of a stand-in, from its speed at full command, as YAML.
 
-    Empty where the arm's file has another one: it holds.
+    Empty where the arm's file has an opening that no `usual` speed of the joint gives: it holds.
     """
     own = joint.actuator
     if own is None:
@@ -97,9 +103,45 @@ def _opening(joint: Joint, speed: float) -> str:
         oil, opening = own.settings.area_a * _lever(joint), own.settings.max_opening
     else:
         oil, opening = own.displacement, own.max_opening
-    if not math.isclose(opening, opening_at(oil, USUAL_SPEED), rel_tol=0.01):
+    sized = [opening_at(oil, one) for one in (USUAL_SPEED, usual)]
+    if not any(math.isclose(opening, one, rel_tol=0.01) for one in sized):
         return ""
     return f"nominal: {short(opening_at(oil, speed))}, "
+
+
+class ValveSide(NamedTuple):
+    """What the settings say of one direction of a joint's valve: numbers as YAML.
+
+    `curve`: its factors at the start; empty: a valve that is open or shut, which tells no curve.
+    """
+
+    name: str
+    opening: str
+    dead: str
+    exponent: str
+    curve: str
+
+
+def _sides(
+    joint: Joint, curve: SpeedCurve | None, motion: JointMotion | None, usual: float
+) -> list[ValveSide]:
+    """Return both directions of a joint's valve, A first, at the speeds that the logs show.
+
+    `usual` is the speed of the joint at full command, by which its actuator was sized [rad/s].
+    """
+    dead = DEAD * min(max(motion.dead_band, 5.0), 40.0) if motion else UNKNOWN_DEAD
+    sides = list[ValveSide]()
+    for name, sign in (("A", 1), ("B", -1)):
+        start = valve_start(curve.side(sign)) if curve else None
+        if start is None:
+            opening = _opening(joint, usual, usual) if motion else ""
+            sides.append(ValveSide(name, opening, short(dead), short(EXPONENT), "[1, 1, 1, 1]"))
+            continue
+        factors = "" if start.one_size else flow([rounded(one) for one in start.factors])
+        opening = _opening(joint, start.speed, usual)
+        band = short(min(start.dead_band, MOST_DEAD))
+        sides.append(ValveSide(name, opening, band, short(start.exponent), factors))
+    return sides
 
 
 def arm_text(imported: ImportedArm, arm: Arm | None, sizes: Sequence[JointSize]) -> str:
@@ -151,7 +193,8 @@ def fit_text(
     middle = np.median([*flows.values()])
     for joint in layout.outputs:
         name, size, own = arm.joint_names[joint - 1], sizes[joint - 1], arm.joints[joint - 1]
-        motion = layout.motions.get(joint)
+        motion, curve = layout.motions.get(joint), layout.speeds.get(joint)
+        lag = curve.delay if curve else motion.likely_lag if motion else 0.0
         linear = isinstance(own.actuator, LinearActuator)
         if not linear:
             volumes.append(size.displacement * math.radians(own.range[1] - own.range[0]) / 2)
@@ -161,13 +204,12 @@ def fit_text(
                 "name": name,
                 "linear": linear,
                 "lever": own.has("lever_slope"),
-                "opening": _opening(own, size.speed) if motion else "",
+                "sides": _sides(own, curve, motion, size.speed),
                 "damping": short(DRAG * size.damping),
-                "delay": min(max(motion.likely_lag - RESPONSE, 0.0), 0.9) if motion else 0.0,
+                "delay": min(max(lag - RESPONSE, 0.0), 0.9),
                 "unit": "N·s/m" if own.slides else "N·m·s/rad",
                 # a stand-in's size is a guess, but the valves of one machine let like flows through
                 "draw": 1 if linear else short(middle / flows[joint]),
-                "dead": short(DEAD * min(max(motion.dead_band, 5.0), 40.0) if motion else 10.0),
             }
         )
     period = layout.section.get("period_s", 0.01)

@@ -109,7 +109,7 @@ def with_curves(parameters: Mapping[str, Any], priors: Any) -> tuple[Plain, Any]
     result: Plain = {}
     smooth: Plain = {}
     for name, entry in parameters.items():
-        side = CURVES.get(entry.get("quantity")) if isinstance(entry, dict) else None
+        side = CURVES.get(str(entry.get("quantity"))) if isinstance(entry, dict) else None
         if side is None:
             result[name] = result.get(name, {}) | entry if isinstance(entry, dict) else entry
             continue

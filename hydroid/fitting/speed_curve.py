@@ -1,0 +1,253 @@
+"""The speed of a joint against its command, as its logs show it: where a fit of its valve starts.
+
+A delay, and one speed for each command that never falls with it: isotonic regression of the speeds on the
+delayed commands (R. E. Barlow, D. J. Bartholomew, J. M. Bremner and H. D. Brunk, 1972), by the delay at which
+it errs least. It assumes no law, so it shows what a law of few numbers cannot be: dead bands of unlike sides,
+a valve that opens all at once. `valve_start` then gives the numbers of a valve that has these speeds.
+
+Speeds count less while the command changes, when they follow it late, and not at all near the ends of a
+joint's travel: there it may stand at a stop, or its sensor at the end of its range.
+"""
+
+from collections.abc import Sequence
+from itertools import product
+
+import numpy as np
+from scipy.optimize import OptimizeResult, isotonic_regression, least_squares
+
+from hydroid.arrays import Array, Mask, record
+from hydroid.hydraulics.valve import KNOTS, bent_opening
+from hydroid.log import Log
+
+LONGEST_DELAY = 0.8
+"""between a command and its motion [s]"""
+WINDOW = 0.15
+"""over which a speed is measured, at least a sample to each side [s]"""
+SETTLING = 0.25
+"""for so long before a speed its command counts, too [s]"""
+STEADY = 10.0
+"""change of the command in that time at which a speed counts half [%]"""
+END = 0.02
+"""part of a joint's travel at each end of it where speeds do not count"""
+STILL = 0.08
+"""part of the speed that a direction reaches below which a joint seems to stand"""
+ONE_SIZE = 5.0
+"""commands of one size differ by less, from the tenth to the ninetieth percentile of a direction's [%]"""
+MOST = 0.97
+"""part of a side's samples below the speed that it reaches"""
+LEAST_COMMAND = 2.0
+"""below which a command is none [%]"""
+ALIKE = 1.0
+"""commands that differ by less are one [%]"""
+LEAST_SAMPLES = 10  # that show a curve
+GRID = 40  # commands at which a valve is compared with the speeds
+UNLIKE = 0.5  # scatter of the logarithms of neighbouring factors of a curve
+EXPONENT, EXPONENT_SD = 1.4, 0.4  # usual exponent, and scatter of its logarithm
+BEGUN = 0.6, 1.4, 2.2  # exponents at which the search for a valve begins
+DEAD_SD = 20.0  # scatter of a dead band around the command from which a joint seems to move [%]
+SPEED_ERROR = 0.03  # of a measured speed, as a part of the largest one
+
+
+@record
+class SpeedCurve:
+    """What a joint's logs show of its speed.
+
+    Attributes:
+        delay: at which the speed follows the command best, the lags included [s].
+        command: those of the logs, ascending, ALIKE apart, below 0 for the negative side [%], shape (n,).
+        speed: of each in the direction in which positive commands move the joint, never falling [rad/s],
+            shape (n,); 0 at a command of 0.
+        weight: how many samples each stands for, shape (n,).
+    """
+
+    delay: float
+    command: Array
+    speed: Array
+    weight: Array
+
+    @property
+    def turned(self) -> "SpeedCurve":
+        """The same against commands of the other sign."""
+        return SpeedCurve(self.delay, -self.command[::-1], -self.speed[::-1], self.weight[::-1])
+
+    def side(self, sign: int) -> "SpeedCurve":
+        """Return the side of positive (1) or negative (-1) commands, both command and speed above 0."""
+        own = sign * self.command >= LEAST_COMMAND
+        order = np.argsort(sign * self.command[own], kind="stable")
+        return SpeedCurve(
+            self.delay,
+            (sign * self.command[own])[order],
+            np.maximum(sign * self.speed[own], 0.0)[order],
+            self.weight[own][order],
+        )
+
+    @property
+    def top(self) -> float:
+        """Speed that a side reaches, but for a few samples, which may be wrong [rad/s]."""
+        reached = np.cumsum(self.weight) / self.weight.sum()
+        return float(np.interp(MOST, reached, self.speed))
+
+    @property
+    def one_size(self) -> bool:
+        """Whether a side has commands of one size only, as a valve has that is open or shut."""
+        if len(self.command) == 0:
+            return True
+        reached = np.cumsum(self.weight) / self.weight.sum()
+        low, high = np.interp([0.1, 0.9], reached, self.command)
+        return bool(high - low < ONE_SIZE)
+
+
+@record
+class ValveStart:
+    """Numbers of a direction of a valve.
+
+    dead_band: command below which nothing moves [%]. exponent: of the opening. factors: of its curve, (4,).
+    speed: at full command [rad/s]. one_size: its commands tell no curve: only the speed is measured.
+    """
+
+    dead_band: float
+    exponent: float
+    factors: tuple[float, ...]
+    speed: float
+    one_size: bool
+
+
+def measured_speeds(logs: Sequence[Log], joint: int) -> SpeedCurve | None:
+    """Return the speeds of a joint (number, from 1) in the logs that drive and measure it.
+
+    None where there are none.
+    """
+    own = [log for log in logs if log.driven[joint - 1] and log.measured[joint - 1]]
+    if not own:
+        return None
+    angles = np.concatenate([log.angle[:, joint - 1] for log in own])
+    reach = float(angles.min()), float(angles.max())
+    period = min(log.period for log in own)
+    delays = np.arange(0.0, LONGEST_DELAY, period).tolist()
+    # which delay is right is seen where commands change, and how fast it moves where they do not
+    tried = [(_isotonic(own, joint, reach, delay, steady=False), delay) for delay in delays]
+    shown = [(result[0], delay) for result, delay in tried if result is not None]
+    if not shown:
+        return None
+    result = _isotonic(own, joint, reach, min(shown)[1], steady=True)
+    return result[1] if result else None
+
+
+def _isotonic(
+    logs: Sequence[Log], joint: int, reach: tuple[float, float], delay: float, *, steady: bool
+) -> tuple[float, SpeedCurve] | None:
+    """Return the curve of a delay [s], and the mean square that it leaves, as a part of the speeds'.
+
+    `steady`: whether speeds count less while the command changes.
+    """
+    pairs = [_pairs(log, joint, reach, delay) for log in logs]
+    command, speed, weight = np.hstack(pairs)
+    if len(command) < LEAST_SAMPLES or not np.ptp(command) > LEAST_COMMAND or not speed.any():
+        return None
+    if not steady:
+        weight = np.ones(len(command))
+    direction = 1.0 if np.average(command * speed, weights=weight) >= 0.0 else -1.0
+    # commands that are alike have one speed: sorted by chance, they would seem to rise with each other
+    number = np.unique(np.round(command / ALIKE), return_inverse=True)[1]
+    total: Array = np.bincount(number, weight).astype(float)
+    asked = np.bincount(number, weight * command) / total
+    mean = np.bincount(number, weight * direction * speed) / total
+    fitted = isotonic_regression(mean, weights=total).x
+    # a drift at rest, such as a sensor's, is no speed of the valve: the curve has one sign at each side
+    fitted = np.where(asked > 0.0, np.maximum(fitted, 0.0), np.minimum(fitted, 0.0))
+    left = np.average((direction * speed - fitted[number]) ** 2, weights=weight)
+    curve = SpeedCurve(delay, asked, fitted, total)
+    return float(left / np.average(speed**2, weights=weight)), curve
+
+
+def _pairs(log: Log, joint: int, reach: tuple[float, float], delay: float) -> Array:
+    """Return commands [%], the speeds that follow them [rad/s], and their weights, shape (3, n)."""
+    command, angle = log.command[:, joint - 1], log.angle[:, joint - 1]
+    half = max(round(0.5 * WINDOW / log.period), 1)
+    late, before = round(delay / log.period), round(SETTLING / log.period)
+    first = max(half, late + before)
+    at = np.arange(first, len(angle) - half)
+    if len(at) == 0:
+        return np.empty((3, 0))
+    speed = (angle[at + half] - angle[at - half]) / (2 * half * log.period)
+    asked = command[at - late]
+    behind = np.stack([command[at - late - shift] for shift in range(before + 1)])
+    changed = np.ptp(behind, axis=0) / STEADY
+    weight = 1.0 / (1.0 + changed * changed)
+    inside = _inside(angle, reach)[at]
+    return np.stack([asked, speed, weight])[:, inside]
+
+
+def _inside(angle: Array, reach: tuple[float, float]) -> Mask:
+    """Which samples are not near the ends of a joint's travel in all logs, (T,)."""
+    margin = END * (reach[1] - reach[0])
+    return (angle > reach[0] + margin) & (angle < reach[1] - margin)
+
+
+def valve_start(side: SpeedCurve) -> ValveStart | None:
+    """Return the valve whose speeds are nearest to those of a side (`SpeedCurve.side`).
+
+    Where the commands of the side tell nothing, it is a power law with the usual exponent. None where the
+    side has no commands, or nothing moves.
+    """
+    if len(side.command) == 0 or not side.top > 0.0:
+        return None
+    top = side.top
+    flat = (1.0,) * len(KNOTS)
+    dead = _dead_band(side)
+    if side.one_size:
+        dead = min(dead, 0.5 * float(side.command[0]))  # nobody knows
+        full = top / max(_share(float(np.median(side.command)), dead), 0.05) ** EXPONENT
+        return ValveStart(dead, EXPONENT, flat, full, one_size=True)
+    at = np.linspace(side.command[0], side.command[-1], GRID)
+    wanted = np.interp(at, side.command, side.speed) / top
+    count = np.histogram(side.command, np.linspace(at[0], at[-1], GRID + 1), weights=side.weight)[0]
+    known = np.minimum(count / 10.0, 1.0)  # no sample between two commands: nothing is known there
+
+    def rows(x: Array) -> Array:
+        band, exponent, factors, full = _numbers(x)
+        share = np.maximum(at - band, 0.0) / (100.0 - band)
+        opening = bent_opening(share**exponent, factors, tuple(knot**exponent for knot in KNOTS))
+        bends = np.diff([*x[2:-1], 0.0]) / UNLIKE
+        off = np.sqrt(known / GRID) * (full * opening - wanted) / SPEED_ERROR
+        unusual = [np.log(exponent / EXPONENT) / EXPONENT_SD, (band - dead) / DEAD_SD, 0.1 * np.log(full)]
+        return np.concatenate([np.sqrt(GRID) * off, bends, unusual])
+
+    least = np.array([0.0, np.log(0.4), *np.full(len(KNOTS), -5.0), -1.0])
+    most = np.array([90.0, np.log(3.0), *np.full(len(KNOTS), 5.0), 4.0])
+    scale = np.array([5.0, 0.3, *np.full(len(KNOTS), 0.5), 0.3])
+    tried = list[OptimizeResult]()
+    for begun, band in product(BEGUN, (dead, 0.5 * dead)):
+        begin = np.array([min(band, 89.0), np.log(begun), *np.zeros(len(KNOTS)), 0.05])
+        tried.append(least_squares(rows, begin, bounds=(least, most), x_scale=scale, max_nfev=60))
+    ended = min(tried, key=lambda one: one.cost)
+    band, exponent, factors, full = _numbers(ended.x)
+    return ValveStart(band, exponent, factors, full * top, one_size=False)
+
+
+def _numbers(x: Array) -> tuple[float, float, tuple[float, ...], float]:
+    """Dead band [%], exponent, factors of the curve, and speed at full command over the largest measured."""
+    values = x.tolist()
+    return (
+        values[0],
+        float(np.exp(values[1])),
+        tuple(np.exp(values[2:-1]).tolist()),
+        float(np.exp(values[-1])),
+    )
+
+
+def _share(command: float, dead: float) -> float:
+    """Part of the command beyond the dead band."""
+    return max(command - dead, 0.0) / (100.0 - dead)
+
+
+def _dead_band(side: SpeedCurve) -> float:
+    """Return the command between the last one that moves nothing and the first one that does [%].
+
+    Where these are far apart, nobody knows: a little below the first one.
+    """
+    moves = side.speed > STILL * side.top
+    first = float(side.command[moves][0])
+    still = side.command[~moves]
+    last = float(still[-1]) if len(still) else 0.0
+    return max(last, first - 5.0) if first - last > 10.0 else 0.5 * (first + last)

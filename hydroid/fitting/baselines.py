@@ -61,7 +61,7 @@ class Baseline:
             beyond = (np.abs(command) - dead) / (100.0 - dead)
             target = speed * np.power(beyond, exponent, out=np.zeros_like(beyond), where=beyond > 0)
         late, lag, start = self.delay / log.period, self.numbers[3] / log.period, log.start[self.joint - 1]
-        return _follow(target * log.period, side, late, lag, start, self.limits)
+        return follow(target * log.period, side, late, lag, start, self.limits)
 
     def errors(self, logs: Sequence[Log]) -> Array:
         """Return measured minus predicted angles of all logs [rad]."""
@@ -69,7 +69,7 @@ class Baseline:
 
 
 @njit(cache=True)
-def _follow(
+def follow(
     target: Array,
     side: NDArray[np.int64],
     delay: float,

@@ -23,8 +23,8 @@ from numpy.random import Generator
 from hydroid.fitting.baselines import NAMES, fit_baselines
 from hydroid.fitting.checkpoints import Checkpoints, Memo
 from hydroid.fitting.refinement import Refining, refine_from_afar
-from hydroid.fitting.speed_curve import measured_speeds, valve_start
 from hydroid.fitting.step import Step
+from hydroid.fitting.valve_start import fitted_valve
 from hydroid.parameters import Array
 from hydroid.posterior.bench import make_bench
 from hydroid.posterior.error_model import likelihood_at, make_likelihood
@@ -188,16 +188,16 @@ def by_speeds(problem: Problem, joint: int, theta: Array) -> Array:
     """
     own = problem.settings.acting_on(joint)
     curved = {problem.settings.parameters[name].quantity[:-2] for name in own} & {*CURVE}
-    speeds = measured_speeds(problem.logs, joint) if curved else None
-    sides = [valve_start(speeds.side(sign)) for sign in (1, -1)] if speeds else []
-    shown = [side for side in sides if side is not None]
-    if len(shown) < 2:
+    found = fitted_valve(problem.logs, joint) if curved else None
+    if found is None:
         return theta
-    values = _sided("dead_band", *(side.dead_band for side in shown))
-    values |= _sided("opening_exponent", *(side.exponent for side in shown))
+    a, b = found.sides
+    values = {"delay": found.delay, "pilot_lag": 0.0, "opening_lag": found.lag}
+    values |= _sided("dead_band", a.dead_band, b.dead_band)
+    values |= _sided("opening_exponent", a.exponent, b.exponent)
     for part, name in enumerate(CURVE):
-        values |= _sided(name, *(side.factors[part] for side in shown))
-    return _with_valve(problem, joint, theta, values, np.array([side.speed for side in shown]))
+        values |= _sided(name, a.factors[part], b.factors[part])
+    return _with_valve(problem, joint, theta, values, np.array([a.speed, b.speed]))
 
 
 def _sided(name: str, a: float, b: float) -> dict[str, float]:

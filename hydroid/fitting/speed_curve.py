@@ -1,22 +1,20 @@
-"""The speed of a joint against its command, as its logs show it: where a fit of its valve starts.
+"""The speed of a joint against its command, as its logs show it.
 
 A delay, and one speed for each command that never falls with it: isotonic regression of the speeds on the
 delayed commands (R. E. Barlow, D. J. Bartholomew, J. M. Bremner and H. D. Brunk, 1972), by the delay at which
 it errs least. It assumes no law, so it shows what a law of few numbers cannot be: dead bands of unlike sides,
-a valve that opens all at once. `valve_start` then gives the numbers of a valve that has these speeds.
+a valve that opens all at once.
 
 Speeds count less while the command changes, when they follow it late, and not at all near the ends of a
 joint's travel: there it may stand at a stop, or its sensor at the end of its range.
 """
 
 from collections.abc import Sequence
-from itertools import product
 
 import numpy as np
-from scipy.optimize import OptimizeResult, isotonic_regression, least_squares
+from scipy.optimize import isotonic_regression
 
 from hydroid.arrays import Array, Mask, record
-from hydroid.hydraulics.valve import KNOTS, bent_opening
 from hydroid.log import Log
 
 LONGEST_DELAY = 0.8
@@ -29,23 +27,15 @@ STEADY = 10.0
 """change of the command in that time at which a speed counts half [%]"""
 END = 0.02
 """part of a joint's travel at each end of it where speeds do not count"""
-STILL = 0.08
-"""part of the speed that a direction reaches below which a joint seems to stand"""
 ONE_SIZE = 5.0
 """commands of one size differ by less, from the tenth to the ninetieth percentile of a direction's [%]"""
-MOST = 0.97
+REACHED = 0.97
 """part of a side's samples below the speed that it reaches"""
 LEAST_COMMAND = 2.0
 """below which a command is none [%]"""
 ALIKE = 1.0
 """commands that differ by less are one [%]"""
 LEAST_SAMPLES = 10  # that show a curve
-GRID = 40  # commands at which a valve is compared with the speeds
-UNLIKE = 0.5  # scatter of the logarithms of neighbouring factors of a curve
-EXPONENT, EXPONENT_SD = 1.4, 0.4  # usual exponent, and scatter of its logarithm
-BEGUN = 0.6, 1.4, 2.2  # exponents at which the search for a valve begins
-DEAD_SD = 20.0  # scatter of a dead band around the command from which a joint seems to move [%]
-SPEED_ERROR = 0.03  # of a measured speed, as a part of the largest one
 
 
 @record
@@ -58,17 +48,14 @@ class SpeedCurve:
         speed: of each in the direction in which positive commands move the joint, never falling [rad/s],
             shape (n,); 0 at a command of 0.
         weight: how many samples each stands for, shape (n,).
+        direction: 1 where a positive command moves the joint to larger angles, else -1.
     """
 
     delay: float
     command: Array
     speed: Array
     weight: Array
-
-    @property
-    def turned(self) -> "SpeedCurve":
-        """The same against commands of the other sign."""
-        return SpeedCurve(self.delay, -self.command[::-1], -self.speed[::-1], self.weight[::-1])
+    direction: float
 
     def side(self, sign: int) -> "SpeedCurve":
         """Return the side of positive (1) or negative (-1) commands, both command and speed above 0."""
@@ -79,13 +66,14 @@ class SpeedCurve:
             (sign * self.command[own])[order],
             np.maximum(sign * self.speed[own], 0.0)[order],
             self.weight[own][order],
+            sign * self.direction,
         )
 
     @property
     def top(self) -> float:
         """Speed that a side reaches, but for a few samples, which may be wrong [rad/s]."""
         reached = np.cumsum(self.weight) / self.weight.sum()
-        return float(np.interp(MOST, reached, self.speed))
+        return float(np.interp(REACHED, reached, self.speed))
 
     @property
     def one_size(self) -> bool:
@@ -95,21 +83,6 @@ class SpeedCurve:
         reached = np.cumsum(self.weight) / self.weight.sum()
         low, high = np.interp([0.1, 0.9], reached, self.command)
         return bool(high - low < ONE_SIZE)
-
-
-@record
-class ValveStart:
-    """Numbers of a direction of a valve.
-
-    dead_band: command below which nothing moves [%]. exponent: of the opening. factors: of its curve, (4,).
-    speed: at full command [rad/s]. one_size: its commands tell no curve: only the speed is measured.
-    """
-
-    dead_band: float
-    exponent: float
-    factors: tuple[float, ...]
-    speed: float
-    one_size: bool
 
 
 def measured_speeds(logs: Sequence[Log], joint: int) -> SpeedCurve | None:
@@ -156,7 +129,7 @@ def _isotonic(
     # a drift at rest, such as a sensor's, is no speed of the valve: the curve has one sign at each side
     fitted = np.where(asked > 0.0, np.maximum(fitted, 0.0), np.minimum(fitted, 0.0))
     left = np.average((direction * speed - fitted[number]) ** 2, weights=weight)
-    curve = SpeedCurve(delay, asked, fitted, total)
+    curve = SpeedCurve(delay, asked, fitted, total, direction)
     return float(left / np.average(speed**2, weights=weight)), curve
 
 
@@ -174,80 +147,11 @@ def _pairs(log: Log, joint: int, reach: tuple[float, float], delay: float) -> Ar
     behind = np.stack([command[at - late - shift] for shift in range(before + 1)])
     changed = np.ptp(behind, axis=0) / STEADY
     weight = 1.0 / (1.0 + changed * changed)
-    inside = _inside(angle, reach)[at]
-    return np.stack([asked, speed, weight])[:, inside]
+    there = inside(angle, reach)[at]
+    return np.stack([asked, speed, weight])[:, there]
 
 
-def _inside(angle: Array, reach: tuple[float, float]) -> Mask:
+def inside(angle: Array, reach: tuple[float, float]) -> Mask:
     """Which samples are not near the ends of a joint's travel in all logs, (T,)."""
     margin = END * (reach[1] - reach[0])
     return (angle > reach[0] + margin) & (angle < reach[1] - margin)
-
-
-def valve_start(side: SpeedCurve) -> ValveStart | None:
-    """Return the valve whose speeds are nearest to those of a side (`SpeedCurve.side`).
-
-    Where the commands of the side tell nothing, it is a power law with the usual exponent. None where the
-    side has no commands, or nothing moves.
-    """
-    if len(side.command) == 0 or not side.top > 0.0:
-        return None
-    top = side.top
-    flat = (1.0,) * len(KNOTS)
-    dead = _dead_band(side)
-    if side.one_size:
-        dead = min(dead, 0.5 * float(side.command[0]))  # nobody knows
-        full = top / max(_share(float(np.median(side.command)), dead), 0.05) ** EXPONENT
-        return ValveStart(dead, EXPONENT, flat, full, one_size=True)
-    at = np.linspace(side.command[0], side.command[-1], GRID)
-    wanted = np.interp(at, side.command, side.speed) / top
-    count = np.histogram(side.command, np.linspace(at[0], at[-1], GRID + 1), weights=side.weight)[0]
-    known = np.minimum(count / 10.0, 1.0)  # no sample between two commands: nothing is known there
-
-    def rows(x: Array) -> Array:
-        band, exponent, factors, full = _numbers(x)
-        share = np.maximum(at - band, 0.0) / (100.0 - band)
-        opening = bent_opening(share**exponent, factors, tuple(knot**exponent for knot in KNOTS))
-        bends = np.diff([*x[2:-1], 0.0]) / UNLIKE
-        off = np.sqrt(known / GRID) * (full * opening - wanted) / SPEED_ERROR
-        unusual = [np.log(exponent / EXPONENT) / EXPONENT_SD, (band - dead) / DEAD_SD, 0.1 * np.log(full)]
-        return np.concatenate([np.sqrt(GRID) * off, bends, unusual])
-
-    least = np.array([0.0, np.log(0.4), *np.full(len(KNOTS), -5.0), -1.0])
-    most = np.array([90.0, np.log(3.0), *np.full(len(KNOTS), 5.0), 4.0])
-    scale = np.array([5.0, 0.3, *np.full(len(KNOTS), 0.5), 0.3])
-    tried = list[OptimizeResult]()
-    for begun, band in product(BEGUN, (dead, 0.5 * dead)):
-        begin = np.array([min(band, 89.0), np.log(begun), *np.zeros(len(KNOTS)), 0.05])
-        tried.append(least_squares(rows, begin, bounds=(least, most), x_scale=scale, max_nfev=60))
-    ended = min(tried, key=lambda one: one.cost)
-    band, exponent, factors, full = _numbers(ended.x)
-    return ValveStart(band, exponent, factors, full * top, one_size=False)
-
-
-def _numbers(x: Array) -> tuple[float, float, tuple[float, ...], float]:
-    """Dead band [%], exponent, factors of the curve, and speed at full command over the largest measured."""
-    values = x.tolist()
-    return (
-        values[0],
-        float(np.exp(values[1])),
-        tuple(np.exp(values[2:-1]).tolist()),
-        float(np.exp(values[-1])),
-    )
-
-
-def _share(command: float, dead: float) -> float:
-    """Part of the command beyond the dead band."""
-    return max(command - dead, 0.0) / (100.0 - dead)
-
-
-def _dead_band(side: SpeedCurve) -> float:
-    """Return the command between the last one that moves nothing and the first one that does [%].
-
-    Where these are far apart, nobody knows: a little below the first one.
-    """
-    moves = side.speed > STILL * side.top
-    first = float(side.command[moves][0])
-    still = side.command[~moves]
-    last = float(still[-1]) if len(still) else 0.0
-    return max(last, first - 5.0) if first - last > 10.0 else 0.5 * (first + last)

@@ -9,7 +9,7 @@ import numpy as np
 from hydroid.arrays import record
 from hydroid.errors import LogError
 from hydroid.files import Plain
-from hydroid.fitting.speed_curve import SpeedCurve, measured_speeds
+from hydroid.fitting.valve_start import JointStart, fitted_valve
 from hydroid.log import ColumnGuess, JointMotion, Log, Table, check_log, motion_of
 from hydroid.log.read import angle_margin
 from hydroid.project.columns import column_lines
@@ -32,7 +32,7 @@ class Layout:
     """The columns of a log, as the `log` section of a fit's settings, and what its numbers say.
 
     `outputs` are joints that a log drives and measures, `motions` how the measured ones move, by number from
-    1, and `speeds` those of the outputs against the command, with the sign that it has in the section;
+    1, and `valves` those by which the outputs follow commands of the sign that these have in the section;
     `reasons` have a line for each column that is not `unused`; `followed`: a joint that no command drives
     moves. `missing` says which columns a person must name, in a section that is then no more than a start;
     `candidates` are lines about what each could be.
@@ -44,7 +44,7 @@ class Layout:
     unused: tuple[str, ...]
     motions: Mapping[int, JointMotion]
     followed: bool
-    speeds: Mapping[int, SpeedCurve] = field(default_factory=dict[int, SpeedCurve])
+    valves: Mapping[int, JointStart] = field(default_factory=dict[int, JointStart])
     origin: str = "GUESSED from the log: check every line."
     missing: str = ""
     candidates: tuple[str, ...] = ()
@@ -104,13 +104,9 @@ def find_layout(
         lacking = [name for place, name in enumerate(names, 1) if not entries.get(place, {}).get(what)]
         reasons += [f"no {what} found for {listed(lacking)}"] if lacking else []
     followed = any(m.travel > 1 for joint, m in motions.items() if joint not in driven)  # [deg]
-    curves = {joint: measured_speeds(logs, joint) for joint in driven}
-    speeds = {
-        joint: curve.turned if joint in wrong else curve
-        for joint, curve in curves.items()
-        if curve is not None
-    }
-    made = Layout(section, tuple(driven), tuple(reasons), guess.unused, motions, followed, speeds)
+    shown = {joint: fitted_valve(logs, joint) for joint in driven}
+    valves = {j: valve.turned if j in wrong else valve for j, valve in shown.items() if valve is not None}
+    made = Layout(section, tuple(driven), tuple(reasons), guess.unused, motions, followed, valves)
     return made if given is None else replace(made, origin="As you gave them, compared with the log.")
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from hydroid.arm.model import load_model
 from hydroid.cad.importer import ImportedArm
 from hydroid.files import Plain, fill_template, yaml_text
-from hydroid.fitting.speed_curve import EXPONENT, SpeedCurve, valve_start
+from hydroid.fitting.valve_start import EXPONENT, USUAL_LAG, JointStart
 from hydroid.hydraulics.valve import DENSITY
 from hydroid.log import JointMotion
 from hydroid.project.layout import Layout
@@ -29,7 +29,6 @@ UNKNOWN_DEAD, MOST_DEAD = (
     85.0,
 )  # dead band of a joint that no log moves, and the largest to start at [%]
 DRAG = 0.02  # part of the torque at the pump's pressure that damping takes at full speed
-RESPONSE = 0.1  # of a valve and its oil without any delay [s]
 USUAL_SPEED = 0.5  # of a joint of which no log tells its own [rad/s, m/s]
 LIFT = 2.0  # torque of a joint at the pump's pressure, over the largest that gravity asks of it
 
@@ -123,20 +122,19 @@ class ValveSide(NamedTuple):
 
 
 def _sides(
-    joint: Joint, curve: SpeedCurve | None, motion: JointMotion | None, usual: float
+    joint: Joint, valve: JointStart | None, motion: JointMotion | None, usual: float
 ) -> list[ValveSide]:
     """Return both directions of a joint's valve, A first, at the speeds that the logs show.
 
     `usual` is the speed of the joint at full command, by which its actuator was sized [rad/s].
     """
-    dead = DEAD * min(max(motion.dead_band, 5.0), 40.0) if motion else UNKNOWN_DEAD
+    if valve is None:
+        dead = DEAD * min(max(motion.dead_band, 5.0), 40.0) if motion else UNKNOWN_DEAD
+        opening = _opening(joint, usual, usual) if motion else ""
+        numbers = opening, short(dead), short(EXPONENT), "[1, 1, 1, 1]"
+        return [ValveSide("A", *numbers), ValveSide("B", *numbers)]
     sides = list[ValveSide]()
-    for name, sign in (("A", 1), ("B", -1)):
-        start = valve_start(curve.side(sign)) if curve else None
-        if start is None:
-            opening = _opening(joint, usual, usual) if motion else ""
-            sides.append(ValveSide(name, opening, short(dead), short(EXPONENT), "[1, 1, 1, 1]"))
-            continue
+    for name, start in zip("AB", valve.sides, strict=True):
         factors = "" if start.one_size else flow([rounded(one) for one in start.factors])
         opening = _opening(joint, start.speed, usual)
         band = short(min(start.dead_band, MOST_DEAD))
@@ -193,8 +191,8 @@ def fit_text(
     middle = np.median([*flows.values()])
     for joint in layout.outputs:
         name, size, own = arm.joint_names[joint - 1], sizes[joint - 1], arm.joints[joint - 1]
-        motion, curve = layout.motions.get(joint), layout.speeds.get(joint)
-        lag = curve.delay if curve else motion.likely_lag if motion else 0.0
+        motion, valve = layout.motions.get(joint), layout.valves.get(joint)
+        delay = max(motion.likely_lag - USUAL_LAG, 0.0) if motion else 0.0
         linear = isinstance(own.actuator, LinearActuator)
         if not linear:
             volumes.append(size.displacement * math.radians(own.range[1] - own.range[0]) / 2)
@@ -204,9 +202,10 @@ def fit_text(
                 "name": name,
                 "linear": linear,
                 "lever": own.has("lever_slope"),
-                "sides": _sides(own, curve, motion, size.speed),
+                "sides": _sides(own, valve, motion, size.speed),
                 "damping": short(DRAG * size.damping),
-                "delay": min(max(lag - RESPONSE, 0.0), 0.9),
+                "delay": min(valve.delay if valve else delay, 0.9),
+                "lag": min(valve.lag if valve else 0.05, 0.5),
                 "unit": "N·s/m" if own.slides else "N·m·s/rad",
                 # a stand-in's size is a guess, but the valves of one machine let like flows through
                 "draw": 1 if linear else short(middle / flows[joint]),

@@ -15,7 +15,8 @@ import numpy as np
 from scipy.optimize import isotonic_regression
 
 from hydroid.arrays import Array, Mask, record
-from hydroid.log import Log
+from hydroid.log import Log, one_size
+from hydroid.log.command_sizes import LEAST_COMMAND
 
 LONGEST_DELAY = 0.8
 """between a command and its motion [s]"""
@@ -27,12 +28,8 @@ STEADY = 10.0
 """change of the command in that time at which a speed counts half [%]"""
 END = 0.02
 """part of a joint's travel at each end of it where speeds do not count"""
-ONE_SIZE = 5.0
-"""commands of one size differ by less, from the tenth to the ninetieth percentile of a direction's [%]"""
 REACHED = 0.97
 """part of a side's samples below the speed that it reaches"""
-LEAST_COMMAND = 2.0
-"""below which a command is none [%]"""
 ALIKE = 1.0
 """commands that differ by less are one [%]"""
 LEAST_SAMPLES = 10  # that show a curve
@@ -78,11 +75,7 @@ class SpeedCurve:
     @property
     def one_size(self) -> bool:
         """Whether a side has commands of one size only, as a valve has that is open or shut."""
-        if len(self.command) == 0:
-            return True
-        reached = np.cumsum(self.weight) / self.weight.sum()
-        low, high = np.interp([0.1, 0.9], reached, self.command)
-        return bool(high - low < ONE_SIZE)
+        return one_size(self.command, self.weight)
 
 
 def measured_speeds(logs: Sequence[Log], joint: int) -> SpeedCurve | None:

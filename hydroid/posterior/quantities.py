@@ -77,7 +77,7 @@ def quantities(problem: Problem, uncertainty: Uncertainty) -> Quantities:
                 scalars[f"{named}_{name}"] = QuantityEstimate(
                     label=label, joint=joint, value=value, unit=unit, sd=sd, interval=interval
                 )
-        if not given:
+        if not given and curve:
             at, value, interval = zip(*sorted(curve), strict=True)
             curves[f"{named}_speed"] = CurveEstimate(
                 label=of_curve,
@@ -176,15 +176,17 @@ def direction_test(bench: Bench, estimate: Candidates, sign: float, ending: str,
     planned = dict(
         zip(COMMANDS, towards * bench.steady(estimate, commands, bench.loads(estimate))[0], strict=True)
     )
+    told = [u for u in COMMANDS if bench.tells(sign * u)]
     # the smallest command from 50 % that clearly moves the joint, or the largest
-    clear = (u for u, speed in planned.items() if u >= 50.0 and speed > ONSET * planned[100.0])
-    rise = next(clear, 100.0)
+    clear = (u for u in told if u >= 50.0 and planned[u] > ONSET * planned[100.0])
+    rise = next(clear, told[-1] if told else 100.0)
     step, opens_later = bench.movement(sign * rise, LASTS), valve_opens(bench, estimate, sign)[1][0] > 0.0
 
     def measure(candidates: Candidates, loads: Array) -> Measured:
         steady = bench.steady(candidates, commands, loads)
         for u, velocity in zip(commands.tolist(), steady.T, strict=True):
-            yield Column("speed", f"speed at {bench.pose}", f"{unit}/s", False, u), velocity
+            if abs(u) in told:
+                yield Column("speed", f"speed at {bench.pose}", f"{unit}/s", False, u), velocity
         speed = dict(zip(COMMANDS, towards * steady.T, strict=True))
         gain = (speed[60.0] - speed[40.0]) / (60.0 - 40.0)
         run = step.speeds(candidates)
@@ -201,7 +203,8 @@ def direction_test(bench: Bench, estimate: Candidates, sign: float, ending: str,
             (100.0, "full_flow", f"flow at 100 % command and {pose}", "L/min", flow),
         ]
         for u, name, label, own_unit, value in rows:
-            if planned[u] != 0.0:
+            of_several = name == "gain" and len(told) < len(COMMANDS)
+            if planned[u] != 0.0 and u in told and not of_several:
                 yield Column(f"{name}_{ending}", f"{label}, {word}", own_unit), value
         if opens_later:
             band = np.add(*valve_opens(bench, candidates, sign))

@@ -28,6 +28,10 @@ from hydroid.settings.parameters import CURVE_SD
 
 JOINT = 2
 NOISE_DEG = 0.05
+MARGIN = 0.05
+"""distance from the stops [rad]"""
+PUSHES = [150.0] * 3 + [80.0] * 5 + [30.0] * 12
+"""sum of the commands [%] from which they turn back, in the tries for a log that reaches no stop"""
 KINDS = ["power law", "bends", "all at once"]
 VALVE = {"onset": 0.0, "current_min": 0.8, "slot_width": 0.33, "plunger_mass": 0.008, "plunger_damping": 8.0}
 """what `init` writes of a coil that moves its spool in proportion to the command"""
@@ -52,7 +56,7 @@ def drawn(kind: str, rng: np.random.Generator, settings: FitSettings) -> dict[st
     truth = {"delay": rng.uniform(0.02, 0.2)}
     for side in "ab":
         truth[f"dead_{side}"] = rng.uniform(5, 45)
-        truth[f"open_{side}"] = rng.uniform(0.08, 0.16)
+        truth[f"open_{side}"] = rng.uniform(0.06, 0.12)
         truth[f"power_{side}"] = float(np.exp(rng.uniform(np.log(0.8), np.log(2.4))))
         scatter = 0.0 if kind == "power law" else CURVE_SD / np.sqrt(rng.chisquare(2) / 2)
         bends = min(scatter, 3 * CURVE_SD) * rng.normal(size=len(CURVE))
@@ -64,16 +68,21 @@ def drawn(kind: str, rng: np.random.Generator, settings: FitSettings) -> dict[st
 
 
 def recorded(truth: Mapping[str, float], settings: FitSettings, rng: np.random.Generator) -> Log:
-    """A minute of sticks, a step every 0.4 s towards the side that is farther away, with noise."""
-    sizes = rng.uniform(5, 100, 150)
-    levels = list[float]()
-    place = 0.0
-    for size in sizes:
-        sign = -np.sign(place) if abs(place) > 120 else rng.choice([-1.0, 1.0])
-        place += sign * size
-        levels.append(sign * size)
-    log = step_log(settings.arm.pose("study"), {JOINT: levels}, 0.4)
-    return noisy(simulate_log(settings, log, truth), NOISE_DEG, rng)
+    """A minute of sticks, a step every 0.4 s, mostly back towards the middle, that reaches no stop."""
+    pose = settings.arm.pose("study")
+    low, high = settings.arm.joints[JOINT - 1].limits
+    pose[JOINT - 1] = (low + high) / 2
+    for push in PUSHES:
+        levels, place = list[float](), 0.0
+        for size in rng.uniform(5, 100, 150):
+            sign = -np.sign(place) if abs(place) > push else rng.choice([-1.0, 1.0])
+            place += sign * size
+            levels.append(sign * size)
+        log = simulate_log(settings, step_log(pose, {JOINT: levels}, 0.4), truth)
+        angle = log.angle[:, JOINT - 1]
+        if angle.min() > low + MARGIN and angle.max() < high - MARGIN:
+            return noisy(log, NOISE_DEG, rng)
+    raise SystemExit("every log reaches a stop")
 
 
 def compared(problem: Problem, theta: Array, truth: Mapping[str, float]) -> dict[str, Any]:

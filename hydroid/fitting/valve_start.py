@@ -146,7 +146,9 @@ class _Following:
         scale = np.array([*SCALE, *SCALE, 0.05, 0.05])
         x = np.clip(begin, least, most)
         for _ in range(ROUNDS):
-            self._noise = max(float(np.sqrt(np.mean(self._errors(x) ** 2))), 1e-6)
+            # errors within MEMORY are about one
+            alike = max(MEMORY / self._logs[0].period, 1.0)
+            self._noise = max(float(np.sqrt(alike * np.mean(self._errors(x) ** 2))), 1e-6)
             raised = np.concatenate([*map(_raised, self._parts(x)), x[-2:]])
             begun = [x] if np.array_equal(raised, x) else [x, np.clip(raised, least, most)]
             search = partial(least_squares, self._rows, bounds=(least, most), x_scale=scale, max_nfev=STEPS)

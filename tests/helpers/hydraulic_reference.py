@@ -209,6 +209,8 @@ def reference(p: Records, command: np.ndarray, rtol: float = 1e-7) -> tuple[np.n
                 left = v["supply_pressure"] - ps
                 given = pump * min(1.0, max(left, 0.0) / v["pump_droop"]) if v["pump_droop"] > 0 else pump
                 relieved = pump * max(-left, 0.0) / 1e3  # all of it at 0.01 bar above
+                if left > v["pump_limit"]:
+                    given += 10 * pump * (left - v["pump_limit"]) / 1e3  # whatever is taken at 0.01 bar below
                 rise = (given - relieved - in_a - in_b) / v["line_volume"]
             speed = r * w
             force = v["area_a"] * pa - v["area_b"] * pb

@@ -54,6 +54,7 @@ def both(spec, arm):
         {"flow_limit": 8e-6, "return_a": 2.5},
         PUMP,
         PUMP | {"draw_a": 0.5, "return_b": 0.6},
+        PUMP | {"pump_limit": 15e5},
         {
             "overlap_a": 0.3e-3,
             "overlap_b": 0.2e-3,

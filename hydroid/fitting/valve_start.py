@@ -17,7 +17,7 @@ from scipy.optimize import OptimizeResult, least_squares
 from scipy.signal import lfilter
 
 from hydroid.arrays import Array, record
-from hydroid.fitting.baselines import follow
+from hydroid.fitting.baselines import Baseline, follow
 from hydroid.fitting.speed_curve import SpeedCurve, inside, measured_speeds
 from hydroid.hydraulics.valve import KNOTS, bent_opening
 from hydroid.log import Log
@@ -40,6 +40,7 @@ MEMORY = 1.5
 USUAL_LAG = 0.1
 """of a valve and its oil without any delay [s]"""
 ROUNDS, STEPS = 2, 25  # of the search for a valve that a joint follows, with the noise that is left
+POINTS = 401  # of a table of one direction
 FREE = np.array([-np.inf, np.inf])  # a joint without stops: its logs may have reached none
 DEAD_SD = 20.0  # scatter of a dead band around the command from which a joint seems to move [%]
 LEAST_ERROR, SPEED_ERROR = 0.01, 0.04
@@ -99,17 +100,31 @@ class JointStart:
     """Where a fit of a joint's valve begins.
 
     sides: of positive and of negative commands. delay: of the commands [s]. lag: of the speed behind the
-    valve [s].
+    valve [s]. direction: 1 where a positive command moves the joint to larger angles, else -1.
     """
 
     sides: tuple[ValveStart, ValveStart]
     delay: float
     lag: float
+    direction: float
 
     @property
     def turned(self) -> "JointStart":
         """The same for commands of the other sign."""
-        return replace(self, sides=self.sides[::-1])
+        return replace(self, sides=self.sides[::-1], direction=-self.direction)
+
+    def baseline(self, joint: int, limits: tuple[float, float]) -> Baseline:
+        """Return a joint (number, from 1) with these speeds and no load; `limits` are its range [rad].
+
+        It is a table of speeds, with a lag.
+        """
+        at = np.linspace(0.0, 100.0, POINTS)
+        a, b = (side.speed * _relative_speed(at, _begin(side)) for side in self.sides)
+        speeds = self.direction * np.concatenate([-b[:0:-1], a])
+        table = np.stack([np.concatenate([-at[:0:-1], at]), speeds], axis=1)
+        numbers = np.zeros((4, 2))
+        numbers[3] = self.lag
+        return Baseline(joint, np.asarray(limits, float), self.delay, table, numbers)
 
 
 def fitted_valve(logs: Sequence[Log], joint: int) -> JointStart | None:
@@ -154,7 +169,7 @@ class _Following:
             search = partial(least_squares, self._rows, bounds=(least, most), x_scale=scale, max_nfev=STEPS)
             x = min(map(search, begun), key=lambda ended: ended.cost).x
         a, b = (_ended(part, side) for part, side in zip(self._parts(x), self._sides, strict=True))
-        return JointStart((a, b), float(x[-2]), float(x[-1]))
+        return JointStart((a, b), float(x[-2]), float(x[-1]), self._direction)
 
     def _parts(self, x: Array) -> tuple[Array, Array]:
         """The numbers of both sides."""

@@ -143,6 +143,14 @@ def test_a_joint_that_follows_its_valve_shows_delay_lag_and_dead_bands():
     assert [np.degrees(side.speed) for side in valve.sides] == pytest.approx([30, 30], rel=0.02)
 
 
+def test_a_valve_predicts_a_log_that_it_has_not_seen():
+    speed = power((17, 60), 1.3, 30)
+    valve = fitted_valve([driven(speed)], 1)
+    assert valve is not None
+    other = driven(speed, seed=1, noise_deg=0.0)
+    assert np.degrees(np.abs(valve.baseline(1, tuple(RANGE)).errors([other])).max()) < 1.5
+
+
 def test_a_joint_that_no_log_drives_has_no_curve():
     log = driven(power((15, 40), 1.3, 30))
     still = Log("still", log.time, 0 * log.command, log.angle, PERIOD)

@@ -5,8 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from hydroid.estimate import FitSummary, ParameterEstimate
+from hydroid.estimate import CurveEstimate, FitSummary, ParameterEstimate
+from hydroid.fitting.speed_curve import measured_speeds
 from hydroid.log import Log
+from hydroid.log.command_sizes import LEAST_COMMAND
 from hydroid.parameters import Parameter
 from hydroid.posterior.uncertainty import Flag, Source
 from hydroid.quantity_table import CHOICES
@@ -17,6 +19,7 @@ from hydroid.settings.fit import FitSettings
 from hydroid.words import listed, number, two_digits
 
 BEST_WITHIN = 0.3  # half of a 95 % interval, relative to the value, up to which a property counts as known
+LEAST_WEIGHT = 5.0  # samples at a command from which its mean speed is drawn
 ENDS = ("from", "to", "by log from", "by log to", "profile from", "profile to")
 SPREAD = ("name", "unit", "median", "lowest", "lower_quartile", "upper_quartile", "highest", "flag")
 Intervals = Mapping[str, tuple[float, float]]
@@ -167,6 +170,7 @@ def speed_section(settings: FitSettings, summary: FitSummary, logs: Sequence[Log
             commands = np.concatenate([log.command[:, curve.joint - 1] for log in logs])
             low, high = [-105.0, commands.max(initial=0.0)], [commands.min(initial=0.0), 105.0]
             marks = [Mark("spans", np.array(low), end=np.array(high), color="pale", alpha=0.4)]
+            marks += _measured(logs, curve)
             for sign, color in (1, "blue"), (-1, "orange"):  # with the dead band between them
                 x, y, low, high = rows[sign * rows[:, 0] > 0].T
                 marks += [
@@ -180,9 +184,19 @@ def speed_section(settings: FitSettings, summary: FitSummary, logs: Sequence[Log
 
     text = (
         "Speeds of a settled motion through mid travel against command, with 95 % intervals. Grey: commands "
-        "beyond the logs."
+        "beyond the logs. Grey points: mean speeds in the logs, which other poses and joints slow or hasten."
     )
     return Section("Speeds", plots=(Plot("speed", text, draw),), folded=True) if curves else None
+
+
+def _measured(logs: Sequence[Log], curve: CurveEstimate) -> list[Mark]:
+    """Return the speeds that the logs show at commands that they hold for long enough, as points."""
+    shown = measured_speeds(logs, curve.joint)
+    if shown is None or not curve.along.startswith("command"):
+        return []
+    factor = shown.direction * (1e3 if curve.unit.startswith("mm") else float(np.degrees(1.0)))
+    held = (shown.weight > LEAST_WEIGHT) & (np.abs(shown.command) > LEAST_COMMAND)
+    return [Mark("points", shown.command[held], factor * shown.speed[held], color="grey", alpha=0.5, width=3)]
 
 
 def merged_tables(runs: Sequence[Record]) -> dict[str, Table]:

@@ -191,8 +191,14 @@ class Arm(Settings):
     @property
     def backward(self) -> tuple[int, ...]:
         """Joints, from 1, that turn to negative angles as their rods run out, at positive commands."""
-        actuators = enumerate((joint.actuator for joint in self.joints), 1)
-        return tuple(j for j, one in actuators if isinstance(one, LinearActuator) and one.sense < 0)
+        joints = list[int]()
+        for number, joint in enumerate(self.joints, 1):
+            if not isinstance(joint.actuator, LinearActuator):
+                continue
+            # the same throughout the range, which need not hold the angle 0 at which the triangle is given
+            if joint.actuator.moment_arm(sum(joint.limits) / 2) < 0:
+                joints.append(number)
+        return tuple(joints)
 
     @property
     def lower(self) -> Array:

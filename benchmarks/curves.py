@@ -68,21 +68,28 @@ def drawn(kind: str, rng: np.random.Generator, settings: FitSettings) -> dict[st
 
 
 def recorded(truth: Mapping[str, float], settings: FitSettings, rng: np.random.Generator) -> Log:
-    """A minute of sticks, a step every 0.4 s, mostly back towards the middle, that reaches no stop."""
+    """A minute of sticks, a step every 0.4 s, mostly back towards the middle, that reaches no stop if it can."""
     pose = settings.arm.pose("study")
     low, high = settings.arm.joints[JOINT - 1].limits
     pose[JOINT - 1] = (low + high) / 2
-    for push in PUSHES:
-        levels, place = list[float](), 0.0
-        for size in rng.uniform(5, 100, 150):
-            sign = -np.sign(place) if abs(place) > push else rng.choice([-1.0, 1.0])
-            place += sign * size
-            levels.append(sign * size)
-        log = simulate_log(settings, step_log(pose, {JOINT: levels}, 0.4), truth)
+    log = _driven(PUSHES[0], pose, truth, settings, rng)
+    for push in PUSHES[1:]:
         angle = log.angle[:, JOINT - 1]
         if angle.min() > low + MARGIN and angle.max() < high - MARGIN:
-            return noisy(log, NOISE_DEG, rng)
-    raise SystemExit("every log reaches a stop")
+            break
+        log = _driven(push, pose, truth, settings, rng)
+    return noisy(log, NOISE_DEG, rng)
+
+
+def _driven(
+    push: float, pose: Array, truth: Mapping[str, float], settings: FitSettings, rng: np.random.Generator
+) -> Log:
+    levels, place = list[float](), 0.0
+    for size in rng.uniform(5, 100, 150):
+        sign = -np.sign(place) if abs(place) > push else rng.choice([-1.0, 1.0])
+        place += sign * size
+        levels.append(sign * size)
+    return simulate_log(settings, step_log(pose, {JOINT: levels}, 0.4), truth)
 
 
 def compared(problem: Problem, theta: Array, truth: Mapping[str, float]) -> dict[str, Any]:

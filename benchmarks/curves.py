@@ -68,7 +68,7 @@ def drawn(kind: str, rng: np.random.Generator, settings: FitSettings) -> dict[st
 
 
 def recorded(truth: Mapping[str, float], settings: FitSettings, rng: np.random.Generator) -> Log:
-    """A minute of sticks, a step every 0.4 s, mostly back towards the middle, that reaches no stop if it can."""
+    """A minute of sticks, a step every 0.4 s, that reaches no stop if it can."""
     pose = settings.arm.pose("study")
     low, high = settings.arm.joints[JOINT - 1].limits
     pose[JOINT - 1] = (low + high) / 2

@@ -17,7 +17,7 @@ from hydroid.fitting.checkpoints import Checkpoints
 from hydroid.fitting.left_out import LeftOut, gain, is_better, parts, predict_parts
 from hydroid.fitting.refinement import Refinement, refine, refine_from_afar
 from hydroid.fitting.step import Step, step_of
-from hydroid.posterior.error_model import Likelihood, likelihood_at, make_likelihood
+from hydroid.posterior.error_model import Likelihood, likelihood_at, make_error_model, make_likelihood
 from hydroid.posterior.linear import estimate_box
 from hydroid.posterior.uncertainty import Uncertainty, uncertainty
 from hydroid.posterior.whiteness import lasting
@@ -148,14 +148,13 @@ class Ladder:
         own = whole.varied(whole.settings.of_estimate(step.estimate))
         theta = own.parameters.started(last.parameters.mapping(start.theta))
         likelihood = make_likelihood(own)
-        before = self.refinements[start.name].negative_log if if_better else np.inf
         if own.settings.quasi_static != last.settings.quasi_static:
             if self._is_white():  # there is nothing for a model that is slow to simulate
                 return
             few = settings.changed({"iterations": FIRST})
             first = self._refined(likelihood, theta, few, step.changed(phase="at first"))
             theta = own.parameters.from_unit(first.point)
-            if first.negative_log > before:
+            if self._explained(own, theta) < 0.0:
                 return
         # what a search ended at may be far from an optimum
         how = refine if if_better else refine_from_afar
@@ -167,7 +166,7 @@ class Ladder:
             self._keep(own, new, step)
             return
         more = max(int(own.parameters.free.sum() - last.parameters.free.sum()), 1)
-        if before - result.negative_log < WORTH * more:
+        if self._explained(own, new.theta) < WORTH * more:
             return
         without = self._parts_left_out(settings)
         mapped = [last.parameters.mapping(one) for one in without.thetas]
@@ -197,11 +196,22 @@ class Ladder:
             self._left_out[step.estimate] = without
             self._keep(own, self._measured(own, result, step), step)
 
+    def _explained(self, problem: Problem, theta: Array) -> float:
+        """Rise of the log-likelihood from the kept estimate to another, (P,), of a problem of the same logs.
+
+        Both are weighed by the errors of the kept one.
+        """
+        kept = likelihood_at(self.problem, self.kept.theta, self.refinements[self.kept.name].numbers)
+        other = replace(kept, problem=problem)
+        before = kept.rows(self.kept.theta[None])[0]
+        after = other.rows(theta[None])[0]
+        return 0.5 * float(before @ before - after @ after)
+
     def _is_white(self) -> bool:
-        """Whether the innovations of the estimate that is kept are white."""
-        likelihood = likelihood_at(self.problem, self.kept.theta, self.refinements[self.kept.name].numbers)
-        innovations = likelihood.innovations(self.kept.theta[None])[0]
-        return not any(lasting(likelihood.errors, innovations).values())
+        """Whether the errors of the estimate that is kept leave innovations that are white."""
+        shown = self.problem.output_errors(self.kept.theta[None])
+        errors = make_error_model(self.problem).estimated(shown[0])
+        return not any(lasting(errors, errors.innovations(shown)[0]).values())
 
     def _keep(self, problem: Problem, estimate: Estimate, step: Step) -> None:
         self.problem, self.kept, self._step = problem, estimate, step

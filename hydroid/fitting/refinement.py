@@ -14,8 +14,8 @@ from hydroid.search.descent import Descent, Ending, start
 from hydroid.search.least_squares import step
 from hydroid.settings.search import RefinementSettings
 
-SETTLED = 1.0
-"""gain of the log-likelihood below which the numbers of the error model stay as they are: so they settle"""
+SETTLED = 0.1
+"""relative change of the errors' numbers below which they stay as they are: so they settle"""
 
 ROUGH = 1e-3
 """gain below which a least squares of output errors ends that is to lead near an optimum"""
@@ -30,7 +30,7 @@ class Refinement(Descent):
     """A descent over innovations, then the priors' scores.
 
     Attributes:
-        numbers: of the error model, shape (S, 5).
+        numbers: of the model that weighs the errors, shape (S, 5).
         negative_log: of likelihood and priors at the point: what starts are compared by.
     """
 
@@ -98,24 +98,20 @@ def refine_from_afar(
 ) -> Refinement:
     """Improve an estimate that may be far off, as `refine` does.
 
-    There an error model takes what the parameters have not explained yet for drift, and the two may settle
-    for that. Output errors know no drift. So a rough least squares of output errors comes first, and the
-    better of both points is where the refinement begins.
+    There a model of the errors takes what the parameters have not explained yet for drift. Output errors know
+    no drift. So a rough least squares of output errors comes first.
     """
-    if likelihood.white:
+    if np.isinf(likelihood.memory):
         return refine(likelihood, theta, settings, progress, checkpoints, what)
     rough = settings.changed({"gain_tolerance": max(settings.gain_tolerance, ROUGH)})
-    output_errors = replace(likelihood, white=True)
+    output_errors = replace(likelihood, memory=np.inf)
     afar = what.changed(phase="from afar")
     first = refine(output_errors, theta, rough, progress, checkpoints, afar)
     if first.ending is Ending.TIME:
         return first
     near = likelihood.problem.parameters.from_unit(first.point)
-    begun = [_begun(likelihood, likelihood.problem.parameters.to_unit(one)) for one in (theta, near)]
-    costs = [_at(likelihood, one).negative_log(one.residual) if not one.ended else np.inf for one in begun]
-    best = near if costs[1] <= costs[0] else theta
-    result = refine(likelihood, best, settings, progress, checkpoints, what)
-    return replace(result, evaluations=result.evaluations + first.evaluations + 2)
+    result = refine(likelihood, near, settings, progress, checkpoints, what)
+    return replace(result, evaluations=result.evaluations + first.evaluations)
 
 
 def _begun(likelihood: Likelihood, unit: Array) -> Refinement:
@@ -131,19 +127,18 @@ def _begun(likelihood: Likelihood, unit: Array) -> Refinement:
 
 
 def _with_new_numbers(likelihood: Likelihood, now: Refinement) -> Refinement:
-    """Return the refinement with the error model of its point, if that is clearly more likely.
+    """Return the refinement with its errors weighed as they are at its point, if that differs clearly.
 
     One that had converged then goes on.
     """
     problem, before = likelihood.problem, _at(likelihood, now)
     errors = problem.output_errors(problem.parameters.from_unit(now.point[None]))
     after = before.estimated(errors[0])
+    now = replace(now, evaluations=now.evaluations + 1)
+    if np.allclose(after.errors.numbers, now.numbers, rtol=SETTLED, atol=0.0):
+        return now
     innovations = after.errors.innovations(errors)[0]
     rows = np.append(innovations, now.residual[innovations.size :])
-    gain = before.negative_log(now.residual) - after.negative_log(rows)
-    now = replace(now, evaluations=now.evaluations + 1)
-    if gain < SETTLED:
-        return now
     begun = start(now.point, rows)
     return replace(
         now,

@@ -17,7 +17,7 @@ from hydroid.fitting.checkpoints import Checkpoints
 from hydroid.fitting.left_out import LeftOut, gain, is_better, parts, predict_parts
 from hydroid.fitting.refinement import Refinement, refine, refine_from_afar
 from hydroid.fitting.step import Step, step_of
-from hydroid.posterior.error_model import Likelihood, likelihood_at, make_error_model, make_likelihood
+from hydroid.posterior.error_model import Likelihood, likelihood_at, make_likelihood
 from hydroid.posterior.linear import estimate_box
 from hydroid.posterior.uncertainty import Uncertainty, uncertainty
 from hydroid.posterior.whiteness import lasting
@@ -120,7 +120,9 @@ class Ladder:
                 self._try_without(whole, term, on_the_way)
         if climbs:
             kept = self.kept
-            last = self._refined(make_likelihood(self.problem), kept.theta, refinement, self._step)
+            likelihood = make_likelihood(self.problem)
+            # with an error that another model has left, the first error model would have too much drift
+            last = self._refined(likelihood, kept.theta, refinement, self._step, refine_from_afar)
             new = self._measured(self.problem, last, self._step)
             self.kept = self.estimates[kept.name] = replace(new, gained=kept.gained)
         if settings.joint_refinement:
@@ -209,9 +211,10 @@ class Ladder:
 
     def _is_white(self) -> bool:
         """Whether the errors of the estimate that is kept leave innovations that are white."""
-        shown = self.problem.output_errors(self.kept.theta[None])
-        errors = make_error_model(self.problem).estimated(shown[0])
-        return not any(lasting(errors, errors.innovations(shown)[0]).values())
+        numbers = self.refinements[self.kept.name].numbers
+        shown = likelihood_at(self.problem, self.kept.theta, numbers).shown
+        errors = self.problem.output_errors(self.kept.theta[None])
+        return not any(lasting(shown, shown.innovations(errors)[0]).values())
 
     def _keep(self, problem: Problem, estimate: Estimate, step: Step) -> None:
         self.problem, self.kept, self._step = problem, estimate, step

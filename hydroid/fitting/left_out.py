@@ -62,7 +62,7 @@ def predict_parts(problem: Problem, starts: Array, refit: Refit) -> LeftOut:
         rest = _of_logs(problem, ~out) if several else problem
         likelihood = make_likelihood(rest)
         if not several:
-            likelihood = replace(likelihood, errors=likelihood.errors.without(out))
+            likelihood = replace(likelihood, shown=likelihood.shown.without(out))
         end = refit(likelihood, start, g + 1)
         thetas[g] = problem.parameters.from_unit(end.point)
         unseen = _of_logs(problem, out) if several else problem

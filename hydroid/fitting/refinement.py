@@ -14,8 +14,8 @@ from hydroid.search.descent import Descent, Ending, start
 from hydroid.search.least_squares import step
 from hydroid.settings.search import RefinementSettings
 
-SETTLED = 0.1
-"""relative change of the errors' numbers below which they stay as they are: so they settle"""
+SETTLED = 1.0
+"""gain of the log-likelihood below which the numbers of the error model stay as they are: so they settle"""
 
 ROUGH = 1e-3
 """gain below which a least squares of output errors ends that is to lead near an optimum"""
@@ -30,7 +30,7 @@ class Refinement(Descent):
     """A descent over innovations, then the priors' scores.
 
     Attributes:
-        numbers: of the model that weighs the errors, shape (S, 5).
+        numbers: of the model of the errors, shape (S, 5).
         negative_log: of likelihood and priors at the point: what starts are compared by.
     """
 
@@ -123,19 +123,20 @@ def _begun(likelihood: Likelihood, unit: Array) -> Refinement:
         likelihood = likelihood.estimated(errors[0])
     innovations = likelihood.errors.innovations(errors)[0]
     begun = start(unit, np.append(innovations, problem.priors.scores(theta)))
-    return Refinement(**vars(begun), numbers=likelihood.errors.numbers)
+    return Refinement(**vars(begun), numbers=likelihood.shown.numbers)
 
 
 def _with_new_numbers(likelihood: Likelihood, now: Refinement) -> Refinement:
-    """Return the refinement with its errors weighed as they are at its point, if that differs clearly.
+    """Return the refinement with the error model of its point, if that is clearly more likely.
 
     One that had converged then goes on.
     """
-    problem, before = likelihood.problem, _at(likelihood, now)
+    problem = likelihood.problem
     errors = problem.output_errors(problem.parameters.from_unit(now.point[None]))
+    before = _at(likelihood, now)
     after = before.estimated(errors[0])
     now = replace(now, evaluations=now.evaluations + 1)
-    if np.allclose(after.errors.numbers, now.numbers, rtol=SETTLED, atol=0.0):
+    if after.shown.log_likelihood(errors[0]) - before.shown.log_likelihood(errors[0]) < SETTLED:
         return now
     innovations = after.errors.innovations(errors)[0]
     rows = np.append(innovations, now.residual[innovations.size :])
@@ -148,12 +149,12 @@ def _with_new_numbers(likelihood: Likelihood, now: Refinement) -> Refinement:
         fresh=False,
         slow=0,
         ending=Ending.UNDER_WAY,
-        numbers=after.errors.numbers,
+        numbers=after.shown.numbers,
     )
 
 
 def _at(likelihood: Likelihood, now: Refinement) -> Likelihood:
-    return replace(likelihood, errors=replace(likelihood.errors, numbers=now.numbers))
+    return replace(likelihood, shown=replace(likelihood.shown, numbers=now.numbers))
 
 
 def _rows(likelihood: Likelihood, now: Refinement) -> Callable[[Array], Array]:

@@ -198,6 +198,10 @@ class ErrorModel:
         """Return the logarithm of each sample's predictive density, from a row of innovations, shape (R,)."""
         return self.log_scale - 0.5 * innovations**2
 
+    def log_likelihood(self, errors: Array) -> float:
+        """Return the log-likelihood of weighted output errors, (R,)."""
+        return float(self.log_density(self.innovations(errors[None])[0]).sum())
+
     def estimated(self, errors: Array) -> "ErrorModel":
         """Return the error model whose numbers make weighted output errors, (R,), most likely."""
         numbers = self.numbers.copy()
@@ -207,35 +211,26 @@ class ErrorModel:
             numbers[i] = _most_likely(pairs, least, float(self.given[i]))
         return replace(self, numbers=numbers)
 
-    def weighing(self, errors: Array, memory: float, *, alike: bool) -> "ErrorModel":
-        """Return the model by which least squares weighs output errors, (R,), that are as here.
+    def weighing(self, memory: float, *, alike: bool) -> "ErrorModel":
+        """Return the model by which least squares weighs output errors that are as here.
 
         It has noise, and a drift that is followed within `memory` [s] or more slowly: inf takes all of the
-        error for noise. The noise is larger than it shows, for errors that last tell less than as many
-        independent ones: by how much is taken from the joint's own motion, for that is what a change of its
-        speed does to its angle.
+        error for noise. Errors that last tell less than as many independent ones. So the noise is as large as
+        makes a change of a joint's speed, whose effect is along its own motion, as uncertain as it is by the
+        errors as they are.
 
         alike: weighted errors of all signals are equally large, so that weights count; else each signal's
         are as large as they are.
         """
-        numbers = np.array([self._unit(i, memory) for i in range(len(self.signals))])
+        signals = range(len(self.signals))
+        numbers = np.array([self._unit(i, memory) for i in signals])
         unit = replace(self, numbers=numbers)
-        squares = unit.innovations(errors[None])[0] ** 2
-        levels = np.empty(len(self.signals))
-        weights = np.empty(len(self.signals))
-        for i in range(len(self.signals)):
-            courses = self.courses_of(i)
-            shown = np.concatenate([squares[course.rows][course.used] for course in courses])
-            levels[i] = np.mean(shown)
-            weights[i] = courses[0].weight
+        levels = np.array([self._level(unit, i) for i in signals])
         if alike:
-            levels = np.mean(squares[self.used] * unit._weights[self.used] ** 2) / weights**2
-        least = np.array([LEAST_NOISE[signal.quantity] ** 2 for signal in self.signals])
-        levels = np.fmax(levels, np.fmax(self.given, least))
-        inflations = np.array([self._inflation(unit, i, levels[i]) for i in range(len(self.signals))])
-        if alike:
-            inflations[:] = inflations.mean()
-        numbers[:, :2] *= (levels * inflations)[:, None]
+            weights = np.array([self.courses_of(i)[0].weight for i in signals])
+            levels = np.mean(levels * weights**2) / weights**2
+        least = [LEAST_NOISE[signal.quantity] ** 2 for signal in self.signals]
+        numbers[:, :2] *= np.maximum(levels, least)[:, None]
         return replace(self, numbers=numbers)
 
     def _unit(self, i: int, memory: float) -> Array:
@@ -245,33 +240,31 @@ class ErrorModel:
         samples = sum(int(course.used.sum()) for course in courses)
         seconds = sum(course.period * len(course.used) for course in courses)
         between = seconds / max(samples, 1)
-        growth = rate + way * sum(float(course.way.sum()) for course in courses) / seconds
         noise = sensor * between
-        if time < MEMORY:  # noise that lasts
+        growth = rate + way * sum(float(course.way.sum()) for course in courses) / seconds
+        if time < MEMORY:
             noise += 2.0 * lasting * time
-        else:  # drift
+        else:  # it is as good as a drift
             growth += 2.0 * lasting / time
-        own = np.sqrt(noise / max(growth, 1e-300))
+        own = np.sqrt(noise / max(growth, np.finfo(float).tiny))
         return np.array([1.0, between / max(own, memory) ** 2, 0.0, 0.0, SHORTEST])
 
-    def _inflation(self, unit: "ErrorModel", i: int, level: float) -> float:
-        """How much more variance the errors of signal i give to a sum along its motion than white ones."""
-        variance, white = 0.0, 0.0
+    def _level(self, unit: "ErrorModel", i: int) -> float:
+        """Variance of signal i's errors summed along its motion, over that of white noise of 1."""
+        variance = 0.0
+        white = 0.0
         for number, course in enumerate(self.courses):
             if self.of[number] == i:
                 row = _innovations(course.moved[None], *unit._filters[number])
                 variance += float(self.scatter(number, row, unit)[0, 0])
-                white += level * float(np.sum(row**2))
-        return max(variance / white, 1.0) if white > 0.0 else 1.0
+                white += float(np.sum(row**2))
+        if white > 0.0:
+            return variance / white
+        return float(self.numbers[i, 0] + self.numbers[i, 3])  # it stands still
 
     def courses_of(self, i: int) -> list[Course]:
         """Return the courses of the channels of signal i."""
         return [course for course, own in zip(self.courses, self.of, strict=True) if own == i]
-
-    @cached_property
-    def _weights(self) -> Array:
-        """Weight of each sample, shape (R,)."""
-        return np.concatenate([np.full(len(course.used), course.weight) for course in self.courses])
 
     def scatter(self, channel: int, rows: Array, fitted: "ErrorModel") -> Array:
         """Covariance of `rows` times a channel's innovations, shape (p, p), where its errors are as here.
@@ -324,14 +317,20 @@ class Likelihood:
 
     Attributes:
         problem: whose output errors these are.
-        errors: the model that weighs them (`ErrorModel.weighing`).
+        shown: the model of these errors, as they are.
         memory: within which least squares takes an error for drift, at the fastest [s]; inf in stage 1, which
             is fitted by output errors as in the article, and on the way from afar.
     """
 
     problem: Problem
-    errors: ErrorModel
+    shown: ErrorModel
     memory: float
+
+    @cached_property
+    def errors(self) -> ErrorModel:
+        """The model that weighs the errors (`ErrorModel.weighing`)."""
+        alike = self.problem.settings.stage == "mech"  # as in the article
+        return self.shown.weighing(self.memory, alike=alike)
 
     def innovations(self, theta: Array) -> Array:
         """Return innovations [1] of theta, shape (n, P): (n, R); NaN where a simulation diverged."""
@@ -359,9 +358,7 @@ class Likelihood:
 
     def estimated(self, errors: Array) -> "Likelihood":
         """Return the likelihood for what weighted output errors, (R,), show of their model."""
-        alike = self.problem.settings.stage == "mech"  # as in the article
-        shown = self.errors.estimated(errors)
-        return replace(self, errors=shown.weighing(errors, self.memory, alike=alike))
+        return replace(self, shown=self.shown.estimated(errors))
 
 
 def make_likelihood(problem: Problem) -> Likelihood:
@@ -373,11 +370,11 @@ def make_likelihood(problem: Problem) -> Likelihood:
 def likelihood_at(problem: Problem, theta: Array, numbers: Array | None = None) -> Likelihood:
     """Return the likelihood of a problem with the errors that it shows at theta, shape (P,).
 
-    With `numbers`, (S, 5), these weigh them.
+    With `numbers`, (S, 5), it shows these.
     """
     likelihood = make_likelihood(problem)
     if numbers is not None:
-        return replace(likelihood, errors=replace(likelihood.errors, numbers=numbers))
+        return replace(likelihood, shown=replace(likelihood.shown, numbers=numbers))
     return likelihood.estimated(problem.output_errors(theta[None])[0])
 
 
@@ -441,10 +438,11 @@ def _most_likely(pairs: Sequence[tuple[Course, Array]], least: float, given: flo
     steady = np.array([0.5, 0.1 / seconds, 0.1 / way, 0.1, 0.0]) * square
     drifting = np.array([1e-3, 10 / seconds, 10 / way, 1e-2, 0.0]) * square
     steady[4] = drifting[4] = 0.3
+    options = {"maxiter": 60, "ftol": 1e-6}  # of a log-likelihood in the thousands
     ended = list[OptimizeResult]()
     for start in (steady, drifting):
         begin = np.clip(np.log(np.maximum(start, 1e-300)), *bounds.T)
-        ended.append(minimize(cost, begin, method="L-BFGS-B", bounds=bounds, options={"maxiter": 60}))
+        ended.append(minimize(cost, begin, method="L-BFGS-B", bounds=bounds, options=options))
     return np.exp(min(ended, key=lambda one: one.fun).x)
 
 

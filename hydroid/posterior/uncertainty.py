@@ -147,7 +147,7 @@ def uncertainty(
 ) -> Uncertainty:
     """Return the uncertainty of theta, shape (P,) (`linearised`).
 
-    `numbers` that weigh the errors, (S, 5), are those that least squares ended with; None: those that the errors
+    `numbers` of the errors, (S, 5), are those that least squares ended with; None: those that the errors
     at theta show.
     """
     likelihood = likelihood_at(problem, theta, numbers)
@@ -164,7 +164,7 @@ def uncertainty_from(likelihood: Likelihood, whole: Linear) -> Uncertainty:
     held = edge & (white <= UNIDENTIFIABLE_ABOVE)
     linear = whole.of(~held | held.all())
     shown = fitted.errors(whole.innovations[None])
-    errors = fitted.estimated(shown[0])
+    errors = likelihood.shown
     scatters = _scatters(likelihood, errors, linear.effects)
     size = np.linalg.norm(linear.changes, axis=0)  # D V' is (V D^-1)^-1
     half = np.linalg.cholesky(scatters.sum(axis=0) + linear.prior_scatter)

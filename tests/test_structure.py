@@ -21,6 +21,7 @@ LAYERS = [
     {"problem"},
     {"plant", "prediction"},
     {"posterior"},
+    {"use"},
     {"fitting"},
     {"advice"},
     {"run"},

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     )
     from hydroid.commands.check import check as check, convert as convert
     from hydroid.commands.fit import FitResult as FitResult, fit as fit
+    from hydroid.commands.follow import follow as follow
     from hydroid.commands.init import init as init
     from hydroid.commands.inputs import load_settings as load_settings
     from hydroid.commands.logs import read_logs as read_logs

@@ -1,6 +1,7 @@
 """The settled speeds of an arm in any pose, and the commands for wished ones, with what keeps them away."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from enum import StrEnum
 
 import mujoco
@@ -113,7 +114,8 @@ class SteadyArm:
         found = [dict[int, Limit]() for _ in speed]
         rows = np.flatnonzero(away.any(axis=1))
         alone = self._with_endless_pump(speed[rows], pose[rows])
-        for row, enough in zip(rows.tolist(), alone, strict=True):
+        gained = np.abs(alone - reached[rows]) > CLOSE * np.abs(speed[rows])
+        for row, pumped in zip(rows.tolist(), gained, strict=True):
             for joint in np.flatnonzero(away[row]).tolist():
                 if stopped[row, joint]:
                     limit = Limit.STOP
@@ -122,23 +124,15 @@ class SteadyArm:
                 elif abs(command[row, joint]) < FULL_COMMAND - 1e-6:
                     limit = Limit.SLOWEST
                 else:
-                    limit = Limit.PUMP if enough[joint] else Limit.FULL
+                    limit = Limit.PUMP if pumped[joint] else Limit.FULL
                 found[row][joint] = limit
         return found
 
-    def _with_endless_pump(self, speed: Array, pose: Array) -> Mask:
-        """Whether joints had their wished speeds if the pump had no limit, (S, J)."""
+    def _with_endless_pump(self, speed: Array, pose: Array) -> Array:
+        """Return the speeds that joints would reach if the pump had no limit [rad/s], (S, J)."""
         endless = self.plugin.coefficients.copy()
         endless["pump_flow"] = np.inf
-        other = SteadyArm(
-            self.weighing,
-            self.plugin._replace(coefficients=endless),
-            self.columns,
-            self.ranges,
-            self.quasi_static,
-        )
-        _, reached = other.commands(speed, pose)
-        return np.abs(reached - speed) <= CLOSE * np.abs(speed)
+        return replace(self, plugin=self.plugin._replace(coefficients=endless)).commands(speed, pose)[1]
 
     def _spread(self, values: Array) -> Array:
         """Spread values of the V joints over all, 0 of the others."""

@@ -1,1 +1,1 @@
-"""What an identified arm is for: commands that follow a path, draws, an environment, other programs' files."""
+"""What an identified arm is for: commands along a path, draws, an environment, files of other programs."""

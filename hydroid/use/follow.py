@@ -31,8 +31,9 @@ PASSED = 0.25
 FASTEST = 0.2  # of that, at most so much of a sample's rate
 QUIET = 0.005
 """part of a joint's largest wished speed below which it stands: no valve should chatter on its dead band"""
-AWAY = 0.02
-"""part of its largest wished speed by which a joint must miss it for a span to be named"""
+AWAY, AWAY_SLOW = 0.02, 0.1
+"""part of its largest wished speed by which a joint must miss a wish for a span to be named; the second of
+wishes that are slow, which every path has where it turns round"""
 
 
 @record
@@ -114,7 +115,7 @@ def follow(model: IdentifiedModel, path: Log, *, payload: float = 0.0) -> Follow
 
 
 def joint_lags(plant: Plant) -> Array:
-    """Return by how much each joint's speed is late [s], shape (J,): delay and lags, the mean of both sides."""
+    """Return by how much joints are late [s], shape (J,): delay and lags, the mean of both sides."""
     own, lags = plant.actuators, np.zeros(len(plant.names))
     late = own["opening_lag"] + 0.5 * (own["delay_a"] + own["delay_b"])
     late = late + 0.5 * (own["pilot_lag_a"] + own["pilot_lag_b"])
@@ -165,6 +166,13 @@ def _within_range(plant: Plant, path: Log) -> tuple[Log, list[Missed]]:
     return replace(path, angle=clipped), missed
 
 
+def _named(limit: Limit | None, away: float) -> bool:
+    """Whether a reason is named where a joint misses its wish by a part of its largest one."""
+    if limit is None:
+        return False
+    return away > (AWAY_SLOW if limit in (Limit.SLOWEST, Limit.LEAKS) else AWAY)
+
+
 class _Tracker:
     """Learns commands along a path of one plant."""
 
@@ -184,18 +192,18 @@ class _Tracker:
         command, reached = self._steady.commands(speed, pose, self._load)
         rows = np.flatnonzero(np.any(np.abs(reached - speed) > self._quiet(), axis=1))
         limits = self._steady.limits(speed[rows], reached[rows], command[rows], pose[rows])
+        by_row = dict(zip(rows.tolist(), limits, strict=True))
         found = list[Missed]()
         for joint in self._driven.tolist():
-            away = np.abs(reached - speed)[:, joint]
-            largest = AWAY * np.abs(speed[:, joint]).max()
-            by_row = {row: one.get(joint) for row, one in zip(rows.tolist(), limits, strict=True)}
-            at = np.array([row for row in rows.tolist() if by_row[row] and away[row] > largest], int)
-            for span in np.split(at, np.flatnonzero(np.diff(at) > 1) + 1):
+            largest = max(float(np.abs(speed[:, joint]).max()), LEAST_SPEED)
+            away = np.abs(reached - speed)[:, joint] / largest
+            at = [row for row in by_row if _named(by_row[row].get(joint), away[row])]
+            for span in np.split(np.array(at, int), np.flatnonzero(np.diff(at) > 1) + 1):
                 if len(span):
-                    worst = span[np.argmax(away[span])]
-                    limit = by_row[int(worst)] or Limit.FULL
+                    worst = int(span[np.argmax(away[span])])
                     speeds = float(speed[worst, joint]), float(reached[worst, joint])
-                    found.append(Missed(joint, limit, float(time[span[0]]), float(time[span[-1]]), *speeds))
+                    times = float(time[span[0]]), float(time[span[-1]])
+                    found.append(Missed(joint, by_row[worst][joint], *times, *speeds))
         return found
 
     def learn(self) -> tuple[Array, Array, int]:

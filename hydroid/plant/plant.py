@@ -3,18 +3,21 @@
 from collections.abc import Mapping, Sequence
 from copy import copy
 from pathlib import Path
+from typing import NamedTuple
 
+import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hydroid.arm.export import dressed_model, locked_spec, write_fitted
 from hydroid.arm.locked import lock
 from hydroid.arm.model import add_payload, load_model
-from hydroid.arrays import Array
+from hydroid.arrays import Array, Index, Structs
 from hydroid.errors import RunError, SettingsError
 from hydroid.estimate import write_estimate
 from hydroid.files import Plain
 from hydroid.hydraulics.actuator import pressures
+from hydroid.hydraulics.kernel import Plugin
 from hydroid.hydraulics.records import JOINT_STATE, Records, has_force_curve
 from hydroid.identified_model import IdentifiedModel, write_settings
 from hydroid.mjcf import quiet_mujoco, read_mjcf
@@ -24,6 +27,34 @@ from hydroid.quantity_table import MECHANICAL, QUANTITIES
 from hydroid.simulation.quasi_static import roll_quasi_static
 from hydroid.simulation.rollout import Course, Record, SteppedArm, compile_rollout, roll
 from hydroid.simulation.scenario import Chain, model_values
+
+PHYSICS = mujoco.mjtState.mjSTATE_INTEGRATION.value
+"""what MuJoCo needs to go on to the same bits"""
+
+
+class PlantParts(NamedTuple):
+    """What a plant is made of since its last reset: for code that steps many."""
+
+    columns: Index  # moving joints among the arm's, (V,)
+    chain: Chain
+    arm: SteppedArm
+    plugin: Plugin
+    state: Structs
+    course: Course
+    gain: Array  # [N·m/%], (V,)
+    balance: Array  # [N·m], (V,)
+
+
+class PlantState(NamedTuple):
+    """Where a plant stands, to the bit: `Plant.state` makes it, `Plant.restore` takes it. It pickles."""
+
+    start: Array
+    taken: int
+    state: Structs
+    commands: Array
+    physics: Array
+    mass: Array
+    armature: Array
 
 
 class Plant:
@@ -98,6 +129,24 @@ class Plant:
         return self.identified.settings.arm.joint_names
 
     @property
+    def quasi_static(self) -> bool:
+        """Whether the joints' speeds follow valve and load at once."""
+        return self.identified.settings.quasi_static
+
+    @property
+    def past(self) -> int:
+        """Steps of commands that its delays reach back."""
+        return self._plugin.past
+
+    @property
+    def parts(self) -> PlantParts:
+        """What it is made of, since its last reset."""
+        chain, arm, course = self._chain, self._arm, self._course
+        return PlantParts(
+            self._columns, chain, arm, self._plugin, self._state, course, self._gain, self._balance
+        )
+
+    @property
     def actuators(self) -> Records:
         """Quantities of all joints' actuators in SI, (J,) of `hydraulics.records.JOINT`."""
         return self._candidate.joints[0]
@@ -151,9 +200,8 @@ class Plant:
             self._plugin, self._state = plugin.of(0), states[0]
             commands = np.zeros((self._plugin.past + self._steps, len(self._state)))
             self._course = Course(commands, np.empty((self._steps, len(self._chain.pushed))))
-            self._roll = self._arm.bind(self._plugin, self._state, self._course, self._record)
             self._mass = self.data.M.copy()
-        self._taken = 0
+        self._roll, self._taken = None, 0
         return self.angle
 
     def step(self, command: ArrayLike | Mapping[str, float]) -> Array:
@@ -179,6 +227,8 @@ class Plant:
         # M of the step before: refreshing positions in between must not change a bit
         np.copyto(self.data.M, self._mass)
         with quiet_mujoco():
+            if self._roll is None:
+                self._roll = self._arm.bind(self._plugin, self._state, self._course, self._record)
             self._roll()
         np.copyto(self._mass, self.data.M)
         self._taken += self._steps
@@ -238,6 +288,32 @@ class Plant:
             self._weighing = Weighing(self._spec, settings.arm, self._candidate, self._start)
         ranges = np.array([settings.arm.lower, settings.arm.upper]).T
         return SteadyArm(self._weighing, self._plugin, self._chain.joints, ranges, settings.quasi_static)
+
+    def state(self) -> PlantState:
+        """Return where the plant stands, oil, valves and commands on their way included."""
+        size = mujoco.mj_stateSize(self.model, PHYSICS)
+        physics = np.empty(size)
+        mujoco.mj_getState(self.model, self.data, physics, PHYSICS)
+        commands, armature = self._course.commands.copy(), self.model.dof_armature.copy()
+        mass = self._mass.copy()
+        return PlantState(
+            self._start.copy(), self._taken, self._state.copy(), commands, physics, mass, armature
+        )
+
+    def restore(self, state: PlantState) -> Array:
+        """Go back to where the plant, or another one of its model, stood; it then steps to the same bits.
+
+        Returns:
+            The joint angles [rad], shape (J,).
+        """
+        self.reset(state.start)
+        self._state[:] = state.state
+        self._course.commands[:] = state.commands
+        mujoco.mj_setState(self.model, self.data, state.physics, PHYSICS)
+        self._mass[:] = state.mass
+        self.model.dof_armature[:] = state.armature
+        self._taken = state.taken
+        return self.angle
 
     def save(self, folder: str | Path) -> None:
         """Write the plant, without payload, to a folder that `load_plant` reads; `export` to `model/` there.

@@ -178,16 +178,25 @@ class SteppedArm:
         """
         self._roll(self._handles, plugin, state, course, record)
 
-    def bind(self, plugin: Plugin, state: Structs, course: Course, record: Record) -> Callable[[], object]:
-        """Return a call of `roll` with these arrays, whatever they hold by then.
+    @property
+    def handles(self) -> Handles:
+        """What compiled code steps."""
+        return self._handles
 
-        It takes some 3 µs beside a step: numba looks at the types of structured arrays, 1 ms, only here.
-        """
-        arguments = (self._handles, plugin, state, course, record)
-        compiled: Any = self._roll
-        (source,) = compiled.py_func.__defaults__
-        kinds = (*map(typeof, arguments), types.Omitted(source))
-        return partial(compiled.compile(kinds), *arguments, OmittedArg(source))
+    def bind(self, plugin: Plugin, state: Structs, course: Course, record: Record) -> Callable[[], object]:
+        """Return a call of `roll` with these arrays, whatever they hold by then."""
+        return bind(self._roll, self._handles, plugin, state, course, record)
+
+
+def bind(compiled: Any, *arguments: Any) -> Callable[[], object]:
+    """Return a call of a compiled function with these arguments, whose last one, `source`, is left out.
+
+    It takes 3 µs beside the function itself. Without it numba looks at the types of structured arrays at
+    every call: 1 ms.
+    """
+    (source,) = compiled.py_func.__defaults__
+    kinds = (*map(typeof, arguments), types.Omitted(source))
+    return partial(compiled.compile(kinds), *arguments, OmittedArg(source))
 
 
 @compilable

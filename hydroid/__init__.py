@@ -42,7 +42,9 @@ if TYPE_CHECKING:
     )
     from hydroid.log import Log as Log, write_log as write_log
     from hydroid.parallel.cluster import open_workers as open_workers
-    from hydroid.plant import Plant as Plant, load_plant as load_plant
+    from hydroid.plant import Plant as Plant, PlantBatch as PlantBatch, load_plant as load_plant
+    from hydroid.use.draws import Draws as Draws
+    from hydroid.use.environment import Env as Env, VectorEnv as VectorEnv
 
 __version__ = "0.1.0"
 

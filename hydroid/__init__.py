@@ -23,6 +23,7 @@ if TYPE_CHECKING:
         quantity as quantity,
     )
     from hydroid.commands.check import check as check, convert as convert
+    from hydroid.commands.export import draw as draw, export as export
     from hydroid.commands.fit import FitResult as FitResult, fit as fit
     from hydroid.commands.follow import follow as follow
     from hydroid.commands.init import init as init

@@ -45,6 +45,7 @@ GROUPS = {
     "Use the model": {
         "simulate": "simulate commands, write a log",
         "follow": "find commands that lead the arm along a path",
+        "export": "write it for other programs: URDF, MJCF, FMU, tables, draws",
     },
     "Compare settings": {"study": "fit with several settings, each over many seeds"},
 }

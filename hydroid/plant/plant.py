@@ -152,6 +152,11 @@ class Plant:
         return self._candidate.joints[0]
 
     @property
+    def masses(self) -> Array:
+        """Of the arm's links [kg], in the order of `arm.link_names`."""
+        return self._candidate.mass[0]
+
+    @property
     def command(self) -> Array:
         """What the motors' controls in `data.ctrl` hold [%], shape (J,)."""
         command = np.zeros(len(self._pose))

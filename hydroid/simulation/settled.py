@@ -30,7 +30,8 @@ HALVINGS = 32
 """of the full command: to 2e-8 %"""
 MOST_PRESSURES = 40
 """of the line that are tried; five suffice"""
-SETTLED = 1e-9  # part of the pump's flow that may be left
+CLOSE = 1e-9  # part of the relief pressure that two pressures of the line may be apart
+SETTLED = 1e-6  # part of the pump's flow that may be left: more than the halvings leave of a command
 
 
 @compilable
@@ -117,10 +118,17 @@ def shared_pressure(plugin: Plugin, work, command, wished, inverse: bool, quasi:
         return np.inf
     low, high, last = 0.0, some.relief, 0
     over = drawn_at(plugin, work, high, command, wished, inverse, quasi, rod)
-    under = drawn_at(plugin, work, low, command, wished, inverse, quasi, rod) - some.pump_flow
-    if over <= 0.0 or under >= 0.0:
+    if over <= 0.0:
         return high
+    if over < some.pump_flow:  # where the pump gives this flow; at less pressure no more is drawn
+        low = high - some.pump_droop * over / some.pump_flow
+    under = drawn_at(plugin, work, low, command, wished, inverse, quasi, rod)
+    under -= delivery(low, 1.0, some)[0]
+    if abs(under) <= SETTLED * some.pump_flow or under >= 0.0:
+        return low
     for count in range(MOST_PRESSURES):
+        if high - low <= CLOSE * some.relief:  # a pump without a droop gives any flow there
+            break
         pressure = low - under * (high - low) / (over - under)
         if count % 4 == 3:
             pressure = 0.5 * (low + high)

@@ -191,8 +191,8 @@ class SteppedArm:
 def bind(compiled: Any, *arguments: Any) -> Callable[[], object]:
     """Return a call of a compiled function with these arguments, whose last one, `source`, is left out.
 
-    It takes 3 µs beside the function itself. Without it numba looks at the types of structured arrays at
-    every call: 1 ms.
+    It takes 3 µs beside the function itself. Without it numba looks at the types at every call, and may take
+    1 ms for those of structured arrays.
     """
     (source,) = compiled.py_func.__defaults__
     kinds = (*map(typeof, arguments), types.Omitted(source))

@@ -14,10 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import gymnasium
 import numpy as np
-from gymnasium.vector import AutoresetMode, VectorEnv as GymnasiumVectorEnv
-from gymnasium.vector.utils import batch_space
 from numpy.random import Generator
 from numpy.typing import NDArray
 
@@ -27,6 +24,13 @@ from hydroid.identified_model import IdentifiedModel, load_identified
 from hydroid.plant import Plant, PlantBatch
 from hydroid.plant.batch import RowState
 from hydroid.use.draws import DriftingAngles, draw, error_numbers
+
+try:
+    import gymnasium
+    from gymnasium.vector import AutoresetMode, VectorEnv as GymnasiumVectorEnv
+    from gymnasium.vector.utils import batch_space
+except ImportError:
+    raise ImportError("environments need gymnasium: pip install 'hydroid[gym]'") from None
 
 Floats = NDArray[np.float32]
 

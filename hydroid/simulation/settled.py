@@ -1,9 +1,10 @@
 """Settled speeds of all joints at once, and their inverse: the commands at which joints move as wished.
 
-As in `steady`, commands are held, all that starts, lags or rings has passed, and lever and load are those of
-the pose; here the joints share the pump's line. At a line pressure P each joint is alone: its speed rises
-with its command, so that halvings find the least command that is enough. What the joints then draw from the
-line rises with P, and what the pump gives falls, so that there is one P.
+As in `steady`, commands are held, all that starts, lags or rings has passed, and lever and load
+are those of the pose; here the joints share the pump's line. At a line pressure P each joint is
+alone: its speed rises with its command, so that halvings find the least command that is enough.
+What the joints then draw from the line rises with P, and what the pump gives falls, so that there
+is one P.
 
 What the dynamic model's oil takes in because load and lever change on the way is left out.
 """
@@ -11,7 +12,7 @@ What the dynamic model's oil takes in because load and lever change on the way i
 # pyright: reportMissingParameterType=false
 # a law takes floats or arrays that broadcast, and compiled code whatever has its fields
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -89,41 +90,62 @@ def nearest_command(c, w, wished: float, command: float, supply: float, quasi: b
     return 0.0 if reached == 0.0 else below
 
 
+class Law(NamedTuple):
+    """What is sought: commands for speeds if `inverse`, or speeds; of the quasi-static model or not."""
+
+    inverse: bool
+    quasi: bool
+
+
+class Rods(NamedTuple):
+    """Of the J joints: scratch space, commands [%], wished speeds [rad/s], and those of the rods [m/s]."""
+
+    work: Any
+    command: Any
+    wished: Any
+    speed: Any
+
+
+class Places(NamedTuple):
+    """Where S poses have the joints [rad], and what holds them there [N·m], shape (S, J) each."""
+
+    angle: Array
+    load: Array
+
+
 @compilable
-def drawn_at(
-    plugin: Plugin, work, pressure: float, command, wished, inverse: bool, quasi: bool, rod
-) -> float:
-    """Flow from the line [m³/s] at its pressure [Pa], with the rods' speeds, and inversely the commands."""
+def drawn_at(plugin: Plugin, rods: Rods, law: Law, pressure: float) -> float:
+    """Flow from the line [m³/s] at its pressure [Pa]; writes the rods' speeds, and inversely commands."""
     drawn = 0.0
     for a in range(plugin.idle, plugin.order.size):
         j = plugin.order[a]
-        c, w = plugin.coefficients[j], work[j]
+        c, w = plugin.coefficients[j], rods.work[j]
         supply = min(pressure, c.supply_pressure)
-        if inverse:
-            command[j] = least_command(c, w, wished[j] * w.arm, supply, quasi)
-        w.travel = steady_opening(command[j], c)
-        rod[j], flow = settled_rod(c, w, supply, quasi)
+        if law.inverse:
+            rods.command[j] = least_command(c, w, rods.wished[j] * w.arm, supply, law.quasi)
+        w.travel = steady_opening(rods.command[j], c)
+        rods.speed[j], flow = settled_rod(c, w, supply, law.quasi)
         drawn += flow
     return drawn
 
 
 @compilable
-def shared_pressure(plugin: Plugin, work, command, wished, inverse: bool, quasi: bool, rod) -> float:
-    """Pressure of the line [Pa] at which the pump gives what joints draw; inf where its flow has no limit.
+def shared_pressure(plugin: Plugin, rods: Rods, law: Law) -> float:
+    """Pressure of the line [Pa] at which the pump gives what joints draw; inf where it has no limit.
 
-    Regula falsi by the Illinois rule: what joints draw at wished speeds hardly depends on the pressure.
+    Regula falsi by the Illinois rule: what joints draw at wished speeds hardly depends on the
+    pressure.
     """
     some = plugin.coefficients[plugin.order[plugin.order.size - 1]]
     if some.pump_flow == np.inf:
         return np.inf
     low, high, last = 0.0, some.relief, 0
-    over = drawn_at(plugin, work, high, command, wished, inverse, quasi, rod)
+    over = drawn_at(plugin, rods, law, high)
     if over <= 0.0:
         return high
     if over < some.pump_flow:  # where the pump gives this flow; at less pressure no more is drawn
         low = high - some.pump_droop * over / some.pump_flow
-    under = drawn_at(plugin, work, low, command, wished, inverse, quasi, rod)
-    under -= delivery(low, 1.0, some)[0]
+    under = drawn_at(plugin, rods, law, low) - delivery(low, 1.0, some)[0]
     if abs(under) <= SETTLED * some.pump_flow or under >= 0.0:
         return low
     for count in range(MOST_PRESSURES):
@@ -132,8 +154,7 @@ def shared_pressure(plugin: Plugin, work, command, wished, inverse: bool, quasi:
         pressure = low - under * (high - low) / (over - under)
         if count % 4 == 3:
             pressure = 0.5 * (low + high)
-        drawn = drawn_at(plugin, work, pressure, command, wished, inverse, quasi, rod)
-        excess = drawn - delivery(pressure, 1.0, some)[0]
+        excess = drawn_at(plugin, rods, law, pressure) - delivery(pressure, 1.0, some)[0]
         if abs(excess) <= SETTLED * some.pump_flow:
             return pressure
         if excess > 0.0:
@@ -147,28 +168,27 @@ def shared_pressure(plugin: Plugin, work, command, wished, inverse: bool, quasi:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _settle(
-    plugin: Plugin, angle, load, command, velocity, inverse: bool, quasi: bool, source: int = SOURCE
-) -> None:
-    """Replace velocities [rad/s], (S, J), by the settled ones; inversely commands [%] by those that do it."""
+def _settle(plugin: Plugin, places: Places, law: Law, command, velocity, source: int = SOURCE) -> None:
+    """Replace velocities [rad/s], (S, J), by the settled ones; inversely commands by those that do it."""
     joints = plugin.order.size
-    work, rod, wished = make_pad(joints).joints, np.zeros(joints), np.zeros(joints)
-    for k in range(angle.shape[0]):
+    work, speed, wished = make_pad(joints).joints, np.zeros(joints), np.zeros(joints)
+    for k in range(places.angle.shape[0]):
         for a in range(plugin.idle, joints):
             j = plugin.order[a]
-            weigh(plugin.coefficients[j], work[j], angle[k, j], load[k, j])
+            weigh(plugin.coefficients[j], work[j], places.angle[k, j], places.load[k, j])
         wished[:] = velocity[k]
-        pressure = shared_pressure(plugin, work, command[k], wished, inverse, quasi, rod)
-        drawn_at(plugin, work, pressure, command[k], wished, inverse, quasi, rod)
+        rods = Rods(work, command[k], wished, speed)
+        pressure = shared_pressure(plugin, rods, law)
+        drawn_at(plugin, rods, law, pressure)
         for a in range(plugin.idle, joints):
             j = plugin.order[a]
             c, w = plugin.coefficients[j], work[j]
-            if inverse and wished[j] != 0.0:
+            if law.inverse and wished[j] != 0.0:
                 supply = min(pressure, c.supply_pressure)
-                command[k, j] = nearest_command(c, w, wished[j] * w.arm, command[k, j], supply, quasi)
+                command[k, j] = nearest_command(c, w, wished[j] * w.arm, command[k, j], supply, law.quasi)
                 w.travel = steady_opening(command[k, j], c)
-                rod[j] = settled_rod(c, w, supply, quasi)[0]
-            velocity[k, j] = rod[j] / w.arm + 0.0  # no -0
+                speed[j] = settled_rod(c, w, supply, law.quasi)[0]
+            velocity[k, j] = speed[j] / w.arm + 0.0  # no -0
 
 
 def settled_speeds(plugin: Plugin, angle: Array, load: Array, command: Array, *, quasi_static: bool) -> Array:
@@ -184,7 +204,7 @@ def settled_speeds(plugin: Plugin, angle: Array, load: Array, command: Array, *,
     Of a joint that slides they are in m/s, and loads are forces [N]. One without actuator has 0.
     """
     velocity = np.zeros(angle.shape)
-    _settle(plugin, angle, load, command.copy(), velocity, False, quasi_static)
+    _settle(plugin, Places(angle, load), Law(False, quasi_static), command.copy(), velocity)
     return velocity
 
 
@@ -193,9 +213,9 @@ def settled_commands(
 ) -> tuple[Array, Array]:
     """Return commands [%] at which joints have wished velocities [rad/s], (S, J), and those they then have.
 
-    Where a wish cannot be had it is the nearest of what the joint can do beside the others. Arguments are as
-    of `settled_speeds`.
+    Where a wish cannot be had it is the nearest of what the joint can do beside the others.
+    Arguments are as of `settled_speeds`.
     """
     command, reached = np.zeros(angle.shape), velocity.copy()
-    _settle(plugin, angle, load, command, reached, True, quasi_static)
+    _settle(plugin, Places(angle, load), Law(True, quasi_static), command, reached)
     return command, reached

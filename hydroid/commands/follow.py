@@ -14,10 +14,12 @@ from hydroid.commands.inputs import (
 )
 from hydroid.commands.logs import read_arms
 from hydroid.errors import SettingsError
-from hydroid.log import Log, write_log
+from hydroid.files import is_file
+from hydroid.log import Log, open_table, write_log
 from hydroid.words import plain
 
 if TYPE_CHECKING:
+    from hydroid.settings.fit import FitSettings
     from hydroid.use.follow import Followed
 
 
@@ -57,7 +59,8 @@ def follow(
     model = open_model(fit, overrides=set)
     if model.settings.stage != "hyd":
         raise SettingsError("a fit of stage 1 has no valves", model.source, "name a fit of stage 2")
-    (path,) = read_arms(trajectory, model.settings, None, angles=True, repair=repair).values()
+    settings = _of_its_joints(trajectory, model.settings)
+    (path,) = read_arms(trajectory, settings, None, angles=True, repair=repair).values()
     from hydroid.reporting.follow_page import follow_page, missed_lines, tracking_table
     from hydroid.use.follow import follow as find_commands
 
@@ -77,6 +80,26 @@ def follow(
     missed = [{**vars(one), "joint": arm.joint_names[one.joint]} for one in found.missed]
     content = {"out": out and str(out), "lead_s": found.lead_s, "joints": rows, "missed": missed}
     return Result(lines, content, found, page)
+
+
+def _of_its_joints(trajectory: "Source | Log", settings: "FitSettings") -> "FitSettings":
+    """Return the settings without the joints that a file has no angle of.
+
+    A file with a column of another name may have misspelt one: there every joint is still asked for.
+    """
+    if isinstance(trajectory, Log) or not is_file(trajectory):
+        return settings
+    columns = settings.log
+    names = {*open_table(Path(trajectory), columns).names} - {columns.time.column}
+    every = range(1, 1 + len(settings.arm.joints))
+    mapped = {joint: columns.columns("angle", joint) for joint in every}
+    absent = [joint for joint, own in mapped.items() if own and not {*own.column} & names]
+    commands = [columns.columns("command", joint) for joint in every]
+    known = {name for own in (*mapped.values(), *commands) if own for name in own.column}
+    if names - known or len(absent) == len(settings.arm.joints):
+        return settings
+    joints = dict(columns.joints) | dict.fromkeys(absent)
+    return settings.changed({"log": columns.changed({"joints": joints})})
 
 
 def _joint(found: "Followed", joint: int, name: str) -> dict[str, object]:

@@ -144,7 +144,7 @@ def _with_rest(path: Log, lag: float) -> Log:
     """Return a path whose first motion leaves time for commands that come before it."""
     angle, period = path.posed, path.period
     moves = np.flatnonzero(np.any(np.abs(angle - angle[0]) > LEAST_SPEED, axis=1))
-    rests = int(moves[0]) - 1 if len(moves) else 0
+    rests = int(moves[0]) - 1 if len(moves) else len(angle)
     more = max(int(np.ceil(lag / period)) + 1 - rests, 0)
     angle = np.concatenate([np.repeat(angle[:1], more, axis=0), angle])
     time = np.arange(len(angle), dtype=float) * period

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import pandas
 import pytest
 from made_logs import HYDRAULIC, TRUTH
 
@@ -34,7 +35,7 @@ def path(one: IdentifiedModel, speed=0.05, seconds=6.0, rest=0.5, joints=JOINTS)
     """Half waves of some joints, after a rest; `speed` [rad/s] is the largest."""
     period = one.settings.log.period_s
     time = np.arange(round(seconds / period)) * period
-    angle = np.tile(one.settings.arm.pose("study"), (len(time), 1))
+    angle = np.tile(one.settings.arm.pose(one.settings.start_pose), (len(time), 1))
     turn = 2 * np.pi / (seconds - rest) * np.maximum(time - rest, 0.0)
     for joint in joints.values():
         angle[:, joint] += 0.5 * speed * (seconds - rest) / (2 * np.pi) * (1 - np.cos(turn))
@@ -115,6 +116,28 @@ def test_the_command_line_writes_a_log_that_simulates_to_the_path(tmp_path: Path
     assert [row["name"] for row in rows] == ["shoulder", "elbow"]
     assert max(row["rms_deg"] for row in rows) < 0.1
     assert "shoulder" in result._repr_html_()
+
+
+def test_a_joint_without_a_column_rests_and_a_misspelt_one_is_named(tmp_path: Path):
+    """Also where the settings map each joint to a column of its own, as those of `hydroid init` do."""
+    urdf = Path(__file__).parents[2] / "examples" / "urdf"
+    hydroid.init(tmp_path / "mine", arm=urdf / "robot.urdf", log=[urdf / "log_1.csv"])
+    one = hydroid.load_plant(tmp_path / "mine" / "fit.yaml").identified
+    settings = one.settings
+    wished = path(one, seconds=3.0, joints={"boom": 1})
+    write_log(tmp_path / "whole.csv", wished, settings.log)
+    mapped = settings.log.columns("angle", 2)
+    assert mapped is not None
+    own = [settings.log.time.column, mapped.column[0]]
+    whole = pandas.read_csv(tmp_path / "whole.csv")[own]
+    whole.to_csv(tmp_path / "boom.csv", index=False)
+    whole.rename(columns={own[1]: "elbwo"}).to_csv(tmp_path / "elbwo.csv", index=False)
+    found = hydroid.follow(tmp_path / "boom.csv", fit=one).result
+    moved = np.ptp(found.log.angle, axis=0)
+    assert moved[1] == pytest.approx(np.ptp(wished.angle[:, 1]), rel=1e-6)
+    assert not np.delete(moved, 1).any()
+    with pytest.raises(HydroidError, match="unused: elbwo"):
+        hydroid.follow(tmp_path / "elbwo.csv", fit=one)
 
 
 @pytest.mark.parametrize(

@@ -52,6 +52,11 @@ def two_digits(value: float) -> str:
     return f"{value:.0f}" if abs(value) >= 100 else f"{value:.2g}"
 
 
+def three_digits(value: float) -> str:
+    """Write three significant digits, or all before the point; without exponent but for the smallest."""
+    return f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}"
+
+
 def told_apart(first: float, second: float) -> tuple[str, str]:
     """Write two numbers beside each other: two significant digits, three where two would tie."""
     two = _significant(first, 2), _significant(second, 2)

@@ -98,7 +98,8 @@ def analyse(
     from hydroid.fitting.summary import account
     from hydroid.posterior import identifiability
     from hydroid.posterior.uncertainty import uncertainty
-    from hydroid.reporting.parameters_report import parameter_table, unknown_sections
+    from hydroid.reporting.correlation_report import correlation_table
+    from hydroid.reporting.parameters_report import parameter_table
 
     with Progress() as progress:
         known = uncertainty(problem, model.theta)
@@ -112,7 +113,9 @@ def analyse(
     findings = (*([Finding("better optimum", "warning", better)] if better else []), *summary.findings)
     intervals = {name: one.interval for name, one in profiles.items()}
     table = parameter_table(problem.settings, summary, intervals)
-    tables = {"parameters": table} | {n: t for s in unknown_sections(summary) for n, t in s.tables.items()}
+    tables = {"parameters": table}
+    if (matrix := correlation_table(summary)) is not None:
+        tables["correlations"] = matrix
     content: dict[str, Any] = {"at": model.source, "rank": identified.rank}
     content |= summary.changed({"findings": findings}).model_dump(
         mode="json", include={"findings", "estimate"}

@@ -161,7 +161,8 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
     from hydroid.fitting.summary import summarise
     from hydroid.fitting.validation import fitted
     from hydroid.fitting.verdict import baselines_of, behind, judge
-    from hydroid.reporting.parameters_report import parameter_table, warnings
+    from hydroid.reporting.knowledge_report import warnings
+    from hydroid.reporting.parameters_report import parameter_table
     from hydroid.reporting.verdict_table import next_lines, next_step, verdict_lines
 
     settings, predictions = fit.problem.settings, fitted(fit)
@@ -173,7 +174,7 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
     summary = summary.changed({"verdict": verdict, "findings": tuple(findings)})
     source = "the fit" if folder is None else str(folder / NAME)
     model = IdentifiedModel(settings, fit.best.theta, source, summary)
-    lines: list[Table | str] = [*verdict_lines({fit.final: verdict}), *warnings(summary)]
+    lines: list[Table | str] = [*verdict_lines({fit.final: verdict}), *map(str, warnings(summary))]
     if folder is not None:
         step = next_step(summary, verdict, str(folder), predictions)
         lines += [*next_lines(step), str(folder / "report.html")]

@@ -148,7 +148,7 @@ def report(
             warn_of_changes(Path(run))
         files = [str(draw(run, figures=figures)) for run in as_list(runs)]
         return Result(files, {"files": files}, ())
-    from hydroid.reporting.parameters_report import merged_tables
+    from hydroid.reporting.merged_report import merged_tables
     from hydroid.run.record import read_runs
 
     collected = read_runs([str(run) for run in as_list(runs)], out)

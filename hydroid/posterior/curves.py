@@ -71,7 +71,7 @@ def step_curves(step: Movement, estimate: Candidates, ending: str, word: str) ->
             at = (k + 0.5) * bench.period  # a speed is that between two samples
             yield Column(f"step_{ending}", label, unit, False, at, "time [s]"), speeds[:, k]
         amplitude, phase = frequency_response(speeds[:, :start], frequencies, bench.period)
-        label = f"speed over command in a step to {size}"
+        label = f"speed over command after a step to {size}"
         along = "frequency [Hz]"
         for i, at in enumerate(frequencies.tolist()):
             gain = amplitude[:, i] / abs(step.command)

@@ -112,8 +112,13 @@
       min_border_left: 64, min_border_right: 16, min_border_top: 8, min_border_bottom: 8,
     });
     if (width < 480) for (const axis of figure.xaxes) axis.ticker.desired_num_ticks = 4;
-    if (panel.log_y) figure.yaxes[0].ticker.mantissas = [1, 2, 5]; // else less than two decades have one tick or two
+    // else less than two decades have one tick or two
+    if (panel.log_y) figure.yaxes[0].ticker.mantissas = [1, 2, 5];
+    if (panel.log_x) figure.xaxes[0].ticker.mantissas = [1, 2, 5];
     axisLook(figure);
+    // lines between rows or columns would only cross what is drawn there
+    for (const grid of figure.center.filter((one) => one.dimension !== undefined))
+      if ((grid.dimension === 0 ? panel.columns : panel.rows).length) grid.visible = false;
     nameTicks(figure.yaxes[0], panel.rows, panel.height - 60, "horizontal");
     // no room for the names of many columns: those of the rows are the same
     nameTicks(figure.xaxes[0], width < 600 || panel.columns.length > 40 ? panel.columns.map(() => "") : panel.columns, Infinity, "vertical");

@@ -117,9 +117,11 @@ def _name_axes(axes: Axes, panel: Panel) -> None:
         size = min(8.0, 50.0 * panel.height / 80 / len(panel.rows))  # [pt], of 72 in an inch
         axes.set_yticks(range(len(panel.rows)), panel.rows, fontsize=size)
         axes.set_ylim(len(panel.rows) - 0.5, -0.5)
+        axes.grid(axis="y", visible=False)
     if panel.columns:
         axes.set_xticks(range(len(panel.columns)), panel.columns, fontsize=6, rotation=90)
         axes.set_xlim(-0.5, len(panel.columns) - 0.5)
+        axes.grid(axis="x", visible=False)
 
 
 def legend(drawing: Figure) -> None:

@@ -15,6 +15,8 @@ from hydroid.words import number, numbered, plain
 if TYPE_CHECKING:
     import rich.table
 
+SHORT = 20
+"""letters of a cell up to which it stands in one line"""
 Cell = str | int | float | None  # text, a count, a measured number, or nothing
 
 
@@ -83,6 +85,12 @@ class Table:
         kinds = ({type(row[i]) for row in self.rows} - {type(None)} for i in range(len(self.header)))
         return tuple(bool(kind) and str not in kind for kind in kinds)
 
+    @cached_property
+    def short(self) -> tuple[bool, ...]:
+        """Columns of text whose cells are too short to be broken into lines."""
+        columns = zip(*self.shown, strict=True) if self.rows else [()] * len(self.header)
+        return tuple(max(map(len, column), default=0) <= SHORT for column in columns)
+
     def _rich(self, left_out: Sequence[str]) -> "rich.table.Table":
         """Return the table for a terminal; headers of numbers are broken into words."""
         from rich import box
@@ -140,7 +148,8 @@ class Plot:
 class Section:
     """A heading with text, points to note, tables by file name, and figures; folded sections open on demand.
 
-    `steps` are findings that say what to do and what it would bring; their number `command` does it. `cards`
+    A folded section says its `answer` beside its heading, and stands on paper if it is `printed`. `steps` are
+    findings that say what to do and what it would bring; their number `command` does it. `cards`
     are small tables side by side.
     """
 
@@ -153,6 +162,8 @@ class Section:
     tabs: tuple[Plot, ...] = ()
     steps: tuple[Finding, ...] = ()
     folded: bool = False
+    answer: str = ""
+    printed: bool = False
 
 
 @record
@@ -160,7 +171,8 @@ class Page:
     """A report: the answer in a sentence, `lead`, and its sections; its file has the `name`, and an ending.
 
     `warnings` must be read before using the answer, and stand behind the first section; `versions` of the
-    software stand at the foot; `data` are further files by name, such as CSV for scripts.
+    software stand at the foot; `data` are further files by name, such as CSV for scripts; `files` are tables
+    that stand in files alone, in place of shorter ones of their names.
     """
 
     name: str
@@ -170,6 +182,7 @@ class Page:
     warnings: tuple[str, ...]
     versions: Mapping[str, str] = field(default_factory=dict[str, str])
     data: Mapping[str, str] = field(default_factory=dict[str, str])
+    files: Mapping[str, Table] = field(default_factory=dict[str, Table])
 
     @property
     def plots(self) -> Iterator[Plot]:
@@ -180,7 +193,10 @@ class Page:
     @property
     def tables(self) -> dict[str, Table]:
         """All tables by file name."""
-        return {name: table for s in self.sections for name, table in {**s.tables, **s.cards}.items()}
+        tables = dict[str, Table]()
+        for section in self.sections:
+            tables |= {**section.tables, **section.cards}
+        return tables | dict(self.files)
 
 
 def log_names(sources: Iterable[str]) -> dict[str, str]:

@@ -15,17 +15,20 @@ from hydroid.fitting.search import HISTORY
 from hydroid.fitting.validation import Prediction
 from hydroid.fitting.verdict import rms_deg, standing_out
 from hydroid.reporting import page_file
+from hydroid.reporting.actuator_report import response_section, speed_section
 from hydroid.reporting.chart import SERIES, Chart, Mark, Panel, finite
-from hydroid.reporting.outlines import motion_section
-from hydroid.reporting.page import Page, Plot, Section, Table, log_names, short_name
-from hydroid.reporting.parameters_report import (
+from hydroid.reporting.correlation_report import correlation_section
+from hydroid.reporting.knowledge_report import (
     error_section,
-    parameter_section,
+    further_findings,
     quantity_section,
-    speed_section,
-    unknown_sections,
+    unknown_section,
     warnings,
 )
+from hydroid.reporting.outlines import motion_section
+from hydroid.reporting.page import Page, Plot, Section, Table, log_names, short_name
+from hydroid.reporting.parameters_report import in_words, parameter_section, parameter_table, prior_section
+from hydroid.reporting.residual_report import residual_section
 from hydroid.reporting.search_report import search_section
 from hydroid.reporting.verdict_table import (
     Verdicts,
@@ -184,9 +187,13 @@ def fit_page(record: Record) -> Page:
         *prediction_sections([*record.validations.values(), *fitted], settings.arm, fits),
         quantity_section(settings, summary),
         error_section(settings, summary),
-        *unknown_sections(summary),
-        parameter_section(settings, summary),
+        unknown_section(settings, summary),
+        residual_section(settings, summary, fitted),
         speed_section(settings, summary, [one.log for one in fitted]),
+        response_section(settings, summary),
+        parameter_section(settings, summary, *further_findings(summary)),
+        prior_section(settings, summary),
+        correlation_section(settings, summary),
         search_section(record),
     )
     in_order = sorted(filter(None, sections), key=lambda section: section.folded)
@@ -196,7 +203,8 @@ def fit_page(record: Record) -> Page:
     apart = [Path(one.log.source).name for one in unseen if one.apart]
     left_out = [f"The verdict does not count {listed(apart)}: validated with --apart."] if apart else []
     out = map(str, standing_out(unseen, record.verdict, record.folder))
-    warned = (*left_out, *out, *outside(record.verdict), *warnings(summary))
+    said = (str(in_words(one, settings)) for one in warnings(summary))
+    warned = (*left_out, *out, *outside(record.verdict), *said)
     # the history and the Pareto set with every bit, in the search's units: rad unless relative
     theta, objectives = record.result.front
     unit = "" if settings.objective.relative else "_rad"
@@ -206,4 +214,5 @@ def fit_page(record: Record) -> Page:
         "history.csv": csv_text([HISTORY, *record.result.history.tolist()]),
         "pareto.csv": csv_text([header, *np.column_stack([theta, objectives]).tolist()]),
     }
-    return Page("report", title, lead(fits), tuple(in_order), warned, made_by, data)
+    files = {"parameters": parameter_table(settings, summary)}
+    return Page("report", title, lead(fits), tuple(in_order), warned, made_by, data, files)

@@ -9,8 +9,10 @@ from report_fits import MODEL, make_fit, make_problem, make_record, make_uncerta
 
 from hydroid.findings import Finding
 from hydroid.fitting.summary import summarise
+from hydroid.reporting.knowledge_report import error_section
+from hydroid.reporting.merged_report import merged_tables
 from hydroid.reporting.page import Table, log_names
-from hydroid.reporting.parameters_report import error_section, merged_tables, parameter_table
+from hydroid.reporting.parameters_report import parameter_table
 
 FEWER = {name: bounds for name, bounds in MODEL.items() if name != "M2"}
 
@@ -31,7 +33,7 @@ def test_every_parameter_is_in_the_table():
     problem = make_problem()
     fit = make_fit(problem)
     table = parameter_table(problem.settings, summarise(problem, fit))
-    assert column(table, "name") == list(MODEL)
+    assert column(table, "symbol") == list(MODEL)
     assert column(table, "value") == list(fit.best.theta)
     assert column(table, "from") == pytest.approx(fit.uncertainty.interval[:, 0])
     assert column(table, "to") == pytest.approx(fit.uncertainty.interval[:, 1])
@@ -43,11 +45,16 @@ def test_flags_and_findings_name_what_the_data_cannot_tell():
     effects = (1e-3, 0.0, 0.0, 1e-3)
     fit = make_fit(problem, effects=effects)
     summary = summarise(problem, fit)
-    assert column(parameter_table(problem.settings, summary), "flag") == ["", "fixed", "no effect", ""]
+    assert column(parameter_table(problem.settings, summary), "source") == [
+        "data",
+        "fixed",
+        "no effect",
+        "data",
+    ]
     assert Finding("no effect", "note", ("M1",)) in summary.findings
     at = with_theta(fit, problem, effects, K=MODEL["K"][0], M2=MODEL["M2"][1])
     expected = ["at lower bound", "fixed", "no effect", "at upper bound"]
-    assert column(parameter_table(problem.settings, summarise(problem, at)), "flag") == expected
+    assert column(parameter_table(problem.settings, summarise(problem, at)), "source") == expected
     assert Finding("at bound", "warning", ("M2",), {"side": "upper"}) in summarise(problem, at).findings
 
 

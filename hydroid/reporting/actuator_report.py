@@ -68,7 +68,7 @@ def speed_section(settings: FitSettings, summary: FitSummary, logs: Sequence[Log
     return Section(title, _SPEED if opens else _SPEED_ALONE, tabs=tuple(tabs), folded=True, answer=answer)
 
 
-def response_section(settings: FitSettings, summary: FitSummary) -> Section | None:
+def step_section(settings: FitSettings, summary: FitSummary) -> Section | None:
     """Return the section of step and frequency responses, a tab per joint; None: the fit states none."""
     tabs = list[Plot]()
     slowest = list[str]()

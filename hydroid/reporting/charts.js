@@ -5,6 +5,7 @@
   const dark = matchMedia("(prefers-color-scheme: dark)");
   const touch = matchMedia("(pointer: coarse)").matches;
   const drawn = new Map(); // host element -> {figures, x ranges, visible labels}
+  const zooms = new Map(); // row of a matrix -> [start, end] to which its charts are zoomed
 
   async function unpack(id) {
     const bytes = Uint8Array.from(atob(document.getElementById(id).textContent), (c) => c.charCodeAt(0));
@@ -162,9 +163,22 @@
     panels.forEach((one) => bokeh.add_root(one.figure));
     await Bokeh.embed.add_document_standalone(bokeh, cells, elements);
     drawn.set(host, { document: bokeh, panels, shown, chart });
+    const row = chart.linked && host.closest("[data-row]")?.dataset.row;
+    if (row) {
+      const range = panels[0].x_range;
+      for (const end of [range.properties.start, range.properties.end])
+        end.change.connect(() => zooms.set(row, [range.start, range.end]));
+    }
+    zoomAlike(host);
     host.classList.toggle("drawn-dark", dark.matches);
     host.querySelector(":scope > .controls").replaceChildren(
       ...legend(panels, shown), ...(host.dataset.zoom ? [zoomButtons(panels)] : []));
+  }
+
+  // charts of one log are zoomed together
+  function zoomAlike(host) {
+    const zoom = zooms.get(host.closest("[data-row]")?.dataset.row), panels = drawn.get(host)?.panels;
+    if (zoom && panels) panels[0].x_range.setv({ start: zoom[0], end: zoom[1] });
   }
 
   // one button per label, that shows or hides its marks in some panels
@@ -219,7 +233,17 @@
   let drawings = {};
   async function drawVisible(again = false) {
     for (const host of document.querySelectorAll(".chart"))
-      if (host.offsetParent !== null && (again || !drawn.has(host))) { await draw(host, drawings[host.dataset.drawing]); await idle(); }
+      if (host.offsetParent !== null && !again && drawn.has(host)) zoomAlike(host);
+      else if (host.offsetParent !== null) { await draw(host, drawings[host.dataset.drawing]); await idle(); }
+  }
+
+  // of what stands beside the tabs, show that of a row, or the note that there is none
+  function besides(section, row) {
+    const all = [...section.querySelectorAll(".beside")], own = all.find((one) => one.dataset.row === row);
+    for (const one of all) {
+      one.hidden = one !== (own ?? all.at(-1));
+      if (one.hidden) one.querySelector(".moving")?.dispatchEvent(new Event("leave"));
+    }
   }
 
   function tabs(list) {
@@ -231,6 +255,7 @@
         one.tabIndex = on ? 0 : -1;
         document.getElementById(one.getAttribute("aria-controls")).hidden = !on;
       }
+      besides(list.closest("section, details"), tab.dataset.row);
       drawVisible();
     };
     all.forEach((tab, i) => {

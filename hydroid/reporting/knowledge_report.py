@@ -6,10 +6,10 @@ import numpy as np
 
 from hydroid.estimate import FitSummary
 from hydroid.findings import Finding
-from hydroid.reporting.page import Section, Table
+from hydroid.reporting.page import Given, Section, Table
 from hydroid.reporting.parameters_report import in_words
 from hydroid.settings.fit import FitSettings
-from hydroid.words import listed, two_digits
+from hydroid.words import listed, three_digits, two_digits
 
 BEST_WITHIN = 0.3
 """half of a 95 % interval, relative to the value, up to which a property counts as known"""
@@ -25,20 +25,23 @@ def warnings(summary: FitSummary) -> tuple[Finding, ...]:
 
 
 def unknown_section(settings: FitSettings, summary: FitSummary) -> Section:
-    """Return the section of the other findings; those after the first six stand with the parameters."""
+    """Return the section of the other findings; those after the first six stand with the parameters.
+
+    Which parameters cannot be told apart, their correlations show.
+    """
     points = tuple(str(in_words(one, settings)) for one in _others(summary)[:MOST_UNKNOWN])
     none = "" if points else "The logs determine every free parameter."
     return Section("What is not known", none, points)
 
 
 def further_findings(summary: FitSummary) -> tuple[str, ...]:
-    """Return the findings that `unknown_section` has no room for, but for what correlations show."""
-    return tuple(str(one) for one in _others(summary)[MOST_UNKNOWN:] if one.kind != "combination")
+    """Return the findings that `unknown_section` has no room for."""
+    return tuple(str(one) for one in _others(summary)[MOST_UNKNOWN:])
 
 
 def _others(summary: FitSummary) -> list[Finding]:
     first = warnings(summary)
-    return [one for one in summary.findings if one not in first]
+    return [one for one in summary.findings if one not in first and one.kind != "combination"]
 
 
 def quantity_section(settings: FitSettings, summary: FitSummary) -> Section | None:
@@ -76,9 +79,9 @@ def error_section(settings: FitSettings, summary: FitSummary) -> Section | None:
             {
                 "joint": name,
                 "unit": unit,
-                "sensor's noise": factor * error.sensor_deg,
-                "uncertain after 10 s": ahead,
-                "what is left lasts [s]": error.lasts_s or None,
+                "sensor's noise": Given(three_digits(factor * error.sensor_deg)),
+                "uncertain after 10 s": Given(three_digits(ahead)),
+                "what is left lasts [s]": Given(two_digits(error.lasts_s)) if error.lasts_s else None,
             }
         )
     if not rows:

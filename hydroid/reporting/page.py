@@ -1,6 +1,7 @@
 """A report as data: tables for readers and scripts, sections, charts, steps; `page_file` writes it."""
 
 import os
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import field
 from functools import cached_property
@@ -15,6 +16,9 @@ from hydroid.words import number, numbered, plain
 if TYPE_CHECKING:
     import rich.table
 
+FIGURE_SPACE, POINT_SPACE = "\u2007", "\u2008"
+"""blanks as wide as a digit and as a point"""
+_NUMBER = re.compile(r"([-−]?\d+)(\.\d+)?(?= |$)")
 SHORT = 20
 """letters of a cell up to which it stands in one line"""
 Cell = str | int | float | None  # text, a count, a measured number, or nothing
@@ -79,10 +83,22 @@ class Table:
         """The text of each cell for a reader."""
         return [[shown(cell) for cell in row] for row in self.rows]
 
+    def aligned(self, digit: str = FIGURE_SPACE, point: str = POINT_SPACE) -> list[list[str]]:
+        """Return `shown` with numbers under each other at the point.
+
+        The blanks are as wide as a digit and a point. A column of text is aligned where each of its cells
+        begins with a number.
+        """
+        columns = list[list[str]]()
+        for i, right in enumerate(self.numeric):
+            cells = [row[i] for row in self.shown]
+            columns.append(_aligned(cells, digit, point, right=right))
+        return [list(row) for row in zip(*columns, strict=True)]
+
     @cached_property
     def numeric(self) -> tuple[bool, ...]:
         """Columns that hold numbers only."""
-        kinds = ({type(row[i]) for row in self.rows} - {type(None)} for i in range(len(self.header)))
+        kinds = ({type(row[i]) for row in self.rows} for i in range(len(self.header)))
         return tuple(bool(kind) and str not in kind for kind in kinds)
 
     @cached_property
@@ -113,9 +129,28 @@ class Table:
                 min_width=None if right else min(widest, 18),  # before that optional columns go
                 overflow="fold",
             )
-        for row in self.shown:
+        for row in self.aligned(" ", " "):
             table.add_row(*(Text(row[i]) for i in kept))
         return table
+
+
+def _aligned(cells: list[str], digit: str, point: str, *, right: bool) -> list[str]:
+    """Return the cells of a column, which stands at the `right` or left, with their numbers at the point."""
+    numbers = [_NUMBER.match(cell) for cell in cells]
+    if not right and any(cell and not number for cell, number in zip(cells, numbers, strict=True)):
+        return cells
+    parts = [number.groups("") if number else ("", "") for number in numbers]
+    widest = max((len(whole) for whole, _ in parts), default=0)
+    longest = max((len(rest) for _, rest in parts), default=0)
+    result = list[str]()
+    for cell, (whole, rest) in zip(cells, parts, strict=True):
+        if not right:
+            result.append(digit * (widest - len(whole)) + cell if cell else cell)
+        elif rest or not longest:
+            result.append(cell + digit * (longest - len(rest)))
+        else:
+            result.append(cell + point + digit * (longest - 1) if whole else cell)
+    return result
 
 
 def shown(cell: Cell) -> str:
@@ -148,7 +183,8 @@ class Plot:
 class Section:
     """A heading with text, points to note, tables by file name, and figures; folded sections open on demand.
 
-    A folded section says its `answer` beside its heading, and stands on paper if it is `printed`. `steps` are
+    Of the figures `beside`, which a note explains, the one of the row of the chosen tab is shown. A folded
+    section says its `answer` beside its heading, and stands on paper if it is `printed`. `steps` are
     findings that say what to do and what it would bring; their number `command` does it. `cards`
     are small tables side by side.
     """
@@ -160,6 +196,8 @@ class Section:
     cards: Mapping[str, Table] = field(default_factory=dict[str, Table])
     plots: tuple[Plot, ...] = ()
     tabs: tuple[Plot, ...] = ()
+    beside: tuple[Plot, ...] = ()
+    beside_note: str = ""
     steps: tuple[Finding, ...] = ()
     folded: bool = False
     answer: str = ""
@@ -188,7 +226,7 @@ class Page:
     def plots(self) -> Iterator[Plot]:
         """All figures."""
         for section in self.sections:
-            yield from (*section.plots, *section.tabs)
+            yield from (*section.plots, *section.tabs, *section.beside)
 
     @property
     def tables(self) -> dict[str, Table]:

@@ -16,11 +16,13 @@ from hydroid.quantity_table import CHOICES
 from hydroid.reporting.chart import Chart, Mark, Panel
 from hydroid.reporting.page import Cell, Given, Plot, Section, Table
 from hydroid.settings.fit import FitSettings
-from hydroid.words import number, three_digits
+from hydroid.words import listed, number, three_digits
 
 ENDS = ("from", "to", "by log from", "by log to", "profile from", "profile to")
 FARTHEST = 5.0
 """standard deviations of the prior up to which a posterior is drawn"""
+MOST_ALIKE = 3
+"""parameters of the same words that a sentence names"""
 ROW = 16
 """height of a parameter's row in a chart [px]"""
 Intervals = Mapping[str, tuple[float, float]]
@@ -147,15 +149,22 @@ def named(settings: FitSettings, name: str, detail: str = "") -> str:
 
 
 def in_words(finding: Finding, settings: FitSettings) -> Finding:
-    """Return a finding that names parameters in words; what else it is about stays as it is."""
-    details = finding.details
-    subjects = {
-        name: named(settings, name, details.get(name, ""))
-        for name in finding.subjects
-        if name in settings.parameters
-    }
-    others = {name: text for name, text in details.items() if name not in subjects}
-    return replace(finding, subjects=tuple(subjects.get(n, n) for n in finding.subjects), details=others)
+    """Return a finding that names parameters in words; those of the same words are named together."""
+    groups = dict[str, list[str]]()
+    details = dict(finding.details)
+    for name in finding.subjects:
+        key = quantity_and_side(settings, name)[0] if name in settings.parameters else name
+        groups.setdefault(key, []).append(name)
+    subjects = list[str]()
+    for what, names in groups.items():
+        if names == [what]:  # no parameter
+            subjects.append(what)
+        elif len(names) == 1:
+            subjects.append(named(settings, names[0], details.pop(names[0], "")))
+        else:
+            said = [f"{name}: {details.pop(name)}" if name in details else name for name in names]
+            subjects.append(f"{what} ({listed(said, MOST_ALIKE)})")
+    return replace(finding, subjects=tuple(subjects), details=details)
 
 
 def status(estimate: ParameterEstimate) -> str:

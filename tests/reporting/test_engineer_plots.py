@@ -11,7 +11,7 @@ from hydroid.fitting.summary import summarise
 from hydroid.fitting.validation import fitted
 from hydroid.log import Log
 from hydroid.parameters import Prior
-from hydroid.reporting.actuator_report import measured_speeds, response_section, speed_section
+from hydroid.reporting.actuator_report import measured_speeds, speed_section, step_section
 from hydroid.reporting.chart import Chart
 from hydroid.reporting.correlation_report import correlation_section, correlations, strongest
 from hydroid.reporting.figure import figure, saved, style
@@ -59,7 +59,7 @@ def test_speeds_have_a_tab_for_each_joint_with_what_was_measured():
 
 
 def test_step_and_frequency_response_stand_where_a_fit_states_them():
-    assert response_section(SETTINGS, SUMMARY) is None
+    assert step_section(SETTINGS, SUMMARY) is None
     speed = SUMMARY.curves["shoulder_speed"]
     points = {
         "at": (0.5, 1.0, 2.0),
@@ -72,7 +72,7 @@ def test_step_and_frequency_response_stand_where_a_fit_states_them():
     turned = step.changed({"along": "frequency [Hz]"})
     kinds = {"step": step, "amplitude": turned, "phase": turned}
     curves = {f"shoulder_{kind}_positive": curve for kind, curve in kinds.items()}
-    section = response_section(SETTINGS, SUMMARY.changed({"curves": curves}))
+    section = step_section(SETTINGS, SUMMARY.changed({"curves": curves}))
     assert section is not None
     (tab,) = section.tabs
     chart = tab.draw()

@@ -11,7 +11,7 @@ from hydroid.fitting.validation import fitted
 from hydroid.reporting.chart import Chart, Mark, Panel
 from hydroid.reporting.figure import figure, saved, style
 from hydroid.reporting.page_file import plain
-from hydroid.reporting.predictions import draw_response
+from hydroid.reporting.response_report import draw_joints, draw_response
 from hydroid.reporting.search_report import learning, pareto
 
 pytestmark = pytest.mark.filterwarnings("error")  # a warning of matplotlib's is a figure gone wrong
@@ -140,3 +140,16 @@ def test_a_thinned_curve_keeps_its_ends_extremes_and_gaps(samples: int):
     gap = np.where(np.arange(samples) > samples // 2, np.nan, curve)
     if samples > 1:
         assert np.isnan(Mark("line", time, gap).thinned(1000).y).any()
+
+
+def test_all_joints_of_a_log_share_one_axis_of_time():
+    problem = make_problem(outputs=(2, 3))
+    (one,) = fitted(make_fit(problem))
+    chart = draw_joints("all", problem.settings.arm, [one], 300)
+    assert chart.linked
+    assert [panel.y for panel in chart.panels] == ["shoulder [deg]", "elbow [deg]", "command [%]"]
+    labels = {mark.label for mark in chart.panels[-1].marks}
+    assert labels == {"command of shoulder", "command of elbow"}
+    measured, simulated = chart.panels[0].marks
+    assert measured.y - simulated.y == pytest.approx(np.degrees(one.error(2)))
+    check(chart)

@@ -1,6 +1,7 @@
 """Fit one problem, with settings and logs that are read: `hydroid.fit`."""
 
 import time
+from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -193,6 +194,7 @@ def _store(folder: "RunFolder", result: FitResult) -> Path:
     began = time.monotonic()
     folder.write_estimate(result.model, result.problem.logs[0])
     write_atomic(folder.path / RESULT, pack(fit_result(result.fit, result.predictions, result.baselines)))
+    folder.status("running", finished=date.today().isoformat())
     page = draw(folder.path)
     folder.status("done", seconds={**result.fit.seconds, "report": time.monotonic() - began})
     return page

@@ -270,6 +270,11 @@
     });
   }
 
+  // what must stand on paper though it is folded
+  const opened = [];
+  addEventListener("beforeprint", () => document.querySelectorAll("details.printed:not([open])").forEach((one) => { one.open = true; opened.push(one); }));
+  addEventListener("afterprint", () => opened.splice(0).forEach((one) => { one.open = false; }));
+
   async function start() {
     document.querySelectorAll("[role=tablist]").forEach(tabs);
     drawings = JSON.parse(await unpack("content"));

@@ -6,10 +6,10 @@ import numpy as np
 
 from hydroid.estimate import FitSummary
 from hydroid.findings import Finding
-from hydroid.reporting.page import Given, Section, Table
+from hydroid.reporting.page import Section, Table
 from hydroid.reporting.parameters_report import in_words
 from hydroid.settings.fit import FitSettings
-from hydroid.words import listed, three_digits, two_digits
+from hydroid.words import listed, two_digits
 
 BEST_WITHIN = 0.3
 """half of a 95 % interval, relative to the value, up to which a property counts as known"""
@@ -79,9 +79,9 @@ def error_section(settings: FitSettings, summary: FitSummary) -> Section | None:
             {
                 "joint": name,
                 "unit": unit,
-                "sensor's noise": Given(three_digits(factor * error.sensor_deg)),
-                "uncertain after 10 s": Given(three_digits(ahead)),
-                "what is left lasts [s]": Given(two_digits(error.lasts_s)) if error.lasts_s else None,
+                "sensor's noise": factor * error.sensor_deg,
+                "uncertain after 10 s": ahead,
+                "what is left lasts [s]": error.lasts_s or None,
             }
         )
     if not rows:

@@ -208,9 +208,9 @@ class Section:
 class Page:
     """A report: the answer in a sentence, `lead`, and its sections; its file has the `name`, and an ending.
 
-    `warnings` must be read before using the answer, and stand behind the first section; `versions` of the
-    software stand at the foot; `data` are further files by name, such as CSV for scripts; `files` are tables
-    that stand in files alone, in place of shorter ones of their names.
+    `warnings` must be read before using the answer, and stand behind the first section. What the page was
+    `made_from` and `versions` of the software stand at the foot. `data` are further files by name, such as
+    CSV for scripts; `files` are tables that stand in files alone, in place of shorter ones of their names.
     """
 
     name: str
@@ -221,6 +221,7 @@ class Page:
     versions: Mapping[str, str] = field(default_factory=dict[str, str])
     data: Mapping[str, str] = field(default_factory=dict[str, str])
     files: Mapping[str, Table] = field(default_factory=dict[str, Table])
+    made_from: tuple[str, ...] = ()
 
     @property
     def plots(self) -> Iterator[Plot]:

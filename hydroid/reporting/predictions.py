@@ -21,7 +21,7 @@ from hydroid.reporting.knowledge_report import (
     unknown_section,
     warnings,
 )
-from hydroid.reporting.page import Page, Section
+from hydroid.reporting.page import Page, Section, short_name
 from hydroid.reporting.parameters_report import in_words, parameter_section, parameter_table, prior_section
 from hydroid.reporting.residual_report import residual_section
 from hydroid.reporting.response_report import error_table, response_section
@@ -38,6 +38,9 @@ from hydroid.run.record import Record, load_record
 from hydroid.settings.arm import Arm
 from hydroid.words import listed
 
+MOST_LOGS = 6
+"""logs that the foot of a page names"""
+
 
 def validation_page(predictions: Sequence[Prediction], fits: Verdicts, arm: Arm, *steps: Finding) -> Page:
     """Return the page of several fits on several logs; its tables are `verdict`, `errors` and `horizons`."""
@@ -45,7 +48,10 @@ def validation_page(predictions: Sequence[Prediction], fits: Verdicts, arm: Arm,
     sections = [*verdict_sections(fits, *steps), *prediction_sections(ordered, arm, fits)]
     files = {"errors": error_table(ordered, arm, one_fit=len(fits) == 1)}
     warned = outside(next(iter(fits.values())))
-    return Page("validation", "Validation", lead(fits), tuple(sections), warned, files=files)
+    logs = [short_name(Path(source).name) for source in dict.fromkeys(p.log.source for p in ordered)]
+    made_from = (f"Fits: {listed([*map(short_name, fits)])}", f"logs: {listed(logs, MOST_LOGS)}")
+    page = Page("validation", "Validation", lead(fits), tuple(sections), warned, files=files)
+    return replace(page, made_from=made_from)
 
 
 def prediction_sections(predictions: Sequence[Prediction], arm: Arm, fits: Verdicts) -> list[Section]:
@@ -108,4 +114,17 @@ def fit_page(record: Record) -> Page:
         "parameters": parameter_table(settings, summary),
         "errors": error_table(shown, settings.arm, one_fit=True),
     }
-    return Page("report", title, lead(fits), tuple(in_order), warned, made_by, data, files)
+    made_from = _made_from(record)
+    return Page("report", title, lead(fits), tuple(in_order), warned, made_by, data, files, made_from)
+
+
+def _made_from(record: Record) -> tuple[str, ...]:
+    """Return the logs, settings, seed and date of a fit, for the foot of its page."""
+    logs = [short_name(Path(one.log.source).name) for one in record.result.fitted]
+    model = record.settings.simulation.model
+    settings = f"settings: config.yaml in {record.folder}, model {record.summary.final}"
+    if record.settings.stage == "hyd":
+        settings += f" ({model})"
+    date = record.identity.get("finished")
+    seed = f"seed {record.seed}"
+    return (f"Fitted to {listed(logs, MOST_LOGS)}", settings, seed, *([str(date)] if date else []))

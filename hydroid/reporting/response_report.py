@@ -23,7 +23,7 @@ SAMPLES, MOST_BINS, LEAST_BINS = 9000, 1000, 150
 """parts of the curves of all responses of a page together, and of one of them: the page stays small"""
 FAR = 3.0
 """ranges of the measured angle beyond which a response that runs away is not drawn"""
-ALL = "all joints"
+ALL = "joints"
 """column of the responses of all joints together"""
 
 _MATRIX = (
@@ -162,7 +162,7 @@ def _all_tab(arm: Arm, group: Sequence[Prediction], log: str, bins: int, tabs: S
     worst = next(state for state in ("bad", "fair", "good") if state in states)
     title = f"All joints in {log}"
     drawing = partial(draw_joints, title, arm, group, max(LEAST_BINS, bins // 2))
-    return Plot("", title, drawing, button="together", column=ALL, state=worst)
+    return Plot("", title, drawing, button="all", column=ALL, state=worst)
 
 
 def _scale(slides: bool) -> tuple[str, str, float]:
@@ -200,8 +200,8 @@ def draw_response(
             drawn = Mark("band", one.log.time, -half, half, color=color, label=label, alpha=0.18, off=i > 0)
             middle.insert(0, drawn)
     panels = [
-        Panel("", f"{place} [{unit}]", tuple(upper), title, 280),
-        Panel("", f"residual [{unit}]", tuple(middle), height=190),
+        Panel("", f"{place} [{unit}]", tuple(upper), title, 230),
+        Panel("", f"residual [{unit}]", tuple(middle), height=140),
     ]
     if log.pressure is not None and np.isfinite(pressure := log.pressure[:, column]).any():
         panels.append(Panel("", "pressure [bar]", _pressures(log.time, pressure), height=150))

@@ -171,7 +171,10 @@ def horizon_section(fits: Verdicts) -> Section | None:
         "is simulated from 2 s before, at the measured angles. Last column: of the angle, over whole logs."
     )
     table = Table.of("Error by prediction time", columns, rows, note)
-    return Section(table.title, tables={"horizons": table}, folded=True) if rows else None
+    if not rows:
+        return None
+    answer = f"the fit beside simple models over {HORIZONS[0]:g} to {HORIZONS[-1]:g} s"
+    return Section(table.title, tables={"horizons": table}, folded=True, answer=answer)
 
 
 def ordered(fits: Verdicts) -> Verdicts:

@@ -194,7 +194,7 @@ def test_analyse_tells_what_a_log_determines(short: Path, hydroid_cli: Run, tmp_
     assert rows["M1"]["source"] == "prior only"
     assert rows["M1"]["data_share"] == 0
     assert rows["S"]["profile_interval"] is not None
-    for name in ("parameters", "directions"):
+    for name in ("parameters", "correlations"):
         assert (tmp_path / "told" / "tables" / f"{name}.csv").stat().st_size > 0
 
 

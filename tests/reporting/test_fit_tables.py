@@ -58,6 +58,18 @@ def test_flags_and_findings_name_what_the_data_cannot_tell():
     assert Finding("at bound", "warning", ("M2",), {"side": "upper"}) in summarise(problem, at).findings
 
 
+def test_nobody_is_asked_to_widen_what_has_no_larger_value():
+    """A share of 1 is the largest there is; a share of 0.5 is a bound that somebody has set."""
+    problem = make_problem()
+    share = {"quantity": "compensation", "joints": (2,), "link": None}
+    for upper, kind in ((1.0, "at limit"), (0.5, "at bound")):
+        changed = problem.settings.parameters["M1"].changed(share | {"bounds": (0.0, upper)})
+        other = problem.varied(problem.settings.with_parameters({"M1": changed}))
+        fit = with_theta(make_fit(other, effects=(1e-3,) * 4), other, (1e-3,) * 4, M1=upper)
+        kinds = {one.kind for one in summarise(other, fit).findings if "M1" in one.subjects}
+        assert kinds & {"at limit", "at bound"} == {kind}
+
+
 def test_what_the_logs_move_far_from_its_prior_is_one_finding():
     own, stated = make_problem().settings, {"K": (0.25, 0.05), "D": (100.0, 50.0), "M1": (5.0, 1.0)}
     free = {n: own.parameters[n].changed({"nominal": v, "sd": sd}) for n, (v, sd) in stated.items()}

@@ -283,7 +283,7 @@ def test_a_joint_that_only_a_later_fit_compares_is_shown():
     assert [(tab.column, tab.button, tab.state) for tab in tabs] == [
         ("shoulder", f"{np.degrees(0.001):.2g}°", "good"),
         ("elbow", size, "bad"),
-        ("all joints", "together", "bad"),
+        ("joints", "all", "bad"),
     ]
     labels = {mark.label.partition(" (")[0] for panel in tabs[1].draw().panels for mark in panel.marks}
     assert "two" in labels

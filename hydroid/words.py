@@ -53,7 +53,9 @@ def two_digits(value: float) -> str:
 
 
 def three_digits(value: float) -> str:
-    """Write three significant digits, or all before the point; without exponent but for the smallest."""
+    """Write three significant digits, or all before the point; a dash if not finite."""
+    if not math.isfinite(value):
+        return "–"
     return f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}"
 
 

@@ -52,6 +52,11 @@ class FitResult(Printed):
     predictions: "tuple[Prediction, ...]"
     baselines: "Baselines"
 
+    def __repr__(self) -> str:
+        from hydroid.reporting.verdict_table import lead
+
+        return f"<FitResult: {lead({'': self.summary.verdict})}>"
+
     def plant(self, **how: Any) -> "Plant":
         """Return the identified arm to be stepped; the keywords are those of `Plant`."""
         from hydroid.plant import Plant
@@ -60,6 +65,9 @@ class FitResult(Printed):
 
     def predict(self, log: "LogSource") -> "Prediction":
         """Predict a log from its commands and its first angles; NaN if the simulation diverges.
+
+            predicted = fitted.predict("b.csv")
+            print(predicted["boom"].error, predicted.to_frame())
 
         Raises:
             LogError: the log cannot be used.

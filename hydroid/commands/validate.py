@@ -47,7 +47,7 @@ def validate(
     Example: hydroid validate OTHER.csv --fit runs/mech --fit runs/hyd
 
         validated = hydroid.validate("b.csv", fit="runs/a")
-        print(validated.result[0].indices[2].rms)  # of joint 2 [rad]
+        print(validated.result[0]["boom"].rms)  # [deg]
 
     Args:
         fit (RUN|YAML): An estimate: a run folder, a folder written by Plant.save (Python), or a YAML file.

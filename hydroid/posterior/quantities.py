@@ -205,7 +205,7 @@ def direction_test(bench: Bench, estimate: Candidates, sign: float, ending: str,
                 yield Column(f"{name}_{ending}", f"{label}, {word}", own_unit), value
         if opens_later:
             band = np.add(*valve_opens(bench, candidates, sign))
-            yield Column(f"dead_band_{ending}", f"dead band, {word}", "%"), band
+            yield Column(f"dead_band_{ending}", f"dead band with the spool's overlap, {word}", "%"), band
         yield from opening_curve(bench, candidates, sign)
         if planned[rise] != 0.0:
             yield from after_step(run)

@@ -16,7 +16,7 @@ from hydroid.fitting.fit import Fit
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
 from hydroid.posterior.band import Band, fitted_bands, prediction_bands
-from hydroid.prediction import predict
+from hydroid.prediction import predict, predict_with_pressures
 from hydroid.progress import LOGGER
 from hydroid.words import listed, three_digits
 
@@ -90,6 +90,8 @@ class Prediction:
         bands: prediction bands by joint; empty of a model that is no fit.
         unseen: whether the model was made without this log; None: not known.
         apart: whether a user has said that it is of other conditions than the fit's: no verdict counts it.
+        pressure: of both chambers of the joints [Pa], shape (T, K, 2); NaN of those without commands; None:
+            the model has no hydraulics.
         names: of the joints; empty: their numbers stand for them.
         slides: numbers of those joints that slide.
         ahead: `errors_ahead` of the joints [rad], shape (N, HORIZONS, K); none where N is 0.
@@ -105,6 +107,7 @@ class Prediction:
     apart: bool = False
     names: tuple[str, ...] = ()
     slides: tuple[int, ...] = ()
+    pressure: Array | None = None
 
     def __getitem__(self, joint: str | int) -> JointPrediction:
         """Return what is predicted of a joint, by its name or its number from 1.
@@ -201,7 +204,8 @@ def error_indices(measured: Array, error: Array) -> ErrorIndices:
 def predicted(model: IdentifiedModel, log: Log, unseen: bool | None) -> Prediction:
     """Return a model's prediction of a log: NaN, with a warning, where the simulation diverges."""
     joints = tuple(model.settings.outputs)
-    response, bands = predict(model, log, joints), dict[int, Band]()
+    response, pressure = predict_with_pressures(model, log, joints)
+    bands = dict[int, Band]()
     if np.isfinite(response).all():
         bands = prediction_bands(model, log, response)
     else:
@@ -212,8 +216,17 @@ def predicted(model: IdentifiedModel, log: Log, unseen: bool | None) -> Predicti
 
     arm = model.settings.arm
     named = tuple(arm.joint_names[joint - 1] for joint in joints)
-    slides = tuple(arm.slides)
-    found = Prediction(model.name, log, joints, response, bands, unseen, names=named, slides=slides)
+    found = Prediction(
+        model.name,
+        log,
+        joints,
+        response,
+        bands,
+        unseen,
+        names=named,
+        slides=tuple(arm.slides),
+        pressure=pressure,
+    )
     return found if unseen is False else replace(found, ahead=errors_ahead(log, errors))
 
 
@@ -237,12 +250,23 @@ def errors_ahead(log: Log, errors: Callable[[Log], Array]) -> Array:
 
 def fitted(fit: Fit) -> tuple[Prediction, ...]:
     """Return what the final estimate of a fit makes of its own logs."""
-    joints, responses = tuple(fit.problem.settings.outputs), fit.best.responses
+    settings = fit.problem.settings
+    joints = tuple(settings.outputs)
+    model = IdentifiedModel(settings, fit.best.theta, fit.final)
+    responses = fit.best.responses
     bands = fitted_bands(fit.problem, fit.uncertainty, responses)
-    arm = fit.problem.settings.arm
-    named = tuple(arm.joint_names[joint - 1] for joint in joints)
-    slides = tuple(arm.slides)
-    return tuple(
-        Prediction(fit.final, log, joints, angles, of_log, False, names=named, slides=slides)
-        for log, angles, of_log in zip(fit.problem.logs, responses, bands, strict=True)
-    )
+    predictions = list[Prediction]()
+    for log, angles, of_log in zip(fit.problem.logs, responses, bands, strict=True):
+        one = Prediction(
+            fit.final,
+            log,
+            joints,
+            angles,
+            of_log,
+            False,
+            names=tuple(settings.arm.joint_names[joint - 1] for joint in joints),
+            slides=tuple(settings.arm.slides),
+            pressure=predict_with_pressures(model, log, joints)[1] if settings.stage == "hyd" else None,
+        )
+        predictions.append(one)
+    return tuple(predictions)

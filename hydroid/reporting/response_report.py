@@ -1,13 +1,14 @@
 """What models make of logs: each joint's error in each log, its response, and the arm in motion."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from itertools import chain, cycle
 
 import numpy as np
 
 from hydroid.arm.model import load_model
-from hydroid.arrays import Array, rms
+from hydroid.arrays import rms
 from hydroid.fitting.validation import Prediction
 from hydroid.fitting.verdict import rms_deg
 from hydroid.joint_verdict import JointVerdict
@@ -200,22 +201,30 @@ def draw_response(
             drawn = Mark("band", one.log.time, -half, half, color=color, label=label, alpha=0.18, off=i > 0)
             middle.insert(0, drawn)
     panels = [
-        Panel("", f"{place} [{unit}]", tuple(upper), title, 230),
-        Panel("", f"residual [{unit}]", tuple(middle), height=140),
+        Panel("", f"{place} [{unit}]", tuple(upper), title, 200),
+        Panel("", f"residual [{unit}]", tuple(middle), height=130),
     ]
-    if log.pressure is not None and np.isfinite(pressure := log.pressure[:, column]).any():
-        panels.append(Panel("", "pressure [bar]", _pressures(log.time, pressure), height=150))
+    if pressures := _pressures(several[0], joint):
+        panels.append(Panel("", "pressure [bar]", pressures, height=120))
     command = Mark("step", log.time, log.command[:, column], color="grey")
-    panels.append(Panel("time [s]", "command [%]", (command,), height=140, y_limits=(-108, 108)))
+    panels.append(Panel("time [s]", "command [%]", (command,), height=130, y_limits=(-108, 108)))
     return Chart(tuple(panels), linked=True, bins=bins)
 
 
-def _pressures(time: Array, pressure: Array) -> tuple[Mark, ...]:
-    """Draw the pressures of both chambers [Pa], shape (T, 2)."""
-    sides = zip("AB", ("green", "pink"), pressure.T, strict=True)
-    return tuple(
-        Mark("line", time, 1e-5 * one, color=color, label=f"chamber {side}") for side, color, one in sides
-    )
+def _pressures(one: Prediction, joint: int) -> tuple[Mark, ...]:
+    """Draw the pressures of both chambers of a joint, as far as they are measured and simulated."""
+    marks = list[Mark]()
+    log = one.log
+    for side, color in enumerate(("green", "pink")):
+        name = f"chamber {'AB'[side]}"
+        if log.pressure is not None and np.isfinite(log.pressure[:, joint - 1, side]).any():
+            measured = 1e-5 * log.pressure[:, joint - 1, side]
+            mark = Mark("line", log.time, measured, color=color, label=f"{name}, measured")
+            marks.append(replace(mark, width=5, alpha=0.35))
+        if one.pressure is not None and np.isfinite(one.pressure[:, one.joints.index(joint), side]).any():
+            simulated = 1e-5 * one.pressure[:, one.joints.index(joint), side]
+            marks.append(Mark("line", log.time, simulated, color=color, label=f"{name}, simulated"))
+    return tuple(marks)
 
 
 def draw_joints(title: str, arm: Arm, group: Sequence[Prediction], bins: int) -> Chart:

@@ -99,8 +99,12 @@ def test_a_response_shows_measured_and_simulated_angle_residual_pressures_and_co
     log = one.log
     pressed = replace(log, pressure=np.tile([5e6, 2e6], (*log.angle.shape, 1)))
     upper, middle, pressure, lower = draw_response("one", 2, [replace(one, log=pressed)], 1000).panels
-    assert labelled(pressure)["chamber A"].y == pytest.approx(np.full(len(log.time), 50.0))
-    assert len(draw_response("one", 2, [one], 1000).panels) == 3  # pressures are drawn where they are logged
+    assert labelled(pressure)["chamber A, measured"].y == pytest.approx(np.full(len(log.time), 50.0))
+    assert len(draw_response("one", 2, [one], 1000).panels) == 3  # there are none
+    simulated = replace(one, pressure=np.full((len(one.log.time), 1, 2), 50e5))
+    *_, drawn, _ = draw_response("one", 2, [simulated], 1000).panels
+    assert [mark.label for mark in drawn.marks] == ["chamber A, simulated", "chamber B, simulated"]
+    assert drawn.marks[0].y == pytest.approx(50.0)
     measured = np.degrees(log.angle[:, 1])
     assert labelled(upper)["measured"].y == pytest.approx(measured)
     simulated = np.degrees(fit.best.responses[0][:, 0])

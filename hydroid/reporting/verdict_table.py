@@ -163,7 +163,9 @@ def horizon_section(fits: Verdicts) -> Section | None:
                 row: dict[str, Cell] = {"joint": one.name, "of": of, "unit": unit}
                 for seconds, error in zip(HORIZONS, errors, strict=True):
                     row[column_of(seconds)] = _shown(error, one.slides)
-                rows.append(row | {WHOLE: _shown(whole[name], one.slides)})
+                row[WHOLE] = _shown(whole[name], one.slides)
+                if row not in rows:  # the simple models of fits to the same logs are the same
+                    rows.append(row)
     names = ("joint", "of", "unit", *map(column_of, HORIZONS), WHOLE)
     columns = {name: name for name in names}
     note = (

@@ -17,7 +17,7 @@ from PIL import Image, ImageDraw, ImageFont
 from hydroid.errors import RunError, SettingsError
 from hydroid.progress import Progress, no_progress
 from hydroid.reporting.outlines import sight
-from hydroid.viewer.motion import Motion, Playback, Replay
+from hydroid.viewer.motion import Motion, Playback, Region, Replay
 
 Picture = NDArray[np.uint8]
 
@@ -40,7 +40,7 @@ def rendered(motion: Motion, size: tuple[int, int], frames: Iterable[tuple[float
         how = f"MUJOCO_GL={os.environ.get('MUJOCO_GL')}: {' '.join(str(error).split())}"
         hint = "install libegl1 or libosmesa6, and set MUJOCO_GL=egl or osmesa before Python starts"
         raise RunError(f"no picture can be rendered ({how})", hint=hint) from None
-    look_at(camera, replay.model)
+    look_at(camera, replay.model, replay.region)
     letters = height // 30
     with renderer:
         for time, text in frames:
@@ -73,9 +73,10 @@ def render_motion(
     return (_mp4 if kind == ".mp4" else _still)(rendered(motion, size, frames()), kind)
 
 
-def look_at(camera: mujoco.MjvCamera, model: mujoco.MjModel) -> None:
-    """Point a camera at a whole machine, as it is seen at first."""
-    camera.lookat[:], camera.distance = model.stat.center, 2.3 * model.stat.extent
+def look_at(camera: mujoco.MjvCamera, model: mujoco.MjModel, region: Region) -> None:
+    """Point a camera at a whole machine, so far away that its region is inside the picture."""
+    camera.lookat[:] = region.centre
+    camera.distance = region.radius / np.sin(np.radians(model.vis.global_.fovy) / 2)
     camera.azimuth, camera.elevation = 125.0, -18.0  # [deg]
 
 
@@ -166,7 +167,7 @@ def show(playback: Playback) -> None:
     drawing = set(threading.enumerate()) - others
     try:
         with viewer.lock():
-            look_at(viewer.cam, playback.model)
+            look_at(viewer.cam, playback.model, playback.region)
         play(playback, viewer)
     finally:
         viewer.close()

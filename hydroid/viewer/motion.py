@@ -13,6 +13,9 @@ from hydroid.log import Log
 from hydroid.plant import Plant
 from hydroid.prediction import predict_log
 
+MOMENTS = 60
+"""of a motion, at which it is looked where the machine is"""
+
 
 @record
 class Motion:
@@ -59,10 +62,39 @@ def place(model: mujoco.MjModel, data: mujoco.MjData, angle: Array) -> None:
         update(model, data)
 
 
+@record
+class Region:
+    """A sphere around all that is drawn of a machine: its centre [m], shape (3,), and radius [m]."""
+
+    centre: Array
+    radius: float
+
+
+def region_of(model: mujoco.MjModel, angles: Array) -> Region:
+    """Return the region of a machine at angles of all joints [rad], (F, nq), without the floor."""
+    data = mujoco.MjData(model)
+    solid = model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE
+    around = model.geom_rbound[solid, None]
+    low = np.full(3, np.inf)
+    high = np.full(3, -np.inf)
+    for angle in angles:
+        place(model, data, angle)
+        low = np.minimum(low, (data.geom_xpos[solid] - around).min(axis=0, initial=np.inf))
+        high = np.maximum(high, (data.geom_xpos[solid] + around).max(axis=0, initial=-np.inf))
+    if not np.isfinite(low).all():  # nothing is drawn
+        return Region(model.stat.center.copy(), float(model.stat.extent))
+    return Region((low + high) / 2, float(np.linalg.norm(high - low)) / 2)
+
+
 class Sliders:
     """A plant with all joints on the viewer's sliders, from a named pose or the settings' start pose."""
 
     duration, ghost = np.inf, None
+
+    @property
+    def region(self) -> Region:
+        """Where the machine stands."""
+        return region_of(self.model, self.data.qpos[None])
 
     def __init__(self, plant: Plant, pose: str | None = None) -> None:
         self.plant, self._start = plant, pose
@@ -85,6 +117,14 @@ class Sliders:
 
 class Replay:
     """A simulated motion from its start to its end."""
+
+    @property
+    def region(self) -> Region:
+        """Where the machine and its ghost are in the course of the motion."""
+        motion = self._motion
+        angles = [motion.simulated] if motion.measured is None else [motion.simulated, motion.measured]
+        moments = np.unique(np.linspace(0, len(motion.time) - 1, MOMENTS).round().astype(int))
+        return region_of(self.model, np.concatenate([one[moments] for one in angles]))
 
     def __init__(self, motion: Motion) -> None:
         self.model, self._motion = motion.machine.model, motion

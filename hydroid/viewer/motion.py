@@ -74,16 +74,18 @@ def region_of(model: mujoco.MjModel, angles: Array) -> Region:
     """Return the region of a machine at angles of all joints [rad], (F, nq), without the floor."""
     data = mujoco.MjData(model)
     solid = model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE
-    around = model.geom_rbound[solid, None]
-    low = np.full(3, np.inf)
-    high = np.full(3, -np.inf)
-    for angle in angles:
-        place(model, data, angle)
-        low = np.minimum(low, (data.geom_xpos[solid] - around).min(axis=0, initial=np.inf))
-        high = np.maximum(high, (data.geom_xpos[solid] + around).max(axis=0, initial=-np.inf))
-    if not np.isfinite(low).all():  # nothing is drawn
+    if not solid.any():
         return Region(model.stat.center.copy(), float(model.stat.extent))
-    return Region((low + high) / 2, float(np.linalg.norm(high - low)) / 2)
+    around = model.geom_rbound[solid]
+    places = np.empty((len(angles), len(around), 3))
+    for row, angle in zip(places, angles, strict=True):
+        place(model, data, angle)
+        row[:] = data.geom_xpos[solid]
+    low = (places - around[:, None]).min(axis=(0, 1))
+    high = (places + around[:, None]).max(axis=(0, 1))
+    centre = (low + high) / 2
+    away = np.linalg.norm(places - centre, axis=2) + around
+    return Region(centre, float(away.max()))
 
 
 class Sliders:

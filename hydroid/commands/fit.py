@@ -171,7 +171,7 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
     from hydroid.fitting.validation import fitted
     from hydroid.fitting.verdict import baselines_of, behind, judge
     from hydroid.reporting.knowledge_report import warnings
-    from hydroid.reporting.parameters_report import parameter_table
+    from hydroid.reporting.parameters_report import in_words, parameter_table
     from hydroid.reporting.verdict_table import next_lines, next_step, verdict_lines
 
     settings, predictions = fit.problem.settings, fitted(fit)
@@ -183,11 +183,15 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
     summary = summary.changed({"verdict": verdict, "findings": tuple(findings)})
     source = "the fit" if folder is None else str(folder / NAME)
     model = IdentifiedModel(settings, fit.best.theta, source, summary)
-    lines: list[Table | str] = [*verdict_lines({fit.final: verdict}), *map(str, warnings(summary))]
+    lines: list[Table | str] = verdict_lines({fit.final: verdict})
+    lines += [str(in_words(one, settings)) for one in warnings(summary)]
     if folder is not None:
         step = next_step(summary, verdict, str(folder), predictions)
         lines += [*next_lines(step), str(folder / "report.html")]
-    details = [parameter_table(settings, summary), *map(str, summary.findings)]
+    details = [
+        parameter_table(settings, summary),
+        *(str(in_words(one, settings)) for one in summary.findings),
+    ]
     content = summary.plain() | {"out": folder and str(folder)}
     return FitResult(
         lines, content, problem, fit, folder, summary, model, predictions, baselines, details=details

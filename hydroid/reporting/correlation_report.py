@@ -8,8 +8,8 @@ from hydroid.arrays import Array
 from hydroid.estimate import Covariance, FitSummary
 from hydroid.reporting.chart import Chart, Mark, Panel
 from hydroid.reporting.page import Plot, Section, Table
-from hydroid.reporting.parameters_report import named
 from hydroid.settings.fit import FitSettings
+from hydroid.settings.naming import named
 
 FAINT = 0.1
 """correlation below which a cell stays empty"""

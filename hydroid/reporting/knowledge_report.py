@@ -4,12 +4,12 @@ from typing import Any
 
 import numpy as np
 
-from hydroid.estimate import FitSummary
+from hydroid.estimate import FitSummary, QuantityEstimate
 from hydroid.findings import Finding
 from hydroid.reporting.page import Section, Table
 from hydroid.reporting.parameters_report import in_words
 from hydroid.settings.fit import FitSettings
-from hydroid.words import listed, two_digits
+from hydroid.words import listed, three_digits, two_digits
 
 BEST_WITHIN = 0.3
 """half of a 95 % interval, relative to the value, up to which a property counts as known"""
@@ -50,7 +50,7 @@ def quantity_section(settings: FitSettings, summary: FitSummary) -> Section | No
     for joint in settings.outputs:
         known = [q for q in summary.quantities.values() if q.joint == joint and q.within <= BEST_WITHIN]
         known.sort(key=lambda one: one.within)
-        rows = [(q.label, f"{q.value:.3g}", q.unit, f"± {100 * q.within:.2g} %") for q in known[:MOST_KNOWN]]
+        rows = [(q.label, f"{q.value:.3g}", q.unit, _within(q)) for q in known[:MOST_KNOWN]]
         name = settings.arm.joint_names[joint - 1]
         if rows:
             cards[f"known_{name}"] = Table(name, ("quantity", "value", "unit", "interval"), tuple(rows))
@@ -58,6 +58,14 @@ def quantity_section(settings: FitSettings, summary: FitSummary) -> Section | No
         "With 95 % intervals, which are right only if the model is right. estimate.yaml has all quantities."
     )
     return Section("What is known", text, cards=cards) if cards else None
+
+
+def _within(one: QuantityEstimate) -> str:
+    """Write an interval: of a percentage its ends, since ± 3 % of 40 % could mean either."""
+    low, high = one.interval
+    if one.unit == "%" and low is not None and high is not None:
+        return f"{three_digits(low)} to {three_digits(high)} %"
+    return f"± {100 * one.within:.2g} %"
 
 
 def error_section(settings: FitSettings, summary: FitSummary) -> Section | None:

@@ -12,10 +12,10 @@ from hydroid.estimate import FitSummary, Interval, ParameterEstimate
 from hydroid.findings import Finding
 from hydroid.parameters import Parameter, Prior
 from hydroid.posterior.uncertainty import Flag, Source
-from hydroid.quantity_table import CHOICES
 from hydroid.reporting.chart import Chart, Mark, Panel
 from hydroid.reporting.page import Cell, Given, Plot, Section, Table
 from hydroid.settings.fit import FitSettings
+from hydroid.settings.naming import named, place, quantity_and_side
 from hydroid.words import listed, number, three_digits
 
 ENDS = ("from", "to", "by log from", "by log to", "profile from", "profile to")
@@ -122,30 +122,6 @@ def parameter_table(settings: FitSettings, summary: FitSummary, profiles: Interv
     optional = ("quantity", "side", "joint", *by_log, "data [%]", "lower", "upper")
     rows = map(row, settings.parameter_set().parameters)
     return Table.of("Parameters", {name: name for name in columns}, rows, _NOTE, optional)
-
-
-def quantity_and_side(settings: FitSettings, name: str) -> tuple[str, str]:
-    """Return what a parameter is, in words, and the side of the actuator that it belongs to, if any."""
-    plain, _, side = CHOICES[settings.parameters[name].quantity].plain.partition(", side ")
-    return plain, side
-
-
-def place(settings: FitSettings, name: str) -> str:
-    """Return the link or the joints that a parameter belongs to; empty where all share it."""
-    own = settings.parameters[name]
-    if own.link is not None:
-        return own.link
-    joints = own.joints or ()
-    where = ", ".join(settings.arm.joint_names[joint - 1] for joint in joints)
-    return f"{where} ({own.per})" if own.per else where
-
-
-def named(settings: FitSettings, name: str, detail: str = "") -> str:
-    """Name a parameter in words, with joint, side, symbol, and a `detail` in brackets behind them."""
-    what, side = quantity_and_side(settings, name)
-    where = f"{place(settings, name)} {side}".strip()
-    symbol = f"{where}: {name}" if where else name
-    return f"{what} ({symbol}; {detail})" if detail else f"{what} ({symbol})"
 
 
 def in_words(finding: Finding, settings: FitSettings) -> Finding:

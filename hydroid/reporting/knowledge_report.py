@@ -9,7 +9,7 @@ from hydroid.findings import Finding
 from hydroid.reporting.page import Section, Table
 from hydroid.reporting.parameters_report import in_words
 from hydroid.settings.fit import FitSettings
-from hydroid.words import listed, three_digits, two_digits
+from hydroid.words import interval_words, listed, two_digits
 
 BEST_WITHIN = 0.3
 """half of a 95 % interval, relative to the value, up to which a property counts as known"""
@@ -64,7 +64,7 @@ def _within(one: QuantityEstimate) -> str:
     """Write an interval: of a percentage its ends, since ± 3 % of 40 % could mean either."""
     low, high = one.interval
     if one.unit == "%" and low is not None and high is not None:
-        return f"{three_digits(low)} to {three_digits(high)} %"
+        return f"{interval_words(low, high)} %"
     return f"± {100 * one.within:.2g} %"
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from hydroid.arrays import Array
-from hydroid.estimate import FitSummary, Interval, ParameterEstimate
+from hydroid.estimate import FitSummary, ParameterEstimate
 from hydroid.findings import Finding
 from hydroid.parameters import Parameter, Prior
 from hydroid.posterior.uncertainty import Flag, Source
@@ -16,7 +16,7 @@ from hydroid.reporting.chart import Chart, Mark, Panel
 from hydroid.reporting.page import Cell, Given, Plot, Section, Table
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.naming import named, place, quantity_and_side
-from hydroid.words import listed, number, three_digits
+from hydroid.words import interval_words, listed, number
 
 ENDS = ("from", "to", "by log from", "by log to", "profile from", "profile to")
 FARTHEST = 5.0
@@ -73,25 +73,11 @@ def short_table(settings: FitSettings, summary: FitSummary) -> Table:
     for name, one in summary.estimate.items():
         what, side = quantity_and_side(settings, name)
         said = place(settings, name), side, what, name
-        logs = (_interval(one.interval_by_log),) if by_log else ()
+        logs = (interval_words(*one.interval_by_log),) if by_log else ()
         share = f", {100 * one.data_share:.0f} % data" if one.source == Source.BOTH and one.data_share else ""
-        rows.append((*said, one.value, one.unit, _interval(one.interval), *logs, origin(one) + share))
+        rows.append((*said, one.value, one.unit, interval_words(*one.interval), *logs, origin(one) + share))
     note = "interval: of 95 %; by log: the same, from the differences between logs."
     return Table("Parameters", header, tuple(rows), note)
-
-
-def _interval(ends: Interval) -> str:
-    """Write an interval with three digits; nothing where neither end has a limit."""
-    low, high = ends
-    if low is None and high is None:
-        return ""
-    if low is None or high is None:
-        return (
-            f"up to {three_digits(high)}"
-            if low is None and high is not None
-            else f"from {three_digits(low or 0.0)}"
-        )
-    return f"{three_digits(low)} to {three_digits(high)}"
 
 
 def parameter_table(settings: FitSettings, summary: FitSummary, profiles: Intervals | None = None) -> Table:

@@ -146,7 +146,12 @@ def test_a_parameter_is_one_line_of_words_with_its_interval():
     estimate["K"] = estimate["K"].changed({"value": 0.25, "interval": (0.2, 0.31), "source": "data"})
     table = short_table(SETTINGS, SUMMARY.changed({"estimate": estimate}))
     row = dict(zip(table.header, table.shown[0], strict=True))
-    expected = {"quantity": "torque per command", "symbol": "K", "value": "0.2500", "interval": "0.2 to 0.31"}
+    expected = {
+        "quantity": "torque per command",
+        "symbol": "K",
+        "value": "0.2500",
+        "interval": "0.20 to 0.31",
+    }
     assert row.items() >= expected.items()
     assert len(table.rows) == len(SUMMARY.estimate)
 

@@ -1,4 +1,6 @@
-"""How well a model predicts a log: its response with a band, and the article's error indices (table 9)."""
+"""How well a model predicts a log: its response with a band, and the article's error indices (table
+9).
+"""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import field, replace
@@ -33,8 +35,8 @@ SETTLING = 2.0
 class ErrorIndices:
     """Indices of an output error: mean absolute, rms and largest [rad], and fit [%].
 
-    fit = 100 (1 - |y - y_hat| / |y - mean(y)|), 100 for a perfect response, 0 for the mean of the data;
-    NaN where the data do not move.
+    fit = 100 (1 - |y - y_hat| / |y - mean(y)|), 100 for a perfect response, 0 for the mean of the
+    data; NaN where the data do not move.
     """
 
     mean_absolute: float
@@ -89,9 +91,10 @@ class Prediction:
         response: their angles [rad], shape (T, K).
         bands: prediction bands by joint; empty of a model that is no fit.
         unseen: whether the model was made without this log; None: not known.
-        apart: whether a user has said that it is of other conditions than the fit's: no verdict counts it.
-        pressure: of both chambers of the joints [Pa], shape (T, K, 2); NaN of those without commands; None:
-            the model has no hydraulics.
+        apart: whether a user has said that it is of other conditions than the fit's: no verdict
+            counts it.
+        pressure: of both chambers of the joints [Pa], shape (T, K, 2); NaN of those without
+            commands; None: the model has no hydraulics.
         names: of the joints; empty: their numbers stand for them.
         slides: numbers of those joints that slide.
         ahead: `errors_ahead` of the joints [rad], shape (N, HORIZONS, K); none where N is 0.
@@ -141,8 +144,8 @@ class Prediction:
     def to_frame(self) -> "pandas.DataFrame":
         """Return one row per sample, by its time [s].
 
-        Columns are, for each joint, `measured`, `response`, `error`, and where there is a band `half` of it,
-        in deg, or in mm of a joint that slides.
+        Columns are, for each joint, `measured`, `response`, `error`, and where there is a band
+        `half` of it, in deg, or in mm of a joint that slides.
         """
         import pandas
 
@@ -177,7 +180,10 @@ class Prediction:
         return self.log.angle[:, joint - 1] - self.response[:, self.joints.index(joint)]
 
     def plain(self, names: Sequence[str]) -> list[Plain]:
-        """Return one mapping per joint, as JSON has them (docs/json.md); `names` are of all joints."""
+        """Return one mapping per joint, as JSON has them (docs/json.md).
+
+        `names` are of all joints.
+        """
         rows: list[Plain] = []
         for joint, one in self.indices.items():
             row = Plain({"fit": self.fit, "log": self.log.source, "joint": joint, "name": names[joint - 1]})
@@ -231,12 +237,13 @@ def predicted(model: IdentifiedModel, log: Log, unseen: bool | None) -> Predicti
 
 
 def errors_ahead(log: Log, errors: Callable[[Log], Array]) -> Array:
-    """Return by how much predicted changes of angles over HORIZONS are off, from starts all along a log.
+    """Return by how much predicted changes of angles over HORIZONS are off, from starts all along a
+    log.
 
-    Each start is simulated from SETTLING before it, at the angles measured there: valves, pilot stages and
-    pump are then as the commands have left them. `errors` are those of a part of the log [rad], shape (T,) or
-    (T, K). Each start has a row [rad], shape (N, HORIZONS) or (N, HORIZONS, K); NaN where the log ends
-    before.
+    Each start is simulated from SETTLING before it, at the angles measured there: valves, pilot
+    stages and pump are then as the commands have left them. `errors` are those of a part of the log
+    [rad], shape (T,) or (T, K). Each start has a row [rad], shape (N, HORIZONS) or
+    (N, HORIZONS, K); NaN where the log ends before.
     """
     before, rows = round(SETTLING / log.period), list[Array]()
     steps = np.array([before + round(seconds / log.period) for seconds in HORIZONS])

@@ -1,8 +1,10 @@
-"""Curves of a joint, point by point: its valve's opening, its answer to a step, its frequency response.
+"""Curves of a joint, point by point: its valve's opening, its answer to a step, its frequency
+response.
 
-The frequency response is that of the step: the Fourier transform of the derivative of the speed, over the
-command. A linear joint has no other. That of a hydraulic one depends on the size of the command, which the
-curve's label says. It is taken from the start of the step alone: further on the joint has left its pose.
+The frequency response is that of the step: the Fourier transform of the derivative of the speed,
+over the command. A linear joint has no other. That of a hydraulic one depends on the size of the
+command, which the curve's label says. It is taken from the start of the step alone: further on the
+joint has left its pose.
 """
 
 from collections.abc import Callable
@@ -27,7 +29,8 @@ DENSE = 400
 MARGIN = 0.02
 """part of a joint's range before its ends where a step response stops to be one"""
 LEAST_START, TIME_CONSTANTS = 1.0, 5.0
-"""how long the start of a step lasts at least [s], and how many time constants after the dead time"""
+"""how long the start of a step lasts at least [s], and how many time constants after the dead
+time"""
 LOWEST = 0.2
 """the lowest frequency [Hz]: below it the speed follows the command"""
 
@@ -51,7 +54,8 @@ def opening_curve(bench: Bench, candidates: Candidates, sign: float) -> Measured
 
 
 def step_curves(step: Movement, estimate: Candidates, ending: str, word: str) -> StepCurves:
-    """Return what makes the curves of a step from the speeds of candidates, up to an end of the range.
+    """Return what makes the curves of a step from the speeds of candidates, up to an end of the
+    range.
 
     `ending` and `word` name the direction, as in the other quantities.
     """
@@ -83,10 +87,11 @@ def step_curves(step: Movement, estimate: Candidates, ending: str, word: str) ->
 
 
 def frequency_response(speeds: Array, frequencies: Array, period: float) -> tuple[Array, Array]:
-    """Return amplitude and phase [deg] over a unit step, (n, F), from speeds after it, (n, samples).
+    """Return amplitude and phase [deg] over a unit step, (n, F), from speeds after it,
+    (n, samples).
 
-    A speed is the mean between two samples, `period` [s] apart; after the last one it is taken to stay. The
-    mean and the difference each damp a frequency by a sinc, which is divided out again.
+    A speed is the mean between two samples, `period` [s] apart; after the last one it is taken to
+    stay. The mean and the difference each damp a frequency by a sinc, which is divided out again.
     """
     impulse = np.diff(speeds, axis=1, prepend=0.0)
     time = period * np.arange(speeds.shape[1])
@@ -100,7 +105,9 @@ def frequency_response(speeds: Array, frequencies: Array, period: float) -> tupl
 
 
 def _before_the_end(bench: Bench, angles: Array) -> int:
-    """Return how many of the angles after a step, (samples,), come before an end of the joint's range."""
+    """Return how many of the angles after a step, (samples,), come before an end of the joint's
+    range.
+    """
     lower, upper = [*bench.settings.arm.ranges.values()][bench.joint - 1]
     margin = MARGIN * (upper - lower) if np.isfinite(upper - lower) else 0.0
     beyond = np.flatnonzero((angles < lower + margin) | (angles > upper - margin))

@@ -105,7 +105,10 @@ def _rounded_ends(interval: Array) -> Interval:
 
 
 def joint_measure(bench: Bench, estimate: Candidates) -> Measure:
-    """Return what computes the quantities of one joint; what is tested is planned at the estimate."""
+    """Return what computes the quantities of one joint.
+
+    What is tested is planned at the estimate.
+    """
     tests, further = list[Test](), gain_model
     if bench.settings.stage == "hyd":
         torque, signs = bench.weigh(estimate)[0][0], ("positive", "negative")
@@ -127,7 +130,9 @@ def joint_measure(bench: Bench, estimate: Candidates) -> Measure:
 
 
 def gain_model(bench: Bench, candidates: Candidates, inertia: Array) -> Measured:
-    """Stage 1: what the joint does under K u = D q̇ + F_c sign(q̇), before springs and gravity's change act."""
+    """Stage 1: what the joint does under K u = D q̇ + F_c sign(q̇), before springs and gravity's
+    change act.
+    """
     joint = candidates.joints[:, bench.joint - 1]
     gain, damping, friction = joint["gain"], joint["damping"], joint["friction"]
     factor, unit = bench.unit
@@ -144,8 +149,8 @@ def gain_model(bench: Bench, candidates: Candidates, inertia: Array) -> Measured
 def oil(bench: Bench, candidates: Candidates, inertia: Array) -> Measured:
     """Stage 2: the arm on its oil with the valve shut, and the ratio of areas.
 
-    The oil is a spring of stiffness r² β (A_A²/V_A + A_B²/V_B) at the joint. Leakage and the seals' friction
-    are left out of the damping.
+    The oil is a spring of stiffness r² β (A_A²/V_A + A_B²/V_B) at the joint. Leakage and the seals'
+    friction are left out of the damping.
     """
     c, travel, arm = actuator(bench, candidates)
     volumes = c.dead_volume, c.dead_volume
@@ -214,9 +219,11 @@ def direction_test(bench: Bench, estimate: Candidates, sign: float, ending: str,
 
 
 def valve_opens(bench: Bench, candidates: Candidates, sign: float) -> tuple[Array, Array]:
-    """Return the parameter `dead_band` of a direction [%], and how much further its valve opens, (n,) each.
+    """Return the parameter `dead_band` of a direction [%], and how much further its valve opens,
+    (n,) each.
 
-    The pilot stage passes nothing up to the first. From there on the spool crosses its overlap, unless the
+    The pilot stage passes nothing up to the first. From there on the spool crosses its overlap,
+    unless the
     voltage at the smallest command has done it: then the second is not above 0.
     """
     c, *_ = actuator(bench, candidates)

@@ -9,7 +9,8 @@ from hydroid.problem.problem import Problem
 
 
 def stored_error_model(problem: Problem, stored: Mapping[str, AngleError]) -> ErrorModel:
-    """Return the error model of a problem's logs with the numbers stored of each angle, such as `q2`.
+    """Return the error model of a problem's logs with the numbers stored of each angle, such as
+    `q2`.
 
     Pressures keep those of a model that is still to be estimated.
     """

@@ -1,4 +1,6 @@
-"""What each joint's valve and actuator do, beside what was measured: speeds, openings, answers to a step."""
+"""What each joint's valve and actuator do, beside what was measured: speeds, openings, answers to a
+step.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -15,7 +17,8 @@ from hydroid.settings.fit import FitSettings
 from hydroid.words import listed, two_digits
 
 OVER = 0.25
-"""time over which a speed is measured [s]; for as long before it the command must have stood still"""
+"""time over which a speed is measured [s]; for as long before it the command must have stood
+still"""
 STILL = 20.0
 """by how much a command that stands still may change [%]: a joystick never rests"""
 AT_END = 0.02
@@ -39,7 +42,10 @@ _STEP = (
 
 
 def speed_section(settings: FitSettings, summary: FitSummary, logs: Sequence[Log]) -> Section | None:
-    """Return the section of speed and valve opening against command, a tab per joint; None: no curves."""
+    """Return the section of speed and valve opening against command, a tab per joint.
+
+    None: no curves.
+    """
     tabs = list[Plot]()
     fastest = list[str]()
     opens = False
@@ -69,7 +75,10 @@ def speed_section(settings: FitSettings, summary: FitSummary, logs: Sequence[Log
 
 
 def step_section(settings: FitSettings, summary: FitSummary) -> Section | None:
-    """Return the section of step and frequency responses, a tab per joint; None: the fit states none."""
+    """Return the section of step and frequency responses, a tab per joint.
+
+    None: the fit states none.
+    """
     tabs = list[Plot]()
     slowest = list[str]()
     for joint in settings.outputs:
@@ -89,10 +98,11 @@ def step_section(settings: FitSettings, summary: FitSummary) -> Section | None:
 
 
 def measured_speeds(log: Log, joint: int, late: float) -> tuple[Array, Array]:
-    """Return commands [%] and speeds [rad/s] of a joint, from 1, where its command stood still, (n,) each.
+    """Return commands [%] and speeds [rad/s] of a joint, from 1, where its command stood still,
+    (n,) each.
 
-    The command is that of `late` [s] before. Stretches of OVER do not overlap; those without a command, and
-    those near an end of the travel, are left out.
+    The command is that of `late` [s] before. Stretches of OVER do not overlap; those without a
+    command, and those near an end of the travel, are left out.
     """
     command = log.command[:, joint - 1]
     angle = log.angle[:, joint - 1]
@@ -185,6 +195,8 @@ def _response_panel(y: str, title: str, height: int, curves: Mapping[str, CurveE
 
 
 def _rows(curve: CurveEstimate) -> Array:
-    """Return places, values, and both ends of the intervals, NaN where there is no limit, shape (4, n)."""
+    """Return places, values, and both ends of the intervals, NaN where there is no limit, shape
+    (4, n).
+    """
     ends = np.array(curve.interval, dtype=float)
     return np.array([curve.at, curve.value, ends[:, 0], ends[:, 1]], dtype=float)

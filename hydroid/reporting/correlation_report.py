@@ -44,7 +44,10 @@ def correlation_table(summary: FitSummary) -> Table | None:
 
 
 def correlation_section(settings: FitSettings, summary: FitSummary) -> Section | None:
-    """Return the section of the correlations as a map of colours; None where fewer than two vary."""
+    """Return the section of the correlations as a map of colours.
+
+    None where fewer than two vary.
+    """
     known = summary.covariance
     if known is None or len(known.parameters) < 2:
         return None
@@ -84,7 +87,9 @@ def correlation_map(matrix: Array, names: tuple[str, ...]) -> Chart:
 
 
 def _by_joint(settings: FitSettings, names: tuple[str, ...]) -> list[int]:
-    """Return the places of parameters in the order of their joints, so that those of one stand together."""
+    """Return the places of parameters in the order of their joints, so that those of one stand
+    together.
+    """
 
     def joint(i: int) -> int:
         own = settings.parameters.get(names[i])

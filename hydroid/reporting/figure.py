@@ -1,4 +1,6 @@
-"""Pictures drawn with matplotlib, the same bytes every time: charts as files, and one to check an arm by."""
+"""Pictures drawn with matplotlib, the same bytes every time: charts as files, and one to check an
+arm by.
+"""
 
 import io
 import warnings
@@ -136,11 +138,15 @@ def legend(drawing: Figure) -> None:
 VIEWS = {"from the right (-y)": (0.0, "z [m]"), "from above": (-90.0, "y [m]")}
 """elevation of the sight [deg], and what points upwards; x points to the right"""
 ACROSS = 0.7
-"""part of an axis's direction that points out of the picture, from which on its sense of rotation is named"""
+"""part of an axis's direction that points out of the picture, from which on its sense of rotation
+is named"""
 
 
 def arm_picture(arm: Arm, title: str) -> tuple[bytes, bytes]:
-    """Draw an arm with all joints at 0, or at the ends of their ranges that are nearest; PNG and SVG."""
+    """Draw an arm with all joints at 0, or at the ends of their ranges that are nearest.
+
+    PNG and SVG.
+    """
     model = load_model(arm).compile()
     data, angles = mujoco.MjData(model), np.clip(0.0, arm.lower, arm.upper)
     data.qpos[:] = angles
@@ -171,7 +177,10 @@ def arm_picture(arm: Arm, title: str) -> tuple[bytes, bytes]:
 
 
 def _view(axes: Axes, arm: Arm, data: Any, outlines: Sequence[Shape], poses: Array, name: str) -> None:
-    """Draw links, joints' axes and pivots in one of the VIEWS; the outlines' corners are in the world."""
+    """Draw links, joints' axes and pivots in one of the VIEWS.
+
+    The outlines' corners are in the world.
+    """
     elevation, upwards = VIEWS[name]
     *across, ahead = sight(90.0, elevation)
     model, onto = data.model, np.transpose(across)

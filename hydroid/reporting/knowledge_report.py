@@ -25,7 +25,9 @@ def warnings(summary: FitSummary) -> tuple[Finding, ...]:
 
 
 def unknown_section(settings: FitSettings, summary: FitSummary) -> Section:
-    """Return the section of the other findings; those after the first six stand with the parameters.
+    """Return the section of the other findings.
+
+    Those after the first six stand with the parameters.
 
     Which parameters cannot be told apart, their correlations show.
     """
@@ -45,7 +47,10 @@ def _others(summary: FitSummary) -> list[Finding]:
 
 
 def quantity_section(settings: FitSettings, summary: FitSummary) -> Section | None:
-    """Return the section with a card of the best known quantities of each joint; none without any."""
+    """Return the section with a card of the best known quantities of each joint.
+
+    None without any.
+    """
     cards = dict[str, Table]()
     for joint in settings.outputs:
         known = [q for q in summary.quantities.values() if q.joint == joint and q.within <= BEST_WITHIN]
@@ -69,7 +74,10 @@ def _within(one: QuantityEstimate) -> str:
 
 
 def error_section(settings: FitSettings, summary: FitSummary) -> Section | None:
-    """Return the section with the error model of each compared joint; none where the run has none."""
+    """Return the section with the error model of each compared joint.
+
+    None where the run has none.
+    """
     rows = list[dict[str, Any]]()
     after = list[str]()
     for joint in settings.outputs:

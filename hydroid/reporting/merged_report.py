@@ -12,10 +12,11 @@ SPREAD = ("name", "unit", "median", "lowest", "lower_quartile", "upper_quartile"
 
 
 def merged_tables(runs: Sequence[Record]) -> dict[str, Table]:
-    """Return the tables `spread` and `runs` of runs that differ in their seeds only, the best run first.
+    """Return the tables `spread` and `runs` of runs that differ in their seeds only, the best run
+    first.
 
-    A seed may lead to further terms, and so to parameters that others lack; their cells are empty, as are
-    errors of joints that diverged. The spread is over the runs that have a value.
+    A seed may lead to further terms, and so to parameters that others lack; their cells are empty,
+    as are errors of joints that diverged. The spread is over the runs that have a value.
     """
     runs = sorted(runs, key=lambda run: run.rms_deg)
     units = dict[str, str]()
@@ -40,7 +41,10 @@ def merged_tables(runs: Sequence[Record]) -> dict[str, Table]:
 
 
 def _errors(run: Record) -> dict[str, float | None]:
-    """Return each joint's error on the fitted logs [deg], of one that slides [mm]; None: there is none."""
+    """Return each joint's error on the fitted logs [deg], of one that slides [mm].
+
+    None: there is none.
+    """
     errors = dict[str, float | None]()
     for one in run.summary.verdict:
         factor = 1e3 * float(np.radians(1.0)) if one.slides else 1.0

@@ -1,8 +1,9 @@
 """The arm in motion, as a page draws it: the measured arm, and over it the simulated one.
 
-A page gets the corners of each link once, and for each moment how its rigid parts are turned and moved in the
-world, and where a camera looks. Its script (`moving_arm.js`) draws both arms. The camera from the side turns
-with the machine, so that a slew never hides the arm behind itself; another one looks down on it.
+A page gets the corners of each link once, and for each moment how its rigid parts are turned and
+moved in the world, and where a camera looks. Its script (`moving_arm.js`) draws both arms. The
+camera from the side turns with the machine, so that a slew never hides the arm behind itself;
+another one looks down on it.
 """
 
 from collections.abc import Sequence
@@ -35,8 +36,8 @@ class View:
 
     Attributes:
         size: of its picture, width and height.
-        axes: what points to the right and downwards in the picture, shape (F, 6); (1, 6) of a camera that
-            does not turn.
+        axes: what points to the right and downwards in the picture, shape (F, 6); (1, 6) of a
+            camera that does not turn.
         corner: what is added to that [1], shape (2,).
         order: the shapes, the farthest first.
     """
@@ -57,7 +58,8 @@ class MovingArm:
         poses: `measured` and `simulated`: rows of the 3 × 4 turn and place [m] of each part, shape
             (parts, F, 12), or (1, 12) for one that stands still.
         views: from the `side`, and from `above` if the machine slews.
-        errors: measured minus simulated angle by the joint's name [°], of one that slides [mm], shape (F,).
+        errors: measured minus simulated angle by the joint's name [°], of one that slides [mm],
+            shape (F,).
         units: of the errors, by name.
         start: number of the moment with the largest error.
     """
@@ -107,7 +109,9 @@ def moving_arm(
 
 
 def _roots(model: mujoco.MjModel, moves: Array) -> list[int]:
-    """Return the body that each body turns with: itself if its joint `moves`, or one that carries it."""
+    """Return the body that each body turns with: itself if its joint `moves`, or one that carries
+    it.
+    """
     moving = {0, *model.jnt_bodyid[moves].tolist()}
     roots = list[int]()
     for body, parent in enumerate(model.body_parentid.tolist()):
@@ -116,7 +120,9 @@ def _roots(model: mujoco.MjModel, moves: Array) -> list[int]:
 
 
 def _rigid_parts(model: mujoco.MjModel, start: Array, roots: list[int], parts: list[int]) -> list[Shape]:
-    """Return all shapes in the frames of their rigid parts, from the poses at the start, (nbody, 3, 4)."""
+    """Return all shapes in the frames of their rigid parts, from the poses at the start,
+    (nbody, 3, 4).
+    """
     outlines = list[Shape]()
     for shape in shapes(model):
         pose = start[roots[shape.body]]
@@ -148,7 +154,8 @@ def _heading(model: mujoco.MjModel, angles: Array) -> Array:
 
 
 def _view(outlines: Sequence[Shape], placed: Array, cameras: Sequence[Array], scale: float = 0.0) -> View:
-    """Return what a camera sees of corners [m], (2, F, n, 3), that looks (right, up, ahead) at each moment.
+    """Return what a camera sees of corners [m], (2, F, n, 3), that looks (right, up, ahead) at each
+    moment.
 
     scale: of the picture [1/m]; 0: so that it is as large as it may be.
     """
@@ -170,7 +177,9 @@ def _view(outlines: Sequence[Shape], placed: Array, cameras: Sequence[Array], sc
 def _errors(
     model: mujoco.MjModel, names: Sequence[str], compared: Sequence[int], error: Array
 ) -> tuple[dict[str, Array], dict[str, str]]:
-    """Return the errors of the compared joints [°, mm] and their units, by name, from [rad, m], (F, nq)."""
+    """Return the errors of the compared joints [°, mm] and their units, by name, from [rad, m],
+    (F, nq).
+    """
     errors = dict[str, Array]()
     units = dict[str, str]()
     for joint in compared:

@@ -41,7 +41,9 @@ def shapes(model: mujoco.MjModel) -> list[Shape]:
 
 
 def body_poses(model: mujoco.MjModel, angles: Array) -> Array:
-    """Return turn and place [m] of all bodies at angles of all joints [rad], (F, nq) -> (F, nbody, 3, 4)."""
+    """Return turn and place [m] of all bodies at angles of all joints [rad], (F, nq) ->
+    (F, nbody, 3, 4).
+    """
     data, poses = mujoco.MjData(model), np.empty((len(angles), model.nbody, 3, 4))
     for pose, angle in zip(poses, angles, strict=True):
         data.qpos[:] = angle
@@ -51,7 +53,9 @@ def body_poses(model: mujoco.MjModel, angles: Array) -> Array:
 
 
 def sight(azimuth: float, elevation: float) -> Array:
-    """Return to the right, up and ahead for a camera that looks to these angles [deg], rows of (3, 3)."""
+    """Return to the right, up and ahead for a camera that looks to these angles [deg], rows of
+    (3, 3).
+    """
     a, e = np.radians([azimuth, elevation])
     ahead = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
     right = np.array([np.sin(a), -np.cos(a), 0.0])
@@ -59,7 +63,10 @@ def sight(azimuth: float, elevation: float) -> Array:
 
 
 def _lines(model: mujoco.MjModel) -> list[Shape]:
-    """A line from each body to each that it carries; that of the last leads to its centre of mass."""
+    """A line from each body to each that it carries.
+
+    That of the last leads to its centre of mass.
+    """
     found: list[Shape] = []
     for body in range(1, model.nbody):
         ends = model.body_pos[model.body_parentid == body]
@@ -69,7 +76,10 @@ def _lines(model: mujoco.MjModel) -> list[Shape]:
 
 
 def _points(model: mujoco.MjModel, geom: int) -> Array | None:
-    """Return points of a shape's surface in its own frame [m], shape (n, 3); None: it is no solid."""
+    """Return points of a shape's surface in its own frame [m], shape (n, 3).
+
+    None: it is no solid.
+    """
     kinds, make, size = mujoco.mjtGeom, trimesh.creation, model.geom_size[geom]
     match kinds(int(model.geom_type[geom])):
         case kinds.mjGEOM_MESH:

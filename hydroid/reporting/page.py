@@ -1,4 +1,7 @@
-"""A report as data: tables for readers and scripts, sections, charts, steps; `page_file` writes it."""
+"""A report as data: tables for readers and scripts, sections, charts, steps.
+
+`page_file` writes it.
+"""
 
 import os
 import re
@@ -32,7 +35,8 @@ class Given(float):
 class Table:
     """A table; each row has one cell per column of the header.
 
-    The note stands below it. A narrow terminal leaves out `optional` columns, the least important first.
+    The note stands below it. A narrow terminal leaves out `optional` columns, the least important
+    first.
     """
 
     title: str
@@ -50,7 +54,10 @@ class Table:
         note: str = "",
         optional: tuple[str, ...] = (),
     ) -> "Table":
-        """Return a table of rows by key; `columns` are the keys that are shown, and the columns' names."""
+        """Return a table of rows by key.
+
+        `columns` are the keys that are shown, and the columns' names.
+        """
         cells = tuple(tuple(row.get(key) for key in columns) for row in rows)
         return cls(title, tuple(columns.values()), cells, note, optional)
 
@@ -59,10 +66,12 @@ class Table:
         return csv_text([self.header, *self.rows])
 
     def show(self) -> None:
-        """Print the table within the width of the terminal or of COLUMNS; elsewhere lines have any length.
+        """Print the table within the width of the terminal or of COLUMNS.
 
-        Columns of text wrap at words. Where that does not suffice, `optional` columns are named below it
-        instead.
+        Elsewhere lines have any length.
+
+        Columns of text wrap at words. Where that does not suffice, `optional` columns are named
+        below it instead.
         """
         from rich.console import Console
 
@@ -86,8 +95,8 @@ class Table:
     def aligned(self, digit: str = FIGURE_SPACE, point: str = POINT_SPACE) -> list[list[str]]:
         """Return `shown` with numbers under each other at the point.
 
-        The blanks are as wide as a digit and a point. A column of text is aligned where each of its cells
-        begins with a number.
+        The blanks are as wide as a digit and a point. A column of text is aligned where each of its
+        cells begins with a number.
         """
         columns = list[list[str]]()
         for i, right in enumerate(self.numeric):
@@ -135,7 +144,9 @@ class Table:
 
 
 def _aligned(cells: list[str], digit: str, point: str, *, right: bool) -> list[str]:
-    """Return the cells of a column, which stands at the `right` or left, with their numbers at the point."""
+    """Return the cells of a column, which stands at the `right` or left, with their numbers at the
+    point.
+    """
     numbers = [_NUMBER.match(cell) for cell in cells]
     if not right and any(cell and not number for cell, number in zip(cells, numbers, strict=True)):
         return cells
@@ -164,9 +175,10 @@ def shown(cell: Cell) -> str:
 class Plot:
     """A figure: its name on the page, what it shows in words, and the function that makes it.
 
-    That returns a `Chart`, which the page shows with buttons to zoom it if `zoom`, or a `MovingArm`. Of
-    several figures of which a reader sees one at a time, `button` chooses it. The button stands in a `row`
-    and a `column`, where these are given; its `state` (`good`, `fair`, `bad`) gives the colour.
+    That returns a `Chart`, which the page shows with buttons to zoom it if `zoom`, or a
+    `MovingArm`. Of several figures of which a reader sees one at a time, `button` chooses it. The
+    button stands in a `row` and a `column`, where these are given; its `state` (`good`, `fair`,
+    `bad`) gives the colour.
     """
 
     name: str
@@ -181,12 +193,14 @@ class Plot:
 
 @record
 class Section:
-    """A heading with text, points to note, tables by file name, and figures; folded sections open on demand.
+    """A heading with text, points to note, tables by file name, and figures.
 
-    Of the figures `beside`, which a note explains, the one of the row of the chosen tab is shown. A folded
-    section says its `answer` beside its heading, and stands on paper if it is `printed`. `steps` are
-    findings that say what to do and what it would bring; their number `command` does it. `cards`
-    are small tables side by side.
+    Folded sections open on demand.
+
+    Of the figures `beside`, which a note explains, the one of the row of the chosen tab is shown. A
+    folded section says its `answer` beside its heading, and stands on paper if it is `printed`.
+    `steps` are findings that say what to do and what it would bring; their number `command` does
+    it. `cards` are small tables side by side.
     """
 
     title: str
@@ -206,11 +220,14 @@ class Section:
 
 @record
 class Page:
-    """A report: the answer in a sentence, `lead`, and its sections; its file has the `name`, and an ending.
+    """A report: the answer in a sentence, `lead`, and its sections.
 
-    `warnings` must be read before using the answer, and stand behind the first section. What the page was
-    `made_from` and `versions` of the software stand at the foot. `data` are further files by name, such as
-    CSV for scripts; `files` are tables that stand in files alone, in place of shorter ones of their names.
+    Its file has the `name`, and an ending.
+
+    `warnings` must be read before using the answer, and stand behind the first section. What the
+    page was `made_from` and `versions` of the software stand at the foot. `data` are further files
+    by name, such as CSV for scripts; `files` are tables that stand in files alone, in place of
+    shorter ones of their names.
     """
 
     name: str
@@ -245,6 +262,8 @@ def log_names(sources: Iterable[str]) -> dict[str, str]:
 
 
 def short_name(name: str) -> str:
-    """Return a name with unprintable characters replaced and the middle of one over 40 letters left out."""
+    """Return a name with unprintable characters replaced and the middle of one over 40 letters left
+    out.
+    """
     text = "".join(c if c.isprintable() else "?" for c in name)
     return text if len(text) <= 40 else f"{text[:19]}…{text[-20:]}"

@@ -55,7 +55,10 @@ def parameter_section(settings: FitSettings, summary: FitSummary, *points: str) 
 
 
 def prior_section(settings: FitSettings, summary: FitSummary) -> Section | None:
-    """Return the section of what the logs made of the priors; None where no parameter has an interval."""
+    """Return the section of what the logs made of the priors.
+
+    None where no parameter has an interval.
+    """
     known = [one for one in summary.estimate.values() if one.sd is not None]
     if not known:
         return None
@@ -81,7 +84,9 @@ def short_table(settings: FitSettings, summary: FitSummary) -> Table:
 
 
 def parameter_table(settings: FitSettings, summary: FitSummary, profiles: Intervals | None = None) -> Table:
-    """Return one row per parameter: what it is, estimate, intervals, bounds, and what it is known from."""
+    """Return one row per parameter: what it is, estimate, intervals, bounds, and what it is known
+    from.
+    """
 
     def row(p: Parameter) -> dict[str, Any]:
         one = summary.estimate[p.name]
@@ -111,7 +116,10 @@ def parameter_table(settings: FitSettings, summary: FitSummary, profiles: Interv
 
 
 def in_words(finding: Finding, settings: FitSettings) -> Finding:
-    """Return a finding that names parameters in words; those of the same words are named together."""
+    """Return a finding that names parameters in words.
+
+    Those of the same words are named together.
+    """
     groups = dict[str, list[str]]()
     details = dict(finding.details)
     for name in finding.subjects:

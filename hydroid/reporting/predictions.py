@@ -1,4 +1,6 @@
-"""Pages of predictions, what models make of logs: of a fit, from what its run stores, and of a validation."""
+"""Pages of predictions, what models make of logs: of a fit, from what its run stores, and of a
+validation.
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -43,7 +45,10 @@ MOST_LOGS = 6
 
 
 def validation_page(predictions: Sequence[Prediction], fits: Verdicts, arm: Arm, *steps: Finding) -> Page:
-    """Return the page of several fits on several logs; its tables are `verdict`, `errors` and `horizons`."""
+    """Return the page of several fits on several logs.
+
+    Its tables are `verdict`, `errors` and `horizons`.
+    """
     ordered = sorted(predictions, key=lambda p: p.unseen is not True)
     sections = [*verdict_sections(fits, *steps), *prediction_sections(ordered, arm, fits)]
     files = {"errors": error_table(ordered, arm, one_fit=len(fits) == 1)}

@@ -1,4 +1,6 @@
-"""Whether the residuals are white and owe nothing to the command: what an engineer asks of any model."""
+"""Whether the residuals are white and owe nothing to the command: what an engineer asks of any
+model.
+"""
 
 from collections.abc import Sequence
 from functools import partial
@@ -32,7 +34,10 @@ _HEADER = (
 def residual_section(
     settings: FitSettings, summary: FitSummary, fitted: Sequence[Prediction]
 ) -> Section | None:
-    """Return the section of the residuals' correlations, a tab per joint; None: nothing can be tested."""
+    """Return the section of the residuals' correlations, a tab per joint.
+
+    None: nothing can be tested.
+    """
     usable = [one for one in fitted if np.isfinite(one.response).all()]
     if not usable or any(f"q{joint}" not in summary.errors for joint in settings.outputs):
         return None

@@ -21,7 +21,8 @@ from hydroid.words import number, two_digits
 MOTIONS = 8
 """logs that a page shows in motion"""
 SAMPLES, MOST_BINS, LEAST_BINS = 9000, 1000, 150
-"""parts of the curves of all responses of a page together, and of one of them: the page stays small"""
+"""parts of the curves of all responses of a page together, and of one of them: the page stays
+small"""
 FAR = 3.0
 """ranges of the measured angle beyond which a response that runs away is not drawn"""
 ALL = "joints"
@@ -57,8 +58,9 @@ def response_section(
 ) -> Section:
     """Return each joint's error in each log with the responses behind it, and the arm in motion.
 
-    The first prediction of a log is the one that moves. Of each joint the errors are shown of the first
-    prediction that compares it; they are coloured by the tolerances of the first fit that does.
+    The first prediction of a log is the one that moves. Of each joint the errors are shown of the
+    first prediction that compares it; they are coloured by the tolerances of the first fit that
+    does.
     """
     by_log = dict[str, list[Prediction]]()
     for one in predictions:
@@ -140,7 +142,9 @@ def _joint_tab(
     bins: int,
     tolerances: Mapping[int, float],
 ) -> Plot:
-    """Return the tab of one joint in a log: its error, and the response of each model that compares it."""
+    """Return the tab of one joint in a log: its error, and the response of each model that compares
+    it.
+    """
     several = [one for one in group if joint in one.joints]
     name = arm.joint_names[joint - 1]
     slides = arm.joints[joint - 1].slides
@@ -174,7 +178,9 @@ def _scale(slides: bool) -> tuple[str, str, float]:
 def draw_response(
     title: str, joint: int, several: Sequence[Prediction], bins: int, *, slides: bool = False
 ) -> Chart:
-    """Draw the measured angle of one joint, every model's response and residual, command and pressures."""
+    """Draw the measured angle of one joint, every model's response and residual, command and
+    pressures.
+    """
     log = several[0].log
     column = joint - 1
     place, unit, factor = _scale(slides)

@@ -14,7 +14,10 @@ from hydroid.words import two_digits
 
 
 def search_section(record: Record) -> Section:
-    """Return the section of a run's search, folded; only a search over generations has curves of it."""
+    """Return the section of a run's search, folded.
+
+    Only a search over generations has curves of it.
+    """
     result = record.result
     objective = record.settings.objective
     points = list[str]()
@@ -52,7 +55,10 @@ def _refined(record: Record, one: Effort) -> str:
 
 
 def starts(names: Sequence[str], costs: Mapping[int, Sequence[float]]) -> Chart:
-    """Draw how far above the best optimum each start ended, by joint (from 1; 0: all joints together)."""
+    """Draw how far above the best optimum each start ended, by joint (from 1.
+
+    0: all joints together).
+    """
     rows = list[str]()
     x = list[float]()
     y = list[float]()
@@ -82,9 +88,11 @@ def learning(history: Array, objective: ObjectiveSettings) -> Chart:
 
 
 def pareto(objectives: Array, estimates: dict[str, Array], objective: ObjectiveSettings) -> Chart:
-    """Draw each candidate of the Pareto set, and the estimates, as a line over the segments' objectives.
+    """Draw each candidate of the Pareto set, and the estimates, as a line over the segments'
+    objectives.
 
-    `objectives`, shape (n, S + 1), end with that over the whole record; the 100 lowest there are drawn.
+    `objectives`, shape (n, S + 1), end with that over the whole record; the 100 lowest there are
+    drawn.
     """
     front = _shown(objective, objectives[np.argsort(objectives[:, -1], kind="stable")[:100], :-1])
     at = np.arange(1.0, front.shape[1] + 1)

@@ -104,7 +104,8 @@ def _beside_best(
 ) -> str | None:
     """Return the fit's error beside that of the best simple model, as "2.1 (2.3) cannot be told".
 
-    Nothing where the logs are too short for the prediction time; no word of fewer than `least` blocks.
+    Nothing where the logs are too short for the prediction time; no word of fewer than `least`
+    blocks.
     """
     simple = {name: error for name, error in errors.items() if name in compared and error is not None}
     if not simple:
@@ -144,7 +145,9 @@ def left_out_table(
 
 
 def verdict_sections(fits: Verdicts, *steps: Finding) -> tuple[Section, ...]:
-    """Return the sections that every page of predictions begins with: the verdicts, and what to do next."""
+    """Return the sections that every page of predictions begins with: the verdicts, and what to do
+    next.
+    """
     table = verdict_table(fits)
     table = replace(table, note=f"{table.note} {_RIVALS}")
     verdict = Section("Verdict", tables={"verdict": table})
@@ -180,7 +183,8 @@ def horizon_section(fits: Verdicts) -> Section | None:
 
 
 def ordered(fits: Verdicts) -> Verdicts:
-    """Return the fits, the smallest errors first: in parts of the tolerances of the joints that all compare.
+    """Return the fits, the smallest errors first: in parts of the tolerances of the joints that all
+    compare.
 
     Where there is no such joint, each fit counts by the mean of its own ones.
     """
@@ -193,19 +197,26 @@ def ordered(fits: Verdicts) -> Verdicts:
 
 
 def _error(one: JointVerdict) -> float:
-    """Return the error on the unseen logs, or of a joint that they do not test on the fitted ones [deg]."""
+    """Return the error on the unseen logs, or of a joint that they do not test on the fitted ones
+    [deg].
+    """
     error = one.unseen_deg if one.unseen_logs else one.fitted_deg
     return np.inf if error is None else error  # it diverged
 
 
 def _size(one: JointVerdict) -> float:
-    """Return the error in parts of the tolerance; 0 of a joint that no log drives, which has none."""
+    """Return the error in parts of the tolerance.
+
+    0 of a joint that no log drives, which has none.
+    """
     driven = one.unseen_logs or one.fitted_deg is not None or one.verdict is not Verdict.UNTESTED
     return _error(one) / one.tolerance_deg if driven else 0.0
 
 
 def verdict_lines(fits: Verdicts) -> list[Table | str]:
-    """Return the verdicts as a terminal shows them: the table, and what is worst about the first fit."""
+    """Return the verdicts as a terminal shows them: the table, and what is worst about the first
+    fit.
+    """
     first = next(iter(fits.values()))
     return [verdict_table(fits), *filter(None, [worst(first)]), *outside(first)]
 
@@ -216,7 +227,9 @@ def next_lines(step: Finding) -> tuple[str, str]:
 
 
 def lead(fits: Verdicts) -> str:
-    """Say of the first of the fits which joints it predicts, what is wrong with the others, and the worst."""
+    """Say of the first of the fits which joints it predicts, what is wrong with the others, and the
+    worst.
+    """
     name, verdicts = next(iter(fits.items()))
     of = f"{short_name(name)} is best. " if len(fits) > 1 else ""
     by_word: dict[str, list[str]] = {}
@@ -229,7 +242,10 @@ def lead(fits: Verdicts) -> str:
 
 
 def outside(verdicts: Sequence[JointVerdict]) -> tuple[str, ...]:
-    """Say of which joints the prediction bands are too narrow; nothing where all hold their samples."""
+    """Say of which joints the prediction bands are too narrow.
+
+    Nothing where all hold their samples.
+    """
     # a right model's hold somewhat less than 95 % where the start of a log is off
     missed = [
         f"{part:.0f} % of the {one.name}'s"
@@ -259,7 +275,9 @@ def worst(verdicts: Sequence[JointVerdict]) -> str:
 def next_step(
     summary: FitSummary, verdicts: Sequence[JointVerdict], folder: str, fitted: Sequence[Prediction]
 ) -> Finding:
-    """Return what to do after a fit in a run folder, which made `fitted` of its logs, with the command."""
+    """Return what to do after a fit in a run folder, which made `fitted` of its logs, with the
+    command.
+    """
     run, files = shlex.quote(folder), shlex.join(one.log.source for one in fitted)
     joints = [one.name for one in verdicts if one.verdict is Verdict.UNTESTED]
     if summary.ending == Ending.TIME.value:
@@ -286,7 +304,10 @@ def next_step(
 
 
 def _too_short(verdicts: Sequence[JointVerdict]) -> list[str]:
-    """Return the joints whose unseen logs are too short to tell; none where any joint is known to fail."""
+    """Return the joints whose unseen logs are too short to tell.
+
+    None where any joint is known to fail.
+    """
     if any(one.verdict.fails for one in verdicts):
         return []
     untold = [one for one in verdicts if one.verdict is Verdict.UNTOLD]

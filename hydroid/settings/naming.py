@@ -5,7 +5,9 @@ from hydroid.settings.fit import FitSettings
 
 
 def quantity_and_side(settings: FitSettings, name: str) -> tuple[str, str]:
-    """Return what a parameter is, in words, and the side of the actuator that it belongs to, if any."""
+    """Return what a parameter is, in words, and the side of the actuator that it belongs to, if
+    any.
+    """
     plain, _, side = CHOICES[settings.parameters[name].quantity].plain.partition(", side ")
     return plain, side
 

@@ -1,4 +1,6 @@
-"""A motion on the screen, as a film or a picture: the simulated machine over the measured one, its ghost."""
+"""A motion on the screen, as a film or a picture: the simulated machine over the measured one, its
+ghost.
+"""
 
 import io
 import os
@@ -26,7 +28,9 @@ KINDS = {".mp4": ((1920, 1080), 20.0), ".gif": ((960, 540), 10.0), ".png": ((192
 
 
 def rendered(motion: Motion, size: tuple[int, int], frames: Iterable[tuple[float, str]]) -> Iterator[Picture]:
-    """Yield a machine at times [s], a text above each, in a size [px]: RGB, shape (height, width, 3)."""
+    """Yield a machine at times [s], a text above each, in a size [px]: RGB, shape
+    (height, width, 3).
+    """
     replay, (width, height), camera = Replay(motion), size, mujoco.MjvCamera()
     look = replay.model.vis
     look.global_.offwidth, look.global_.offheight = width, height
@@ -55,7 +59,9 @@ def rendered(motion: Motion, size: tuple[int, int], frames: Iterable[tuple[float
 def render_motion(
     motion: Motion, kind: str, span: tuple[float, float], progress: Progress = no_progress
 ) -> bytes:
-    """Return the content of a film of a motion in a span [s], or of a picture of its beginning (.png)."""
+    """Return the content of a film of a motion in a span [s], or of a picture of its beginning
+    (.png).
+    """
     begin, end = max(span[0], 0.0), min(span[1], motion.time[-1])
     if not begin < end:
         what = f"{span[0]:g}:{span[1]:g} s holds nothing of a motion of {motion.time[-1]:g} s"
@@ -83,8 +89,8 @@ def look_at(camera: mujoco.MjvCamera, model: mujoco.MjModel, region: Region) -> 
 def add_ghost(playback: Playback, scene: mujoco.MjvScene, camera: mujoco.MjvCamera) -> None:
     """Add what moves of a playback's ghost, if it has one, to a scene, blue and translucent.
 
-    It stands 4 mm farther away from the camera: where both machines agree only the simulated one is seen,
-    and their surfaces do not flicker.
+    It stands 4 mm farther away from the camera: where both machines agree only the simulated one is
+    seen, and their surfaces do not flicker.
     """
     if playback.ghost is None:
         return

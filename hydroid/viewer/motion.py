@@ -19,10 +19,11 @@ MOMENTS = 60
 
 @record
 class Motion:
-    """A machine under the commands of logs: times [s], (T,), and angles of all joints [rad], (T, nq).
+    """A machine under the commands of logs: times [s], (T,), and angles of all joints [rad],
+    (T, nq).
 
-    `measured` is None where the logs hold no motion; `error` is the rms difference of the driven joints that
-    were measured [deg], NaN where there are none.
+    `measured` is None where the logs hold no motion; `error` is the rms difference of the driven
+    joints that were measured [deg], NaN where there are none.
     """
 
     machine: Machine
@@ -89,7 +90,9 @@ def region_of(model: mujoco.MjModel, angles: Array) -> Region:
 
 
 class Sliders:
-    """A plant with all joints on the viewer's sliders, from a named pose or the settings' start pose."""
+    """A plant with all joints on the viewer's sliders, from a named pose or the settings' start
+    pose.
+    """
 
     duration, ghost = np.inf, None
 
@@ -149,5 +152,5 @@ class Replay:
 
 
 Playback = Sliders | Replay
-"""what is drawn (`model`, `data` and, where something was measured, `ghost`), the `time` that is shown and
-the `duration` after which all stands still [s]"""
+"""what is drawn (`model`, `data` and, where something was measured, `ghost`), the `time` that is
+shown and the `duration` after which all stands still [s]"""

@@ -113,9 +113,11 @@
       min_border_left: 64, min_border_right: 16, min_border_top: 8, min_border_bottom: 8,
     });
     if (width < 480) for (const axis of figure.xaxes) axis.ticker.desired_num_ticks = 4;
-    // else less than two decades have one tick or two
-    if (panel.log_y) figure.yaxes[0].ticker.mantissas = [1, 2, 5];
-    if (panel.log_x) figure.xaxes[0].ticker.mantissas = [1, 2, 5];
+    for (const [axis, log] of [[figure.xaxes[0], panel.log_x], [figure.yaxes[0], panel.log_y]])
+      if (log) {
+        axis.ticker.mantissas = [1, 2, 5]; // else less than two decades have one tick or two
+        axis.formatter = new Bokeh.BasicTickFormatter(); // 0.1, not a power of ten
+      }
     axisLook(figure);
     // lines between rows or columns would only cross what is drawn there
     for (const grid of figure.center.filter((one) => one.dimension !== undefined))

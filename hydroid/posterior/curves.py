@@ -20,7 +20,8 @@ from hydroid.simulation import Candidates
 
 OPENING_COMMANDS = tuple(range(5, 101, 5))
 """at which a valve's opening is stated [%]"""
-STEP_POINTS = 40
+START_POINTS, REST_POINTS = 40, 15
+"""of a step response: in its start, where a joint may ring, and after it"""
 FREQUENCY_POINTS = 24
 LEAST_PERIODS = 4.0
 """samples in a period of the highest frequency"""
@@ -65,7 +66,9 @@ def step_curves(step: Movement, estimate: Candidates, ending: str, word: str) ->
     start = min(_start(step, step.speeds_of(angles)[:, :samples]), samples)
     unit = f"{bench.unit[1]}/s"
     size = f"{abs(step.command):g} % command, {word}"
-    points = np.unique(np.linspace(0, samples - 1, STEP_POINTS).round().astype(int))
+    begun = np.linspace(0, start - 1, START_POINTS)
+    rest = np.linspace(start - 1, samples - 1, REST_POINTS)
+    points = np.unique(np.concatenate([begun, rest]).round().astype(int))
     highest = max(1.0 / (LEAST_PERIODS * bench.period), 2.0 * LOWEST)
     frequencies = np.geomspace(LOWEST, highest, FREQUENCY_POINTS)
 

@@ -48,10 +48,16 @@ def parameter_section(settings: FitSettings, summary: FitSummary, *points: str) 
     if settings.stage == "hyd" and not supplied:
         supply = number(settings.hydraulics.supply_pressure)  # without pressures in the log only p A is known
         text = f"Areas, masses, torques and flows hold for the given supply of {supply} bar."
-    known = sum(one.sd is not None for one in summary.estimate.values())
     tables = {"parameters": short_table(settings, summary)}
-    answer = f"{known} of {len(summary.estimate)} estimated with an interval"
+    answer = known_of_free(summary)
     return Section("Parameters", text, points, tables, folded=True, answer=answer, printed=True)
+
+
+def known_of_free(summary: FitSummary) -> str:
+    """Say how many of the free parameters have an interval."""
+    free = [one for one in summary.estimate.values() if one.flag != Flag.FIXED]
+    known = sum(one.sd is not None for one in free)
+    return f"{known} of {len(free)} free parameters have an interval"
 
 
 def prior_section(settings: FitSettings, summary: FitSummary) -> Section | None:

@@ -11,7 +11,9 @@ from hydroid.fitting.summary import summarise
 from hydroid.fitting.validation import fitted
 from hydroid.log import Log
 from hydroid.parameters import Prior
+from hydroid.posterior.identifiability import Profile
 from hydroid.reporting.actuator_report import measured_speeds, speed_section, step_section
+from hydroid.reporting.analysis import analysis_page
 from hydroid.reporting.chart import Chart
 from hydroid.reporting.correlation_report import correlation_section, correlations, strongest
 from hydroid.reporting.figure import figure, saved, style
@@ -169,3 +171,18 @@ def test_only_a_search_over_generations_has_curves_of_it():
     assert {plot.name for plot in search_section(record).plots} == {"learning", "pareto"}
     once = replace(record.result, history=record.result.history[-1:], starts={0: (1.0, 2.0)})
     assert {plot.name for plot in search_section(replace(record, result=once)).plots} == {"starts"}
+
+
+def test_a_profile_is_a_curve_with_the_line_that_ends_its_interval():
+    values = np.array([0.1, 0.2, 0.3, 0.4])
+    points = np.column_stack([values, 25.0 * (values - 0.25) ** 2 * 100])
+    page = analysis_page(SETTINGS, SUMMARY, {"K": Profile((0.2, 0.3), 0.0, points)})
+    assert {"parameters", "correlations"} <= set(page.tables)
+    (tab,) = next(section for section in page.sections if section.title == "Profiles").tabs
+    assert tab.caption == "torque per command (K)"
+    rule, line, _ = tab.draw().panels[0].marks
+    assert rule.y == pytest.approx([1.96**2], rel=1e-3)
+    assert np.array_equal(line.x, values)
+    drawn(tab.draw())
+    bare = analysis_page(SETTINGS, SUMMARY, {})
+    assert "Profiles" not in [section.title for section in bare.sections]

@@ -83,7 +83,9 @@ def short_table(settings: FitSettings, summary: FitSummary) -> Table:
         what, side = quantity_and_side(settings, name)
         said = place(settings, name), side, what, name
         logs = (interval_words(*one.interval_by_log),) if by_log else ()
-        share = f", {100 * one.data_share:.0f} % data" if one.source == Source.BOTH and one.data_share else ""
+        share = ""
+        if one.source == Source.BOTH and one.data_share:
+            share = f" ({100 * one.data_share:.0f} %)"
         rows.append((*said, one.value, one.unit, interval_words(*one.interval), *logs, origin(one) + share))
     note = "interval: of 95 %; by log: the same, from the differences between logs."
     return Table("Parameters", header, tuple(rows), note)

@@ -54,7 +54,7 @@ def residual_section(
         rows.append((name, two_digits(own), two_digits(command), two_digits(largest)))
         if seconds := summary.errors[f"q{joint}"].lasts_s:
             lasting.append(f"{name} (for {two_digits(seconds)} s)")
-    answer = f"an error lasts in {listed(lasting)}" if lasting else "white for any use"
+    answer = f"an error lasts in {listed(lasting)}" if lasting else "white"
     title = "Are the residuals white?"
     table = Table("", _HEADER, tuple(rows))
     tables = {"residuals": table}

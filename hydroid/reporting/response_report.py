@@ -103,6 +103,15 @@ def error_table(predictions: Sequence[Prediction], arm: Arm, *, one_fit: bool) -
     return Table.of("All errors", columns, rows, _NOTE, optional)
 
 
+def motion_section(arm: Arm, predictions: Mapping[str, Prediction], caption: str = _MOTION) -> Section | None:
+    """Return the arm in motion as a section of its own, a tab for each of the worst logs, by name.
+
+    It is for pages without responses beside it. None of what diverged.
+    """
+    tabs = [replace(plot, button=plot.row, row="") for plot in motions(arm, predictions)]
+    return Section("The arm in motion", caption, tabs=tuple(tabs)) if tabs else None
+
+
 def motions(arm: Arm, predictions: Mapping[str, Prediction]) -> tuple[Plot, ...]:
     """Return the arm in motion in the worst of the logs, given by the names of their rows.
 

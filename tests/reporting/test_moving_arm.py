@@ -12,7 +12,7 @@ from hydroid.arm.model import load_model
 from hydroid.fitting.validation import Prediction
 from hydroid.log import Log
 from hydroid.reporting.moving_arm import MOST, MovingArm, moving_arm
-from hydroid.reporting.response_report import MOTIONS, motions
+from hydroid.reporting.response_report import MOTIONS, motion_section, motions
 
 PROBLEM = make_problem(outputs=(2, 3), samples=400)
 ARM = PROBLEM.settings.arm
@@ -105,3 +105,7 @@ def test_the_worst_logs_are_shown_and_one_that_diverged_never():
     assert motions(ARM, {"b.csv": lost}) == ()
     many = motions(ARM, {str(i): good for i in range(MOTIONS + 3)})
     assert len(many) == MOTIONS
+    alone = motion_section(ARM, {"a.csv": good, "b.csv": lost, "c.csv": bad}, "Orange: wished.")
+    assert alone is not None
+    assert [tab.button for tab in alone.tabs] == ["c.csv", "a.csv"]
+    assert motion_section(ARM, {"b.csv": lost}) is None

@@ -12,8 +12,8 @@ from collections.abc import Callable
 import numpy as np
 
 from hydroid.arrays import Array
+from hydroid.hydraulics.joint import opened
 from hydroid.hydraulics.solenoid import drive, resting_stroke, side_voltage
-from hydroid.hydraulics.valve import notched, slot_share
 from hydroid.posterior.bench import ONSET, RISEN, Bench, Movement, actuator
 from hydroid.posterior.column import Column, Measured
 from hydroid.simulation import Candidates
@@ -49,8 +49,9 @@ def opening_curve(bench: Bench, candidates: Candidates, sign: float) -> Measured
         passed = np.where(beyond > 0.0, 1.0, 0.0)
         voltage = side_voltage(beyond, passed, side.onset, side.dead_band)
         travel = resting_stroke(drive(voltage, c), c.gap, c.plunger_stiffness) - idle
-        share = slot_share(travel, side) ** side.opening_exponent
-        area = 1e6 * side.opening * notched(share, side)
+        # the law of the compiled loops, candidate by candidate: it branches
+        areas = [opened(one, float(way)) for one, way in zip(side, travel, strict=True)]
+        area = 1e6 * np.array(areas, dtype=float)
         yield Column("opening", "opening of the valve", "mm²", False, sign * command), area
 
 

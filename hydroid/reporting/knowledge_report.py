@@ -103,8 +103,8 @@ def error_section(settings: FitSettings, summary: FitSummary) -> Section | None:
     if not rows:
         return None
     text = (
-        f"After 10 s of motion the prediction is uncertain by {listed(after)}, whatever the parameters: what "
-        "moves a joint between the samples and beside the commands adds up."
+        f"Even with exact parameters a prediction is uncertain by {listed(after)} after 10 s of motion: what "
+        "moves a joint beside its commands adds up."
     )
     note = (
         "Standard deviations; after 10 s at the mean speed of the logs. What is left and lasts is the error "

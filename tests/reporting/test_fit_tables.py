@@ -86,7 +86,7 @@ def test_how_sure_a_prediction_can_be_is_said_of_each_joint():
     two = one.changed({"after_10_s_deg": 0.5, "lasts_s": 1.4})
     section = error_section(problem.settings, summary.changed({"errors": {"q2": one, "q3": two}}))
     assert section is not None
-    assert "uncertain by 1.2 deg (shoulder) and 0.5 deg (elbow), whatever the parameters" in section.text
+    assert "uncertain by 1.2 deg (shoulder) and 0.5 deg (elbow) after 10 s" in section.text
     table = section.tables["prediction_errors"]
     assert table.rows == (("shoulder", "deg", 0.05, 1.234, None), ("elbow", "deg", 0.05, 0.5, 1.4))
     assert error_section(problem.settings, summary.changed({"errors": {}})) is None

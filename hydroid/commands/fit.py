@@ -1,6 +1,7 @@
 """Fit one problem, with settings and logs that are read: `hydroid.fit`."""
 
 import time
+from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -52,6 +53,11 @@ class FitResult(Printed):
     predictions: "tuple[Prediction, ...]"
     baselines: "Baselines"
 
+    def __repr__(self) -> str:
+        from hydroid.reporting.verdict_table import lead
+
+        return f"<FitResult: {lead({'': self.summary.verdict})}>"
+
     def plant(self, **how: Any) -> "Plant":
         """Return the identified arm to be stepped; the keywords are those of `Plant`."""
         from hydroid.plant import Plant
@@ -66,6 +72,9 @@ class FitResult(Printed):
 
     def predict(self, log: "LogSource") -> "Prediction":
         """Predict a log from its commands and its first angles; NaN if the simulation diverges.
+
+            predicted = fitted.predict("b.csv")
+            print(predicted["boom"].error, predicted.to_frame())
 
         Raises:
             LogError: the log cannot be used.
@@ -168,7 +177,8 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
     from hydroid.fitting.summary import summarise
     from hydroid.fitting.validation import fitted
     from hydroid.fitting.verdict import baselines_of, behind, judge
-    from hydroid.reporting.parameters_report import parameter_table, warnings
+    from hydroid.reporting.knowledge_report import warnings
+    from hydroid.reporting.parameters_report import in_words, parameter_table
     from hydroid.reporting.verdict_table import next_lines, next_step, verdict_lines
 
     settings, predictions = fit.problem.settings, fitted(fit)
@@ -180,11 +190,15 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
     summary = summary.changed({"verdict": verdict, "findings": tuple(findings)})
     source = "the fit" if folder is None else str(folder / NAME)
     model = IdentifiedModel(settings, fit.best.theta, source, summary)
-    lines: list[Table | str] = [*verdict_lines({fit.final: verdict}), *warnings(summary)]
+    lines: list[Table | str] = verdict_lines({fit.final: verdict})
+    lines += [str(in_words(one, settings)) for one in warnings(summary)]
     if folder is not None:
         step = next_step(summary, verdict, str(folder), predictions)
         lines += [*next_lines(step), str(folder / "report.html")]
-    details = [parameter_table(settings, summary), *map(str, summary.findings)]
+    details = [
+        parameter_table(settings, summary),
+        *(str(in_words(one, settings)) for one in summary.findings),
+    ]
     content = summary.plain() | {"out": folder and str(folder)}
     return FitResult(
         lines, content, problem, fit, folder, summary, model, predictions, baselines, details=details
@@ -199,6 +213,7 @@ def _store(folder: "RunFolder", result: FitResult) -> Path:
     began = time.monotonic()
     folder.write_estimate(result.model, result.problem.logs[0])
     write_atomic(folder.path / RESULT, pack(fit_result(result.fit, result.predictions, result.baselines)))
+    folder.status("running", finished=date.today().isoformat())
     page = draw(folder.path)
     folder.status("done", seconds={**result.fit.seconds, "report": time.monotonic() - began})
     return page

@@ -1,7 +1,8 @@
-"""Errors that a user can correct: each says what is wrong, where, and what is allowed or what to do.
+"""Errors that a user can correct: each says what is wrong, where,
+and what is allowed or what to do.
 
-The command line shows them as one line and ends with exit status 2. Any other exception is a defect of
-hydroid and keeps its traceback.
+The command line shows them as one line and ends with exit status 2. Any other exception is a defect
+of hydroid and keeps its traceback.
 """
 
 LONGEST = 1500  # largest length of a message, in characters
@@ -47,4 +48,5 @@ class RunError(HydroidError):
 
 
 class Stopped(KeyboardInterrupt):
-    """A fit or study that Ctrl-C or a signal ended; its text: what remains of it, and what continues it."""
+    """A fit or study that Ctrl-C or a signal ended; its text: what remains of it,
+    and what continues it."""

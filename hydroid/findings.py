@@ -1,4 +1,5 @@
-"""Findings: what an analysis has to say, in the words of `findings.yaml`, for terminal, JSON and report."""
+"""Findings: what an analysis has to say, in the words of `findings.yaml`, for terminal,
+JSON and report."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -20,7 +21,8 @@ class Finding:
         level: how much it matters.
         subjects: names of what it is about: parameters, joints, logs.
         numbers: what the sentence states, by name, in the units that the sentence prints.
-        details: by subject, what stands in brackets behind it. Apart from `numbers`: a user names subjects.
+        details: by subject, what stands in brackets behind it. Apart from `numbers`: a user names
+            subjects.
         where: file with line and column, or a setting; empty where there is none.
     """
 

@@ -1,4 +1,5 @@
-"""An estimate with its settings: from a run folder, a saved plant, a file of values, or nominal values."""
+"""An estimate with its settings: from a run folder, a saved plant, a file of values,
+or nominal values."""
 
 import hashlib
 import json
@@ -29,8 +30,8 @@ class IdentifiedModel:
         theta: the parameters in the order and units of the settings, shape (P,).
         source: where the estimate came from, for messages.
         summary: the fit's own account of the estimate, where a fit made it.
-        nominal: parameters without a value, whose effect the settings and the arm's file give; they are not
-            among the settings' parameters.
+        nominal: parameters without a value, whose effect the settings and the arm's file give; they
+            are not among the settings' parameters.
     """
 
     settings: FitSettings
@@ -79,15 +80,16 @@ def load_identified(
     """Read an estimate and the settings it belongs to.
 
     Args:
-        source: a run folder, the folder of a saved plant, an `estimate.yaml`, or a YAML file of values by
-            name; None: no values.
-        config: settings, a path or a shipped name; left out: those beside the estimate. A file of values
-            without settings beside it has those that are shipped.
+        source: a run folder, the folder of a saved plant, an `estimate.yaml`, or a YAML file of
+            values by name; None: no values.
+        config: settings, a path or a shipped name; left out: those beside the estimate. A file of
+            values without settings beside it has those that are shipped.
         nominal: take parameters without a value as the settings and the arm's file have them.
 
     Raises:
         RunError: the folder holds no estimate, or a fit's settings are not beside its estimate.
-        SettingsError: a file that cannot be read, a parameter that is unknown, or missing and not `nominal`.
+        SettingsError: a file that cannot be read, a parameter that is unknown,
+            or missing and not `nominal`.
     """
     if source is not None and config is None:
         warn_of_changes(Path(source))
@@ -132,7 +134,8 @@ def own_hashes(folder: Path) -> dict[str, str]:
 
 
 def warn_of_changes(source: Path) -> None:
-    """Say which files of a run, given by its folder or its estimate, are not as its fit left them."""
+    """Say which files of a run, given by its folder or its estimate,
+    are not as its fit left them."""
     folder = source if os.path.isdir(source) else source.parent
     for name in changed_files(folder):
         text = "warning: %s: is not as the fit left it; put it back, or fit again"
@@ -140,7 +143,8 @@ def warn_of_changes(source: Path) -> None:
 
 
 def changed_files(folder: Path) -> list[str]:
-    """Return the files of a run folder that are not what its fit wrote; none of a folder that is no run's."""
+    """Return the files of a run folder that are not what its fit wrote;
+    none of a folder that is no run's."""
     try:
         run = json.loads(read_file(folder / DESCRIPTION))
         written = {**run["files"]} | ({NAME: run["estimate"]} if "estimate" in run else {})
@@ -157,7 +161,8 @@ def file_hash(*files: Path) -> str:
 
 
 def start_values(settings: FitSettings) -> IdentifiedModel:
-    """Return the model before any fit, where a search starts: nominal values, or the middle of the bounds."""
+    """Return the model before any fit, where a search starts: nominal values,
+    or the middle of the bounds."""
     return IdentifiedModel(settings, settings.parameter_set().start, "the start values")
 
 

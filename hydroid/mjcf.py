@@ -1,4 +1,5 @@
-"""MuJoCo's XML of an arm: read, held to what hydroid simulates, copied; MuJoCo's errors as one line."""
+"""MuJoCo's XML of an arm: read, held to what hydroid simulates, copied;
+MuJoCo's errors as one line."""
 
 import warnings
 from collections.abc import Generator, Mapping
@@ -14,7 +15,8 @@ from hydroid.robot_xml import read_robot
 
 
 def read_mjcf(path: Path) -> mujoco.MjSpec:
-    """Read an MJCF whose joints turn or slide, each alone on its body, and whose numbers are finite."""
+    """Read an MJCF whose joints turn or slide, each alone on its body,
+    and whose numbers are finite."""
     if not is_file(path):
         raise ModelError("no such model", path)
     read_robot(path)  # MuJoCo takes a NaN for what it likes
@@ -62,7 +64,8 @@ def copy_models(models: Mapping[str, Path], folder: Path) -> None:
             write_atomic(folder / "meshes" / mesh.file, content)
         for pictures, place in ((spec.textures, spec.texturedir), (spec.hfields, spec.meshdir)):
             for picture in pictures:
-                picture.file = picture.file and str(home / place / picture.file)  # these stay where they are
+                # these stay where they are
+                picture.file = picture.file and str(home / place / picture.file)
         spec.modelfiledir, spec.meshdir = str(folder.resolve()), "meshes"
         write_atomic(folder / name, mjcf_text(spec))
 
@@ -85,7 +88,8 @@ def mujoco_errors(where: object) -> Generator[None]:
 
 @contextmanager
 def quiet_mujoco() -> Generator[None]:
-    """Keep MuJoCo from printing a warning for every diverged candidate, and from writing MUJOCO_LOG.TXT."""
+    """Keep MuJoCo from printing a warning for every diverged candidate,
+    and from writing MUJOCO_LOG.TXT."""
     before, silent = mujoco.MjLogConfig.get(), mujoco.MjLogConfig.get()
     silent.logto_console = silent.logto_file = False
     mujoco.MjLogConfig.set(silent)

@@ -16,8 +16,8 @@ from hydroid.errors import SettingsError
 class Prior:
     """What is known of one parameter besides the logs: Gaussian, or log-normal where `log`.
 
-    `nominal` is the most likely value, of a log-normal prior its median; `sd` the standard deviation in the
-    unit, or that of the logarithm.
+    `nominal` is the most likely value, of a log-normal prior its median; `sd` the standard
+    deviation in the unit, or that of the logarithm.
     """
 
     nominal: float
@@ -43,7 +43,8 @@ class Parameter:
         name, unit: its symbol, and the unit of its values.
         lower, upper: its bounds.
         fixed: its value if it is not estimated.
-        log: whether it is searched, refined and reported by its logarithm; the lower bound is then above 0.
+        log: whether it is searched, refined and reported by its logarithm; the lower bound is then
+            above 0.
         start: where a search starts; None: no parameter of the set states a start.
         prior: what is known besides the logs.
         least: what a relative change of 1 is at least, in the unit.
@@ -60,13 +61,15 @@ class Parameter:
     least: float = 0.0
 
     def position(self, value: Array | float) -> Array:
-        """Return where values lie on the parameter's scale: 0 at the lower bound, 1 at the upper one."""
+        """Return where values lie on the parameter's scale: 0 at the lower bound,
+        1 at the upper one."""
         if self.log:
             return np.log(np.asarray(value) / self.lower) / np.log(self.upper / self.lower)
         return (np.asarray(value) - self.lower) / (self.upper - self.lower)
 
     def at(self, position: Array | float) -> Array:
-        """Return the values at positions; the ends are the bounds to the last digit. Equations (15), (16)."""
+        """Return the values at positions; the ends are the bounds to the last digit.
+        Equations (15), (16)."""
         low, high = self.lower, self.upper
         inner = low * (high / low) ** np.asarray(position) if self.log else low + position * (high - low)
         return np.where(np.asarray(position) >= 1.0, high, inner)
@@ -109,13 +112,15 @@ class ParameterSet:
 
     @property
     def start(self) -> Array:
-        """Where a search starts, shape (P,): as stated, or in the middle of the bounds on their scale."""
+        """Where a search starts, shape (P,): as stated,
+        or in the middle of the bounds on their scale."""
         middle = self.from_unit(np.full(int(self.free.sum()), 0.5))
         stated = [p.start if p.fixed is None else None for p in self.parameters]
         return np.array([m if s is None else s for m, s in zip(middle, stated, strict=True)])
 
     def started(self, values: Mapping[str, float]) -> Array:
-        """Return values by name as theta, shape (P,), the others as at the start, all within the bounds."""
+        """Return values by name as theta, shape (P,), the others as at the start,
+        all within the bounds."""
         theta = self.start
         for column, p in enumerate(self.parameters):
             if p.fixed is None and p.name in values:
@@ -130,7 +135,8 @@ class ParameterSet:
         return theta
 
     def to_unit(self, theta: Array) -> Array:
-        """Map theta, shape (.., P), to the unit box, shape (.., free); values beyond a bound are clipped."""
+        """Map theta, shape (.., P), to the unit box, shape (.., free);
+        values beyond a bound are clipped."""
         values = np.moveaxis(theta, -1, 0)
         columns = [p.position(v) for p, v in zip(self.parameters, values, strict=True) if p.fixed is None]
         return np.clip(np.stack(columns, axis=-1), 0.0, 1.0)
@@ -151,7 +157,8 @@ class ParameterSet:
         for p in self.parameters:
             if (value := values.get(p.name, p.fixed)) is None:
                 raise SettingsError(f"parameter {p.name!r} is missing", source)
-            # most quantities cannot be negative; the comparison is False for NaN, and squares stay finite
+            # most quantities cannot be negative; the comparison is False for NaN, and squares stay
+            # finite
             least = min(p.lower, 0.0)
             if isinstance(value, bool) or not isinstance(value, int | float) or not least <= value < 1e100:
                 hint = f"a number from {least:g}, in {p.unit}"

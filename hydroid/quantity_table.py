@@ -1,7 +1,8 @@
-"""The rows of `quantities.yaml`, every quantity that can be stated or estimated, by name and by side.
+"""The rows of `quantities.yaml`, every quantity that can be stated or estimated,
+by name and by side.
 
-Of a quantity with two sides, such as `delay`, `delay_a` acts on motion towards A, which a positive command
-causes, and `delay_b` towards B; the name without an ending sets both.
+Of a quantity with two sides, such as `delay`, `delay_a` acts on motion towards A, which a positive
+command causes, and `delay_b` towards B; the name without an ending sets both.
 """
 
 from collections.abc import Iterator
@@ -18,10 +19,12 @@ class Quantity(NamedTuple):
     Attributes:
         name: in settings and as a parameter of a fit.
         unit: of its values.
-        default: value where nothing states one; None: no limit. Of a quantity with two sides a pair.
+        default: value where nothing states one; None: no limit. Of a quantity with two sides a
+            pair.
         plain: what it is, for readers who do not know its symbol.
         note: what those who set it must know besides.
-        span: values of real machines, between which `hydroid suggest` searches a quantity that is not free.
+        span: values of real machines, between which `hydroid suggest` searches a quantity that is
+            not free.
         limits: least and largest value; None: from 0 where 0 is the default, or else above 0.
         of: the kind of actuator that alone has it, as `Joint.has` tells them apart; "": all have.
         optional: whether null is allowed beside a number; where it is the default, it is.
@@ -100,4 +103,5 @@ CHOICES = {row.name: row for row in ROWS} | QUANTITIES  # what a parameter of a 
 TARGETS = {name: tuple(quantity.name for quantity in row.each()) for name, row in CHOICES.items()}
 """the quantities that a name sets: itself, or both sides"""
 
-MECHANICAL = tuple(row.name for row in _GROUPS["mechanical"])  # the quantities that both stages have
+# the quantities that both stages have
+MECHANICAL = tuple(row.name for row in _GROUPS["mechanical"])

@@ -1,6 +1,8 @@
-"""A URDF or MJCF as a tree of elements that can be trusted: its size, its names and its numbers are checked.
+"""A URDF or MJCF as a tree of elements that can be trusted: its size,
+its names and its numbers are checked.
 
-MuJoCo itself takes a NaN for 0 or for the default, and ends the program where elements are too deep.
+MuJoCo itself takes a NaN for 0 or for the default,
+and ends the program where elements are too deep.
 """
 
 import math
@@ -26,8 +28,8 @@ COPIES = 2000  # that an MJCF may ask for
 def read_robot(path: Path) -> ElementTree.Element:
     """Read a URDF, or an MJCF with the files that it includes in their places.
 
-    Raises ModelError: a file cannot be read, is too large or too deep, is included twice, or holds the same
-    name twice, or a length, place, angle or limit that is no finite number.
+    Raises ModelError: a file cannot be read, is too large or too deep, is included twice, or holds
+    the same name twice, or a length, place, angle or limit that is no finite number.
     """
     root = _parsed(path)
     _include(root, path, path.resolve().parent, {path.resolve()})
@@ -72,7 +74,8 @@ def _parsed(path: Path) -> ElementTree.Element:
 
 
 def _include(root: ElementTree.Element, path: Path, folder: Path, there: set[Path]) -> None:
-    """Put included files in their places, each once, as MuJoCo does: what includes itself has no end."""
+    """Put included files in their places, each once, as MuJoCo does:
+    what includes itself has no end."""
     for owner, element in _owned(root):
         _check_numbers(owner, element, path)
         _check_limits(owner, element, path)
@@ -101,7 +104,8 @@ def _owned(root: ElementTree.Element) -> Iterator[tuple[str, ElementTree.Element
 
 
 def _check_names(root: ElementTree.Element, path: Path) -> None:
-    """Refuse a name that two links or two joints share: what the file says of it is said of both."""
+    """Refuse a name that two links or two joints share:
+    what the file says of it is said of both."""
     seen = set[tuple[str, str]]()
     trees = [root] if root.tag == "robot" else root.findall("worldbody")
     for element in (one for tree in trees for one in (tree if tree is root else tree.iter())):
@@ -157,7 +161,8 @@ def _check_numbers(owner: str, element: ElementTree.Element, path: Path) -> None
 
 
 def _check_limits(owner: str, element: ElementTree.Element, path: Path) -> None:
-    """Refuse limits that are no numbers or reversed, and take infinite ones out: there are none then."""
+    """Refuse limits that are no numbers or reversed, and take infinite ones out:
+    there are none then."""
     low = high = None
     if element.tag == "limit":
         low, high = (_number(element.get(name, "0")) for name in ("lower", "upper"))

@@ -1,9 +1,10 @@
 """A study: every cell of some settings, fitted over every seed, and what is measured of each run.
 
-Each run is a fit of one cell and one seed, and leaves one small file. The file's name is a digest of all that
-decides its content: settings, arm, data and versions. So a study that was killed goes on where it was, and
-studies in one folder share the runs that they have in common. Only the process that was started writes. The
-fits run in processes of their own or on Dask's workers, one thread each.
+Each run is a fit of one cell and one seed, and leaves one small file. The file's name is a digest
+of all that decides its content: settings, arm, data and versions. So a study that was killed goes
+on where it was, and studies in one folder share the runs that they have in common. Only the process
+that was started writes. The fits run in processes of their own or on Dask's workers,
+one thread each.
 """
 
 import json
@@ -61,8 +62,8 @@ def perform(task: Task) -> Result:
     """Fit, and return what a study needs of the run, as plain values.
 
     `measures` are those of docs/studies.md, by name. `history` has generation, simulations and best
-    objective; `segment_bests` are the parameters of the best candidate of each segment, as `theta` are those
-    of the estimate.
+    objective; `segment_bests` are the parameters of the best candidate of each segment, as `theta`
+    are those of the estimate.
     """
     result = fit(Problem(task.settings, task.logs))
     if not result.best.usable:
@@ -91,12 +92,14 @@ def perform(task: Task) -> Result:
     }
 
 
-Read = Callable[[Sequence[Path], FitSettings], list[Log]]  # reads logs as settings map their columns
+# reads logs as settings map their columns
+Read = Callable[[Sequence[Path], FitSettings], list[Log]]
 
 
 @record
 class Row:
-    """One run: its cell and seed, its measures by name (empty where it failed), and why it failed."""
+    """One run: its cell and seed, its measures by name (empty where it failed),
+    and why it failed."""
 
     cell: str
     seed: int
@@ -107,7 +110,8 @@ class Row:
 def run_study(
     path: Path, folder: Path, read: Read, executor: Executor, progress: Progress
 ) -> tuple[Row, ...]:
-    """Perform the runs of a study that `folder` does not have yet; return the measures of all, by seed."""
+    """Perform the runs of a study that `folder` does not have yet; return the measures of all,
+    by seed."""
     study = load(path, StudySettings)
     cells = cell_settings(study, path)
     logs = read([path.parent / name for name in study.logs], next(iter(cells.values())))
@@ -143,7 +147,8 @@ def run_study(
 
 
 def make_tasks(cells: Mapping[str, FitSettings], seeds: int, logs: Sequence[Log]) -> list[Task]:
-    """Return all runs of a study, seed by seed, with one thread: the runs are what is shared out."""
+    """Return all runs of a study, seed by seed, with one thread:
+    the runs are what is shared out."""
     return [
         Task(name, seed, settings.changed({"search.seed": seed, "simulation.threads": 1}), tuple(logs))
         for seed in range(1, seeds + 1)
@@ -172,7 +177,8 @@ def _read(file: Path) -> Result:
 @contextmanager
 def processes(count: int = 0) -> Generator[Executor]:
     """Open that many processes, one per core for 0; they end with this one, however it ends."""
-    context = multiprocessing.get_context("spawn")  # threads of the simulation do not survive a fork
+    # threads of the simulation do not survive a fork
+    context = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(count or None, context, initializer=_end_with_parent)
     try:
         yield pool

@@ -1,4 +1,5 @@
-"""Units as files, settings and data sheets write them: what each measures, and what one of it is in SI."""
+"""Units as files, settings and data sheets write them: what each measures,
+and what one of it is in SI."""
 
 import math
 import re
@@ -25,7 +26,8 @@ UNITS = {
 
 
 def unit_of(text: str) -> Unit | None:
-    """Return the unit that a text spells, with or without brackets around it; None where it spells none."""
+    """Return the unit that a text spells, with or without brackets around it;
+    None where it spells none."""
     return UNITS.get(bare(text).lower())
 
 
@@ -42,7 +44,8 @@ def bare(text: str) -> str:
 
 
 def likely_time_unit(step: float) -> str:
-    """Return the unit in which a step between samples is one of 2 to 1000 samples a second; "": in none."""
+    """Return the unit in which a step between samples is one of 2 to 1000 samples a second; "":
+    in none."""
     return next(
         (name for name in ("s", "ms", "us", "ns", "min", "day") if 9e-4 < step * UNITS[name].factor < 0.6), ""
     )

@@ -1,8 +1,10 @@
-"""Adaptation: a fit moved to a changed machine by a few of its parameters, all others held at its estimate.
+"""Adaptation: a fit moved to a changed machine by a few of its parameters,
+all others held at its estimate.
 
-Which few is found by trying: the one whose fit foretells parts of the logs left out best is freed, then the
-next, until none foretells them clearly better (`fitting.left_out`).
-Candidates are what all joints share, such as the pump and the masses, and the effects of the logs' groups:
+Which few is found by trying: the one whose fit foretells parts of the logs left out best is freed,
+then the next, until none foretells them clearly better (`fitting.left_out`).
+Candidates are what all joints share, such as the pump and the masses, and the effects of the logs'
+groups:
 what a load, a slower engine or another day changes.
 """
 
@@ -25,10 +27,11 @@ from hydroid.settings.search import MultistartSettings, RefinementSettings
 
 
 def adapted(model: IdentifiedModel, free: Sequence[str], logs: Sequence[Log] = ()) -> FitSettings:
-    """Return the settings in which only some parameters of a model are free, by name, from its estimate.
+    """Return the settings in which only some parameters of a model are free, by name,
+    from its estimate.
 
-    Their priors stay as wide as they were, around the estimate. Of the payloads those of these logs stay.
-    Raises SettingsError: a name that is none of a parameter with bounds or a prior.
+    Their priors stay as wide as they were, around the estimate. Of the payloads those of these logs
+    stay. Raises SettingsError: a name that is none of a parameter with bounds or a prior.
     """
     settings, parameters = model.settings, dict(model.settings.parameters)
     possible = [name for name, own in parameters.items() if own.can_be_free]
@@ -57,9 +60,11 @@ def adapted(model: IdentifiedModel, free: Sequence[str], logs: Sequence[Log] = (
 def steps(
     model: IdentifiedModel, logs: Sequence[Log], free: Sequence[str], progress: Progress
 ) -> list[Plain]:
-    """Return what freeing parameters one after another does, after the model as it is (""), as JSON has it.
+    """Return what freeing parameters one after another does, after the model as it is (""),
+    as JSON has it.
 
-    `free` are those to be freed; without any, those that pay. Errors are those of parts of the logs left out.
+    `free` are those to be freed; without any, those that pay.
+    Errors are those of parts of the logs left out.
     """
     groups = {model.settings.log.group_of(log.source) for log in logs}
     pool = list(free) or [
@@ -96,7 +101,8 @@ def _as_it_is(problem: Problem, model: IdentifiedModel) -> LeftOut:
 
 
 def load_findings(settings: FitSettings) -> tuple[Finding, ...]:
-    """Return which masses an adaptation has freed, although a load at the tip has no payload to be in."""
+    """Return which masses an adaptation has freed,
+    although a load at the tip has no payload to be in."""
     own = settings.parameters.items()
     freed = tuple(name for name, p in own if p.quantity == "mass" and p.fixed is None)
     return (Finding("load as mass", "warning", freed),) if freed and not settings.payloads else ()

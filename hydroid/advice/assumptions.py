@@ -1,10 +1,11 @@
 """Tests of what a fit takes for granted: which way an angle counts, and which columns are whose.
 
-Gravity slows what lifts and speeds up what lowers. So a joint's speed follows its command, late and unevenly,
-times what its lever arm and the pump do, less a part in proportion to the load: the torque that holds the arm
-in its pose. This law is linear in its unknowns, and needs no simulation. Where the angle of a joint counts
-the wrong way, the loads are those of other poses. With n independent samples, and sums of squares S and S' of
-what the laws of all joints leave, the logs make a joint turned round more likely by (S / S')^(n/2).
+Gravity slows what lifts and speeds up what lowers. So a joint's speed follows its command, late and
+unevenly, times what its lever arm and the pump do, less a part in proportion to the load: the
+torque that holds the arm in its pose. This law is linear in its unknowns, and needs no simulation.
+Where the angle of a joint counts the wrong way, the loads are those of other poses. With n
+independent samples, and sums of squares S and S' of what the laws of all joints leave,
+the logs make a joint turned round more likely by (S / S')^(n/2).
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -20,11 +21,14 @@ from hydroid.settings.fit import FitSettings
 
 ENOUGH = 6.0  # evidence that names a joint: turned round is 400 times as likely
 LOWER = 0.99
-"""part of the laws' rms error, on geometric average, that turning a joint round must leave at most"""
+"""part of the laws' rms error, on geometric average,
+that turning a joint round must leave at most"""
 FOLLOWED = 0.2
-"""by how much a joint's speed must correlate better with another joint's command than with its own"""
+"""by how much a joint's speed must correlate better with another joint's command than
+with its own"""
 PERIOD, WINDOW, LATEST = 0.05, 0.2, 0.8
-"""of the samples; over which speeds and commands are averaged; from a command to its effect at most [s]"""
+"""of the samples; over which speeds and commands are averaged;
+from a command to its effect at most [s]"""
 TAPS = (0.0, 0.1, 0.2, 0.3, 0.4)  # between the commands that a speed follows [s]
 KNOTS = np.linspace(-100.0, 100.0, 11)  # of the piecewise linear effect of each of them [%]
 FROM_STOPS, FROM_ZERO = 0.02, 3.0
@@ -36,8 +40,8 @@ TINY = np.finfo(float).tiny
 class _Motion:
     """What logs show in short windows: speeds [rad/s] and angles [rad] of all joints, shape (n, J).
 
-    joints: those that a log drives and all measure, 0-based. commands: means of each log's, shape (m, J) [%],
-    over windows that begin `period` [s] after each other.
+    joints: those that a log drives and all measure, 0-based. commands: means of each log's, shape
+    (m, J) [%], over windows that begin `period` [s] after each other.
     """
 
     joints: list[int]
@@ -53,7 +57,8 @@ class _Motion:
         )
 
     def follows(self, joint: int, other: int) -> tuple[float, int]:
-        """How a joint's speed correlates with a joint's command, and the windows after which it does most."""
+        """How a joint's speed correlates with a joint's command,
+        and the windows after which it does most."""
         speed, found = self.speed[:, joint] - self.speed[:, joint].mean(), list[tuple[float, int]]()
         for late in range(round(LATEST / self.period) + 1):
             command = self.command(other, late)
@@ -65,7 +70,8 @@ class _Motion:
 
 
 def doubts(settings: FitSettings, logs: Sequence[Log]) -> dict[int, float]:
-    """Return the joints (number, from 1) whose logged angle counts the wrong way, with the evidence for it.
+    """Return the joints (number, from 1) whose logged angle counts the wrong way,
+    with the evidence for it.
 
     The clearest comes first. Stage 1 has no law of speed.
     """
@@ -99,7 +105,8 @@ def doubts(settings: FitSettings, logs: Sequence[Log]) -> dict[int, float]:
 
 
 def exchanged(settings: FitSettings, logs: Sequence[Log]) -> tuple[tuple[int, int], ...]:
-    """Return pairs of joints (numbers, from 1) each of which follows the other's command, not its own."""
+    """Return pairs of joints (numbers, from 1) each of which follows the other's command,
+    not its own."""
     motion = _motion(settings, logs)
     follows = {(j, k): motion.follows(j, k)[0] for j in motion.joints for k in motion.joints}
     prefers = {(j, k) for (j, k), size in follows.items() if size > follows[j, j] + FOLLOWED}
@@ -118,7 +125,8 @@ def assumption_findings(
 
 
 def _motion(settings: FitSettings, logs: Sequence[Log]) -> _Motion:
-    """The motion in all logs that are long enough and show the pose; what is not driven may be unmeasured."""
+    """The motion in all logs that are long enough and show the pose;
+    what is not driven may be unmeasured."""
     step = max(round(PERIOD / logs[0].period), 1)
     period, pose = step * logs[0].period, settings.arm.pose(settings.start_pose)
     width, windows = step * max(round(WINDOW / period), 1), list[tuple[Array, ...]]()
@@ -138,7 +146,8 @@ def _motion(settings: FitSettings, logs: Sequence[Log]) -> _Motion:
 
 
 def _law(settings: FitSettings, motion: _Motion, joint: int) -> dict[int, Callable[[Array], Array]]:
-    """What a joint's law leaves of its speeds, by loads, shape (n,); nothing where it moves too little."""
+    """What a joint's law leaves of its speeds, by loads, shape (n,);
+    nothing where it moves too little."""
     taps = [round(tap / motion.period) for tap in TAPS]
     first = max(motion.follows(joint, joint)[1] - taps[-1] // 2, 0)
     commands = np.stack([motion.command(joint, first + tap) for tap in taps], axis=1)

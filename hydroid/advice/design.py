@@ -1,9 +1,11 @@
-"""The search for the next experiment: start pose, joints and commands with the most useful information.
+"""The search for the next experiment: start pose,
+joints and commands with the most useful information.
 
-Optimal experiment design (V. V. Fedorov, 1972; E. Walter and L. Pronzato, 1997) by random draws and random
-changes of the best. The design is local: motions and sensitivities are simulated at the present estimate.
-Where that is far from the truth, design again after the next fit.
-Only the simulated motion is kept within the limits; an arm that differs from the model moves differently.
+Optimal experiment design (V. V. Fedorov, 1972; E. Walter and L. Pronzato, 1997) by random draws and
+random changes of the best. The design is local: motions and sensitivities are simulated at the
+present estimate. Where that is far from the truth, design again after the next fit.
+Only the simulated motion is kept within the limits;
+an arm that differs from the model moves differently.
 """
 
 from collections import Counter
@@ -39,8 +41,9 @@ from hydroid.settings.search import DesignSettings
 from hydroid.words import listed
 
 PRIOR_SD = 1.0
-"""relative standard deviation that a forecast assumes of every parameter at most (ours): a fit's own prior is
-so weak that a direction which stays unknown would outweigh all that an experiment can do"""
+"""relative standard deviation that a forecast assumes of every parameter at most (ours): a fit's
+own prior is so weak that a direction which stays unknown would outweigh all that an
+experiment can do"""
 
 
 def forecast(known: Posterior) -> Posterior:
@@ -51,8 +54,8 @@ def forecast(known: Posterior) -> Posterior:
 def measured(settings: DesignSettings, signals: Sequence[Array], period: float) -> Array:
     """Return rows N of the information N' N that signals of the joints' angles give, shape (p, p).
 
-    `signals` are derivatives by p parameters [rad], (p, T). The errors of a future log are those of an error
-    model: the sensor's noise, and a drift.
+    `signals` are derivatives by p parameters [rad], (p, T). The errors of a future log are those of
+    an error model: the sensor's noise, and a drift.
     """
     noise, drift = np.radians([settings.noise_deg, settings.drift_deg])
     rows = [whitened(one, period, noise**2, drift**2 / 10.0) for one in signals]
@@ -70,8 +73,8 @@ MOVED = 0.9
 class Trial(NamedTuple):
     """A simulated experiment that keeps the limits.
 
-    experiment: its commands. gained: rows of its information (`measured`), shape (p, p). log: its commands
-    with the simulated angles.
+    experiment: its commands. gained: rows of its information (`measured`), shape (p, p). log: its
+    commands with the simulated angles.
     """
 
     experiment: Experiment
@@ -80,7 +83,8 @@ class Trial(NamedTuple):
 
 
 class Broken(NamedTuple):
-    """Why an experiment cannot be made: what it does, against which setting, in what part of its time."""
+    """Why an experiment cannot be made: what it does, against which setting,
+    in what part of its time."""
 
     what: str
     setting: str
@@ -111,7 +115,8 @@ class ExperimentSimulator:
         self._box, self._axes = known.box, known.axes(1e-5).one_sided  # little curvature
 
     def trial(self, experiment: Experiment) -> Trial | Broken:
-        """Return the experiment, levels reversed or reduced until it keeps the limits, and its information.
+        """Return the experiment, levels reversed or reduced until it keeps the limits,
+        and its information.
 
         Or the limit that it still breaks.
         """
@@ -141,7 +146,8 @@ class ExperimentSimulator:
         return Violation(near, int(np.argmax(turned)), False)
 
     def _broken(self, angle: Array, first: Violation | None) -> Broken:
-        """What a motion of all joints, (T, J), breaks: at first a joint's limits, or None: bodies meet."""
+        """What a motion of all joints, (T, J), breaks: at first a joint's limits, or None:
+        bodies meet."""
         limits = self._settings.design
         if first is not None:
             out, fast = (float(one[:, first.joint].mean()) for one in beyond(angle, self._settings))
@@ -169,7 +175,8 @@ class ExperimentSimulator:
         return Trial(experiment, gained, replace(experiment.log(self._settings), angle=angle))
 
     def _simulate(self, experiment: Experiment, theta: Array) -> Array:
-        """All joints' angles [rad] of candidates, (n, P) -> (n, T, J); NaN of what moves if one diverged."""
+        """All joints' angles [rad] of candidates, (n, P) -> (n, T, J);
+        NaN of what moves if one diverged."""
         log = experiment.log(self._settings)
         passive = self._settings.simulation.other_joints == "passive"
         moving = np.flatnonzero(log.driven | passive | np.isin(np.arange(log.joints), self._outputs))
@@ -183,9 +190,9 @@ class ExperimentSimulator:
 class Design:
     """A designed experiment beside the random ones it was chosen from.
 
-    random: those drawn at random that keep the limits. known: what is known without it. moved: which of the p
-    parameters any of these improves (`MOVED`), but for effects of a group of logs, which belong to another
-    day, (p,); the others must not hide them. names: of the parameters.
+    random: those drawn at random that keep the limits. known: what is known without it. moved:
+    which of the p parameters any of these improves (`MOVED`), but for effects of a group of logs,
+    which belong to another day, (p,); the others must not hide them. names: of the parameters.
     """
 
     best: Trial
@@ -207,17 +214,20 @@ class Design:
 
     @property
     def random_deviations(self) -> Array:
-        """Relative standard deviation of each parameter after a random experiment, the median; (p,)."""
+        """Relative standard deviation of each parameter after a random experiment, the median;
+        (p,)."""
         return np.median([self.known.add(t.gained).deviations for t in self.random], axis=0)
 
 
 def typical(known: Posterior, moved: Mask) -> float:
-    """Return the geometric mean of the relative standard deviations of some parameters, a mask (p,)."""
+    """Return the geometric mean of the relative standard deviations of some parameters,
+    a mask (p,)."""
     return float(np.exp(np.mean(np.log(known.deviations[moved]))))
 
 
 def broken_limits(broken: Sequence[Broken]) -> SettingsError:
-    """Return the error that no experiment keeps the limits: it names the one that is broken most often."""
+    """Return the error that no experiment keeps the limits:
+    it names the one that is broken most often."""
     often = Counter(one[:2] for one in broken)
     ((what, setting), times) = often.most_common(1)[0]
     shares = [one.share for one in broken if one.what == what]
@@ -230,10 +240,12 @@ def broken_limits(broken: Sequence[Broken]) -> SettingsError:
 
 
 def design(settings: FitSettings, theta: Array, logs: Sequence[Log], seed: int, progress: Progress) -> Design:
-    """Choose start pose, joints and commands of an experiment at an estimate, shape (P,), beside its logs.
+    """Choose start pose, joints and commands of an experiment at an estimate, shape (P,),
+    beside its logs.
 
-    Random experiments are drawn and kept within the limits. The best few are then changed at random, and a
-    changed one replaces the worst of them where it is better. The same seed gives the same experiment.
+    Random experiments are drawn and kept within the limits. The best few are then changed at
+    random, and a changed one replaces the worst of them where it is better.
+    The same seed gives the same experiment.
     """
     effort, parameters = settings.design.effort, settings.parameter_set()
     rng = np.random.default_rng(seed)
@@ -272,7 +284,8 @@ def design(settings: FitSettings, theta: Array, logs: Sequence[Log], seed: int, 
 
 
 def moved_by(random: Sequence[Trial], known: Posterior, counted: Mask) -> Mask:
-    """Return which counted parameters any random experiment improves, (p,); all counted if there is none."""
+    """Return which counted parameters any random experiment improves, (p,);
+    all counted if there is none."""
     least = np.min([known.add(trial.gained).deviations for trial in random], axis=0)
     moved = counted & (least < MOVED * known.deviations)
     return moved if moved.any() else counted | ~counted.any()

@@ -1,4 +1,5 @@
-"""Experiments: a start pose and pseudo-random commands, drawn and changed at random, kept within the limits.
+"""Experiments: a start pose and pseudo-random commands, drawn and changed at random,
+kept within the limits.
 
 A command is a sequence of levels, each held for a random time, as in the article's figure 17.
 """
@@ -18,7 +19,8 @@ from hydroid.settings.fit import FitSettings
 
 
 class Input(NamedTuple):
-    """One joint's command: `level[i]` [%] from sample `start[i]` to the next, and none before the first."""
+    """One joint's command: `level[i]` [%] from sample `start[i]` to the next,
+    and none before the first."""
 
     start: Ints
     level: Array
@@ -89,13 +91,15 @@ class RandomExperiments:
         self._shortest, self._longest = (max(1, round(t / period)) for t in limits.dwell_s)
 
     def draw(self) -> Experiment:
-        """Draw an experiment: half of them drive all allowed joints, the others a random part of them."""
+        """Draw an experiment: half of them drive all allowed joints,
+        the others a random part of them."""
         some = self._rng.random(len(self._joints)) < 0.5
         driven = self._joints if self._rng.random() < 0.5 or not some.any() else np.array(self._joints)[some]
         return Experiment(self._pose(), {j: self._input() for j in driven})
 
     def change(self, experiment: Experiment) -> Experiment:
-        """Change an experiment in one to three places: its pose, a joint's input, or some levels of it."""
+        """Change an experiment in one to three places: its pose, a joint's input,
+        or some levels of it."""
         rng, limit = self._rng, self._limit
         for _ in range(rng.integers(1, 4)):
             kind, joint = rng.random(), rng.choice(self._joints)
@@ -135,7 +139,8 @@ class RandomExperiments:
 
 
 class Violation(NamedTuple):
-    """The first sample at which a joint (0-based) leaves its range, is too fast, or makes bodies meet."""
+    """The first sample at which a joint (0-based) leaves its range, is too fast,
+    or makes bodies meet."""
 
     sample: int
     joint: int
@@ -143,7 +148,8 @@ class Violation(NamedTuple):
 
 
 def violation(angle: Array, settings: FitSettings) -> Violation | None:
-    """Return where a motion [rad], shape (T, J), first leaves the joints' ranges or is too fast; or None."""
+    """Return where a motion [rad], shape (T, J), first leaves the joints' ranges or is too fast;
+    or None."""
     out, fast = beyond(angle, settings)
     for sample, joint in np.argwhere(out | fast)[:1].tolist():
         return Violation(sample, joint, not out[sample, joint])
@@ -151,7 +157,8 @@ def violation(angle: Array, settings: FitSettings) -> Violation | None:
 
 
 def beyond(angle: Array, settings: FitSettings) -> tuple[Mask, Mask]:
-    """Return where joints of a motion [rad], (T, J), are outside their ranges, and too fast: both (T, J)."""
+    """Return where joints of a motion [rad], (T, J), are outside their ranges, and too fast:
+    both (T, J)."""
     limits, arm = settings.design, settings.arm
     margin, speed = np.radians([limits.margin_deg, limits.speed_deg_s])
     fast = np.abs(np.diff(angle, axis=0, prepend=angle[:1])) / settings.log.period_s > speed

@@ -1,19 +1,22 @@
-"""Growth: the terms that a model lacks, and whether they lower the error on parts of the logs left out.
+"""Growth: the terms that a model lacks, and whether they lower the error on parts of
+the logs left out.
 
-A small change of each term changes the residual. What the free parameters cannot do as well tells how
-clearly the term is missing, and how much freeing it would gain (`score`). That is cheap: some simulations a
-term. The best few are then really freed: least squares goes on from the estimate, once with all samples and
-once without each part of them, on which the result is judged. A term that only follows the noise loses there.
+A small change of each term changes the residual. What the free parameters cannot do as well tells
+how clearly the term is missing, and how much freeing it would gain (`score`). That is cheap: some
+simulations a term. The best few are then really freed: least squares goes on from the estimate,
+once with all samples and once without each part of them, on which the result is judged.
+A term that only follows the noise loses there.
 
-The score test: let r be the innovations at a maximum of the likelihood and d the change of them with a
-quantity that the fit holds. What the free parameters can do as well as d, the fit has done already. So d is
-projected off their effects, with the priors' scores as further rows: d' = d - U' U d with orthonormal rows U.
-The statistic is the score of C. R. Rao (1948), a standard normal variable where the model lacks nothing:
+The score test: let r be the innovations at a maximum of the likelihood and d the change of them
+with a quantity that the fit holds. What the free parameters can do as well as d, the fit has done
+already. So d is projected off their effects, with the priors' scores as further rows: d' = d - U' U
+d with orthonormal rows U. The statistic is the score of C. R. Rao (1948),
+a standard normal variable where the model lacks nothing:
 
     z = -d' r / |d'|.
 
-The change of the quantity that would explain most is a = -d' r / |d'|². It raises the log-likelihood by
-z² / 2.
+The change of the quantity that would explain most is a = -d' r / |d'|². It raises the
+log-likelihood by z² / 2.
 """
 
 import math
@@ -33,9 +36,9 @@ from hydroid.progress import Progress
 class Score:
     """Statistic z of one change of the model, positive where the change lowers the error.
 
-    By the linear approximation the `amount` of it that lowers the error most raises the log-likelihood by
-    `gain`. `strength` is the statistic that the whole change would have without noise: what can be seen at
-    all.
+    By the linear approximation the `amount` of it that lowers the error most raises the
+    log-likelihood by `gain`. `strength` is the statistic that the whole change would have without
+    noise: what can be seen at all.
     """
 
     statistic: float
@@ -85,7 +88,8 @@ def explained(problem: Problem, known: Uncertainty) -> Explained:
 
 
 def holm(chances: Sequence[float], level: float) -> Mask:
-    """Return which findings hold, any false one with at most a probability `level` (S. Holm, 1979)."""
+    """Return which findings hold, any false one with at most a probability `level` (S. Holm,
+    1979)."""
     p = np.array(chances, dtype=float)
     order = np.argsort(p)
     holds = p[order] <= level / np.arange(len(p), 0, -1)
@@ -96,17 +100,20 @@ def holm(chances: Sequence[float], level: float) -> Mask:
 
 LEVEL = 0.05  # probability that any term is a candidate where none is missing
 MIN_GAIN = 2.0
-"""rise of the log-likelihood that a candidate must promise: that of one more parameter by Akaike's measure"""
+"""rise of the log-likelihood that a candidate must promise:
+that of one more parameter by Akaike's measure"""
 VISIBLE = 3.0
-"""statistic of the largest change, without noise; a term below it cannot be told from the free parameters"""
+"""statistic of the largest change, without noise;
+a term below it cannot be told from the free parameters"""
 LARGEST_EFFECT = 0.5
-"""rms effect of the change that is tested, in standard deviations of an innovation: large enough for terms
-that act beyond a threshold, small enough for a derivative"""
+"""rms effect of the change that is tested, in standard deviations of an innovation: large enough
+for terms that act beyond a threshold, small enough for a derivative"""
 
 
 @record
 class Candidate:
-    """A change of the settings that frees one more parameter, to be refined from `start`, in its unit.
+    """A change of the settings that frees one more parameter, to be refined from `start`,
+    in its unit.
 
     Attributes:
         score: how clearly the residual shows its effect, in standard deviations.
@@ -131,7 +138,8 @@ def score_terms(problem: Problem, known: Uncertainty, progress: Progress) -> lis
 
 
 def promising(tests: Sequence[Candidate]) -> list[Candidate]:
-    """Return those that are significant among all (S. Holm, 1979) and promise MIN_GAIN, the best first.
+    """Return those that are significant among all (S. Holm, 1979) and promise MIN_GAIN,
+    the best first.
 
     Of one quantity of one joint only the best: a side, or both.
     """

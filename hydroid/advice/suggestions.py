@@ -38,7 +38,8 @@ COMPARED = RefinementSettings(iterations=60, gain_tolerance=1e-4)
 """of the refinements without a part of the logs"""
 
 STATED_SD = {"weigh": 0.02, "state": 0.05}
-"""relative standard deviation of a mass that was weighed, and of a value from a data sheet (ours)"""
+"""relative standard deviation of a mass that was weighed,
+and of a value from a data sheet (ours)"""
 MEASURABLE = "kg", "m", "mm", "mm²", "cm³", "bar", "L/min", "A", "V"
 """units of what scales, rulers, gauges and data sheets say"""
 FEWEST_TIMES = 1.5  # factor by which an action must improve a parameter to be listed
@@ -49,7 +50,8 @@ Content = Mapping[str, Any]
 def advice(
     problem: Problem, known: Uncertainty, run: str, progress: Progress
 ) -> tuple[Content, tuple[Finding, ...]]:
-    """Return the suggestions about an estimate with its uncertainty, and what is to be said, the first first.
+    """Return the suggestions about an estimate with its uncertainty, and what is to be said,
+    the first first.
 
     The suggestions are as JSON has them (docs/json.md); `run` is the estimate's folder in commands.
     """
@@ -102,10 +104,11 @@ def refitted(likelihood: Likelihood, theta: Array, without: int) -> Refinement:
 
 
 def improvement(after: LeftOut, before: LeftOut) -> dict[str, tuple[float, float]]:
-    """Return by how much the rms error on a part left out falls, with a standard error, by joint [deg].
+    """Return by how much the rms error on a part left out falls, with a standard error,
+    by joint [deg].
 
-    The error is that of the change of an angle over AHEAD. The standard error is by leaving out one block of
-    time after the other (a jackknife).
+    The error is that of the change of an angle over AHEAD. The standard error is by leaving out one
+    block of time after the other (a jackknife).
     """
     problem = after.problem
     names = problem.settings.arm.joint_names
@@ -122,7 +125,8 @@ def improvement(after: LeftOut, before: LeftOut) -> dict[str, tuple[float, float
 
 
 def squares_ahead(one: LeftOut, joint: int) -> Array:
-    """Squares of the errors of a joint's change over AHEAD, one span after the other in all logs [rad²]."""
+    """Squares of the errors of a joint's change over AHEAD,
+    one span after the other in all logs [rad²]."""
     spans = list[Array]()
     for channel in one.problem.channels:
         if channel.quantity == "angle" and channel.joint == joint:
@@ -153,8 +157,8 @@ def next_actions(problem: Problem, known: Uncertainty) -> list[Plain]:
 def _forecasts(problem: Problem, known: Uncertainty, now: Posterior) -> Iterator[tuple[str, str, Array]]:
     """Yield actions, their subjects, and rows of the information that each adds, shape (k, p).
 
-    A weighed link, a value of a data sheet, and the best of six random experiments for the designed one, with
-    the noise of the fit's worst angle.
+    A weighed link, a value of a data sheet, and the best of six random experiments for the designed
+    one, with the noise of the fit's worst angle.
     """
     settings, names = problem.settings, problem.parameters.named(now.box.varied)
     for name, row in zip(names, np.eye(len(names)), strict=True):
@@ -184,8 +188,8 @@ def _forecasts(problem: Problem, known: Uncertainty, now: Posterior) -> Iterator
 def proposed(one: Candidate, value: float) -> dict[str, Plain]:
     """Return the entries of `parameters` that free a term, by name.
 
-    Its bounds are a fifth and five times the value that was found, with the present value inside. Stage 2
-    asks for a start of every mechanical parameter that no run of stage 1 gives.
+    Its bounds are a fifth and five times the value that was found, with the present value inside.
+    Stage 2 asks for a start of every mechanical parameter that no run of stage 1 gives.
     """
     (low, high), term = one.term.span, one.term
     held = value if math.isinf(term.value) else term.value
@@ -231,7 +235,8 @@ def missing_findings(content: Content) -> Iterator[Finding]:
 
 
 def action_findings(content: Content, settings: FitSettings) -> Iterator[Finding]:
-    """Yield what each action would bring, the best first; one that changes nothing visible is left out."""
+    """Yield what each action would bring, the best first;
+    one that changes nothing visible is left out."""
     for action in content["actions"]:
         kind, of = action["action"], str(action["of"])
         before, after = (f"{action[f'{when}_percent']:.2g}" for when in ("before", "after"))

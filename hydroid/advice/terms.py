@@ -1,7 +1,7 @@
 """Terms: changes of the settings that give a model one more parameter.
 
-A term is a quantity that the fit holds fixed, one that it leaves at its nominal value, or the share of one
-side or joint in a parameter that serves several.
+A term is a quantity that the fit holds fixed, one that it leaves at its nominal value, or the share
+of one side or joint in a parameter that serves several.
 """
 
 import math
@@ -23,7 +23,8 @@ from hydroid.settings.problem import ParameterSettings
 
 @record
 class Term:
-    """One more free parameter: the settings' entries that add it, its own and that of what it is split from.
+    """One more free parameter: the settings' entries that add it,
+    its own and that of what it is split from.
 
     `value` is what it has now; inf of a limit that is switched off.
     """
@@ -44,19 +45,22 @@ class Term:
         return problem.varied(problem.settings.with_parameters(self.entries))
 
     def theta(self, problem: Problem, theta: Array, value: float) -> Array:
-        """Return an estimate of a problem, (P,), for the problem `added_to`, with the term at a value."""
+        """Return an estimate of a problem, (P,), for the problem `added_to`,
+        with the term at a value."""
         values = problem.parameters.mapping(theta) | {self.name: value}
         return np.array([values[name] for name in problem.settings.parameters | dict(self.entries)])
 
     def innovations(self, likelihood: Likelihood, theta: Array, values: Sequence[float]) -> Array:
-        """Innovations of a likelihood at an estimate, (P,), with the term at n values, shape (n, R)."""
+        """Innovations of a likelihood at an estimate, (P,), with the term at n values, shape (n,
+        R)."""
         problem = likelihood.problem
         thetas = np.array([self.theta(problem, theta, value) for value in values])
         return likelihood.errors.innovations(self.added_to(problem).output_errors(thetas))
 
     @property
     def kind(self) -> tuple[object, ...]:
-        """What it is, with both sides of an actuator alike: the same for `delay` and `delay_a` of a joint."""
+        """What it is, with both sides of an actuator alike:
+        the same for `delay` and `delay_a` of a joint."""
         own = self.entries[self.name]
         return own.quantity.removesuffix("_a").removesuffix("_b"), own.joints, own.link
 
@@ -77,7 +81,8 @@ def _held(problem: Problem) -> Iterator[Term]:
 
 
 def _means_something(problem: Problem, p: ParameterSettings) -> bool:
-    """Whether what moves the joints has such a quantity, and an effect of a group has logs beside it."""
+    """Whether what moves the joints has such a quantity,
+    and an effect of a group has logs beside it."""
     acts_on = joints_of(problem.settings, p)
     groups = {problem.settings.log.group_of(log.source) for log in problem.logs}
     if p.per is not None and (p.per not in groups or len(groups) == 1):
@@ -92,7 +97,8 @@ def _moving(problem: Problem, quantity: str, joints: Iterable[int]) -> tuple[int
 
 
 def _split(problem: Problem, theta: Array) -> Iterator[Term]:
-    """Yield the share of side B, or of one joint that moves, in a free parameter that serves several."""
+    """Yield the share of side B, or of one joint that moves,
+    in a free parameter that serves several."""
     settings = problem.settings
     for parameter, value in zip(problem.parameters.parameters, theta.tolist(), strict=True):
         name, p = parameter.name, settings.parameters[parameter.name]
@@ -112,7 +118,8 @@ def _split(problem: Problem, theta: Array) -> Iterator[Term]:
 
 
 def _nominal(problem: Problem) -> Iterator[Term]:
-    """Yield what no parameter sets: of all joints together and each, of both sides together and each."""
+    """Yield what no parameter sets: of all joints together and each,
+    of both sides together and each."""
     settings, moving = problem.settings, problem.active_joints
     always = [p for p in settings.parameters.values() if p.per is None]
     taken = {(t, j) for p in always for t in TARGETS[p.quantity] for j in joints_of(settings, p) or (0,)}
@@ -148,7 +155,8 @@ def _label(settings: FitSettings, joint: int) -> str:
 
 
 def joints_of(settings: FitSettings, p: ParameterSettings) -> tuple[int, ...]:
-    """Return the joints that a parameter acts on; a link's mass, and the pump's numbers, act on none."""
+    """Return the joints that a parameter acts on; a link's mass, and the pump's numbers,
+    act on none."""
     if p.link is not None or CHOICES[p.quantity].of_the_pump:
         return ()
     return p.joints or tuple(range(1, len(settings.arm.joints) + 1))

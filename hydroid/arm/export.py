@@ -1,7 +1,9 @@
-"""An arm with locked joints as an MJCF with its looks: what a plant steps and shows, and what is exported.
+"""An arm with locked joints as an MJCF with its looks: what a plant steps and shows,
+and what is exported.
 
-The bodies are those of `hydroid.arm.locked`, with the inertia of all that is fused into them. Shapes, sites,
-cameras and lights of a fused body hang on the body that carries it; contacts are off, as in every simulation.
+The bodies are those of `hydroid.arm.locked`, with the inertia of all that is fused into them.
+Shapes, sites, cameras and lights of a fused body hang on the body that carries it;
+contacts are off, as in every simulation.
 """
 
 import math
@@ -26,8 +28,8 @@ _FIELDS = (
 def dressed_model(spec: mujoco.MjSpec, locked: LockedArm) -> mujoco.MjModel:
     """Return the locked arm's model with shapes, cameras and one idle motor per joint.
 
-    It steps as `locked.model` does, bit for bit: motors are switched off, and their controls are free to hold
-    commands in %.
+    It steps as `locked.model` does, bit for bit: motors are switched off, and their controls are
+    free to hold commands in %.
     """
     source = locked_spec(spec, locked, locked.model, np.zeros((2, len(locked.joints))))
     with quiet_mujoco():
@@ -43,8 +45,8 @@ def locked_spec(
 ) -> mujoco.MjSpec:
     """Return an arm's MJCF with joints locked; inertia, joints and time step are those of `model`.
 
-    `motors` are torque per command [N·m/%] and torque without one [N·m] of the moving joints, shape (2, V);
-    shape (2, 0): no motors.
+    `motors` are torque per command [N·m/%] and torque without one [N·m] of the moving joints, shape
+    (2, V); shape (2, 0): no motors.
     """
     source = spec.copy()
     forces = source.actuators, source.sensors, source.equalities, source.keys, source.excludes, source.pairs
@@ -70,7 +72,8 @@ def locked_spec(
         body.inertia, body.fullinertia = model.body_inertia[k], [np.nan, 0, 0, 0, 0, 0]
         joint.damping, joint.stiffness = [model.dof_damping[j], 0, 0], [model.jnt_stiffness[j], 0, 0]
         joint.frictionloss, joint.armature = model.dof_frictionloss[j], model.dof_armature[j]
-        joint.actfrclimited = mujoco.mjtLimited.mjLIMITED_FALSE  # a URDF's effort is of another motor
+        # a URDF's effort is of another motor
+        joint.actfrclimited = mujoco.mjtLimited.mjLIMITED_FALSE
         turns = joint.type == mujoco.mjtJoint.mjJNT_HINGE
         joint.springref = math.degrees(slack) if compiler.degree and turns else slack
     for name, gain, bias in zip(locked.joints, *motors, strict=False):
@@ -100,10 +103,11 @@ def _draw_tendons(spec: mujoco.MjSpec) -> None:
 
 
 def write_fitted(folder: Path, fitted: mujoco.MjSpec, joints: str, actuators: Plain) -> None:
-    """Write the fitted arm to `model/`, beside `arm.xml`, and a README that says what it is good for.
+    """Write the fitted arm to `model/`, beside `arm.xml`,
+    and a README that says what it is good for.
 
-    `joints` names those that take commands; `actuators` are hydraulic parameters by joint; of stage 1
-    there are none: the MJCF has motors.
+    `joints` names those that take commands; `actuators` are hydraulic parameters by joint; of stage
+    1 there are none: the MJCF has motors.
     """
     name = "fitted"
     if actuators:

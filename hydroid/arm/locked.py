@@ -1,9 +1,10 @@
 """The smallest model that moves exactly like the arm with some of its joints locked.
 
-A locked joint makes its link one rigid body with the link before it. `lock` builds the model of those
-rigid bodies, and `LockedArm.inertials` gives their mass, centre and inertia for any masses of the links, by
-Steiner's theorem; links that cannot move at all become part of the world and drop out. With every joint
-moving nothing but the fixed parts is fused, and the result is the whole arm without shapes or contacts.
+A locked joint makes its link one rigid body with the link before it. `lock` builds the model of
+those rigid bodies, and `LockedArm.inertials` gives their mass, centre and inertia for any masses of
+the links, by Steiner's theorem; links that cannot move at all become part of the world and drop
+out. With every joint moving nothing but the fixed parts is fused,
+and the result is the whole arm without shapes or contacts.
 """
 
 from collections.abc import Sequence
@@ -30,9 +31,9 @@ _JOINT_FIELDS = (
 PART = np.dtype(
     [("body", int), ("column", int), ("mass", float), ("centre", float, 3), ("inertia", float, (3, 3))]
 )
-"""a link, or another body of the model, as a rigid part of a fused body and in its frame: that body; the
-column of its mass in `masses`, -1 where no setting names it; its mass in the model [kg]; its centre [m]; its
-inertia about that for 1 kg [m²]"""
+"""a link, or another body of the model, as a rigid part of a fused body and in its frame: that
+body; the column of its mass in `masses`, -1 where no setting names it; its mass in the model [kg];
+its centre [m]; its inertia about that for 1 kg [m²]"""
 
 
 @record
@@ -40,21 +41,24 @@ class LockedArm:
     """A model with only the moving joints, and the way from link masses to its bodies."""
 
     model: mujoco.MjModel
-    """one body per moving joint, no actuator: torques go to qfrc_applied [N·m]; contacts, auto-reset off"""
+    """one body per moving joint, no actuator: torques go to qfrc_applied [N·m]; contacts,
+    auto-reset off"""
     joints: tuple[str, ...]  # the moving joints in the order of qpos and qvel, (V,)
     columns: Index  # the same among the arm's joints, 0-based, shape (V,)
     pose: Array  # where they start [rad], shape (V,)
     parts: Any  # what the bodies consist of, (P,) of PART
     held: dict[str, tuple[Array, Array]]
-    """place in its parent of a locked joint's body, by name: [m], (3,), and a quaternion (w, x, y, z)"""
+    """place in its parent of a locked joint's body, by name: [m], (3,), and a quaternion (w, x, y,
+    z)"""
 
     def inertials(self, masses: Array) -> dict[str, Array]:
-        """Fuse links of some masses [kg], shape (n, L); row k depends on masses[k] alone, to the last bit.
+        """Fuse links of some masses [kg], shape (n, L); row k depends on masses[k] alone,
+        to the last bit.
 
         Returns:
-            The fields of mjModel that describe the B bodies, the world first: body_mass [kg], shape (n, B);
-            body_ipos [m], shape (n, B, 3); body_iquat (w, x, y, z), shape (n, B, 4); body_inertia [kg·m²],
-            shape (n, B, 3).
+            The fields of mjModel that describe the B bodies, the world first: body_mass [kg], shape
+            (n, B); body_ipos [m], shape (n, B, 3); body_iquat (w, x, y, z), shape (n, B, 4);
+            body_inertia [kg·m²], shape (n, B, 3).
         """
         shapes = (len(masses), self.model.nbody)
         mass, ipos, tensor = np.zeros(shapes), np.zeros((*shapes, 3)), np.zeros((*shapes, 3, 3))
@@ -77,7 +81,8 @@ class LockedArm:
 def lock(spec: mujoco.MjSpec, arm: Arm, moving: Mask, pose: Array) -> LockedArm:
     """Lock all joints of an arm's model but the `moving` ones, (J,), one at least.
 
-    `pose` has the angles [rad], shape (J,), in the order of `arm.joint_names`; a moving joint's is its start.
+    `pose` has the angles [rad], shape (J,), in the order of `arm.joint_names`;
+    a moving joint's is its start.
     """
     names, columns = np.array(arm.joint_names), np.flatnonzero(moving)
     with quiet_mujoco():
@@ -108,7 +113,8 @@ def _place(data: mujoco.MjData, body: int, above: int) -> tuple[Array, Array]:
 def _fused(
     full: mujoco.MjModel, data: mujoco.MjData, arm: Arm, joints: Sequence[str]
 ) -> tuple[mujoco.MjModel, Any]:
-    """The chain of bodies that joints move, without what they weigh, and every body that is part of them."""
+    """The chain of bodies that joints move, without what they weigh,
+    and every body that is part of them."""
     spec, kept, carriers, parts = mujoco.MjSpec(), [0], list[int](), list[tuple[Any, ...]]()
     bodies = [spec.worldbody]
     column = {full.body(name).id: place for place, name in enumerate(arm.link_names)}
@@ -131,15 +137,18 @@ def _fused(
         model = spec.compile()
     _take_over(model, full, [moved[number].id for number in kept[1:]])
     off = mujoco.mjtDisableBit
-    # looking for what the chain lacks takes a tenth of a step; a diverged candidate must stay diverged
+    # looking for what the chain lacks takes a tenth of a step; a diverged candidate must stay
+    # diverged
     idle = off.mjDSBL_ACTUATION | off.mjDSBL_SENSOR | off.mjDSBL_EQUALITY
-    idle |= off.mjDSBL_ISLAND | off.mjDSBL_WARMSTART  # which is taken for all arms of a model or for none
+    # which is taken for all arms of a model or for none
+    idle |= off.mjDSBL_ISLAND | off.mjDSBL_WARMSTART
     model.opt.disableflags = full.opt.disableflags | off.mjDSBL_CONTACT | off.mjDSBL_AUTORESET | idle
     return model, np.array(parts, PART).view(np.recarray)
 
 
 def repeat(model: mujoco.MjModel, copies: int) -> mujoco.MjModel:
-    """Return a `LockedArm`'s model as often as asked for, side by side; bodies weigh nothing in particular.
+    """Return a `LockedArm`'s model as often as asked for, side by side;
+    bodies weigh nothing in particular.
 
     None changes a bit of another, and a step of many costs little more than a step of one.
     """

@@ -1,9 +1,10 @@
-"""An arm's compiled model: with a payload where a log has one, or beside its mirror image on one carrier.
+"""An arm's compiled model: with a payload where a log has one,
+or beside its mirror image on one carrier.
 
-Which of its bodies meet along a trajectory, and how near they come otherwise: bodies collide with the shapes
-that the MJCF makes collide; a mesh counts as its convex hull. Distances are MuJoCo's (`mj_geomDistance`). As
-in MuJoCo a body is not held against the one that it hangs on, nor against one that the model excludes;
-`hydroid init` excludes bodies that touch in the pose `home`.
+Which of its bodies meet along a trajectory, and how near they come otherwise: bodies collide with
+the shapes that the MJCF makes collide; a mesh counts as its convex hull. Distances are MuJoCo's
+(`mj_geomDistance`). As in MuJoCo a body is not held against the one that it hangs on, nor against
+one that the model excludes; `hydroid init` excludes bodies that touch in the pose `home`.
 """
 
 from collections.abc import Mapping
@@ -19,7 +20,8 @@ from hydroid.settings.arm import Arm
 
 ALONE = "alone"  # the name of the arm that is not one of two
 SIDES = ("right", "left")
-"""the arms of a pair in the order of its joints; the names of their parts begin with these and `_`"""
+"""the arms of a pair in the order of its joints;
+the names of their parts begin with these and `_`"""
 
 
 def load_model(arm: Arm) -> mujoco.MjSpec:
@@ -52,7 +54,8 @@ FARTHEST = 100.0  # distance beyond which MuJoCo need not look [m]
 
 @record
 class Meeting:
-    """Two bodies inside each other, from one sample to another; at most by a depth, reached at a time."""
+    """Two bodies inside each other, from one sample to another; at most by a depth,
+    reached at a time."""
 
     bodies: list[str]
     from_s: float
@@ -63,10 +66,11 @@ class Meeting:
 
 @record
 class Clearance:
-    """The smallest distance of any two bodies [m], (T,), along a trajectory; negative inside each other.
+    """The smallest distance of any two bodies [m], (T,), along a trajectory;
+    negative inside each other.
 
-    `nearest` names the two bodies of each sample, `meetings` stand in the order of their beginnings;
-    `excluded` are pairs that the model excludes, `checked` is the number of the others.
+    `nearest` names the two bodies of each sample, `meetings` stand in the order of their
+    beginnings; `excluded` are pairs that the model excludes, `checked` is the number of the others.
     """
 
     time: Array
@@ -93,7 +97,8 @@ class CollisionChecker:
         """of the bodies of each pair of shapes"""
 
     def clearance(self, time: Array, angle: Array) -> Clearance:
-        """Return how near bodies come along a trajectory: time [s], (T,), and angles of all joints [rad]."""
+        """Return how near bodies come along a trajectory: time [s], (T,),
+        and angles of all joints [rad]."""
         distance = np.stack([self._distances(pose, FARTHEST) for pose in angle])
         depths: dict[tuple[str, str], Array] = {}
         for pair in np.flatnonzero(distance.min(axis=0) < 0):
@@ -114,7 +119,8 @@ class CollisionChecker:
         return Clearance(time, distance.min(axis=1), nearest, tuple(meetings), checked, excluded)
 
     def first_below(self, angle: Array, margin: float, counted: Mask | None = None) -> int | None:
-        """Return the first sample of a motion [rad], (T, nq), with two bodies nearer than a margin [m].
+        """Return the first sample of a motion [rad], (T, nq),
+        with two bodies nearer than a margin [m].
 
         `counted` are the pairs of shapes that count, shape (P,); None: all.
         """
@@ -124,20 +130,23 @@ class CollisionChecker:
         return None
 
     def below(self, angle: Array, margin: float, counted: Mask) -> tuple[tuple[str, str], float]:
-        """Return which two bodies are nearer than a margin [m] most often, and in what part of a motion."""
+        """Return which two bodies are nearer than a margin [m] most often,
+        and in what part of a motion."""
         near = np.stack([self._distances(pose, margin) for pose in angle]) < margin
         share = np.where(counted, near.mean(axis=0), -1.0)
         return self.names[int(np.argmax(share))], float(share.max())
 
     def changing(self, poses: Array) -> Mask:
-        """Return which pairs of shapes stand at different distances in some poses [rad], (n, nq): shape (P,).
+        """Return which pairs of shapes stand at different distances in some poses [rad], (n, nq):
+        shape (P,).
 
         No joint moves the others nearer: a base and what turns on it.
         """
         return np.ptp([self._distances(pose, FARTHEST) for pose in poses], axis=0) > STILL
 
     def _distances(self, pose: Array, within: float) -> Array:
-        """Distances of all pairs of shapes in a pose [m], shape (P,); farther than `within` they are that."""
+        """Distances of all pairs of shapes in a pose [m], shape (P,);
+        farther than `within` they are that."""
         self._data.qpos[:] = pose
         mujoco.mj_kinematics(self._model, self._data)
         return np.array(
@@ -160,7 +169,8 @@ def _pairs(model: mujoco.MjModel) -> list[list[int]]:
 class Machine:
     """A whole machine, all joints free, to be put into poses.
 
-    Its `sides` name its arms, `ALONE` or right and left; the compiled model's joints are theirs, arm by arm.
+    Its `sides` name its arms, `ALONE` or right and left; the compiled model's joints are theirs,
+    arm by arm.
     """
 
     arm: Arm
@@ -173,7 +183,8 @@ class Machine:
         return CollisionChecker(self.model, self.arm.name)
 
     def joined(self, angle: Mapping[str, Array], rest: Array) -> Array:
-        """Return all joints' angles [rad], (T, nq), of arms that move, (T, J) by name; others rest, (J,)."""
+        """Return all joints' angles [rad], (T, nq), of arms that move, (T, J) by name; others rest,
+        (J,)."""
         still = np.tile(rest, (max(map(len, angle.values())), 1))
         return np.hstack([angle.get(side, still) for side in self.sides])
 

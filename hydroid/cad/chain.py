@@ -1,4 +1,5 @@
-"""Which joints of a robot are the arm: those from its base to one of its ends; all others are held."""
+"""Which joints of a robot are the arm: those from its base to one of its ends;
+all others are held."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,11 +19,13 @@ SIDES = {"left", "right", "l", "r"}
 def choose_chain(
     spec: mujoco.MjSpec, path: Path, notes: Notes, columns: Sequence[str], tip: str | None
 ) -> None:
-    """Choose the joints from the base to `tip`, or else to the tip that fits best, and delete the others.
+    """Choose the joints from the base to `tip`, or else to the tip that fits best,
+    and delete the others.
 
-    The best tip is the one with the most joints that the columns of a log name, then the one with the most
-    joints, then the first. Rods and tubes of cylinders are no tips, nor are fingers that the log does not
-    name. What is left out is held, and its mass belongs to the link that carries it.
+    The best tip is the one with the most joints that the columns of a log name, then the one with
+    the most joints, then the first. Rods and tubes of cylinders are no tips, nor are fingers that
+    the log does not name. What is left out is held,
+    and its mass belongs to the link that carries it.
     """
     _hold(spec, notes)
     chains: dict[str, tuple[str, ...]] = {}
@@ -59,14 +62,16 @@ def choose_chain(
 
 
 def _without_fingers(spec: mujoco.MjSpec, chain: tuple[str, ...], columns: Sequence[str]) -> tuple[str, ...]:
-    """Return a chain without the fingers at its end that no column names: they grip, and are no arm."""
+    """Return a chain without the fingers at its end that no column names: they grip,
+    and are no arm."""
     while len(chain) > 1 and _is_finger(spec, chain[-1]) and not _named(spec, chain[-1:], columns):
         chain = chain[:-1]
     return chain
 
 
 def _is_finger(spec: mujoco.MjSpec, name: str) -> bool:
-    """Return whether a joint's name or its link's says so, or another beside it differs by its side only."""
+    """Return whether a joint's name or its link's says so,
+    or another beside it differs by its side only."""
     joint = spec.joint(name)
     told = {*words(joint.name), *words(joint.parent.name)}
     if told & FINGERS:

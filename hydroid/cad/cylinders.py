@@ -1,9 +1,10 @@
 """Cylinders that a robot's file models as links of their own -> where they are pinned.
 
-A tube that turns on one link, a rod that slides in it and is pinned to another: in an MJCF by an equality
-constraint, which closes the loop. Between rod and moved link there may be a rocker and a coupler (a bucket's
-four-bar linkage). Where one is recognised its links are held, so that their mass is part of the links that
-carry them, and the joint that it moves gets the cylinder. A URDF cannot close loops: its rods end nowhere.
+A tube that turns on one link, a rod that slides in it and is pinned to another: in an MJCF by an
+equality constraint, which closes the loop. Between rod and moved link there may be a rocker and a
+coupler (a bucket's four-bar linkage). Where one is recognised its links are held, so that their
+mass is part of the links that carry them, and the joint that it moves gets the cylinder.
+A URDF cannot close loops: its rods end nowhere.
 """
 
 import math
@@ -27,7 +28,8 @@ ENDS = "parent", "child"  # of the sites that show where a cylinder is pinned
 
 @record
 class _Pin:
-    """Where two bodies turn on each other [m], shape (3,), in the file's pose; `joint` None: an equality."""
+    """Where two bodies turn on each other [m], shape (3,), in the file's pose; `joint` None:
+    an equality."""
 
     bodies: tuple[str, str]
     at: Array
@@ -38,10 +40,11 @@ class _Pin:
 
 
 def take_cylinders(spec: mujoco.MjSpec, notes: Notes) -> dict[str, Plain]:
-    """Hold the links of cylinders and return what an arm's file says of them, by the joint that they move.
+    """Hold the links of cylinders and return what an arm's file says of them,
+    by the joint that they move.
 
-    Pivots become sites of the links. A joint needs limits, or its cylinder might pass a dead centre. The
-    constraints that close the loops of what is held are deleted; others stay.
+    Pivots become sites of the links. A joint needs limits, or its cylinder might pass a dead
+    centre. The constraints that close the loops of what is held are deleted; others stay.
     """
     if not any(one.type == mujoco.mjtEq.mjEQ_CONNECT for one in spec.equalities):
         return {}
@@ -79,8 +82,8 @@ def take_cylinders(spec: mujoco.MjSpec, notes: Notes) -> dict[str, Plain]:
 def take_sites(spec: mujoco.MjSpec, notes: Notes) -> dict[str, Plain]:
     """Return what an arm's file says of the cylinders that pairs of sites show, by joint.
 
-    The sites are called JOINT_pivot_parent and JOINT_pivot_child; the name of the joint may lack its ending
-    `_joint`, or be that of the link, and is completed.
+    The sites are called JOINT_pivot_parent and JOINT_pivot_child; the name of the joint may lack
+    its ending `_joint`, or be that of the link, and is completed.
     """
     found, sites = dict[str, Plain](), {word(site.name): site for site in spec.sites}
     for joint in spec.joints:
@@ -104,7 +107,8 @@ def ends_of(spec: mujoco.MjSpec, constraint: Any) -> tuple[str, str]:
 
 
 def is_part_of_cylinder(joint: mujoco.MjsJoint) -> bool:
-    """Return whether the names of a joint and its link tell a cylinder's tube or rod, which moves no link."""
+    """Return whether the names of a joint and its link tell a cylinder's tube or rod,
+    which moves no link."""
     return all({*re.split(r"[\W_\d]+", name.lower())} & PARTS for name in (joint.name, joint.parent.name))
 
 
@@ -134,12 +138,13 @@ def _at(pins: Sequence[_Pin], body: str, *without: str) -> list[_Pin]:
 def _linkage(
     pins: Sequence[_Pin], foot: _Pin, eye: _Pin, cylinder: tuple[str, str], data: mujoco.MjData
 ) -> tuple[Any, Plain, tuple[str, ...]] | None:
-    """Return the joint that a cylinder moves, its settings, and links between them; None: it moves none.
-    `foot` pins the tube to a link, `eye` the rod to another.
+    """Return the joint that a cylinder moves, its settings, and links between them; None: it moves
+    none. `foot` pins the tube to a link, `eye` the rod to another.
     """
     tube, rod = cylinder
     base, moved = foot.other(tube), eye.other(rod)
-    for ground in _at(pins, moved, rod):  # a rocker on the same link, with a coupler to the link that moves
+    # a rocker on the same link, with a coupler to the link that moves
+    for ground in _at(pins, moved, rod):
         for pin in _at(pins, moved, rod, base) if ground.other(moved) == base else ():
             coupler = pin.other(moved)
             for end in _at(pins, coupler, moved):
@@ -156,14 +161,17 @@ def _joint(pins: Sequence[_Pin], first: str, second: str) -> Any:
 
 
 def _four_bar(joint: Any, pins: Sequence[_Pin]) -> Plain | None:
-    """Return the settings of a cylinder that turns a joint by a rocker and a coupler, as the file stands.
+    """Return the settings of a cylinder that turns a joint by a rocker and a coupler,
+    as the file stands.
 
-    The pins are those of rocker and link, rocker and coupler, coupler and child, of the tube, of the rod.
+    The pins are those of rocker and link, rocker and coupler, coupler and child, of the tube,
+    of the rod.
     """
     axis = joint.xaxis
     x = np.cross([0.0, 1.0, 0.0] if abs(axis[1]) < 0.9 else [1.0, 0.0, 0.0], axis)
     x /= np.linalg.norm(x)
-    y, away = np.cross(axis, x), [one.at - joint.xanchor for one in pins]  # in a plane across the axis [m]
+    # in a plane across the axis [m]
+    y, away = np.cross(axis, x), [one.at - joint.xanchor for one in pins]
     ground, pin, child, foot, eye = (complex(one @ x, one @ y) for one in away)
     turn = abs(ground) / ground  # the rocker's pivot lies at (ground, 0)
     side = "left" if ((pin - ground) * np.conj(child - ground)).imag > 0 else "right"
@@ -174,7 +182,8 @@ def _four_bar(joint: Any, pins: Sequence[_Pin]) -> Plain | None:
     if not math.isfinite(psi):
         return None
     theta = float(np.angle((eye - ground) * np.conj(foot - ground)))
-    sense = 1.0 if math.sin(theta) * first > 0 else -1.0  # the rod's pin turns with the rocker, by psi
+    # the rod's pin turns with the rocker, by psi
+    sense = 1.0 if math.sin(theta) * first > 0 else -1.0
     theta0 = math.degrees(math.remainder(theta - psi, math.tau))
     theta0 += 360.0 * sense if theta0 * sense < 0 else 0.0  # its sign is the rod's way
     a, b = (round(abs(pivot - ground), 6) for pivot in (foot, eye))

@@ -20,7 +20,8 @@ from hydroid.settings.linkage import Cylinder
 from hydroid.words import distinct
 
 ENDLESS = 2000.0  # range of a joint that has none [rad, m]
-TURNS, SLIGHT = 4.1 * np.pi, 0.11  # ranges of a joint that are rather in deg, or rad read as deg [rad]
+# ranges of a joint that are rather in deg, or rad read as deg [rad]
+TURNS, SLIGHT = 4.1 * np.pi, 0.11
 FAR = 50.0  # range of a joint that is rather in mm [m]
 
 
@@ -28,8 +29,8 @@ FAR = 50.0  # range of a joint that is rather in mm [m]
 class ImportedArm:
     """A serial arm out of a robot's file: its MJCF, and its meshes as STL by their path from that.
 
-    `cylinders` are settings of those that the file models, but for areas, by joint; `notes` say what was
-    assumed, left out or mended.
+    `cylinders` are settings of those that the file models, but for areas, by joint; `notes` say
+    what was assumed, left out or mended.
     """
 
     title: str
@@ -42,7 +43,8 @@ class ImportedArm:
 def import_arm(
     path: Path, columns: Sequence[str] = (), tip: str | None = None, total_mass: float | None = None
 ) -> ImportedArm:
-    """Read a URDF or an MJCF through MuJoCo's importer and take the arm out of it (`hydroid.init`)."""
+    """Read a URDF or an MJCF through MuJoCo's importer and take the arm out of it
+    (`hydroid.init`)."""
     notes = Notes(path)
     spec, files, urdf = read_source(path, notes)
     _clear(spec, path)
@@ -82,7 +84,8 @@ def import_arm(
 
 
 def _clear(spec: mujoco.MjSpec, path: Path) -> None:
-    """Delete what is no part of the arm's bodies or would stand beside the scene, and give plain names."""
+    """Delete what is no part of the arm's bodies or would stand beside the scene,
+    and give plain names."""
     plane, sky = mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtTexture.mjTEXTURE_SKYBOX
     floors = [geom for geom in spec.geoms if geom.type == plane]
     looks = [*spec.textures, *spec.materials]
@@ -105,7 +108,8 @@ def _clear(spec: mujoco.MjSpec, path: Path) -> None:
 
 
 def _weigh_as_on_earth(spec: mujoco.MjSpec, notes: Notes) -> None:
-    """Take out what carries the arm in the file in place of its actuators: hydroid does not simulate it."""
+    """Take out what carries the arm in the file in place of its actuators:
+    hydroid does not simulate it."""
     lifted, option = [body for body in spec.bodies if body.gravcomp], spec.option
     for body in lifted:
         body.gravcomp = 0.0
@@ -162,14 +166,16 @@ def _possible(cylinders: Mapping[str, Plain], data: mujoco.MjData, notes: Notes)
 
 
 def arrange(spec: mujoco.MjSpec, base: Array, tip: Array) -> None:
-    """Put lights and cameras around the stretched arm, as far away as it reaches; exclude contacts by design.
+    """Put lights and cameras around the stretched arm, as far away as it reaches;
+    exclude contacts by design.
 
-    `base` and `tip` are its ends in the world [m], shape (3,). What touches in a named pose is close by
-    design, or its hull is wide.
+    `base` and `tip` are its ends in the world [m], shape (3,). What touches in a named pose is
+    close by design, or its hull is wide.
     """
     model = spec.compile()
     centre, reach = np.round(0.5 * (base + tip), 6), round(0.8 * float(np.linalg.norm(tip - base)), 6)
-    if reach < 0.2 * model.stat.extent:  # one joint, or joints close together: the links reach farther
+    # one joint, or joints close together: the links reach farther
+    if reach < 0.2 * model.stat.extent:
         centre, reach = np.round(model.stat.center, 6), round(0.5 * float(model.stat.extent), 6)
     if reach > 4.0:
         spec.geom("floor").size = [round(1.25 * reach, 3)] * 2 + [0.1]

@@ -23,13 +23,15 @@ LARGEST = 1e7  # of a vertex in any of these units: no machine is 10 km long
 TOO_LONG = 5.0  # length of a mesh over the longest distance between joints: no part of the arm
 TOO_SHORT = 1 / 30  # length of what is seen of a link over its own distance: a link is no pin
 BRACKET = 1 / 300  # the same of the fixed base, over the longest distance: it may be small
-SPEAKS = 0.3  # part of the longest distance between joints from which a link's own tells its meshes' unit
+# part of the longest distance between joints from which a link's own tells its meshes' unit
+SPEAKS = 0.3
 LONGEST = 50.0  # mesh of an arm whose joints tell no distance [m]
 
 
 @record
 class _Reach:
-    """Distances from a joint to the next one [m], by the link between them, and the link of each body.
+    """Distances from a joint to the next one [m], by the link between them,
+    and the link of each body.
 
     What no joint moves is part of the fixed base, "".
     """
@@ -52,8 +54,8 @@ def convert_meshes(
 ) -> tuple[dict[str, bytes], set[str]]:
     """Turn the meshes into STL files in m and delete those that cannot be shown.
 
-    `exact`: no link has its inertia by what the file says of its meshes, so that the best way may be taken.
-    Returned are the files by their path from the model, and the bodies that lost a mesh.
+    `exact`: no link has its inertia by what the file says of its meshes, so that the best way may
+    be taken. Returned are the files by their path from the model, and the bodies that lost a mesh.
     """
     read = {name: mesh for name, path in files.items() if (mesh := _read_mesh(path, notes)) is not None}
     units = _units(spec, files, read, notes)
@@ -83,8 +85,8 @@ def _units(
 ) -> dict[str, float]:
     """Return the unit of each mesh that is used [m], by its name.
 
-    Most meshes of a file have one unit: the one in which most links are as long as their joints are apart.
-    A mesh that this makes far too long or too short has its own.
+    Most meshes of a file have one unit: the one in which most links are as long as their joints are
+    apart. A mesh that this makes far too long or too short has its own.
     """
     lengths = {
         mesh.name: float(np.max(read[mesh.file].extents * np.abs(mesh.scale)))
@@ -163,7 +165,8 @@ def _read_mesh(path: Path, notes: Notes) -> trimesh.Trimesh | None:
 def _shown_stl(
     mesh: trimesh.Trimesh, scale: Array, name: str, notes: Notes
 ) -> tuple[bytes, mujoco.mjtMeshInertia] | None:
-    """Return a mesh as a binary STL, and how MuJoCo takes its inertia; None, with a note: it refuses both.
+    """Return a mesh as a binary STL, and how MuJoCo takes its inertia; None, with a note:
+    it refuses both.
 
     That is exact where the mesh is closed, else that of its hull, and of no use where it is flat.
     """

@@ -1,4 +1,5 @@
-"""Masses and inertias of bodies: those of the file, or those of their hulls where no machine has them."""
+"""Masses and inertias of bodies: those of the file,
+or those of their hulls where no machine has them."""
 
 from collections.abc import Collection, Mapping, Sequence
 from itertools import pairwise
@@ -14,17 +15,19 @@ from hydroid.mjcf import mujoco_errors
 
 MASSLESS = 1e-6  # mass up to which a body counts as a frame without mass [kg]
 USUAL = 1200.0
-"""mass of a link over the volume of its hull [kg/m³]: compact parts of machines have 500 to 3,000. A welded
-boom has less: 10 mm of steel around 0.4 m square make 770 of the box, and a bend half empties its hull"""
+"""mass of a link over the volume of its hull [kg/m³]: compact parts of machines have 500 to 3,000.
+A welded boom has less: 10 mm of steel around 0.4 m square make 770 of the box,
+and a bend half empties its hull"""
 LEAST, MOST = 100.0, 8000.0
-"""outside these no link can be: a box around a boom of 400 kg/m³ that points up at 45 deg, four times as
-large as the boom; and solid steel"""
+"""outside these no link can be: a box around a boom of 400 kg/m³ that points up at 45 deg, four
+times as large as the boom; and solid steel"""
 BOXED = 500.0
-"""the same of a link that is drawn as boxes, cylinders and balls around it: a bucket of 15 mm plates fills
-500 of its box, a bent boom 400"""
+"""the same of a link that is drawn as boxes, cylinders and balls around it: a bucket of 15 mm
+plates fills 500 of its box, a bent boom 400"""
 SLENDER = 0.015  # volume of a link without a shape, over the cube of its length: a box of 1 to 8
 SLIGHT = 67.0
-"""the least density of this box: that of a boom of 1 to 20 with 400 kg/m³, 1 kg for a length of 1 m"""
+"""the least density of this box: that of a boom of 1 to 20 with 400 kg/m³,
+1 kg for a length of 1 m"""
 WATER = 1000.0  # MuJoCo's density of shapes without mass and density [kg/m³]
 NO_TENSOR = [np.nan, 0, 0, 0, 0, 0]  # MuJoCo's word for a full inertia that is not given
 
@@ -38,9 +41,11 @@ class Inertial(NamedTuple):
 
 
 def repair_inertias(spec: mujoco.MjSpec, urdf: bool, notes: Notes) -> None:
-    """Give every body a mass and an inertia that a rigid body can have; one without a mass is a mere frame.
+    """Give every body a mass and an inertia that a rigid body can have;
+    one without a mass is a mere frame.
 
-    What the file says is kept where it is possible, else the mass with the inertia of the shape's hull.
+    What the file says is kept where it is possible,
+    else the mass with the inertia of the shape's hull.
     """
     faults = {body.name: _stated_fault(body, urdf) for body in spec.bodies[1:]}
     model, hulls = compiled(spec, notes.path), hull_model(spec, notes.path)
@@ -67,7 +72,8 @@ def repair_inertias(spec: mujoco.MjSpec, urdf: bool, notes: Notes) -> None:
 def weigh(spec: mujoco.MjSpec, notes: Notes, total: float | None, lost: Collection[str]) -> None:
     """Replace masses that no machine's link has, and scale all to a total [kg] that is known.
 
-    The spec has moving bodies alone, with masses and inertias. Those that `lost` a mesh count as shapeless.
+    The spec has moving bodies alone, with masses and inertias.
+    Those that `lost` a mesh count as shapeless.
     """
     model, hulls = compiled(spec, notes.path), hull_model(spec, notes.path)
     data = mujoco.MjData(model)
@@ -110,9 +116,11 @@ def weigh(spec: mujoco.MjSpec, notes: Notes, total: float | None, lost: Collecti
 
 
 def _filled(links: Sequence[mujoco.MjsBody], hull: Mapping[str, Inertial]) -> dict[str, float]:
-    """Return the likely mass of links over the volume of their hulls [kg/m³], by name; some have none.
+    """Return the likely mass of links over the volume of their hulls [kg/m³], by name;
+    some have none.
 
-    That of the file's links that have a mass and are drawn alike tells it, where it is lower than usual.
+    That of the file's links that have a mass and are drawn alike tells it,
+    where it is lower than usual.
     """
     usual, stated = dict[str, float](), dict[float, list[float]]()
     for body in links:
@@ -140,7 +148,8 @@ def compiled(spec: mujoco.MjSpec, path: Path) -> mujoco.MjModel:
 
 
 def bare_model(spec: mujoco.MjSpec, path: Path) -> tuple[mujoco.MjModel, mujoco.MjData]:
-    """Compile without meshes, and pose as the file stands: where bodies and joints are is all that counts."""
+    """Compile without meshes, and pose as the file stands:
+    where bodies and joints are is all that counts."""
     bare = spec.copy()
     bare.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
     for body in bare.bodies[1:]:
@@ -178,7 +187,8 @@ def inertial_of(model: mujoco.MjModel, body: int) -> Inertial:
 
 
 def set_inertia(body: mujoco.MjsBody, mass: float, centre: Array, tensor: Array) -> None:
-    """Give a body a mass [kg], centre [m], (3,), and inertia about it [kg·m²], (3, 3), in its frame."""
+    """Give a body a mass [kg], centre [m], (3,), and inertia about it [kg·m²], (3, 3),
+    in its frame."""
     body.explicitinertial, body.mass, body.ipos = True, mass, centre
     body.iquat, body.ialt.type = [1.0, 0.0, 0.0, 0.0], mujoco.mjtOrientation.mjORIENTATION_QUAT
     body.inertia = [0.0] * 3
@@ -186,7 +196,8 @@ def set_inertia(body: mujoco.MjsBody, mass: float, centre: Array, tensor: Array)
 
 
 def _stated_fault(body: mujoco.MjsBody, urdf: bool) -> str:
-    """Say why no rigid body has the mass or inertia that a file states, and take it out; empty: one has."""
+    """Say why no rigid body has the mass or inertia that a file states, and take it out; empty:
+    one has."""
     if not body.explicitinertial:
         # MuJoCo fills every shape with water of which the file says nothing
         unsaid = all(np.isnan(geom.mass) and geom.density == WATER for geom in body.geoms)

@@ -40,7 +40,8 @@ class Notes:
         self._parts: dict[str, list[str]] = {}
 
     def add(self, sentence: str, *parts: str) -> None:
-        """Say a sentence about parts of the robot; the parts of equal sentences stand in one line."""
+        """Say a sentence about parts of the robot;
+        the parts of equal sentences stand in one line."""
         names = self._parts.setdefault(sentence, [])
         names += [part for part in parts if part not in names]
 
@@ -50,7 +51,8 @@ class Notes:
 
 
 def read_source(path: Path, notes: Notes) -> tuple[mujoco.MjSpec, dict[str, Path], bool]:
-    """Read a URDF or an MJCF: its spec, where each mesh file that it names lies, and whether it is a URDF."""
+    """Read a URDF or an MJCF: its spec, where each mesh file that it names lies,
+    and whether it is a URDF."""
     usd = path.suffix.lower() in (".usd", ".usda", ".usdc", ".usdz")
     root = ElementTree.Element("usd") if usd else read_robot(path)
     kind = "xacro" if any("xacro" in str(part.tag).lower() for part in root.iter()) else str(root.tag)
@@ -75,8 +77,8 @@ def read_source(path: Path, notes: Notes) -> tuple[mujoco.MjSpec, dict[str, Path
 def _found(files: dict[str, str], folder: Path, notes: Notes) -> dict[str, Path]:
     """Return where mesh files lie, by the names that the spec has for them.
 
-    A file is where it is said to be, or else there from the folder or one of its parents, by as many of its
-    last folders as are there; or it has its name below the folder.
+    A file is where it is said to be, or else there from the folder or one of its parents, by as
+    many of its last folders as are there; or it has its name below the folder.
     """
     below = {path.name.lower(): path for path in islice(folder.rglob("*"), 20_000)} if files else {}
     found = dict[str, Path]()
@@ -128,7 +130,8 @@ def _prepare_mjcf(root: ElementTree.Element) -> None:
 
 
 def sort_shapes(spec: mujoco.MjSpec) -> None:
-    """Show what the file shows, or else what collides; let collide what collides, or else what is shown."""
+    """Show what the file shows, or else what collides; let collide what collides,
+    or else what is shown."""
     for body in spec.bodies:
         collide = [bool(geom.contype or geom.conaffinity) for geom in body.geoms]
         for geom, solid in zip(body.geoms, collide, strict=True):

@@ -1,4 +1,5 @@
-"""`hydroid analyse` and `hydroid.quantity`: what logs determine of the parameters, and of what follows."""
+"""`hydroid analyse` and `hydroid.quantity`: what logs determine of the parameters,
+and of what follows."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -35,7 +36,8 @@ if TYPE_CHECKING:
 
 @record
 class Analysis:
-    """What logs determine at an estimate: intervals, directions, and the profiles that were asked for."""
+    """What logs determine at an estimate: intervals, directions,
+    and the profiles that were asked for."""
 
     uncertainty: "Uncertainty"
     identifiability: "Identifiability"
@@ -72,8 +74,8 @@ def analyse(
 ) -> Result[Analysis]:
     """Find which parameters, and which combinations of parameters, the logs determine.
 
-    Prints the standard deviation and the 95 % interval of each parameter, and the combinations that the logs
-    do not determine.
+    Prints the standard deviation and the 95 % interval of each parameter, and the combinations that
+    the logs do not determine.
 
     Example: hydroid analyse LOG.csv --fit runs/hyd --profile A_A
 
@@ -82,8 +84,8 @@ def analyse(
 
     Args:
         logs (LOG): Logs of commands and joint angles [default: those of the run].
-        fit (RUN|YAML): An estimate, as a run folder or a YAML file [default: the start values of the
-            parameters].
+        fit (RUN|YAML): An estimate, as a run folder or a YAML file [default: the start values of
+            the parameters].
         profile (K,D): Parameters to profile. Each point of a profile takes a refinement.
 
     Raises:
@@ -138,8 +140,9 @@ def quantity(
 
     Args:
         model: the run folder of a fit, or a plant saved from one.
-        function: takes a `Plant` and returns a number or an array. It is called with 2 p + 1 plants, p free
-            parameters, and should be smooth in them: interpolate an event between two samples.
+        function: takes a `Plant` and returns a number or an array. It is called with 2 p + 1
+            plants, p free parameters, and should be smooth in them: interpolate an event between
+            two samples.
         unit: of the value, for the reader.
         positive: the quantity cannot be negative; its interval is then multiplicative.
 

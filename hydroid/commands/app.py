@@ -54,12 +54,14 @@ PLAIN: Any = {"add_completion": False, "rich_markup_mode": None, "pretty_excepti
 SYSTEM = (errno.ENAMETOOLONG, errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EIO, errno.EMFILE)
 """what a system refuses that no program can help"""
 ONE_THREAD = ("OPENBLAS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
-"""what keeps linear algebra from sums over several threads, whose last bits depend on how many there are"""
+"""what keeps linear algebra from sums over several threads,
+whose last bits depend on how many there are"""
 VERBOSE = "Also print all tables, findings, and the lines that go to run.log."
 
 
 class LazyGroup(TyperGroup):
-    """Imports a command's module when the command is called, and lists the commands under their headings."""
+    """Imports a command's module when the command is called,
+    and lists the commands under their headings."""
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of all commands."""
@@ -136,7 +138,8 @@ def _root(  # pyright: ignore[reportUnusedFunction]  # typer calls it
 
 
 def main() -> None:
-    """Run a command: exit 0 when it is done, 2 for an error of the input, 130 when it was stopped."""
+    """Run a command: exit 0 when it is done, 2 for an error of the input,
+    130 when it was stopped."""
     code, kept = 0, None
     for variable in ONE_THREAD:  # numpy is not imported yet
         os.environ.setdefault(variable, "1")

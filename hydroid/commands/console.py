@@ -108,7 +108,8 @@ def program() -> str:
 
 
 def show_error(error: Any) -> None:
-    """Print a `HydroidError`, or typer's, in one line or as JSON, by the option that set what is wrong."""
+    """Print a `HydroidError`, or typer's, in one line or as JSON,
+    by the option that set what is wrong."""
     if usage := hasattr(error, "format_message"):
         text = error.format_message().rstrip(".")
         error = HydroidError(text[:1].lower() + text[1:], hint=f"see {error.ctx.command_path} --help")
@@ -130,7 +131,8 @@ def _print_json(content: Plain) -> None:
 
 
 def log_lines(*, verbose: bool, quiet: bool) -> AbstractContextManager[None]:
-    """Print hydroid's warnings and notes, all lines if verbose; errors are printed where a command ends."""
+    """Print hydroid's warnings and notes, all lines if verbose;
+    errors are printed where a command ends."""
     handler = _Terminal()
     handler.addFilter(lambda record: verbose or (logging.INFO < record.levelno < logging.ERROR and not quiet))
     return logging_to(handler, "" if verbose else "hydroid: %(message)s")

@@ -69,7 +69,8 @@ class FitResult(Printed):
         return predicted(self.model, read, None)
 
     def validate(self, logs: "LogSources", out: Source | None = None) -> "Result[list[Prediction]]":
-        """Return the verdict on each joint by logs that were not fitted; a page of it is written to `out`.
+        """Return the verdict on each joint by logs that were not fitted;
+        a page of it is written to `out`.
 
         Raises:
             LogError, RunError: as of `hydroid.validate`.
@@ -129,7 +130,8 @@ def fit(
     """
     read = read_logs(logs, settings)
     names = [Path(log.source).name for log in read]
-    if stray := sorted(set(settings.payloads) - set(names)):  # misspelt, it would be left out silently
+    # misspelt, it would be left out silently
+    if stray := sorted(set(settings.payloads) - set(names)):
         raise SettingsError("is none of the logs", f"payloads.{stray[0]}", f"logs: {', '.join(names)}")
     refuse_undriven(read, settings)
     groups = {None, OTHER, *map(settings.log.group_of, names)}

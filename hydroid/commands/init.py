@@ -30,8 +30,8 @@ def init(
     It has the arm's file and model, settings of a fit with starts and priors from the arm's size, a
     picture to check the arm by, and the commands to run next.
 
-    A log whose columns it does not know ends with status 2, and a project whose fit.yaml lists them. Name
-    them there, and go on with --config.
+    A log whose columns it does not know ends with status 2, and a project whose fit.yaml lists
+    them. Name them there, and go on with --config.
 
     Example: hydroid init mine --arm robot.urdf --log a.csv
 
@@ -40,21 +40,25 @@ def init(
 
     Args:
         folder (DIR): Folder of the project, new or not [default: that of --config].
-        arm (robot.urdf): URDF or MJCF of the arm, or an arm's YAML file [default: a template of boxes].
-        log (LOG): A log; its columns are guessed. Repeat it for several logs: the next steps keep the last to
-            validate on.
-        config (YAML): Settings whose `log` section you have completed, such as mine/fit.yaml: its columns are
-            taken in place of guesses, its arm stays, and the other settings are written anew.
-        joints (NAME,NAME): Names of the arm's joints in the order of the log's numbers (u1, u2, ...)
-            [default: the order in the arm's file].
-        total_mass (KG): Mass of all links that move [kg], to which those of the arm's file are scaled.
+        arm (robot.urdf): URDF or MJCF of the arm, or an arm's YAML file [default: a template of
+            boxes].
+        log (LOG): A log; its columns are guessed. Repeat it for several logs: the next steps keep
+            the last to validate on.
+        config (YAML): Settings whose `log` section you have completed, such as mine/fit.yaml: its
+            columns are taken in place of guesses, its arm stays, and the other settings are written
+            anew.
+        joints (NAME,NAME): Names of the arm's joints in the order of the log's numbers (u1, u2,
+            ...) [default: the order in the arm's file].
+        total_mass (KG): Mass of all links that move [kg], to which those of the arm's file are
+            scaled.
         force: Replace the files of an earlier project in the folder.
-        tip (LINK): Last link of the arm, if the robot has several branches [default: the end of the branch
-            whose joints the log names, or else of the longest branch].
+        tip (LINK): Last link of the arm, if the robot has several branches [default: the end of the
+            branch whose joints the log names, or else of the longest branch].
 
     Raises:
         SettingsError: a file of the project is there already, or no joint has one of the names.
-        ModelError, MeshError: the arm's file cannot be used. LogError: the first log cannot, or no joint is
+        ModelError, MeshError: the arm's file cannot be used. LogError: the first log cannot, or no
+        joint is
             driven and moves in the logs.
         RunError: the folder cannot be written.
     """

@@ -1,8 +1,9 @@
 """What commands take: functions whose parameters are the options, and what is read for them.
 
-A docstring says what each parameter is. A line of `Args:` is `name (VALUE): text`; VALUE is what `--help`
-calls it, or the range of a number. What parameters of several commands are stands in `SHARED`. Those before
-`*` need no name on the command line. Settings and estimates can be a file's name or what was read before.
+A docstring says what each parameter is. A line of `Args:` is `name (VALUE): text`; VALUE is what
+`--help` calls it, or the range of a number. What parameters of several commands are stands in
+`SHARED`. Those before `*` need no name on the command line.
+Settings and estimates can be a file's name or what was read before.
 """
 
 import inspect
@@ -29,7 +30,8 @@ ConfigSource = str | Path | FitSettings
 LogSource = str | Path | Log
 LogSources: TypeAlias = LogSource | Sequence[LogSource] | None
 ModelSource: TypeAlias = "str | Path | IdentifiedModel | Any"
-"""a run or a file, a model, or what a fit returned (`commands.fit.FitResult`, which builds on this file)"""
+"""a run or a file, a model, or what a fit returned (`commands.fit.FitResult`,
+which builds on this file)"""
 SettingChanges = Mapping[str, Any] | Sequence[str] | None
 """settings to replace: values by dotted key, or texts `KEY=VALUE`"""
 
@@ -81,7 +83,8 @@ COMMAND_LINES: dict[Callable[..., Any], tuple[str, str, list[inspect.Parameter]]
 
 
 def setting_changes(given: SettingChanges, options: Mapping[str, Any] | None = None) -> Plain:
-    """Return settings to replace by dotted key: those of `--set`, and the options that are not None."""
+    """Return settings to replace by dotted key: those of `--set`,
+    and the options that are not None."""
     changes = dict(given if isinstance(given, Mapping) else map(parse_override, given or ()))
     return changes | {key: value for key, value in (options or {}).items() if value is not None}
 
@@ -113,9 +116,11 @@ def open_model(
     *,
     nominal: bool = False,
 ) -> IdentifiedModel:
-    """Return the model of a result, or read it from a run folder, a saved plant or a YAML file of values.
+    """Return the model of a result, or read it from a run folder,
+    a saved plant or a YAML file of values.
 
-    Where `nominal`, parameters without a value have nominal ones, which only stage 2 has; a note names them.
+    Where `nominal`, parameters without a value have nominal ones, which only stage 2 has;
+    a note names them.
     """
     if fit is not None and not isinstance(fit, str | Path):
         if changes := setting_changes(overrides):
@@ -134,7 +139,8 @@ def open_model(
 
 
 def open_values(fit: ModelSource) -> tuple[Plain, FitSummary | None]:
-    """Return the values of an estimate by name, and the fit's own account of them where there is one."""
+    """Return the values of an estimate by name,
+    and the fit's own account of them where there is one."""
     if isinstance(fit, str | Path):
         return read_estimate(Path(fit))[1:]
     model = open_model(fit)
@@ -155,7 +161,8 @@ def as_list(sources: Any) -> list[Any]:
 
 
 def command(function: F) -> F:
-    """Make a command of a function: describe all its parameters in its docstring, and keep them for typer."""
+    """Make a command of a function: describe all its parameters in its docstring,
+    and keep them for typer."""
     text, _, raises = inspect.cleandoc(function.__doc__ or "").partition("\n\nRaises:")
     text, _, arguments = text.partition("\n\nArgs:")
     summary, _, example = text.partition("\n\nExample:")

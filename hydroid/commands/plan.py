@@ -55,10 +55,10 @@ def suggest(
 ) -> "Result[tuple[Finding, ...]]":
     """Find what the model lacks, and what to do next.
 
-    Tests every parameter that is kept fixed, switched off or shared, such as a delay or dry friction. The
-    most promising ones are freed: does that lower the error on parts of the logs left out? Tests whether the
-    logs contradict the sign of an angle, and predicts for the best actions, from weighing a
-    link to a new experiment, how much each would reduce the uncertainty.
+    Tests every parameter that is kept fixed, switched off or shared, such as a delay or dry
+    friction. The most promising ones are freed: does that lower the error on parts of the logs left
+    out? Tests whether the logs contradict the sign of an angle, and predicts for the best actions,
+    from weighing a link to a new experiment, how much each would reduce the uncertainty.
 
     Example: hydroid suggest --fit runs/hyd
 
@@ -71,7 +71,8 @@ def suggest(
     Raises:
         LogError: a log cannot be used.
         SettingsError: no log is given, and the estimate is not in a run folder.
-        RunError: the simulation diverged, a log of the run is not there, or the folder cannot be written.
+        RunError: the simulation diverged, a log of the run is not there,
+            or the folder cannot be written.
     """
     model = open_model(fit, config, set)
     problem = problem_of(model, logs, repair=repair)
@@ -116,15 +117,16 @@ def design(
     set: "SettingChanges" = None,
     repair: bool = False,
 ) -> "Result[Design]":
-    """Design the next experiment: start pose and commands that best reduce the uncertainty of the estimate.
+    """Design the next experiment: start pose and commands that best reduce the uncertainty
+    of the estimate.
 
     SAFETY: Keep a hand on the emergency stop during the first run. The limits (design.speed_deg_s,
-    design.margin_deg, design.clearance_m) are checked only in simulation with the present estimate; the
-    real arm may exceed them. Collisions are checked with the shapes of the model, which knows no hoses and
-    nothing that stands around the machine.
+    design.margin_deg, design.clearance_m) are checked only in simulation with the present estimate;
+    the real arm may exceed them. Collisions are checked with the shapes of the model, which knows
+    no hoses and nothing that stands around the machine.
 
-    Writes commands.csv (the experiment) and predicted.csv (the simulated motion, no measurement). The
-    settings define the compared joints, the free parameters and the limits.
+    Writes commands.csv (the experiment) and predicted.csv (the simulated motion, no measurement).
+    The settings define the compared joints, the free parameters and the limits.
 
     Example: hydroid design LOG.csv --fit runs/mech --duration 30
 

@@ -1,7 +1,7 @@
 """How far a command is, and whether it is to stop.
 
-A bar shows it on a terminal, plain lines elsewhere, and nothing in Python or with -q. A cluster's notice that
-time is nearly up ends a run as Ctrl-C does: with a checkpoint.
+A bar shows it on a terminal, plain lines elsewhere, and nothing in Python or with -q. A cluster's
+notice that time is nearly up ends a run as Ctrl-C does: with a checkpoint.
 """
 
 import math
@@ -41,8 +41,8 @@ def listen() -> None:
 def stopped() -> bool:
     """Whether a notice has come.
 
-    Python drops an exception that is raised in a finalizer. Who asks here between two pieces of work does not
-    miss the notice.
+    Python drops an exception that is raised in a finalizer. Who asks here between two pieces of
+    work does not miss the notice.
     """
     return _stopped
 
@@ -117,8 +117,8 @@ class FitProgress(Progress):
     def refining(self, step: "Step", simulated: int, rms: float) -> bool:
         """Take a step of the fit, its number of simulations, and its rms error [rad] so far.
 
-        A rung is the search, or a model or term of the ladder; what is kept is refined as the last one.
-        Returns whether time is up.
+        A rung is the search, or a model or term of the ladder; what is kept is refined as the last
+        one. Returns whether time is up.
         """
         from hydroid.units import way
 

@@ -52,8 +52,8 @@ def fit_mech(
 ) -> FitResult:
     """Estimate gain, damping, stiffness and link masses from logs (stage 1).
 
-    Writes a run folder with report.html, estimate.yaml, tables and the fitted arm. Then test the estimate on
-    a log that it was not fitted to: `hydroid validate`.
+    Writes a run folder with report.html, estimate.yaml, tables and the fitted arm. Then test the
+    estimate on a log that it was not fitted to: `hydroid validate`.
 
     Example: hydroid fit-mech LOG.csv --out runs/mech
 
@@ -89,8 +89,9 @@ def fit_hyd(
 ) -> FitResult:
     """Estimate the hydraulic actuators (stage 2); the arm's parameters come from stage 1.
 
-    By default it estimates piston areas, valve openings, onsets, delay and damping. The config can free more,
-    such as the amplifier's currents and the solenoid. Writes a run folder as fit-mech does.
+    By default it estimates piston areas, valve openings, onsets, delay and damping. The config can
+    free more, such as the amplifier's currents and the solenoid.
+    Writes a run folder as fit-mech does.
 
     Example: hydroid fit-hyd LOG.csv --config mine/fit.yaml --out runs/hyd
 
@@ -150,12 +151,14 @@ def _fit(stage: str, given: Mapping[str, Any]) -> FitResult:
 
 
 def held_mechanics(mech: "ModelSource | None", settings: FitSettings, changes: Plain) -> Plain:
-    """Return what of stage 2's settings, read with `changes`, stage 1 says: its parameters at its estimate.
+    """Return what of stage 2's settings, read with `changes`, stage 1 says:
+    its parameters at its estimate.
 
-    Of a run folder or a result of stage 1, or a YAML file of values by name, the masses hold, and damping and
-    stiffness where the settings state no start or nominal value of their own. None: the settings fix them, or
-    say what is known of them (a prior or a start), and they are estimated with the others. `changes` have the
-    last word. Raises RunError, SettingsError: no values there, or one that stage 2 needs is missing.
+    Of a run folder or a result of stage 1, or a YAML file of values by name, the masses hold, and
+    damping and stiffness where the settings state no start or nominal value of their own. None: the
+    settings fix them, or say what is known of them (a prior or a start), and they are estimated
+    with the others. `changes` have the last word. Raises RunError, SettingsError: no values there,
+    or one that stage 2 needs is missing.
     """
     values, summary = ({}, None) if mech is None else open_values(mech)
     if summary is not None and summary.stage != "mech":
@@ -198,9 +201,9 @@ def adapt(
 ) -> FitResult:
     """Adapt a fit to new logs: a few parameters are freed, all others are held at its estimate.
 
-    For a slower engine, a colder day, another tool. A load of known mass is no parameter but a payload of the
-    logs: --set 'payloads={LOADED.csv: 250}'. Writes a run that every command takes. Judges each
-    freed parameter by parts of the logs left out.
+    For a slower engine, a colder day, another tool. A load of known mass is no parameter but a
+    payload of the logs: --set 'payloads={LOADED.csv: 250}'. Writes a run that every command takes.
+    Judges each freed parameter by parts of the logs left out.
 
     Example: hydroid adapt LOADED.csv --fit runs/hyd --free P_flow,P_droop
 
@@ -209,8 +212,9 @@ def adapt(
 
     Args:
         logs (LOG): The new logs.
-        free (NAME,NAME): Parameters to be freed [default: masses, pump and effects of the logs' groups, one
-            after the other, as long as the error falls on every part of the logs left out].
+        free (NAME,NAME): Parameters to be freed [default: masses, pump and effects of the logs'
+            groups, one after the other, as long as the error falls on every part of the logs left
+            out].
         out (DIR): Run folder [default of the command line: runs/adapt].
         set (KEY=VALUE): Replace a setting of the fit, such as refinement.iterations=100.
 

@@ -27,9 +27,9 @@ def study(
 ) -> "Result[tuple[Row, ...]]":
     """Compare settings over many seeds.
 
-    The file names a config, the settings that vary, and the logs. Every run leaves a small file in DIR/runs
-    when it ends. To continue a study that was stopped, give the same command again: it ends with the same
-    bits.
+    The file names a config, the settings that vary, and the logs. Every run leaves a small file in
+    DIR/runs when it ends. To continue a study that was stopped, give the same command again: it
+    ends with the same bits.
 
     Example: hydroid study my-study.yaml --out runs/my-study
 

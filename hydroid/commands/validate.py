@@ -1,4 +1,5 @@
-"""`hydroid validate` and `hydroid report`: fits on logs that they were not fitted to; reports drawn anew."""
+"""`hydroid validate` and `hydroid report`: fits on logs that they were not fitted to;
+reports drawn anew."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -39,10 +40,11 @@ def validate(
     set: "SettingChanges" = None,
     repair: bool = False,
 ) -> "Result[list[Prediction]]":
-    """Test fits on logs that they have not seen: a verdict on each joint, beside the errors of simple models.
+    """Test fits on logs that they have not seen: a verdict on each joint,
+    beside the errors of simple models.
 
-    Each fit reads the logs with its own settings. The page shows every response with its errors (article,
-    table 9). From then on, the report of the fit's own run shows these logs too.
+    Each fit reads the logs with its own settings. The page shows every response with its errors
+    (article, table 9). From then on, the report of the fit's own run shows these logs too.
 
     Example: hydroid validate OTHER.csv --fit runs/mech --fit runs/hyd
 
@@ -50,12 +52,13 @@ def validate(
         print(validated.result[0].indices[2].rms)  # of joint 2 [rad]
 
     Args:
-        fit (RUN|YAML): An estimate: a run folder, a folder written by Plant.save (Python), or a YAML file.
-            Repeat the option for several estimates.
-        tolerance (0.001 to 90): The rms error [deg] that you accept for every joint; config.yaml can
-            hold one for each (tolerance_deg) [default: that of the fit, or else 2 % of a joint's travel].
-        apart: These logs are of other conditions than the fit's, such as another load: its own report shows
-            them, and does not count them in its verdict. Without it, they count again.
+        fit (RUN|YAML): An estimate: a run folder, a folder written by Plant.save (Python), or a
+            YAML file. Repeat the option for several estimates.
+        tolerance (0.001 to 90): The rms error [deg] that you accept for every joint; config.yaml
+            can hold one for each (tolerance_deg) [default: that of the fit, or else 2 % of a
+            joint's travel].
+        apart: These logs are of other conditions than the fit's, such as another load: its own
+            report shows them, and does not count them in its verdict. Without it, they count again.
 
     Raises:
         LogError: a log cannot be used.
@@ -103,7 +106,8 @@ def validate(
 
 
 def _unseen(log: Log, fitted: Sequence[Log]) -> bool:
-    """Return whether a log is none of the fitted ones, in whatever file, and holds no large part of them."""
+    """Return whether a log is none of the fitted ones, in whatever file,
+    and holds no large part of them."""
     part = overlap(log, fitted)
     if 0 < part < 1:
         counts = "unseen" if part < KNOWN else "fitted"
@@ -122,8 +126,8 @@ def report(
 ) -> "Result[tuple[Record, ...]]":
     """Draw the reports of finished runs anew, or merge runs of one fit with different seeds.
 
-    Nothing is simulated, and no log is needed: a run stores all that its report shows, which is written again
-    in its folder. `hydroid validate` compares several fits.
+    Nothing is simulated, and no log is needed: a run stores all that its report shows, which is
+    written again in its folder. `hydroid validate` compares several fits.
 
     Example: hydroid report runs/mech runs/hyd
 
@@ -138,8 +142,8 @@ def report(
         out (DIR): Folder for the tables of --merge.
 
     Raises:
-        RunError: a folder holds no finished run of this version, runs to be merged differ in more than their
-            seeds, or the page cannot be written.
+        RunError: a folder holds no finished run of this version, runs to be merged differ in more
+            than their seeds, or the page cannot be written.
     """
     if not merge:
         from hydroid.reporting.predictions import draw

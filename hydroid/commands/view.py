@@ -1,4 +1,5 @@
-"""`hydroid simulate` and `hydroid view`: what a model predicts as a log, and as an arm in motion."""
+"""`hydroid simulate` and `hydroid view`: what a model predicts as a log,
+and as an arm in motion."""
 
 from contextlib import suppress
 from dataclasses import replace
@@ -55,7 +56,8 @@ def simulate(
     set: "SettingChanges" = None,
     repair: bool = False,
 ) -> Simulated:
-    """Simulate commands with an estimate and write the log: a prediction, or synthetic data to test a fit.
+    """Simulate commands with an estimate and write the log: a prediction,
+    or synthetic data to test a fit.
 
     Of two arms neither feels the other: the carrier stands still, and they share no pump.
 
@@ -64,7 +66,8 @@ def simulate(
         log = hydroid.simulate("commands.csv", fit="runs/a", out="predicted.csv").log
 
     Args:
-        commands (COMMANDS.csv): A log of commands. Its angles before the first command give the start pose.
+        commands (COMMANDS.csv): A log of commands. Its angles before the first command give the
+            start pose.
         out (LOG.csv): The log to write [default of the command line: runs/simulated.csv].
         noise_deg (0 to 90): Standard deviation of Gaussian noise on the angles [deg].
 
@@ -82,7 +85,8 @@ def simulate(
     for number, (name, log) in enumerate(read.items()):
         predicted = predict_log(model, log)
         noise = np.random.default_rng(seed + number).normal(0.0, np.deg2rad(noise_deg), log.angle.shape)
-        source = str(out or f"simulated {Path(log.source).name}")  # no longer the log of the commands
+        # no longer the log of the commands
+        source = str(out or f"simulated {Path(log.source).name}")
         logs[name] = replace(predicted, angle=predicted.angle + noise, source=source)
     columns = model.settings.log
     if out is not None:
@@ -108,9 +112,10 @@ def view(
 ) -> "Result[Clearance | None]":
     """Show the moving arm in MuJoCo's viewer, in real time, beside the ghost of the measured one.
 
-    Without a log, the sliders in the panel "Control" on the right set the commands in %. Backspace restarts.
-    With -o FILE it writes a film or a picture instead. This needs no display, but OpenGL by EGL or OSMesa. In
-    a program of your own, set MUJOCO_GL to egl or osmesa before anything is imported.
+    Without a log, the sliders in the panel "Control" on the right set the commands in %. Backspace
+    restarts. With -o FILE it writes a film or a picture instead. This needs no display, but OpenGL
+    by EGL or OSMesa. In a program of your own,
+    set MUJOCO_GL to egl or osmesa before anything is imported.
 
     Example: hydroid view runs/hyd -o arm.mp4
 
@@ -118,13 +123,16 @@ def view(
 
     Args:
         source (RUN|LOG): A run folder, whose first log drives the arm; or a log, with --fit.
-        out (FILE): Write a film (.mp4, .gif) or the beginning of the span (.png) instead of opening a window.
-        fit (RUN|YAML): An estimate, as a run folder or a YAML file [default: the arm's file and `hydraulics`
-            in the settings].
+        out (FILE): Write a film (.mp4, .gif) or the beginning of the span (.png) instead of opening
+            a window.
+        fit (RUN|YAML): An estimate, as a run folder or a YAML file [default: the arm's file and
+            `hydraulics` in the settings].
         span (FROM:TO): Part of the log to film [s], such as 10:20 [default: all].
-        collisions: Instead, find which bodies meet along the log's joint angles: of the arm, its base and the
-            floor; with --arm also of the carrier and the other arm. The exit status is 1 if bodies meet.
-        config (YAML): Settings [default: config.yaml in the folder of the estimate, or else fit-hyd].
+        collisions: Instead, find which bodies meet along the log's joint angles: of the arm, its
+            base and the floor; with --arm also of the carrier and the other arm. The exit status is
+            1 if bodies meet.
+        config (YAML): Settings [default: config.yaml in the folder of the estimate,
+            or else fit-hyd].
 
     Raises:
         RunError: no window, no OpenGL, no package that writes films, or the simulation diverged.

@@ -1,12 +1,13 @@
 """What anybody would try before a model: each joint's speed follows its command, and nothing else.
 
-Three models of one joint, fitted to logs in about a second: it does not move; a table of mean speeds with a
-delay; nine numbers: dead band, exponent, speed and lag of each direction, and one delay. A model of the arm
-must predict better than they do, and can start its own fit from them.
+Three models of one joint, fitted to logs in about a second: it does not move; a table of mean
+speeds with a delay; nine numbers: dead band, exponent, speed and lag of each direction, and one
+delay. A model of the arm must predict better than they do, and can start its own fit from them.
 
-They are fitted to angles, not to innovations as a model of the arm is (`posterior.error_model`). So simple a
-model errs far more than any noise, the error model takes all of that for drift, and what is left is a fit of
-speeds from sample to sample: it predicts 1 to 10 s worse (`make bench B=simple_models`).
+They are fitted to angles, not to innovations as a model of the arm is (`posterior.error_model`). So
+simple a model errs far more than any noise, the error model takes all of that for drift, and what
+is left is a fit of speeds from sample to sample:
+it predicts 1 to 10 s worse (`make bench B=simple_models`).
 """
 
 from collections.abc import Iterator, Sequence
@@ -39,9 +40,11 @@ class Baseline:
         joint: number, from 1.
         limits: its range [rad], where it stops, shape (2,).
         delay: [s].
-        table: commands [%], ascending, and their speeds [rad/s], shape (N, 2); None: by the numbers.
-        numbers: dead band [%], exponent of the command beyond it, speed at full command [rad/s], of either
-            sign, and time constant of the speed [s], of positive and negative commands: shape (4, 2).
+        table: commands [%], ascending, and their speeds [rad/s], shape (N, 2); None: by the
+            numbers.
+        numbers: dead band [%], exponent of the command beyond it, speed at full command [rad/s], of
+            either sign, and time constant of the speed [s], of positive and negative commands:
+            shape (4, 2).
     """
 
     joint: int
@@ -77,7 +80,8 @@ def _follow(
     start: float,
     limits: Array,
 ) -> Array:
-    """Angles of a joint whose speed follows `target` [rad/sample] after a delay and a lag [samples]."""
+    """Angles of a joint whose speed follows `target` [rad/sample] after a delay and a
+    lag [samples]."""
     whole, part = int(delay), delay - int(delay)
     left = [np.exp(-1.0 / time) if time > 1e-6 else 0.0 for time in lag]
     angle, speed, angles = start, 0.0, np.empty(len(target))
@@ -95,7 +99,8 @@ def _follow(
 
 
 def fit_baselines(logs: Sequence[Log], joint: int, limits: tuple[float, float]) -> dict[str, Baseline]:
-    """Fit the baselines of a joint (number, from 1) to the logs that measure it; `limits` is its range [rad].
+    """Fit the baselines of a joint (number, from 1) to the logs that measure it;
+    `limits` is its range [rad].
 
     They are by name, the simplest first. A joint that is never driven has only that.
     """
@@ -118,7 +123,8 @@ def fit_baselines(logs: Sequence[Log], joint: int, limits: tuple[float, float]) 
 
 
 def _mean_speeds(logs: Sequence[Log], still: Baseline, delay: float) -> Baseline:
-    """Return the mean speed in each of 24 bins of a command that acts after a delay, but for zero command."""
+    """Return the mean speed in each of 24 bins of a command that acts after a delay,
+    but for zero command."""
     pairs = list[Array]()
     for log in logs:
         command, angle = log.command[:, still.joint - 1], log.angle[:, still.joint - 1]

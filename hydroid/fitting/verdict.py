@@ -1,20 +1,25 @@
 """The verdict on a fit, joint by joint: what it predicts, beside what anybody would try first.
 
-Errors are rms over the logs that drive the joint. The tolerance is `tolerance_deg` of the settings, or 2 % of
-the joint's travel in the unseen logs. With each simple model the fit is compared in pairs at JUDGED times
-ahead (`fitting.comparison`). It is ahead of one if it is better at one of these times. The first of these
-that is true is the verdict:
+Errors are rms over the logs that drive the joint. The tolerance is `tolerance_deg` of the settings,
+or 2 % of the joint's travel in the unseen logs. With each simple model the fit is compared in pairs
+at JUDGED times ahead (`fitting.comparison`). It is ahead of one if it is better at one of these
+times. The first of these that is true is the verdict:
 
 1. predicts: the error on the unseen logs is within the tolerance, whatever the simple models do;
-2. does not fit: on the fitted logs the error is outside the tolerance, and a simple model's is smaller; where
+2. does not fit: on the fitted logs the error is outside the tolerance, and a simple model's is
+smaller; where
    there are unseen logs, the fit is not ahead of each simple model there either;
 3. not tested: no unseen log drives the joint;
-4. predicts no better than a simple model: it is not ahead of that one, and at one of these times it is worse;
+4. predicts no better than a simple model: it is not ahead of that one, and at one of these times it
+is worse;
    the simplest such is named;
-5. predicts worse than it fits: the error on the unseen logs is more than twice that on the fitted ones, or
+5. predicts worse than it fits: the error on the unseen logs is more than twice that on the fitted
+ones, or
    it diverges;
-6. predicts little: the error on the unseen logs is more than half of what standing still errs by there;
-7. cannot be told from a simple model: it is not ahead of that one, and at none of these times worse; of
+6. predicts little: the error on the unseen logs is more than half of what standing still errs by
+there;
+7. cannot be told from a simple model: it is not ahead of that one, and at none of these times
+worse; of
    several such that with the smallest error is named;
 8. predicts roughly: none of these. It is ahead of every simple model, and outside the tolerance.
 """
@@ -40,7 +45,8 @@ SHARE = 0.02
 CLEARLY = 0.9
 """part of another model's error on the fitted logs that a better one stays below"""
 LEAST_TOLERANCE = 0.001
-"""the least that a tolerance can be [deg]; none follows from a joint that is never driven, or never moves"""
+"""the least that a tolerance can be [deg]; none follows from a joint that is never driven,
+or never moves"""
 WORSE = 2.0
 """times the error on fitted logs, beyond which a fit predicts worse than it fits"""
 LITTLE = 0.5
@@ -69,9 +75,10 @@ def judge(
 ) -> tuple[JointVerdict, ...]:
     """Return the verdict on each compared joint.
 
-    `fitted` is what the fit makes of its own logs; none of values that are no fit's. `baselines` are fitted
-    to the same logs; none: a joint is compared with standing still. Of the predictions `unseen`, those of
-    logs that the fit has seen test nothing, and those that are `apart` do not count.
+    `fitted` is what the fit makes of its own logs; none of values that are no fit's. `baselines`
+    are fitted to the same logs; none: a joint is compared with standing still. Of the predictions
+    `unseen`, those of logs that the fit has seen test nothing,
+    and those that are `apart` do not count.
     """
     verdicts = list[JointVerdict]()
     for joint in settings.outputs:
@@ -88,7 +95,8 @@ def _tests(unseen: Sequence[Prediction], joint: int) -> list[Prediction]:
 
 @record
 class _Errors:
-    """Rms errors of one joint over some logs [deg]: of the fit, None without logs, and of simple models."""
+    """Rms errors of one joint over some logs [deg]: of the fit, None without logs,
+    and of simple models."""
 
     fit: float | None
     simple: Mapping[str, float]
@@ -170,7 +178,8 @@ def _expected(banded: Sequence[Prediction], joint: int) -> float | None:
 
 
 def _ahead(models: Mapping[str, Baseline], new: Sequence[Prediction], joint: int) -> dict[str, list[Array]]:
-    """Return errors of predicted changes, (N, HORIZONS) of each log, by model; empty where no log has any.
+    """Return errors of predicted changes, (N, HORIZONS) of each log, by model;
+    empty where no log has any.
 
     A log that is shorter than the shortest horizon has no starts.
     """
@@ -196,7 +205,8 @@ def _compared(ours: Sequence[Array], theirs: Sequence[Array]) -> tuple[Compariso
 
 
 def _beside(compared: Sequence[Comparison] | None, whole: Comparison) -> Outcome:
-    """Return whether the fit is ahead of a simple model at all, by JUDGED times; without starts by logs."""
+    """Return whether the fit is ahead of a simple model at all, by JUDGED times;
+    without starts by logs."""
     if compared is None:
         return whole.outcome
     outcomes = [one.outcome for seconds, one in zip(HORIZONS, compared, strict=True) if seconds in JUDGED]
@@ -211,7 +221,8 @@ def _verdict(
 ) -> tuple[Verdict, str | None]:
     """Return the verdict, and the simple model that it names.
 
-    Errors are those on the fitted logs, `there`, and on the unseen ones, `here`; `beside` are `_beside`.
+    Errors are those on the fitted logs, `there`, and on the unseen ones, `here`;
+    `beside` are `_beside`.
     """
     fitted, unseen = there.fit, here.fit
     if unseen is not None and unseen <= tolerance:
@@ -238,10 +249,11 @@ def _verdict(
 def standing_out(
     unseen: Sequence[Prediction], verdicts: Sequence[JointVerdict], where: str = "RUN"
 ) -> list[Finding]:
-    """Return which unseen logs err by more than STANDING_OUT times what the other ones do, in any joint.
+    """Return which unseen logs err by more than STANDING_OUT times what the other ones do,
+    in any joint.
 
-    Three logs at least, and beyond the tolerance. Whether such a log counts is for its user to say: the
-    hint has the command, with the run's folder `where`.
+    Three logs at least, and beyond the tolerance. Whether such a log counts is for its user to say:
+    the hint has the command, with the run's folder `where`.
     """
     names = list[str]()
     for one in verdicts:
@@ -256,7 +268,8 @@ def standing_out(
 
 
 def behind(settings: FitSettings, verdicts: Sequence[JointVerdict]) -> list[Finding]:
-    """Return that a fit of the hydraulics errs more on its own logs than nine numbers do, which it holds."""
+    """Return that a fit of the hydraulics errs more on its own logs than nine numbers do,
+    which it holds."""
     joints = tuple(
         one.name
         for one in verdicts
@@ -272,7 +285,8 @@ def rms_deg(errors: Iterable[Array]) -> float:
 
 
 def _rms_ahead(errors: Array) -> tuple[float | None, ...]:
-    """Return the rms of errors of predicted changes [rad], shape (N, HORIZONS), over the starts [deg]."""
+    """Return the rms of errors of predicted changes [rad], shape (N, HORIZONS),
+    over the starts [deg]."""
     there = ~np.isnan(errors)
     with np.errstate(all="ignore"):
         mean = np.sum(errors**2, axis=0, where=there) / there.sum(axis=0)

@@ -1,10 +1,10 @@
 """Which Dask scheduler hydroid uses: its own on this machine, or one that runs already.
 
-A Dask scheduler runs whatever code reaches its port. The one that is started here therefore uses TLS
-with credentials made for the run, and refuses clients and workers without them. A scheduler that was started
-elsewhere needs TLS too, with the credentials of Dask's configuration, unless it listens on the loopback
-interface. `python -m hydroid.parallel.cluster FOLDER` makes credentials for a scheduler and workers that a
-script starts, as examples/cluster/dask.sbatch does.
+A Dask scheduler runs whatever code reaches its port. The one that is started here therefore uses
+TLS with credentials made for the run, and refuses clients and workers without them. A scheduler
+that was started elsewhere needs TLS too, with the credentials of Dask's configuration, unless it
+listens on the loopback interface. `python -m hydroid.parallel.cluster FOLDER` makes credentials for
+a scheduler and workers that a script starts, as examples/cluster/dask.sbatch does.
 """
 
 import ipaddress
@@ -34,9 +34,10 @@ def open_workers(dask: str | None) -> Generator[DaskWorkers | None]:
     """Connect to workers; at the end, stop those that were started here.
 
     Args:
-        dask: `local[:N]` starts N workers on this machine, one per core if N is left out; anything else is
-            the address of a scheduler, or its scheduler file. None: no workers.
-    Raises SettingsError: Dask is not installed, or the address is refused; RunError: no scheduler answers.
+        dask: `local[:N]` starts N workers on this machine, one per core if N is left out; anything
+            else is the address of a scheduler, or its scheduler file. None: no workers.
+    Raises SettingsError: Dask is not installed, or the address is refused; RunError:
+    no scheduler answers.
     """
     if dask is None:
         yield None
@@ -52,8 +53,8 @@ def open_workers(dask: str | None) -> Generator[DaskWorkers | None]:
         closed = {f"distributed.{name}.http.routes": list[str]() for name in ("scheduler", "worker")}
         stack.enter_context(config.set(closed))
         if own := re.fullmatch("local(?::([1-9][0-9]{0,3}))?", dask):
-            # a worker that dies is started again, and Dask would give it up for good if that takes longer
-            # than 15 s, as on a busy machine
+            # a worker that dies is started again, and Dask would give it up for good if that takes
+            # longer than 15 s, as on a busy machine
             stack.enter_context(config.set({"distributed.deploy.lost-worker-timeout": "1 hour"}))
             target = _start_local(stack, int(own[1] or os.cpu_count() or 1))
         else:
@@ -62,8 +63,8 @@ def open_workers(dask: str | None) -> Generator[DaskWorkers | None]:
         try:
             client.__init__(target, timeout=CONNECT)
         except (OSError, ValueError, TypeError, RuntimeError) as error:
-            # a refused client left open is closed when it is collected; in the thread that another waits
-            # for, that would wait for the other
+            # a refused client left open is closed when it is collected; in the thread that another
+            # waits for, that would wait for the other
             _close(client)
             words = " ".join(str(error).split())
             hint = "check the address; for tls:// name the folder of its credentials in DASK_CONFIG"
@@ -73,10 +74,11 @@ def open_workers(dask: str | None) -> Generator[DaskWorkers | None]:
 
 
 def write_credentials(folder: Path) -> None:
-    """Write new TLS credentials, as a Dask configuration, into a new folder that only its user can read.
+    """Write new TLS credentials, as a Dask configuration,
+    into a new folder that only its user can read.
 
-    Scheduler, workers and hydroid use them where the environment variable DASK_CONFIG names the folder.
-    Raises FileExistsError: the folder is there already.
+    Scheduler, workers and hydroid use them where the environment variable DASK_CONFIG names the
+    folder. Raises FileExistsError: the folder is there already.
     """
     from distributed.security import Security
 

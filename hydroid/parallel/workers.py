@@ -1,4 +1,5 @@
-"""Spread the simulation of candidates over Dask workers; no bit of a result depends on their number."""
+"""Spread the simulation of candidates over Dask workers;
+no bit of a result depends on their number."""
 
 import logging
 import pickle
@@ -37,15 +38,17 @@ class DaskWorkers:
         return max(1, len(self.client.nthreads()))
 
     def __call__(self, target: object, method: str, theta: Array, columns: int) -> Array:
-        """Apply `target.method`, which maps rows (m, P) to (m, columns), to theta, (n, P), on the workers.
+        """Apply `target.method`, which maps rows (m, P) to (m, columns), to theta, (n, P),
+        on the workers.
 
-        Each worker gets one chunk of the rows. When a worker dies, another one takes its chunk. The target
-        can be pickled, and is sent once. The result, (n, columns), is in theta's order; NaN in the row of a
-        candidate that kills its workers.
+        Each worker gets one chunk of the rows. When a worker dies, another one takes its chunk. The
+        target can be pickled, and is sent once. The result, (n, columns), is in theta's order; NaN
+        in the row of a candidate that kills its workers.
         """
         result = np.full((len(theta), columns), np.nan)
         try:
-            if target not in self._sent:  # a task and no data: what a dead worker held is computed again
+            # a task and no data: what a dead worker held is computed again
+            if target not in self._sent:
                 self._sent[target] = self.client.submit(bytes, pickle.dumps(target), pure=False)
             edges = np.linspace(0, len(theta), min(self.count, len(theta)) + 1).astype(int).tolist()
             parts = [slice(*edge) for edge in pairwise(edges)]
@@ -53,7 +56,8 @@ class DaskWorkers:
                 if rows is not None:
                     result[part] = rows
                     continue
-                # Dask also gives up chunks that waited behind a killer: try each of their candidates alone
+                # Dask also gives up chunks that waited behind a killer: try each of their
+                # candidates alone
                 for i in range(part.start, part.stop):
                     (row,) = self._map(target, method, [theta[i : i + 1]])
                     if row is None:
@@ -82,7 +86,8 @@ class DaskWorkers:
                 method,
                 chunk,
                 pure=False,
-                workers=where and where[i % len(where)],  # one each; left to Dask, one may get two short ones
+                # one each; left to Dask, one may get two short ones
+                workers=where and where[i % len(where)],
                 allow_other_workers=where is not None,
             )
             for i, chunk in enumerate(chunks)

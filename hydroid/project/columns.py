@@ -1,4 +1,5 @@
-"""What the columns of a log could be, told by their numbers alone: for a person who knows the machine."""
+"""What the columns of a log could be, told by their numbers alone:
+for a person who knows the machine."""
 
 from collections.abc import Iterator
 from contextlib import suppress
@@ -17,7 +18,8 @@ RADIANS, DEGREES, METRES = 6.3, 400.0, 50.0  # largest values of angles and posi
 
 
 def column_lines(table: Table) -> tuple[str, ...]:
-    """Return a line for each column: its name, its smallest and largest value, and what it could be."""
+    """Return a line for each column: its name, its smallest and largest value,
+    and what it could be."""
     names = [name for name in dict.fromkeys(table.names) if name]
     lines = [
         f"{ascii(name)[1:-1] if not name.isprintable() else name}: {_told(table, name)}" for name in names

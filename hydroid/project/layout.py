@@ -30,10 +30,10 @@ MOVED = 0.5  # travel from which a joint moves [deg]
 class Layout:
     """The columns of a log, as the `log` section of a fit's settings, and what its numbers say.
 
-    `outputs` are joints that a log drives and measures, `motions` how the measured ones move, by number from
-    1; `reasons` have a line for each column that is not `unused`; `followed`: a joint that no command drives
-    moves. `missing` says which columns a person must name, in a section that is then no more than a start;
-    `candidates` are lines about what each could be.
+    `outputs` are joints that a log drives and measures, `motions` how the measured ones move, by
+    number from 1; `reasons` have a line for each column that is not `unused`; `followed`: a joint
+    that no command drives moves. `missing` says which columns a person must name, in a section that
+    is then no more than a start; `candidates` are lines about what each could be.
     """
 
     section: Plain
@@ -55,7 +55,8 @@ def find_layout(
     given: LogSettings | None = None,
     others: Sequence[Path] = (),
 ) -> Layout:
-    """Guess the columns of a log, turn commands that act against the angle, and see how fast joints are.
+    """Guess the columns of a log, turn commands that act against the angle,
+    and see how fast joints are.
 
     Without a log all joints have a command and an angle, and none is seen to move.
 
@@ -66,7 +67,8 @@ def find_layout(
 
     Raises:
         SettingsError: no joint has one of the names.
-        LogError: no column holds numbers, `given` does not fit the log, or no joint is driven and moves.
+        LogError: no column holds numbers, `given` does not fit the log,
+            or no joint is driven and moves.
     """
     if table is None:
         every = range(1, len(arm.joints) + 1)
@@ -106,7 +108,8 @@ def find_layout(
 
 
 def _skeleton(table: Table, arm: Arm, guess: ColumnGuess, missing: str) -> Layout:
-    """Return a layout that a person completes: all joints, with placeholders for what is not known."""
+    """Return a layout that a person completes: all joints,
+    with placeholders for what is not known."""
     section = guess.log
     entries = {
         joint: dict(section["joints"].get(joint, {"command": None, "angle": None}))
@@ -133,7 +136,8 @@ def _read(
     *,
     strict: bool,
 ) -> list[Log]:
-    """Read logs by a section; an error of the first one is a reason, or ends the command if `strict`."""
+    """Read logs by a section; an error of the first one is a reason,
+    or ends the command if `strict`."""
     free = dict.fromkeys(arm.joint_names, (-np.inf, np.inf))
     settings, logs = validate(section, LogSettings, table.source), list[Log]()
     for path in (Path(table.source), *others):

@@ -33,8 +33,8 @@ FILES = (ARM, MODEL, PICTURE, FIT, STEPS, OLD, MESHES)
 class Project:
     """A project that was written: its folder, and the names of its files and folders there.
 
-    `notes`: what the import assumed; `columns`: what each of the log is taken for; `unused`: the others;
-    `missing`: which columns of the log a person must name in the settings, empty if none.
+    `notes`: what the import assumed; `columns`: what each of the log is taken for; `unused`: the
+    others; `missing`: which columns of the log a person must name in the settings, empty if none.
     """
 
     folder: Path
@@ -49,7 +49,8 @@ class Project:
 def write_project(
     folder: Path, robot: Path | None, logs: Sequence[Path], joints: Sequence[str], **options: Any
 ) -> Project:
-    """Write a project to a folder, new or with other things in it (`hydroid.init` says what is given)."""
+    """Write a project to a folder, new or with other things in it (`hydroid.init` says
+    what is given)."""
     _refuse_replacing(folder, FILES, force=options.pop("force", False))
     table = open_table(logs[0]) if logs else None
     imported, reference, own = None, ARM, None
@@ -75,7 +76,8 @@ def write_project(
 
 
 def go_on(folder: Path | None, config: Path, logs: Sequence[Path], *, force: bool) -> Project:
-    """Write the settings anew, with starts from the logs, whose columns a person has named in `config`.
+    """Write the settings anew, with starts from the logs,
+    whose columns a person has named in `config`.
 
     Its arm stays as it is. Settings that are replaced are kept as OLD.
     """

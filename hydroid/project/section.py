@@ -1,4 +1,5 @@
-"""The `log` section of a fit's settings: guessed from a log, or as a person gave it, joint by joint."""
+"""The `log` section of a fit's settings: guessed from a log, or as a person gave it,
+joint by joint."""
 
 from collections.abc import Sequence
 
@@ -41,7 +42,8 @@ def guessed_section(table: Table, arm: Arm, order: Sequence[str]) -> ColumnGuess
 def _period(period: float) -> float:
     """Return the period of a simulation [s] for a log's.
 
-    A slow log is simulated in two steps a sample; what a fast one adds is not seen on such machines.
+    A slow log is simulated in two steps a sample;
+    what a fast one adds is not seen on such machines.
     """
     if period < 0.03:
         return max(period, PERIOD)

@@ -1,4 +1,5 @@
-"""The texts of a project: the arm's file of an import, and the settings of a fit of the whole chain.
+"""The texts of a project: the arm's file of an import,
+and the settings of a fit of the whole chain.
 
 These have starts and priors from the arm and the log.
 """
@@ -29,9 +30,11 @@ LIFT = 2.0  # torque of a joint at the pump's pressure, over the largest that gr
 
 
 class JointSize(NamedTuple):
-    """What a joint needs: oil [cm³/rad], valve opening [mm²] and damping [N·m·s/rad] at a speed [rad/s].
+    """What a joint needs: oil [cm³/rad], valve opening [mm²] and damping [N·m·s/rad] at
+    a speed [rad/s].
 
-    Of a joint that slides [mm², mm², N·s/m, m/s]. `area` is the one that pushes its cylinder's rod out [mm²].
+    Of a joint that slides [mm², mm², N·s/m, m/s].
+    `area` is the one that pushes its cylinder's rod out [mm²].
     """
 
     displacement: float
@@ -42,11 +45,13 @@ class JointSize(NamedTuple):
 
 
 def joint_sizes(arm: Arm, speeds: Mapping[int, float]) -> tuple[JointSize, ...]:
-    """Return the size of what moves every joint, (J,): starts and centres of wide priors, not estimates.
+    """Return the size of what moves every joint, (J,): starts and centres of wide priors,
+    not estimates.
 
-    The displacement gives the torque at the pump's pressure; the opening gives the speed while the arm is
-    lifted, and both edges lose the same; the damping holds the speed at full command. `speeds` are those that
-    a log shows, by number of the joint [rad/s, m/s]; USUAL_SPEED for the others.
+    The displacement gives the torque at the pump's pressure; the opening gives the speed while the
+    arm is lifted, and both edges lose the same; the damping holds the speed at full command.
+    `speeds` are those that a log shows, by number of the joint [rad/s, m/s];
+    USUAL_SPEED for the others.
     """
     model = load_model(arm).compile()
     data = mujoco.MjData(model)
@@ -68,7 +73,8 @@ def joint_sizes(arm: Arm, speeds: Mapping[int, float]) -> tuple[JointSize, ...]:
 
 
 def opening_at(displacement: float, speed: float) -> float:
-    """Return the valve's opening [mm²] that lets a joint of a displacement [cm³/rad] move at a speed [rad/s].
+    """Return the valve's opening [mm²] that lets a joint of a displacement [cm³/rad] move at
+    a speed [rad/s].
 
     Of a joint that slides [mm², m/s].
     """
@@ -86,7 +92,8 @@ def _lever(joint: Joint) -> float:
 
 
 def _opening(joint: Joint, speed: float) -> str:
-    """Return the nominal opening of a stand-in that was sized before a log told its joint's speed, as YAML.
+    """Return the nominal opening of a stand-in that was sized before a log told its joint's speed,
+    as YAML.
 
     Empty where the arm's file has another one: it holds.
     """
@@ -105,8 +112,8 @@ def _opening(joint: Joint, speed: float) -> str:
 def arm_text(imported: ImportedArm, arm: Arm | None, sizes: Sequence[JointSize]) -> str:
     """Return the arm's file of an import, with an actuator of each joint of sizes, (J,).
 
-    `arm` is what an earlier text of it says; None: this is that text, and cylinders have a size that nothing
-    uses.
+    `arm` is what an earlier text of it says; None: this is that text, and cylinders have a size
+    that nothing uses.
     """
     actuators = dict[str, Plain]()
     if arm is None:
@@ -143,8 +150,8 @@ def fit_text(
 ) -> str:
     """Return the settings of a fit of the whole chain.
 
-    `file` is their own name as a command takes it, and `arm_file` that of the arm as they name it; `again` is
-    the command that goes on once the columns are named.
+    `file` is their own name as a command takes it, and `arm_file` that of the arm as they name it;
+    `again` is the command that goes on once the columns are named.
     """
     joints, volumes = list[Plain](), list[float]()
     flows = {joint: 0.06 * sizes[joint - 1].displacement * sizes[joint - 1].speed for joint in layout.outputs}

@@ -1,4 +1,5 @@
-"""What a run stores as npz without pickle: trees of dataclasses, mappings and arrays, and its checkpoints.
+"""What a run stores as npz without pickle: trees of dataclasses, mappings and arrays,
+and its checkpoints.
 
 Every file is checked before it is believed.
 """
@@ -69,7 +70,8 @@ def unpack(file: Path) -> Any:
 
 
 def _arrays(data: bytes) -> dict[str, np.ndarray]:
-    """Return the arrays of an npz by name: numbers only, and none larger than the bytes that it has.
+    """Return the arrays of an npz by name: numbers only,
+    and none larger than the bytes that it has.
 
     `np.load` makes room for what an array's header says before it looks at its bytes.
     """
@@ -92,12 +94,13 @@ def _arrays(data: bytes) -> dict[str, np.ndarray]:
 
 
 class CheckpointFile(UserDict[str, Arrays]):
-    """Checkpoints by name; every change is written to one file, which is made with the first of a run's id.
+    """Checkpoints by name; every change is written to one file,
+    which is made with the first of a run's id.
 
-    The file before it is kept as `checkpoint.previous.npz`. Where the newest one is damaged, it is put aside
-    as `checkpoint.damaged.npz` with a warning, and the one before it is taken: what the run did since is done
-    again, to the same bits. Raises RunError: none is whole, or it is that of another run; on a change, it
-    cannot be written, and both files are as they were.
+    The file before it is kept as `checkpoint.previous.npz`. Where the newest one is damaged, it is
+    put aside as `checkpoint.damaged.npz` with a warning, and the one before it is taken: what the
+    run did since is done again, to the same bits. Raises RunError: none is whole, or it is that of
+    another run; on a change, it cannot be written, and both files are as they were.
     """
 
     def __init__(self, file: Path, run: str) -> None:

@@ -49,7 +49,8 @@ def identity(settings: FitSettings, logs: Sequence[Log]) -> Plain:
 
 
 def deciding(settings: FitSettings) -> Plain:
-    """Return the settings that decide a result, the arm's too: no threads, unused searches, or paths."""
+    """Return the settings that decide a result, the arm's too: no threads, unused searches,
+    or paths."""
     values, search = portable(settings), settings.search.algorithm
     del values["simulation"]["threads"]
     values["search"] = {n: v for n, v in values["search"].items() if n == search or not isinstance(v, dict)}
@@ -129,7 +130,8 @@ class RunFolder:
 
     @contextmanager
     def owned(self) -> Generator[None]:
-        """Hold the folder against other processes, and write the `hydroid` logger's lines to `run.log`."""
+        """Hold the folder against other processes,
+        and write the `hydroid` logger's lines to `run.log`."""
         # it is the run's if it is empty, or holds a run's description or at least its lock
         other = os.path.exists(self.path) and not (self.exists or (self.path / LOCK).exists())
         if other and (not self.path.is_dir() or any(self.path.iterdir())):
@@ -187,7 +189,8 @@ class RunFolder:
         return content
 
     def write_estimate(self, model: IdentifiedModel, log: Log) -> None:
-        """Write `estimate.yaml` of a fit's model, and the fitted arm in `model/` as it began a log."""
+        """Write `estimate.yaml` of a fit's model,
+        and the fitted arm in `model/` as it began a log."""
         write_estimate(self.path, model.summarise())
         plant = Plant(model, payload=model.settings.payloads.get(Path(log.source).name, 0.0))
         plant.reset(log.start)
@@ -200,7 +203,8 @@ class RunFolder:
         self._describe(self.identity() | {"status": word} | more)
 
     def interrupt(self) -> str:
-        """Record the status `interrupted`, and return what is kept, empty where nothing was written."""
+        """Record the status `interrupted`, and return what is kept,
+        empty where nothing was written."""
         if not self.exists:
             return ""
         self.status("interrupted")

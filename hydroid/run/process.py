@@ -31,15 +31,16 @@ LOCK = ".lock"  # name of the lock's file; it stays, what counts is whether a pr
 def locked(folder: Path) -> Generator[None]:
     """Hold a folder, which is made if it is not there, against all other processes.
 
-    The lock is `flock`'s. A file that merely exists, with a process's number in it, would outlive a killed
-    process, and on a cluster nobody can tell whether that number lives on another machine. Linux passes the
-    lock on to NFS's server (since 2.6.12) and to Lustre's where it is mounted with `flock`, so that it holds
-    between machines; with `localflock`, or NFS's `nolock`, it holds on one machine only. On a file system
-    that has no locks there is none, but a warning.
+    The lock is `flock`'s. A file that merely exists, with a process's number in it, would outlive a
+    killed process, and on a cluster nobody can tell whether that number lives on another machine.
+    Linux passes the lock on to NFS's server (since 2.6.12) and to Lustre's where it is mounted with
+    `flock`, so that it holds between machines; with `localflock`, or NFS's `nolock`, it holds on
+    one machine only. On a file system that has no locks there is none, but a warning.
     """
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
-        file = (folder / LOCK).open("a+b", buffering=0)  # for writing: NFS grants no exclusive lock otherwise
+        # for writing: NFS grants no exclusive lock otherwise
+        file = (folder / LOCK).open("a+b", buffering=0)
         if fcntl is not None:
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

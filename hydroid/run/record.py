@@ -58,8 +58,9 @@ class Effort:
 class FitResult:
     """The arrays of a fit: what its estimates make of its logs, and how they came to be.
 
-    The history has shape (G, len(HISTORY)); the front is non-dominated candidates, (n, P), with objectives by
-    segment and overall, (n, S + 1); segments are objectives of each estimate by segment, (S,).
+    The history has shape (G, len(HISTORY)); the front is non-dominated candidates, (n, P), with
+    objectives by segment and overall, (n, S + 1);
+    segments are objectives of each estimate by segment, (S,).
     """
 
     fitted: tuple[Prediction, ...]
@@ -72,7 +73,8 @@ class FitResult:
 
 @record
 class Record:
-    """A finished run: its folder, as a command takes it, versions and hashes of its logs, what it found.
+    """A finished run: its folder, as a command takes it, versions and hashes of its logs,
+    what it found.
 
     After a joint refinement every parameter that was refined is free in the settings.
     """
@@ -121,8 +123,8 @@ def run_of(model: IdentifiedModel) -> Path | None:
 def keep_validation(model: IdentifiedModel, predictions: Sequence[Prediction]) -> Path | None:
     """Store predictions of unseen logs in the run that a model is from; return it.
 
-    Nothing is stored of a model that is from no run, or whose settings are not the run's. What was stored of
-    the same file before is replaced.
+    Nothing is stored of a model that is from no run, or whose settings are not the run's. What was
+    stored of the same file before is replaced.
     """
     folder, unseen = run_of(model), [p for p in predictions if p.unseen]
     if folder is None or not unseen or read_identified(folder).settings != model.settings:
@@ -133,7 +135,8 @@ def keep_validation(model: IdentifiedModel, predictions: Sequence[Prediction]) -
 
 
 def validation_name(log: Log) -> str:
-    """Return the name of a log's folder among the validations: its file's, and a digest of the file's place.
+    """Return the name of a log's folder among the validations: its file's,
+    and a digest of the file's place.
 
     Of a log that is no file the digest is that of its samples.
     """
@@ -145,7 +148,8 @@ def validation_name(log: Log) -> str:
 
 
 def fitted_by(model: IdentifiedModel) -> tuple[Sequence[Prediction], Baselines]:
-    """Return what a model's run made of its logs, and the baselines; nothing if it is from no run."""
+    """Return what a model's run made of its logs, and the baselines;
+    nothing if it is from no run."""
     if (folder := run_of(model)) is None:
         return (), {}
     result = _read(folder / RESULT, FitResult)
@@ -205,9 +209,11 @@ def _adapter(kind: type[Any]) -> TypeAdapter[Any]:
 
 
 def read_runs(names: Sequence[str], out: str | Path | None) -> tuple[Record, ...]:
-    """Read finished runs that differ in nothing but their seeds, in their order, and leave out the others.
+    """Read finished runs that differ in nothing but their seeds, in their order,
+    and leave out the others.
 
-    `names` are run folders, or patterns of them; `out` is the folder for what is to be written about them.
+    `names` are run folders, or patterns of them;
+    `out` is the folder for what is to be written about them.
     """
     if out is not None and RunFolder(Path(out)).exists:
         raise RunError("is a run itself", out, "name another folder")

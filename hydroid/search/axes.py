@@ -1,9 +1,10 @@
-"""Derivatives by finite differences along the axes of a covariance, with steps as wide as the uncertainty.
+"""Derivatives by finite differences along the axes of a covariance,
+with steps as wide as the uncertainty.
 
-Where parameters trade, their effects nearly cancel: what is left of the derivatives of single parameters is
-the error of their differences. So the step goes along the combination itself, as far as the combination is
-uncertain. Its effect is then as large as the noise, and large against rounding and the small jumps that
-events make.
+Where parameters trade, their effects nearly cancel: what is left of the derivatives of single
+parameters is the error of their differences. So the step goes along the combination itself, as far
+as the combination is uncertain. Its effect is then as large as the noise, and large against
+rounding and the small jumps that events make.
 """
 
 from collections.abc import Callable
@@ -17,17 +18,21 @@ Function = Callable[[Array], Array]
 """points (n, P) -> values (n, R); a row that is not finite is a point that cannot be simulated"""
 
 LARGEST = 0.1
-"""largest relative change of a coordinate in a step: nothing holds over the width of an unknown direction"""
+"""largest relative change of a coordinate in a step:
+nothing holds over the width of an unknown direction"""
 EDGE = 0.1  # standard deviations from a bound, below which a coordinate counts as held by it
-UNBALANCED = 0.3  # part of a step within which both sides must have room; else it goes twice to one side
+# part of a step within which both sides must have room; else it goes twice to one side
+UNBALANCED = 0.3
 SHORTER = 0.1  # a step whose effect may be mostly curvature is taken again, this part as long
 CURVED = 0.3
-"""part of the long step's slope; where the short step's is smaller, the long one's is mostly curvature"""
+"""part of the long step's slope; where the short step's is smaller,
+the long one's is mostly curvature"""
 
 
 @record
 class Box:
-    """A point between its bounds, (P,), what a relative change of 1 is, and which p coordinates move."""
+    """A point between its bounds, (P,), what a relative change of 1 is,
+    and which p coordinates move."""
 
     at: Array
     lower: Array
@@ -48,7 +53,8 @@ class Box:
         return np.maximum(away, 0.0) / self.scale[self.varied]
 
     def points(self, changes: Array) -> Array:
-        """Return points, (n, P), at relative changes, (n, p); rounding does not lead out of the bounds."""
+        """Return points, (n, P), at relative changes, (n, p);
+        rounding does not lead out of the bounds."""
         moved = np.tile(self.at, (len(changes), 1))
         moved[:, self.varied] += changes * self.scale[self.varied]
         return np.clip(moved, np.minimum(self.lower, self.at), np.maximum(self.upper, self.at))
@@ -56,10 +62,11 @@ class Box:
 
 @record
 class Axes:
-    """Steps from a point along p directions of its varied coordinates, one a row, all within the bounds.
+    """Steps from a point along p directions of its varied coordinates, one a row,
+    all within the bounds.
 
-    `steps` are signed lengths along each: to both sides, or one and two steps to one side, shape (p, 2); to
-    one side only, shape (p, 1).
+    `steps` are signed lengths along each: to both sides, or one and two steps to one side, shape
+    (p, 2); to one side only, shape (p, 1).
     """
 
     directions: Array
@@ -74,17 +81,18 @@ class Axes:
 def differentiate(
     function: Function, at: Box, axes: Axes, value: Array | None = None, former: Array | None = None
 ) -> Array:
-    """Differentiate a function at a point by relative changes of its p varied coordinates, shape (p, R).
+    """Differentiate a function at a point by relative changes of its p varied coordinates,
+    shape (p, R).
 
-    Along each axis the derivative is that of the parabola through the values at the point and at both steps,
-    or of the line where there is one step or where one of two fails. Where both sides differ more than they
-    have in common, or where the slope exceeds the former one by far, a shorter step tells whether the effect
-    of the long one is mostly curvature.
+    Along each axis the derivative is that of the parabola through the values at the point and at
+    both steps, or of the line where there is one step or where one of two fails. Where both sides
+    differ more than they have in common, or where the slope exceeds the former one by far, a
+    shorter step tells whether the effect of the long one is mostly curvature.
 
-    The function is called with all points of the differences at once, and with those of the shorter steps.
-    Its `value` at the point, shape (R,), is given where it is known. `former` derivatives, (p, R), are kept
-    along axes that fail; without them, axes that are not single coordinates must not: a coordinate's row is
-    NaN.
+    The function is called with all points of the differences at once, and with those of the shorter
+    steps. Its `value` at the point, shape (R,), is given where it is known. `former` derivatives,
+    (p, R), are kept along axes that fail; without them, axes that are not single coordinates must
+    not: a coordinate's row is NaN.
     """
     centre = function(at.at[None])[0] if value is None else value
     expected = None if former is None else axes.directions @ former
@@ -114,10 +122,10 @@ def single_axes(at: Box, step: float) -> Axes:
 def covariance_axes(at: Box, root: Array, step: float) -> Axes:
     """Return steps of so many standard deviations along the axes of a covariance.
 
-    The axes are those of the coordinates off their bounds. A coordinate at a bound has a direction of its
-    own: the others change with it as the covariance says. So no direction leads out of the bounds to both
-    sides. `root` is G of C^-1 = G' G, of full rank, (p, p): a relative change v is |G v| standard deviations
-    long.
+    The axes are those of the coordinates off their bounds. A coordinate at a bound has a direction
+    of its own: the others change with it as the covariance says. So no direction leads out of the
+    bounds to both sides. `root` is G of C^-1 = G' G, of full rank, (p, p): a relative change v is
+    |G v| standard deviations long.
     """
     room = at.room
     deviation = np.linalg.norm(np.linalg.inv(root), axis=1)
@@ -133,12 +141,14 @@ def covariance_axes(at: Box, root: Array, step: float) -> Axes:
 
 
 def held_by_bound(room: Array, deviation: Array) -> Mask:
-    """Whether coordinates are held by a bound, (p,), from the room to both, (2, p), and their deviations."""
+    """Whether coordinates are held by a bound, (p,), from the room to both, (2, p),
+    and their deviations."""
     return room.min(axis=0) < EDGE * np.minimum(deviation, LARGEST)
 
 
 def _slopes(function: Function, at: Box, axes: Axes, value: Array) -> tuple[Array, Mask]:
-    """Slopes along each axis, (p, R), and where both sides differ more than they have in common, (p,)."""
+    """Slopes along each axis, (p, R), and where both sides differ more than they have in common,
+    (p,)."""
     steps = axes.steps.T[:, :, None]
     changes = (steps * axes.directions).reshape(-1, axes.directions.shape[1])
     rows = function(at.points(changes)).reshape(*steps.shape[:2], -1)

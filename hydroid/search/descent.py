@@ -1,4 +1,5 @@
-"""Where least squares stands: the state between two steps, why it ended, and the residual's linear model."""
+"""Where least squares stands: the state between two steps, why it ended,
+and the residual's linear model."""
 
 from dataclasses import fields
 from enum import Enum
@@ -15,7 +16,8 @@ WIDTH = 2.0**-26  # of the differences: the root of the rounding unit
 WIDER = 2.0**10  # how much wider the step is that tells a weak effect from rounding noise
 SUSPECT = 1e-3  # a column this much shorter than the longest one may be noise, and is taken twice
 TOLERANCE = 1e-12
-"""of the box-constrained minimum: slope, in units of a column and the residual, that is only rounding"""
+"""of the box-constrained minimum: slope, in units of a column and the residual,
+that is only rounding"""
 DAMPING = 1e-3  # λ at the start
 BLOCK = 4096  # rows of a tall matrix that are factorised at a time
 
@@ -115,7 +117,8 @@ def no_jacobian(point: Array) -> Array:
 
 
 class LinearModel:
-    """The linear model r + J s of the residual around a descent's point, for the parameters with effect.
+    """The linear model r + J s of the residual around a descent's point,
+    for the parameters with effect.
 
     A column of J of a parameter without effect is 0; `scale` has the lengths of the others.
     """
@@ -139,7 +142,8 @@ class LinearModel:
         size = np.linalg.norm(right)
         if not size:
             return np.zeros_like(right)
-        # in lengths of the columns and of the residual, in which the solver's tolerances mean something
+        # in lengths of the columns and of the residual, in which the solver's tolerances mean
+        # something
         there, unit = self.at.point[self._moving], self.scale / size
         matrix = np.vstack([triangle / self.scale, np.sqrt(damping) * np.eye(len(unit))])
         target = np.append(-right / size, np.zeros(len(unit)))
@@ -162,7 +166,8 @@ class LinearModel:
 def triangle(rows: Array) -> Array:
     """Return the upper triangle R, (p, p), of Q R = rows, shape (m, p).
 
-    Tall matrices are factorised block by block, which keeps each block in the cache: four times as fast.
+    Tall matrices are factorised block by block, which keeps each block in the cache:
+    four times as fast.
     """
     blocks = np.array_split(rows, max(len(rows) // BLOCK, 1))
     if len(blocks) > 1:
@@ -171,10 +176,11 @@ def triangle(rows: Array) -> Array:
 
 
 def derivatives(residuals: Function, point: Array, row: Array) -> Array:
-    """Derivatives by each parameter at a point of the box, (p,), with its residuals, (R,): shape (p, R).
+    """Derivatives by each parameter at a point of the box, (p,), with its residuals, (R,):
+    shape (p, R).
 
-    They are 0 without effect. All differences are one batch. Those that fail are taken to the other side in
-    a second batch; where that fails too, they are not finite.
+    They are 0 without effect. All differences are one batch. Those that fail are taken to the other
+    side in a second batch; where that fails too, they are not finite.
     """
 
     def quotients(which: Ints, width: float) -> Array:
@@ -191,7 +197,8 @@ def derivatives(residuals: Function, point: Array, row: Array) -> Array:
     length = np.linalg.norm(columns, axis=1)
     suspect = np.flatnonzero((length > 0) & (length < SUSPECT * length.max()))
     if len(suspect):
-        # a derivative does not depend on the step; rounding noise divided by a wider step becomes smaller
+        # a derivative does not depend on the step; rounding noise divided by a wider step becomes
+        # smaller
         wider = np.linalg.norm(quotients(suspect, WIDER * WIDTH), axis=1)
         columns[suspect[wider < 0.1 * length[suspect]]] = 0.0
     return columns

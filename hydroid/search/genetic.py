@@ -1,7 +1,7 @@
 """The article's two searches: the simple genetic algorithm (4.1, figure 12), and NSGA-II (4.2).
 
-A search is deterministic: it draws from the generator passed in alone. So a run is continued by running it
-again from its seed, with the objectives that are known (`fitting.checkpoints`).
+A search is deterministic: it draws from the generator passed in alone. So a run is continued by
+running it again from its seed, with the objectives that are known (`fitting.checkpoints`).
 
     population = None
     for _ in range(1 + generations):
@@ -23,7 +23,8 @@ from hydroid.settings.search import GeneticSettings
 
 @record
 class Population:
-    """Candidates, (n, length), and objectives to be minimised, (n, m); nothing ever writes into its arrays.
+    """Candidates, (n, length), and objectives to be minimised, (n, m);
+    nothing ever writes into its arrays.
 
     A candidate with an objective that is not finite is infeasible.
     """
@@ -44,7 +45,8 @@ class Population:
 
 
 def crowded_order(objectives: Array) -> Ints:
-    """Return candidates, (n,), from best to worst by their objectives, (n, m); equals keep their order.
+    """Return candidates, (n,), from best to worst by their objectives, (n, m);
+    equals keep their order.
 
     That is the crowded comparison: lower rank first, then more room around them.
     """
@@ -53,10 +55,11 @@ def crowded_order(objectives: Array) -> Ints:
 
 
 def tournament(objectives: Array, count: int, rng: Generator) -> Ints:
-    """Return winners, (count,), of binary tournaments by the crowded comparison of objectives, (n, m).
+    """Return winners, (count,), of binary tournaments by the crowded comparison of objectives, (n,
+    m).
 
-    The contestants of each round are a random permutation of the population, so that every candidate
-    competes equally often. No infeasible candidate beats a feasible one.
+    The contestants of each round are a random permutation of the population, so that every
+    candidate competes equally often. No infeasible candidate beats a feasible one.
     """
     rank = ranks(objectives)
     room = crowding(objectives, rank)
@@ -76,7 +79,8 @@ class SimpleGa:
         parameters: dimensions p of the unit box.
         start: point of the box that joins the first population, shape (p,).
         single: whether it minimises one objective, shape (n, 1), rather than several at once.
-        elite: best candidates that survive unchanged, and are not simulated again (the article gives none).
+        elite: best candidates that survive unchanged,
+            and are not simulated again (the article gives none).
     """
 
     settings: GeneticSettings
@@ -114,7 +118,8 @@ class SimpleGa:
 class Nsga2(SimpleGa):
     """NSGA-II (Deb, Pratap, Agarwal, Meyarivan 2002) on the simple GA's operators.
 
-    Non-dominated sorting, crowding, crowded tournament, and survival of the best of parents and children.
+    Non-dominated sorting, crowding, crowded tournament,
+    and survival of the best of parents and children.
     """
 
     single, elite = False, 0

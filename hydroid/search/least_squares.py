@@ -6,17 +6,21 @@
 
 `step` is a pure function of a `Descent`: a stored one continues to the same bits.
 
-One step is one of two things. *Without a Jacobian* it takes one, by finite differences in one batch, and
-ends where the linear model promises no gain. *With one* it tries a step s that minimises
-|r + J s|² + λ |D s|² inside the box, D the lengths of J's columns, with Nielsen's rule for the damping λ.
-What differs from a textbook:
+One step is one of two things. *Without a Jacobian* it takes one, by finite differences in one
+batch, and ends where the linear model promises no gain. *With one* it tries a step s that minimises
+|r + J s|² + λ |D s|² inside the box, D the lengths of J's columns, with Nielsen's rule for the
+damping λ. What differs from a textbook:
 
-- A Jacobian of p simulations is expensive. After a step it is updated from that step (C. G. Broyden, 1965) as
-  long as the updated one lowers the logarithm of the cost by as much per simulation as the one before did.
-- Beside each step from a new Jacobian a second one is tried, corrected for the curvature of the residual
-  along the first (geodesic acceleration, M. K. Transtrum and J. P. Sethna, 2012). It follows the curved
-  valleys of problems whose parameters compensate each other.
-- A parameter without effect stays where it is: its column of J is zero, or rounding noise (`derivatives`).
+- A Jacobian of p simulations is expensive. After a step it is updated from that step (C. G.
+Broyden, 1965) as
+  long as the updated one lowers the logarithm of the cost by as much per simulation as the one
+  before did.
+- Beside each step from a new Jacobian a second one is tried, corrected for the curvature of the
+residual
+  along the first (geodesic acceleration, M. K. Transtrum and J. P. Sethna, 2012). It follows the
+  curved valleys of problems whose parameters compensate each other.
+- A parameter without effect stays where it is: its column of J is zero, or rounding noise
+(`derivatives`).
 - A candidate whose simulation fails is a step that does not help.
 """
 
@@ -58,7 +62,8 @@ SLOW_STEPS = 2
 
 
 def least_squares(start_at: Array, residuals: Function, settings: RefinementSettings) -> Descent:
-    """Minimise the sum of squared residuals from a point of the unit box, shape (p,); return the last state.
+    """Minimise the sum of squared residuals from a point of the unit box, shape (p,);
+    return the last state.
 
     Its point is the best one evaluated, and its ending says whether that is an optimum.
     """
@@ -127,7 +132,8 @@ def _advance(now: State, residuals: Function, settings: RefinementSettings) -> S
     mean = np.log(cost / after.cost) / (now.evaluations + 1 - evaluations)
     if not (ratio > TRUSTED if now.fresh else np.log(now.cost / after.cost) >= mean):
         return after
-    # Broyden's update: the Jacobian nearest to the present one, by its own scale, that explains the step
+    # Broyden's update: the Jacobian nearest to the present one, by its own scale, that explains the
+    # step
     move = after.point - now.point
     scaled = np.sum(now.jacobian**2, axis=0) * move
     unexplained = after.residual - now.residual - now.jacobian @ move
@@ -135,7 +141,8 @@ def _advance(now: State, residuals: Function, settings: RefinementSettings) -> S
 
 
 def _moved(now: State, point: Array, row: Array, ratio: float, settings: RefinementSettings) -> State:
-    """Move to a better point, whose gain is `ratio` times the promised one; the Jacobian is to be taken."""
+    """Move to a better point, whose gain is `ratio` times the promised one;
+    the Jacobian is to be taken."""
     cost = costs(row[None])[0]
     slow = now.slow + 1 if now.cost - cost < settings.gain_tolerance * now.cost else 0
     ending = Ending.UNDER_WAY

@@ -1,7 +1,7 @@
 """A hydraulic arm: an MJCF, and one YAML file with what MJCF cannot say.
 
-The MJCF has links, joints, ranges, masses and meshes; its keyframes are the named poses. The YAML has the
-actuators, in units of a drawing (mm, mm², cm³/rad).
+The MJCF has links, joints, ranges, masses and meshes; its keyframes are the named poses. The YAML
+has the actuators, in units of a drawing (mm, mm², cm³/rad).
 """
 
 import math
@@ -24,8 +24,8 @@ from hydroid.settings.load import Settings, load
 Actuator: TypeAlias = LinearActuator | RotaryActuator
 
 FARTHEST_BY_CYLINDER = 200.0
-"""how far a cylinder turns a joint at most, with a linkage such as a bucket's [deg]; slewing gears and
-rotators turn farther"""
+"""how far a cylinder turns a joint at most, with a linkage such as a bucket's [deg]; slewing gears
+and rotators turn farther"""
 SLIDE = 2  # MuJoCo's number of a joint that slides
 
 
@@ -40,10 +40,11 @@ Beside = Annotated[Path, Strict(False), AfterValidator(_from_folder)]
 
 @record
 class Joint:
-    """A joint that turns [deg], or `slides` [m]; what is said of angles then holds for its position.
+    """A joint that turns [deg], or `slides` [m];
+    what is said of angles then holds for its position.
 
-    A continuous one turns without stops: its range limits what is shown and tested. No actuator: nothing that
-    stage 2 knows moves it.
+    A continuous one turns without stops: its range limits what is shown and tested. No actuator:
+    nothing that stage 2 knows moves it.
     """
 
     name: str
@@ -73,9 +74,9 @@ class Joint:
 
 
 class Arm(Settings):
-    """An arm as its YAML file and its MJCF describe it; the MJCF is read when something of it is asked for.
-    Raises SettingsError: where the MJCF is read, a setting that does not fit it; ModelError: then, no MJCF,
-    or one that hydroid cannot simulate.
+    """An arm as its YAML file and its MJCF describe it; the MJCF is read when something of it is
+    asked for. Raises SettingsError: where the MJCF is read, a setting that does not fit it;
+    ModelError: then, no MJCF, or one that hydroid cannot simulate.
     """
 
     model: Beside
@@ -83,17 +84,20 @@ class Arm(Settings):
     actuators: dict[str, Annotated[Cylinder | RotaryActuator, Field(discriminator="kind")]] = {}
     """what moves the joints, by name; a joint that stage 2 does not drive needs none"""
     payload: str | None = None
-    """site of the model where the gripper holds a payload's centre of mass; null: logs have no payloads"""
+    """site of the model where the gripper holds a payload's centre of mass; null:
+    logs have no payloads"""
     pair: Beside | None = None
-    """MJCF of a machine with two of these arms, whose joints are named right_JOINT and left_JOINT; null: the
-    arm stands alone"""
+    """MJCF of a machine with two of these arms, whose joints are named right_JOINT and left_JOINT;
+    null: the arm stands alone"""
 
     def model_post_init(self, context: Any) -> None:
-        """Keep where the settings came from beside what is read of the model: it decides nothing."""
+        """Keep where the settings came from beside what is read of the model:
+        it decides nothing."""
         vars(self)["where"] = (context or {}).get("source", self.where)
 
     def __copy__(self) -> "Arm":
-        """Copy the settings alone: a copy with another model must not keep what was read of this one."""
+        """Copy the settings alone: a copy with another model must not keep what was read
+        of this one."""
         copy = super().__copy__()
         for name in vars(copy).keys() - Arm.model_fields.keys():
             del vars(copy)[name]
@@ -179,7 +183,8 @@ class Arm(Settings):
 
     @property
     def ranges(self) -> dict[str, tuple[float, float]]:
-        """Lower and upper stop of each joint by its name [rad], or [m] of a slide; infinite where none is."""
+        """Lower and upper stop of each joint by its name [rad], or [m] of a slide;
+        infinite where none is."""
         free = (-math.inf, math.inf)
         return {joint.name: free if joint.continuous else joint.limits for joint in self.joints}
 
@@ -190,7 +195,8 @@ class Arm(Settings):
 
     @property
     def backward(self) -> tuple[int, ...]:
-        """Joints, from 1, that turn to negative angles as their rods run out, at positive commands."""
+        """Joints, from 1, that turn to negative angles as their rods run out,
+        at positive commands."""
         actuators = enumerate((joint.actuator for joint in self.joints), 1)
         return tuple(j for j, one in actuators if isinstance(one, LinearActuator) and one.sense < 0)
 
@@ -226,7 +232,8 @@ def _at_zero(path: Path) -> Any:
 
 @lru_cache(maxsize=8)
 def _compiled(path: Path, _changed: int, _size: int) -> Any:
-    """The same of a file that did not change, without meshes that decide no inertia: these take long."""
+    """The same of a file that did not change, without meshes that decide no inertia:
+    these take long."""
     import mujoco
 
     from hydroid.mjcf import mujoco_errors, read_mjcf

@@ -1,7 +1,8 @@
-"""YAML text -> plain values: mappings, lists, text, numbers, true, false and null, and nothing else.
+"""YAML text -> plain values: mappings, lists, text, numbers, true, false and null,
+and nothing else.
 
-Scalars are read as YAML 1.2 defines them. PyYAML's own rules, those of YAML 1.1, read 010 as 8, 1:30 as 90
-and 1e3 as text; here they are 10, text and 1000.
+Scalars are read as YAML 1.2 defines them. PyYAML's own rules, those of YAML 1.1, read 010 as 8,
+1:30 as 90 and 1e3 as text; here they are 10, text and 1000.
 """
 
 import re

@@ -1,4 +1,5 @@
-"""Settings of a fit, one YAML file per job, from the log to the search; and of a study, which vary them."""
+"""Settings of a fit, one YAML file per job, from the log to the search; and of a study,
+which vary them."""
 
 import math
 from collections.abc import Mapping
@@ -28,22 +29,24 @@ class FitSettings(Settings):
     stage: Literal["mech", "hyd"] = "mech"
     """mech: the hydraulics are a gain; hyd: the whole chain from command to torque is simulated"""
     arm: Arm = "hydrolek"  # pyright: ignore[reportAssignmentType]
-    """name of a shipped arm, or path of an arm's YAML file, relative to this file or to the working folder"""
+    """name of a shipped arm, or path of an arm's YAML file,
+    relative to this file or to the working folder"""
     outputs: Annotated[Joints, Field(min_length=1)] = (2,)
     """joints whose measured angle is compared"""
     tolerance_deg: Positive | ByJoint[Positive] | None = None
-    """rms error on unseen logs up to which joints are predicted [deg], of all or by joint; null: 2 % of their
-    travel there"""
+    """rms error on unseen logs up to which joints are predicted [deg], of all or by joint; null: 2
+    % of their travel there"""
     start_pose: str = "home"
     """name of the arm's pose that joints without a measured angle hold"""
     free_start: bool = True
-    """whether simulated angles may begin beside the truth, as far as the sensor's noise in the rest before
-    the first command allows: the drift of the errors begins as uncertain as that. false: it is exact"""
+    """whether simulated angles may begin beside the truth, as far as the sensor's noise in the rest
+    before the first command allows: the drift of the errors begins as uncertain as that. false:
+    it is exact"""
     parameters: dict[str, ParameterSettings]
     """the parameters of the model by name, those to be estimated and those that are fixed"""
     scale: Literal["log", "linear"] = "log"
-    """log: parameters with a lower bound above 0 are searched, refined and reported by their logarithm;
-    linear: by their value, as in equations (15) and (16)"""
+    """log: parameters with a lower bound above 0 are searched, refined and reported by their
+    logarithm; linear: by their value, as in equations (15) and (16)"""
     hydraulics: HydraulicSettings = HydraulicSettings()
     priors: dict[str, PriorSettings] = {}
     """what is known besides the logs, each under a name of your choice"""
@@ -56,7 +59,8 @@ class FitSettings(Settings):
     refinement: RefinementSettings | None = RefinementSettings()
     """the refinement's settings; null: no refinement, as in the article"""
     joint_refinement: bool = False
-    """at the end, refine the parameters of both stages together: all that have bounds, fixed ones included"""
+    """at the end, refine the parameters of both stages together: all that have bounds,
+    fixed ones included"""
     design: DesignSettings = DesignSettings()
 
     @classmethod
@@ -94,7 +98,8 @@ class FitSettings(Settings):
     @model_validator(mode="before")
     @classmethod
     def _one_model_without_hydraulics(cls, values: Any) -> Any:
-        """Take stage 1 for dynamic, whatever `simulation.model` says of stage 2: its steps follow from it."""
+        """Take stage 1 for dynamic, whatever `simulation.model` says of stage 2:
+        its steps follow from it."""
         if not isinstance(values, dict) or values.get("stage", "mech") != "mech":
             return values
         simulation = values.get("simulation")
@@ -123,7 +128,8 @@ class FitSettings(Settings):
 
     @property
     def seeded(self) -> bool:
-        """Whether another seed may lead a search elsewhere: not one that begins at stated starts alone."""
+        """Whether another seed may lead a search elsewhere:
+        not one that begins at stated starts alone."""
         stated = any(p.states_start for p in self.parameters.values() if p.fixed is None)
         drawn = self.search.algorithm != "multistart" or self.search.multistart.starts > 1
         return drawn or not stated
@@ -145,7 +151,8 @@ class FitSettings(Settings):
     def of_estimate(self, name: str | None) -> "FitSettings":
         """Return the settings that an estimate of a fit was refined with, and predicts with.
 
-        `name` is that of the estimate, then those of the terms that it has: refined+pump; None: no fit's.
+        `name` is that of the estimate, then those of the terms that it has: refined+pump; None:
+        no fit's.
         """
         if name is None:
             return self
@@ -160,7 +167,8 @@ class FitSettings(Settings):
         return settings.changed({"simulation.model": model}) if model == "dynamic" else settings
 
     def parameter_set(self) -> ParameterSet:
-        """Return the parameters with units, bounds, priors and fixed values, in the order of theta."""
+        """Return the parameters with units, bounds, priors and fixed values,
+        in the order of theta."""
         parameters = [
             make_parameter(name, own, self.arm, self.hydraulics, log=self.scale == "log")
             for name, own in self.parameters.items()
@@ -204,7 +212,8 @@ class StudySettings(Settings):
     logs: Annotated[tuple[str, ...], Field(min_length=1)]
     """fitted logs, relative to the study's file"""
     axes: dict[str, Annotated[dict[str, Changes] | tuple[Any, ...], Field(min_length=1)]] = {}
-    """what varies: a dotted key with a list of values, or a name with cells: {label: {key: value, ...}}"""
+    """what varies: a dotted key with a list of values, or a name with cells: {label: {key: value,
+    ...}}"""
     seeds: Annotated[int, Field(ge=0, le=10_000)] = 10
     """number of seeds, from 1"""
 
@@ -225,7 +234,8 @@ class StudySettings(Settings):
 
 
 def cell_settings(study: StudySettings, path: Path, extra: Changes | None = None) -> dict[str, FitSettings]:
-    """Return the settings of a fit of every cell, with `extra` ones replaced, by the cell's name."""
+    """Return the settings of a fit of every cell, with `extra` ones replaced,
+    by the cell's name."""
     config = find_config(study.base, path.parent)
     try:
         return {

@@ -1,4 +1,5 @@
-"""How the columns of a log become commands [%] and joint angles [rad]. The defaults fit the shipped logs.
+"""How the columns of a log become commands [%] and joint angles [rad].
+The defaults fit the shipped logs.
 
 log:
   time: {column: t, unit: ms}
@@ -49,15 +50,17 @@ class TimeColumn(Settings):
 
 
 class Columns(Settings):
-    """Columns of one quantity: value = scale · cell + offset. Null: as for all joints, or the default."""
+    """Columns of one quantity: value = scale · cell + offset. Null: as for all joints,
+    or the default."""
 
     column: Annotated[tuple[Name, ...] | None, BeforeValidator(_one_or_more)] = None
-    """name in the header, with {joint} for the joint's number; or two names: the positive and the negative
-    direction of a command, whose values lie in [0, 100] % and are subtracted; chamber A, which pushes to
-    positive angles, and chamber B of a pressure. Default: u{joint}_pct, q{joint}_deg, [pA{joint}_bar,
-    pB{joint}_bar]"""
+    """name in the header, with {joint} for the joint's number; or two names: the positive and the
+    negative direction of a command, whose values lie in [0, 100] % and are subtracted; chamber A,
+    which pushes to positive angles, and chamber B of a pressure. Default: u{joint}_pct,
+    q{joint}_deg, [pA{joint}_bar, pB{joint}_bar]"""
     unit: Literal["%", "deg", "rad", "m", "cm", "mm", "bar", "Pa", "MPa"] | None = None
-    """unit of the scaled cells, of the angle of a joint that slides m, cm or mm; default: %, deg, bar"""
+    """unit of the scaled cells, of the angle of a joint that slides m, cm or mm; default: %, deg,
+    bar"""
     scale: Annotated[Number | None, AfterValidator(_nonzero)] = None
     """factor on the cells; default: 1"""
     offset: Number | None = None
@@ -135,15 +138,17 @@ class LogSettings(Settings):
     groups: dict[
         Annotated[str, Field(pattern=r"^\w+$")], Annotated[tuple[Name, ...], BeforeValidator(_one_or_more)]
     ] = {}
-    """logs that share a day, an oil temperature or an operator, by a name of your choice: a pattern of file
-    names, or several, as in {monday: mon_*.csv}. Parameters may have an effect in each (`per: group`)"""
+    """logs that share a day, an oil temperature or an operator, by a name of your choice: a pattern
+    of file names, or several, as in {monday: mon_*.csv}.
+    Parameters may have an effect in each (`per: group`)"""
     repair_s: Annotated[float, Field(ge=0, le=10)] = 0.1
     """longest gap that --repair fills [s]"""
 
     _prefix: str = PrivateAttr("")
 
     def columns(self, kind: Kind, joint: int) -> ColumnMap | None:
-        """Return the columns of a joint (number, from 1), its number in their names; None: not in the log."""
+        """Return the columns of a joint (number, from 1), its number in their names; None:
+        not in the log."""
         common: Columns | None = getattr(self, kind)
         own: Columns | None = getattr(self.joints.get(joint, JointColumns()), kind, None)
         if own is None or (common is None and own == Columns()):
@@ -166,13 +171,15 @@ class LogSettings(Settings):
         return of[0] if of else OTHER
 
     def of_arm(self, side: str) -> "LogSettings":
-        """Return the columns of one of two arms: their names begin with its own; the time's is common."""
+        """Return the columns of one of two arms: their names begin with its own;
+        the time's is common."""
         copy = self.model_copy()
         copy._prefix = f"{side}_"
         return copy
 
     def angles_only(self) -> "LogSettings":
-        """Return the columns of a trajectory: whatever commands and pressures it holds are not read."""
+        """Return the columns of a trajectory: whatever commands and pressures it holds
+        are not read."""
         nothing = {"command": None, "pressure": None}
         joints = {joint: own and own.changed(nothing) for joint, own in self.joints.items()}
         return self.changed(nothing | {"joints": joints})

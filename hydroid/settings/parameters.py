@@ -1,4 +1,5 @@
-"""From the settings of parameters to parameters: one per joint, nominal values, priors, bounds and starts."""
+"""From the settings of parameters to parameters: one per joint, nominal values, priors,
+bounds and starts."""
 
 import math
 import re
@@ -22,11 +23,12 @@ GROUP = "group"
 
 
 def expanded(parameters: Mapping[str, Any], compared: Any, arm: Arm | None) -> Plain:
-    """Return the settings of parameters, as YAML gives them, with one entry for each joint or link of `each`.
+    """Return the settings of parameters, as YAML gives them,
+    with one entry for each joint or link of `each`.
 
-    `compared` are the joints that `each: true` means; of masses it means all links. With one joint a
-    mechanical parameter serves all joints, because those that are driven but not compared need it too.
-    Raises ValueError: a parameter with `joints` or `link` and `each`.
+    `compared` are the joints that `each: true` means; of masses it means all links. With one joint
+    a mechanical parameter serves all joints, because those that are driven but not compared need it
+    too. Raises ValueError: a parameter with `joints` or `link` and `each`.
     """
     result: Plain = {}
     for name, entry in parameters.items():
@@ -57,7 +59,8 @@ def expanded(parameters: Mapping[str, Any], compared: Any, arm: Arm | None) -> P
         taken = set[str]()
         for place in places:
             label = names.get(place, place)
-            own = distinct(re.sub(r"\W", "_", f"{name}_{label}"), taken)  # --set splits names at dots
+            # --set splits names at dots
+            own = distinct(re.sub(r"\W", "_", f"{name}_{label}"), taken)
             result[own] = shared | {key: place if key == "link" else [place]} | result.get(own, {})
     return result
 
@@ -73,7 +76,8 @@ def _refuse(joints: Any, where: str, names: Sequence[str]) -> None:
 
 
 def by_group(parameters: Mapping[str, Any], groups: Collection[str]) -> Plain:
-    """Return the settings of parameters with one entry for each group of `per: group`, and for other logs.
+    """Return the settings of parameters with one entry for each group of `per: group`,
+    and for other logs.
 
     Raises ValueError: there are no groups.
     """
@@ -94,7 +98,8 @@ def by_group(parameters: Mapping[str, Any], groups: Collection[str]) -> Plain:
 
 
 def nominal_value(arm: Arm, hydraulics: HydraulicSettings, own: ParameterSettings) -> float | None:
-    """Return what its settings, `hydraulics` or the arm's file say of a parameter; None: no one value."""
+    """Return what its settings, `hydraulics` or the arm's file say of a parameter; None:
+    no one value."""
     if own.nominal is not None or own.per is not None:
         return own.nominal or 0.0
     if own.link is not None:
@@ -112,7 +117,8 @@ def make_parameter(
     """Return one parameter with its bounds, prior and start.
 
     `log`: on a log scale where it is positive, as one with a log-normal prior always is.
-    Raises ValueError: a prior without a nominal value, or one that does not fit, with the parameter's name.
+    Raises ValueError: a prior without a nominal value, or one that does not fit,
+    with the parameter's name.
     """
     nominal = nominal_value(arm, hydraulics, own)
     prior = _prior(name, own, nominal)
@@ -155,7 +161,8 @@ def _default_bounds(own: ParameterSettings, prior: Prior | None) -> tuple[float,
 
 
 def _unit(arm: Arm, own: ParameterSettings) -> str:
-    """The unit of a parameter; joints that slide, and rotary actuators that turn, have their own."""
+    """The unit of a parameter; joints that slide, and rotary actuators that turn,
+    have their own."""
     sliding = bool(own.joints) and {*own.joints} <= {*arm.slides}
     if own.quantity in MECHANICAL and sliding:
         return own.unit.replace("N·m", "N").replace("rad", "m")
@@ -166,5 +173,6 @@ def _unit(arm: Arm, own: ParameterSettings) -> str:
 
 
 def _actuators(arm: Arm, own: ParameterSettings) -> list[Actuator | None]:
-    """What moves the joints that a parameter acts on; joints that the arm lacks are refused elsewhere."""
+    """What moves the joints that a parameter acts on;
+    joints that the arm lacks are refused elsewhere."""
     return [joint.actuator for j, joint in enumerate(arm.joints, 1) if own.joints is None or j in own.joints]

@@ -85,11 +85,13 @@ KINDS = {
 
 
 def _checked(columns: Columns | None, info: ValidationInfo) -> Columns | None:
+    if columns is None:
+        return None
     kind = str(info.field_name)
     _, counts, units = KINDS[kind]
-    if columns and columns.unit not in (None, *units):
+    if columns.unit not in (None, *units):
         raise ValueError(f"{columns.unit} is no unit of a log's {kind}s")
-    if columns and columns.column and len(columns.column) not in counts:
+    if columns.column and len(columns.column) not in counts:
         raise ValueError(f"{kind} needs {' or '.join(map(str, counts))} column names")
     return columns
 
@@ -109,7 +111,9 @@ class JointColumns(Settings):
 
 
 def _common(columns: Columns | None) -> Columns | None:
-    for name in (columns and columns.column) or ():
+    if columns is None:
+        return None
+    for name in columns.column or ():
         if JOINT not in name:
             raise ValueError(f"column {name!r} is meant for all joints, so its name must contain {JOINT}")
     return columns
@@ -147,28 +151,37 @@ class LogSettings(Settings):
     _prefix: str = PrivateAttr("")
 
     def columns(self, kind: Kind, joint: int) -> ColumnMap | None:
-        """Return the columns of a joint (number, from 1), its number in their names; None:
-        not in the log."""
+        """Return the columns of a joint (number, from 1), its number in their names; None: not in
+        the log."""
         common: Columns | None = getattr(self, kind)
-        own: Columns | None = getattr(self.joints.get(joint, JointColumns()), kind, None)
-        if own is None or (common is None and own == Columns()):
+        of_joint = self.joints.get(joint, JointColumns())
+        own: Columns | None = getattr(of_joint, kind, None)
+        if own is None:
             return None
-        default, _, (unit, *_) = KINDS[kind]
-        given: Plain = {"column": default, "unit": unit}
-        for columns in filter(None, (common, own)):
-            given |= columns.model_dump(exclude_none=True)
-        names = tuple(self._prefix + name.replace(JOINT, str(joint)) for name in given.pop("column"))
+        if common is None and own == Columns():
+            return None
+        names, _, (unit, *_) = KINDS[kind]
+        given: Plain = {"column": names, "unit": unit}
+        if common is not None:
+            given |= common.model_dump(exclude_none=True)
+        given |= own.model_dump(exclude_none=True)
+        templates = given.pop("column")
+        names = tuple(self._prefix + name.replace(JOINT, str(joint)) for name in templates)
         return ColumnMap(names, **given)
 
     def group_of(self, log: str) -> str:
         """Return the group of a log by its file's name.
+
         Raises SettingsError: it is in several.
         """
         name = Path(log).name
-        of = [group for group, patterns in self.groups.items() for p in patterns if fnmatch(name, p)]
-        if len({*of}) > 1:
-            raise SettingsError(f"{name} is in the groups {listed(of)}", "log.groups")
-        return of[0] if of else OTHER
+        found = list[str]()
+        for group, patterns in self.groups.items():
+            if any(fnmatch(name, pattern) for pattern in patterns):
+                found.append(group)
+        if len(found) > 1:
+            raise SettingsError(f"{name} is in the groups {listed(found)}", "log.groups")
+        return found[0] if found else OTHER
 
     def of_arm(self, side: str) -> "LogSettings":
         """Return the columns of one of two arms: their names begin with its own;

@@ -112,8 +112,9 @@ class ParameterSettings(Settings):
             limit = f"below {least:g}" if least else "negative"
             raise ValueError(f"a {self.quantity} cannot be {limit}")
         for name, value in inside_bounds.items():
-            if value is not None and not lower <= value <= upper:
-                raise ValueError(f"{name} {value:g} lies outside the bounds")
+            if value is None or lower <= value <= upper:
+                continue
+            raise ValueError(f"{name} {value:g} lies outside the bounds")
 
     @property
     def unit(self) -> str:

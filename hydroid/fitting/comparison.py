@@ -42,8 +42,8 @@ def in_blocks(errors: Array, between: float) -> list[Array]:
 
 
 def compare(ours: Sequence[Array], theirs: Sequence[Array]) -> Comparison:
-    """Compare errors [rad] of a fit with those of a simple model, in the same blocks,
-    each of shape (n,).
+    """Compare errors [rad] of a fit with those of a simple model, in the same blocks, each of shape
+    (n,).
 
     An infinite error stands for a simulation that diverged. A fit that diverges is worse.
     """
@@ -52,15 +52,16 @@ def compare(ours: Sequence[Array], theirs: Sequence[Array]) -> Comparison:
         return Comparison(outcome=Outcome.WORSE, blocks=blocks)
     if blocks == 0:
         return Comparison(outcome=Outcome.UNTOLD)
-    degree = np.degrees(1.0)
-    differences = [degree**2 * (a**2 - b**2) for a, b in zip(ours, theirs, strict=True)]
+    to_deg2 = np.degrees(1.0) ** 2
+    differences = [to_deg2 * (a**2 - b**2) for a, b in zip(ours, theirs, strict=True)]
     count = sum(map(len, differences))
     mean = sum(float(block.sum()) for block in differences) / count
     if blocks < 2:
         return Comparison(outcome=Outcome.UNTOLD, difference_deg2=mean, blocks=blocks)
-    off = np.array([np.sum(block - mean) for block in differences])
-    sd = float(np.sqrt(blocks / (blocks - 1) * np.sum(off**2)) / count)
+    sums = np.array([np.sum(block - mean) for block in differences])
+    sd = float(np.sqrt(blocks / (blocks - 1) * np.sum(sums**2)) / count)
+    quantile = float(student.ppf(ONE_SIDED, blocks - 1))
     outcome = Outcome.UNTOLD
-    if blocks >= LEAST_BLOCKS and abs(mean) > float(student.ppf(ONE_SIDED, blocks - 1)) * sd:
+    if blocks >= LEAST_BLOCKS and abs(mean) > quantile * sd:
         outcome = Outcome.BETTER if mean < 0 else Outcome.WORSE
     return Comparison(outcome=outcome, difference_deg2=mean, sd_deg2=sd, blocks=blocks)

@@ -16,10 +16,10 @@ class ParameterSettings(Settings):
     or the value it is held at.
 
     parameters:
-      A_A: {quantity: area_a, joints: [2], within: 2}                  # around the value of the arm's file
-      M3:  {quantity: mass, link: link3, nominal: 20, sd: 1}           # weighed
-      D:   {quantity: damping, each: true, bounds: [20, 5000]}         # D_boom, D_arm, ... of compared joints
-      M:   {quantity: mass, each: true, within: 2}                     # M_link1, M_link2, ... of all links
+      A_A: {quantity: area_a, joints: [2], within: 2}           # around the value of the arm's file
+      M3:  {quantity: mass, link: link3, nominal: 20, sd: 1}    # weighed
+      D:   {quantity: damping, each: true, bounds: [20, 5000]}  # D_boom, ... of compared joints
+      M:   {quantity: mass, each: true, within: 2}              # M_link1, M_link2, ... of all links
     """
 
     quantity: str

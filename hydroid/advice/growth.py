@@ -82,9 +82,9 @@ class Explained:
 def explained(problem: Problem, known: Uncertainty) -> Explained:
     """Return what a fit has explained at an estimate. Parameters at bounds are held."""
     linear = known.linear
+    of_priors = problem.priors.scores(known.theta[None])[0]
     weak = np.zeros(len(linear.slopes))  # the estimate does not depend on the weak priors
-    left = np.concatenate([linear.innovations, problem.priors.scores(known.theta[None])[0], weak])
-    return Explained(linear.effects, left)
+    return Explained(linear.effects, np.concatenate([linear.innovations, of_priors, weak]))
 
 
 def holm(chances: Sequence[float], level: float) -> Mask:
@@ -130,11 +130,15 @@ class Candidate:
 
 def score_terms(problem: Problem, known: Uncertainty, progress: Progress) -> list[Candidate]:
     """Test every term of a problem at an estimate; those that the logs cannot show are left out."""
-    every, fit, tests = terms(problem, known.theta), explained(problem, known), list[Candidate]()
+    every = terms(problem, known.theta)
+    fit = explained(problem, known)
+    candidates = list[Candidate]()
     for done, term in enumerate(every):
         progress("terms", done, len(every))
-        tests += _tested(term, known, fit)
-    return tests
+        candidate = _tested(term, known, fit)
+        if candidate is not None:
+            candidates.append(candidate)
+    return candidates
 
 
 def promising(tests: Sequence[Candidate]) -> list[Candidate]:
@@ -143,36 +147,55 @@ def promising(tests: Sequence[Candidate]) -> list[Candidate]:
 
     Of one quantity of one joint only the best: a side, or both.
     """
-    significant, best = holm([one.chance for one in tests], LEVEL), dict[object, Candidate]()
-    for one, holds in sorted(zip(tests, significant, strict=True), key=lambda pair: -pair[0].gain):
-        if holds and one.gain >= MIN_GAIN:
-            best.setdefault(one.term.kind, one)
+    significant = holm([candidate.chance for candidate in tests], LEVEL)
+    kept = [
+        candidate
+        for candidate, holds in zip(tests, significant, strict=True)
+        if holds and candidate.gain >= MIN_GAIN
+    ]
+    best = dict[object, Candidate]()
+    for candidate in sorted(kept, key=lambda candidate: -candidate.gain):
+        best.setdefault(candidate.term.kind, candidate)
     return list(best.values())
 
 
-def _tested(term: Term, known: Uncertainty, fit: Explained) -> list[Candidate]:
-    """Test one term by the largest change whose effect is small, a limit by each that acts."""
-    (low, high), limit = term.span, math.isinf(term.value)
-    end = high if high - term.value >= term.value - low else low
-    parts = np.zeros(16) if limit else 4.0 ** np.arange(-5.0, 1.0)
-    values = np.geomspace(high, low, 16) if limit else term.value + parts * (end - term.value)
-    likelihood = known.likelihood
-    effects = term.innovations(likelihood, known.theta, values.tolist()) - known.linear.innovations
+def _tested(term: Term, known: Uncertainty, fit: Explained) -> Candidate | None:
+    """Test one term by the largest change whose effect is small, a limit by each that acts.
+
+    None: the logs cannot show it.
+    """
+    low, high = term.span
+    is_limit = math.isinf(term.value)
+    if is_limit:
+        values = np.geomspace(high, low, 16)
+        parts = np.zeros(16)
+    else:
+        end = high if high - term.value >= term.value - low else low
+        parts = 4.0 ** np.arange(-5.0, 1.0)
+        values = term.value + parts * (end - term.value)
+    innovations = term.innovations(known.likelihood, known.theta, values.tolist())
+    effects = innovations - known.linear.innovations
     sizes = rms(effects, axis=1)
     acting = np.flatnonzero(np.isfinite(sizes) & (sizes > 0))
-    if not limit:
-        acting = acting[: max(np.sum(sizes[acting] <= LARGEST_EFFECT), 1)][-1:]
-    one_sided = limit or term.value in term.span
-    scores = list[tuple[float, Score, float]]()
+    if not is_limit:
+        small = np.sum(sizes[acting] <= LARGEST_EFFECT)
+        acting = acting[: max(small, 1)][-1:]
+    one_sided = is_limit or term.value in term.span
+    tried = list[tuple[float, Score, float]]()  # gain, score, and where a refinement starts
     for i in acting:
         score = fit.score(effects[i])
-        if score.strength >= VISIBLE * parts[i]:
-            gain = 0.0 if one_sided and score.statistic <= 0 else score.gain
-            away = values[i] - term.value
-            start = values[i] if limit else term.value + np.copysign(away, away * score.amount)
-            scores.append((gain, score, np.clip(start, low, high)))
-    if not scores:
-        return []
-    gain, score, start = max(scores, key=lambda one: one[0])
-    chance = min(len(scores) * score.chance(one_sided=one_sided), 1.0)
-    return [Candidate(term, start, score.statistic if one_sided else abs(score.statistic), chance, gain)]
+        if score.strength < VISIBLE * parts[i]:
+            continue
+        gain = 0.0 if one_sided and score.statistic <= 0 else score.gain
+        start = values[i]
+        if not is_limit:
+            change = values[i] - term.value
+            start = term.value + np.copysign(change, change * score.amount)
+        tried.append((gain, score, np.clip(start, low, high)))
+    if not tried:
+        return None
+    gain, score, start = max(tried, key=lambda trial: trial[0])
+    # as many limits as were tried may each look significant by chance (C. E. Bonferroni)
+    chance = min(len(tried) * score.chance(one_sided=one_sided), 1.0)
+    statistic = score.statistic if one_sided else abs(score.statistic)
+    return Candidate(term, start, statistic, chance, gain)

@@ -167,8 +167,9 @@ def _possible_poses(settings: FitSettings) -> Array:
     inside = (poses >= arm.lower + margin) & (poses <= arm.upper - margin)
     possible = poses[inside[:, moving].all(axis=1)]
     if not len(possible) and limits.poses != "any":
+        within = f"{limits.margin_deg:g} deg inside the ranges of what moves"
         raise SettingsError(
-            f"no pose of {', '.join(names)} is {limits.margin_deg:g} deg inside the ranges of what moves",
+            f"no pose of {', '.join(names)} is {within}",
             "design.poses",
             "add one to the arm's file, reduce design.margin_deg, or set design.poses=any",
         )

@@ -131,12 +131,12 @@ def _test(
     """Test a fit on logs that were read with its settings."""
     from hydroid.fitting.validation import predicted
     from hydroid.fitting.verdict import judge
-    from hydroid.run.record import fitted_by
+    from hydroid.run.record import record_of
 
-    if isinstance(source, str | Path | IdentifiedModel):
-        fitted, baselines = fitted_by(model)
-    else:  # a fit in memory
-        fitted, baselines = source.predictions, source.baselines
+    in_memory = not isinstance(source, str | Path | IdentifiedModel)
+    record = source.record if in_memory else record_of(model)
+    fitted = record.fitted if record else ()
+    baselines = record.baselines if record else {}
     fitted_logs = [prediction.log for prediction in fitted]
     predictions = list["Prediction"]()
     for log in logs:

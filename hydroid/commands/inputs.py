@@ -57,7 +57,7 @@ SHARED = f"""
     pose (NAME): The start pose, by its name in the arm's file [default: the first angles of the
         log].
 
-    algorithm (NAME): Search: ga, nsga2 or multistart.
+    algorithm (NAME): Search: ga, nsga2, multistart or pymoo (search.pymoo).
     start (RUN|YAML): Start the search from the values of an estimate.
     resume: Continue the stopped run in --out; start it if there is none.
     refinement: After the search, refine its estimate by least squares.

@@ -46,6 +46,20 @@ class ParetoSettings(GeneticSettings):
     mutation_rate: Rate = 0.2
 
 
+class PymooSettings(Settings):
+    """A multi-objective algorithm of the package pymoo, beside NSGA-II (ours; not in the article).
+
+    It needs `pip install 'hydroid[moo]'`.
+    """
+
+    algorithm: Literal["moead", "mopso-cd", "nsga3", "spea2"] = "moead"
+    """moead: MOEA/D, by decomposition; mopso-cd: a particle swarm; nsga3: NSGA-III; spea2: SPEA2"""
+    population: Population = 20
+    """number of candidates in a population"""
+    generations: Generations = 140
+    """number of populations after the first one"""
+
+
 class RefinementSettings(Settings):
     """The refinement: bounded least squares that start from the search's estimate (ours; not in the
     article)."""
@@ -79,7 +93,7 @@ class MultistartSettings(RefinementSettings):
 class SearchSettings(Settings):
     """The search: its algorithm, its seed, and how one estimate is taken from a Pareto set."""
 
-    algorithm: Literal["ga", "nsga2", "multistart"] = "nsga2"
+    algorithm: Literal["ga", "nsga2", "multistart", "pymoo"] = "nsga2"
     """the search algorithm; its settings stand under the same name"""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 1
     """seed of all random numbers"""
@@ -91,6 +105,7 @@ class SearchSettings(Settings):
     nsga2: ParetoSettings = ParetoSettings()
     """the multi-objective genetic algorithm NSGA-II, article 4.2"""
     multistart: MultistartSettings = MultistartSettings()
+    pymoo: PymooSettings = PymooSettings()
 
 
 class DesignSettings(Settings):

@@ -5,8 +5,8 @@ A chromosome is a row of genes; each element of equation (23), one parameter, ow
 Both codings divide a parameter's range into the same 65,535 steps, ends included.
 
 - Gray: the article's multivariable binary string. An element is 16 bits, highest first, in Gray
-code:
-  neighbouring values differ in one bit, so a flipped bit or a cut through an element need not jump.
+  code: neighbouring values differ in one bit, so a flipped bit or a cut through an element need not
+  jump.
 - Integer: an element is one number from 0 to 65,535; operators never cut through a parameter.
 
 The operators work on whole populations, leave their arguments alone,
@@ -40,8 +40,9 @@ class GrayCoding:
         return rng.integers(0, 2, (n, self.parameters * BITS), dtype=np.uint8)
 
     def decode(self, chromosomes: Genes) -> Array:
-        """Points of the unit box, shape (n, parameters)."""
-        bits = np.bitwise_xor.accumulate(chromosomes.reshape(-1, self.parameters, BITS), axis=-1)
+        """Return points of the unit box, shape (n, parameters)."""
+        gray = chromosomes.reshape(-1, self.parameters, BITS)
+        bits = np.bitwise_xor.accumulate(gray, axis=-1)
         return bits @ 2.0 ** np.arange(BITS - 1, -1, -1) / STEPS
 
     def encode(self, points: Array) -> Genes:
@@ -152,4 +153,5 @@ def mutate(chromosomes: Genes, rate: float, coding: Coding, rng: Generator) -> G
     or it is redrawn (integer).
     """
     hit = rng.random((len(chromosomes), coding.parameters)) < rate
-    return np.where(np.repeat(hit, coding.width, axis=1), coding.altered(chromosomes, rng), chromosomes)
+    hit_genes = np.repeat(hit, coding.width, axis=1)
+    return np.where(hit_genes, coding.altered(chromosomes, rng), chromosomes)

@@ -83,7 +83,7 @@ class Descent:
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Return arrays by name, to be stored; without the residual once it has ended."""
-        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
         values["ending"] = self.ending.name
         if self.ended:
             values["residual"] = []  # the Jacobian is where the uncertainty begins
@@ -92,7 +92,9 @@ class Descent:
     @classmethod
     def from_arrays(cls, arrays: dict[str, NDArray[Any]]) -> Self:
         """Return the descent that `arrays` stored."""
-        values: dict[str, Any] = {name: a if a.ndim else a.item() for name, a in arrays.items()}
+        values: dict[str, Any] = {}
+        for name, array in arrays.items():
+            values[name] = array if array.ndim else array.item()
         values["ending"] = Ending[values["ending"]]
         return cls(**values)
 
@@ -144,12 +146,14 @@ class LinearModel:
             return np.zeros_like(right)
         # in lengths of the columns and of the residual, in which the solver's tolerances mean
         # something
-        there, unit = self.at.point[self._moving], self.scale / size
+        unit = self.scale / size
+        point = self.at.point[self._moving]
         matrix = np.vstack([triangle / self.scale, np.sqrt(damping) * np.eye(len(unit))])
         target = np.append(-right / size, np.zeros(len(unit)))
-        limits = -there * unit, (1 - there) * unit
+        limits = (-point * unit, (1 - point) * unit)
         most = 20 * len(unit) + 20  # changes of the active set: far more than it takes
-        return lsq_linear(matrix, target, limits, method="bvls", tol=TOLERANCE, max_iter=most).x / unit
+        solved = lsq_linear(matrix, target, limits, method="bvls", tol=TOLERANCE, max_iter=most)
+        return solved.x / unit
 
     def gain(self, s: Array) -> float:
         """Part of the cost that the linear model promises to save by a step."""
@@ -176,7 +180,7 @@ def triangle(rows: Array) -> Array:
 
 
 def derivatives(residuals: Function, point: Array, row: Array) -> Array:
-    """Derivatives by each parameter at a point of the box, (p,), with its residuals, (R,):
+    """Return derivatives by each parameter at a point of the box, (p,), with its residuals, (R,):
     shape (p, R).
 
     They are 0 without effect. All differences are one batch. Those that fail are taken to the other
@@ -184,7 +188,8 @@ def derivatives(residuals: Function, point: Array, row: Array) -> Array:
     """
 
     def quotients(which: Ints, width: float) -> Array:
-        steps = np.where(point + abs(width) <= 1.0, width, -width)[which]
+        inwards = np.where(point + abs(width) <= 1.0, width, -width)
+        steps = inwards[which]
         points = np.tile(point, (len(which), 1))
         points[np.arange(len(which)), which] += steps
         with np.errstate(all="ignore"):
@@ -200,5 +205,6 @@ def derivatives(residuals: Function, point: Array, row: Array) -> Array:
         # a derivative does not depend on the step; rounding noise divided by a wider step becomes
         # smaller
         wider = np.linalg.norm(quotients(suspect, WIDER * WIDTH), axis=1)
-        columns[suspect[wider < 0.1 * length[suspect]]] = 0.0
+        noise = wider < 0.1 * length[suspect]
+        columns[suspect[noise]] = 0.0
     return columns

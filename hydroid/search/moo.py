@@ -2,8 +2,9 @@
 
 Those for several objectives: MOEA/D (Q. Zhang and H. Li, 2007), the particle swarm MOPSO-CD (C. R.
 Raquel and P. C. Naval, 2005), NSGA-III (K. Deb and H. Jain, 2014) and SPEA2 (E. Zitzler and others,
-2001), with pymoo's own rates. pymoo is an optional package. Its swarm CMOPSO is left out: in version
-0.6.2 it does not draw from the generator that it is given, so that no run of it can be continued.
+2001), with pymoo's own rates. pymoo is an optional package. Its swarm CMOPSO is left out: in
+version 0.6.2 it does not draw from the generator that it is given,
+so that no run of it can be continued.
 """
 
 from importlib import import_module

@@ -93,8 +93,8 @@ def average(points: Array, objectives: Array) -> Array:
 
 
 def utopia(points: Array, objectives: Array) -> Array:
-    """The candidate nearest to the utopia point F⁰, (p,), of a Pareto set of points, (n, p), by (n,
-    S).
+    """Return the candidate nearest to the utopia point F⁰, (p,), of a Pareto set of points, (n, p),
+    by (n, S).
 
     The article's criterion 1 is the sum of squares of F - F⁰. Segments in which the arm moves far
     would decide alone, so each objective is first divided by its range over the set;
@@ -102,9 +102,10 @@ def utopia(points: Array, objectives: Array) -> Array:
     """
     values = _ranked(objectives)
     usable = objectives[feasible(objectives)]
-    nearest, span = usable.min(axis=0), np.ptp(usable, axis=0)
-    distance = (((values - nearest) / np.where(span > 0, span, 1.0)) ** 2).sum(axis=1)
-    return points[distance.argmin()]
+    nearest = usable.min(axis=0)
+    span = np.ptp(usable, axis=0)
+    relative = (values - nearest) / np.where(span > 0, span, 1.0)
+    return points[(relative**2).sum(axis=1).argmin()]
 
 
 def _ranked(objectives: Array) -> Array:

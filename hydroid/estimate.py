@@ -80,7 +80,8 @@ class Covariance(Settings):
 
     @model_validator(mode="after")
     def _square(self) -> "Covariance":
-        if {len(self.parameters)} != {len(self.scale), len(self.root), *map(len, self.root)}:
+        sizes = {len(self.scale), len(self.root), *map(len, self.root)}
+        if sizes != {len(self.parameters)}:
             raise ValueError("root must have a row and a column, and scale a value, for each of parameters")
         return self
 
@@ -156,9 +157,13 @@ class AngleError(Settings):
     def numbers(self) -> tuple[float, ...]:
         """The numbers of the error model in rad and s."""
         degree = math.radians(1.0)
-        drifts = degree**2 * self.drift_per_s, degree * self.drift_per_way
-        lasting = (degree * self.lasting_deg) ** 2
-        return (degree * self.sensor_deg) ** 2, *drifts, lasting, self.lasting_s
+        return (
+            (degree * self.sensor_deg) ** 2,
+            degree**2 * self.drift_per_s,
+            degree * self.drift_per_way,
+            (degree * self.lasting_deg) ** 2,
+            self.lasting_s,
+        )
 
 
 class FitSummary(Settings):
@@ -225,22 +230,32 @@ def read_estimate(source: Path) -> tuple[Path, Plain, FitSummary | None]:
 
     Returned are the file, its values, unchecked where they are not an estimate's, and the estimate
     where there is one.
+
+    Raises:
+        RunError: a folder that holds no estimate. SettingsError: a file that is none.
     """
-    folder = os.path.isdir(source)  # Path's own raises for a name that no folder can have
-    file = source / NAME if folder else source
-    if folder and not is_file(file):
-        begun = is_file(source / DESCRIPTION)
-        hint = "resume the fit" if begun else "name a run folder, a folder of Plant.save or a YAML file"
-        raise RunError("holds no estimate" + (" yet" if begun else ""), source, hint)
+    file = _estimate_in(source) if os.path.isdir(source) else source
     content, lines = read_yaml(file)
     if "estimate" in content:
         summary = validate(content, FitSummary, str(file), lines)
         return file, summary.values, summary
     values = content.get("parameters", content)
-    if not isinstance(values, dict) or any(isinstance(value, dict) for value in values.values()):
+    is_flat = isinstance(values, dict) and not any(isinstance(v, dict) for v in values.values())
+    if not is_flat:
         hint = "give the run folder, its estimate.yaml, or a YAML file of `K: 0.2` lines"
         raise SettingsError("is no estimate", file, hint)
     return file, values, None
+
+
+def _estimate_in(folder: Path) -> Path:
+    """Return the file of the estimate in a folder."""
+    file = folder / NAME
+    if is_file(file):
+        return file
+    if is_file(folder / DESCRIPTION):
+        raise RunError("holds no estimate yet", folder, "resume the fit")
+    hint = "name a run folder, a folder of Plant.save or a YAML file"
+    raise RunError("holds no estimate", folder, hint)
 
 
 def finite_ends(interval: Array) -> Interval:
@@ -250,4 +265,6 @@ def finite_ends(interval: Array) -> Interval:
 
 def finite(value: float | None) -> float | None:
     """Return a number, or None where it is infinite or NaN, which JSON has no word for."""
-    return None if value is None or not math.isfinite(value) else float(value)
+    if value is None or not math.isfinite(value):
+        return None
+    return float(value)

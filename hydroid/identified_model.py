@@ -11,12 +11,15 @@ from typing import Any
 from hydroid.arrays import Array, record
 from hydroid.errors import RunError
 from hydroid.estimate import DESCRIPTION, NAME, FitSummary, ParameterEstimate, read_estimate
-from hydroid.files import find_config, is_file, read_file, write_atomic, yaml_text
+from hydroid.files import Plain, find_config, is_file, read_file, write_atomic, yaml_text
 from hydroid.progress import LOGGER
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load
+from hydroid.settings.problem import ParameterSettings
 
-CONFIG, ARM, MODEL = "config.yaml", "arm.yaml", "model/arm.xml"
+CONFIG = "config.yaml"
+ARM = "arm.yaml"
+MODEL = "model/arm.xml"
 """the files of a folder that `load_identified` reads, beside the estimate"""
 PAIR = "model/pair.xml"  # the machine of two arms
 
@@ -104,33 +107,49 @@ def read_identified(
     nominal: bool = False,
 ) -> IdentifiedModel:
     """Read as `load_identified` does, without a word on what was changed."""
-    file, values, summary = (None, {}, None) if source is None else read_estimate(Path(source))
-    beside = file and file.parent / CONFIG
-    if beside and is_file(beside):
-        own = beside
-    elif summary is None or config is not None:
-        own = "fit-hyd" if nominal else "fit-mech"
-    else:
-        what = f"is missing, and {NAME} says nothing without the settings of its fit"
-        raise RunError(what, beside, "put it back, or name the run folder")
-    chosen = config or own
+    file: Path | None = None
+    values: Plain = {}
+    summary: FitSummary | None = None
+    if source is not None:
+        file, values, summary = read_estimate(Path(source))
+    chosen = config
+    if chosen is None:
+        chosen = _config_beside(file, summary, nominal=nominal)
     settings = load(find_config(chosen), FitSettings, overrides)
     if config is None and summary is not None:
         settings = settings.of_estimate(summary.final)
-    missing = [n for n, p in settings.parameters.items() if n not in values and p.fixed is None]
+    missing = list[str]()
+    stated = dict[str, ParameterSettings]()
+    for name, parameter in settings.parameters.items():
+        if name in values or parameter.fixed is not None:
+            stated[name] = parameter
+        else:
+            missing.append(name)
     if nominal and missing:
-        known = {n: p for n, p in settings.parameters.items() if n not in missing}
-        settings = settings.changed({"parameters": known})
+        settings = settings.changed({"parameters": stated})
     origin = str(file or chosen)
     theta = settings.parameter_set().vector(values, origin)
     return IdentifiedModel(settings, theta, origin, summary, tuple(missing))
+
+
+def _config_beside(file: Path | None, summary: FitSummary | None, *, nominal: bool) -> str | Path:
+    """Return the settings that an estimate belongs to: those in its folder, or shipped ones."""
+    if file is not None:
+        beside = file.parent / CONFIG
+        if is_file(beside):
+            return beside
+        if summary is not None:
+            what = f"is missing, and {NAME} says nothing without the settings of its fit"
+            raise RunError(what, beside, "put it back, or name the run folder")
+    return "fit-hyd" if nominal else "fit-mech"
 
 
 def own_hashes(folder: Path) -> dict[str, str]:
     """Return hashes of the settings and the model in a run folder, by file."""
     files = [folder / name for name in (CONFIG, ARM, MODEL)]
     files += sorted((folder / MODEL).parent.glob("meshes/*"))
-    return {f.relative_to(folder).as_posix(): file_hash(f) for f in files if f.is_file()}
+    present = filter(Path.is_file, files)
+    return {file.relative_to(folder).as_posix(): file_hash(file) for file in present}
 
 
 def warn_of_changes(source: Path) -> None:
@@ -147,11 +166,13 @@ def changed_files(folder: Path) -> list[str]:
     none of a folder that is no run's."""
     try:
         run = json.loads(read_file(folder / DESCRIPTION))
-        written = {**run["files"]} | ({NAME: run["estimate"]} if "estimate" in run else {})
+        written = dict(run["files"])
+        if "estimate" in run:
+            written[NAME] = run["estimate"]
     except (OSError, ValueError, RecursionError, KeyError, TypeError):
         return []  # whoever needs the description says what is wrong with it
-    there = own_hashes(folder) | {NAME: file_hash(folder / NAME)}
-    return [name for name, known in written.items() if there.get(name) != known]
+    present = own_hashes(folder) | {NAME: file_hash(folder / NAME)}
+    return [name for name, stored in written.items() if present.get(name) != stored]
 
 
 def file_hash(*files: Path) -> str:

@@ -7,7 +7,6 @@ contacts are off, as in every simulation.
 """
 
 import math
-from itertools import chain
 from pathlib import Path
 
 import mujoco
@@ -49,33 +48,31 @@ def locked_spec(
     (2, V); shape (2, 0): no motors.
     """
     source = spec.copy()
-    forces = source.actuators, source.sensors, source.equalities, source.keys, source.excludes, source.pairs
-    for part in [*chain(*forces, source.flexes, source.skins)]:
+    forces = [*source.actuators, *source.sensors, *source.equalities]
+    others = [*source.keys, *source.excludes, *source.pairs, *source.flexes, *source.skins]
+    for part in forces + others:
         source.delete(part)
     _draw_tendons(source)
     for name, (position, turn) in locked.held.items():
         body = source.body(name)
         body.set_frame(body.parent.add_frame())  # its own one is part of the place
-        body.pos, body.quat, body.alt.type = position, turn, mujoco.mjtOrientation.mjORIENTATION_QUAT
+        body.pos = position
+        body.quat = turn
+        body.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
         source.delete(body.first_joint())
     source.fuse_static()
+    # inertias stand in the file to the last bit, and nothing is to change them
     compiler = source.compiler
     compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
-    compiler.balanceinertia, compiler.boundmass, compiler.boundinertia = False, 0.0, 0.0
-    compiler.settotalmass, compiler.fusestatic = -1.0, False
+    compiler.balanceinertia = False
+    compiler.boundmass = compiler.boundinertia = 0.0
+    compiler.settotalmass = -1.0
+    compiler.fusestatic = False
     source.option.timestep = model.opt.timestep
     source.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
-    for j, joint in enumerate(map(source.joint, locked.joints)):
-        body, k, slack = joint.parent, model.jnt_bodyid[j], model.qpos_spring[j]
-        body.explicitinertial, body.mass, body.ipos = True, model.body_mass[k], model.body_ipos[k]
-        body.iquat, body.ialt.type = model.body_iquat[k], mujoco.mjtOrientation.mjORIENTATION_QUAT
-        body.inertia, body.fullinertia = model.body_inertia[k], [np.nan, 0, 0, 0, 0, 0]
-        joint.damping, joint.stiffness = [model.dof_damping[j], 0, 0], [model.jnt_stiffness[j], 0, 0]
-        joint.frictionloss, joint.armature = model.dof_frictionloss[j], model.dof_armature[j]
-        # a URDF's effort is of another motor
-        joint.actfrclimited = mujoco.mjtLimited.mjLIMITED_FALSE
-        turns = joint.type == mujoco.mjtJoint.mjJNT_HINGE
-        joint.springref = math.degrees(slack) if compiler.degree and turns else slack
+    for number, joint in enumerate(map(source.joint, locked.joints)):
+        _take_inertia(joint.parent, model, model.jnt_bodyid[number])
+        _take_joint(joint, model, number, in_degrees=bool(compiler.degree))
     for name, gain, bias in zip(locked.joints, *motors, strict=False):
         source.add_actuator(
             name=name,
@@ -89,6 +86,30 @@ def locked_spec(
         )
     source.add_key(name="start", qpos=model.qpos_spring)
     return source
+
+
+def _take_inertia(body: mujoco.MjsBody, model: mujoco.MjModel, number: int) -> None:
+    """Give a body what one of a model weighs."""
+    body.explicitinertial = True
+    body.mass = model.body_mass[number]
+    body.ipos = model.body_ipos[number]
+    body.iquat = model.body_iquat[number]
+    body.ialt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
+    body.inertia = model.body_inertia[number]
+    body.fullinertia = [np.nan, 0, 0, 0, 0, 0]  # MuJoCo's word for one that is not given
+
+
+def _take_joint(joint: mujoco.MjsJoint, model: mujoco.MjModel, number: int, *, in_degrees: bool) -> None:
+    """Give a joint the damper, spring and friction of one of a model."""
+    joint.damping = [model.dof_damping[number], 0, 0]
+    joint.stiffness = [model.jnt_stiffness[number], 0, 0]
+    joint.frictionloss = model.dof_frictionloss[number]
+    joint.armature = model.dof_armature[number]
+    # a URDF's effort is of another motor
+    joint.actfrclimited = mujoco.mjtLimited.mjLIMITED_FALSE
+    rest = model.qpos_spring[number]
+    turns = joint.type == mujoco.mjtJoint.mjJNT_HINGE
+    joint.springref = math.degrees(rest) if in_degrees and turns else rest
 
 
 def _draw_tendons(spec: mujoco.MjSpec) -> None:

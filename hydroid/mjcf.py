@@ -16,7 +16,10 @@ from hydroid.robot_xml import read_robot
 
 def read_mjcf(path: Path) -> mujoco.MjSpec:
     """Read an MJCF whose joints turn or slide, each alone on its body,
-    and whose numbers are finite."""
+    and whose numbers are finite.
+
+    Raises ModelError: it is another one, or has what hydroid does not simulate.
+    """
     if not is_file(path):
         raise ModelError("no such model", path)
     read_robot(path)  # MuJoCo takes a NaN for what it likes
@@ -24,50 +27,75 @@ def read_mjcf(path: Path) -> mujoco.MjSpec:
         spec = mujoco.MjSpec.from_file(str(path))
     if not spec.joints:
         raise ModelError("has no joint", path)
-    for joint in spec.joints:
-        if not joint.name or not joint.parent.name:
-            raise ModelError(f"joint {joint.name!r} of body {joint.parent.name!r}: both need a name", path)
-        kinds = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
-        if joint.type not in kinds or len(joint.parent.joints) > 1:
-            raise ModelError(f"joint {joint.name!r} must be a hinge or a slide, alone on its body", path)
-    if spec.equalities:
-        raise ModelError("has equality constraints, which hydroid does not simulate", path)
-    lifted = [body.name for body in spec.bodies if body.gravcomp]
-    if lifted:
-        what = f"body {lifted[0]!r} has gravcomp: hydroid does not simulate what takes its weight away"
-        raise ModelError(what, path, "take gravcomp out")
-    if spec.option.density or spec.option.viscosity:
-        raise ModelError("has a density or viscosity of the air, which hydroid does not simulate", path)
+    _refuse_joints(spec, path)
+    _refuse_forces(spec, path)
     for joint in spec.joints:
         if not np.isfinite(joint.range).all():  # both, or `read_robot` refuses it
-            joint.limited, joint.range = mujoco.mjtLimited.mjLIMITED_FALSE, [0.0, 0.0]
+            joint.limited = mujoco.mjtLimited.mjLIMITED_FALSE
+            joint.range = [0.0, 0.0]
     return spec
 
 
+def _refuse_joints(spec: mujoco.MjSpec, path: Path) -> None:
+    """Refuse joints without a name, of another kind, or several of one body."""
+    kinds = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
+    for joint in spec.joints:
+        body = joint.parent
+        if not joint.name or not body.name:
+            what = f"joint {joint.name!r} of body {body.name!r}: both need a name"
+            raise ModelError(what, path)
+        if joint.type not in kinds or len(body.joints) > 1:
+            what = f"joint {joint.name!r} must be a hinge or a slide, alone on its body"
+            raise ModelError(what, path)
+
+
+def _refuse_forces(spec: mujoco.MjSpec, path: Path) -> None:
+    """Refuse forces that hydroid does not simulate."""
+    if spec.equalities:
+        raise ModelError("has equality constraints, which hydroid does not simulate", path)
+    for body in spec.bodies:
+        if body.gravcomp:
+            what = f"body {body.name!r} has gravcomp: hydroid does not simulate what takes its weight away"
+            raise ModelError(what, path, "take gravcomp out")
+    if spec.option.density or spec.option.viscosity:
+        what = "has a density or viscosity of the air, which hydroid does not simulate"
+        raise ModelError(what, path)
+
+
 def copy_models(models: Mapping[str, Path], folder: Path) -> None:
-    """Write MJCFs by their new names, with their meshes, to a folder that stands alone."""
-    kept: dict[str, bytes] = {}
+    """Write MJCFs by their new names, with their meshes, to a folder that stands alone.
+
+    Raises RunError: a mesh cannot be read, or the folder cannot be written.
+    """
+    contents: dict[str, bytes] = {}  # of the meshes, by their new names
     for name, path in models.items():
-        spec, home = read_mjcf(path), path.resolve().parent
+        spec = read_mjcf(path)
+        home = path.resolve().parent
         for mesh in spec.meshes:
-            if not mesh.file:
-                continue  # its vertices stand in the MJCF
-            source = home / spec.meshdir / mesh.file
-            try:
-                content = source.read_bytes()
-            except OSError as error:
-                raise RunError(f"mesh cannot be read ({error.strerror})", source) from None
-            # meshes of different folders may have one name
-            taken = kept.get(source.name, content) != content
-            mesh.file = f"{len(kept)}_{source.name}" if taken else source.name
-            kept[mesh.file] = content
-            write_atomic(folder / "meshes" / mesh.file, content)
+            if mesh.file:  # else its vertices stand in the MJCF
+                mesh.file = _copied(home / spec.meshdir / mesh.file, folder, contents)
         for pictures, place in ((spec.textures, spec.texturedir), (spec.hfields, spec.meshdir)):
             for picture in pictures:
                 # these stay where they are
                 picture.file = picture.file and str(home / place / picture.file)
-        spec.modelfiledir, spec.meshdir = str(folder.resolve()), "meshes"
+        spec.modelfiledir = str(folder.resolve())
+        spec.meshdir = "meshes"
         write_atomic(folder / name, mjcf_text(spec))
+
+
+def _copied(source: Path, folder: Path, contents: dict[str, bytes]) -> str:
+    """Copy a mesh to a folder, and return its name there: meshes of different folders may have one
+    name."""
+    try:
+        content = source.read_bytes()
+    except OSError as error:
+        raise RunError(f"mesh cannot be read ({error.strerror})", source) from None
+    name = source.name
+    if contents.get(name, content) != content:
+        name = f"{len(contents)}_{name}"
+    contents[name] = content
+    write_atomic(folder / "meshes" / name, content)
+    return name
 
 
 def mjcf_text(spec: mujoco.MjSpec) -> str:

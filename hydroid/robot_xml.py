@@ -106,9 +106,14 @@ def _owned(root: ElementTree.Element) -> Iterator[tuple[str, ElementTree.Element
 def _check_names(root: ElementTree.Element, path: Path) -> None:
     """Refuse a name that two links or two joints share:
     what the file says of it is said of both."""
+    if root.tag == "robot":
+        elements = [*root]
+    else:
+        elements = list[ElementTree.Element]()
+        for tree in root.findall("worldbody"):
+            elements += tree.iter()
     seen = set[tuple[str, str]]()
-    trees = [root] if root.tag == "robot" else root.findall("worldbody")
-    for element in (one for tree in trees for one in (tree if tree is root else tree.iter())):
+    for element in elements:
         name = element.get("name", "")
         if element.tag not in OWN_NAMES or not name:
             continue
@@ -124,18 +129,26 @@ def _check_chains(root: ElementTree.Element, path: Path) -> None:
     """Refuse links of a URDF that carry themselves, and chains that no program should go along."""
     parents = dict[str, str]()
     for joint in root.iterfind("joint"):
-        ends = (joint.find(end) for end in ("child", "parent"))
-        child, parent = ("" if end is None else end.get("link", "") for end in ends)
+        child = _link(joint.find("child"))
+        parent = _link(joint.find("parent"))
         if child and parent:  # else MuJoCo refuses the joint
             parents[child] = parent
     for link in parents:
-        above, count = link, 0
+        above = link
+        count = 0
         while above in parents:
-            above, count = parents[above], count + 1
+            above = parents[above]
+            count += 1
             if above == link:
-                raise ModelError(f"link {link!r} is carried by itself", path, "correct parents and children")
+                what = f"link {link!r} is carried by itself"
+                raise ModelError(what, path, "correct parents and children")
             if count > DEEPEST:
                 raise ModelError(f"link {link!r} is carried by more than {DEEPEST} others", path)
+
+
+def _link(end: ElementTree.Element | None) -> str:
+    """Return the link that an end of a joint names; empty where there is none."""
+    return "" if end is None else end.get("link", "")
 
 
 def _check_copies(root: ElementTree.Element, path: Path) -> None:
@@ -154,8 +167,10 @@ def _check_copies(root: ElementTree.Element, path: Path) -> None:
 def _check_numbers(owner: str, element: ElementTree.Element, path: Path) -> None:
     for name in GEOMETRY.intersection(element.keys()):
         text = element.get(name, "")
-        numbers = [number for word in text.split() if (number := _number(word)) is not None]
-        if not all(abs(number) <= FARTHEST for number in numbers):  # neither is NaN
+        for number in map(_number, text.split()):
+            # False of NaN, too; words that are no numbers MuJoCo refuses
+            if number is None or abs(number) <= FARTHEST:
+                continue
             shown = f'{name}="{text[:60]}"'
             raise ModelError(f"{_place(owner, element)}: {shown} must be finite numbers", path)
 
@@ -163,23 +178,32 @@ def _check_numbers(owner: str, element: ElementTree.Element, path: Path) -> None
 def _check_limits(owner: str, element: ElementTree.Element, path: Path) -> None:
     """Refuse limits that are no numbers or reversed, and take infinite ones out:
     there are none then."""
-    low = high = None
-    if element.tag == "limit":
-        low, high = (_number(element.get(name, "0")) for name in ("lower", "upper"))
-    elif element.tag == "joint" and len(ends := element.get("range", "").split()) == 2:
-        low, high = map(_number, ends)
+    low, high = _limits(element)
     if low is None or high is None:
         return  # MuJoCo refuses what is no number
+    place = _place(owner, element)
     if math.isnan(low) or math.isnan(high):
-        raise ModelError(f"{_place(owner, element)}: a limit is no number", path)
+        raise ModelError(f"{place}: a limit is no number", path)
     if low > high:
-        raise ModelError(f"{_place(owner, element)}: lower {low:g} above upper {high:g}", path)
-    if math.isinf(low) and math.isinf(high):
+        raise ModelError(f"{place}: lower {low:g} above upper {high:g}", path)
+    infinite = (math.isinf(low), math.isinf(high))
+    if all(infinite):
         for name in ("lower", "upper", "range", "limited"):
             element.attrib.pop(name, None)
-    elif math.isinf(low) or math.isinf(high):
-        what = f"{_place(owner, element)}: one limit is infinite"
-        raise ModelError(what, path, "give both, or none: a joint without limits")
+    elif any(infinite):
+        hint = "give both, or none: a joint without limits"
+        raise ModelError(f"{place}: one limit is infinite", path, hint)
+
+
+def _limits(element: ElementTree.Element) -> tuple[float | None, float | None]:
+    """Return the limits that an element of a URDF or an MJCF states."""
+    if element.tag == "limit":
+        return _number(element.get("lower", "0")), _number(element.get("upper", "0"))
+    ends = element.get("range", "").split()
+    if element.tag == "joint" and len(ends) == 2:
+        low, high = map(_number, ends)
+        return low, high
+    return None, None
 
 
 def _place(owner: str, element: ElementTree.Element) -> str:

@@ -145,7 +145,7 @@ def run_study(
     finally:
         for future in futures:
             future.cancel()
-    return tuple(measured(task, results[file]) for task, file in zip(tasks, files, strict=True))
+    return tuple(map(measured, tasks, [results[file] for file in files]))
 
 
 def _ended(future: Future[Result], task: Task) -> tuple[Result, bool]:

@@ -37,11 +37,7 @@ def adapted(model: IdentifiedModel, free: Sequence[str], logs: Sequence[Log] = (
     Raises SettingsError: a name that is none of a parameter with bounds or a prior.
     """
     settings = model.settings
-    possible = [name for name, p in settings.parameters.items() if p.can_be_free]
-    for name in free:
-        if name not in possible:
-            what = f"no parameter {name!r} has bounds or a prior"
-            raise SettingsError(what, "--free", f"one of {', '.join(possible)}")
+    _refuse_unknown(free, settings)
     parameters: dict[str, ParameterSettings] = {}
     for name, parameter in settings.parameters.items():
         value = model.values[name]
@@ -65,6 +61,15 @@ def adapted(model: IdentifiedModel, free: Sequence[str], logs: Sequence[Log] = (
             "refinement": settings.refinement or RefinementSettings(),
         }
     )
+
+
+def _refuse_unknown(names: Sequence[str], settings: FitSettings) -> None:
+    """Refuse names of no parameter that could be free."""
+    possible = [name for name, p in settings.parameters.items() if p.can_be_free]
+    for name in names:
+        if name not in possible:
+            what = f"no parameter {name!r} has bounds or a prior"
+            raise SettingsError(what, "--free", f"one of {', '.join(possible)}")
 
 
 def steps(

@@ -143,26 +143,30 @@ def _shares(problem: Problem, shared: ParameterSettings) -> dict[str, tuple[Plai
 def _nominal(problem: Problem) -> Iterator[Term]:
     """Yield what no parameter sets: of all joints together and each,
     of both sides together and each."""
-    settings = problem.settings
-    taken = _set_by_parameters(settings)
+    taken = _set_by_parameters(problem.settings)
     for row in ROWS:
         if row.span is None or not _may_lack(problem, row):
             continue
         joints = _moving(problem, row.name, problem.active_joints)
         for quantity in dict.fromkeys((row.name, *TARGETS[row.name])):
             for group in _groups(row, quantity, joints):
-                atoms = {(target, joint) for target in TARGETS[quantity] for joint in group}
-                # the pump is no joint's: the first has its values as well as any
-                values = {_nominal_value(settings, target, joint or 1) for target, joint in atoms}
-                if len(values) != 1 or not taken.isdisjoint(atoms):
-                    continue
-                name = _new_name(problem, row, quantity, group)
-                parameter = ParameterSettings(
-                    quantity=quantity,
-                    joints=None if row.of_the_pump else group,
-                    bounds=row.span,
-                )
-                yield Term(name, {name: parameter}, values.pop())
+                if taken.isdisjoint(product(TARGETS[quantity], group)):
+                    yield from _new_term(problem, row, quantity, group)
+
+
+def _new_term(problem: Problem, row: Quantity, quantity: str, group: tuple[int, ...]) -> Iterator[Term]:
+    """Yield a quantity of a group of joints as a term, if it has one value there."""
+    # the pump is no joint's: the first has its values as well as any
+    values = {
+        _nominal_value(problem.settings, target, joint or 1)
+        for target, joint in product(TARGETS[quantity], group)
+    }
+    if len(values) != 1:
+        return
+    name = _new_name(problem, row, quantity, group)
+    joints = None if row.of_the_pump else group
+    parameter = ParameterSettings(quantity=quantity, joints=joints, bounds=row.span)
+    yield Term(name, {name: parameter}, values.pop())
 
 
 def _set_by_parameters(settings: FitSettings) -> set[tuple[str, int]]:

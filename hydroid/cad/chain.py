@@ -41,18 +41,22 @@ def choose_chain(
         if not chain:
             raise ModelError(f"no joint moves a link {tip!r}", path, f"tips: {', '.join(tips)}")
     left_out = [joint for joint in spec.joints if joint.name not in chain]
-    if not left_out:
-        return
-    held = [joint.name for joint in left_out]
-    named = [name for name in held if _named(spec, [name], columns)]
-    warning = f"; THE LOG NAMES {', '.join(named)}" if named else ""
-    others = [f"--tip {link}" for link, other in tips.items() if other != chain]
-    notes.add(
-        f"the arm is {' - '.join(chain)} ({why}); held at 0, on no way to its end: "
-        f"{listed(held, 12)}{warning}. Other ends: {listed(others, 6) or 'none'}"
-    )
+    if left_out:
+        others = [f"--tip {link}" for link, other in tips.items() if other != chain]
+        held = _held(spec, [joint.name for joint in left_out], columns)
+        notes.add(
+            f"the arm is {' - '.join(chain)} ({why}); held at 0, on no way to its end: {held}. "
+            f"Other ends: {listed(others, 6) or 'none'}"
+        )
     for joint in left_out:
         spec.delete(joint)
+
+
+def _held(spec: mujoco.MjSpec, names: Sequence[str], columns: Sequence[str]) -> str:
+    """Return which joints are held, and loudly those that a log names."""
+    named = [name for name in names if _named(spec, [name], columns)]
+    warning = f"; THE LOG NAMES {', '.join(named)}" if named else ""
+    return f"{listed(names, 12)}{warning}"
 
 
 def _tips(spec: mujoco.MjSpec, path: Path) -> dict[str, tuple[str, ...]]:

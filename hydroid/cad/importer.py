@@ -117,6 +117,18 @@ def _clear(spec: mujoco.MjSpec, path: Path) -> None:
         spec.delete(part)
     unnamed = spec.modelname in ("", "MuJoCo Model")
     spec.modelname = word(path.stem if unnamed else spec.modelname)
+    bodies, joints = _renamed(spec)
+    for equality in spec.equalities:
+        if equality.objtype == mujoco.mjtObj.mjOBJ_SITE:
+            continue  # sites keep their names
+        of_joints = equality.type == mujoco.mjtEq.mjEQ_JOINT
+        names = joints if of_joints else bodies
+        equality.name1 = names.get(equality.name1, equality.name1)
+        equality.name2 = names.get(equality.name2, equality.name2)
+
+
+def _renamed(spec: mujoco.MjSpec) -> tuple[dict[str, str], dict[str, str]]:
+    """Give bodies and joints plain names, all different; return the new names by the old ones."""
     bodies = dict[str, str]()
     taken = {"world"}
     for number, body in enumerate(spec.bodies[1:], 1):
@@ -129,13 +141,7 @@ def _clear(spec: mujoco.MjSpec, path: Path) -> None:
         old = joint.name
         joint.name = distinct(word(old or f"{joint.parent.name}_joint"), taken)
         joints[old] = joint.name
-    for equality in spec.equalities:
-        if equality.objtype == mujoco.mjtObj.mjOBJ_SITE:
-            continue  # sites keep their names
-        of_joints = equality.type == mujoco.mjtEq.mjEQ_JOINT
-        names = joints if of_joints else bodies
-        equality.name1 = names.get(equality.name1, equality.name1)
-        equality.name2 = names.get(equality.name2, equality.name2)
+    return bodies, joints
 
 
 def _is_of_scene(look: Any) -> bool:

@@ -58,11 +58,7 @@ def convert_meshes(
     `exact`: no link has its inertia by what the file says of its meshes, so that the best way may
     be taken. Returned are the files by their path from the model, and the bodies that lost a mesh.
     """
-    read = dict[str, trimesh.Trimesh]()
-    for name, path in files.items():
-        mesh = _read_mesh(path, notes)
-        if mesh is not None:
-            read[name] = mesh
+    read = _read_meshes(files, notes)
     units = _units(spec, files, read, notes)
     taken: set[str] = set()
     stl_names = {name: f"{MESHES}/{distinct(word(files[name].stem), taken)}.stl" for name in read}
@@ -89,6 +85,16 @@ def convert_meshes(
     return assets, lost
 
 
+def _read_meshes(files: Mapping[str, Path], notes: Notes) -> dict[str, trimesh.Trimesh]:
+    """Return the meshes that can be read, by the names that the spec has for their files."""
+    read = dict[str, trimesh.Trimesh]()
+    for name, path in files.items():
+        mesh = _read_mesh(path, notes)
+        if mesh is not None:
+            read[name] = mesh
+    return read
+
+
 def _units(
     spec: mujoco.MjSpec,
     files: Mapping[str, Path],
@@ -100,18 +106,18 @@ def _units(
     Most meshes of a file have one unit: the one in which most links are as long as their joints are
     apart. A mesh that this makes far too long or too short has its own.
     """
-    lengths = {
-        mesh.name: float(np.max(read[mesh.file].extents * np.abs(mesh.scale)))
-        for mesh in spec.meshes
-        if mesh.file in read
-    }
+    lengths = dict[str, float]()  # of meshes in their own units
+    for mesh in spec.meshes:
+        if mesh.file in read:
+            extents = read[mesh.file].extents * np.abs(mesh.scale)
+            lengths[mesh.name] = float(np.max(extents))
     body_of = {g.meshname: g.parent.name for g in spec.geoms if lengths.get(g.meshname)}
     if not body_of:
         return {}
     reach = _reach(spec, notes)
-    link_of = {mesh: reach.link[body] for mesh, body in body_of.items()}
-    longest = dict[str, float]()  # mesh of each link, in its own unit
-    for mesh, link in link_of.items():
+    longest = dict[str, float]()  # mesh of each link
+    for mesh, body in body_of.items():
+        link = reach.link[body]
         longest[link] = max(longest.get(link, 0.0), lengths[mesh])
     telling = {
         link: distance
@@ -120,20 +126,32 @@ def _units(
     }
     common = _common_unit(reach, telling, longest)
     units = dict[str, float]()
-    for mesh, link in link_of.items():
+    for mesh, body in body_of.items():
+        link = reach.link[body]
         distance = telling.get(link, reach.longest)
-        units[mesh] = common
-        if not reach.longest:
-            continue
-        too_short = longest[link] * common < distance * _least_part(link, telling)
-        too_long = lengths[mesh] * common > TOO_LONG * reach.longest
-        if too_short:
-            units[mesh] = reach.nearest(longest[link], distance)
-        elif too_long:
-            units[mesh] = reach.nearest(lengths[mesh], distance)
+        least = distance * _least_part(link, telling)
+        units[mesh] = _own_unit(reach, common, lengths[mesh], longest[link], (least, distance))
     file_of = {mesh.name: files[mesh.file].name for mesh in spec.meshes if mesh.name in units}
     _tell_units(units, common, lengths, file_of, notes)
     return units
+
+
+def _own_unit(
+    reach: _Reach, common: float, length: float, longest: float, wanted: tuple[float, float]
+) -> float:
+    """Return the unit of a mesh of a length [m]: the common one, unless that cannot be.
+
+    `longest` is the length of the longest mesh of its link, which is at least as long as the first
+    of `wanted` and most likely as long as the second [m].
+    """
+    if not reach.longest:
+        return common
+    least, likely = wanted
+    if longest * common < least:
+        return reach.nearest(longest, likely)
+    if length * common > TOO_LONG * reach.longest:
+        return reach.nearest(length, likely)
+    return common
 
 
 def _common_unit(reach: "_Reach", telling: Mapping[str, float], longest: Mapping[str, float]) -> float:

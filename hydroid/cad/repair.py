@@ -88,34 +88,22 @@ def weigh(spec: mujoco.MjSpec, notes: Notes, total: float | None, lost: Collecti
     Those that `lost` a mesh count as shapeless.
     """
     model = compiled(spec, notes.path)
-    hulls = hull_model(spec, notes.path)
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
     links = [body for body in spec.bodies[1:] if body.joints]
-    file_has_masses = any(body.mass for body in links)
-    hull_of = {body.name: inertial_of(hulls, model.body(body.name).id) for body in links}
-    filled = _filled([body for body in links if body.name not in lost], hull_of)
-    joints = _joints_and_end(links, data)
-    longest = np.linalg.norm(np.diff(joints, axis=0), axis=1).max()
+    what = "MASSES THAT NO MACHINE HAS"
+    if not any(body.mass for body in links):
+        what = "no masses in the file"
     replaced = list[str]()
     densities = set[float]()
-    for body, (here, there) in zip(links, pairwise(joints), strict=True):
-        if body.name in filled:
-            density = filled[body.name]
-            likely = _Likely(hull_of[body.name], LEAST, MOST)
-        else:
-            density = USUAL
-            likely = _slender(data.body(body.name), there - here, 0.4 * longest)
+    for body, likely in _likely(links, model, hull_model(spec, notes.path), lost):
         usual = likely.usual
         if likely.least <= USUAL * body.mass / usual.mass <= likely.most:
             continue
-        mass = density / USUAL * usual.mass
+        mass = likely.density / USUAL * usual.mass
         stated = f"{body.mass:.2g}" if body.mass else "none"
         replaced.append(f"{body.name} {stated} -> {mass:.3g}")
-        set_inertia(body, mass, usual.centre, density / USUAL * usual.tensor)
-        densities.add(density)
+        set_inertia(body, mass, usual.centre, likely.density / USUAL * usual.tensor)
+        densities.add(likely.density)
     if replaced:
-        what = "MASSES THAT NO MACHINE HAS" if file_has_masses else "no masses in the file"
         taken = " and ".join(f"{density:.0f}" for density in sorted(densities))
         notes.add(
             f"{what} [kg]: {', '.join(replaced)} ({taken} kg/m³ of hull is taken). Say "
@@ -126,12 +114,36 @@ def weigh(spec: mujoco.MjSpec, notes: Notes, total: float | None, lost: Collecti
 
 
 class _Likely(NamedTuple):
-    """What a link may weigh: its inertia at the USUAL density, and the least and largest density
-    [kg/m³]."""
+    """What a link may weigh: its inertia at the USUAL density, and the least, largest and likeliest
+    density [kg/m³]."""
 
     usual: Inertial
     least: float
     most: float
+    density: float
+
+
+def _likely(
+    links: Sequence[mujoco.MjsBody],
+    model: mujoco.MjModel,
+    hulls: mujoco.MjModel,
+    lost: Collection[str],
+) -> list[tuple[mujoco.MjsBody, _Likely]]:
+    """Return what links may weigh, by the hulls of those that have a shape."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    hull_of = {body.name: inertial_of(hulls, model.body(body.name).id) for body in links}
+    filled = _filled([body for body in links if body.name not in lost], hull_of)
+    places = _joints_and_end(links, data)
+    longest = np.linalg.norm(np.diff(places, axis=0), axis=1).max()
+    likely = list[tuple[mujoco.MjsBody, _Likely]]()
+    for body, (here, there) in zip(links, pairwise(places), strict=True):
+        if body.name in filled:
+            shape = _Likely(hull_of[body.name], LEAST, MOST, filled[body.name])
+        else:
+            shape = _slender(data.body(body.name), there - here, 0.4 * longest)
+        likely.append((body, shape))
+    return likely
 
 
 def _joints_and_end(links: Sequence[mujoco.MjsBody], data: mujoco.MjData) -> list[Array]:
@@ -151,7 +163,7 @@ def _slender(body: Any, to_next: Array, shortest: float) -> _Likely:
     length = max(float(np.linalg.norm(along)), shortest, 0.1)
     mass = USUAL * SLENDER * length**3
     rod = Inertial(mass, 0.5 * along, mass * length**2 / 12 * np.eye(3))
-    return _Likely(rod, SLIGHT, np.inf)
+    return _Likely(rod, SLIGHT, np.inf, USUAL)
 
 
 def _scale_masses(links: Sequence[mujoco.MjsBody], total: float, notes: Notes) -> None:

@@ -3,7 +3,7 @@ and of what follows."""
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,6 +25,7 @@ from hydroid.commands.logs import problem_of
 from hydroid.commands.progress import Progress
 from hydroid.errors import RunError
 from hydroid.estimate import finite
+from hydroid.files import Plain
 from hydroid.findings import Finding
 from hydroid.identified_model import start_values
 
@@ -102,25 +103,30 @@ def analyse(
     from hydroid.posterior.uncertainty import uncertainty
     from hydroid.reporting.parameters_report import parameter_table, unknown_sections
 
+    wanted = names(profile)
+    profiles: dict[str, Profile] = {}
     with Progress() as progress:
         known = uncertainty(problem, model.theta)
-        profiles: dict[str, Profile] = {}
-        for done, name in enumerate(names(profile)):
-            progress("profiles", done, len(names(profile)))
+        for done, name in enumerate(wanted):
+            progress("profiles", done, len(wanted))
             profiles[name] = identifiability.profile(problem, known, name)
     identified = identifiability.identifiability(problem, known)
     summary = account(problem, known)
-    better = tuple(name for name, one in profiles.items() if one.better_optimum)
-    findings = (*([Finding("better optimum", "warning", better)] if better else []), *summary.findings)
-    intervals = {name: one.interval for name, one in profiles.items()}
+    findings = summary.findings
+    better = tuple(name for name, found in profiles.items() if found.better_optimum)
+    if better:
+        findings = (Finding("better optimum", "warning", better), *findings)
+    intervals = {name: found.interval for name, found in profiles.items()}
     table = parameter_table(problem.settings, summary, intervals)
-    tables = {"parameters": table} | {n: t for s in unknown_sections(summary) for n, t in s.tables.items()}
-    content: dict[str, Any] = {"at": model.source, "rank": identified.rank}
-    content |= summary.changed({"findings": findings}).model_dump(
-        mode="json", include={"findings", "estimate"}
-    )
+    tables = {"parameters": table}
+    for section in unknown_sections(summary):
+        tables |= section.tables
+    content: Plain = {"at": model.source, "rank": identified.rank}
+    stated = summary.changed({"findings": findings})
+    content |= stated.model_dump(mode="json", include={"findings", "estimate"})
     for name, parameter in content["estimate"].items():
-        parameter["profile_interval"] = [*map(finite, intervals[name])] if name in intervals else None
+        interval = intervals.get(name)
+        parameter["profile_interval"] = None if interval is None else [*map(finite, interval)]
     lines = [table, *(f"- {finding}" for finding in findings), *written(tables, out)]
     return Result(lines, content, Analysis(known, identified, profiles))
 

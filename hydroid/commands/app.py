@@ -56,6 +56,8 @@ SYSTEM = (errno.ENAMETOOLONG, errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EAC
 ONE_THREAD = ("OPENBLAS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 """what keeps linear algebra from sums over several threads,
 whose last bits depend on how many there are"""
+STOPPED = 130
+"""exit status of what was interrupted, as in shells"""
 VERBOSE = "Also print all tables, findings, and the lines that go to run.log."
 
 
@@ -140,32 +142,47 @@ def _root(  # pyright: ignore[reportUnusedFunction]  # typer calls it
 def main() -> None:
     """Run a command: exit 0 when it is done, 2 for an error of the input,
     130 when it was stopped."""
-    code, kept = 0, None
     for variable in ONE_THREAD:  # numpy is not imported yet
         os.environ.setdefault(variable, "1")
+    code = 0
+    kept: str | None = None
+    try:
+        code = _run()
+    except KeyboardInterrupt as stop:
+        code = STOPPED
+        kept = str(stop) if isinstance(stop, Stopped) else None
+    except BrokenPipeError:
+        sys.stderr.close()  # the reader has left; Python would complain at exit
+    except Exception as error:
+        code = _ending(error)
+    if code == STOPPED:
+        rest = "" if kept is None else f"; {kept or 'nothing was written'}"
+        typer.echo(f"hydroid: stopped{rest}", err=True)
+    sys.exit(code)
+
+
+def _run() -> int:
+    """Run the command of the command line, and return its exit status."""
     try:
         listen()
         group: Any = typer.main.get_command(app)
         with group.make_context(program(), sys.argv[1:] or ["--help"]) as context:
             group.invoke(context)
     except typer.Exit as end:
-        code = end.exit_code
-    except KeyboardInterrupt as stop:
-        code, kept = 130, str(stop) if isinstance(stop, Stopped) else None
-    except BrokenPipeError:
-        sys.stderr.close()  # the reader has left; Python would complain at exit
-    except Exception as error:
-        if isinstance(error, HydroidError) or hasattr(error, "format_message"):
-            show_error(error)
-            code = 2
-        elif isinstance(error, OSError) and error.errno in SYSTEM:
-            show_error(RunError(f"cannot be used ({error.strerror})", error.filename or "the system"))
-            code = 2
-        elif stopped():  # what the interrupt met may have made another error of it
-            code = 130
-        else:
-            raise  # a defect of hydroid
-    if code == 130:  # as in shells
-        rest = "" if kept is None else f"; {kept or 'nothing was written'}"
-        typer.echo(f"hydroid: stopped{rest}", err=True)
-    sys.exit(code)
+        return end.exit_code
+    return 0
+
+
+def _ending(error: Exception) -> int:
+    """Say what is wrong, and return the exit status; raise a defect of hydroid again."""
+    is_users = isinstance(error, HydroidError) or hasattr(error, "format_message")
+    if is_users:
+        show_error(error)
+        return 2
+    if isinstance(error, OSError) and error.errno in SYSTEM:
+        what = f"cannot be used ({error.strerror})"
+        show_error(RunError(what, error.filename or "the system"))
+        return 2
+    if stopped():  # what the interrupt met may have made another error of it
+        return STOPPED
+    raise error

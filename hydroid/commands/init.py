@@ -68,7 +68,7 @@ def init(
     from hydroid.project.project import go_on, write_project
 
     if kept_config is not None:
-        if robot or joints or tip or total_mass is not None:
+        if any((robot, joints, tip, total_mass is not None)):
             hint = "leave --arm, --joints, --tip and --total-mass out"
             raise SettingsError("names its arm, which stays as it is", kept_config, hint)
         project = go_on(Path(folder) if folder else None, kept_config, logs, force=force)

@@ -243,19 +243,21 @@ def held_mechanics(mech: "ModelSource | None", settings: FitSettings, changes: P
     if summary is not None and summary.stage != "mech":
         hint = "name a run of fit-mech, or begin at this fit with --start"
         raise SettingsError("is a fit of stage 2, but --mech takes one of stage 1", mech, hint)
-    held = Plain()
+    mechanical = {
+        name: parameter
+        for name, parameter in settings.parameters.items()
+        if parameter.quantity in MECHANICAL and parameter.quantity != "gain"
+    }
     missing = list[str]()
-    for name, parameter in settings.parameters.items():
-        if parameter.quantity not in MECHANICAL or parameter.quantity == "gain":
-            continue
-        if name not in values:
-            can_do_without = mech is None and parameter.states_start
-            if parameter.fixed is None and not can_do_without:
-                missing.append(name)
-            continue
+    for name, parameter in mechanical.items():
+        can_do_without = mech is None and parameter.states_start
+        if name not in values and parameter.fixed is None and not can_do_without:
+            missing.append(name)
+    held = Plain()
+    for name, parameter in mechanical.items():
         key = f"parameters.{name}.fixed"
         estimated_anew = parameter.states_start and parameter.quantity != "mass"
-        if key in changes or estimated_anew:
+        if name not in values or key in changes or estimated_anew:
             continue
         held[key] = values[name]
         if summary is not None:

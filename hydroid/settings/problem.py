@@ -103,18 +103,21 @@ class ParameterSettings(Settings):
         lower, upper = self.bounds or (least, math.inf)
         if lower >= upper:
             raise ValueError("bounds must be [lower, upper] with lower < upper")
-        inside_bounds = {"nominal": self.nominal, "start": self.start}
-        stated = [*(self.bounds or ()), *inside_bounds.values(), self.fixed]
+        self._check_lowest(least)
+        for name, value in (("nominal", self.nominal), ("start", self.start)):
+            if value is None or lower <= value <= upper:
+                continue
+            raise ValueError(f"{name} {value:g} lies outside the bounds")
+
+    def _check_lowest(self, least: float) -> None:
+        """Raise ValueError where any value is lower than the quantity can be."""
+        stated = [*(self.bounds or ()), self.nominal, self.start, self.fixed]
         lowest = min((value for value in stated if value is not None), default=1.0)
         if self.quantity == "mass" and lowest <= 0:
             raise ValueError("a mass must be above 0 kg")
         if lowest < least:
             limit = f"below {least:g}" if least else "negative"
             raise ValueError(f"a {self.quantity} cannot be {limit}")
-        for name, value in inside_bounds.items():
-            if value is None or lower <= value <= upper:
-                continue
-            raise ValueError(f"{name} {value:g} lies outside the bounds")
 
     @property
     def unit(self) -> str:

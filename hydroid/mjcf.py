@@ -55,8 +55,8 @@ def _refuse_forces(spec: mujoco.MjSpec, path: Path) -> None:
         raise ModelError("has equality constraints, which hydroid does not simulate", path)
     for body in spec.bodies:
         if body.gravcomp:
-            what = f"body {body.name!r} has gravcomp: hydroid does not simulate what takes its weight away"
-            raise ModelError(what, path, "take gravcomp out")
+            why = "hydroid does not simulate what takes its weight away"
+            raise ModelError(f"body {body.name!r} has gravcomp: {why}", path, "take gravcomp out")
     if spec.option.density or spec.option.viscosity:
         what = "has a density or viscosity of the air, which hydroid does not simulate"
         raise ModelError(what, path)

@@ -1,7 +1,7 @@
 """`hydroid validate` and `hydroid report`: fits on logs that they were not fitted to;
 reports drawn anew."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -88,17 +88,12 @@ def validate(
     fits = ordered({name: test.verdict for name, test in tested.items()})
     arm = models[0].settings.arm
     predictions = list["Prediction"]()
-    content: dict[str, list[Plain]] = {"verdict": [], "results": []}
-    for name, verdict in fits.items():
+    for name in fits:
         predictions += [replace(p, fit=name) for p in tested[name].predictions]
-        content["verdict"] += [{"fit": name} | joint.model_dump() for joint in verdict]
-    for prediction in predictions:
-        content["results"] += prediction.plain(arm.joint_names)
-    best_name = next(iter(fits))
-    best = tested[best_name]
+    best = tested[next(iter(fits))]
+    run = run_of(best.model)
     lines = verdict_lines(fits)
     steps = list[Finding]()
-    run = run_of(best.model)
     if run:
         step = next_step(best.model.summarise(), best.verdict, str(run), best.fitted)
         steps.append(step)
@@ -109,7 +104,23 @@ def validate(
     if seen:
         lines.insert(1, f"The fit was made with {listed(seen, 3)}: that tests nothing.")
     lines += written(page, out)
+    content = _content(fits, predictions, arm.joint_names)
     return Result(lines, content, predictions, page, details=[page.tables["errors"]])
+
+
+def _content(
+    fits: "Mapping[str, Sequence[JointVerdict]]",
+    predictions: "Sequence[Prediction]",
+    joint_names: Sequence[str],
+) -> Plain:
+    """Return verdicts and errors as JSON has them, of the best fit first."""
+    verdicts = list[Plain]()
+    for name, verdict in fits.items():
+        verdicts += [{"fit": name} | joint.model_dump() for joint in verdict]
+    results = list[Plain]()
+    for prediction in predictions:
+        results += prediction.plain(joint_names)
+    return {"verdict": verdicts, "results": results}
 
 
 @record

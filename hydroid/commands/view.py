@@ -155,20 +155,20 @@ def view(
         fit = source
         log = run_logs(Path(source))[0]
     if log is None:
+        # only the sliders need no log
         for option, given in {"--collisions": collisions, "--arm": arm, "--out": out}.items():
             if given:
                 raise SettingsError("needs a log or a run", option, "name the log")
+        _show(open_model(fit, config, set, nominal=True), None, pose)
+        return Result([], {}, None)
     if collisions:
         if fit:
             settings = open_model(fit, config, set, nominal=True).settings
         else:
             settings = load_settings(config or "fit-hyd", set)
-        logs = read_arms(log or "", settings, arm, angles=True, repair=repair)
+        logs = read_arms(log, settings, arm, angles=True, repair=repair)
         return _collisions(logs, settings)
     model = open_model(fit, config, set, nominal=True)
-    if log is None:
-        _show(model, None, pose)
-        return Result([], {}, None)
     logs = read_arms(log, model.settings, arm, pose=pose, repair=repair)
     if out is None:
         _show(model, logs, pose)
@@ -240,6 +240,7 @@ def _collisions(logs: "dict[str, Log]", settings: "FitSettings") -> "Result[Clea
 
 
 def _span(text: str) -> tuple[float, float]:
+    """Return the ends of a span [s] such as 10:20, 10: or :20."""
     begin, _, end = text.partition(":")
     try:
         return float(begin or 0.0), float(end or "inf")

@@ -256,7 +256,7 @@ def _verdict(
     """Return the verdict, and the simple model that it names.
 
     Errors are those on the fitted and on the unseen logs; `outcomes` are those of `_outcome` by
-    simple model, the simplest first. An error may be NaN, so that "not within" is no "beyond".
+    simple model, the simplest first.
     """
     if unseen.fit is not None and unseen.fit <= tolerance:
         return Verdict.PREDICTS, None
@@ -270,13 +270,18 @@ def _verdict(
     diverged_alone = fitted.fit is not None and not np.isfinite(unseen.fit)
     if worse and not diverged_alone:
         return Verdict.NO_BETTER, worse[0]
-    if fitted.fit is not None and not unseen.fit <= WORSE * fitted.fit:
+    if fitted.fit is not None and _is_beyond(unseen.fit, WORSE * fitted.fit):
         return Verdict.WORSE_THAN_FITTED, None
-    if not unseen.fit <= LITTLE * unseen.simple[NAMES[0]]:
+    if _is_beyond(unseen.fit, LITTLE * unseen.simple[NAMES[0]]):
         return Verdict.LITTLE, None
     if not_ahead:
         return Verdict.UNTOLD, min(not_ahead, key=unseen.simple.__getitem__)
     return Verdict.ROUGHLY, None
+
+
+def _is_beyond(error: float, limit: float) -> bool:
+    """Return whether an error is above a limit, or NaN: that of a simulation that diverged."""
+    return not error <= limit
 
 
 def _misfits(fitted: _Errors, tolerance: float) -> bool:

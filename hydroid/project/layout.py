@@ -76,17 +76,14 @@ def find_layout(
     if table is None:
         every = tuple(range(1, len(arm.joints) + 1))
         return Layout({"period_s": 0.01, "joints": {}}, every, (), (), {}, followed=False)
-    if given is not None:
-        guess = ColumnGuess(given_section(table, arm, given), (), ())
-    else:
+    if given is None:
         guess = guessed_section(table, arm, order)
+        missing = missing_column(guess.log)
+        if missing:
+            return _skeleton(table, arm, guess, missing)
+    else:
+        guess = _given(table, arm, given)
     section = guess.log
-    missing = missing_column(section)
-    if missing and given is None:
-        return _skeleton(table, arm, guess, missing)
-    if missing:
-        what = missing.replace("looks like", "is given as")
-        raise LogError(what, table.source, "correct the log section")
     entries = section["joints"]
     reasons = [*guess.reasons]
     logs = _read(table, section, arm, others, reasons, strict=given is not None)
@@ -109,6 +106,16 @@ def find_layout(
         followed=any(motion.travel > FOLLOWED for motion in undriven),
         origin=GUESSED if given is None else GIVEN,
     )
+
+
+def _given(table: Table, arm: Arm, given: LogSettings) -> ColumnGuess:
+    """Return the columns that a person has named, which must be enough for a fit."""
+    section = given_section(table, arm, given)
+    missing = missing_column(section)
+    if missing:
+        what = missing.replace("looks like", "is given as")
+        raise LogError(what, table.source, "correct the log section")
+    return ColumnGuess(section, (), ())
 
 
 def _driven(

@@ -118,7 +118,8 @@ def mujoco_errors(where: object) -> Generator[None]:
 def quiet_mujoco() -> Generator[None]:
     """Keep MuJoCo from printing a warning for every diverged candidate,
     and from writing MUJOCO_LOG.TXT."""
-    before, silent = mujoco.MjLogConfig.get(), mujoco.MjLogConfig.get()
+    before = mujoco.MjLogConfig.get()
+    silent = mujoco.MjLogConfig.get()
     silent.logto_console = silent.logto_file = False
     mujoco.MjLogConfig.set(silent)
     try:

@@ -5,7 +5,7 @@ Of a quantity with two sides, such as `delay`, `delay_a` acts on motion towards 
 command causes, and `delay_b` towards B; the name without an ending sets both.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from itertools import chain
 from typing import Literal, NamedTuple
 
@@ -71,15 +71,19 @@ class Quantity(NamedTuple):
             yield self
             return
         for side, other, default in zip("AB", "BA", self.default, strict=True):
-            name, plain = f"{self.name}_{side.lower()}", f"{self.plain}, side {side}"
             yield self._replace(
-                name=name, default=default, plain=plain, note=self.note.format(side=side, other=other)
+                name=f"{self.name}_{side.lower()}",
+                default=default,
+                plain=f"{self.plain}, side {side}",
+                note=self.note.format(side=side, other=other),
             )
 
 
 def quantity(name: str, row: Plain) -> Quantity:
     """Return the quantity of one row; ValueError if `units.yaml` lacks its unit."""
-    values: Plain = {key: tuple(value) if isinstance(value, list) else value for key, value in row.items()}
+    values: Plain = {}
+    for key, value in row.items():
+        values[key] = tuple(value) if isinstance(value, list) else value
     made = Quantity(name, **values)
     if made.unit and made.unit.lower() not in UNITS:
         raise ValueError(f"quantities.yaml: {name}: units.yaml has no unit {made.unit}")
@@ -92,15 +96,22 @@ _GROUPS = {
 
 ROWS = tuple(chain(*_GROUPS.values()))  # the one table
 
-QUANTITIES = {quantity.name: quantity for row in ROWS for quantity in row.each()}
+
+def _by_side(rows: Iterable[Quantity]) -> dict[str, Quantity]:
+    """Return quantities by name, each side by itself."""
+    sides = chain.from_iterable(row.each() for row in rows)
+    return {quantity.name: quantity for quantity in sides}
+
+
+QUANTITIES = _by_side(ROWS)
 """the quantities by name, each side by itself"""
 
-HYDRAULIC = {quantity.name: quantity for row in _GROUPS["hydraulic"] for quantity in row.each()}
+HYDRAULIC = _by_side(_GROUPS["hydraulic"])
 """those that `hydraulics` sets for all joints"""
 
 CHOICES = {row.name: row for row in ROWS} | QUANTITIES  # what a parameter of a fit can be, by name
 
-TARGETS = {name: tuple(quantity.name for quantity in row.each()) for name, row in CHOICES.items()}
+TARGETS = {name: tuple(_by_side([row])) for name, row in CHOICES.items()}
 """the quantities that a name sets: itself, or both sides"""
 
 # the quantities that both stages have

@@ -44,7 +44,9 @@ class _Tree(ElementTree.TreeBuilder):
 
     def __init__(self, path: Path) -> None:
         super().__init__()
-        self._path, self._depth, self._count = path, 0, 0
+        self._path = path
+        self._depth = 0
+        self._count = 0
 
     def start(self, tag: str, attrs: dict[str, str], /) -> ElementTree.Element:
         self._depth += 1
@@ -153,7 +155,8 @@ def _link(end: ElementTree.Element | None) -> str:
 
 def _check_copies(root: ElementTree.Element, path: Path) -> None:
     """Refuse what MuJoCo would copy without end."""
-    waiting, copies = [(1.0, root)], 0.0
+    copies = 0.0
+    waiting = [(1.0, root)]
     while waiting:
         times, element = waiting.pop()
         if element.tag == "replicate":

@@ -91,10 +91,10 @@ def _show_pivots(spec: mujoco.MjSpec, made: "_Linkage", data: mujoco.MjData) -> 
     """Add the two sites by which an arm's file finds the pivots of a cylinder."""
     carrier = made.joint.parent.parent.name
     moved = made.joint.parent.name
-    on_carrier, on_moved = made.foot, made.eye
+    pins = [made.foot, made.eye]
     if made.foot.other(made.tube) != carrier:  # the cylinder stands on its head
-        on_carrier, on_moved = made.eye, made.foot
-    for end, pin, body in zip(ENDS, (on_carrier, on_moved), (carrier, moved), strict=True):
+        pins.reverse()
+    for end, pin, body in zip(ENDS, pins, (carrier, moved), strict=True):
         frame = data.body(body)
         place = frame.xmat.reshape(3, 3).T @ (pin.at - frame.xpos)
         spec.body(body).add_site(name=f"{made.joint.name}_pivot_{end}", pos=place)

@@ -172,9 +172,11 @@ def refuse_overwriting(source: Any, out: Source | None) -> None:
 
 def as_list(sources: Any) -> list[Any]:
     """Return one or several sources as a list; an empty one for none."""
+    if sources is None:
+        return []
     if isinstance(sources, Sequence) and not isinstance(sources, str):
         return list(sources)
-    return [] if sources is None else [sources]
+    return [sources]
 
 
 def command(function: F) -> F:

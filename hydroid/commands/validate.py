@@ -28,6 +28,7 @@ from hydroid.words import listed, numbered
 
 if TYPE_CHECKING:
     from hydroid.fitting.validation import Prediction
+    from hydroid.fitting.verdict import Baselines
     from hydroid.joint_verdict import JointVerdict
     from hydroid.run.record import Record
 
@@ -144,10 +145,13 @@ def _test(
     from hydroid.fitting.verdict import judge
     from hydroid.run.record import record_of
 
-    in_memory = not isinstance(source, str | Path | IdentifiedModel)
-    record = source.record if in_memory else record_of(model)
-    fitted = record.fitted if record else ()
-    baselines = record.baselines if record else {}
+    is_fit = not isinstance(source, str | Path | IdentifiedModel)  # in memory
+    record = source.record if is_fit else record_of(model)
+    fitted: Sequence[Prediction] = ()
+    baselines: Baselines = {}
+    if record is not None:
+        fitted = record.fitted
+        baselines = record.baselines
     fitted_logs = [prediction.log for prediction in fitted]
     predictions = list["Prediction"]()
     for log in logs:

@@ -247,10 +247,12 @@ def _beyond_range(angle: Array, joint: Joint) -> Iterator[str]:
     margin = angle_margin(lowest, highest)
     if low >= lowest - margin and high <= highest + margin:
         return
-    what, unit, factor = ("angles", "deg", np.degrees(1))
     if joint.slides:
-        what, unit, factor = ("positions", "m", 1.0)
-    run = f"run from {low * factor:.4g} to {high * factor:.4g} {unit}"
+        what = "positions"
+        run = f"run from {low:.4g} to {high:.4g} m"
+    else:
+        what = "angles"
+        run = f"run from {np.degrees(low):.4g} to {np.degrees(high):.4g} deg"
     allowed = f"{joint.range[0]:.6g} to {joint.range[1]:.6g}"
     yield (
         f"{joint.name}: {what} in the log {run}, but the arm allows {allowed}: give them an offset "

@@ -59,7 +59,8 @@ def unpack(file: Path) -> Any:
     more than LARGEST.
     """
     packed = read_file(file)
-    data, digest = packed[:-32], packed[-32:]
+    data = packed[:-32]
+    digest = packed[-32:]
     if hashlib.sha256(data).digest() != digest:
         raise ValueError("checksum")
     try:

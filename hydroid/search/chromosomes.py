@@ -132,7 +132,8 @@ def crossover(parents: Genes, settings: GeneticSettings, rng: Generator) -> Gene
 
     At each gene the two children of a pair hold what its two parents held.
     """
-    first, second = parents[0::2], parents[1::2]
+    first = parents[0::2]
+    second = parents[1::2]
     pairs, length = first.shape
     if settings.crossover == "pointwise":
         swaps = pointwise_swaps(pairs, length, CUTS, rng)

@@ -48,7 +48,9 @@ def expanded(parameters: Mapping[str, Any], compared: Any, arm: Arm | None) -> P
 
 def _add(result: Plain, name: str, entry: Any) -> None:
     """Add an entry that needs no expansion; it changes one that `each` has made under its name."""
-    result[name] = result.get(name, {}) | entry if isinstance(entry, dict) else entry
+    if isinstance(entry, dict):
+        entry = result.get(name, {}) | entry
+    result[name] = entry
 
 
 def _add_links(result: Plain, name: str, entry: Plain, arm: Arm | None) -> None:
@@ -71,9 +73,8 @@ def _add_links(result: Plain, name: str, entry: Plain, arm: Arm | None) -> None:
 def _add_joints(result: Plain, name: str, entry: Plain, compared: Any, arm: Arm | None) -> None:
     """Add a parameter for each joint of `each`."""
     if entry.get("joints") is not None:
-        raise ValueError(
-            f"parameters.{name}: give joints that share it or each: joints that have their own, not both"
-        )
+        what = "joints that share it or each: joints that have their own, not both"
+        raise ValueError(f"parameters.{name}: give {what}")
     all_compared = entry["each"] is True
     joints: Any = compared if all_compared else entry["each"]
     if not _are_all(joints, int | str):
@@ -173,21 +174,25 @@ def make_parameter(
     nominal = nominal_value(arm, hydraulics, settings)
     prior = _prior(name, settings, nominal)
     lower, upper = settings.bounds or _default_bounds(settings, prior)
-    start = nominal if settings.start is None else settings.start
+    start = nominal
+    if settings.start is not None:
+        start = settings.start
     if start is not None:
         start = min(max(start, lower), upper)
-    wants_log = log or (prior is not None and prior.log)
-    spread = settings.sd if settings.per else None
+    has_log_prior = prior is not None and prior.log
+    least = 0.0
+    if settings.per is not None and settings.sd is not None:
+        least = settings.sd  # an effect is near 0, where no relative change means anything
     return Parameter(
-        name,
-        _unit(arm, settings),
-        lower,
-        upper,
-        settings.fixed,
-        lower > 0 and wants_log,
-        start,
-        prior,
-        spread or 0.0,
+        name=name,
+        unit=_unit(arm, settings),
+        lower=lower,
+        upper=upper,
+        fixed=settings.fixed,
+        log=lower > 0 and (log or has_log_prior),
+        start=start,
+        prior=prior,
+        least=least,
     )
 
 
@@ -223,9 +228,10 @@ def _default_bounds(settings: ParameterSettings, prior: Prior | None) -> tuple[f
     upper = prior.value(4.0)
     if settings.per is not None:
         return lower, upper
-    # what must be above 0 is not searched below 1 % of its value
     quantity = CHOICES[settings.quantity]
-    least = 0.01 * prior.nominal if quantity.positive else quantity.lowest
+    least = quantity.lowest
+    if quantity.positive:
+        least = 0.01 * prior.nominal  # what must be above 0 is not searched below 1 % of its value
     return max(lower, least), upper
 
 

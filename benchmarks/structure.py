@@ -61,6 +61,7 @@ class Shape:
     code_lines: int = 0
     docstring_lines: int = 0
     comment_lines: int = 0
+    comments_beside: int = 0
     long_lines: int = 0
     tokens: int = 0
     comprehensions: int = 0
@@ -95,6 +96,7 @@ class Shape:
             f"lines over {LONG_LINE} characters, %": (self.percent(self.long_lines), "0.5"),
             "docstrings, % of lines": (self.percent(self.docstring_lines), ""),
             "comments, % of lines": (self.percent(self.comment_lines), "2 to 3"),
+            "comments beside code, % of lines": (self.percent(self.comments_beside), ""),
             "nodes a statement, mean": (float(np.mean(nodes)), ""),
             "nodes a statement, 90th percentile": (float(np.percentile(nodes, 90)), "14"),
             "nodes a statement, 99th percentile": (float(np.percentile(nodes, 99)), "25"),
@@ -115,7 +117,8 @@ def shape(path: Path) -> Shape:
     tree = ast.parse(text)
     tokens = [*tokenize.generate_tokens(io.StringIO(text).readline)]
     documented = docstring_lines(tree)
-    comments = [t for t in tokens if is_comment(t)]
+    comments = [t for t in tokens if t.type == tokenize.COMMENT and not DIRECTIVE.match(t.string)]
+    alone = [t for t in comments if not t.line[: t.start[1]].strip()]
     code = [t for t in tokens if t.type in CODE_TOKENS]
     code_lines = {line for t in code for line in range(t.start[0], t.end[0] + 1)} - documented
     nodes = [*ast.walk(tree)]
@@ -128,7 +131,8 @@ def shape(path: Path) -> Shape:
         lines=len(text.splitlines()),
         code_lines=len(code_lines),
         docstring_lines=len(documented),
-        comment_lines=len(comments),
+        comment_lines=len(alone),
+        comments_beside=len(comments) - len(alone),
         long_lines=sum(len(line) > LONG_LINE for line in text.splitlines()),
         tokens=len(code),
         comprehensions=len(comprehensions),
@@ -161,12 +165,6 @@ def is_docstring(node: ast.AST) -> TypeGuard[ast.Expr]:
 def holds(node: ast.AST, kinds: type[ast.AST] | tuple[type[ast.AST], ...]) -> bool:
     """Return whether a node of these kinds stands inside another."""
     return any(isinstance(inner, kinds) for inner in ast.walk(node) if inner is not node)
-
-
-def is_comment(token: tokenize.TokenInfo) -> bool:
-    """Return whether a token is a comment to a reader with a line of its own."""
-    alone = token.type == tokenize.COMMENT and not token.line[: token.start[1]].strip()
-    return alone and not DIRECTIVE.match(token.string)
 
 
 def is_nested(node: ast.ListComp | ast.SetComp | ast.DictComp | ast.GeneratorExp) -> bool:

@@ -9,6 +9,7 @@ one that the model excludes; `hydroid init` excludes bodies that touch in the po
 
 from collections.abc import Mapping
 from functools import cached_property
+from itertools import product
 
 import mujoco
 import numpy as np
@@ -244,7 +245,7 @@ def load_machine(arm: Arm, *, pair: bool) -> Machine:
         hint = "name its MJCF in the arm's file, pair: MODEL.xml"
         raise SettingsError(f"{arm.name} stands alone", "--arm", hint)
     spec = read_mjcf(arm.pair)
-    wanted = [f"{side}_{name}" for side in SIDES for name in arm.joint_names]
+    wanted = [f"{side}_{name}" for side, name in product(SIDES, arm.joint_names)]
     if [joint.name for joint in spec.joints] != wanted:
         hint = f"the joints of two arms are {', '.join(wanted)}"
         raise ModelError("is not the model of two of the arm", arm.pair, hint)

@@ -8,6 +8,7 @@ import inspect
 import os
 import sys
 from collections.abc import Callable
+from itertools import chain
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -46,7 +47,7 @@ GROUPS = {
     "Compare settings": {"study": "fit with several settings, each over many seeds"},
 }
 """every command with a summary, by the heading of its group"""
-COMMANDS = [name for commands in GROUPS.values() for name in commands]
+COMMANDS = [*chain.from_iterable(GROUPS.values())]
 PLAIN: Any = {"add_completion": False, "rich_markup_mode": None, "pretty_exceptions_enable": False}
 """of typer's apps; plain help: importing rich would triple the time it takes"""
 
@@ -75,10 +76,11 @@ class LazyGroup(TyperGroup):
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write one section for each group."""
-        width = max(map(len, COMMANDS))
+        width = max(map(len, COMMANDS))  # of all groups, so that their columns are aligned
         for heading, commands in GROUPS.items():
+            rows = [(name.ljust(width), summary) for name, summary in commands.items()]
             with formatter.section(heading):
-                formatter.write_dl([(name.ljust(width), summary) for name, summary in commands.items()])
+                formatter.write_dl(rows)
 
 
 def click_command(command: str) -> "TyperCommand":
@@ -114,14 +116,13 @@ def click_command(command: str) -> "TyperCommand":
     return typer.main.get_command(alone)  # pyright: ignore[reportReturnType]  # a group only of several commands
 
 
-app = typer.Typer(
-    name="hydroid",
-    cls=LazyGroup,
-    help="Estimate the physical parameters of a hydraulic arm from logs of commands and joint angles.",
-    epilog="Where to start: with the shipped arm, hydroid check and hydroid fit-mech; with your own arm, "
-    "hydroid init. 'The article' is Montazeri et al. 2017, whose method hydroid follows.",
-    **PLAIN,
+ABOUT = "Estimate the physical parameters of a hydraulic arm from logs of commands and joint angles."
+WHERE_TO_START = (
+    "Where to start: with the shipped arm, hydroid check and hydroid fit-mech; with your own arm, "
+    "hydroid init. 'The article' is Montazeri et al. 2017, whose method hydroid follows."
 )
+
+app = typer.Typer(name="hydroid", cls=LazyGroup, help=ABOUT, epilog=WHERE_TO_START, **PLAIN)
 
 
 def _version(wanted: bool) -> None:

@@ -58,6 +58,7 @@ def compare(ours: Sequence[Array], theirs: Sequence[Array]) -> Comparison:
     mean = sum(float(block.sum()) for block in differences) / count
     if blocks < 2:
         return Comparison(outcome=Outcome.UNTOLD, difference_deg2=mean, blocks=blocks)
+    # the variance of a ratio of sums over blocks: of differences, to samples
     sums = np.array([np.sum(block - mean) for block in differences])
     sd = float(np.sqrt(blocks / (blocks - 1) * np.sum(sums**2)) / count)
     quantile = float(student.ppf(ONE_SIDED, blocks - 1))

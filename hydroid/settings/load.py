@@ -23,6 +23,10 @@ _PLAIN = {
 its own words say the others"""
 
 
+_YAML_WORDS = {"None": "null", "True": "true", "False": "false"}
+"""how YAML spells what Python spells otherwise"""
+
+
 def _with_tuples(values: Any) -> Any:
     """Take YAML's lists for tuples, which frozen settings hold."""
     if isinstance(values, dict):
@@ -295,9 +299,9 @@ def _problem(fault: Any) -> str:
 
 def _shown(value: object) -> str:
     """Return a value as YAML writes it, shortened where it is long."""
+    text = repr(value)
     if isinstance(value, tuple):
         text = f"[{', '.join(map(_shown, value))}]"
-    else:
-        text = repr(value)
-        text = {"None": "null", "True": "true", "False": "false"}.get(text, text)
+    elif text in _YAML_WORDS:
+        text = _YAML_WORDS[text]
     return text if len(text) <= 60 else f"{text[:56]}...{text[-1]}"

@@ -127,11 +127,24 @@ def run_study(
     tasks = make_tasks(cells, study.seeds, logs)
     files = [folder / "runs" / f"{task.key()}.json" for task in tasks]
     results = {file: _read(file) for file in files if file.is_file()}
+    # cells that say the same are one run
     missing = {file: task for file, task in zip(files, tasks, strict=True) if file not in results}
+    if results and missing:
+        total = len(results) + len(missing)
+        LOGGER.log(NOTE, "%d of %d runs found, goes on", len(results), total)
+    _perform_all(missing, results, executor, progress)
+    return tuple(map(measured, tasks, [results[file] for file in files]))
+
+
+def _perform_all(
+    missing: Mapping[Path, Task],
+    results: dict[Path, Result],
+    executor: Executor,
+    progress: Progress,
+) -> None:
+    """Perform the runs that are missing, and add their results to those that are there."""
     there = len(results)
     total = there + len(missing)
-    if there and missing:
-        LOGGER.log(NOTE, "%d of %d runs found, goes on", there, total)
     progress("runs", there, total)
     futures = {executor.submit(perform, task): file for file, task in missing.items()}
     try:
@@ -145,7 +158,6 @@ def run_study(
     finally:
         for future in futures:
             future.cancel()
-    return tuple(map(measured, tasks, [results[file] for file in files]))
 
 
 def _ended(future: Future[Result], task: Task) -> tuple[Result, bool]:

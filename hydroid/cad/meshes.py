@@ -60,8 +60,7 @@ def convert_meshes(
     """
     read = _read_meshes(files, notes)
     units = _units(spec, files, read, notes)
-    taken: set[str] = set()
-    stl_names = {name: f"{MESHES}/{distinct(word(files[name].stem), taken)}.stl" for name in read}
+    stl_names = _stl_names({name: files[name] for name in read})
     assets = dict[str, bytes]()
     lost = set[str]()
     for mesh in [mesh for mesh in spec.meshes if mesh.file]:
@@ -85,6 +84,12 @@ def convert_meshes(
     return assets, lost
 
 
+def _stl_names(files: Mapping[str, Path]) -> dict[str, str]:
+    """Return the path from the model of each mesh's STL file, all different."""
+    taken = set[str]()
+    return {name: f"{MESHES}/{distinct(word(path.stem), taken)}.stl" for name, path in files.items()}
+
+
 def _read_meshes(files: Mapping[str, Path], notes: Notes) -> dict[str, trimesh.Trimesh]:
     """Return the meshes that can be read, by the names that the spec has for their files."""
     read = dict[str, trimesh.Trimesh]()
@@ -106,11 +111,7 @@ def _units(
     Most meshes of a file have one unit: the one in which most links are as long as their joints are
     apart. A mesh that this makes far too long or too short has its own.
     """
-    lengths = dict[str, float]()  # of meshes in their own units
-    for mesh in spec.meshes:
-        if mesh.file in read:
-            extents = read[mesh.file].extents * np.abs(mesh.scale)
-            lengths[mesh.name] = float(np.max(extents))
+    lengths = _lengths(spec, read)
     body_of = {g.meshname: g.parent.name for g in spec.geoms if lengths.get(g.meshname)}
     if not body_of:
         return {}
@@ -134,6 +135,16 @@ def _units(
     file_of = {mesh.name: files[mesh.file].name for mesh in spec.meshes if mesh.name in units}
     _tell_units(units, common, lengths, file_of, notes)
     return units
+
+
+def _lengths(spec: mujoco.MjSpec, read: Mapping[str, trimesh.Trimesh]) -> dict[str, float]:
+    """Return the lengths of meshes in their own units, by name."""
+    lengths = dict[str, float]()
+    for mesh in spec.meshes:
+        if mesh.file in read:
+            extents = read[mesh.file].extents * np.abs(mesh.scale)
+            lengths[mesh.name] = float(np.max(extents))
+    return lengths
 
 
 def _own_unit(

@@ -57,9 +57,8 @@ def init(
 
     Raises:
         SettingsError: a file of the project is there already, or no joint has one of the names.
-        ModelError, MeshError: the arm's file cannot be used. LogError: the first log cannot, or no
-        joint is
-            driven and moves in the logs.
+        ModelError, MeshError: the arm's file cannot be used.
+        LogError: the first log cannot, or no joint is driven and moves in the logs.
         RunError: the folder cannot be written.
     """
     logs = [_existing(path) for path in as_list(log)]

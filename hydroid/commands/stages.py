@@ -30,6 +30,7 @@ from hydroid.progress import LOGGER, NOTE
 from hydroid.quantity_table import MECHANICAL
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.parameters import nominal_value
+from hydroid.settings.problem import ParameterSettings
 from hydroid.units import seconds
 
 
@@ -243,16 +244,7 @@ def held_mechanics(mech: "ModelSource | None", settings: FitSettings, changes: P
     if summary is not None and summary.stage != "mech":
         hint = "name a run of fit-mech, or begin at this fit with --start"
         raise SettingsError("is a fit of stage 2, but --mech takes one of stage 1", mech, hint)
-    mechanical = {
-        name: parameter
-        for name, parameter in settings.parameters.items()
-        if parameter.quantity in MECHANICAL and parameter.quantity != "gain"
-    }
-    missing = list[str]()
-    for name, parameter in mechanical.items():
-        can_do_without = mech is None and parameter.states_start
-        if name not in values and parameter.fixed is None and not can_do_without:
-            missing.append(name)
+    mechanical = _mechanical(settings)
     held = Plain()
     for name, parameter in mechanical.items():
         key = f"parameters.{name}.fixed"
@@ -262,11 +254,31 @@ def held_mechanics(mech: "ModelSource | None", settings: FitSettings, changes: P
         held[key] = values[name]
         if summary is not None:
             _warn_of_doubtful_mass(name, values[name], summary.estimate[name].flag, settings)
+    missing = [
+        name for name, parameter in mechanical.items() if name not in values and _needs_value(parameter, mech)
+    ]
     if missing:
         hint = "give the run of stage 1 with --mech RUN, or set fixed, nominal or start for each"
         what = f"stage 2 needs the values of {', '.join(missing)} from stage 1"
         raise SettingsError(what, mech or "", hint)
     return held
+
+
+def _mechanical(settings: FitSettings) -> dict[str, ParameterSettings]:
+    """Return the parameters of stage 2 that stage 1 has, too."""
+    return {
+        name: parameter
+        for name, parameter in settings.parameters.items()
+        if parameter.quantity in MECHANICAL and parameter.quantity != "gain"
+    }
+
+
+def _needs_value(parameter: ParameterSettings, mech: "ModelSource | None") -> bool:
+    """Return whether nothing but stage 1 tells a parameter; where it is named,
+    it is to tell all."""
+    if parameter.fixed is not None:
+        return False
+    return mech is not None or not parameter.states_start
 
 
 def _warn_of_doubtful_mass(name: str, value: float, flag: str | None, settings: FitSettings) -> None:

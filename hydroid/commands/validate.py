@@ -72,20 +72,16 @@ def validate(
     models = [open_model(source, None, set) for source in sources]
     read = [read_logs(logs, model.settings, repair=repair) for model in models]
     from hydroid.fitting.verdict import standing_out
-    from hydroid.reporting.predictions import draw, validation_page
+    from hydroid.reporting.predictions import validation_page
     from hydroid.reporting.verdict_table import next_lines, next_step, ordered, verdict_lines
-    from hydroid.run.record import keep_validation, run_of
+    from hydroid.run.record import run_of
 
     tested: dict[str, _Tested] = {}
     names = numbered(model.name for model in models)
     for source, model, unseen, name in zip(sources, models, read, names, strict=True):
         tested[name] = _test(source, model, unseen, tolerance)
         if out is not None:
-            # the report of the fit's own run shows these logs from now on
-            kept = [replace(p, apart=apart) for p in tested[name].predictions]
-            own_run = keep_validation(model, kept)
-            if own_run:
-                draw(own_run)
+            _keep(tested[name], apart=apart)
     fits = ordered({name: test.verdict for name, test in tested.items()})
     arm = models[0].settings.arm
     predictions = list["Prediction"]()
@@ -161,6 +157,16 @@ def _test(
     if tolerance is not None:
         settings = settings.changed({"tolerance_deg": tolerance})
     return _Tested(model, fitted, predictions, judge(settings, fitted, baselines, predictions))
+
+
+def _keep(test: _Tested, *, apart: bool) -> None:
+    """Store what a fit makes of unseen logs in its own run, whose report shows them from now on."""
+    from hydroid.reporting.predictions import draw
+    from hydroid.run.record import keep_validation
+
+    run = keep_validation(test.model, [replace(p, apart=apart) for p in test.predictions])
+    if run:
+        draw(run)
 
 
 def _unseen(log: Log, fitted: Sequence[Log]) -> bool:

@@ -270,12 +270,23 @@ def _verdict(
     diverged_alone = fitted.fit is not None and not np.isfinite(unseen.fit)
     if worse and not diverged_alone:
         return Verdict.NO_BETTER, worse[0]
-    if fitted.fit is not None and _is_beyond(unseen.fit, WORSE * fitted.fit):
+    return _rough_verdict(fitted.fit, unseen.fit, unseen.simple, not_ahead)
+
+
+def _rough_verdict(
+    fitted: float | None, unseen: float, simple: Mapping[str, float], not_ahead: Sequence[str]
+) -> tuple[Verdict, str | None]:
+    """Return the verdict on a fit that is outside the tolerance, and no worse than a simple model.
+
+    Errors are the fit's, and those of simple models on unseen logs; `not_ahead` are the simple
+    models that the fit cannot be told from.
+    """
+    if fitted is not None and _is_beyond(unseen, WORSE * fitted):
         return Verdict.WORSE_THAN_FITTED, None
-    if _is_beyond(unseen.fit, LITTLE * unseen.simple[NAMES[0]]):
+    if _is_beyond(unseen, LITTLE * simple[NAMES[0]]):
         return Verdict.LITTLE, None
     if not_ahead:
-        return Verdict.UNTOLD, min(not_ahead, key=unseen.simple.__getitem__)
+        return Verdict.UNTOLD, min(not_ahead, key=simple.__getitem__)
     return Verdict.ROUGHLY, None
 
 

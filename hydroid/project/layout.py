@@ -76,17 +76,21 @@ def find_layout(
     if table is None:
         every = tuple(range(1, len(arm.joints) + 1))
         return Layout({"period_s": 0.01, "joints": {}}, every, (), (), {}, followed=False)
-    if given is None:
-        guess = guessed_section(table, arm, order)
-        missing = missing_column(guess.log)
-        if missing:
-            return _skeleton(table, arm, guess, missing)
-    else:
+    if given is not None:
         guess = _given(table, arm, given)
-    section = guess.log
-    entries = section["joints"]
+        return _seen(table, arm, guess, others, GIVEN)
+    guess = guessed_section(table, arm, order)
+    missing = missing_column(guess.log)
+    if missing:
+        return _skeleton(table, arm, guess, missing)
+    return _seen(table, arm, guess, others, GUESSED)
+
+
+def _seen(table: Table, arm: Arm, guess: ColumnGuess, others: Sequence[Path], origin: str) -> Layout:
+    """Return the layout of columns, with what the logs show of the joints' motion."""
+    entries = guess.log["joints"]
     reasons = [*guess.reasons]
-    logs = _read(table, section, arm, others, reasons, strict=given is not None)
+    logs = _read(table, guess.log, arm, others, reasons, strict=origin == GIVEN)
     measured = [joint for joint, entry in entries.items() if entry["angle"]]
     driven = [joint for joint in measured if entries[joint]["command"] is not None]
     motions = dict[int, JointMotion]()
@@ -98,13 +102,13 @@ def find_layout(
     reasons += _lacking(entries, arm.joint_names)
     undriven = [motion for joint, motion in motions.items() if joint not in driven]
     return Layout(
-        section,
+        guess.log,
         tuple(driven),
         tuple(reasons),
         guess.unused,
         motions,
         followed=any(motion.travel > FOLLOWED for motion in undriven),
-        origin=GUESSED if given is None else GIVEN,
+        origin=origin,
     )
 
 

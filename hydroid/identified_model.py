@@ -170,7 +170,8 @@ def changed_files(folder: Path) -> list[str]:
         if "estimate" in run:
             written[NAME] = run["estimate"]
     except (OSError, ValueError, RecursionError, KeyError, TypeError):
-        return []  # whoever needs the description says what is wrong with it
+        # whoever needs the description says what is wrong with it
+        return []
     present = own_hashes(folder) | {NAME: file_hash(folder / NAME)}
     return [name for name, stored in written.items() if present.get(name) != stored]
 
@@ -189,7 +190,8 @@ def start_values(settings: FitSettings) -> IdentifiedModel:
 
 def write_settings(folder: Path, settings: FitSettings) -> None:
     """Write the settings, the arm and its models to a folder, so that it can be read anywhere."""
-    from hydroid.mjcf import copy_models  # imports MuJoCo
+    # this imports MuJoCo, which takes long
+    from hydroid.mjcf import copy_models
 
     arm = settings.arm
     models = {MODEL: arm.model} | ({PAIR: arm.pair} if arm.pair else {})

@@ -22,7 +22,8 @@ def read_mjcf(path: Path) -> mujoco.MjSpec:
     """
     if not is_file(path):
         raise ModelError("no such model", path)
-    read_robot(path)  # MuJoCo takes a NaN for what it likes
+    # MuJoCo takes a NaN for what it likes
+    read_robot(path)
     with mujoco_errors(path):
         spec = mujoco.MjSpec.from_file(str(path))
     if not spec.joints:
@@ -30,7 +31,8 @@ def read_mjcf(path: Path) -> mujoco.MjSpec:
     _refuse_joints(spec, path)
     _refuse_forces(spec, path)
     for joint in spec.joints:
-        if not np.isfinite(joint.range).all():  # both, or `read_robot` refuses it
+        # both ends are infinite then, or `read_robot` refuses the file
+        if not np.isfinite(joint.range).all():
             joint.limited = mujoco.mjtLimited.mjLIMITED_FALSE
             joint.range = [0.0, 0.0]
     return spec
@@ -67,12 +69,14 @@ def copy_models(models: Mapping[str, Path], folder: Path) -> None:
 
     Raises RunError: a mesh cannot be read, or the folder cannot be written.
     """
-    contents: dict[str, bytes] = {}  # of the meshes, by their new names
+    # of the meshes, by their new names
+    contents: dict[str, bytes] = {}
     for name, path in models.items():
         spec = read_mjcf(path)
         home = path.resolve().parent
         for mesh in spec.meshes:
-            if mesh.file:  # else its vertices stand in the MJCF
+            # a mesh without a file has its vertices in the MJCF
+            if mesh.file:
                 mesh.file = _copied(home / spec.meshdir / mesh.file, folder, contents)
         for pictures, place in ((spec.textures, spec.texturedir), (spec.hfields, spec.meshdir)):
             for picture in pictures:
@@ -100,7 +104,8 @@ def _copied(source: Path, folder: Path, contents: dict[str, bytes]) -> str:
 
 def mjcf_text(spec: mujoco.MjSpec) -> str:
     """Return a spec as XML to the last bit, as it is written and not as it compiles."""
-    spec.compiler.savecompiled = spec.compiler.savecanonical = False  # canonical is six digits
+    # MuJoCo's canonical form has six digits
+    spec.compiler.savecompiled = spec.compiler.savecanonical = False
     return spec.to_xml()
 
 
@@ -124,7 +129,8 @@ def quiet_mujoco() -> Generator[None]:
     mujoco.MjLogConfig.set(silent)
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # MuJoCo's own, of the same things
+            # MuJoCo warns in Python of the same things
+            warnings.simplefilter("ignore", UserWarning)
             yield
     finally:
         mujoco.MjLogConfig.set(before)

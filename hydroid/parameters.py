@@ -171,7 +171,8 @@ class ParameterSet:
             value = values.get(parameter.name, parameter.fixed)
             if value is None:
                 raise SettingsError(f"parameter {parameter.name!r} is missing", source)
-            least = min(parameter.lower, 0.0)  # most quantities cannot be negative
+            # most quantities cannot be negative
+            least = min(parameter.lower, 0.0)
             number = _number(value)
             # so that squares stay finite
             if not least <= number < 1e100:

@@ -133,7 +133,8 @@ def _check_chains(root: ElementTree.Element, path: Path) -> None:
     for joint in root.iterfind("joint"):
         child = _link(joint.find("child"))
         parent = _link(joint.find("parent"))
-        if child and parent:  # else MuJoCo refuses the joint
+        # a joint without both MuJoCo refuses
+        if child and parent:
             parents[child] = parent
     for link in parents:
         above = link
@@ -183,7 +184,8 @@ def _check_limits(owner: str, element: ElementTree.Element, path: Path) -> None:
     there are none then."""
     low, high = _limits(element)
     if low is None or high is None:
-        return  # MuJoCo refuses what is no number
+        # MuJoCo refuses what is no number
+        return
     place = _place(owner, element)
     if math.isnan(low) or math.isnan(high):
         raise ModelError(f"{place}: a limit is no number", path)

@@ -103,7 +103,8 @@ class ExperimentSimulator:
     """Simulates experiments at an estimate within the limits of the settings."""
 
     def __init__(self, settings: FitSettings, known: Posterior) -> None:
-        if settings.simulation.other_joints == "measured":  # an experiment has no measured motion
+        # an experiment has no measured motion
+        if settings.simulation.other_joints == "measured":
             settings = settings.changed({"simulation.other_joints": "locked"})
         arm = settings.arm
         self._settings = settings
@@ -112,7 +113,8 @@ class ExperimentSimulator:
         self._spec = load_model(arm)
         self._pose = arm.pose(settings.start_pose)
         self._box = known.box
-        self._axes = known.axes(1e-5).one_sided  # little curvature
+        # steps so short that curvature matters little
+        self._axes = known.axes(1e-5).one_sided
         self._margin = settings.design.clearance_m
         self._machine = None
         self._counted = np.empty(0, bool)

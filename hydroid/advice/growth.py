@@ -83,7 +83,8 @@ def explained(problem: Problem, known: Uncertainty) -> Explained:
     """Return what a fit has explained at an estimate. Parameters at bounds are held."""
     linear = known.linear
     of_priors = problem.priors.scores(known.theta[None])[0]
-    weak = np.zeros(len(linear.slopes))  # the estimate does not depend on the weak priors
+    # the estimate does not depend on the weak priors
+    weak = np.zeros(len(linear.slopes))
     return Explained(linear.effects, np.concatenate([linear.innovations, of_priors, weak]))
 
 
@@ -181,7 +182,8 @@ def _tested(term: Term, known: Uncertainty, fit: Explained) -> Candidate | None:
         small = np.sum(sizes[acting] <= LARGEST_EFFECT)
         acting = acting[: max(small, 1)][-1:]
     one_sided = is_limit or term.value in term.span
-    tried = list[tuple[float, Score, float]]()  # gain, score, and where a refinement starts
+    # gain, score, and where a refinement starts
+    tried = list[tuple[float, Score, float]]()
     for i in acting:
         score = fit.score(effects[i])
         if score.strength < VISIBLE * parts[i]:

@@ -164,7 +164,8 @@ def squares_ahead(left_out: LeftOut, joint: int) -> Array:
             continue
         error = left_out.errors[channel.rows] / channel.weight
         step = max(round(AHEAD / problem.logs[channel.log].period), 1)
-        step = min(step, len(error) - 1)  # a shorter log has one span
+        # a shorter log has one span
+        step = min(step, len(error) - 1)
         spans.append(np.diff(error[::step]) ** 2)
     return np.concatenate(spans)
 
@@ -212,7 +213,8 @@ def _forecasts(problem: Problem, known: Uncertainty, now: Posterior) -> Iterator
     try:
         draws = RandomExperiments(settings, np.random.default_rng(1))
     except SettingsError:
-        return  # no pose that an experiment may start from: hydroid design says so
+        # no pose that an experiment may start from: hydroid design says so
+        return
     simulator = ExperimentSimulator(settings, now)
     trials = [simulator.trial(draws.draw()) for _ in range(6)]
     gained = [trial.gained for trial in trials if isinstance(trial, Trial)]
@@ -291,7 +293,8 @@ def missing_findings(content: Content) -> Iterator[Finding]:
         return
     best = free[0]
     before = content["left_out_deg"]
-    left = dict[str, float]()  # part of the error that remains, by joint
+    # the part of the error that remains, by joint
+    left = dict[str, float]()
     for joint, error in best["left_out_deg"].items():
         if before[joint]:
             # None: it diverged

@@ -55,7 +55,8 @@ def locked_spec(
     _draw_tendons(source)
     for name, (position, turn) in locked.held.items():
         body = source.body(name)
-        body.set_frame(body.parent.add_frame())  # its own one is part of the place
+        # the body's own frame is part of its place
+        body.set_frame(body.parent.add_frame())
         body.pos = position
         body.quat = turn
         body.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
@@ -96,7 +97,8 @@ def _take_inertia(body: mujoco.MjsBody, model: mujoco.MjModel, number: int) -> N
     body.iquat = model.body_iquat[number]
     body.ialt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
     body.inertia = model.body_inertia[number]
-    body.fullinertia = [np.nan, 0, 0, 0, 0, 0]  # MuJoCo's word for one that is not given
+    # MuJoCo's word for one that is not given
+    body.fullinertia = [np.nan, 0, 0, 0, 0, 0]
 
 
 def _take_joint(joint: mujoco.MjsJoint, model: mujoco.MjModel, number: int, *, in_degrees: bool) -> None:

@@ -94,7 +94,8 @@ class LockedArm:
         tensor = np.zeros((*shapes, 3, 3))
         np.add.at(tensor, body_of_part, weight[..., None, None] * per_mass)
         inertia, axes = np.linalg.eigh(tensor)
-        axes[..., 2] *= np.sign(np.linalg.det(axes))[..., None]  # right-handed
+        # the axes form a right-handed frame
+        axes[..., 2] *= np.sign(np.linalg.det(axes))[..., None]
         scalar_last = Rotation.from_matrix(axes.reshape(-1, 3, 3)).as_quat()
         quaternion = np.roll(scalar_last, 1, axis=-1).reshape(*shapes, 4)
         return {
@@ -152,8 +153,10 @@ def _fused(
     moved = {int(joint.bodyid[0]): joint for joint in map(full.joint, joints)}
     spec = mujoco.MjSpec()
     bodies = [spec.worldbody]
-    kept = [0]  # the body of `full` that each of `bodies` is
-    carriers = list[int]()  # place in `bodies` of what each body of `full` is part of
+    # the body of `full` that each of `bodies` is
+    kept = [0]
+    # place in `bodies` of what each body of `full` is part of
+    carriers = list[int]()
     parts = list[tuple[Any, ...]]()
     for number, parent in enumerate(full.body_parentid):
         carrier = carriers[parent] if number else 0
@@ -195,7 +198,8 @@ def repeat(model: mujoco.MjModel, copies: int) -> mujoco.MjModel:
     spec = mujoco.MjSpec()
     for copy in range(copies):
         bodies = [spec.worldbody]
-        for number, joint in enumerate(map(model.joint, range(model.njnt)), 1):  # a body each
+        # each joint has a body of its own
+        for number, joint in enumerate(map(model.joint, range(model.njnt)), 1):
             body = model.body(number)
             above = bodies[body.parentid[0]]
             name = f"{body.name} {copy}"

@@ -122,7 +122,8 @@ class CollisionChecker:
     def _meetings(self, time: Array, distance: Array) -> tuple[Meeting, ...]:
         """Return when bodies are inside each other, by the distances of all pairs of shapes, (T,
         P)."""
-        depths: dict[tuple[str, str], Array] = {}  # of a body's shapes the deepest
+        # of a body's shapes the deepest
+        depths: dict[tuple[str, str], Array] = {}
         for pair in np.flatnonzero(distance.min(axis=0) < 0):
             inside = np.maximum(-distance[:, pair], 0.0)
             names = self.names[pair]

@@ -64,7 +64,8 @@ def take_cylinders(spec: mujoco.MjSpec, notes: Notes) -> dict[str, Plain]:
         if not made.bars:
             _show_pivots(spec, made, data)
         notes.add("cylinders of the file give these joints' pivots", joint.name)
-    for name in held:  # and all that hangs on them
+    # with them all that hangs on them
+    for name in held:
         for joint in spec.body(name).find_all("joint"):
             spec.delete(joint)
     for equality in list(spec.equalities):
@@ -92,7 +93,8 @@ def _show_pivots(spec: mujoco.MjSpec, made: "_Linkage", data: mujoco.MjData) -> 
     carrier = made.joint.parent.parent.name
     moved = made.joint.parent.name
     pins = [made.foot, made.eye]
-    if made.foot.other(made.tube) != carrier:  # the cylinder stands on its head
+    # the cylinder stands on its head
+    if made.foot.other(made.tube) != carrier:
         pins.reverse()
     for end, pin, body in zip(ENDS, pins, (carrier, moved), strict=True):
         frame = data.body(body)
@@ -245,7 +247,8 @@ def _four_bar(joint: Any, pins: Sequence[_Pin]) -> Plain | None:
     y = np.cross(axis, x)
     offsets = [pin.at - joint.xanchor for pin in pins]
     ground, pin, child, foot, eye = (complex(offset @ x, offset @ y) for offset in offsets)
-    turn = abs(ground) / ground  # the rocker's pivot lies at (ground, 0)
+    # the rocker's pivot lies at (ground, 0)
+    turn = abs(ground) / ground
     is_left = ((pin - ground) * np.conj(child - ground)).imag > 0
     bars = FourBar(
         ground=round(abs(ground), 6),
@@ -262,7 +265,8 @@ def _four_bar(joint: Any, pins: Sequence[_Pin]) -> Plain | None:
     # the rod's pin turns with the rocker
     sense = 1.0 if math.sin(between_pivots) * per_joint_angle > 0 else -1.0
     theta0 = math.degrees(math.remainder(between_pivots - rocker_angle, math.tau))
-    if theta0 * sense < 0:  # its sign is the rod's way
+    # the sign of theta0 says which way the rod moves
+    if theta0 * sense < 0:
         theta0 += 360.0 * sense
     triangle = {
         "a": round(abs(foot - ground), 6),

@@ -93,7 +93,8 @@ def _in_scene(
 ) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
     """Return the arm with light, floor and cameras, and the pose nearest to 0 as `home`; and its
     model before these are arranged."""
-    scene = fill_template("cad/scene.xml")  # `arrange` puts its lights and cameras around the arm
+    # `arrange` puts its lights and cameras around the arm
+    scene = fill_template("cad/scene.xml")
     text = mjcf_text(spec).replace("<worldbody>", scene + "<worldbody>", 1)
     with mujoco_errors(path):
         whole = mujoco.MjSpec.from_string(text, assets=meshes)

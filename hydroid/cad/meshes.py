@@ -1,7 +1,7 @@
 """Meshes of any format and unit -> STL files in m that MuJoCo takes."""
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from contextlib import suppress
 from pathlib import Path
 
@@ -44,6 +44,12 @@ class _Reach:
     def longest(self) -> float:
         """The longest of them [m], 0 where there is none."""
         return max(self.own.values(), default=0.0)
+
+    def telling(self, links: Collection[str]) -> dict[str, float]:
+        """Return the distances, by link, that are long enough to tell the unit of a
+        link's meshes."""
+        least = SPEAKS * self.longest
+        return {link: distance for link, distance in self.own.items() if distance >= least and link in links}
 
     def nearest(self, length: float, of: float) -> float:
         """Return the unit [m] in which a mesh of a length is most like a distance [m]."""
@@ -116,15 +122,12 @@ def _units(
     if not body_of:
         return {}
     reach = _reach(spec, notes)
-    longest = dict[str, float]()  # mesh of each link
+    # the longest mesh of each link
+    longest = dict[str, float]()
     for mesh, body in body_of.items():
         link = reach.link[body]
         longest[link] = max(longest.get(link, 0.0), lengths[mesh])
-    telling = {
-        link: distance
-        for link, distance in reach.own.items()
-        if distance >= SPEAKS * reach.longest and link in longest
-    }
+    telling = reach.telling(longest)
     common = _common_unit(reach, telling, longest)
     units = dict[str, float]()
     for mesh, body in body_of.items():
@@ -220,7 +223,8 @@ def _read_mesh(path: Path, notes: Notes) -> trimesh.Trimesh | None:
     fault = f"mesh {path.name}"
     try:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
-            warnings.simplefilter("ignore")  # of numbers that are refused below
+            # trimesh warns of numbers that are refused below
+            warnings.simplefilter("ignore")
             mesh = trimesh.load(path, force="mesh")
     except Exception as error:  # trimesh's readers raise whatever their format's parser does
         hint = "export them as STL"

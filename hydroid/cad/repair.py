@@ -182,7 +182,7 @@ def _filled(links: Sequence[mujoco.MjsBody], hull: Mapping[str, Inertial]) -> di
     where it is lower than usual.
     """
     usual = dict[str, float]()
-    stated = dict[float, list[float]]()
+    stated: dict[float, list[float]] = {USUAL: [], BOXED: []}
     for body in links:
         if hull[body.name].mass <= MASSLESS:
             continue
@@ -190,10 +190,10 @@ def _filled(links: Sequence[mujoco.MjsBody], hull: Mapping[str, Inertial]) -> di
         usual[body.name] = USUAL if meshed else BOXED
         density = USUAL * body.mass / hull[body.name].mass
         if LEAST <= density <= MOST:
-            stated.setdefault(usual[body.name], []).append(density)
+            stated[usual[body.name]].append(density)
     filled = dict[str, float]()
     for name, density in usual.items():
-        alike = stated.get(density, [density])
+        alike = stated[density] or [density]
         filled[name] = min(density, float(np.median(alike)))
     return filled
 
@@ -231,7 +231,8 @@ def hull_model(spec: mujoco.MjSpec, path: Path) -> mujoco.MjModel:
     hulls = spec.copy()
     hulls.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
     hulls.compiler.inertiagrouprange = [SHOWN, SHOWN]
-    solid = {""}  # what is no mesh
+    # shapes that are no mesh name none
+    solid = {""}
     for mesh in hulls.meshes:
         if mesh.inertia != mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL:
             mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
@@ -286,7 +287,8 @@ def _stated_fault(body: mujoco.MjsBody, urdf: bool) -> str:
 
 def _stated_tensor(body: mujoco.MjsBody) -> Array:
     """Return the inertia that a file states [kg·m²], shape (3, 3)."""
-    full = np.array(body.fullinertia)  # xx, yy, zz, xy, xz, yz
+    # in MuJoCo's order: xx, yy, zz, xy, xz, yz
+    full = np.array(body.fullinertia)
     if np.isnan(full[0]):
         return np.diag(body.inertia)
     return full[[0, 3, 4, 3, 1, 5, 4, 5, 2]].reshape(3, 3)

@@ -71,7 +71,8 @@ def read_source(path: Path, notes: Notes) -> tuple[mujoco.MjSpec, dict[str, Path
     Raises:
         ModelError: a file of another kind, or one that MuJoCo refuses.
     """
-    is_usd = path.suffix.lower() in USD  # which is no XML
+    # a USD stage is no XML
+    is_usd = path.suffix.lower() in USD
     root = ElementTree.Element("usd") if is_usd else read_robot(path)
     is_xacro = any("xacro" in str(part.tag).lower() for part in root.iter())
     kind = "xacro" if is_xacro else str(root.tag)
@@ -125,7 +126,8 @@ def _found(files: dict[str, str], folder: Path, notes: Notes) -> dict[str, Path]
 def _plain_path(given: str) -> Path:
     """Return the path that a mesh's file name or URI means."""
     scheme, colon, rest = given.partition(":")
-    is_uri = colon and len(scheme) > 1  # C: is a disk
+    # C: is a disk, and no scheme
+    is_uri = colon and len(scheme) > 1
     text = unquote(rest.removeprefix("//")) if is_uri else given
     return Path(text.replace("\\", "/"))
 
@@ -147,7 +149,8 @@ def _prepare_urdf(root: ElementTree.Element, notes: Notes) -> dict[str, str]:
         if link.get("name") not in children:
             what = "root link, the fixed base: its mass does not matter"
             notes.add(what, str(link.get("name")))
-    for joint in root.iterfind("joint[@type='planar']"):  # MuJoCo makes three joints of it
+    # MuJoCo makes three joints of it
+    for joint in root.iterfind("joint[@type='planar']"):
         joint.set("type", "fixed")
         what = "moving in a plane, which hydroid does not model: held at 0"
         notes.add(what, str(joint.get("name")))

@@ -76,7 +76,8 @@ class LazyGroup(TyperGroup):
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write one section for each group."""
-        width = max(map(len, COMMANDS))  # of all groups, so that their columns are aligned
+        # of all groups, so that their columns are aligned
+        width = max(map(len, COMMANDS))
         for heading, commands in GROUPS.items():
             rows = [(name.ljust(width), summary) for name, summary in commands.items()]
             with formatter.section(heading):
@@ -99,7 +100,8 @@ def click_command(command: str) -> "TyperCommand":
         verbose: Annotated[bool, typer.Option("-v", "--verbose", help=VERBOSE)] = False,
         **given: Any,
     ) -> None:
-        if given.get("out", "") is None and command != "view":  # in Python nothing is written then
+        # in Python nothing is written then
+        if given.get("out", "") is None and command != "view":
             given["out"] = "runs/simulated.csv" if command == "simulate" else f"runs/{command}"
         VISIBLE.set(not (quiet or json))
         with log_lines(verbose=verbose, quiet=quiet):
@@ -143,7 +145,8 @@ def _root(  # pyright: ignore[reportUnusedFunction]  # typer calls it
 def main() -> None:
     """Run a command: exit 0 when it is done, 2 for an error of the input,
     130 when it was stopped."""
-    for variable in ONE_THREAD:  # numpy is not imported yet
+    # numpy is not imported yet
+    for variable in ONE_THREAD:
         os.environ.setdefault(variable, "1")
     code = 0
     kept: str | None = None
@@ -153,7 +156,8 @@ def main() -> None:
         code = STOPPED
         kept = str(stop) if isinstance(stop, Stopped) else None
     except BrokenPipeError:
-        sys.stderr.close()  # the reader has left; Python would complain at exit
+        # the reader has left; Python would complain at exit
+        sys.stderr.close()
     except Exception as error:
         code = _ending(error)
     if code == STOPPED:
@@ -184,6 +188,7 @@ def _ending(error: Exception) -> int:
         what = f"cannot be used ({error.strerror})"
         show_error(RunError(what, error.filename or "the system"))
         return 2
-    if stopped():  # what the interrupt met may have made another error of it
+    # what the interrupt met may have made another error of it
+    if stopped():
         return STOPPED
     raise error

@@ -195,7 +195,8 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
     summary = summarise(problem, fit)
     doubted = doubts(settings, problem.logs)
     findings = [*summary.findings, *assumption_findings(settings, problem.logs, doubted)]
-    findings[1:1] = behind(settings, verdict)  # after the first, which may be that time was up
+    # after the first, which may be that time was up
+    findings[1:1] = behind(settings, verdict)
     summary = summary.changed({"verdict": verdict, "findings": tuple(findings)})
     source = "the fit" if folder is None else str(folder / NAME)
     lines: list[Table | str] = [*verdict_lines({fit.final: verdict}), *warnings(summary)]

@@ -214,7 +214,8 @@ class _Described(NamedTuple):
 
 def _described(section: str) -> dict[str, _Described]:
     """Return what the lines of `Args:` say of each parameter, by name."""
-    entry = r"^ {4}(\w+)(?: \((.+?)\))?: (.*(?:\n {8}.*)*)"  # lines that go on are indented by 8
+    # lines that go on are indented by 8
+    entry = r"^ {4}(\w+)(?: \((.+?)\))?: (.*(?:\n {8}.*)*)"
     found = re.findall(entry, section, re.MULTILINE)
     return {name: _Described(value, " ".join(text.split())) for name, value, text in found}
 
@@ -231,7 +232,8 @@ def _on_command_line(parameter: inspect.Parameter, described: _Described) -> ins
     else:
         flags = _flags(parameter.name)
         if value_type is bool and default is not False:
-            flags = []  # typer then offers --no-... too, for what is on, or left to the settings
+            # typer then offers --no-... too, for what is on, or left to the settings
+            flags = []
         option = typer.Option(*flags, **details)
     kind: Any = list[value_type] if is_list else value_type
     if default is None:

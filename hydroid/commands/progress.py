@@ -92,12 +92,14 @@ class Progress:
             from rich.console import Console
             from rich.progress import Progress as Bar
 
-            columns = reversed(Bar.get_default_columns())  # the line last: its length varies
+            # the line last: its length varies
+            columns = reversed(Bar.get_default_columns())
             self._bar = Bar(*columns, console=Console(stderr=True), transient=True)
             self._bar.add_task("", total=None)
             self._bar.start()
         task = self._bar.tasks[0]
-        task.total = total  # `update` takes None for no change
+        # `update` takes None for no change
+        task.total = total
         # a joint may be called [/b]
         self._bar.update(task.id, completed=done, description=escape(line))
 
@@ -144,7 +146,8 @@ class FitProgress(Progress):
     def _rung(self, step: "Step") -> str:
         """Return which step of how many it is, and what is done there."""
         total = self._rungs
-        number = total  # in which what is kept is refined
+        # the last step, in which what is kept is refined
+        number = total
         if step.phase or step.without or step.start:
             models = {"start": 1, "refined": 2, "joint": 2, "dynamic": total}
             number = models.get(step.model, 1)

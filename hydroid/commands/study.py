@@ -51,7 +51,8 @@ def study(
     """
     path = Path(file)
     folder = Path(out)
-    load(path, StudySettings)  # a wrong file is refused before anything heavy is imported
+    # a wrong file is refused before anything heavy is imported
+    load(path, StudySettings)
     from hydroid.estimate import finite
     from hydroid.reporting.page import Table
     from hydroid.run.process import locked

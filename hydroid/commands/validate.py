@@ -141,7 +141,8 @@ def _test(
     from hydroid.fitting.verdict import judge
     from hydroid.run.record import record_of
 
-    is_fit = not isinstance(source, str | Path | IdentifiedModel)  # in memory
+    # a fit in memory brings its record along
+    is_fit = not isinstance(source, str | Path | IdentifiedModel)
     record = source.record if is_fit else record_of(model)
     fitted: Sequence[Prediction] = ()
     baselines: Baselines = {}

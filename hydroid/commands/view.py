@@ -147,7 +147,8 @@ def view(
         SettingsError: another kind of file, no such arm or pose, a span without time.
     """
     if out is not None:
-        choose_platform()  # before anything here imports MuJoCo
+        # before anything here imports MuJoCo
+        choose_platform()
     log = source
     if isinstance(source, str | Path) and is_file(Path(source) / "run.json"):
         if fit is not None:

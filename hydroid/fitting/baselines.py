@@ -197,7 +197,8 @@ def _starts(table: Baseline) -> Iterator[Array]:
         dead[side] = 0.9 * size[moves].min(initial=size.max())
         largest[side] = size.max()
         last[side] = speed[size.argmax()]
-    delay = max(table.delay - 0.1, 0.01)  # the lag of 0.1 s takes the rest
+    # the lag of 0.1 s takes the rest
+    delay = max(table.delay - 0.1, 0.01)
     for exponent in (1.0, 1.6, 2.5):
         full = last * ((100 - dead) / (largest - dead)) ** exponent
         yield np.array([*dead, exponent, exponent, *full, 0.1, 0.1, delay])

@@ -95,7 +95,8 @@ def write_credentials(folder: Path) -> None:
     for role in ("scheduler", "worker", "client"):
         role_config = security.get_tls_config_for_role(role)
         tls[role] = {"cert": role_config["cert"], "key": role_config["key"]}
-        tls["ca-file"] = role_config["ca_file"]  # one for all
+        # all trust one authority
+        tls["ca-file"] = role_config["ca_file"]
     comm = {"default-scheme": "tls", "require-encryption": True, "tls": tls}
     # HTTP servers have no TLS, and serve nothing
     closed: dict[str, Any] = {"http": {"routes": []}}
@@ -109,7 +110,8 @@ def _start_local(stack: ExitStack, count: int) -> Any:
     from distributed.security import Security
 
     with _signals_blocked(), warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the port of the HTTP server that serves nothing
+        # Dask warns of the port of an HTTP server that serves nothing
+        warnings.simplefilter("ignore")
         cluster: Any = LocalCluster(
             n_workers=count,
             threads_per_worker=1,
@@ -129,7 +131,8 @@ def _signals_blocked() -> Generator[None]:
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    resource_tracker.ensure_running()  # it would unblock them
+    # the tracker would unblock them
+    resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGUSR1})
     try:
         yield
@@ -147,7 +150,8 @@ def _address(given: str) -> str:
         if Path(given).is_file():
             address = str(json.loads(Path(given).read_text())["address"])
         elif given.startswith("local:"):
-            raise ValueError(given)  # not the host of that name
+            # local: is not a host of that name
+            raise ValueError(given)
         scheme, _ = parse_address(address)
         host = get_address_host(address)
     except (OSError, ValueError, TypeError, KeyError):

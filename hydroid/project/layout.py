@@ -207,7 +207,8 @@ def _read(
         if log is not None:
             logs.append(log)
         elif path == first:
-            return []  # what its joints do is not known
+            # what its joints do is not known
+            return []
     return logs
 
 
@@ -267,7 +268,8 @@ def _beyond_range(angle: Array, joint: Joint) -> Iterator[str]:
 def turned(command: Plain) -> Plain:
     """Return the settings of a command of the other sign."""
     columns = command["column"]
-    if isinstance(columns, list):  # the positive and the negative direction
+    # the positive and the negative direction
+    if isinstance(columns, list):
         return command | {"column": columns[::-1]}
     changes = {"scale": -command.get("scale", 1.0)}
     if command.get("offset"):

@@ -148,7 +148,8 @@ def _steps(folder: Path, logs: Sequence[Path], layout: Layout) -> tuple[str, ...
         given = [f"--log {name}" for name in names]
         return (" ".join([f"hydroid init {config}", *given]),)
     *fitted, other = names
-    if not fitted:  # a single log is fitted, and another one is still to be recorded
+    # a single log is fitted, and another one is still to be recorded
+    if not fitted:
         fitted = names
         other = "OTHER.csv"
     fitted_logs = " ".join(fitted)
@@ -252,7 +253,8 @@ def _move(stage: Path, folder: Path) -> tuple[str, ...]:
         try:
             folder.mkdir(parents=True, exist_ok=True)
             for name in names:
-                if os.path.lexists(folder / name):  # of an earlier project
+                # a file of an earlier project
+                if os.path.lexists(folder / name):
                     os.rename(folder / name, old / name)
                 os.rename(stage / name, folder / name)
         except OSError:

@@ -71,7 +71,8 @@ def difference(run: Mapping[str, Any], other: Mapping[str, Any], but: str = "") 
             return f"was made by {key} {run.get(key)}, not {other.get(key)}"
     logs = run.get("logs", {})
     other_logs = other.get("logs", {})
-    if [*logs.values()] != [*other_logs.values()]:  # the files may have moved
+    # the files may have moved
+    if [*logs.values()] != [*other_logs.values()]:
         names = ", ".join(logs)
         return f"has other logs, or others' contents: {names}, not {', '.join(other_logs)}"
     settings = _flat(run.get("settings"))
@@ -147,7 +148,8 @@ class RunFolder:
         if self._is_of_others():
             raise RunError("exists and holds no run", self.path, "choose another folder with --out")
         with locked(self.path), run_log(self.path / "run.log"):
-            for part in self.path.rglob(f".*{PART}"):  # nobody else writes here
+            # nobody else writes here
+            for part in self.path.rglob(f".*{PART}"):
                 LOGGER.info("removed %s, left by a process that was killed while it wrote", part.name)
                 part.unlink(missing_ok=True)
             try:
@@ -179,7 +181,8 @@ class RunFolder:
             self._describe(wanted | {"files": own_hashes(self.path), "status": "running"})
             return self.checkpoints()
         self.refuse_changes()
-        if (self.path / MODEL).samefile(settings.arm.model):  # its own copy, to the last bit
+        # its own copy, to the last bit
+        if (self.path / MODEL).samefile(settings.arm.model):
             wanted["origin"] = self.identity().get("origin")
         other = difference(self.identity(), wanted)
         if other:

@@ -86,7 +86,8 @@ class Descent:
         values = {field.name: getattr(self, field.name) for field in fields(self)}
         values["ending"] = self.ending.name
         if self.ended:
-            values["residual"] = []  # the Jacobian is where the uncertainty begins
+            # the Jacobian is where the uncertainty begins
+            values["residual"] = []
         return {name: np.asarray(value) for name, value in values.items()}
 
     @classmethod
@@ -151,7 +152,8 @@ class LinearModel:
         matrix = np.vstack([triangle / self.scale, np.sqrt(damping) * np.eye(len(unit))])
         target = np.append(-right / size, np.zeros(len(unit)))
         limits = (-point * unit, (1 - point) * unit)
-        most = 20 * len(unit) + 20  # changes of the active set: far more than it takes
+        # changes of the active set: far more than it takes
+        most = 20 * len(unit) + 20
         solved = lsq_linear(matrix, target, limits, method="bvls", tol=TOLERANCE, max_iter=most)
         return solved.x / unit
 

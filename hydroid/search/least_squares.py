@@ -185,7 +185,8 @@ def _moved(now: State, point: Array, row: Array, ratio: float, settings: Refinem
         ending = Ending.SLOW
     elif now.iterations + 1 >= settings.iterations:
         ending = Ending.ITERATIONS
-    shrinking = max(1 / 3, 1 - (2 * ratio - 1) ** 3)  # Nielsen's rule
+    # Nielsen's rule
+    shrinking = max(1 / 3, 1 - (2 * ratio - 1) ** 3)
     return replace(
         now,
         point=point,

@@ -57,7 +57,8 @@ def read_document(text: str, source: object) -> tuple[Any, Lines]:
     """Read one YAML document."""
     reader = _Reader(source)
     try:
-        node = yaml.compose(text, Loader=yaml.BaseLoader)  # every scalar is text
+        # every scalar is text
+        node = yaml.compose(text, Loader=yaml.BaseLoader)
         value = None if node is None else reader.value(node, ())
     except yaml.YAMLError as error:
         raise _not_yaml(error, source) from None
@@ -127,7 +128,8 @@ class _Reader:
             raise SettingsError(f"holds more than {MOST_CHARACTERS} characters of text", self._source)
         if not all(letter.isprintable() or letter in "\t\n" for letter in text):
             raise SettingsError("a text contains characters that cannot be printed", self._place(node))
-        is_plain = node.style is None  # neither quoted nor a block of text
+        # a plain scalar is neither quoted nor a block of text
+        is_plain = node.style is None
         return _plain_value(text) if is_plain else text
 
 

@@ -127,7 +127,8 @@ class FitSettings(Settings):
                 raise ValueError(f"parameters.{name}: stage mech has no {quantity}; set stage: hyd")
             if self.stage == "hyd" and quantity == "gain":
                 raise ValueError(f"parameters.{name}: stage hyd has no gain; the hydraulics take its place")
-        self.parameter_set()  # raises where a parameter cannot be made
+        # this raises where a parameter cannot be made
+        self.parameter_set()
         return self
 
     @property

@@ -61,7 +61,8 @@ def _add_links(result: Plain, name: str, entry: Plain, arm: Arm | None) -> None:
     if links is True:
         links = arm.link_names if arm else None
     if not _are_all(links, str):
-        result[name] = entry  # refused as any other wrong value
+        # refused as any other wrong value
+        result[name] = entry
         return
     shared = _without_each(entry)
     taken = set[str]()
@@ -78,7 +79,8 @@ def _add_joints(result: Plain, name: str, entry: Plain, compared: Any, arm: Arm 
     all_compared = entry["each"] is True
     joints: Any = compared if all_compared else entry["each"]
     if not _are_all(joints, int | str):
-        result[name] = entry  # refused as any other wrong value
+        # refused as any other wrong value
+        result[name] = entry
         return
     names = arm.joint_names if arm else ()
     _refuse(joints, "outputs" if all_compared else f"parameters.{name}.each", names)
@@ -148,7 +150,8 @@ def nominal_value(arm: Arm, hydraulics: HydraulicSettings, settings: ParameterSe
     if settings.nominal is not None:
         return settings.nominal
     if settings.per is not None:
-        return 0.0  # an effect of a group is added to the quantity
+        # an effect of a group is added to the quantity
+        return 0.0
     if settings.link is not None:
         return arm.mass_of.get(settings.link)
     if settings.quantity in MECHANICAL:
@@ -182,7 +185,8 @@ def make_parameter(
     has_log_prior = prior is not None and prior.log
     least = 0.0
     if settings.per is not None and settings.sd is not None:
-        least = settings.sd  # an effect is near 0, where no relative change means anything
+        # an effect is near 0, where no relative change means anything
+        least = settings.sd
     return Parameter(
         name=name,
         unit=_unit(arm, settings),
@@ -231,7 +235,8 @@ def _default_bounds(settings: ParameterSettings, prior: Prior | None) -> tuple[f
     quantity = CHOICES[settings.quantity]
     least = quantity.lowest
     if quantity.positive:
-        least = 0.01 * prior.nominal  # what must be above 0 is not searched below 1 % of its value
+        # what must be above 0 is not searched below 1 % of its value
+        least = 0.01 * prior.nominal
     return max(lower, least), upper
 
 

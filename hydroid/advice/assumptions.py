@@ -9,7 +9,7 @@ the logs make a joint turned round more likely by (S / S')^(n/2).
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from itertools import product
+from itertools import combinations
 
 import mujoco
 import numpy as np
@@ -134,10 +134,17 @@ def exchanged(settings: FitSettings, logs: Sequence[Log]) -> tuple[tuple[int, in
     """Return pairs of joints (numbers, from 1) each of which follows the other's command,
     not its own."""
     motion = _motion(settings, logs)
-    follows = {(j, k): motion.follows(j, k)[0] for j, k in product(motion.joints, repeat=2)}
-    prefers = {(j, k) for (j, k), size in follows.items() if size > follows[j, j] + FOLLOWED}
-    pairs = sorted((j, k) for j, k in prefers if j < k and (k, j) in prefers)
-    return tuple((j + 1, k + 1) for j, k in pairs)
+
+    def prefers(joint: int, other: int) -> bool:
+        own, _ = motion.follows(joint, joint)
+        others, _ = motion.follows(joint, other)
+        return others > own + FOLLOWED
+
+    pairs = list[tuple[int, int]]()
+    for first, second in combinations(motion.joints, 2):
+        if prefers(first, second) and prefers(second, first):
+            pairs.append((first + 1, second + 1))
+    return tuple(pairs)
 
 
 def assumption_findings(

@@ -1,9 +1,10 @@
 """Meshes of any format and unit -> STL files in m that MuJoCo takes."""
 
 import warnings
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -69,15 +70,16 @@ def convert_meshes(
     stl_names = _stl_names({name: files[name] for name in read})
     assets = dict[str, bytes]()
     lost = set[str]()
-    for mesh in [mesh for mesh in spec.meshes if mesh.file]:
+    for mesh in list(spec.meshes):
+        if not mesh.file:
+            continue
         shapes = [geom for geom in spec.geoms if geom.meshname == mesh.name]
         mesh.scale = mesh.scale * units.get(mesh.name, 1.0)
         source = read.get(mesh.file) if shapes else None
         shown = source and _shown_stl(source, mesh.scale, files[mesh.file].name, notes)
         if not shown:
-            lost |= {geom.parent.name for geom in shapes}
-            for part in (*shapes, mesh):
-                spec.delete(part)
+            lost.update(geom.parent.name for geom in shapes)
+            _delete(spec, [*shapes, mesh])
             continue
         content, inertia = shown
         mesh.file = stl_names[mesh.file]
@@ -88,6 +90,11 @@ def convert_meshes(
     spec.strippath = False
     spec.assets = assets
     return assets, lost
+
+
+def _delete(spec: mujoco.MjSpec, parts: Sequence[Any]) -> None:
+    for part in parts:
+        spec.delete(part)
 
 
 def _stl_names(files: Mapping[str, Path]) -> dict[str, str]:

@@ -23,6 +23,7 @@ from hydroid.commands.inputs import (
 from hydroid.commands.logs import read_logs, refuse_undriven
 from hydroid.commands.progress import FitProgress, Progress
 from hydroid.errors import SettingsError
+from hydroid.estimate import FitSummary
 from hydroid.files import Plain
 from hydroid.log import Log
 from hydroid.parallel.cluster import open_workers
@@ -237,13 +238,7 @@ def held_mechanics(mech: "ModelSource | None", settings: FitSettings, changes: P
     Raises:
         RunError, SettingsError: no values there, or one that stage 2 needs is missing.
     """
-    values: Plain = {}
-    summary = None
-    if mech is not None:
-        values, summary = open_values(mech)
-    if summary is not None and summary.stage != "mech":
-        hint = "name a run of fit-mech, or begin at this fit with --start"
-        raise SettingsError("is a fit of stage 2, but --mech takes one of stage 1", mech, hint)
+    values, summary = _stage_1(mech)
     mechanical = _mechanical(settings)
     held = Plain()
     for name, parameter in mechanical.items():
@@ -262,6 +257,18 @@ def held_mechanics(mech: "ModelSource | None", settings: FitSettings, changes: P
         what = f"stage 2 needs the values of {', '.join(missing)} from stage 1"
         raise SettingsError(what, mech or "", hint)
     return held
+
+
+def _stage_1(mech: "ModelSource | None") -> tuple[Plain, FitSummary | None]:
+    """Return the values of stage 1 by name, and the fit's own account of them where
+    there is one."""
+    if mech is None:
+        return {}, None
+    values, summary = open_values(mech)
+    if summary is not None and summary.stage != "mech":
+        hint = "name a run of fit-mech, or begin at this fit with --start"
+        raise SettingsError("is a fit of stage 2, but --mech takes one of stage 1", mech, hint)
+    return values, summary
 
 
 def _mechanical(settings: FitSettings) -> dict[str, ParameterSettings]:

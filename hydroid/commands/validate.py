@@ -97,12 +97,18 @@ def validate(
         lines += next_lines(step)
     page = validation_page(predictions, fits, arm, *steps)
     lines += map(str, standing_out(best.predictions, best.verdict, str(run or "RUN")))
-    seen = [p.log.source for p in best.predictions if p.unseen is False]
-    if seen:
-        lines.insert(1, f"The fit was made with {listed(seen, 3)}: that tests nothing.")
+    lines[1:1] = _fitted_lines(best.predictions)
     lines += written(page, out)
     content = _content(fits, predictions, arm.joint_names)
     return Result(lines, content, predictions, page, details=[page.tables["errors"]])
+
+
+def _fitted_lines(predictions: "Sequence[Prediction]") -> list[str]:
+    """Return which logs test nothing, because the fit was made with them."""
+    fitted = [p.log.source for p in predictions if p.unseen is False]
+    if not fitted:
+        return []
+    return [f"The fit was made with {listed(fitted, 3)}: that tests nothing."]
 
 
 def _content(

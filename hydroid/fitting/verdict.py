@@ -168,7 +168,7 @@ def _inside(banded: Sequence[Prediction], joint: int) -> float | None:
     if not banded:
         return None
     parts = [p.bands[joint].inside for p in banded]
-    return 100 * float(np.average(parts, weights=[len(p.log.time) for p in banded]))
+    return 100 * float(np.average(parts, weights=_samples(banded)))
 
 
 def _expected(banded: Sequence[Prediction], joint: int) -> float | None:
@@ -176,8 +176,12 @@ def _expected(banded: Sequence[Prediction], joint: int) -> float | None:
     if not banded:
         return None
     errors = [p.bands[joint].expected for p in banded]
-    samples = [len(p.log.time) for p in banded]
-    return finite(rms_deg([np.repeat(errors, samples)]))
+    return finite(rms_deg([np.repeat(errors, _samples(banded))]))
+
+
+def _samples(predictions: Sequence[Prediction]) -> list[int]:
+    """Return the number of samples of each prediction."""
+    return [len(p.log.time) for p in predictions]
 
 
 def _ahead(
@@ -258,18 +262,19 @@ def _verdict(
     Errors are those on the fitted and on the unseen logs; `outcomes` are those of `_outcome` by
     simple model, the simplest first.
     """
-    if unseen.fit is not None and unseen.fit <= tolerance:
+    if _is_within(unseen.fit, tolerance):
         return Verdict.PREDICTS, None
     not_ahead = [name for name, outcome in outcomes.items() if outcome is not Outcome.BETTER]
     if _misfits(fitted, tolerance) and (unseen.fit is None or not_ahead):
         return Verdict.MISFIT, None
     if unseen.fit is None:
         return Verdict.UNTESTED, None
-    worse = [name for name in not_ahead if outcomes[name] is Outcome.WORSE]
     # of a fit that fits, and diverges elsewhere, that is the news
     diverged_alone = fitted.fit is not None and not np.isfinite(unseen.fit)
-    if worse and not diverged_alone:
-        return Verdict.NO_BETTER, worse[0]
+    if not diverged_alone:
+        for name in not_ahead:
+            if outcomes[name] is Outcome.WORSE:
+                return Verdict.NO_BETTER, name
     return _rough_verdict(fitted.fit, unseen.fit, unseen.simple, not_ahead)
 
 
@@ -290,6 +295,11 @@ def _rough_verdict(
     return Verdict.ROUGHLY, None
 
 
+def _is_within(error: float | None, limit: float) -> bool:
+    """Return whether there is an error, and it is at most a limit."""
+    return error is not None and error <= limit
+
+
 def _is_beyond(error: float, limit: float) -> bool:
     """Return whether an error is above a limit, or NaN: that of a simulation that diverged."""
     return not error <= limit
@@ -298,7 +308,7 @@ def _is_beyond(error: float, limit: float) -> bool:
 def _misfits(fitted: _Errors, tolerance: float) -> bool:
     """Return whether the fit errs beyond the tolerance, and more than a simple model,
     on fitted logs."""
-    if fitted.fit is None or fitted.fit <= tolerance:
+    if fitted.fit is None or _is_within(fitted.fit, tolerance):
         return False
     return not fitted.fit < min(fitted.simple.values())
 

@@ -35,12 +35,12 @@ class Finding:
 
     @property
     def what(self) -> str:
-        """What it states."""
+        """The sentence that states it."""
         return self._filled(WORDS[self.kind][0])
 
     @property
     def hint(self) -> str:
-        """What to do about it; empty where nothing is to be done."""
+        """The sentence that says what to do about it; empty where nothing is to be done."""
         return self._filled(WORDS[self.kind][1])
 
     def _filled(self, words: str) -> str:

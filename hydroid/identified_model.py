@@ -45,7 +45,7 @@ class IdentifiedModel:
 
     @property
     def name(self) -> str:
-        """Of the run folder or the file that the estimate came from."""
+        """Name of the run folder or the file that the estimate came from."""
         file = Path(self.source)
         return file.resolve().parent.name if file.name == NAME else file.stem
 

@@ -22,12 +22,12 @@ class Verdict(StrEnum):
 
     @property
     def sign(self) -> str:
-        """What stands before it: ✓ good, ! usable with care, ? the logs do not tell, ✗ bad."""
+        """The sign before its words: ✓ good, ! usable with care, ? the logs do not tell, ✗ bad."""
         return _SIGNS.get(self, "✗")
 
     @property
     def fails(self) -> bool:
-        """Whether it says of unseen or fitted logs that the fit errs by more than is good."""
+        """Whether the fit errs by more than is good, on unseen or on fitted logs."""
         return self.sign == "✗"
 
     def beside(self, model: str | None) -> str:

@@ -152,7 +152,8 @@ class ParameterSet:
         return np.clip(np.stack(columns, axis=-1), 0.0, 1.0)
 
     def width(self, theta: Array) -> Array:
-        """Change of each value per change of its position on its scale, at theta, shape (P,)."""
+        """Return the change of each value per change of its position on its scale, at theta,
+        (P,)."""
         lower = np.where(self.log, self.lower, 1.0)
         upper = np.where(self.log, self.upper, 1.0)
         return np.where(self.log, theta * np.log(upper / lower), self.upper - self.lower)

@@ -42,12 +42,13 @@ class Quantity(NamedTuple):
 
     @property
     def meaning(self) -> str:
-        """What it is, with the note."""
+        """The plain words for the quantity, with the note behind them."""
         return f"{self.plain}; {self.note}" if self.note else self.plain
 
     @property
     def factor(self) -> float:
-        """What turns a value in `unit` into SI, but for the command's %; 1 of a plain number."""
+        """Factor that turns a value in `unit` into SI; a command stays in %,
+        and a plain number has 1."""
         return UNITS[self.unit.lower()].factor if self.unit else 1.0
 
     @property

@@ -52,7 +52,7 @@ class _Motion:
     commands: Sequence[Array]
 
     def command(self, joint: int, earlier: int) -> Array:
-        """A joint's commands some windows earlier, shape (n,)."""
+        """Return a joint's commands some windows earlier, shape (n,)."""
         late = list[Array]()
         for commands in self.commands:
             padded = np.pad(commands[:, joint], (earlier, 0), "edge")
@@ -60,8 +60,8 @@ class _Motion:
         return np.concatenate(late)
 
     def follows(self, joint: int, other: int) -> tuple[float, int]:
-        """How a joint's speed correlates with a joint's command,
-        and the windows after which it does most."""
+        """Return how a joint's speed correlates with a joint's command, and after how many windows
+        it does most."""
         speed = self.speed[:, joint] - self.speed[:, joint].mean()
         correlations = list[tuple[float, int]]()
         for late in range(round(LATEST / self.period) + 1):

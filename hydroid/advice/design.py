@@ -236,7 +236,7 @@ class Design:
 
     @property
     def after(self) -> Posterior:
-        """What is known after the experiment."""
+        """The posterior after the experiment."""
         return self.known.add(self.best.gained)
 
     @property

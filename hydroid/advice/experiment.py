@@ -177,8 +177,8 @@ def _possible_poses(settings: FitSettings) -> Array:
 
 
 class Violation(NamedTuple):
-    """The first sample at which a joint (0-based) leaves its range, is too fast,
-    or makes bodies meet."""
+    """A limit that a motion breaks: the first sample at which a joint (0-based) leaves its range,
+    is too fast, or makes bodies meet."""
 
     sample: int
     joint: int

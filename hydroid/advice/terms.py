@@ -60,8 +60,8 @@ class Term:
 
     @property
     def kind(self) -> tuple[object, ...]:
-        """What it is, with both sides of an actuator alike:
-        the same for `delay` and `delay_a` of a joint."""
+        """Quantity, joints and link, with both sides of an actuator alike: `delay` and `delay_a` of
+        a joint are of one kind."""
         parameter = self.entries[self.name]
         quantity = parameter.quantity.removesuffix("_a").removesuffix("_b")
         return quantity, parameter.joints, parameter.link

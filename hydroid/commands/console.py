@@ -37,7 +37,7 @@ T_co = TypeVar("T_co", covariant=True)
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Printed:
-    """What prints itself.
+    """A result that prints itself.
 
     Attributes:
         lines: what a terminal and a notebook show: tables and sentences.

@@ -80,8 +80,8 @@ class FitRecord:
 
 @record
 class Record:
-    """A finished run: its folder, as a command takes it, versions and hashes of its logs,
-    what it found.
+    """A finished run: its folder, as a command takes it, the versions and the hashes of its logs,
+    and what it has found.
 
     After a joint refinement every parameter that was refined is free in the settings.
     """
@@ -95,7 +95,7 @@ class Record:
 
     @property
     def seed(self) -> int:
-        """Of the search."""
+        """Seed of the search."""
         return self.settings.search.seed
 
     @property
@@ -105,7 +105,7 @@ class Record:
 
     @cached_property
     def verdict(self) -> tuple[JointVerdict, ...]:
-        """By its logs and the unseen ones."""
+        """The verdict on each joint, by the fitted logs and the unseen ones."""
         unseen = [*self.validations.values()]
         return judge(self.settings, self.result.fitted, self.result.baselines, unseen)
 

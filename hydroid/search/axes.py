@@ -74,7 +74,7 @@ class Axes:
 
     @property
     def one_sided(self) -> "Axes":
-        """The same with half the steps: for derivatives of first order."""
+        """These axes with a step to one side only, as derivatives of first order need them."""
         return Axes(self.directions, self.steps[:, :1])
 
 

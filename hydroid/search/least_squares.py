@@ -140,7 +140,7 @@ def _corrected(now: Descent, model: LinearModel, first: Array, residuals: Functi
 
 
 def _without_gain(now: State, model: LinearModel, settings: RefinementSettings) -> State:
-    """Where no step helps: take a new Jacobian, or a shorter step."""
+    """Take a new Jacobian, or a shorter step, after a step that does not help."""
     if not now.fresh:
         return replace(now, jacobian=no_jacobian(now.point))
     after = replace(now, damping=now.damping * 2 * now.growth, growth=2 * now.growth)
@@ -203,7 +203,7 @@ def _moved(now: State, point: Array, row: Array, ratio: float, settings: Refinem
 
 
 def _no_step(now: State) -> State:
-    """Where no step is left: end, or take a Jacobian that was updated anew."""
+    """End where no step is left, or first take anew a Jacobian that was updated."""
     if now.fresh:
         return replace(now, ending=Ending.NO_IMPROVEMENT)
     return replace(now, jacobian=no_jacobian(now.point), damping=DAMPING, growth=2.0)

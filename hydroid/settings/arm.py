@@ -111,12 +111,12 @@ class Arm(Settings):
 
     @cached_property
     def where(self) -> str:
-        """Begins messages about the settings."""
+        """The file that settings came from, with which messages about them begin."""
         return "the arm's file"
 
     @cached_property
     def joints(self) -> tuple["Joint", ...]:
-        """In the order of the model, (J,)."""
+        """Joints in the order of the model, (J,)."""
         model = self._model
         names = [model.joint(j).name for j in range(model.njnt)]
         for name in self.actuators:
@@ -172,7 +172,7 @@ class Arm(Settings):
 
     @cached_property
     def name(self) -> str:
-        """Of the model."""
+        """Name of the model."""
         return self._model.names.split(b"\0")[0].decode()
 
     @property

@@ -105,9 +105,9 @@ class Shape:
             f"functions of complexity over {MOST_COMPLEX}": (too_complex, "0"),
             f"functions of over {MOST_ARGUMENTS} arguments": (self.functions_of_many_arguments, "0"),
             "comprehensions a thousand lines": (self.per_thousand(self.comprehensions), "35"),
-            "  nested ones": (self.per_thousand(self.nested_comprehensions), "1"),
+            "nested comprehensions a thousand lines": (self.per_thousand(self.nested_comprehensions), "1"),
             "conditional expressions a thousand lines": (self.per_thousand(self.conditionals), "20"),
-            "  nested ones ": (self.per_thousand(self.nested_conditionals), "0"),
+            "nested conditionals a thousand lines": (self.per_thousand(self.nested_conditionals), "0"),
             "a, b = x, y a thousand lines": (self.per_thousand(self.paired_assignments), "8"),
         }
 

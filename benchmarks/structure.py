@@ -1,13 +1,14 @@
 """The shape of the code, beside what it may be at most; with `--packages`, every package by itself.
 
-`--worst N` names the N functions of most complexity and the N statements of most syntax nodes; `--files` the
-figures of every file; a name of a package or file restricts both.
+`--worst N` names the N functions of most complexity and the N statements of most syntax nodes;
+`--files` the figures of every file; a name of a package or file restricts both.
 
-A line of code holds a token that is not a comment or a docstring. A comment has a line of its own. Tokens
-are names, operators, numbers and strings. The nodes of a statement are those of its syntax tree, without
-the statements inside it. The complexity of a function counts the ways through it: one, and one more for
-each branch, loop, handler, condition of a comprehension, conditional expression and operand of `and` and
-`or`. Its arguments are all but `self` and `cls`; those of a command are options, and are not counted.
+A line of code holds a token that is not a comment or a docstring. A comment has a line of its own.
+Tokens are names, operators, numbers and strings. The nodes of a statement are those of its syntax
+tree, without the statements inside it. The complexity of a function counts the ways through it:
+one, and one more for each branch, loop, handler, condition of a comprehension, conditional
+expression and operand of `and` and `or`. Its arguments are all but `self` and `cls`;
+those of a command are options, and are not counted.
 """
 
 import argparse
@@ -147,7 +148,8 @@ def shape(path: Path) -> Shape:
 
 
 def docstring_lines(tree: ast.Module) -> set[int]:
-    """Return the lines of strings that stand alone as statements: docstrings, also those of attributes."""
+    """Return the lines of strings that stand alone as statements: docstrings,
+    also those of attributes."""
     lines = set[int]()
     for node in ast.walk(tree):
         if is_docstring(node):
@@ -203,7 +205,8 @@ def statement_nodes(statement: ast.stmt) -> int:
 
 
 def complexity(function: Function) -> int:
-    """Return one more than the number of branches of a function, without those of functions inside it."""
+    """Return one more than the number of branches of a function,
+    without those of functions inside it."""
     count = 1
     open_nodes: list[ast.AST] = [*function.body]
     while open_nodes:
@@ -235,7 +238,8 @@ def imports(tree: ast.Module) -> Iterator[str]:
 
 
 def cycles(trees: dict[Path, ast.Module]) -> int:
-    """Return the number of groups of files that import each other (strongly connected components)."""
+    """Return the number of groups of files that import each other (strongly connected
+    components)."""
     names = [".".join(path.relative_to(ROOT).with_suffix("").parts) for path in trees]
     names = [name.removesuffix(".__init__") for name in names]
     taken = [set(imports(tree)) - {own} for own, tree in zip(names, trees.values(), strict=True)]
@@ -253,7 +257,8 @@ def constants(tree: ast.Module) -> int:
 
 
 def settings(kind: object, seen: set[object]) -> int:
-    """Return the settings that a class declares, and the classes of its fields; each counts once."""
+    """Return the settings that a class declares, and the classes of its fields;
+    each counts once."""
     if kind in seen:
         return 0
     if not (isinstance(kind, type) and issubclass(kind, BaseModel)):

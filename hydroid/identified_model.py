@@ -116,6 +116,7 @@ def read_identified(
     if chosen is None:
         chosen = _config_beside(file, summary, nominal=nominal)
     settings = load(find_config(chosen), FitSettings, overrides)
+    # a fit's final estimate may have terms, or be of another model than its settings began with
     if config is None and summary is not None:
         settings = settings.of_estimate(summary.final)
     missing = list[str]()

@@ -55,6 +55,7 @@ class Task:
             "model": model_hash(self.settings.arm),
             "logs": [log_hash(log, self.settings) for log in self.logs],
         }
+        # 96 bits are enough: no two runs of a study have the same by chance
         return digest(content)[:24]
 
 

@@ -57,6 +57,7 @@ def adapted(model: IdentifiedModel, free: Sequence[str], logs: Sequence[Log] = (
             # a ladder that kept the quasi-static model: the dynamic one is not tried again
             "simulation.model": "quasi-static" if kind == "ladder" else kind,
             "search.algorithm": "multistart",
+            # a search in name only: the refinement goes on from the fit's own estimate
             "search.multistart": MultistartSettings(starts=1, horizons=(), iterations=20),
             "refinement": settings.refinement or RefinementSettings(),
         }

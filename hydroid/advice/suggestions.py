@@ -58,6 +58,7 @@ def advice(
     """
     tests = score_terms(problem, known, progress)
     candidates = promising(tests)
+    # the model as it is, refined without each part: what a freed term is compared with
     starts = np.tile(known.theta, (len(np.unique(parts(problem))), 1))
     without = predict_parts(problem, starts, refitted)
     ranked = list[tuple[bool, float, Plain]]()

@@ -59,6 +59,7 @@ def import_arm(
     spec, files, urdf = read_source(path, notes)
     _clear(spec, path)
     _weigh_as_on_earth(spec, notes)
+    # cylinders first: their rods and tubes are then held, and are no joints of the arm
     cylinders = take_sites(spec, notes) | take_cylinders(spec, notes)
     choose_chain(spec, path, notes, columns, tip)
     exact = urdf or all(geom.parent.explicitinertial for geom in spec.geoms if geom.meshname)
@@ -66,6 +67,7 @@ def import_arm(
     sort_shapes(spec)
     with mujoco_errors(path):
         repair_inertias(spec, urdf, notes)
+        # a link weighs what all parts that are fixed to it weigh
         spec.fuse_static()
         weigh(spec, notes, total_mass, lost)
     _free_joints(spec, notes)

@@ -148,6 +148,7 @@ def fit(
     from hydroid.run.folder import RunFolder
     from hydroid.run.process import log_start
 
+    # a folder of another run is refused before the fit, which takes long
     folder = None if out is None else RunFolder(Path(out))
     if folder is not None and folder.exists and not resume:
         raise RunError("holds a run already", out, "resume it, or choose another folder")

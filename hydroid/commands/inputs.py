@@ -222,6 +222,7 @@ def _described(section: str) -> dict[str, _Described]:
 
 def _on_command_line(parameter: inspect.Parameter, described: _Described) -> inspect.Parameter:
     """Return a parameter of a Python function as typer takes it: an argument, or an option."""
+    # annotations are texts where their types are imported for the checker alone
     type_names = re.findall(r"\w+", inspect.formatannotation(parameter.annotation))
     value_type = next(TERMINAL[name] for name in type_names if name in TERMINAL)
     is_list = bool(LISTS & {*type_names})

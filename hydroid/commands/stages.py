@@ -188,6 +188,7 @@ def _fit(stage: str, options: FitOptions, mech: "ModelSource | None" = None) -> 
     if settings.stage != stage:
         what = f"has stage: {settings.stage}, but hydroid fit-{stage} needs stage: {stage}"
         raise SettingsError(what, config, f"use hydroid fit-{settings.stage}, or another --config")
+    # what stage 1 and --start say are settings like any others: they are read with them once more
     known = Plain()
     if stage == "hyd":
         known |= held_mechanics(mech, settings, changes)

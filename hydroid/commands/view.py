@@ -153,6 +153,7 @@ def view(
     if isinstance(source, str | Path) and is_file(Path(source) / "run.json"):
         if fit is not None:
             raise SettingsError("is a run itself", source, f"name a log, or leave out --fit {fit}")
+        # a run names both its fit and its logs
         fit = source
         log = run_logs(Path(source))[0]
     if log is None:

@@ -127,6 +127,7 @@ def fit_baselines(logs: Sequence[Log], joint: int, limits: tuple[float, float]) 
     still = Baseline(joint, np.asarray(limits, float))
     if not any(log.driven[joint - 1] for log in measured):
         return {NAMES[0]: still}
+    # the table has no delay of its own to be fitted: the best of all that are tried is taken
     delays = np.arange(0, LONGEST_DELAY, max(0.02, measured[0].period))
     tables = (_mean_speeds(measured, still, delay) for delay in delays)
     table = min(tables, key=lambda model: np.mean(model.errors(measured) ** 2))
@@ -149,6 +150,7 @@ def _fit_numbers(logs: Sequence[Log], table: Baseline) -> Baseline:
             max_nfev=evaluations,
         )
 
+    # a few evaluations tell which start leads on: only the best is worth more
     short_fits = (fit(start, 10) for start in _starts(table))
     best = min(short_fits, key=lambda fitted: fitted.cost)
     return made(fit(best.x, 40).x)

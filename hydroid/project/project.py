@@ -61,6 +61,7 @@ def write_project(
     imported = None
     if robot is not None and not has_own_file:
         imported = import_arm(robot, table.names if table else (), **options)
+    # all is written aside and read back, so that the folder has all of a project or nothing
     with _stage(folder) as stage, _of_the_project(stage, folder, robot):
         if robot is not None and has_own_file:
             reference = _seen_from(folder, robot)

@@ -79,6 +79,7 @@ def _torques(arm: Arm) -> Array:
     low = np.maximum(arm.lower, -np.pi)
     high = np.minimum(arm.upper, np.pi)
     torque = np.zeros(len(arm.joints))
+    # the same poses every time: a project is written twice with the same bytes
     for pose in np.random.default_rng(0).uniform(low, high, (300, len(low))):
         data.qpos[:] = pose
         mujoco.mj_forward(model, data)

@@ -148,6 +148,7 @@ def keep_validation(model: IdentifiedModel, predictions: Sequence[Prediction]) -
     unseen = [prediction for prediction in predictions if prediction.unseen]
     if folder is None or not unseen:
         return None
+    # with other settings, such as by --set, it is another model than the run's
     if read_identified(folder).settings != model.settings:
         return None
     for prediction in unseen:

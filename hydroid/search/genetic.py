@@ -105,6 +105,7 @@ class SimpleGa:
                 chromosomes[:1] = self.coding.encode(self.start[None])
             return chromosomes
         count = self.settings.population - self.elite
+        # parents come in pairs: of an odd number of children the last one's sibling is left out
         parents = self.select(population.objectives, count + count % 2, rng)
         children = crossover(population.chromosomes[parents], self.settings, rng)[:count]
         return mutate(children, self.settings.mutation_rate, self.coding, rng)

@@ -158,6 +158,7 @@ class Arm(Settings):
         model = self._model
         bodies = [model.body(b) for b in range(1, model.nbody) if model.body_weldid[b]]
         links = [body for body in bodies if body.name and body.mass[0]]
+        # the sort is stable: those of the joints come first, in their order
         links.sort(key=lambda body: not body.jntnum[0])
         return {body.name: float(body.mass[0]) for body in links}
 

@@ -281,6 +281,7 @@ def _choice(location: Sequence[Any], kind: type[Settings]) -> str:
         field = getattr(settings, "model_fields", {}).get(str(part))
         settings = field and field.annotation
     allowed = [*getattr(settings, "model_fields", ())]
+    # a misspelt setting is more likely than one that was never there
     near = difflib.get_close_matches(str(unknown), allowed, n=1)
     if near:
         return f"; did you mean {near[0]!r}?"

@@ -88,6 +88,7 @@ def _add_joints(result: Plain, name: str, entry: Plain, compared: Any, arm: Arm 
     joints = [numbers.get(joint, joint) for joint in joints]
     shared = _without_each(entry)
     if len(joints) == 1:
+        # joints that are driven but not compared need a mechanical parameter, too
         everywhere = all_compared and entry.get("quantity") in MECHANICAL
         result[name] = shared if everywhere else shared | {"joints": joints}
         return

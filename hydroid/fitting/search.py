@@ -1,4 +1,5 @@
-"""The search over a problem: ask for candidates, simulate them, tell their objectives, store a checkpoint."""
+"""The search over a problem: ask for candidates, simulate them, tell their objectives,
+store a checkpoint."""
 
 from collections.abc import Mapping, Sequence
 from typing import Protocol
@@ -19,16 +20,17 @@ from hydroid.search.moo import PymooSearch
 from hydroid.search.protocol import BoxSearch
 
 HISTORY = ("generation", "evaluations", "simulated", "infeasible", "best", "median")
-"""Columns of a run's history; `best` is over the run so far, `median` over the population, both of (18) or
-(19) over the whole record."""
+"""Columns of a run's history; `best` is over the run so far, `median` over the population, both of
+(18) or (19) over the whole record."""
 
 
 @record
 class Searched:
-    """Result of a search: its last population, theta (n, P), all candidates simulated, and its history.
+    """Result of a search: its last population, theta (n, P), all candidates simulated,
+    and its history.
 
-    `single`: whether it minimised one objective, not that of each segment. `ends`: costs at which the starts
-    of a multi-start ended, by the joint that was fitted alone (0: all together).
+    `single`: whether it minimised one objective, not that of each segment. `ends`: costs at which
+    the starts of a multi-start ended, by the joint that was fitted alone (0: all together).
     """
 
     theta: Array
@@ -40,7 +42,8 @@ class Searched:
 
 
 class Search(Protocol):
-    """What the loop of `search` asks of an algorithm whose chromosomes stand for candidates theta."""
+    """What the loop of `search` asks of an algorithm whose chromosomes stand for
+    candidates theta."""
 
     @property
     def single(self) -> bool:

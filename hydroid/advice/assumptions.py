@@ -95,16 +95,20 @@ def doubts(settings: FitSettings, logs: Sequence[Log]) -> dict[int, float]:
         return [law(loads[:, joint]) for joint, law in laws.items()]
 
     before = left()
-    sizes_before = np.array([np.linalg.norm(rest) for rest in before])
+    sizes_before = _sizes(before)
     samples = [float(independent_samples(rest[:, None])[0]) for rest in before]
     doubted = dict[int, float]()
     for joint in laws:
-        sizes = np.array([np.linalg.norm(rest) for rest in left(joint)])
-        gains = np.log(sizes_before / sizes)
+        gains = np.log(sizes_before / _sizes(left(joint)))
         evidence = float(np.dot(samples, gains))
         if evidence >= ENOUGH and gains.mean() > -np.log(LOWER):
             doubted[joint + 1] = evidence
     return dict(sorted(doubted.items(), key=lambda entry: -entry[1]))
+
+
+def _sizes(rows: Sequence[Array]) -> Array:
+    """Return the lengths of rows, shape (n,)."""
+    return np.array([float(np.linalg.norm(row)) for row in rows])
 
 
 class _Loads:

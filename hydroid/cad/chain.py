@@ -43,7 +43,7 @@ def choose_chain(
     left_out = [joint for joint in spec.joints if joint.name not in chain]
     if left_out:
         others = [f"--tip {link}" for link, other in tips.items() if other != chain]
-        held = _held(spec, [joint.name for joint in left_out], columns)
+        held = _held(spec, left_out, columns)
         notes.add(
             f"the arm is {' - '.join(chain)} ({why}); held at 0, on no way to its end: {held}. "
             f"Other ends: {listed(others, 6) or 'none'}"
@@ -52,8 +52,9 @@ def choose_chain(
         spec.delete(joint)
 
 
-def _held(spec: mujoco.MjSpec, names: Sequence[str], columns: Sequence[str]) -> str:
+def _held(spec: mujoco.MjSpec, joints: Sequence[mujoco.MjsJoint], columns: Sequence[str]) -> str:
     """Return which joints are held, and loudly those that a log names."""
+    names = [joint.name for joint in joints]
     named = [name for name in names if _named(spec, [name], columns)]
     warning = f"; THE LOG NAMES {', '.join(named)}" if named else ""
     return f"{listed(names, 12)}{warning}"
@@ -105,9 +106,11 @@ def _is_finger(spec: mujoco.MjSpec, name: str) -> bool:
     if in_names & FINGERS:
         return True
     above = joint.parent.parent
-    beside = [other.name for other in spec.joints if other.parent.parent == above]
-    others = (other for other in beside if other != name)
-    return _without_side(name) in map(_without_side, others)
+    for other in spec.joints:
+        is_beside = other.parent.parent == above and other.name != name
+        if is_beside and _without_side(other.name) == _without_side(name):
+            return True
+    return False
 
 
 def _without_side(name: str) -> tuple[str, ...]:

@@ -78,11 +78,16 @@ def study(
     title = "Median over the seeds [lowest, highest], errors in deg"
     cell_columns = ("cell", "runs", *MEASURES)
     tables = {
-        "cells": Table.of(title, {name: name for name in cell_columns}, _cells(runs)),
-        "runs": Table.of("Runs", {name: name for name in columns}, run_rows),
+        "cells": Table.of(title, _headed(cell_columns), _cells(runs)),
+        "runs": Table.of("Runs", _headed(columns), run_rows),
     }
     lines = [tables["cells"], *failures, *written(tables, folder)]
     return Result(lines, {"out": str(folder), "runs": run_rows}, runs)
+
+
+def _headed(columns: Sequence[str]) -> dict[str, str]:
+    """Return columns of a table that are called by their keys."""
+    return dict(zip(columns, columns, strict=True))
 
 
 def _cells(runs: "Sequence[Row]") -> list[Plain]:

@@ -140,10 +140,14 @@ class FitSettings(Settings):
     def seeded(self) -> bool:
         """Whether another seed may lead a search elsewhere:
         not one that begins at stated starts alone."""
-        free = [parameter for parameter in self.parameters.values() if parameter.fixed is None]
-        if not any(parameter.states_start for parameter in free):
+        if not self._states_start:
             return True
         return self.search.algorithm != "multistart" or self.search.multistart.starts > 1
+
+    @property
+    def _states_start(self) -> bool:
+        """Whether any parameter that is estimated says where a search starts."""
+        return any(p.states_start for p in self.parameters.values() if p.fixed is None)
 
     @property
     def substeps(self) -> int:
@@ -203,8 +207,7 @@ class FitSettings(Settings):
             make_parameter(name, settings, self.arm, self.hydraulics, log=self.scale == "log")
             for name, settings in self.parameters.items()
         ]
-        free = [settings for settings in self.parameters.values() if settings.fixed is None]
-        if not any(settings.states_start for settings in free):
+        if not self._states_start:
             # nominal values alone are no start: the search draws its own
             parameters = [replace(parameter, start=None) for parameter in parameters]
         return ParameterSet(tuple(parameters))

@@ -30,6 +30,7 @@ from hydroid.plant import Plant
 from hydroid.posterior.error_model import likelihood_at
 from hydroid.posterior.posterior import NORMAL, Posterior, stored_posterior
 from hydroid.problem.problem import Problem
+from hydroid.run.record import record_of
 
 FORGOTTEN, BETWEEN = 20, 4
 """motions before the first draw, and between two: with bounds, one alone does not forget where it began"""

@@ -13,14 +13,16 @@ already. So d is projected off their effects, with the priors' scores as further
 d with orthonormal rows U. The statistic is the score of C. R. Rao (1948),
 a standard normal variable where the model lacks nothing:
 
-    z = -d' r / |d'|.
+    z = -d' r / √(Var d' r),
+
+whose variance is that of the errors as they are, whatever least squares weighs them by.
 
 The change of the quantity that would explain most is a = -d' r / |d'|². It raises the
 log-likelihood by z² / 2.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from scipy.stats import norm as normal
@@ -63,20 +65,23 @@ class Explained:
     Attributes:
         effects: of the free parameters, orthonormal rows with all priors behind, (k, R + M + p).
         left: innovations with the priors' scores behind, shape (R + M + p,).
+        variance: of what is left, summed along a row of that shape.
     """
 
     effects: Array
     left: Array
+    variance: Callable[[Array], float]
 
     def score(self, change: Array) -> Score:
         """Return the score of a change of the innovations, shape (R,)."""
         row = np.append(change, np.zeros(self.left.size - change.size))
         row -= self.effects.T @ (self.effects @ row)
-        strength = float(np.linalg.norm(row))
-        if not strength > 0:
+        square = float(row @ row)
+        if not square > 0:
             return Score(0.0, 0.0, 0.0)
-        statistic = -float(row @ self.left) / strength
-        return Score(statistic, statistic / strength, strength)
+        deviation = math.sqrt(self.variance(row))
+        amount = -float(row @ self.left) / square
+        return Score(amount * square / deviation, amount, square / deviation)
 
 
 def explained(problem: Problem, known: Uncertainty) -> Explained:
@@ -85,7 +90,13 @@ def explained(problem: Problem, known: Uncertainty) -> Explained:
     of_priors = problem.priors.scores(known.theta[None])[0]
     # the estimate does not depend on the weak priors
     weak = np.zeros(len(linear.slopes))
-    return Explained(linear.effects, np.concatenate([linear.innovations, of_priors, weak]))
+    left = np.concatenate([linear.innovations, of_priors, weak])
+
+    def variance(row: Array) -> float:
+        samples = problem.measured.size
+        return known.variance(row[:samples]) + float(np.sum(row[samples:] ** 2))
+
+    return Explained(linear.effects, left, variance)
 
 
 def holm(chances: Sequence[float], level: float) -> Mask:
@@ -107,8 +118,8 @@ VISIBLE = 3.0
 """statistic of the largest change, without noise;
 a term below it cannot be told from the free parameters"""
 LARGEST_EFFECT = 0.5
-"""rms effect of the change that is tested, in standard deviations of an innovation: large enough
-for terms that act beyond a threshold, small enough for a derivative"""
+"""rms effect of the change that is tested, in rms innovations: large enough for terms
+that act beyond a threshold, small enough for a derivative"""
 
 
 @record
@@ -176,7 +187,8 @@ def _tested(term: Term, known: Uncertainty, fit: Explained) -> Candidate | None:
         values = term.value + parts * (end - term.value)
     innovations = term.innovations(known.likelihood, known.theta, values.tolist())
     effects = innovations - known.linear.innovations
-    sizes = rms(effects, axis=1)
+    noise = max(float(rms(known.linear.innovations)), np.finfo(float).tiny)
+    sizes = rms(effects, axis=1) / noise
     acting = np.flatnonzero(np.isfinite(sizes) & (sizes > 0))
     if not is_limit:
         small = np.sum(sizes[acting] <= LARGEST_EFFECT)

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from hydroid.reporting.page import Table
     from hydroid.run.folder import RunFolder
     from hydroid.run.record import FitRecord
+    from hydroid.use.draws import Draws
 
 
 @record
@@ -65,6 +66,12 @@ class FitResult(Printed):
         from hydroid.plant import Plant
 
         return Plant(self.model, **how)
+
+    def draw(self, n: int, seed: int = 0) -> "Draws":
+        """Draw n machines that the logs do not rule out (`hydroid.draw`)."""
+        from hydroid.use.draws import draw
+
+        return draw(self.model, n, seed, self.problem)
 
     def predict(self, log: "LogSource") -> "Prediction":
         """Predict a log from its commands and its first angles; NaN if the simulation diverges.

@@ -96,7 +96,7 @@ def account(problem: Problem, known: Uncertainty) -> FitSummary:
 def angle_errors(known: Uncertainty) -> dict[str, AngleError]:
     """Return what is known of the error of each compared angle, by its name."""
     errors = known.errors
-    lasts = lasting(errors, known.linear.innovations)
+    lasts = lasting(errors, known.innovations)
     result = dict[str, AngleError]()
     for i, signal in enumerate(errors.signals):
         if signal.quantity == "angle":

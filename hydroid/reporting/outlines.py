@@ -131,7 +131,9 @@ class MovingArm:
     start: int
 
 
-def motion_section(arm: Arm, predictions: Mapping[str, Prediction]) -> Section | None:
+def motion_section(
+    arm: Arm, predictions: Mapping[str, Prediction], caption: str = _CAPTION
+) -> Section | None:
     """Return the section with a tab for each of the worst logs, by name; none for what diverged."""
     finite = [item for item in predictions.items() if np.isfinite(item[1].response).all()]
     if not finite:
@@ -143,7 +145,7 @@ def motion_section(arm: Arm, predictions: Mapping[str, Prediction]) -> Section |
     tabs = (
         Plot(f"motion_{i}", name, partial(draw, one), button=name) for i, (name, one) in enumerate(finite, 1)
     )
-    return Section("The arm in motion", few + _CAPTION, tabs=tuple(tabs))
+    return Section("The arm in motion", few + caption, tabs=tuple(tabs))
 
 
 def moving_arm(

@@ -29,6 +29,7 @@ from hydroid.problem.problem import Problem
 from hydroid.progress import Progress
 from hydroid.quantity_table import MECHANICAL
 from hydroid.settings.fit import FitSettings
+from hydroid.settings.naming import named
 from hydroid.settings.problem import ParameterSettings
 from hydroid.settings.search import RefinementSettings
 
@@ -319,10 +320,10 @@ def action_findings(content: Content, settings: FitSettings) -> Iterator[Finding
         if before == after:
             continue
         numbers = {
-            "what": action["parameter"],
+            "what": named(settings, action["parameter"]),
             "before": before,
             "after": after,
             "sd": 100 * STATED_SD.get(kind, 0.0),
         }
         link = settings.parameters[subject].link if kind == "weigh" else None
-        yield Finding(kind, "note", (link or subject,), numbers)
+        yield Finding(kind, "note", (link or named(settings, subject),), numbers)

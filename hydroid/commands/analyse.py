@@ -76,7 +76,8 @@ def analyse(
     """Find which parameters, and which combinations of parameters, the logs determine.
 
     Prints the standard deviation and the 95 % interval of each parameter, and the combinations that
-    the logs do not determine.
+    the logs do not determine. The page shows priors beside posteriors, correlations, and profiles as
+    curves.
 
     Example: hydroid analyse LOG.csv --fit runs/hyd --profile A_A
 
@@ -101,7 +102,8 @@ def analyse(
     from hydroid.fitting.summary import account
     from hydroid.posterior import identifiability
     from hydroid.posterior.uncertainty import uncertainty
-    from hydroid.reporting.parameters_report import parameter_table, unknown_sections
+    from hydroid.reporting.analysis import analysis_page
+    from hydroid.reporting.parameters_report import in_words, parameter_table
 
     wanted = names(profile)
     profiles: dict[str, Profile] = {}
@@ -118,17 +120,17 @@ def analyse(
         findings = (Finding("better optimum", "warning", better), *findings)
     intervals = {name: found.interval for name, found in profiles.items()}
     table = parameter_table(problem.settings, summary, intervals)
-    tables = {"parameters": table}
-    for section in unknown_sections(summary):
-        tables |= section.tables
     content: Plain = {"at": model.source, "rank": identified.rank}
     stated = summary.changed({"findings": findings})
     content |= stated.model_dump(mode="json", include={"findings", "estimate"})
     for name, parameter in content["estimate"].items():
         interval = intervals.get(name)
         parameter["profile_interval"] = None if interval is None else [*map(finite, interval)]
-    lines = [table, *(f"- {finding}" for finding in findings), *written(tables, out)]
-    return Result(lines, content, Analysis(known, identified, profiles))
+    page = analysis_page(problem.settings, stated, profiles)
+    page = replace(page, files={**page.files, "parameters": table})
+    said = [f"- {in_words(finding, problem.settings)}" for finding in findings]
+    lines = [table, *said, *written(page, out)]
+    return Result(lines, content, Analysis(known, identified, profiles), page)
 
 
 def quantity(

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Sequence
+from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -61,6 +62,11 @@ class FitResult(Printed):
         """Simple models fitted to the same logs, by joint and name."""
         return self.record.baselines
 
+    def __repr__(self) -> str:
+        from hydroid.reporting.verdict_table import lead
+
+        return f"<FitResult: {lead({'': self.summary.verdict})}>"
+
     def plant(self, **how: Any) -> "Plant":
         """Return the identified arm to be stepped; the keywords are those of `Plant`."""
         from hydroid.plant import Plant
@@ -75,6 +81,9 @@ class FitResult(Printed):
 
     def predict(self, log: "LogSource") -> "Prediction":
         """Predict a log from its commands and its first angles; NaN if the simulation diverges.
+
+            predicted = fitted.predict("b.csv")
+            print(predicted["boom"].error, predicted.to_frame())
 
         Raises:
             LogError: the log cannot be used.
@@ -192,7 +201,8 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
     from hydroid.fitting.summary import summarise
     from hydroid.fitting.validation import fitted
     from hydroid.fitting.verdict import baselines_of, behind, judge
-    from hydroid.reporting.parameters_report import parameter_table, warnings
+    from hydroid.reporting.knowledge_report import warnings
+    from hydroid.reporting.parameters_report import in_words, parameter_table
     from hydroid.reporting.verdict_table import next_lines, next_step, verdict_lines
     from hydroid.run.record import fit_record
 
@@ -207,14 +217,16 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
     findings[1:1] = behind(settings, verdict)
     summary = summary.changed({"verdict": verdict, "findings": tuple(findings)})
     source = "the fit" if folder is None else str(folder / NAME)
-    lines: list[Table | str] = [*verdict_lines({fit.final: verdict}), *warnings(summary)]
+    lines: list[Table | str] = verdict_lines({fit.final: verdict})
+    lines += [str(in_words(finding, settings)) for finding in warnings(summary)]
     if folder is not None:
         step = next_step(summary, verdict, str(folder), predictions)
         lines += [*next_lines(step), str(folder / "report.html")]
+    said = [str(in_words(finding, settings)) for finding in summary.findings]
     return FitResult(
         lines=lines,
         content=summary.plain() | {"out": folder and str(folder)},
-        details=[parameter_table(settings, summary), *map(str, summary.findings)],
+        details=[parameter_table(settings, summary), *said],
         problem=problem,
         fit=fit,
         folder=folder,
@@ -232,6 +244,7 @@ def _store(folder: "RunFolder", result: FitResult) -> Path:
     began = time.monotonic()
     folder.write_estimate(result.model, result.problem.logs[0])
     write_record(folder.path, result.record)
+    folder.status("running", finished=date.today().isoformat())
     page = draw(folder.path)
     folder.status("done", seconds={**result.fit.seconds, "report": time.monotonic() - began})
     return page

@@ -53,7 +53,7 @@ def validate(
     Example: hydroid validate OTHER.csv --fit runs/mech --fit runs/hyd
 
         validated = hydroid.validate("b.csv", fit="runs/a")
-        print(validated.result[0].indices[2].rms)  # of joint 2 [rad]
+        print(validated.result[0]["boom"].rms)  # [deg]
 
     Args:
         fit (RUN|YAML): An estimate: a run folder, a folder written by Plant.save (Python), or a
@@ -229,7 +229,7 @@ def report(
 
 def _merged(folders: Sequence[str], out: "Source | None") -> "Result[tuple[Record, ...]]":
     """Return median and spread of the estimates of one fit with different seeds."""
-    from hydroid.reporting.parameters_report import merged_tables
+    from hydroid.reporting.merged_report import merged_tables
     from hydroid.run.record import read_runs
 
     collected = read_runs(folders, out)

@@ -244,7 +244,7 @@ class RunFolder:
         """Return what the run's search and refinements have stored, by name."""
         # checkpoints belong to a run by what does not change while it goes on
         lasting = self.identity()
-        for key in ("status", "seconds", "estimate"):
+        for key in ("status", "seconds", "estimate", "finished"):
             lasting.pop(key, None)
         return CheckpointFile(self.path / "checkpoint.npz", digest(lasting))
 

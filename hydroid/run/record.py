@@ -12,7 +12,7 @@ import math
 import os
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import field, replace
 from functools import cache, cached_property
 from itertools import pairwise
 from pathlib import Path
@@ -68,6 +68,7 @@ class FitRecord:
         segments: objectives of each estimate by segment, (S,), by its name.
         refinements: what each took.
         baselines: simple models fitted to the same logs, by joint and name.
+        starts: costs at which the starts of least squares ended, by joint (0: all joints together).
     """
 
     fitted: tuple[Prediction, ...]
@@ -76,6 +77,7 @@ class FitRecord:
     segments: Mapping[str, Array]
     refinements: tuple[Effort, ...]
     baselines: Baselines
+    starts: Mapping[int, tuple[float, ...]] = field(default_factory=dict[int, tuple[float, ...]])
 
 
 @record
@@ -123,6 +125,7 @@ def fit_record(fit: Fit, fitted: tuple[Prediction, ...], baselines: Baselines) -
         segments={name: estimate.segments for name, estimate in fit.estimates.items()},
         refinements=tuple(efforts),
         baselines=baselines,
+        starts={joint: tuple(costs) for joint, costs in fit.ends.items()},
     )
 
 

@@ -187,8 +187,8 @@ def _tested(term: Term, known: Uncertainty, fit: Explained) -> Candidate | None:
         values = term.value + parts * (end - term.value)
     innovations = term.innovations(known.likelihood, known.theta, values.tolist())
     effects = innovations - known.linear.innovations
-    level = max(float(rms(known.linear.innovations)), np.finfo(float).tiny)
-    sizes = rms(effects, axis=1) / level
+    noise = max(float(rms(known.linear.innovations)), np.finfo(float).tiny)
+    sizes = rms(effects, axis=1) / noise
     acting = np.flatnonzero(np.isfinite(sizes) & (sizes > 0))
     if not is_limit:
         small = np.sum(sizes[acting] <= LARGEST_EFFECT)

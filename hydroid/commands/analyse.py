@@ -76,8 +76,8 @@ def analyse(
     """Find which parameters, and which combinations of parameters, the logs determine.
 
     Prints the standard deviation and the 95 % interval of each parameter, and the combinations that
-    the logs do not determine. The page shows priors beside posteriors, correlations, and profiles
-    as curves.
+    the logs do not determine. The page shows priors beside posteriors, correlations, and profiles as
+    curves.
 
     Example: hydroid analyse LOG.csv --fit runs/hyd --profile A_A
 

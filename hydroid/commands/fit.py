@@ -218,11 +218,11 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
     summary = summary.changed({"verdict": verdict, "findings": tuple(findings)})
     source = "the fit" if folder is None else str(folder / NAME)
     lines: list[Table | str] = verdict_lines({fit.final: verdict})
-    lines += [str(in_words(one, settings)) for one in warnings(summary)]
+    lines += [str(in_words(finding, settings)) for finding in warnings(summary)]
     if folder is not None:
         step = next_step(summary, verdict, str(folder), predictions)
         lines += [*next_lines(step), str(folder / "report.html")]
-    said = [str(in_words(one, settings)) for one in summary.findings]
+    said = [str(in_words(finding, settings)) for finding in summary.findings]
     return FitResult(
         lines=lines,
         content=summary.plain() | {"out": folder and str(folder)},

@@ -107,10 +107,9 @@ def draw(model: IdentifiedModel, n: int, seed: int = 0, problem: Problem | None 
     if n < 1:
         raise SettingsError("needs one draw at least", "draws")
     changes = within(known, n, np.random.default_rng(seed))
-    if problem is None:
-        record = record_of(model)
-        if record is not None:
-            problem = Problem(model.settings, [one.log for one in record.fitted])
+    record = None if problem is not None else record_of(model)
+    if record is not None:
+        problem = Problem(model.settings, [p.log for p in record.fitted])
     if problem is not None:
         changes = on_their_level(known, changes, problem)
     return Draws(model, known.box.points(changes), known)

@@ -18,7 +18,7 @@ a standard normal variable where the model lacks nothing:
 whose variance is that of the errors as they are, whatever least squares weighs them by.
 
 The change of the quantity that would explain most is a = -d' r / |d'|². It raises the
-log-likelihood by z² / 2.
+log-likelihood that least squares takes by a² |d'|² / 2.
 """
 
 import math
@@ -39,18 +39,14 @@ class Score:
     """Statistic z of one change of the model, positive where the change lowers the error.
 
     By the linear approximation the `amount` of it that lowers the error most raises the
-    log-likelihood by `gain`. `strength` is the statistic that the whole change would have without
-    noise: what can be seen at all.
+    log-likelihood that least squares takes by `gain`. `strength` is the statistic that the whole
+    change would have without noise: what can be seen at all.
     """
 
     statistic: float
     amount: float
     strength: float
-
-    @property
-    def gain(self) -> float:
-        """Rise of the log-likelihood by the best amount of the change."""
-        return 0.5 * self.statistic**2
+    gain: float
 
     def chance(self, *, one_sided: bool) -> float:
         """Return the probability of such a statistic where the model lacks nothing."""
@@ -78,10 +74,11 @@ class Explained:
         row -= self.effects.T @ (self.effects @ row)
         square = float(row @ row)
         if not square > 0:
-            return Score(0.0, 0.0, 0.0)
+            return Score(0.0, 0.0, 0.0, 0.0)
         deviation = math.sqrt(self.variance(row))
         amount = -float(row @ self.left) / square
-        return Score(amount * square / deviation, amount, square / deviation)
+        gain = 0.5 * amount**2 * square
+        return Score(amount * square / deviation, amount, square / deviation, gain)
 
 
 def explained(problem: Problem, known: Uncertainty) -> Explained:

@@ -181,7 +181,8 @@ def design(
     findings = list[str]()
     still = tuple(row["parameter"] for row in rows if not row["moved"])
     if still:
-        findings.append(f"- {Finding('no experiment moves', 'note', still)}")
+        unmoved = Finding("no experiment moves", "note", still)
+        findings.append(f"- {unmoved}")
     note = (
         f"Noise: {settings.design.noise_deg:g} deg. before: every parameter ±100 % unless logs say "
         f"more. random: median of {len(result.random)} experiments of the same length and limits. "

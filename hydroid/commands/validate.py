@@ -53,7 +53,7 @@ def validate(
     Example: hydroid validate OTHER.csv --fit runs/mech --fit runs/hyd
 
         validated = hydroid.validate("b.csv", fit="runs/a")
-        print(validated.result[0]["boom"].rms)  # [deg]
+        print(validated.result[0]["shoulder"].rms)  # [deg]
 
     Args:
         fit (RUN|YAML): An estimate: a run folder, a folder written by Plant.save (Python), or a

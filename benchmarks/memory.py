@@ -1,9 +1,9 @@
 """How fast least squares may follow an error: the real excavator fitted with several memories.
 
 Each begins at the estimate of `make excavator`, refined by output errors (a memory without end).
-Rms errors [deg] of the logs that are not fitted, by joint: of the change over 1, 5 and 10 s, and over whole logs. The shortest memory
-is as good as maximum likelihood here: the errors of this model last, so that their own model follows them
-from sample to sample.
+Rms errors [deg] of the logs that are not fitted, by joint: of the change over 1, 5 and 10 s, and
+over whole logs. The shortest memory is as good as maximum likelihood here: the errors of this model
+last, so that their own model follows them from sample to sample.
 """
 
 from collections.abc import Iterator

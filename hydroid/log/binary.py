@@ -1,4 +1,4 @@
-"""Formats of arrays -> a table: .mat (v4 to v7 by scipy, v7.3 by h5py) and Parquet by pyarrow; and all formats.
+"""Formats of arrays -> a table: .mat (v4 to v7 by scipy, v7.3 by h5py), and Parquet by pyarrow.
 
 Of a .mat a vector is a column of the variable's name; column k of a matrix is `name[k]`, from 1, and its
 longer axis is the time; fields of structs follow after a dot; element k of a cell array is `name[k]`.

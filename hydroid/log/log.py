@@ -25,6 +25,7 @@ class Log:
         pressure: of chambers A and B [Pa], shape (T, J, 2), NaN where unmeasured; None: the log has none.
         rest: samples before the first command of the recording; None: before the first one in `command`.
         pose: in which joints stand that are not measured [rad], shape (J,); None: it is not known.
+        begin: time of its first sample in the recording, of which it may be a part [s].
     """
 
     source: str
@@ -35,6 +36,7 @@ class Log:
     pressure: Array | None = None
     rest: int | None = None
     pose: Array | None = None
+    begin: float = 0.0
 
     @property
     def joints(self) -> int:
@@ -111,6 +113,7 @@ class Log:
         return replace(
             self,
             time=self.time[at] - self.time[first],
+            begin=self.begin + float(self.time[first]),
             command=self.command[at],
             angle=self.angle[at],
             pressure=None if self.pressure is None else self.pressure[at],

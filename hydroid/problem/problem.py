@@ -8,7 +8,6 @@ from collections.abc import Callable, Collection, Sequence
 from copy import copy
 from dataclasses import replace
 from functools import cached_property
-from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -29,6 +28,7 @@ from hydroid.problem.channels import (
 )
 from hydroid.problem.priors import Priors
 from hydroid.settings.fit import FitSettings
+from hydroid.settings.log import log_file
 from hydroid.simulation import Response, Simulation
 from hydroid.simulation.scenario import Scenario
 
@@ -217,7 +217,7 @@ def make_simulation(
 
     Its response has the angles of the joints `outputs` and the chamber pressures of `pressures`, 0-based.
     """
-    payload = settings.payloads.get(Path(log.source).name)
+    payload = settings.payloads.get(log_file(log.source).name)
     if payload:
         spec = add_payload(spec, settings.arm, payload)
     scenario = Scenario(spec, settings.arm, log, outputs, settings.simulation)

@@ -24,6 +24,7 @@ from hydroid.run.archive import CheckpointFile
 from hydroid.run.process import LOCK, locked, run_log
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
+from hydroid.settings.log import log_file
 
 DESCRIPTION = "run.json"
 """name of the file that describes the run: versions, seed, hashes of its logs and files, status, seconds"""
@@ -183,7 +184,7 @@ class RunFolder:
     def write_estimate(self, model: IdentifiedModel, log: Log) -> None:
         """Write `estimate.yaml` of a fit's model, and the fitted arm in `model/` as it began a log."""
         write_estimate(self.path, model.summarise())
-        plant = Plant(model, payload=model.settings.payloads.get(Path(log.source).name, 0.0))
+        plant = Plant(model, payload=model.settings.payloads.get(log_file(log.source).name, 0.0))
         plant.reset(log.start)
         plant.export(self.path / "model")
 

@@ -7,7 +7,6 @@ what a load, a slower engine or another day changes.
 """
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
@@ -21,6 +20,7 @@ from hydroid.log import Log
 from hydroid.problem.problem import Problem
 from hydroid.progress import Progress
 from hydroid.settings.fit import FitSettings
+from hydroid.settings.log import log_file
 from hydroid.settings.search import MultistartSettings, RefinementSettings
 
 
@@ -40,7 +40,7 @@ def adapted(model: IdentifiedModel, free: Sequence[str], logs: Sequence[Log] = (
         value = model.values[name]
         freed = {"fixed": None, "start": value} | ({"nominal": value} if own.has_prior else {})
         parameters[name] = own.changed({"term": None} | (freed if name in free else {"fixed": value}))
-    names = {Path(log.source).name for log in logs}
+    names = {log_file(log.source).name for log in logs}
     ladder = settings.simulation.model == "ladder"
     return settings.changed(
         {

@@ -29,6 +29,7 @@ from hydroid.problem.problem import Problem
 from hydroid.progress import Progress
 from hydroid.quantity_table import MECHANICAL
 from hydroid.settings.fit import FitSettings
+from hydroid.settings.log import log_file
 from hydroid.settings.search import RefinementSettings
 
 MOST_TRIED = 6  # terms that are really freed, the most promising first
@@ -204,7 +205,7 @@ def freeing_command(problem: Problem, entries: Mapping[str, Any], run: str) -> s
     for name, entry in entries.items():
         line = yaml.safe_dump(entry, default_flow_style=True, sort_keys=False, width=math.inf).strip()
         changes += f"--set {shlex.quote(f'parameters.{name}={line}')} "
-    given = shlex.join(log.source for log in problem.logs)
+    given = shlex.join(dict.fromkeys(str(log_file(log.source)) for log in problem.logs))
     config, own, out = (shlex.quote(path) for path in (f"{run}/config.yaml", run, f"{run}-{[*entries][-1]}"))
     return (
         f"hydroid fit-{problem.settings.stage} {given} --config {config} --start {own} {changes}--out {out}"

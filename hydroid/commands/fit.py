@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 from hydroid.arrays import record
 from hydroid.commands.console import Printed
 from hydroid.commands.inputs import LogSource, LogSources, Source
-from hydroid.commands.logs import read_logs, refuse_undriven
+from hydroid.commands.logs import read_log, read_logs, refuse_undriven
 from hydroid.errors import RunError, SettingsError
 from hydroid.estimate import NAME, FitSummary
 from hydroid.files import write_atomic
 from hydroid.identified_model import IdentifiedModel
 from hydroid.settings.fit import FitSettings
-from hydroid.settings.log import OTHER
+from hydroid.settings.log import OTHER, log_file
 
 if TYPE_CHECKING:
     import pandas
@@ -65,8 +65,7 @@ class FitResult(Printed):
         """
         from hydroid.fitting.validation import predicted
 
-        (read,) = read_logs(log, self.model.settings)
-        return predicted(self.model, read, None)
+        return predicted(self.model, read_log(log, self.model.settings), None)
 
     def validate(self, logs: "LogSources", out: Source | None = None) -> "Result[list[Prediction]]":
         """Return the verdict on each joint by logs that were not fitted; a page of it is written to `out`.
@@ -128,7 +127,7 @@ def fit(
         RunError: `out` holds another run or cannot be written, or every simulation diverged.
     """
     read = read_logs(logs, settings)
-    names = [Path(log.source).name for log in read]
+    names = [log_file(log.source).name for log in read]
     if stray := sorted(set(settings.payloads) - set(names)):  # misspelt, it would be left out silently
         raise SettingsError("is none of the logs", f"payloads.{stray[0]}", f"logs: {', '.join(names)}")
     refuse_undriven(read, settings)

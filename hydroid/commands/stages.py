@@ -3,7 +3,6 @@
 import builtins
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
-from pathlib import Path
 from typing import Any
 
 from hydroid.commands.fit import FitResult, fit as run_fit
@@ -29,6 +28,7 @@ from hydroid.parallel.cluster import open_workers
 from hydroid.progress import LOGGER, NOTE
 from hydroid.quantity_table import MECHANICAL
 from hydroid.settings.fit import FitSettings
+from hydroid.settings.log import log_file
 from hydroid.settings.parameters import nominal_value
 from hydroid.units import seconds
 
@@ -243,4 +243,4 @@ def adapt(
 
 def _own_payloads(fit: "ModelSource", logs: Sequence[Log]) -> builtins.set[str]:
     """Return the logs that may have a payload: these, and those of the fit itself."""
-    return {*open_model(fit).settings.payloads, *(Path(log.source).name for log in logs)}
+    return {*open_model(fit).settings.payloads, *(log_file(log.source).name for log in logs)}

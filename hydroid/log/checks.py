@@ -10,7 +10,7 @@ from hydroid.arrays import Array
 from hydroid.log.clues import CLUES, column_unit, likely_range
 from hydroid.log.log import Log, LogFinding, log_finding
 from hydroid.log.motion import END, driven_joints, motion_of
-from hydroid.log.repair import GAP, sample_period
+from hydroid.log.repair import GAP, SHORTEST, sample_period
 from hydroid.log.sensors import check_sensors
 from hydroid.log.table import Recording, Signal
 from hydroid.settings.arm import Arm
@@ -23,8 +23,8 @@ DEGREE = UNITS["deg"].factor
 FULL = 50.0  # [%], which most joints' commands reach where single ones of 10 are in another range
 
 
-def check_recording(recording: Recording, settings: LogSettings, *, repaired: bool) -> Iterator[LogFinding]:
-    """Yield the faults in the order to mend them; `repaired`: gaps up to `settings.repair_s` are none."""
+def check_recording(recording: Recording, settings: LogSettings) -> Iterator[LogFinding]:
+    """Yield the faults in the order to mend them."""
     table, longest = recording.table, settings.repair_s
     torn = np.isnan(recording.values).all(axis=1)
     if torn.any():
@@ -36,39 +36,37 @@ def check_recording(recording: Recording, settings: LogSettings, *, repaired: bo
             what = f"{cell[:30]!r} is not a number" if isinstance(cell, str) and cell else "no value is there"
             kind = "no time" if signal.kind == "time" else "hole"
             yield recording.finding("error", kind, rows, signal, what=what, longest=longest)
-    yield from _time(recording, settings, longest if repaired else 0.0)
+    yield from _time(recording, settings)
     yield from _values(recording)
     yield from _units(recording)
     yield from check_sensors(recording)
 
 
-def _time(recording: Recording, settings: LogSettings, repaired: float) -> Iterator[LogFinding]:
-    """A time that falls, is too short or slow, or has gaps longer than `repaired` [s]; else its period."""
+def _time(recording: Recording, settings: LogSettings) -> Iterator[LogFinding]:
+    """A time that falls, is too short or slow; else its period."""
     signal, known = recording.signals[0], recording.time[~np.isnan(recording.time)]
     if len(recording.time) > len(known) == 0:
         return  # a finding about its cells says why
     steps, period = np.diff(recording.time), sample_period(recording.time)  # NaN beside a row without time
     falls = 1 + np.flatnonzero(steps <= 0)
-    gaps = 1 + np.flatnonzero((steps > GAP * period) & (steps > repaired * (1 + 1e-9) + period))
     duration = np.ptp(known) if len(known) else 0.0
     slowest = 10 * settings.period_s  # else held commands would not explain the motion
-    kind, rows = ("time order", falls) if len(falls) else ("gap", gaps)
-    if not len(falls) and (duration < 0.5 or period > slowest):
-        kind, rows = "too short" if duration < 0.5 else "too slow", gaps[:0]
-    elif not len(rows):
-        uneven = np.nanmax(np.abs(steps - period)) > 0.25 * period
+    if len(falls):
+        before, after = recording.time[falls[0] - 1 : falls[0] + 1]
+        yield recording.finding("error", "time order", falls, signal, time=after, before=before)
+    elif duration < SHORTEST or period > slowest:
+        kind = "too short" if duration < SHORTEST else "too slow"
+        unit, remedy = likely_time_unit(period / signal.gain), "check log.time.unit and log.period_s"
+        if unit and UNITS[unit].factor != signal.gain:
+            remedy = f"if its unit is {unit}, set log.time.unit: {unit}"
+        numbers = {"duration": duration, "samples": float(len(known)), "period": period, "slowest": slowest}
+        yield recording.finding("error", kind, (), signal, remedy=remedy, **numbers)
+    else:
+        steps = steps[steps <= GAP * period]  # gaps are spoken of where they split the log
+        uneven = np.abs(steps - period).max(initial=0.0) > 0.25 * period
         if uneven or abs(period - settings.period_s) > 0.01 * settings.period_s:
-            step = f"{np.nanmin(steps):.4g} to {np.nanmax(steps):.4g}" if uneven else f"{period:.4g}"
+            step = f"{steps.min():.4g} to {steps.max():.4g}" if uneven else f"{period:.4g}"
             yield recording.finding("note", "resampled", (), signal, step=step, period=settings.period_s)
-        return
-    unit, remedy = likely_time_unit(period / signal.gain), "check log.time.unit and log.period_s"
-    if unit and UNITS[unit].factor != signal.gain:
-        remedy = f"if its unit is {unit}, set log.time.unit: {unit}"
-    numbers = {"duration": duration, "samples": float(len(known)), "period": period, "slowest": slowest}
-    if len(rows):
-        before, after = recording.time[rows[0] - 1 : rows[0] + 1]
-        numbers |= {"time": after, "before": before, "gap": after - before, "longest": settings.repair_s}
-    yield recording.finding("error", kind, rows, signal, remedy=remedy, **numbers)
 
 
 def _values(recording: Recording) -> Iterator[LogFinding]:

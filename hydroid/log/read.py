@@ -1,9 +1,10 @@
 """A log file -> `Log`: open, map, repair, check, resample; and back to CSV, which reads the same."""
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from hydroid.log.binary import BINARY, first_bytes
 from hydroid.log.checks import check_motion, check_recording
 from hydroid.log.csv import open_csv
 from hydroid.log.log import Log, LogFinding, by_level, log_finding
-from hydroid.log.repair import fill, hold, resample, unwrap
+from hydroid.log.repair import between_gaps, fill, hold, resample, unwrap, without_cut_end
 from hydroid.log.table import Signal, Table
 from hydroid.settings.log import Kind, LogSettings
 from hydroid.units import UNITS
@@ -53,6 +54,17 @@ def _first_bytes(path: Path) -> bytes:
 
 
 def check_log(
+    path: Path, settings: LogSettings, ranges: Ranges, **how: Any
+) -> tuple[Log | None, list[LogFinding]]:
+    """Return the longest part of a log between its gaps, None if it cannot be used, and all findings.
+
+    The arguments are those of `check_parts`.
+    """
+    parts, findings = check_parts(path, settings, ranges, **how)
+    return max(parts, key=lambda part: part.duration, default=None), findings
+
+
+def check_parts(
     path: Path,
     settings: LogSettings,
     ranges: Ranges,
@@ -60,8 +72,10 @@ def check_log(
     outputs: Sequence[int] | None = (),
     backward: Collection[int] = (),
     repair: bool = False,
-) -> tuple[Log | None, list[LogFinding]]:
-    """Find everything that is wrong with a log: return it, None if any finding is an error, and all findings.
+) -> tuple[list[Log], list[LogFinding]]:
+    """Find everything that is wrong with a log: return its parts between gaps, and all findings.
+
+    There are no parts if any finding is an error, and one if there is no long gap.
 
     Args:
         ranges: (-inf, inf) for a continuous joint. Findings call joints by these names.
@@ -70,7 +84,7 @@ def check_log(
         backward: joints (from 1) that a positive command turns to negative angles.
         repair: fill holes up to `settings.repair_s`.
     """
-    source, log, findings, compared = str(path), None, list[LogFinding](), outputs or ()
+    source, parts, findings, compared = str(path), list[Log](), list[LogFinding](), outputs or ()
     try:
         needed, signals = {*compared, *settings.joints}, map_signals(settings, ranges)
         if (last := max(needed, default=0)) > len(ranges):
@@ -84,17 +98,25 @@ def check_log(
             signals = [s for s in signals if s.kind in ("time", "command") or s.name in table.names]
         recording = table.read(_match(table, signals, needed, findings))
         findings += [log_finding("note", "layout", source, what=one) for one in recording.table.remarks]
-        recording = unwrap(recording, findings)
         if repair:
-            recording = fill(recording, settings.repair_s, findings)
-        findings += check_recording(recording, settings, repaired=repair)
+            recording = fill(unwrap(recording, findings), settings.repair_s, findings)
+        else:
+            recording = unwrap(without_cut_end(recording, findings), findings)
+        findings += check_recording(recording, settings)
         if all(finding.level != "error" for finding in findings):
-            log = resample(recording, settings, len(ranges))
-            findings += check_motion(log, recording.signals, compared, backward, settings.delay_s)
+            for piece in between_gaps(recording, settings, findings, repair=repair):
+                begin = float(piece.time[0] - recording.time[0])
+                rest = 0 if begin else None  # after a gap the arm may be moving
+                parts.append(replace(resample(piece, settings, len(ranges)), begin=begin, rest=rest))
+            if len(parts) > 1:
+                parts = [replace(one, source=f"{source}[{k}]") for k, one in enumerate(parts, 1)]
+            for part in parts:
+                findings += check_motion(part, recording.signals, compared, backward, settings.delay_s)
     except LogError as error:
         numbers = {"what": error.what, "hint": error.hint}
         findings.append(LogFinding("unreadable", "error", (), numbers, error.where, source))
-    return log, by_level(findings)
+        parts = []
+    return parts, by_level(findings)
 
 
 def map_signals(settings: LogSettings, ranges: Ranges) -> list[Signal]:

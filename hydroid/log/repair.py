@@ -9,15 +9,19 @@ the angle.
 """
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
 from hydroid.arrays import Array
+from hydroid.errors import LogError
 from hydroid.log.log import Log, LogFinding
 from hydroid.log.table import Recording
 from hydroid.settings.log import LogSettings
 
 GAP = 1.95  # in sample periods: a longer step is a gap, a shorter one jitter; one dropped sample makes it 2
+BRIDGED = 3.05  # in periods of the samples or of the settings: a gap that is no longer is bridged
+SHORTEST = 0.5  # of a log [s]
 
 
 def sample_period(time: Array) -> float:
@@ -73,6 +77,51 @@ def fill(recording: Recording, longest: float, findings: list[LogFinding]) -> Re
     if cells or added or lost:
         findings.append(recording.finding("warning", "repair", cells=cells, samples=added, lost=lost))
     return replace(recording, values=values, rows=rows)
+
+
+def without_cut_end(recording: Recording, findings: list[LogFinding]) -> Recording:
+    """Leave out the last row if it is cut off, as when a logger is killed: its last cell holds no number."""
+    table, values = recording.table, recording.values
+    if table.header is None or len(values) < 2:
+        return recording
+    ends = [column for column, signal in enumerate(recording.signals) if signal.name == table.names[-1]]
+    cut = np.isnan(values[-1]).all() or any(np.isnan(values[-1, column]) for column in ends)
+    if not cut or np.isnan(values[-2]).all():
+        return recording
+    findings.append(recording.finding("warning", "cut end", [len(values) - 1]))
+    return replace(recording, values=values[:-1], rows=recording.rows[:-1])
+
+
+def between_gaps(
+    recording: Recording, settings: LogSettings, findings: list[LogFinding], *, repair: bool
+) -> list[Recording]:
+    """Return the parts of a recording between gaps, without those shorter than SHORTEST.
+
+    Gaps of up to two samples, or with `repair` of up to `settings.repair_s` besides the usual step, are none:
+    `resample` bridges them. Raises LogError: no part is long enough.
+    """
+    time, signal = recording.time, recording.signals[0]
+    steps, period = np.diff(time), sample_period(time)
+    bridged = BRIDGED * max(period, settings.period_s)
+    if repair:
+        bridged = max(bridged, settings.repair_s * (1 + 1e-9) + period)
+    lost = 1 + np.flatnonzero((steps > GAP * period) & (steps <= bridged))
+    if len(lost) and not repair:
+        samples = float(np.rint(steps[lost - 1] / period - 1).sum())
+        findings.append(recording.finding("warning", "lost", lost, signal, samples=samples))
+    gaps = 1 + np.flatnonzero(steps > bridged)
+    ends = [0, *gaps.tolist(), len(time)]
+    every = [slice(first, end) for first, end in pairwise(ends)]
+    kept = [rows for rows in every if time[rows.stop - 1] - time[rows.start] >= SHORTEST]
+    if not kept:
+        hint = "log at a higher rate, or use --repair"
+        raise LogError(f"has no part of {SHORTEST} s without a gap", recording.table.source, hint)
+    if len(gaps):
+        first, left = gaps[0], len(every) - len(kept)
+        numbers = {"gap": time[first] - time[first - 1], "period": period, "parts": float(len(kept))}
+        more = f", {left} shorter than {SHORTEST:g} s left out" if left else ""
+        findings.append(recording.finding("warning", "gap", gaps, signal, **numbers, left=more))
+    return [replace(recording, values=recording.values[at], rows=recording.rows[at]) for at in kept]
 
 
 def resample(recording: Recording, settings: LogSettings, joints: int) -> Log:

@@ -1,8 +1,7 @@
 """Faults of a sensor or a logger that the readings of one angle show: leaps, and steps that are too coarse.
 
-A spike, a drop-out to zero, a zero point that shifts, and seconds that were cut out and renumbered all
-make an
-angle leap within one sample, as no joint moves: faster than it ever does elsewhere, and in between samples
+A spike, a drop-out to zero, a zero point that shifts, and seconds that were cut out and renumbered all make
+an angle leap within one sample, as no joint moves: faster than it ever does elsewhere, and in between samples
 in which it hardly moves.
 """
 

@@ -175,8 +175,8 @@ MOST_NUMBERS = 30_000_000
 def refuse_large(source: str, rows: int, columns: int) -> None:
     """Raise a LogError where a log is too long for the memory of a usual computer."""
     if rows * columns > MOST_NUMBERS:
-        most = MOST_NUMBERS // columns
-        what = f"has {rows:,} rows, of which {columns} columns are read; at most {most:,} can be"
+        most = f"at most {MOST_NUMBERS // columns:,} rows of {columns} columns can be read"
+        what = f"has {rows:,} rows; {most}"
         raise LogError(what, source, "cut it, or record at a lower rate")
 
 

@@ -34,6 +34,7 @@ from hydroid.progress import LOGGER
 from hydroid.run.archive import pack, unpack
 from hydroid.run.folder import RunFolder, difference, samples
 from hydroid.settings.fit import FitSettings
+from hydroid.settings.log import log_file
 from hydroid.words import numbered
 
 RESULT, VALIDATIONS = "result.npz", "validations"
@@ -135,10 +136,11 @@ def keep_validation(model: IdentifiedModel, predictions: Sequence[Prediction]) -
 def validation_name(log: Log) -> str:
     """Return the name of a log's folder among the validations: its file's, and a digest of the file's place.
 
-    Of a log that is no file the digest is that of its samples.
+    Of a log that is no file the digest is that of its samples. A part of a file has its number in both.
     """
-    there = os.path.exists(log.source)
-    place = Path(os.path.realpath(log.source)) if there else Path(log.source)
+    file = log_file(log.source)
+    there, number = file.exists(), Path(log.source).name[len(file.name) :]
+    place = Path(os.path.realpath(file) + number) if there else Path(log.source)
     key = os.fsencode(place) if there else samples(log)
     name = re.sub(r"[^\w.-]+", "_", place.name).strip(".")[:LONGEST_NAME]
     return f"{name or 'log'}-{hashlib.sha256(key).hexdigest()[:8]}"

@@ -8,6 +8,7 @@ log:
     7: null                     # not in the log
 """
 
+import re
 from fnmatch import fnmatch
 from pathlib import Path
 from typing import Annotated, Literal, NamedTuple
@@ -18,6 +19,14 @@ from hydroid.errors import SettingsError
 from hydroid.files import Plain
 from hydroid.settings.load import ByJoint, Settings
 from hydroid.words import listed
+
+_PART = re.compile(r"\[\d+\]$")
+
+
+def log_file(source: str | Path) -> Path:
+    """Return the file of a log by its source: FILE[2] is the part of FILE after its first gap."""
+    return Path(_PART.sub("", str(source)))
+
 
 JOINT = "{joint}"
 OTHER = "other"
@@ -159,7 +168,7 @@ class LogSettings(Settings):
         """Return the group of a log by its file's name.
         Raises SettingsError: it is in several.
         """
-        name = Path(log).name
+        name = log_file(log).name
         of = [group for group, patterns in self.groups.items() for p in patterns if fnmatch(name, p)]
         if len({*of}) > 1:
             raise SettingsError(f"{name} is in the groups {listed(of)}", "log.groups")

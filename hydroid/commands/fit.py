@@ -1,13 +1,14 @@
 """Fit one problem, with settings and logs that are read: `hydroid.fit`."""
 
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hydroid.arrays import record
 from hydroid.commands.console import Printed
-from hydroid.commands.inputs import LogSource, LogSources, Source
-from hydroid.commands.logs import read_log, read_logs, refuse_undriven
+from hydroid.commands.inputs import LogSource, LogSources, ModelSource, Source
+from hydroid.commands.logs import earlier_logs, read_log, read_logs, refuse_undriven
 from hydroid.errors import RunError, SettingsError
 from hydroid.estimate import NAME, FitSummary
 from hydroid.files import write_atomic
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from hydroid.fitting.fit import Fit, Watcher
     from hydroid.fitting.validation import Prediction
     from hydroid.fitting.verdict import Baselines
+    from hydroid.log import Log
     from hydroid.parallel.workers import DaskWorkers
     from hydroid.plant import Plant
     from hydroid.problem.problem import Problem
@@ -41,6 +43,7 @@ class FitResult(Printed):
         model: at the final estimate.
         predictions: what its estimates make of its logs.
         baselines: fitted to the same logs, by joint and name.
+        earlier: logs of the fits that it began from, which are no test of it either.
     """
 
     problem: "Problem"
@@ -50,6 +53,16 @@ class FitResult(Printed):
     model: IdentifiedModel
     predictions: "tuple[Prediction, ...]"
     baselines: "Baselines"
+    earlier: "tuple[Log, ...]" = ()
+
+    def begun_from(self, *fits: "ModelSource | None") -> "FitResult":
+        """Return the fit with the logs that other fits have seen, which it began from; its run keeps them."""
+        from hydroid.run.record import keep_earlier
+
+        earlier = earlier_logs(fits)
+        if self.folder is not None:
+            keep_earlier(self.folder, earlier)
+        return replace(self, earlier=earlier)
 
     def plant(self, **how: Any) -> "Plant":
         """Return the identified arm to be stepped; the keywords are those of `Plant`."""
@@ -186,11 +199,12 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
 def _store(folder: "RunFolder", result: FitResult) -> Path:
     from hydroid.reporting.predictions import draw
     from hydroid.run.archive import pack
-    from hydroid.run.record import RESULT, fit_result
+    from hydroid.run.record import RESULT, fit_result, keep_earlier
 
     began = time.monotonic()
     folder.write_estimate(result.model, result.problem.logs[0])
     write_atomic(folder.path / RESULT, pack(fit_result(result.fit, result.predictions, result.baselines)))
+    keep_earlier(folder.path, result.earlier)
     page = draw(folder.path)
     folder.status("done", seconds={**result.fit.seconds, "report": time.monotonic() - began})
     return page

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hydroid.commands.inputs import LogSource, LogSources, as_list
+from hydroid.commands.inputs import LogSource, LogSources, ModelSource, as_list
 from hydroid.errors import LogError, RunError, SettingsError
+from hydroid.estimate import read_estimate
 from hydroid.files import is_file
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log, LogFinding, check_parts, grouped, log_finding, open_table
@@ -146,6 +147,35 @@ def read_arms(
     if any(name.startswith(tuple(f"{side}_" for side in SIDES)) for name in names):
         return {side: read(columns.of_arm(side)) for side in moving}
     return dict.fromkeys(moving, read(columns))
+
+
+def seen_logs(fit: ModelSource) -> list[Log]:
+    """Return the logs that a fit has seen: its own, and those of fits that it began from.
+
+    Of values that are from no run there are none. Raises RunError: the run's logs cannot be read.
+    """
+    from hydroid.run.record import logs_behind
+
+    if isinstance(fit, str | Path):
+        return logs_behind(read_estimate(Path(fit))[0])
+    if isinstance(fit, IdentifiedModel):
+        return logs_behind(Path(fit.source))
+    return [*(one.log for one in fit.predictions), *fit.earlier]
+
+
+def earlier_logs(fits: "Sequence[ModelSource | None]") -> tuple[Log, ...]:
+    """Return the logs that fits have seen, each once; those of a run that cannot be read are left out."""
+    from hydroid.run.folder import samples
+
+    seen = dict[bytes, Log]()
+    for fit in fits:
+        if fit is None:
+            continue
+        try:
+            seen |= {samples(log): log for log in seen_logs(fit)}
+        except RunError as error:
+            LOGGER.warning("warning: %s; the logs of that fit will count as unseen", error)
+    return tuple(seen.values())
 
 
 def run_logs(folder: Path) -> list[Path]:

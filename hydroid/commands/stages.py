@@ -144,9 +144,10 @@ def _fit(stage: str, given: Mapping[str, Any]) -> FitResult:
         raise SettingsError(f"is no time: {limit!r}", "--budget", "such as 90s, 5min or 2h")
     read = read_logs(given["logs"], settings, repair=given["repair"])
     with open_workers(given["dask"]) as workers, FitProgress(settings, budget) as watcher:
-        return run_fit(
+        result = run_fit(
             settings, read, given["out"], resume=given["resume"], progress=watcher, workers=workers
         )
+    return result.begun_from(given.get("mech"), start)
 
 
 def held_mechanics(mech: "ModelSource | None", settings: FitSettings, changes: Plain) -> Plain:
@@ -233,7 +234,7 @@ def adapt(
         raise SettingsError("no parameter lowers the error on parts left out", model.source, hint)
     settings = adapted(model, chosen, read)
     with FitProgress(settings) as watcher:
-        result = run_fit(settings, read, out, progress=watcher)
+        result = run_fit(settings, read, out, progress=watcher).begun_from(fit)
     named = [step | {"parameter": step["parameter"] or "none"} for step in path]
     table = left_out_table("Parameters freed one after another", {"parameter": "freed"}, named, settings.arm)
     said = load_findings(settings)

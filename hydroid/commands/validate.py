@@ -15,7 +15,7 @@ from hydroid.commands.inputs import (
     command,
     open_model,
 )
-from hydroid.commands.logs import read_logs
+from hydroid.commands.logs import read_logs, seen_logs
 from hydroid.files import Plain
 from hydroid.identified_model import IdentifiedModel, warn_of_changes
 from hydroid.log import Log
@@ -77,7 +77,7 @@ def validate(
         fitted, baselines = fitted_by(model)
         if not isinstance(one, str | Path | IdentifiedModel):
             fitted, baselines = one.predictions, one.baselines
-        known = [prediction.log for prediction in fitted]
+        known = seen_logs(one)
         predictions = [predicted(model, log, _unseen(log, known) if known else None) for log in own]
         kept = [replace(one, apart=apart) for one in predictions]
         if out is not None and (run := keep_validation(model, kept)):
@@ -98,7 +98,9 @@ def validate(
     lines = [*verdict_lines(fits), *(line for step in steps for line in next_lines(step))]
     lines += map(str, standing_out(results[best], fits[best], str(run or "RUN")))
     if seen := [one.log.source for one in results[best] if one.unseen is False]:
-        lines.insert(1, f"The fit was made with {listed(seen, 3)}: that tests nothing.")
+        lines.insert(
+            1, f"The fit, or one that it began from, was made with {listed(seen, 3)}: that tests nothing."
+        )
     return Result([*lines, *written(page, out)], content, every, page, details=[page.tables["errors"]])
 
 

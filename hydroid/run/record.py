@@ -37,8 +37,8 @@ from hydroid.settings.fit import FitSettings
 from hydroid.settings.log import log_file
 from hydroid.words import numbered
 
-RESULT, VALIDATIONS = "result.npz", "validations"
-"""names of the file of arrays, and of the folder of unseen logs"""
+RESULT, EARLIER, VALIDATIONS = "result.npz", "earlier.npz", "validations"
+"""names of the file of arrays, of that of the logs of earlier fits, and of the folder of unseen logs"""
 LONGEST_NAME = 60
 """characters of a log's name in that of its validation; file systems take 255 bytes"""
 
@@ -144,6 +144,25 @@ def validation_name(log: Log) -> str:
     key = os.fsencode(place) if there else samples(log)
     name = re.sub(r"[^\w.-]+", "_", place.name).strip(".")[:LONGEST_NAME]
     return f"{name or 'log'}-{hashlib.sha256(key).hexdigest()[:8]}"
+
+
+def keep_earlier(folder: Path, logs: Sequence[Log]) -> None:
+    """Store the logs of the fits that a run began from, in its folder."""
+    if logs:
+        write_atomic(folder / EARLIER, pack(logs))
+
+
+def logs_behind(estimate: Path) -> list[Log]:
+    """Return the logs that the estimate of a run has seen: the run's, and those of fits that it began from.
+
+    Of a file of values that is no run's there are none. Raises RunError: the run's cannot be read.
+    """
+    folder = estimate.parent
+    if estimate.name != NAME or not (folder / RESULT).is_file():
+        return []
+    fitted = [one.log for one in _read(folder / RESULT, FitResult).fitted]
+    earlier = _read(folder / EARLIER, tuple[Log, ...]) if (folder / EARLIER).is_file() else ()
+    return [*fitted, *earlier]
 
 
 def fitted_by(model: IdentifiedModel) -> tuple[Sequence[Prediction], Baselines]:

@@ -32,8 +32,8 @@ def check_recording(recording: Recording, settings: LogSettings) -> Iterator[Log
     for signal, values in zip(recording.signals, recording.values.T, strict=True):
         rows = np.flatnonzero(np.isnan(values) & ~torn)
         if len(rows):
-            cell = table.columns[signal.name][recording.rows[rows[0]]]
-            what = f"{cell[:30]!r} is not a number" if isinstance(cell, str) and cell else "no value is there"
+            cell = table.text(signal.name, int(recording.rows[rows[0]]))
+            what = f"{cell[:30]!r} is not a number" if cell else "no value is there"
             kind = "no time" if signal.kind == "time" else "hole"
             yield recording.finding("error", kind, rows, signal, what=what, longest=longest)
     yield from _time(recording, settings)

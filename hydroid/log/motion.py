@@ -23,12 +23,12 @@ class JointMotion:
     log: Log
     joint: int
 
-    @property
+    @cached_property
     def reach(self) -> tuple[float, float]:
         """Its least and largest angle but for the noise [rad]."""
         return self._slow[1].min(), self._slow[1].max()
 
-    @property
+    @cached_property
     def travel(self) -> float:
         """Range of its angle but for the noise [deg]."""
         return np.rad2deg(np.ptp(self._slow[1]))
@@ -140,26 +140,29 @@ class JointMotion:
     def _following(self) -> Array:
         return _correlations(self._logged, self._quick[2], round(0.8 / self.log.period))
 
-    @cached_property
+    @property
     def _quick(self) -> tuple[Array, ...]:
-        return self._smoothed(QUICK)
+        return _smoothed(self.log, self.joint, QUICK)
 
-    @cached_property
+    @property
     def _slow(self) -> tuple[Array, ...]:
-        return self._smoothed(SLOW)
+        return _smoothed(self.log, self.joint, SLOW)
 
-    def _smoothed(self, seconds: float) -> tuple[Array, ...]:
-        """Return command [%], angle [rad] and speed [rad/s], each (T,), behind a Gaussian."""
-        width, angle = seconds / self.log.period, self.log.angle[:, self.joint - 1]
-        reach = int(4 * width + 0.5)
-        at = np.arange(-reach, reach + 1)
-        bell = np.exp(-0.5 * (at / width) ** 2)
-        bell /= bell.sum()
-        slope = -at / width**2 * bell / self.log.period
-        return tuple(
-            np.convolve(np.pad(signal, reach, "symmetric"), by, "valid").astype(np.float64)
-            for signal, by in ((self._logged, bell), (angle, bell), (angle, slope))
-        )
+
+@lru_cache(maxsize=2)  # a long log's signals are large
+def _smoothed(log: Log, joint: int, seconds: float) -> tuple[Array, ...]:
+    """Return command [%], angle [rad] and speed [rad/s], each (T,), behind a Gaussian."""
+    width = seconds / log.period
+    command, angle = log.command[:, joint - 1], log.angle[:, joint - 1]
+    reach = int(4 * width + 0.5)
+    at = np.arange(-reach, reach + 1)
+    bell = np.exp(-0.5 * (at / width) ** 2)
+    bell /= bell.sum()
+    slope = -at / width**2 * bell / log.period
+    return tuple(
+        np.convolve(np.pad(signal, reach, "symmetric"), by, "valid").astype(np.float64)
+        for signal, by in ((command, bell), (angle, bell), (angle, slope))
+    )
 
 
 def _correlations(leading: Array, following: Array, most: int) -> Array:

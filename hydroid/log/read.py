@@ -14,8 +14,8 @@ from hydroid.log.binary import BINARY, first_bytes
 from hydroid.log.checks import check_motion, check_recording
 from hydroid.log.csv import open_csv
 from hydroid.log.log import Log, LogFinding, by_level, log_finding
-from hydroid.log.repair import between_gaps, fill, hold, resample, unwrap, without_cut_end
-from hydroid.log.table import Signal, Table
+from hydroid.log.repair import between_gaps, hold, resample, without_bad_rows
+from hydroid.log.table import Recording, Signal, Table
 from hydroid.settings.log import Kind, LogSettings
 from hydroid.units import UNITS
 from hydroid.words import listed
@@ -96,27 +96,36 @@ def check_parts(
         table = open_table(path, settings)
         if outputs is None:
             signals = [s for s in signals if s.kind in ("time", "command") or s.name in table.names]
-        recording = table.read(_match(table, signals, needed, findings))
+        signals = _match(table, signals, needed, findings)
+        recording = table.read(signals)
+        del table  # with the columns that are not used
         findings += [log_finding("note", "layout", source, what=one) for one in recording.table.remarks]
-        if repair:
-            recording = fill(unwrap(recording, findings), settings.repair_s, findings)
-        else:
-            recording = unwrap(without_cut_end(recording, findings), findings)
+        recording = without_bad_rows(recording, settings, findings, repair=repair)
         findings += check_recording(recording, settings)
         if all(finding.level != "error" for finding in findings):
-            for piece in between_gaps(recording, settings, findings, repair=repair):
-                begin = float(piece.time[0] - recording.time[0])
-                rest = 0 if begin else None  # after a gap the arm may be moving
-                parts.append(replace(resample(piece, settings, len(ranges)), begin=begin, rest=rest))
-            if len(parts) > 1:
-                parts = [replace(one, source=f"{source}[{k}]") for k, one in enumerate(parts, 1)]
+            parts = _parts(recording, settings, len(ranges), findings, repair=repair)
+            del recording
             for part in parts:
-                findings += check_motion(part, recording.signals, compared, backward, settings.delay_s)
+                findings += check_motion(part, signals, compared, backward, settings.delay_s)
     except LogError as error:
         numbers = {"what": error.what, "hint": error.hint}
         findings.append(LogFinding("unreadable", "error", (), numbers, error.where, source))
         parts = []
     return parts, by_level(findings)
+
+
+def _parts(
+    recording: Recording, settings: LogSettings, joints: int, findings: list[LogFinding], *, repair: bool
+) -> list[Log]:
+    """Return the parts of a recording between its gaps as logs."""
+    parts = list[Log]()
+    for piece in between_gaps(recording, settings, findings, repair=repair):
+        begin = float(piece.time[0] - recording.time[0])
+        rest = 0 if begin else None  # after a gap the arm may be moving
+        parts.append(replace(resample(piece, settings, joints), begin=begin, rest=rest))
+    if len(parts) == 1:
+        return parts
+    return [replace(one, source=f"{one.source}[{k}]") for k, one in enumerate(parts, 1)]
 
 
 def map_signals(settings: LogSettings, ranges: Ranges) -> list[Signal]:

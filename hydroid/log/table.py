@@ -1,9 +1,10 @@
 """What every file format is read as: a table of named columns, some of which are read into a recording."""
 
 import re
+from array import array
 from collections.abc import Generator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import KW_ONLY, field
+from contextlib import contextmanager, suppress
+from dataclasses import KW_ONLY, field, replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -11,12 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hydroid.arrays import Array, Ints, record
+from hydroid.arrays import Array, Index, Ints, record
 from hydroid.errors import LogError
 from hydroid.findings import Level
 from hydroid.log.log import LogFinding, log_finding
 
 _DAY = 86_400 * 10**9  # [ns]
+_NO_TIME = np.iinfo(np.int64).min  # NaT of numpy
 _TIME = re.compile(
     r"(?:.*[T ])?(\d{1,2}):(\d{2}):(\d{2})(?:[.,](\d{1,9})\d*)? *([AaPp])?\.?[Mm]?\.?(?:Z|[+-][\d:]+)?"
 )
@@ -71,6 +73,11 @@ class Table:
     remarks: tuple[str, ...] = ()
     lines: Ints | None = None
 
+    def text(self, name: str, row: int) -> str:
+        """Return the text of a cell that holds no number, for a message; empty where it is no text."""
+        cell = self.columns[name][row]
+        return cell if isinstance(cell, str) else ""
+
     def read(self, signals: Sequence[Signal]) -> "Recording":
         """Read the columns of signals; a number that is too large counts as none."""
         first = signals[0].name
@@ -106,6 +113,10 @@ class Recording:
     def time(self) -> Array:
         """Time [s], shape (R,)."""
         return self.values[:, 0]
+
+    def kept(self, rows: Index | slice) -> "Recording":
+        """Return some of its rows."""
+        return replace(self, values=self.values[rows], rows=self.rows[rows])
 
     def finding(
         self,
@@ -144,25 +155,61 @@ def clock(cell: str) -> int | None:
     return ((hours * 60 + int(minute)) * 60 + int(second)) * 10**9 + int((fraction or "0").ljust(9, "0"))
 
 
-def _as_numbers(cells: NDArray[Any]) -> tuple[Array, bool]:
-    """Return cells as numbers, NaN for those that hold none, and whether they are times [s] from the first.
+class TextColumn:
+    """The numbers in a column of text, which comes in pieces; or times, if its first cell with text is one.
 
-    Dates in text do not count, which programs write in many ways: a time of day that falls by more than half
-    a day has passed midnight.
+    Dates do not count, which programs write in many ways: a time of day that falls by more than half a day
+    has passed midnight.
     """
+
+    def __init__(self) -> None:
+        self._numbers = array("d")
+        self._ticks: array[int] | None = None
+        self._begun = False
+
+    def extend(self, cells: Sequence[str]) -> None:
+        """Take the next cells."""
+        if not self._begun and (first := next(filter(None, cells), "")):
+            self._begun = True
+            if clock(first) is not None:
+                self._ticks = array("q", [_NO_TIME] * len(self._numbers))
+        if self._ticks is not None:
+            clocks = map(clock, cells)
+            self._ticks.extend(_NO_TIME if tick is None else tick for tick in clocks)
+        else:
+            self._numbers.extend(_numbers(cells))
+
+    def values(self) -> NDArray[Any]:
+        """Return numbers, NaN where there is none, or times, NaT where there is none; shape (R,)."""
+        if self._ticks is None:
+            return np.frombuffer(self._numbers, np.float64) if self._numbers else np.zeros(0)
+        ticks = np.array(self._ticks, np.int64)
+        there = ticks != _NO_TIME
+        days = np.cumsum(np.diff(ticks[there], prepend=ticks[there][:1]) < -_DAY // 2)
+        ticks[there] += _DAY * days
+        return ticks.view("M8[ns]")
+
+
+def _numbers(cells: Sequence[str]) -> "array[float]":
+    """Return the numbers in cells, NaN where there is none."""
+    if not any("_" in cell for cell in cells):
+        with suppress(ValueError):
+            return array("d", map(float, cells))
+    numbers = map(number, cells)
+    return array("d", [np.nan if one is None else one for one in numbers])
+
+
+def _as_numbers(cells: NDArray[Any]) -> tuple[Array, bool]:
+    """Return cells as numbers, NaN where there is none, and whether they are times [s] from the first."""
     if cells.dtype.kind in "fiub":
         return cells.astype(np.float64), False
     if cells.dtype.kind == "M":
         there = ~np.isnat(cells)
         ticks = (cells[there] - cells[there][:1]).astype("m8[ns]").astype(np.int64)
     else:
-        texts = [str(cell) for cell in cells]
-        if clock(next(filter(None, texts), "")) is None:
-            return np.array([number(text) for text in texts], np.float64), False
-        clocks = [clock(text) for text in texts]
-        there = np.array([tick is not None for tick in clocks])
-        ticks = np.array([tick for tick in clocks if tick is not None], np.int64)
-        ticks += _DAY * np.cumsum(np.diff(ticks, prepend=ticks[0]) < -_DAY // 2)
+        column = TextColumn()
+        column.extend([str(cell) for cell in cells])
+        return _as_numbers(column.values())
     seconds = np.full(len(cells), np.nan)
     seconds[there] = (ticks - ticks[:1]) / 1e9
     return seconds, True

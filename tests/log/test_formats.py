@@ -103,8 +103,10 @@ BAD = {
         lambda p: write_parquet(p / "a.parquet", {**COLUMNS, "u1_pct": ["up"] * 80}),
         "row 1, column u1_pct: 'up' is not a number (and 79 more",
     ),
-    "no value in parquet": (
-        lambda p: write_parquet(p / "a.parquet", {**COLUMNS, "u1_pct": [None, *COLUMNS["u1_pct"][1:]]}),
+    "no values in parquet": (
+        lambda p: write_parquet(
+            p / "a.parquet", {**COLUMNS, "u1_pct": [*[None] * 9, *COLUMNS["u1_pct"][9:]]}
+        ),
         "row 1, column u1_pct: no value is there",
     ),
     "other length": (

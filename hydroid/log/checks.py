@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 
 from hydroid.arrays import Array
-from hydroid.log.clues import CLUES, column_unit, likely_range
+from hydroid.log.clues import CLUES, column_unit
 from hydroid.log.log import Log, LogFinding, log_finding
 from hydroid.log.motion import END, driven_joints, motion_of
 from hydroid.log.repair import GAP, SHORTEST, sample_period
 from hydroid.log.sensors import check_sensors
+from hydroid.log.signals import likely_range
 from hydroid.log.table import Recording, Signal
 from hydroid.settings.arm import Arm
 from hydroid.settings.log import LogSettings

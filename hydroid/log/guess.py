@@ -15,7 +15,8 @@ import numpy as np
 from hydroid.arrays import Array
 from hydroid.errors import LogError
 from hydroid.files import Plain
-from hydroid.log.clues import CLUES, column_unit, direction, joint_of, kind_of, likely_range, number_in, words
+from hydroid.log.clues import CLUES, column_unit, direction, joint_of, kind_of, number_in, words
+from hydroid.log.signals import likely_range
 from hydroid.log.table import Signal, Table
 from hydroid.units import UNITS, likely_time_unit
 from hydroid.words import listed
@@ -115,9 +116,13 @@ def _columns(table: Table, names: Sequence[str]) -> Iterator[_Column]:
         if length == max(lengths, key=lengths.count):
             with suppress(LogError):  # a channel of a single message
                 recording = table.read([Signal(name, kind)])
-                if np.isfinite(recording.time).any():
-                    unit = units[name]
-                    yield _Column(name, kind, unit.name if unit else "", recording.time)
+                values = recording.time
+                unit = units[name]
+                stated = unit.name if unit else ""
+                if kind == "time" and not _rises(values) and likely_range(values, unit=stated):
+                    kind = "command"  # pulses
+                if np.isfinite(values).any():
+                    yield _Column(name, kind, stated, values)
 
 
 def _rises(values: Array) -> bool:
@@ -172,7 +177,8 @@ def _by_joint(
 def _command(table: Table, columns: Sequence[_Column]) -> tuple[Plain, str]:
     names = [column.name for column in columns]
     signals = [Signal(name, "command", rest=np.nan) for name in names]
-    likely = likely_range(*table.read(signals).values.T)
+    cells = table.read(signals).values.T
+    likely = likely_range(cells[0], cells[1] if len(cells) > 1 else None, columns[0].unit)
     entry: Plain = {"column": names[0] if len(names) == 1 else names}
     if likely is None or "%" in (columns[0].unit, likely.name):
         return entry, f"{' and '.join(names)}: command in %"

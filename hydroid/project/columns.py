@@ -8,7 +8,8 @@ import numpy as np
 from hydroid.arrays import Array
 from hydroid.errors import LogError
 from hydroid.log import Table
-from hydroid.log.clues import column_unit, likely_range
+from hydroid.log.clues import column_unit
+from hydroid.log.signals import likely_range
 from hydroid.log.table import Signal
 from hydroid.units import likely_time_unit
 
@@ -40,14 +41,15 @@ def _told(table: Table, name: str) -> str:
         return f"{low:g} throughout"
     unit = column_unit(name, table.units.get(name, ""))
     stated = f", in {unit.name}" if unit else ""
-    return f"{low:.4g} to {high:.4g}{stated}; {' or '.join(_choices(values)) or 'neither command nor angle'}"
+    choices = " or ".join(_choices(values, unit.name if unit else ""))
+    return f"{low:.4g} to {high:.4g}{stated}; {choices or 'neither command nor angle'}"
 
 
-def _choices(values: Array) -> Iterator[str]:
+def _choices(values: Array, unit: str) -> Iterator[str]:
     steps = np.diff(values)
     if len(steps) and (steps > 0).all():
         yield f"a time in {likely_time_unit(float(np.median(steps))) or 's'}"
-    if likely := likely_range(values):
+    if likely := likely_range(values, unit=unit):
         scale = "" if likely.name == "%" else f" (scale: {likely.scale:.4g}"
         scale += f", offset: {likely.offset:.4g}" if likely.offset else ""
         yield f"a command in {likely.name}{scale}{')' if scale else ''}"

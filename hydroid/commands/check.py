@@ -149,14 +149,15 @@ def convert(
     refuse_overwriting(path, out)
     if config is not None or set:
         settings = load_settings(config or "fit-mech", set)
-        layout, ranges = settings.log, settings.arm.ranges
+        layout, ranges, arm = settings.log, settings.arm.ranges, settings.arm
     else:
+        arm = None
         most = [f"joint {number}" for number in range(1, 13)]  # more joints than an arm has
         guess = guess_columns(open_table(path), most)
         layout = LogSettings.model_validate(guess.log)
         ranges = {str(number): (-np.inf, np.inf) for number in range(1, 1 + max(layout.joints, default=1))}
         reasons = [*guess.reasons]
-    parts, findings = check_parts(path, layout, ranges, repair=repair)
+    parts, findings = check_parts(path, layout, ranges, arm=arm, repair=repair)
     if not parts:
         raise findings[0].error()
     read = _with_gaps(parts)

@@ -81,7 +81,7 @@ def check_file(
     """
     path = path.resolve() if path.name in ("", "..") else path
     arm, outputs = settings.arm, settings.outputs if angles else None
-    return check_parts(path, settings.log, arm.ranges, outputs=outputs, backward=arm.backward, repair=repair)
+    return check_parts(path, settings.log, arm.ranges, outputs=outputs, arm=arm, repair=repair)
 
 
 def undriven_findings(logs: Sequence[Log], settings: FitSettings) -> list[LogFinding]:

@@ -180,8 +180,8 @@ def design(
     files, commands = written({"design": table}, out), None
     if out is not None:
         commands = str(Path(out) / "commands.csv")
-        write_log(Path(commands), result.log, settings.log)
-        write_log(Path(out) / "predicted.csv", result.best.log, settings.log)
+        write_log(Path(commands), result.log, settings.log, arm=settings.arm)
+        write_log(Path(out) / "predicted.csv", result.best.log, settings.log, arm=settings.arm)
         files.insert(0, commands)
     content = {"commands": commands, "precision": rows}
     return Result([table, *(f"- {one}" for one in findings), *files], content, result)

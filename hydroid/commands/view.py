@@ -86,7 +86,8 @@ def simulate(
         logs[name] = replace(predicted, angle=predicted.angle + noise, source=source)
     columns = model.settings.log
     if out is not None:
-        write_logs(Path(out), [(log, columns.of_arm(n) if arm else columns) for n, log in logs.items()])
+        pairs = [(log, columns.of_arm(n) if arm else columns) for n, log in logs.items()]
+        write_logs(Path(out), pairs, arm=model.settings.arm)
     first, file = next(iter(logs.values())), out and str(out)
     content = {"out": file, "samples": len(first.time), "duration_s": first.duration}
     return Simulated([file] if file else [], content, logs)

@@ -6,7 +6,7 @@ no column of a kind has a joint they are given to the joints in order; beside co
 without is left out and named.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from typing import Any, NamedTuple
 
@@ -16,12 +16,17 @@ from hydroid.arrays import Array
 from hydroid.errors import LogError
 from hydroid.files import Plain
 from hydroid.log.clues import CLUES, column_unit, direction, joint_of, kind_of, number_in, words
+from hydroid.log.rods import Rod
 from hydroid.log.signals import likely_range
 from hydroid.log.table import Signal, Table
 from hydroid.units import UNITS, likely_time_unit
 from hydroid.words import listed
 
 PERIODS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2)  # [s], of which a guess takes the nearest
+
+LENGTHS = ("m", "cm", "mm")
+LARGEST_ANGLE = np.radians(400.0)
+"""of an arm's joint [rad]; larger numbers are lengths or counts"""
 
 
 class ColumnGuess(NamedTuple):
@@ -47,13 +52,19 @@ _Pairs = dict[int, tuple[list[_Column], str]]
 
 
 def guess_columns(
-    table: Table, joints: Sequence[str], *, links: Sequence[str] = (), slides: Sequence[int] = ()
+    table: Table,
+    joints: Sequence[str],
+    *,
+    links: Sequence[str] = (),
+    slides: Sequence[int] = (),
+    rods: Mapping[int, Rod] | None = None,
 ) -> ColumnGuess:
     """Guess which columns are time, commands and angles, of which joints, in which units.
 
     Columns may have the names of the links that the joints move instead; positions of joints (from 1) that
-    slide are in m.
+    slide are in m. Lengths of the cylinders of joints, `rods`, stand for their angles.
     """
+    rods = rods or {}
     columns = [*_columns(table, (*joints, *links))]
     time = max((c for c in columns if c.kind == "time"), key=lambda c: _rises(c.values), default=None)
     if time is None:
@@ -64,7 +75,7 @@ def guess_columns(
     step *= UNITS[unit].factor
     reasons = [f"{time.name}: time in {unit}, every {step:.3g} s"]
     commands, angles = (
-        _by_joint([c for c in columns if c.kind == kind], (joints, links), slides, reasons)
+        _by_joint(_angles_first(columns, kind), (joints, links), (slides, rods), reasons)
         for kind in ("command", "angle")
     )
     unitless = [c.values for joint, ((c,), _) in angles.items() if joint not in slides and not c.unit]
@@ -81,8 +92,15 @@ def guess_columns(
             ((column,), why), what, usual = angles[joint], "angle", default
             if joint in slides:  # no telescope is 50 m long
                 what, usual = "position", "mm" if np.nanmax(np.abs(column.values)) > 50 else "m"
+            length = _length(column, rods.get(joint), default)
             entry["angle"] = {"column": column.name, "unit": column.unit or usual}
-            reasons.append(f"{column.name}: {what} in {column.unit or usual} of {of}, {why}")
+            if length:
+                what, (usual, offset) = "length of the cylinder", length
+                entry["angle"] = {"column": column.name, "unit": usual} | (
+                    {"offset": offset} if offset else {}
+                )
+                what += f", which is {offset:.6g} {usual} with the rod in," if offset else ""
+            reasons.append(f"{column.name}: {what} in {entry['angle']['unit']} of {of}, {why}")
     used = {time.name} | {c.name for pairs in (commands, angles) for pair, _ in pairs.values() for c in pair}
     log: Plain = {
         "time": {"column": time.name, "unit": unit},
@@ -94,6 +112,28 @@ def guess_columns(
     unused = tuple(name for name in table.names if name and name not in used)
     reasons += [f"not used: {listed(unused)}"] if unused else []
     return ColumnGuess(log, tuple(reasons), unused)
+
+
+def _angles_first(columns: Sequence[_Column], kind: str) -> list[_Column]:
+    """Return the columns of a kind; lengths last, for a joint whose angle is there needs none."""
+    return sorted((c for c in columns if c.kind == kind), key=_is_length)
+
+
+def _is_length(column: _Column) -> bool:
+    return column.unit in LENGTHS or not {*words(column.name)}.isdisjoint(CLUES["lengths"])
+
+
+def _length(column: _Column, rod: Rod | None, unit: str) -> tuple[str, float] | None:
+    """Return unit and offset of a column that holds the length of a joint's cylinder; None: it does not.
+
+    A column without a unit holds angles if its name does not say otherwise and they are in a joint's reach.
+    """
+    if rod is None or (column.unit and column.unit not in LENGTHS):
+        return None
+    angles = np.nanmax(np.abs(column.values)) * UNITS[unit].factor <= LARGEST_ANGLE
+    if not _is_length(column) and angles:
+        return None
+    return rod.reading(column.values, column.unit)
 
 
 def nearest_period(step: float) -> float:
@@ -133,10 +173,14 @@ def _rises(values: Array) -> bool:
 def _by_joint(
     columns: Sequence[_Column],
     known: tuple[Sequence[str], Sequence[str]],
-    slides: Sequence[int],
+    lengths: tuple[Collection[int], Collection[int]],
     reasons: list[str],
 ) -> _Pairs:
-    """Give columns of one kind to the joints; say what is uncertain or left out."""
+    """Give columns of one kind to the joints; say what is uncertain or left out.
+
+    `lengths`: joints that slide, and those that a cylinder turns.
+    """
+    slides, rods = lengths
     groups, given, names = dict[Any, list[_Column]](), _Pairs(), known[0]
     kind = columns[0].kind if columns else ""
     for column in columns:
@@ -148,7 +192,9 @@ def _by_joint(
     def give(pair: list[_Column], joint: int, why: str) -> bool:
         """Give columns to a joint that has none yet and moves in their unit; return whether it does."""
         unit = pair[0].unit
-        fits = kind == "command" or not unit or (UNITS[unit].quantity == "length") == (joint in slides)
+        length = unit in LENGTHS
+        takes = (length and joint in rods) or length == (joint in slides)
+        fits = kind == "command" or not unit or takes
         free = fits and 0 < joint <= len(names) and joint not in given
         if free:
             given[joint] = pair, why

@@ -15,7 +15,9 @@ from hydroid.log.checks import check_motion, check_recording
 from hydroid.log.csv import open_csv
 from hydroid.log.log import Log, LogFinding, by_level, log_finding
 from hydroid.log.repair import between_gaps, hold, resample, without_bad_rows
+from hydroid.log.rods import as_angles, rods_of
 from hydroid.log.table import Recording, Signal, Table
+from hydroid.settings.arm import Arm
 from hydroid.settings.log import Kind, LogSettings
 from hydroid.units import UNITS
 from hydroid.words import listed
@@ -23,6 +25,8 @@ from hydroid.words import listed
 DEFAULT = LogSettings()
 SHOWN = {"command": "%", "angle": "deg", "length": "mm", "pressure": "bar"}
 """units in which messages state what is measured"""
+LENGTHS = ("m", "cm", "mm")
+"""units of positions, and of the lengths of cylinders"""
 
 
 Ranges = Mapping[str, tuple[float, float]]
@@ -70,7 +74,7 @@ def check_parts(
     ranges: Ranges,
     *,
     outputs: Sequence[int] | None = (),
-    backward: Collection[int] = (),
+    arm: Arm | None = None,
     repair: bool = False,
 ) -> tuple[list[Log], list[LogFinding]]:
     """Find everything that is wrong with a log: return its parts between gaps, and all findings.
@@ -81,12 +85,13 @@ def check_parts(
         ranges: (-inf, inf) for a continuous joint. Findings call joints by these names.
         outputs: joints (numbers, from 1) whose angles a fit compares; None: a joint whose angle column the
             file lacks is unmeasured, which else is an error.
-        backward: joints (from 1) that a positive command turns to negative angles.
+        arm: whose cylinders have lengths that stand for angles; a positive command turns its joints
+            `backward` to negative angles.
         repair: fill holes up to `settings.repair_s`.
     """
     source, parts, findings, compared = str(path), list[Log](), list[LogFinding](), outputs or ()
     try:
-        needed, signals = {*compared, *settings.joints}, map_signals(settings, ranges)
+        needed, signals = {*compared, *settings.joints}, map_signals(settings, ranges, arm)
         if (last := max(needed, default=0)) > len(ranges):
             what = f"no joint {last}; the arm has joints 1 to {len(ranges)}"
             raise LogError(what, source, "correct outputs or log.joints")
@@ -100,11 +105,13 @@ def check_parts(
         recording = table.read(signals)
         del table  # with the columns that are not used
         findings += [log_finding("note", "layout", source, what=one) for one in recording.table.remarks]
+        recording = as_angles(recording, findings)
         recording = without_bad_rows(recording, settings, findings, repair=repair)
         findings += check_recording(recording, settings)
         if all(finding.level != "error" for finding in findings):
             parts = _parts(recording, settings, len(ranges), findings, repair=repair)
             del recording
+            backward = arm.backward if arm else ()
             for part in parts:
                 findings += check_motion(part, signals, compared, backward, settings.delay_s)
     except LogError as error:
@@ -128,8 +135,12 @@ def _parts(
     return [replace(one, source=f"{one.source}[{k}]") for k, one in enumerate(parts, 1)]
 
 
-def map_signals(settings: LogSettings, ranges: Ranges) -> list[Signal]:
-    """Return the signals that the settings ask for, time first."""
+def map_signals(settings: LogSettings, ranges: Ranges, arm: Arm | None = None) -> list[Signal]:
+    """Return the signals that the settings ask for, time first.
+
+    Raises LogError: lengths stand for the angles of a joint of the arm that no known cylinder turns.
+    """
+    rods = rods_of(arm) if arm and _has_lengths(settings) else {}
     signals = [Signal(settings.time.column, "time", gain=UNITS[settings.time.unit].factor)]
     for kind in get_args(Kind):
         for joint, (owner, (low, high)) in enumerate(ranges.items(), 1):
@@ -142,10 +153,20 @@ def map_signals(settings: LogSettings, ranges: Ranges) -> list[Signal]:
                 }[kind]
                 unit = UNITS[columns.unit.lower()]
                 scale = columns.scale * unit.factor, columns.offset * unit.factor
+                shown, rod = SHOWN[unit.quantity], None
+                if unit.quantity == "length" and arm and joint not in arm.slides:
+                    shown, rod = "deg", rods.get(joint)
+                    if rod is None:
+                        what = f"{listed(columns.column)} is a length, but no cylinder of {owner} is known"
+                        raise LogError(what, arm.where, f"give {owner} a cylinder with its pivots there")
                 for part, name in enumerate(columns.column):
-                    shown = SHOWN[unit.quantity]
-                    signals.append(Signal(name, kind, joint, part, *scale, *limits, shown, owner))
+                    signals.append(Signal(name, kind, joint, part, *scale, *limits, shown, owner, rod=rod))
     return signals
+
+
+def _has_lengths(settings: LogSettings) -> bool:
+    every = (settings.angle, *(own and own.angle for own in settings.joints.values()))
+    return any(columns and columns.unit in LENGTHS for columns in every)
 
 
 def angle_margin(low: float, high: float) -> float:
@@ -190,8 +211,10 @@ def _match(
     return wanted
 
 
-def write_log(path: Path, log: Log, settings: LogSettings, *, exact: bool = False) -> None:
-    """Write a log, whole or not at all.
+def write_log(
+    path: Path, log: Log, settings: LogSettings, *, exact: bool = False, arm: Arm | None = None
+) -> None:
+    """Write a log, whole or not at all. The `arm` has the cylinders whose lengths stand for angles.
 
     Cells have ten digits, or with `exact` as many as it takes to read the same bits back; where no cell does
     (degrees for a value that was in radians) the last bit may differ. The command is written ahead by
@@ -200,14 +223,17 @@ def write_log(path: Path, log: Log, settings: LogSettings, *, exact: bool = Fals
     Raises LogError: the settings map no column for a joint that is driven, or one for an angle that was not
     measured.
     """
-    write_logs(path, [(log, settings)], exact=exact)
+    write_logs(path, [(log, settings)], exact=exact, arm=arm)
 
 
-def write_logs(path: Path, logs: Sequence[tuple[Log, LogSettings]], *, exact: bool = False) -> None:
+def write_logs(
+    path: Path, logs: Sequence[tuple[Log, LogSettings]], *, exact: bool = False, arm: Arm | None = None
+) -> None:
     """Write logs of the same time side by side into one file, each with its settings, as `write_log` does."""
     columns: dict[str, list[str]] = {}
     for log, settings in logs:
-        signals = map_signals(settings, dict.fromkeys(map(str, range(1, 1 + log.joints)), (np.inf, np.inf)))
+        free = dict.fromkeys(map(str, range(1, 1 + log.joints)), (np.inf, np.inf))
+        signals = map_signals(settings, free, arm)
         mapped = {(signal.kind, signal.joint) for signal in signals}
         for joint, (driven, measured) in enumerate(zip(log.driven, log.measured, strict=True), 1):
             if driven and ("command", joint) not in mapped:
@@ -222,7 +248,8 @@ def write_logs(path: Path, logs: Sequence[tuple[Log, LogSettings]], *, exact: bo
             if signal.kind == "command":
                 values = (-command if signal.part else command)[:, joint].clip(min=signal.low)
             elif signal.kind == "angle":
-                values = log.angle[:, joint]
+                angle = log.angle[:, joint]
+                values = angle if signal.rod is None else signal.rod.cylinder.length(angle)
             elif signal.kind == "pressure":
                 if log.pressure is None:
                     continue

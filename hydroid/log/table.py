@@ -7,7 +7,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import KW_ONLY, field, replace
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,9 @@ from hydroid.arrays import Array, Index, Ints, record
 from hydroid.errors import LogError
 from hydroid.findings import Level
 from hydroid.log.log import LogFinding, log_finding
+
+if TYPE_CHECKING:
+    from hydroid.log.rods import Rod
 
 _DAY = 86_400 * 10**9  # [ns]
 _NO_TIME = np.iinfo(np.int64).min  # NaT of numpy
@@ -32,7 +35,8 @@ class Signal:
     `name` is that in the header, `kind` time, command, angle or pressure, `joint` a number from 1, or 0 for
     the time, `owner` the joint's name. `part` is 0, or 1 for the column of a command's negative direction and
     of the pressure in chamber B. `unit` is the one to be read: %, deg, mm of a joint that slides, or bar.
-    `rest` is the value of a command before its first message, in a format of messages.
+    `rest` is the value of a command before its first message, in a format of messages. `rod` is the cylinder
+    whose length the cells of an angle are.
     """
 
     name: str
@@ -46,6 +50,7 @@ class Signal:
     unit: str = ""
     owner: str = ""
     rest: float = 0.0
+    rod: "Rod | None" = None
 
     def __str__(self) -> str:
         return f"{self.kind} of joint {self.owner}" if self.joint else self.kind

@@ -137,12 +137,12 @@ def _read(
     free = dict.fromkeys(arm.joint_names, (-np.inf, np.inf))
     settings, logs = validate(section, LogSettings, table.source), list[Log]()
     for path in (Path(table.source), *others):
-        log, findings = check_log(path, settings, free)
+        log, findings = check_log(path, settings, free, arm=arm)
         if log is None:
             if strict:
                 raise findings[0].error()
             reasons.append(f"the log cannot be used as it is: {findings[0]}")
-            log, _ = check_log(path, settings, free, repair=True)
+            log, _ = check_log(path, settings, free, arm=arm, repair=True)
         if log is None and path == Path(table.source):
             return []  # what its joints do is not known
         logs += [log] if log else []

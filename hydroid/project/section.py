@@ -8,6 +8,7 @@ from hydroid.errors import LogError, SettingsError
 from hydroid.files import Plain
 from hydroid.log import ColumnGuess, Table, guess_columns
 from hydroid.log.guess import nearest_period
+from hydroid.log.rods import rods_of
 from hydroid.log.table import Signal
 from hydroid.project.columns import holds_numbers
 from hydroid.settings.arm import Arm
@@ -25,9 +26,13 @@ def guessed_section(table: Table, arm: Arm, order: Sequence[str]) -> ColumnGuess
             raise SettingsError(f"no joint {name!r}", "--joints", f"the arm's joints: {', '.join(names)}")
     places = [names.index(name) for name in order or names]
     slides = [k for k, place in enumerate(places, 1) if arm.joints[place].slides]
+    rods = rods_of(arm)
+    own_rods = {k: rods[place + 1] for k, place in enumerate(places, 1) if place + 1 in rods}
     links = [arm.link_names[place] for place in places]
     try:
-        section, reasons, unused = guess_columns(table, order or names, links=links, slides=slides)
+        section, reasons, unused = guess_columns(
+            table, order or names, links=links, slides=slides, rods=own_rods
+        )
     except LogError:
         if not holds_numbers(table):
             raise

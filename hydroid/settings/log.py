@@ -66,7 +66,8 @@ class Columns(Settings):
     positive angles, and chamber B of a pressure. Default: u{joint}_pct, q{joint}_deg, [pA{joint}_bar,
     pB{joint}_bar]"""
     unit: Literal["%", "deg", "rad", "m", "cm", "mm", "bar", "Pa", "MPa"] | None = None
-    """unit of the scaled cells, of the angle of a joint that slides m, cm or mm; default: %, deg, bar"""
+    """unit of the scaled cells: of the angle of a joint that slides m, cm or mm, which of a joint that turns
+    are the length of its cylinder from pin to pin; default: %, deg, bar"""
     scale: Annotated[Number | None, AfterValidator(_nonzero)] = None
     """factor on the cells; default: 1"""
     offset: Number | None = None

@@ -23,6 +23,8 @@ REVERSED = (
     "(compare arm.png), set scale: -1 at its angle and not at its command: gravity follows the angle"
 )
 
+LEFT_OUT = ("row left out", "cut end", "lost", "gap")
+"""kinds of findings that say which part of a log is not read"""
 MOVED = 0.5  # travel from which a joint moves [deg]
 
 
@@ -143,6 +145,7 @@ def _read(
                 raise findings[0].error()
             reasons.append(f"the log cannot be used as it is: {findings[0]}")
             log, _ = check_log(path, settings, free, arm=arm, repair=True)
+        reasons += [str(one) for one in findings if one.level == "warning" and one.kind in LEFT_OUT]
         if log is None and path == Path(table.source):
             return []  # what its joints do is not known
         logs += [log] if log else []

@@ -1,6 +1,6 @@
 """Checks of a recording and of the motion in it: what is wrong, where, and what to do."""
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from itertools import product
 from typing import Any
 
@@ -9,7 +9,7 @@ import numpy as np
 from hydroid.arrays import Array
 from hydroid.log.clues import CLUES, column_unit
 from hydroid.log.log import Log, LogFinding, log_finding
-from hydroid.log.motion import END, driven_joints, motion_of
+from hydroid.log.motion import END, LEAST_PATH, JointMotion, driven_joints, motion_of
 from hydroid.log.repair import GAP, SHORTEST, sample_period
 from hydroid.log.sensors import check_sensors
 from hydroid.log.signals import likely_range
@@ -21,6 +21,8 @@ from hydroid.units import UNITS, likely_time_unit, way
 SMALL = ("±1", "±10 V")
 """ranges of commands whose numbers are possible commands in %, too"""
 DEGREE = UNITS["deg"].factor
+UNASKED = 0.2
+"""part of its travel that a joint moves without a command, above which commands are missing"""
 FULL = 50.0  # [%], which most joints' commands reach where single ones of 10 are in another range
 
 
@@ -159,6 +161,7 @@ def check_motion(
             kind, part = ("straight", 1 - against) if joint in backward else ("turned", against)
             scale = f"{-command.gain:g}"
             yield warning(kind, command, path=way(path, slides=slides), part=part, scale=scale)
+        yield from _half_told(motion, command, warning, slides=slides)
         if span := motion.frozen:
             over = span[1] > log.duration - 1.5 * log.period
             when = f"from {span[0]:.4g} s on" if over else f"from {span[0]:.4g} to {span[1]:.4g} s"
@@ -167,6 +170,22 @@ def check_motion(
             yield warning("no motion", angle, most=way(motion.travel, slides=slides))
         if ahead := motion.ahead:
             yield warning("late", command, lag=ahead, delay=delay - ahead)
+
+
+def _half_told(
+    motion: JointMotion, command: Signal, warning: Callable[..., LogFinding], *, slides: bool
+) -> Iterator[LogFinding]:
+    """Yield what the log does not tell of a joint's commands: one direction, or any valve's opening."""
+    given = motion.log.command[:, motion.joint - 1]
+    by_degrees = max(motion.unasked)
+    if by_degrees > max(LEAST_PATH, UNASKED * motion.travel):
+        upwards = motion.unasked[0] > motion.unasked[1]
+        one_way = (given >= 0).all() or (given <= 0).all()
+        kind = "half a command" if one_way else "unasked"
+        by = way(by_degrees, slides=slides)
+        yield warning(kind, command, by=by, path="positive" if upwards else "negative")
+    if motion.is_target:
+        yield warning("target", command)
 
 
 def motion_findings(logs: Sequence[Log], arm: Arm) -> Iterator[LogFinding]:

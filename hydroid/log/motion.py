@@ -12,6 +12,10 @@ LEAST_PATH = 3.0  # [deg] that tell a direction
 AGAINST = 0.75  # of the path goes against the command: it is logged the other way around
 END = 0.02  # part of a joint's travel that counts as its end
 MOVING = 0.2  # part of a joint's speed above which it moves
+UNASKED_AFTER = 1.5
+"""how long after a command a joint may still move by it [s]"""
+TARGET, VALVE, TARGET_WITHIN = 0.98, 0.7, 1.0
+"""least correlation of a target with the angle, largest one with its speed, and by how much it leads [s]"""
 LEAST_PUSH, LEAST_FROZEN = 20.0, 0.75
 """command [%], and how long it must last [s], that would move a joint whose angle does not change"""
 
@@ -131,6 +135,33 @@ class JointMotion:
         if at_end or len(pushes) * period < LEAST_FROZEN or end - begin < 3 * other:
             return None
         return begin * period, end * period
+
+    @cached_property
+    def unasked(self) -> tuple[float, float]:
+        """Its way upwards and downwards while no command has been given for a while [deg].
+
+        Only what is as quick as a valve moves it: an arm that leaks sinks slowly.
+        """
+        period = self.log.period
+        given = np.flatnonzero(self._logged)
+        if not len(given):
+            return 0.0, 0.0
+        samples = np.arange(len(self._logged))
+        last = given[np.searchsorted(given, samples, side="right") - 1]
+        idle = (samples < given[0]) | (samples - last > UNASKED_AFTER / period)
+        speed = self._slow[2]
+        moves = np.flatnonzero(idle & (np.abs(speed) > MOVING * self.speed))
+        steps = np.rad2deg(speed[moves]) * period
+        return float(steps.clip(0).sum()), float(-steps.clip(None, 0).sum())
+
+    @cached_property
+    def is_target(self) -> bool:
+        """Whether its command is where it shall be, which its angle follows, and no opening of a valve."""
+        if self.log.duration < 5 or not np.ptp(self._logged) or self.travel < LEAST_PATH:
+            return False
+        lags = min(round(TARGET_WITHIN / self.log.period), len(self._logged) // 2)
+        follows = _correlations(self._logged, self._slow[1], lags)
+        return follows.max(initial=0.0) > TARGET and self._following.max(initial=0.0) < VALVE
 
     @property
     def _logged(self) -> Array:

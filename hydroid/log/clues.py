@@ -26,6 +26,8 @@ def kind_of(name: str, unit: Unit | None) -> str:
     there = words(name)
     if {*there} & {*CLUES["derived"]}:
         return "other"
+    if {*there} & {*CLUES["targets"]} and unit and unit.quantity in ("angle", "length"):
+        return "target"
     if unit:
         return CLUES["units"].get(unit.quantity, "other")
     if {*there} & {"cmd", "command", "commands", "joystick", "joy"}:

@@ -25,6 +25,8 @@ from hydroid.words import listed
 PERIODS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2)  # [s], of which a guess takes the nearest
 
 LENGTHS = ("m", "cm", "mm")
+NO_RODS: Mapping[int, Rod] = {}
+NO_RANGES: Mapping[int, tuple[float, float]] = {}
 LARGEST_ANGLE = np.radians(400.0)
 """of an arm's joint [rad]; larger numbers are lengths or counts"""
 
@@ -57,14 +59,15 @@ def guess_columns(
     *,
     links: Sequence[str] = (),
     slides: Sequence[int] = (),
-    rods: Mapping[int, Rod] | None = None,
+    rods: Mapping[int, Rod] = NO_RODS,
+    ranges: Mapping[int, tuple[float, float]] = NO_RANGES,
 ) -> ColumnGuess:
     """Guess which columns are time, commands and angles, of which joints, in which units.
 
     Columns may have the names of the links that the joints move instead; positions of joints (from 1) that
-    slide are in m. Lengths of the cylinders of joints, `rods`, stand for their angles.
+    slide are in m. Lengths of the cylinders of joints, `rods`, stand for their angles. Counts of an encoder
+    or a converter are taken for the `ranges` of the joints [rad].
     """
-    rods = rods or {}
     columns = [*_columns(table, (*joints, *links))]
     time = max((c for c in columns if c.kind == "time"), key=lambda c: _rises(c.values), default=None)
     if time is None:
@@ -89,18 +92,17 @@ def guess_columns(
             entry["command"], said = _command(table, pair)
             reasons.append(f"{said} of {of}, {why}")
         if joint in angles:
-            ((column,), why), what, usual = angles[joint], "angle", default
-            if joint in slides:  # no telescope is 50 m long
-                what, usual = "position", "mm" if np.nanmax(np.abs(column.values)) > 50 else "m"
-            length = _length(column, rods.get(joint), default)
-            entry["angle"] = {"column": column.name, "unit": column.unit or usual}
-            if length:
-                what, (usual, offset) = "length of the cylinder", length
-                entry["angle"] = {"column": column.name, "unit": usual} | (
-                    {"offset": offset} if offset else {}
-                )
-                what += f", which is {offset:.6g} {usual} with the rod in," if offset else ""
-            reasons.append(f"{column.name}: {what} in {entry['angle']['unit']} of {of}, {why}")
+            (column,), why = angles[joint]
+            slide = joint in slides
+            entry["angle"], said = _angle(
+                column, default, slides=slide, rod=rods.get(joint), limits=ranges.get(joint)
+            )
+            reasons.append(f"{said} of {of}, {why}")
+    for column in columns:
+        if column.kind == "target":
+            reasons.append(
+                f"{column.name}: a target of a position, no valve's opening; a controller lies between"
+            )
     used = {time.name} | {c.name for pairs in (commands, angles) for pair, _ in pairs.values() for c in pair}
     log: Plain = {
         "time": {"column": time.name, "unit": unit},
@@ -112,6 +114,44 @@ def guess_columns(
     unused = tuple(name for name in table.names if name and name not in used)
     reasons += [f"not used: {listed(unused)}"] if unused else []
     return ColumnGuess(log, tuple(reasons), unused)
+
+
+def _angle(
+    column: _Column,
+    usual: str,
+    *,
+    slides: bool,
+    rod: Rod | None,
+    limits: tuple[float, float] | None,
+) -> tuple[Plain, str]:
+    """Return the settings of the column of a joint's angle, and what it is taken for."""
+    known = column.values[np.isfinite(column.values)]
+    low, high = float(known.min()), float(known.max())
+    largest = max(abs(low), abs(high))
+    if slides:  # no telescope is 50 m long
+        unit = column.unit or ("mm" if largest > 50 else "m")
+        return {"column": column.name, "unit": unit}, f"{column.name}: position in {unit}"
+    if length := _length(column, rod, usual):
+        unit, offset = length
+        entry: Plain = {"column": column.name, "unit": unit}
+        if not offset:
+            return entry, f"{column.name}: length of the cylinder in {unit}"
+        with_it_in = f"whose cylinder is {offset:.6g} {unit} long with it in,"
+        said = f"{column.name}: travel of the rod in {unit}, {with_it_in}"
+        return entry | {"offset": offset}, said
+    unit = column.unit or usual
+    if column.unit or largest * UNITS[unit].factor <= LARGEST_ANGLE or not limits or high == low:
+        return {"column": column.name, "unit": unit}, f"{column.name}: angle in {unit}"
+    least, most = np.degrees(limits)
+    scale = float(f"{(most - least) / (high - low):.6g}")
+    entry = {
+        "column": column.name,
+        "unit": "deg",
+        "scale": scale,
+        "offset": float(f"{least - scale * low:.6g}"),
+    }
+    what = f"counts from {low:g} to {high:g}, taken for the whole range of {least:.4g} to {most:.4g} deg"
+    return entry, f"{column.name}: {what}: correct scale and offset where the log does not reach both ends,"
 
 
 def _angles_first(columns: Sequence[_Column], kind: str) -> list[_Column]:
@@ -167,7 +207,9 @@ def _columns(table: Table, names: Sequence[str]) -> Iterator[_Column]:
 
 def _rises(values: Array) -> bool:
     steps = np.diff(values[np.isfinite(values)])
-    return bool(len(steps) and (steps > 0).all() and np.median(steps) > 0.5 * steps.mean())
+    if not len(steps):
+        return False
+    return bool(np.mean(steps > 0) > 0.99 and np.median(steps) > 0.5 * steps.mean())
 
 
 def _by_joint(

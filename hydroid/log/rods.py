@@ -44,15 +44,20 @@ class Rod:
 
         `unit`: the one that the file states; empty: none. None: they are neither.
         """
-        (shortest, longest), known = self.ends, cells[np.isfinite(cells)]
+        shortest, longest = self.ends
+        known = cells[np.isfinite(cells)]
+        fitting = list[tuple[float, str, float]]()
         for name in [unit] if unit else ["mm", "cm", "m"]:
             factor = UNITS[name].factor
             low, high = factor * known.min(), factor * known.max()
             for offset in (0.0, shortest):
                 inside = low + offset >= shortest - self.margin and high + offset <= longest + self.margin
-                if inside and high - low > 0.1 * self.margin:
-                    return name, float(f"{offset / factor:.9g}")
-        return None
+                if inside:
+                    fitting.append((high - low, name, offset / factor))
+        if not fitting:
+            return None
+        _, name, offset = max(fitting, key=lambda one: one[0])  # in which the rod moves farthest
+        return name, float(f"{offset:.9g}")
 
     def angle(self, length: Array) -> Array:
         """Return the joint's angle [rad] at lengths [m], (R,); those outside count as the nearest end.

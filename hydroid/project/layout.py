@@ -10,6 +10,7 @@ from hydroid.arrays import record
 from hydroid.errors import LogError
 from hydroid.files import Plain
 from hydroid.log import ColumnGuess, JointMotion, Log, Table, check_log, motion_of
+from hydroid.log.clues import column_unit, kind_of
 from hydroid.log.read import angle_margin
 from hydroid.project.columns import column_lines
 from hydroid.project.section import given_section, guessed_section, missing_column
@@ -23,8 +24,8 @@ REVERSED = (
     "(compare arm.png), set scale: -1 at its angle and not at its command: gravity follows the angle"
 )
 
-LEFT_OUT = ("row left out", "cut end", "lost", "gap")
-"""kinds of findings that say which part of a log is not read"""
+SAID = ("row left out", "cut end", "lost", "gap", "half a command", "unasked", "target")
+"""kinds of findings that say which part of a log is not read, or not told by it"""
 MOVED = 0.5  # travel from which a joint moves [deg]
 
 
@@ -77,7 +78,7 @@ def find_layout(
         ColumnGuess(given_section(table, arm, given), (), ()) if given else guessed_section(table, arm, order)
     )
     section, reasons = guess.log, [*guess.reasons]
-    if missing := missing_column(section):
+    if missing := missing_column(section, targets=_has_targets(table)):
         if given is not None:
             raise LogError(
                 missing.replace("looks like", "is given as"), table.source, "correct the log section"
@@ -105,6 +106,12 @@ def find_layout(
     followed = any(m.travel > 1 for joint, m in motions.items() if joint not in driven)  # [deg]
     made = Layout(section, tuple(driven), tuple(reasons), guess.unused, motions, followed)
     return made if given is None else replace(made, origin="As you gave them, compared with the log.")
+
+
+def _has_targets(table: Table) -> bool:
+    """Return whether a column seems to hold the position that a controller is to reach."""
+    units = {name: column_unit(name, table.units.get(name, "")) for name in table.names if name}
+    return any(kind_of(name, unit) == "target" for name, unit in units.items())
 
 
 def _skeleton(table: Table, arm: Arm, guess: ColumnGuess, missing: str) -> Layout:
@@ -145,7 +152,7 @@ def _read(
                 raise findings[0].error()
             reasons.append(f"the log cannot be used as it is: {findings[0]}")
             log, _ = check_log(path, settings, free, arm=arm, repair=True)
-        reasons += [str(one) for one in findings if one.level == "warning" and one.kind in LEFT_OUT]
+        reasons += [str(one) for one in findings if one.level == "warning" and one.kind in SAID]
         if log is None and path == Path(table.source):
             return []  # what its joints do is not known
         logs += [log] if log else []

@@ -28,10 +28,12 @@ def guessed_section(table: Table, arm: Arm, order: Sequence[str]) -> ColumnGuess
     slides = [k for k, place in enumerate(places, 1) if arm.joints[place].slides]
     rods = rods_of(arm)
     own_rods = {k: rods[place + 1] for k, place in enumerate(places, 1) if place + 1 in rods}
+    limited = {k: arm.joints[place] for k, place in enumerate(places, 1) if not arm.joints[place].continuous}
+    ranges = {k: joint.limits for k, joint in limited.items()}
     links = [arm.link_names[place] for place in places]
     try:
         section, reasons, unused = guess_columns(
-            table, order or names, links=links, slides=slides, rods=own_rods
+            table, order or names, links=links, slides=slides, rods=own_rods, ranges=ranges
         )
     except LogError:
         if not holds_numbers(table):
@@ -79,13 +81,16 @@ def _entry(columns: ColumnMap) -> Plain:
     return entry | {key: value for key, (value, usual) in numbers.items() if value != usual}
 
 
-def missing_column(section: Plain) -> str:
-    """Say what no column looks like; empty: there is all that a fit needs."""
+def missing_column(section: Plain, *, targets: bool) -> str:
+    """Say what no column looks like; empty: there is all that a fit needs. `targets`: there are such."""
     if "time" not in section:
         return "no column looks like a time"
     entries = section["joints"].values()
     for kind in "angle", "command":
         if not any(entry[kind] for entry in entries):
-            return f"no column looks like {'an' if kind == 'angle' else 'a'} {kind}"
+            what = f"no column looks like {'an' if kind == 'angle' else 'a'} {kind}"
+            if targets and kind == "command":
+                what += ", only like targets of positions: hydroid fits valves"
+            return what
     both = any(entry["angle"] and entry["command"] for entry in entries)
     return "" if both else "no joint has both a command and an angle"

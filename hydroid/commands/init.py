@@ -21,6 +21,7 @@ def init(
     log: "Source | Sequence[Source] | None" = None,
     config: "Source | None" = None,
     joints: str | list[str] | None = None,
+    lengths: str | list[str] | None = None,
     tip: str | None = None,
     total_mass: float | None = None,
     force: bool = False,
@@ -47,6 +48,8 @@ def init(
             taken in place of guesses, its arm stays, and the other settings are written anew.
         joints (NAME,NAME): Names of the arm's joints in the order of the log's numbers (u1, u2, ...)
             [default: the order in the arm's file].
+        lengths (M,M): Lengths of the links that these joints move [m], in place of --arm: an arm of boxes, as
+            in --joints swing,boom,arm,bucket --lengths 0,3.7,1.6,0.9; 0 for a joint that slews.
         total_mass (KG): Mass of all links that move [kg], to which those of the arm's file are scaled.
         force: Replace the files of an earlier project in the folder.
         tip (LINK): Last link of the arm, if the robot has several branches [default: the end of the branch
@@ -65,10 +68,12 @@ def init(
     from hydroid.project.project import go_on, write_project
 
     if configs:
-        if robots or joints or tip or total_mass is not None:
-            hint = "leave --arm, --joints, --tip and --total-mass out"
+        if robots or joints or lengths or tip or total_mass is not None:
+            hint = "leave --arm, --joints, --lengths, --tip and --total-mass out"
             raise SettingsError("names its arm, which stays as it is", configs[0], hint)
         project = go_on(Path(folder) if folder else None, configs[0], logs, force=force)
+    elif robots and lengths:
+        raise SettingsError("are those of the arm's file", "--lengths", "leave it out, or --arm")
     elif folder is None:
         raise SettingsError("which folder shall the project have?", hint="hydroid init DIR")
     else:
@@ -80,6 +85,7 @@ def init(
             tip=tip,
             total_mass=total_mass,
             force=force,
+            lengths=_numbers(names(lengths)),
         )
     lines = [f"{project.folder}: {', '.join(project.files)}"]
     guessed = "The log's columns, guessed. Check them, and correct them in fit.yaml:"
@@ -99,3 +105,12 @@ def init(
         key: [*getattr(project, key)] for key in keys
     }
     return Result(lines, content, project, exit_status=2 if project.missing else 0)
+
+
+def _numbers(texts: Sequence[str]) -> tuple[float, ...]:
+    """Return the numbers in texts."""
+    try:
+        return tuple(map(float, texts))
+    except ValueError:
+        what = f"{','.join(texts)!r} holds something else than numbers"
+        raise SettingsError(what, "--lengths", "such as 0,3.7,1.6,0.9") from None

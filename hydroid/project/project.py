@@ -5,6 +5,7 @@ import shlex
 import tempfile
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +13,9 @@ from hydroid.arrays import record
 from hydroid.cad.importer import ImportedArm, import_arm
 from hydroid.cad.meshes import MESHES
 from hydroid.errors import HydroidError, SettingsError
-from hydroid.files import fill_template, undisturbed, write_atomic, writing
+from hydroid.files import Plain, fill_template, undisturbed, write_atomic, writing
 from hydroid.log import open_table
+from hydroid.project.boxes import boxes_urdf
 from hydroid.project.layout import Layout, find_layout
 from hydroid.project.texts import JointSize, arm_text, fit_text, joint_sizes
 from hydroid.reporting.figure import arm_picture
@@ -51,12 +53,15 @@ def write_project(
 ) -> Project:
     """Write a project to a folder, new or with other things in it (`hydroid.init` says what is given)."""
     _refuse_replacing(folder, FILES, force=options.pop("force", False))
+    boxes = boxes_urdf(joints, lengths) if (lengths := options.pop("lengths", ())) else ""
     table = open_table(logs[0]) if logs else None
     imported, reference, own = None, ARM, None
     if robot is not None and robot.suffix.lower() in (".yaml", ".yml"):
         own, reference = robot, _seen_from(folder, robot)
     elif robot is not None:
         imported = import_arm(robot, table.names if table else (), **options)
+    elif boxes:
+        imported = _arm_of_boxes(boxes, options)
     with _stage(folder) as stage, _of_the_project(stage, folder, robot):
         arm = load_arm(own) if own else _write_arm(stage, imported)
         layout = find_layout(table, arm, joints, others=_fitted(logs)[1:])
@@ -72,6 +77,18 @@ def write_project(
         text = fit_text(arm, layout, sizes, str(folder / FIT), reference, steps[0])
         _write_settings(stage, arm, text)
         return _finished(stage, folder, arm.name, layout, notes, steps)
+
+
+def _arm_of_boxes(urdf: str, options: Plain) -> ImportedArm:
+    """Import an arm of boxes as if a person had drawn it."""
+    with tempfile.TemporaryDirectory() as name:
+        path = Path(name) / "boxes.urdf"
+        write_atomic(path, urdf)
+        imported = import_arm(path, **options)
+    guessed = (
+        "the arm is made of boxes of these lengths: its masses and ranges are guesses; mend them in arm.xml"
+    )
+    return replace(imported, notes=(guessed, *imported.notes))
 
 
 def go_on(folder: Path | None, config: Path, logs: Sequence[Path], *, force: bool) -> Project:

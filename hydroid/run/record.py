@@ -139,7 +139,8 @@ def validation_name(log: Log) -> str:
     Of a log that is no file the digest is that of its samples. A part of a file has its number in both.
     """
     file = log_file(log.source)
-    there, number = file.exists(), Path(log.source).name[len(file.name) :]
+    there = os.path.exists(file)  # a name may be longer than Path allows
+    number = Path(log.source).name[len(file.name) :]
     place = Path(os.path.realpath(file) + number) if there else Path(log.source)
     key = os.fsencode(place) if there else samples(log)
     name = re.sub(r"[^\w.-]+", "_", place.name).strip(".")[:LONGEST_NAME]

@@ -73,11 +73,22 @@ class Machine:
 
     def simulate(self, command: Array, start: Array) -> Array:
         """Angles [rad], (T, J), under commands of STEP [s] and %, (T, J)."""
+        return self.go_on(command, self.at_rest(start), 0)
+
+    def at_rest(self, start: Array) -> Array:
+        """What a machine carries from step to step, at rest at angles [rad], (J,): shape (4, J)."""
+        carry = np.zeros((4, self.joints))
+        carry[0] = start
+        return carry
+
+    def go_on(self, command: Array, carry: Array, first: int) -> Array:
+        """Angles [rad] from step `first` on, under commands from the start on, (T, J); changes `carry`."""
         sided = (*self.ends.T, *self.full.T, *self.dead.T, *self.exponent.T, *self.draw.T)
         single = (self.length, self.mass, self.lag, self.early, self.load, self.friction, self.lever)
         numbers = np.array([*single, self.stiff, self.ratio, *sided], float)
         late = np.round(self.delay / STEP).astype(np.int64)
-        return integrate(np.ascontiguousarray(command), start, late, self.vertical, numbers, self.droop)
+        how = late, self.vertical, numbers, self.droop
+        return integrate(np.ascontiguousarray(command), carry, first, *how)
 
 
 @njit(cache=True)
@@ -111,16 +122,21 @@ def part_of_speed(supply: float, part: float, lift: float, friction: float, turn
 
 
 @njit(cache=True)
-def integrate(command: Array, start: Array, late: Any, vertical: Any, numbers: Array, droop: float) -> Array:
-    """Angles [rad], (T, J), under commands of STEP [s] and %, (T, J); `numbers` as in `Machine.simulate`."""
+def integrate(
+    command: Array, carry: Array, first: int, late: Any, vertical: Any, numbers: Array, droop: float
+) -> Array:
+    """Angles [rad] from step `first` on, under commands of STEP [s] and %, (T, J).
+
+    `carry` has angle, held signal, speed and force, (4, J); `numbers` as in `Machine.go_on`.
+    """
     steps, joints = command.shape
     length, mass, lag, early, load, friction, lever, stiff, ratio, lower, upper = numbers[:11]
     full, dead, exponent, draw = numbers[11:13], numbers[13:15], numbers[15:17], numbers[17:19]
-    angle, found = start.copy(), np.empty((steps, joints))
-    held, speed, force = np.zeros(joints), np.zeros(joints), np.zeros(joints)
+    angle, held, speed, force = carry[0], carry[1], carry[2], carry[3]
+    found = np.empty((steps - first, joints))
     part, turn, lift = np.zeros(joints), np.zeros(joints), np.zeros(joints)
-    for k in range(steps):
-        found[k] = angle
+    for k in range(first, steps):
+        found[k - first] = angle
         torque = gravity_torque(angle, vertical, length, mass)
         for j in range(joints):
             u = command[k - late[j], j] if k >= late[j] else 0.0

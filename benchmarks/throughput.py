@@ -3,8 +3,11 @@
 A population (70 candidates, 7,500 steps, objectives included) against `mujoco.batch.Batch.rollout` alone
 on the same model and candidates, set up beforehand; `locked` against `passive`; both stages; how fast a plant
 steps, as a multiple of real time; and the excavator's derivatives in both models of stage 2.
+
+--together: only how fast many plants, and environments of gymnasium, step in one call.
 """
 
+import sys
 import time
 from collections.abc import Callable
 from functools import partial
@@ -18,10 +21,13 @@ from mujoco.batch import Batch
 from hydroid import load_settings, read_logs
 from hydroid.arm.locked import lock
 from hydroid.arm.model import load_model
-from hydroid.plant import load_plant
+from hydroid.plant import Plant, PlantBatch, load_plant
 from hydroid.problem.problem import Problem
+from hydroid.use.environment import VectorEnv
 
 CANDIDATES, REPEATS = 70, 9
+MACHINES = 64
+"""plants, and environments, in one call"""
 ALL = list(range(1, 8))
 
 
@@ -100,7 +106,40 @@ def plant_steps(joints: list[int], steps: int = 2000) -> tuple[float, float]:
     return min(in_turn({"plant": run})["plant"]) / steps, plant.period
 
 
+def together(model: str) -> tuple[float, float]:
+    """Return the steps per second of 64 plants in one call, and those of 64 environments (use.environment).
+
+    Two threads; an action is held for five steps, which count as one of an environment.
+    """
+    plant = load_plant(
+        "article-hyd", overrides={"start_pose": "study", "simulation.model": model}, joints=[2]
+    )
+    batch = PlantBatch([Plant(plant.identified, joints=[2]) for _ in range(MACHINES)], threads=2)
+    envs = VectorEnv(plant.identified, MACHINES, draws=False, threads=2)
+    envs.reset(seed=0)
+    rng = np.random.default_rng(0)
+    commands = 30.0 * rng.uniform(-1.0, 1.0, (50, MACHINES, 1)) * np.isin(ALL, [2])
+    actions = rng.uniform(-0.3, 0.3, (50, MACHINES, len(envs.joints))).astype(np.float32)
+
+    def step() -> None:
+        for command in commands:
+            batch.step(command)
+
+    def act() -> None:
+        for action in actions:
+            envs.step(action)
+
+    took = in_turn({"batch": step, "envs": act})
+    return MACHINES * 50 / min(took["batch"]), MACHINES * 50 / min(took["envs"])
+
+
 if __name__ == "__main__":
+    if "--together" in sys.argv[1:]:
+        table("model | steps/s of 64 plants in a call | steps/s of 64 environments")
+        for name in ("quasi-static", "dynamic"):
+            plants, envs = together(name)
+            row(f"{name} | {plants:.0f} | {envs:.0f}")
+        raise SystemExit
     problems = {name: make_problem("article-mech", [2], name) for name in ("passive", "locked")}
     calls = {f"{name}, bare": bare_rollout(problem) for name, problem in problems.items()}
     problems |= {f"hydraulics of {len(j)}": make_problem("article-hyd", j, "passive") for j in ([2], ALL)}

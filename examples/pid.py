@@ -1,36 +1,91 @@
-"""A PID controller on a joint: `python examples/pid.py [RUN]` steps a fitted arm, or the shipped one."""
+"""Feed-forward with a PID controller beside it: `python examples/pid.py [RUN]`, of a fit or the shipped arm.
+
+The first joint that takes commands goes along a smooth path. The controller asks for speeds: that of the
+path, which comes earlier by what the joint is late, and more where the angle errs. `Plant.commands` turns
+them into commands. Its gains are tuned on the plant, and tried on machines that the logs do not rule out.
+"""
 
 import sys
 
 import numpy as np
 
-from hydroid.plant import load_plant
+import hydroid
+from hydroid.plant import Plant, load_plant
+from hydroid.use.follow import joint_lags
 
-KP, KI, KD = 800.0, 400.0, 20.0  # [% per travel], [% per travel and second], [% second per travel]
 START, TARGET = 0.5, 0.75  # of the joint's travel
+SECONDS, FASTEST = 10.0, 0.6  # of the run; part of its top speed that the path asks for
+GAINS = (0.1, 0.2, 0.4, 0.8)  # speed per error, times what the joint is late
+DRAWS = 5
 
-plant = load_plant(sys.argv[1] if len(sys.argv) > 1 else "article-hyd")
-arm = plant.identified.settings.arm
-joint = plant.joints[0] - 1  # the first that takes commands
-low, high = np.clip([arm.lower[joint], arm.upper[joint]], -np.pi, np.pi)  # it may turn without end
-pose, target = plant.reset(), low + TARGET * (high - low)
-pose[joint] = low + START * (high - low)
 
-# a positive command lowers the angle of some joints
-angle = plant.reset(pose)
-while plant.time < 1.0:
-    angle = plant.step({plant.names[joint]: 100.0})
-sense = 1.0 if angle[joint] > pose[joint] else -1.0
+class Path:
+    """The way of one joint from `start` to `end`, with a peak of its speed at most."""
 
-angle = plant.reset(pose)
-integral, before = 0.0, (target - angle[joint]) / (high - low)
-while plant.time < 10.0:
-    error = (target - angle[joint]) / (high - low)
-    integral += error * plant.period if abs(error) < 0.02 else 0.0
-    command = KP * error + KI * integral + KD * (error - before) / plant.period
-    before = error
-    angle = plant.step({plant.names[joint]: sense * command})
+    def __init__(self, start: float, end: float, peak: float) -> None:
+        self.start, self.way = start, end - start
+        self.seconds = max(1.875 * abs(self.way) / peak, 1.0)
 
-unit, factor = ("mm", 1e3) if arm.joints[joint].slides else ("deg", np.degrees(1.0))
-reached, wanted = factor * angle[joint], factor * target
-print(f"{plant.names[joint]} after {plant.time:.0f} s: {reached:.2f} {unit} of {wanted:.2f}")
+    def angle(self, time: float) -> float:
+        """Return where it should be."""
+        part = float(np.clip(time / self.seconds, 0.0, 1.0))
+        return self.start + self.way * part**3 * (10.0 - 15.0 * part + 6.0 * part**2)
+
+    def speed(self, time: float) -> float:
+        """Return how fast it should move."""
+        part = float(np.clip(time / self.seconds, 0.0, 1.0))
+        return self.way / self.seconds * 30.0 * (part * (1.0 - part)) ** 2
+
+
+def follow(machine: Plant, model: Plant, path: Path, gain: float) -> tuple[float, float]:
+    """Return the rms error along a path, and the angle at its end; gain [1/s]."""
+    joint = model.joints[0] - 1
+    late = float(joint_lags(model)[joint])
+    pose = model.angle
+    pose[joint] = path.start
+    angle = machine.reset(pose)
+    integral, before, errors = 0.0, 0.0, list[float]()
+    while machine.time < SECONDS - 1e-9:
+        error = path.angle(machine.time) - angle[joint]
+        integral += error * machine.period
+        change = (error - before) / machine.period
+        before = error
+        wished = path.speed(machine.time + late) + gain * (
+            error + 0.2 * gain * integral + 0.1 * late * change
+        )
+        found = model.commands({model.names[joint]: wished}, at=angle)
+        angle = machine.step(found.command)
+        errors.append(error)
+    return float(np.sqrt(np.mean(np.square(errors)))), float(angle[joint])
+
+
+def main(source: str) -> None:
+    """Tune on the plant, and try on draws."""
+    model, machine = load_plant(source), load_plant(source)
+    arm, joint = model.identified.settings.arm, model.joints[0] - 1
+    name = model.names[joint]
+    low, high = np.clip([arm.lower[joint], arm.upper[joint]], -np.pi, np.pi)  # it may turn without end
+    pose = model.angle
+    pose[joint] = low + START * (high - low)
+    top = model.commands({name: 1e3}, at=pose).speed[joint]
+    path = Path(pose[joint], low + TARGET * (high - low), FASTEST * top)
+    late = max(float(joint_lags(model)[joint]), model.period)
+    ended = {gain / late: follow(machine, model, path, gain / late) for gain in GAINS}
+    gain = min(ended, key=lambda one: ended[one][0])
+    unit, factor = ("mm", 1e3) if arm.joints[joint].slides else ("deg", float(np.degrees(1.0)))
+    wanted = factor * path.angle(SECONDS)
+    print(f"{name} after {SECONDS:.0f} s: {factor * ended[gain][1]:.2f} {unit} of {wanted:.2f}")
+    print(f"gain {gain:.2g} 1/s, rms error {factor * ended[gain][0]:.3f} {unit}")
+    try:
+        plants = [*hydroid.draw(source, DRAWS).plants()]
+    except hydroid.HydroidError:
+        return  # no fit: there is nothing to draw from
+    for some in (gain, 2.0 * gain):
+        errors = [factor * follow(plant, model, path, some)[0] for plant in plants]
+        print(
+            f"gain {some:.2g} 1/s on {DRAWS} draws: rms errors {min(errors):.3f} to {max(errors):.3f} {unit}"
+        )
+
+
+if __name__ == "__main__":
+    main(sys.argv[1] if len(sys.argv) > 1 else "article-hyd")

@@ -23,7 +23,9 @@ if TYPE_CHECKING:
         quantity as quantity,
     )
     from hydroid.commands.check import check as check, convert as convert
+    from hydroid.commands.export import draw as draw, export as export
     from hydroid.commands.fit import FitResult as FitResult, fit as fit
+    from hydroid.commands.follow import follow as follow
     from hydroid.commands.init import init as init
     from hydroid.commands.inputs import load_settings as load_settings
     from hydroid.commands.logs import read_logs as read_logs
@@ -41,7 +43,9 @@ if TYPE_CHECKING:
     )
     from hydroid.log import Log as Log, write_log as write_log
     from hydroid.parallel.cluster import open_workers as open_workers
-    from hydroid.plant import Plant as Plant, load_plant as load_plant
+    from hydroid.plant import Plant as Plant, PlantBatch as PlantBatch, load_plant as load_plant
+    from hydroid.use.draws import Draws as Draws
+    from hydroid.use.environment import Env as Env, VectorEnv as VectorEnv
 
 __version__ = "0.1.0"
 

@@ -9,8 +9,8 @@ import shlex
 import shutil
 import subprocess
 import sys
-import warnings
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -22,15 +22,6 @@ from hydroid.commands.app import app
 from hydroid.viewer import PLATFORMS, renders
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
-
-
-@pytest.fixture
-def gym_env(monkeypatch: pytest.MonkeyPatch):
-    pytest.importorskip("gymnasium")
-    monkeypatch.syspath_prepend(str(EXAMPLES))
-    import gym_env  # pyright: ignore[reportMissingImports]
-
-    return gym_env
 
 
 SHORT = ["--set", "search.multistart={starts: 1, horizons: [], iterations: 1}", "--no-refinement"]
@@ -58,30 +49,67 @@ def example(name: str, *words: object) -> str:
     ("name", "joint", "target"), [("shipped", "shoulder", 60.0), ("boom", "boom", 41.25)]
 )
 def test_the_controller_brings_a_joint_of_any_run_to_its_target(name, joint, target, runs):
-    found = re.fullmatch(
-        rf"{joint} after 10 s: ([\d.]+) deg of {target:.2f}\n", example("pid.py", runs[name])
+    printed = example("pid.py", runs[name])
+    found = re.match(
+        rf"{joint} after 10 s: ([\d.]+) deg of {target:.2f}\ngain .* rms error ([\d.]+) deg", printed
     )
-    assert found
+    assert found, printed
     assert float(found[1]) == pytest.approx(target, abs=0.5)
+    assert float(found[2]) < 1.0  # along the whole path
+    assert ("on 5 draws" in printed) == (name == "boom")
 
 
 @pytest.mark.parametrize(("name", "joint"), [("shipped", "shoulder"), ("boom", "boom")])
 def test_the_policy_of_the_environment_works_on_any_run(name, joint, runs):
     pytest.importorskip("gymnasium")
-    found = re.fullmatch(
-        rf"error of {joint} after 5 s \[deg\]: \[(.*)\]\n", example("gym_env.py", runs[name])
-    )
-    assert found
-    assert max(map(float, found[1].split(","))) < 2.0
+    printed = example("gym_env.py", runs[name])
+    found = re.fullmatch(rf"error of {joint} after 5 s \[half ranges\]: \[(.*)\]\n", printed)
+    assert found, printed
+    errors = [float(one) for one in found[1].split(",")]
+    assert errors[0] < 0.1  # the fit's own estimate; draws of a short fit may be too weak
+    assert np.median(errors) < 0.1
 
 
-@pytest.mark.parametrize("name", ["shipped", "boom"])
-def test_the_environment_passes_gymnasiums_own_check(gym_env, name, runs):
-    from gymnasium.utils.env_checker import check_env
+class Topics:
+    """A stub of rclpy's node: it keeps what is made and published."""
 
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        check_env(gym_env.JointEnv(str(runs[name])), skip_render_check=True)
+    def __init__(self) -> None:
+        self.published, self.calls, self.warnings = [], {}, []
+
+    def create_publisher(self, _, topic, __):
+        return SimpleNamespace(publish=lambda state: self.published.append((topic, state)))
+
+    def create_subscription(self, _, topic, call, __):
+        self.calls[topic] = call
+
+    def create_timer(self, period, call):
+        self.calls["timer"], self.period = call, period
+
+    def get_logger(self):
+        return SimpleNamespace(warning=self.warnings.append)
+
+    def get_clock(self):
+        return SimpleNamespace(now=lambda: SimpleNamespace(to_msg=lambda: "now"))
+
+
+def test_the_ros_node_is_the_plant_between_two_topics(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    import ros2_node  # pyright: ignore[reportMissingImports]
+
+    topics, plants = Topics(), [hydroid.load_plant("article-hyd") for _ in range(2)]
+    ros2_node.ArmNode(topics, lambda: SimpleNamespace(header=SimpleNamespace()), plants[0])
+    assert topics.period == plants[0].period
+    for value in (50.0, -30.0):
+        topics.calls["command"](SimpleNamespace(name=["shoulder", "bucket"], effort=[value, 1.0]))
+        for _ in range(5):
+            topics.calls["timer"]()
+            expected = plants[1].step({"shoulder": value})
+            topic, state = topics.published[-1]
+            assert (topic, state.header.stamp) == ("joint_states", "now")
+            assert state.name == [*plants[1].names]
+            np.testing.assert_array_equal(state.position, expected)
+    assert len(topics.warnings) == 2
+    assert "bucket takes no command" in topics.warnings[0]
 
 
 def test_a_run_is_drawn_without_a_display_or_a_setting(runs, tmp_path: Path):

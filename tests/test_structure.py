@@ -24,6 +24,7 @@ LAYERS = [
     {"fitting"},
     {"advice"},
     {"run"},
+    {"use"},
     {"studies"},
     {"reporting"},
     {"project"},

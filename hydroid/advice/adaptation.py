@@ -14,7 +14,7 @@ from hydroid.advice.suggestions import refitted
 from hydroid.errors import SettingsError
 from hydroid.files import Plain
 from hydroid.findings import Finding
-from hydroid.fitting.left_out import LeftOut, density_of, gain, is_better, parts, predict_parts
+from hydroid.fitting.left_out import LeftOut, gain, is_better, parts, predict_parts
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
 from hydroid.problem.problem import Problem
@@ -92,7 +92,7 @@ def _as_it_is(problem: Problem, model: IdentifiedModel) -> LeftOut:
     """Return what a model that is not fitted to them makes of the parts of the logs."""
     errors = problem.output_errors(model.theta[None])[0]
     thetas = np.tile(model.theta, (len(np.unique(parts(problem))), 1))
-    return LeftOut(problem, thetas, errors, density_of(problem, errors))
+    return LeftOut(problem, thetas, errors)
 
 
 def load_findings(settings: FitSettings) -> tuple[Finding, ...]:

@@ -10,14 +10,16 @@ quantity that the fit holds. What the free parameters can do as well as d, the f
 projected off their effects, with the priors' scores as further rows: d' = d - U' U d with orthonormal rows U.
 The statistic is the score of C. R. Rao (1948), a standard normal variable where the model lacks nothing:
 
-    z = -d' r / |d'|.
+    z = -d' r / √(Var d' r),
+
+whose variance is that of the errors as they are, whatever least squares weighs them by.
 
 The change of the quantity that would explain most is a = -d' r / |d'|². It raises the log-likelihood by
 z² / 2.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from scipy.stats import norm as normal
@@ -60,20 +62,23 @@ class Explained:
     Attributes:
         effects: of the free parameters, orthonormal rows with all priors behind, (k, R + M + p).
         left: innovations with the priors' scores behind, shape (R + M + p,).
+        variance: of what is left, summed along a row of that shape.
     """
 
     effects: Array
     left: Array
+    variance: Callable[[Array], float]
 
     def score(self, change: Array) -> Score:
         """Return the score of a change of the innovations, shape (R,)."""
         row = np.append(change, np.zeros(self.left.size - change.size))
         row -= self.effects.T @ (self.effects @ row)
-        strength = float(np.linalg.norm(row))
-        if not strength > 0:
+        square = float(row @ row)
+        if not square > 0:
             return Score(0.0, 0.0, 0.0)
-        statistic = -float(row @ self.left) / strength
-        return Score(statistic, statistic / strength, strength)
+        deviation = math.sqrt(self.variance(row))
+        amount = -float(row @ self.left) / square
+        return Score(amount * square / deviation, amount, square / deviation)
 
 
 def explained(problem: Problem, known: Uncertainty) -> Explained:
@@ -81,7 +86,12 @@ def explained(problem: Problem, known: Uncertainty) -> Explained:
     linear = known.linear
     weak = np.zeros(len(linear.slopes))  # the estimate does not depend on the weak priors
     left = np.concatenate([linear.innovations, problem.priors.scores(known.theta[None])[0], weak])
-    return Explained(linear.effects, left)
+
+    def variance(row: Array) -> float:
+        samples = problem.measured.size
+        return known.variance(row[:samples]) + float(np.sum(row[samples:] ** 2))
+
+    return Explained(linear.effects, left, variance)
 
 
 def holm(chances: Sequence[float], level: float) -> Mask:
@@ -100,7 +110,7 @@ MIN_GAIN = 2.0
 VISIBLE = 3.0
 """statistic of the largest change, without noise; a term below it cannot be told from the free parameters"""
 LARGEST_EFFECT = 0.5
-"""rms effect of the change that is tested, in standard deviations of an innovation: large enough for terms
+"""rms effect of the change that is tested, in rms innovations: large enough for terms
 that act beyond a threshold, small enough for a derivative"""
 
 
@@ -150,7 +160,7 @@ def _tested(term: Term, known: Uncertainty, fit: Explained) -> list[Candidate]:
     values = np.geomspace(high, low, 16) if limit else term.value + parts * (end - term.value)
     likelihood = known.likelihood
     effects = term.innovations(likelihood, known.theta, values.tolist()) - known.linear.innovations
-    sizes = rms(effects, axis=1)
+    sizes = rms(effects, axis=1) / max(float(rms(known.linear.innovations)), np.finfo(float).tiny)
     acting = np.flatnonzero(np.isfinite(sizes) & (sizes > 0))
     if not limit:
         acting = acting[: max(np.sum(sizes[acting] <= LARGEST_EFFECT), 1)][-1:]

@@ -30,6 +30,7 @@ from hydroid.progress import Progress
 from hydroid.quantity_table import MECHANICAL
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.log import log_file
+from hydroid.settings.naming import named
 from hydroid.settings.search import RefinementSettings
 
 MOST_TRIED = 6  # terms that are really freed, the most promising first
@@ -238,6 +239,7 @@ def action_findings(content: Content, settings: FitSettings) -> Iterator[Finding
         before, after = (f"{action[f'{when}_percent']:.2g}" for when in ("before", "after"))
         if before != after:
             sd = 100 * STATED_SD.get(kind, 0.0)
-            numbers = {"what": action["parameter"], "before": before, "after": after, "sd": sd}
+            what = named(settings, action["parameter"])
+            numbers = {"what": what, "before": before, "after": after, "sd": sd}
             link = settings.parameters[of].link if kind == "weigh" else None
-            yield Finding(kind, "note", (link or of,), numbers)
+            yield Finding(kind, "note", (link or named(settings, of),), numbers)

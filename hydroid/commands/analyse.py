@@ -73,7 +73,7 @@ def analyse(
     """Find which parameters, and which combinations of parameters, the logs determine.
 
     Prints the standard deviation and the 95 % interval of each parameter, and the combinations that the logs
-    do not determine.
+    do not determine. The page shows priors beside posteriors, correlations, and profiles as curves.
 
     Example: hydroid analyse LOG.csv --fit runs/hyd --profile A_A
 
@@ -98,7 +98,8 @@ def analyse(
     from hydroid.fitting.summary import account
     from hydroid.posterior import identifiability
     from hydroid.posterior.uncertainty import uncertainty
-    from hydroid.reporting.parameters_report import parameter_table, unknown_sections
+    from hydroid.reporting.analysis import analysis_page
+    from hydroid.reporting.parameters_report import in_words, parameter_table
 
     with Progress() as progress:
         known = uncertainty(problem, model.theta)
@@ -112,15 +113,17 @@ def analyse(
     findings = (*([Finding("better optimum", "warning", better)] if better else []), *summary.findings)
     intervals = {name: one.interval for name, one in profiles.items()}
     table = parameter_table(problem.settings, summary, intervals)
-    tables = {"parameters": table} | {n: t for s in unknown_sections(summary) for n, t in s.tables.items()}
     content: dict[str, Any] = {"at": model.source, "rank": identified.rank}
     content |= summary.changed({"findings": findings}).model_dump(
         mode="json", include={"findings", "estimate"}
     )
     for name, parameter in content["estimate"].items():
         parameter["profile_interval"] = [*map(finite, intervals[name])] if name in intervals else None
-    lines = [table, *(f"- {finding}" for finding in findings), *written(tables, out)]
-    return Result(lines, content, Analysis(known, identified, profiles))
+    page = analysis_page(problem.settings, summary.changed({"findings": findings}), profiles)
+    page = replace(page, files={**page.files, "parameters": table})
+    said = [f"- {in_words(finding, problem.settings)}" for finding in findings]
+    lines = [table, *said, *written(page, out)]
+    return Result(lines, content, Analysis(known, identified, profiles), page)
 
 
 def quantity(

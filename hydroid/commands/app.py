@@ -42,7 +42,11 @@ GROUPS = {
         "suggest": "find what the model lacks, and what to do next",
         "design": "design the next experiment",
     },
-    "Use the model": {"simulate": "simulate commands, write a log"},
+    "Use the model": {
+        "simulate": "simulate commands, write a log",
+        "follow": "find commands that lead the arm along a path",
+        "export": "write it for other programs: URDF, MJCF, FMU, tables, draws",
+    },
     "Compare settings": {"study": "fit with several settings, each over many seeds"},
 }
 """every command with a summary, by the heading of its group"""
@@ -51,6 +55,8 @@ PLAIN: Any = {"add_completion": False, "rich_markup_mode": None, "pretty_excepti
 """of typer's apps; plain help: importing rich would triple the time it takes"""
 
 
+OUT = {"simulate": "runs/simulated.csv", "follow": "runs/follow/commands.csv"}
+"""what commands write without --out, where it is no folder of their name"""
 SYSTEM = (errno.ENAMETOOLONG, errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EIO, errno.EMFILE)
 """what a system refuses that no program can help"""
 ONE_THREAD = ("OPENBLAS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
@@ -94,7 +100,7 @@ def click_command(command: str) -> "TyperCommand":
         **given: Any,
     ) -> None:
         if given.get("out", "") is None and command != "view":  # in Python nothing is written then
-            given["out"] = "runs/simulated.csv" if command == "simulate" else f"runs/{command}"
+            given["out"] = OUT.get(command, f"runs/{command}")
         VISIBLE.set(not (quiet or json))
         with log_lines(verbose=verbose, quiet=quiet):
             result = function(**given)

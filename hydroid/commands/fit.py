@@ -2,6 +2,7 @@
 
 import time
 from dataclasses import replace
+from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from hydroid.problem.problem import Problem
     from hydroid.reporting.page import Table
     from hydroid.run.folder import RunFolder
+    from hydroid.use.draws import Draws
 
 
 @record
@@ -64,14 +66,28 @@ class FitResult(Printed):
             keep_earlier(self.folder, earlier)
         return replace(self, earlier=earlier)
 
+    def __repr__(self) -> str:
+        from hydroid.reporting.verdict_table import lead
+
+        return f"<FitResult: {lead({'': self.summary.verdict})}>"
+
     def plant(self, **how: Any) -> "Plant":
         """Return the identified arm to be stepped; the keywords are those of `Plant`."""
         from hydroid.plant import Plant
 
         return Plant(self.model, **how)
 
+    def draw(self, n: int, seed: int = 0) -> "Draws":
+        """Draw n machines that the logs do not rule out (`hydroid.draw`)."""
+        from hydroid.use.draws import draw
+
+        return draw(self.model, n, seed, self.problem)
+
     def predict(self, log: "LogSource") -> "Prediction":
         """Predict a log from its commands and its first angles; NaN if the simulation diverges.
+
+            predicted = fitted.predict("b.csv")
+            print(predicted["boom"].error, predicted.to_frame())
 
         Raises:
             LogError: the log cannot be used.
@@ -173,7 +189,8 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
     from hydroid.fitting.summary import summarise
     from hydroid.fitting.validation import fitted
     from hydroid.fitting.verdict import baselines_of, behind, judge
-    from hydroid.reporting.parameters_report import parameter_table, warnings
+    from hydroid.reporting.knowledge_report import warnings
+    from hydroid.reporting.parameters_report import in_words, parameter_table
     from hydroid.reporting.verdict_table import next_lines, next_step, verdict_lines
 
     settings, predictions = fit.problem.settings, fitted(fit)
@@ -185,11 +202,15 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
     summary = summary.changed({"verdict": verdict, "findings": tuple(findings)})
     source = "the fit" if folder is None else str(folder / NAME)
     model = IdentifiedModel(settings, fit.best.theta, source, summary)
-    lines: list[Table | str] = [*verdict_lines({fit.final: verdict}), *warnings(summary)]
+    lines: list[Table | str] = verdict_lines({fit.final: verdict})
+    lines += [str(in_words(one, settings)) for one in warnings(summary)]
     if folder is not None:
         step = next_step(summary, verdict, str(folder), predictions)
         lines += [*next_lines(step), str(folder / "report.html")]
-    details = [parameter_table(settings, summary), *map(str, summary.findings)]
+    details = [
+        parameter_table(settings, summary),
+        *(str(in_words(one, settings)) for one in summary.findings),
+    ]
     content = summary.plain() | {"out": folder and str(folder)}
     return FitResult(
         lines, content, problem, fit, folder, summary, model, predictions, baselines, details=details
@@ -205,6 +226,7 @@ def _store(folder: "RunFolder", result: FitResult) -> Path:
     folder.write_estimate(result.model, result.problem.logs[0])
     write_atomic(folder.path / RESULT, pack(fit_result(result.fit, result.predictions, result.baselines)))
     keep_earlier(folder.path, result.earlier)
+    folder.status("running", finished=date.today().isoformat())
     page = draw(folder.path)
     folder.status("done", seconds={**result.fit.seconds, "report": time.monotonic() - began})
     return page

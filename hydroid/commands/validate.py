@@ -47,7 +47,7 @@ def validate(
     Example: hydroid validate OTHER.csv --fit runs/mech --fit runs/hyd
 
         validated = hydroid.validate("b.csv", fit="runs/a")
-        print(validated.result[0].indices[2].rms)  # of joint 2 [rad]
+        print(validated.result[0]["boom"].rms)  # [deg]
 
     Args:
         fit (RUN|YAML): An estimate: a run folder, a folder written by Plant.save (Python), or a YAML file.
@@ -150,7 +150,7 @@ def report(
             warn_of_changes(Path(run))
         files = [str(draw(run, figures=figures)) for run in as_list(runs)]
         return Result(files, {"files": files}, ())
-    from hydroid.reporting.parameters_report import merged_tables
+    from hydroid.reporting.merged_report import merged_tables
     from hydroid.run.record import read_runs
 
     collected = read_runs([str(run) for run in as_list(runs)], out)

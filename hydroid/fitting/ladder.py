@@ -120,7 +120,9 @@ class Ladder:
                 self._try_without(whole, term, on_the_way)
         if climbs:
             kept = self.kept
-            last = self._refined(make_likelihood(self.problem), kept.theta, refinement, self._step)
+            likelihood = make_likelihood(self.problem)
+            # with an error that another model has left, the first error model would have too much drift
+            last = self._refined(likelihood, kept.theta, refinement, self._step, refine_from_afar)
             new = self._measured(self.problem, last, self._step)
             self.kept = self.estimates[kept.name] = replace(new, gained=kept.gained)
         if settings.joint_refinement:
@@ -148,14 +150,13 @@ class Ladder:
         own = whole.varied(whole.settings.of_estimate(step.estimate))
         theta = own.parameters.started(last.parameters.mapping(start.theta))
         likelihood = make_likelihood(own)
-        before = self.refinements[start.name].negative_log if if_better else np.inf
         if own.settings.quasi_static != last.settings.quasi_static:
             if self._is_white():  # there is nothing for a model that is slow to simulate
                 return
             few = settings.changed({"iterations": FIRST})
             first = self._refined(likelihood, theta, few, step.changed(phase="at first"))
             theta = own.parameters.from_unit(first.point)
-            if first.negative_log > before:
+            if self._explained(own, theta) < 0.0:
                 return
         # what a search ended at may be far from an optimum
         how = refine if if_better else refine_from_afar
@@ -167,7 +168,7 @@ class Ladder:
             self._keep(own, new, step)
             return
         more = max(int(own.parameters.free.sum() - last.parameters.free.sum()), 1)
-        if before - result.negative_log < WORTH * more:
+        if self._explained(own, new.theta) < WORTH * more:
             return
         without = self._parts_left_out(settings)
         mapped = [last.parameters.mapping(one) for one in without.thetas]
@@ -197,11 +198,23 @@ class Ladder:
             self._left_out[step.estimate] = without
             self._keep(own, self._measured(own, result, step), step)
 
+    def _explained(self, problem: Problem, theta: Array) -> float:
+        """Rise of the log-likelihood from the kept estimate to another, (P,), of a problem of the same logs.
+
+        Both are weighed by the errors of the kept one.
+        """
+        kept = likelihood_at(self.problem, self.kept.theta, self.refinements[self.kept.name].numbers)
+        other = replace(kept, problem=problem)
+        before = kept.rows(self.kept.theta[None])[0]
+        after = other.rows(theta[None])[0]
+        return 0.5 * float(before @ before - after @ after)
+
     def _is_white(self) -> bool:
-        """Whether the innovations of the estimate that is kept are white."""
-        likelihood = likelihood_at(self.problem, self.kept.theta, self.refinements[self.kept.name].numbers)
-        innovations = likelihood.innovations(self.kept.theta[None])[0]
-        return not any(lasting(likelihood.errors, innovations).values())
+        """Whether the errors of the estimate that is kept leave innovations that are white."""
+        numbers = self.refinements[self.kept.name].numbers
+        shown = likelihood_at(self.problem, self.kept.theta, numbers).shown
+        errors = self.problem.output_errors(self.kept.theta[None])
+        return not any(lasting(shown, shown.innovations(errors)[0]).values())
 
     def _keep(self, problem: Problem, estimate: Estimate, step: Step) -> None:
         self.problem, self.kept, self._step = problem, estimate, step

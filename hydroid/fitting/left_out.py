@@ -13,7 +13,7 @@ import numpy as np
 from hydroid.arrays import Array, Ints, record
 from hydroid.estimate import finite
 from hydroid.fitting.refinement import Refinement
-from hydroid.posterior.error_model import Likelihood, make_error_model, make_likelihood
+from hydroid.posterior.error_model import Likelihood, make_likelihood
 from hydroid.problem.problem import Problem
 
 BLOCK = 5.0
@@ -33,13 +33,11 @@ class LeftOut:
         problem: with all logs.
         thetas: of the fit without each part, shape (G, P).
         errors: weighted output errors of each part in the fit without it [rad], shape (R,).
-        density: logarithm of each sample's predictive density, shape (R,).
     """
 
     problem: Problem
     thetas: Array
     errors: Array
-    density: Array
 
     @property
     def by_joint(self) -> dict[str, float | None]:
@@ -64,25 +62,13 @@ def predict_parts(problem: Problem, starts: Array, refit: Refit) -> LeftOut:
         rest = _of_logs(problem, ~out) if several else problem
         likelihood = make_likelihood(rest)
         if not several:
-            likelihood = replace(likelihood, errors=likelihood.errors.without(out))
+            likelihood = replace(likelihood, shown=likelihood.shown.without(out))
         end = refit(likelihood, start, g + 1)
         thetas[g] = problem.parameters.from_unit(end.point)
         unseen = _of_logs(problem, out) if several else problem
         row = unseen.output_errors(thetas[g][None])[0]
         errors[out] = row if several else row[out]
-    return LeftOut(problem, thetas, errors, density_of(problem, errors))
-
-
-def density_of(problem: Problem, errors: Array) -> Array:
-    """Return the logarithm of each sample's density, (R,), by the error model that predictions show, (R,).
-
-    A fit to few logs is too sure of itself: by its own numbers a part that it errs on by degrees would be
-    impossible, and one such part would decide. So how far predictions err is judged by what they show.
-    """
-    if not np.isfinite(errors).all():
-        return np.full(errors.size, -np.inf)
-    model = make_error_model(problem).estimated(errors)
-    return model.log_density(model.innovations(errors[None])[0])
+    return LeftOut(problem, thetas, errors)
 
 
 def parts(problem: Problem) -> Ints:
@@ -100,13 +86,19 @@ def parts(problem: Problem) -> Ints:
 def gain(after: LeftOut, before: LeftOut) -> tuple[float, float]:
     """Return by how much one model foretells the parts better than another, and the standard error of that.
 
-    It is a difference of log-likelihoods. Both are of the same logs. The error is infinite where there is one
-    block only, or where either model cannot be simulated.
+    It is a difference of log-likelihoods, by the weights of errors that the one before shows on the parts. By
+    the weights of its fit a part that it errs on by degrees would be impossible, and one such part would
+    decide. The error is infinite where there is one block only, or where either model cannot be simulated.
     """
-    with np.errstate(invalid="ignore"):
-        change = np.nan_to_num(after.density - before.density, nan=0.0, posinf=np.inf, neginf=-np.inf)
-    sums = np.bincount(blocks(after.problem), change)
-    if not np.isfinite(sums).all() or len(sums) < 2:
+    problem = before.problem
+    able = [bool(np.isfinite(one.errors).all()) for one in (after, before)]
+    if not all(able):
+        return float(np.inf if able[0] else -np.inf), np.inf
+    weighing = make_likelihood(problem).estimated(before.errors).errors
+    squares = weighing.innovations(np.stack([after.errors, before.errors])) ** 2
+    change = 0.5 * (squares[1] - squares[0])
+    sums = np.bincount(blocks(problem), change)
+    if len(sums) < 2:
         return float(np.sum(sums)), np.inf
     return float(sums.sum()), float(np.sqrt(len(sums) * np.var(sums, ddof=1)))
 

@@ -30,7 +30,7 @@ class Refinement(Descent):
     """A descent over innovations, then the priors' scores.
 
     Attributes:
-        numbers: of the error model, shape (S, 5).
+        numbers: of the model of the errors, shape (S, 5).
         negative_log: of likelihood and priors at the point: what starts are compared by.
     """
 
@@ -98,24 +98,20 @@ def refine_from_afar(
 ) -> Refinement:
     """Improve an estimate that may be far off, as `refine` does.
 
-    There an error model takes what the parameters have not explained yet for drift, and the two may settle
-    for that. Output errors know no drift. So a rough least squares of output errors comes first, and the
-    better of both points is where the refinement begins.
+    There a model of the errors takes what the parameters have not explained yet for drift. Output errors know
+    no drift. So a rough least squares of output errors comes first.
     """
-    if likelihood.white:
+    if np.isinf(likelihood.memory):
         return refine(likelihood, theta, settings, progress, checkpoints, what)
     rough = settings.changed({"gain_tolerance": max(settings.gain_tolerance, ROUGH)})
-    output_errors = replace(likelihood, white=True)
+    output_errors = replace(likelihood, memory=np.inf)
     afar = what.changed(phase="from afar")
     first = refine(output_errors, theta, rough, progress, checkpoints, afar)
     if first.ending is Ending.TIME:
         return first
     near = likelihood.problem.parameters.from_unit(first.point)
-    begun = [_begun(likelihood, likelihood.problem.parameters.to_unit(one)) for one in (theta, near)]
-    costs = [_at(likelihood, one).negative_log(one.residual) if not one.ended else np.inf for one in begun]
-    best = near if costs[1] <= costs[0] else theta
-    result = refine(likelihood, best, settings, progress, checkpoints, what)
-    return replace(result, evaluations=result.evaluations + first.evaluations + 2)
+    result = refine(likelihood, near, settings, progress, checkpoints, what)
+    return replace(result, evaluations=result.evaluations + first.evaluations)
 
 
 def _begun(likelihood: Likelihood, unit: Array) -> Refinement:
@@ -127,7 +123,7 @@ def _begun(likelihood: Likelihood, unit: Array) -> Refinement:
         likelihood = likelihood.estimated(errors[0])
     innovations = likelihood.errors.innovations(errors)[0]
     begun = start(unit, np.append(innovations, problem.priors.scores(theta)))
-    return Refinement(**vars(begun), numbers=likelihood.errors.numbers)
+    return Refinement(**vars(begun), numbers=likelihood.shown.numbers)
 
 
 def _with_new_numbers(likelihood: Likelihood, now: Refinement) -> Refinement:
@@ -135,15 +131,15 @@ def _with_new_numbers(likelihood: Likelihood, now: Refinement) -> Refinement:
 
     One that had converged then goes on.
     """
-    problem, before = likelihood.problem, _at(likelihood, now)
+    problem = likelihood.problem
     errors = problem.output_errors(problem.parameters.from_unit(now.point[None]))
+    before = _at(likelihood, now)
     after = before.estimated(errors[0])
+    now = replace(now, evaluations=now.evaluations + 1)
+    if after.shown.log_likelihood(errors[0]) - before.shown.log_likelihood(errors[0]) < SETTLED:
+        return now
     innovations = after.errors.innovations(errors)[0]
     rows = np.append(innovations, now.residual[innovations.size :])
-    gain = before.negative_log(now.residual) - after.negative_log(rows)
-    now = replace(now, evaluations=now.evaluations + 1)
-    if gain < SETTLED:
-        return now
     begun = start(now.point, rows)
     return replace(
         now,
@@ -153,12 +149,12 @@ def _with_new_numbers(likelihood: Likelihood, now: Refinement) -> Refinement:
         fresh=False,
         slow=0,
         ending=Ending.UNDER_WAY,
-        numbers=after.errors.numbers,
+        numbers=after.shown.numbers,
     )
 
 
 def _at(likelihood: Likelihood, now: Refinement) -> Likelihood:
-    return replace(likelihood, errors=replace(likelihood.errors, numbers=now.numbers))
+    return replace(likelihood, shown=replace(likelihood.shown, numbers=now.numbers))
 
 
 def _rows(likelihood: Likelihood, now: Refinement) -> Callable[[Array], Array]:

@@ -16,9 +16,11 @@ from typing import Any
 
 from hydroid.errors import SettingsError
 from hydroid.identified_model import load_identified
-from hydroid.plant.plant import Plant
+from hydroid.plant.batch import PlantBatch
+from hydroid.plant.plant import Plant, PlantState
+from hydroid.plant.steady import Limit, SteadyCommands
 
-__all__ = ["Plant", "load_plant"]
+__all__ = ["Limit", "Plant", "PlantBatch", "PlantState", "SteadyCommands", "load_plant"]
 
 
 def load_plant(source: Any, *, overrides: Mapping[str, Any] | None = None, **how: Any) -> Plant:

@@ -3,26 +3,58 @@
 from collections.abc import Mapping, Sequence
 from copy import copy
 from pathlib import Path
+from typing import NamedTuple
 
+import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hydroid.arm.export import dressed_model, locked_spec, write_fitted
 from hydroid.arm.locked import lock
 from hydroid.arm.model import add_payload, load_model
-from hydroid.arrays import Array
+from hydroid.arrays import Array, Index, Structs
 from hydroid.errors import RunError, SettingsError
 from hydroid.estimate import write_estimate
 from hydroid.files import Plain
 from hydroid.hydraulics.actuator import pressures
-from hydroid.hydraulics.records import JOINT_STATE, has_force_curve
+from hydroid.hydraulics.kernel import Plugin
+from hydroid.hydraulics.records import JOINT_STATE, Records, has_force_curve
 from hydroid.identified_model import IdentifiedModel, write_settings
 from hydroid.mjcf import quiet_mujoco, read_mjcf
+from hydroid.plant.steady import SteadyArm, SteadyCommands, Weighing, by_name
 from hydroid.problem.bindings import Bindings
 from hydroid.quantity_table import MECHANICAL, QUANTITIES
 from hydroid.simulation.quasi_static import roll_quasi_static
 from hydroid.simulation.rollout import Course, Record, SteppedArm, compile_rollout, roll
 from hydroid.simulation.scenario import Chain, model_values
+
+PHYSICS = mujoco.mjtState.mjSTATE_INTEGRATION.value
+"""what MuJoCo needs to go on to the same bits"""
+
+
+class PlantParts(NamedTuple):
+    """What a plant is made of since its last reset: for code that steps many."""
+
+    columns: Index  # moving joints among the arm's, (V,)
+    chain: Chain
+    arm: SteppedArm
+    plugin: Plugin
+    state: Structs
+    course: Course
+    gain: Array  # [N·m/%], (V,)
+    balance: Array  # [N·m], (V,)
+
+
+class PlantState(NamedTuple):
+    """Where a plant stands, to the bit: `Plant.state` makes it, `Plant.restore` takes it. It pickles."""
+
+    start: Array
+    taken: int
+    state: Structs
+    commands: Array
+    physics: Array
+    mass: Array
+    armature: Array
 
 
 class Plant:
@@ -97,6 +129,34 @@ class Plant:
         return self.identified.settings.arm.joint_names
 
     @property
+    def quasi_static(self) -> bool:
+        """Whether the joints' speeds follow valve and load at once."""
+        return self.identified.settings.quasi_static
+
+    @property
+    def past(self) -> int:
+        """Steps of commands that its delays reach back."""
+        return self._plugin.past
+
+    @property
+    def parts(self) -> PlantParts:
+        """What it is made of, since its last reset."""
+        chain, arm, course = self._chain, self._arm, self._course
+        return PlantParts(
+            self._columns, chain, arm, self._plugin, self._state, course, self._gain, self._balance
+        )
+
+    @property
+    def actuators(self) -> Records:
+        """Quantities of all joints' actuators in SI, (J,) of `hydraulics.records.JOINT`."""
+        return self._candidate.joints[0]
+
+    @property
+    def masses(self) -> Array:
+        """Of the arm's links [kg], in the order of `arm.link_names`."""
+        return self._candidate.mass[0]
+
+    @property
     def command(self) -> Array:
         """What the motors' controls in `data.ctrl` hold [%], shape (J,)."""
         command = np.zeros(len(self._pose))
@@ -131,14 +191,9 @@ class Plant:
         Raises:
             SettingsError: no such pose, or not J finite angles.
         """
-        settings = self.identified.settings
-        start = settings.start_pose if pose is None else pose
-        if isinstance(start, str):
-            self._pose = settings.arm.pose(start)
-        else:
-            self._pose = np.array(start, float)
-            if self._pose.shape != self._active.shape or not np.isfinite(self._pose).all():
-                raise SettingsError(f"a pose needs {len(self._active)} finite angles [rad]", f"{start}")
+        self._pose = self._posed(self.identified.settings.start_pose if pose is None else pose)
+        self._start = self._pose.copy()
+        self._weighing: Weighing | None = None  # springs are slack where it starts
         locked = np.where(self._moving, 0.0, self._pose)
         if not np.array_equal(locked, self._locked_pose):
             self._lock(locked)
@@ -151,7 +206,7 @@ class Plant:
             commands = np.zeros((self._plugin.past + self._steps, len(self._state)))
             self._course = Course(commands, np.empty((self._steps, len(self._chain.pushed))))
             self._mass = self.data.M.copy()
-        self._taken = 0
+        self._roll, self._taken = None, 0
         return self.angle
 
     def step(self, command: ArrayLike | Mapping[str, float]) -> Array:
@@ -168,15 +223,7 @@ class Plant:
             ValueError: not J finite commands, or one for a joint that takes none.
             RunError: the simulation diverged.
         """
-        if isinstance(command, Mapping):
-            if stray := command.keys() - set(self.names):
-                raise ValueError(f"no joint {', '.join(stray)}; the arm has {', '.join(self.names)}")
-            command = [command.get(name, 0.0) for name in self.names]
-        given = np.asarray(command, float)
-        if given.shape != self._active.shape or not np.isfinite(given).all():
-            raise ValueError(f"a command needs {len(self._active)} finite numbers [%], not {command}")
-        if given[~self._active].any():
-            raise ValueError(f"only {', '.join(self._named)} take commands: name the others in joints=")
+        given = self._of_joints(command, "command", "%")
         self.data.ctrl[:] = given[self._columns].clip(-100.0, 100.0)
         commands, torque, *_ = self._course
         torque[:] = (self._gain * self.data.ctrl + self._balance)[self._chain.pushed]
@@ -185,11 +232,92 @@ class Plant:
         # M of the step before: refreshing positions in between must not change a bit
         np.copyto(self.data.M, self._mass)
         with quiet_mujoco():
-            self._arm.roll(self._plugin, self._state, self._course, self._record)
+            if self._roll is None:
+                self._roll = self._arm.bind(self._plugin, self._state, self._course, self._record)
+            self._roll()
         np.copyto(self._mass, self.data.M)
         self._taken += self._steps
         if not self._arm.healthy:
             raise RunError(f"the simulation diverged before {self.time:.2f} s", self.identified.source)
+        return self.angle
+
+    def speeds(self, commands: ArrayLike | Mapping[str, float], at: str | ArrayLike | None = None) -> Array:
+        """Return the speeds that joints settle to under commands that are held, all at once.
+
+        Args:
+            commands: [%], shape (J,), or by the joints' names, others 0.
+            at: a pose of the arm's file, or joint angles [rad], shape (J,); by default where the plant is.
+
+        Returns:
+            [rad/s], of joints that slide [m/s], shape (J,): of the law itself (`simulation.settled`).
+
+        Raises:
+            ValueError: not J finite commands, or one for a joint that takes none.
+            SettingsError: no such pose, or a plant of stage 1, which has no valves.
+        """
+        given = self._of_joints(commands, "command", "%").clip(-100.0, 100.0)
+        return self.steady().speeds(given[None], self._posed(at)[None])[0]
+
+    def commands(
+        self, speeds: ArrayLike | Mapping[str, float], at: str | ArrayLike | None = None
+    ) -> SteadyCommands:
+        """Return the commands under which joints settle to wished speeds, all at once.
+
+        Dead band, curve, load, pump and compensation are in it. Where a wish cannot be had, the command gives
+        the nearest speed, and `limits` says by name why.
+
+        Args:
+            speeds: [rad/s], of joints that slide [m/s], shape (J,), or by the joints' names, others 0.
+            at: as of `speeds`.
+
+        Raises:
+            ValueError, SettingsError: as of `speeds`.
+        """
+        wished, pose = self._of_joints(speeds, "speed", "rad/s")[None], self._posed(at)[None]
+        steady = self.steady()
+        command, reached = steady.commands(wished, pose)
+        (limits,) = steady.limits(wished, reached, command, pose)
+        return SteadyCommands(command[0], reached[0], by_name(limits, self.names))
+
+    def steady(self) -> SteadyArm:
+        """Return the law behind `speeds` and `commands`, for many poses at once.
+
+        Raises:
+            SettingsError: a plant of stage 1, which has no valves.
+        """
+        settings = self.identified.settings
+        if settings.stage != "hyd":
+            hint = "name a fit of stage 2"
+            raise SettingsError("a gain gives torques, not speeds", self.identified.source, hint)
+        if self._weighing is None:
+            self._weighing = Weighing(self._spec, settings.arm, self._candidate, self._start)
+        ranges = np.array([settings.arm.lower, settings.arm.upper]).T
+        return SteadyArm(self._weighing, self._plugin, self._chain.joints, ranges, settings.quasi_static)
+
+    def state(self) -> PlantState:
+        """Return where the plant stands, oil, valves and commands on their way included."""
+        size = mujoco.mj_stateSize(self.model, PHYSICS)
+        physics = np.empty(size)
+        mujoco.mj_getState(self.model, self.data, physics, PHYSICS)
+        commands, armature = self._course.commands.copy(), self.model.dof_armature.copy()
+        mass = self._mass.copy()
+        return PlantState(
+            self._start.copy(), self._taken, self._state.copy(), commands, physics, mass, armature
+        )
+
+    def restore(self, state: PlantState) -> Array:
+        """Go back to where the plant, or another one of its model, stood; it then steps to the same bits.
+
+        Returns:
+            The joint angles [rad], shape (J,).
+        """
+        self.reset(state.start)
+        self._state[:] = state.state
+        self._course.commands[:] = state.commands
+        mujoco.mj_setState(self.model, self.data, state.physics, PHYSICS)
+        self._mass[:] = state.mass
+        self.model.dof_armature[:] = state.armature
+        self._taken = state.taken
         return self.angle
 
     def save(self, folder: str | Path) -> None:
@@ -223,6 +351,30 @@ class Plant:
                 actuators[joint] = {name: float(values[name] / q.factor) for name, q in hydraulic.items()}
         fitted = locked_spec(spec, self._locked, model, motors)
         write_fitted(folder, fitted, ", ".join(self._named), actuators)
+
+    def _of_joints(self, values: ArrayLike | Mapping[str, float], what: str, unit: str) -> Array:
+        """Return values by joint, shape (J,), given so or by name; 0 of joints that take no commands."""
+        if isinstance(values, Mapping):
+            if stray := values.keys() - set(self.names):
+                raise ValueError(f"no joint {', '.join(stray)}; the arm has {', '.join(self.names)}")
+            values = [values.get(name, 0.0) for name in self.names]
+        given = np.asarray(values, float)
+        if given.shape != self._active.shape or not np.isfinite(given).all():
+            raise ValueError(f"a {what} needs {len(self._active)} finite numbers [{unit}], not {values}")
+        if given[~self._active].any():
+            raise ValueError(f"only {', '.join(self._named)} take commands: name the others in joints=")
+        return given
+
+    def _posed(self, pose: str | ArrayLike | None) -> Array:
+        """Return the angles of a pose [rad], shape (J,), by its name or its angles; None: of where it is."""
+        if pose is None:
+            return self.angle
+        if isinstance(pose, str):
+            return self.identified.settings.arm.pose(pose)
+        angle = np.array(pose, float)
+        if angle.shape != self._active.shape or not np.isfinite(angle).all():
+            raise SettingsError(f"a pose needs {len(self._active)} finite angles [rad]", f"{pose}")
+        return angle
 
     def _lock(self, pose: Array) -> None:
         settings, candidate = self.identified.settings, self._candidate

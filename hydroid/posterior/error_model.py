@@ -18,10 +18,18 @@ likelihood.
 A Kalman filter turns the residual into *innovations*: what the past of the log does not foretell of each
 sample (L. Ljung, *System Identification*, 1999, chapters 3, 7 and 14). Divided by their standard deviation
 they are white with variance 1. The filter's gains depend on the measured way, not on θ: the filter is a
-linear map of the residual, and least squares of innovations is maximum likelihood.
+linear map of the residual.
 
-Stage 1 puts a gain in place of the hydraulics, and the article fits it by output errors. Its least squares
-weighs them as white noise (`ErrorModel.white`); its covariance is that of the errors as they are.
+Least squares does not take the innovations of this model, though: maximum likelihood does so where the model
+is right, and is misled where it errs. What a model does wrong for a moment (a start that is late and a stop
+that is late as well) returns; a filter that forgets within a tenth of a second takes it for drift, fits how
+the joint moves from one sample to the next, and lets it end degrees away. So a second, simpler model weighs
+the errors (`ErrorModel.weighing`): noise, and a drift that is followed within `MEMORY` at the fastest. Its
+noise is as large as makes least squares as certain as it may be by the errors as they are; so priors count
+rightly. Covariances, bands and findings are those of the errors as they are.
+
+Stage 1 puts a gain in place of the hydraulics, and the article fits it by output errors: there the memory is
+endless.
 """
 
 from collections.abc import Sequence
@@ -49,8 +57,8 @@ SHORTEST, LONGEST = 0.05, 30.0
 """time constants of a lasting error [s]: what is shorter is noise, and what is longer is drift (ours)"""
 NONE = 1e-12
 """growth of a drift, as a part of the residual's mean square, that counts as none"""
-LEAST_GUESS = 0.01
-"""part of the guess that a number begins with at least"""
+MEMORY = 5.0
+"""time within which least squares takes a lasting error for drift, at the fastest [s] (docs/measured.md)"""
 WAY_OVER = 0.25
 """time over which a way is measured [s]: the sensor's noise is no way"""
 AT_STOP = 0.002
@@ -73,6 +81,7 @@ class Course:
         weight: of the channel's errors.
         period: between samples [s].
         way: travelled from each sample to the next [rad], shape (T,).
+        moved: the measured signal less its first value [rad], shape (T,).
         stops: whether the joint stands at an end of its range, shape (T,).
         readings: of which the start angle is the mean; inf where it is taken for exact.
         used: samples that count, shape (T,); of the others nothing is taken to be measured.
@@ -82,6 +91,7 @@ class Course:
     weight: float
     period: float
     way: Array
+    moved: Array
     stops: Mask
     readings: float
     used: Mask
@@ -99,7 +109,8 @@ def make_course(channel: Channel, log: Log, problem: Problem) -> Course:
             readings = max(float(log.start_samples[joint]), 1.0)
     way = travelled(channel.measured, log.period)
     used = np.ones(len(way), dtype=bool) if log.recorded is None else log.recorded
-    return Course(channel.rows, channel.weight, log.period, way, stops, readings, used)
+    moved = channel.measured - channel.measured[0]
+    return Course(channel.rows, channel.weight, log.period, way, moved, stops, readings, used)
 
 
 def travelled(signal: Array, period: float) -> Array:
@@ -132,14 +143,14 @@ class ErrorModel:
         numbers: NUMBERS of each, shape (S, 5).
         courses: of each channel.
         of: the index of each channel's signal.
-        given: whether the settings give the sensor's noise, shape (S,).
+        given: variance of the sensor's noise that the settings give, shape (S,); NaN: none.
     """
 
     signals: tuple[Signal, ...]
     numbers: Array
     courses: tuple[Course, ...]
     of: tuple[int, ...]
-    given: Mask
+    given: Array
 
     @cached_property
     def _filters(self) -> list["Filter"]:
@@ -187,37 +198,73 @@ class ErrorModel:
         """Return the logarithm of each sample's predictive density, from a row of innovations, shape (R,)."""
         return self.log_scale - 0.5 * innovations**2
 
+    def log_likelihood(self, errors: Array) -> float:
+        """Return the log-likelihood of weighted output errors, (R,)."""
+        return float(self.log_density(self.innovations(errors[None])[0]).sum())
+
     def estimated(self, errors: Array) -> "ErrorModel":
         """Return the error model whose numbers make weighted output errors, (R,), most likely."""
         numbers = self.numbers.copy()
         for i, signal in enumerate(self.signals):
-            pairs = [
-                (course, errors[course.rows] / course.weight)
-                for course, own in zip(self.courses, self.of, strict=True)
-                if own == i
-            ]
+            pairs = [(c, errors[c.rows] / c.weight) for c in self.courses_of(i)]
             least = LEAST_NOISE[signal.quantity] ** 2
-            numbers[i] = _most_likely(pairs, self.numbers[i], least, bool(self.given[i]))
+            numbers[i] = _most_likely(pairs, least, float(self.given[i]))
         return replace(self, numbers=numbers)
 
-    def white(self, errors: Array, *, alike: bool = False) -> "ErrorModel":
-        """Return the model that takes errors, (R,), for white noise alone, but for the starts.
+    def weighing(self, memory: float, *, alike: bool) -> "ErrorModel":
+        """Return the model by which least squares weighs output errors that are as here.
+
+        It has noise, and a drift that is followed within `memory` [s] or more slowly: inf takes all of the
+        error for noise. Errors that last tell less than as many independent ones. So the noise is as large as
+        makes a change of a joint's speed, whose effect is along its own motion, as uncertain as it is by the
+        errors as they are.
 
         alike: weighted errors of all signals are equally large, so that weights count; else each signal's
         are as large as they are.
         """
-        numbers = np.zeros_like(self.numbers)
-        numbers[:, 4] = SHORTEST
-        shown = errors**2
-        common = float(np.mean(shown[self.used]))
-        for i, signal in enumerate(self.signals):
-            courses = [course for course, own in zip(self.courses, self.of, strict=True) if own == i]
-            own = np.concatenate([shown[course.rows][course.used] for course in courses])
-            square = common if alike else float(np.mean(own))
-            least = LEAST_NOISE[signal.quantity] ** 2
-            level = max(square / courses[0].weight ** 2, least)
-            numbers[i, 0] = self.numbers[i, 0] if self.given[i] else level
+        signals = range(len(self.signals))
+        numbers = np.array([self._unit(i, memory) for i in signals])
+        unit = replace(self, numbers=numbers)
+        levels = np.array([self._level(unit, i) for i in signals])
+        if alike:
+            weights = np.array([self.courses_of(i)[0].weight for i in signals])
+            levels = np.mean(levels * weights**2) / weights**2
+        least = [LEAST_NOISE[signal.quantity] ** 2 for signal in self.signals]
+        numbers[:, :2] *= np.maximum(levels, least)[:, None]
         return replace(self, numbers=numbers)
+
+    def _unit(self, i: int, memory: float) -> Array:
+        """NUMBERS of signal i by which least squares weighs, for noise of variance 1, shape (5,)."""
+        sensor, rate, way, lasting, time = self.numbers[i].tolist()
+        courses = self.courses_of(i)
+        samples = sum(int(course.used.sum()) for course in courses)
+        seconds = sum(course.period * len(course.used) for course in courses)
+        between = seconds / max(samples, 1)
+        noise = sensor * between
+        growth = rate + way * sum(float(course.way.sum()) for course in courses) / seconds
+        if time < MEMORY:
+            noise += 2.0 * lasting * time
+        else:  # it is as good as a drift
+            growth += 2.0 * lasting / time
+        own = np.sqrt(noise / max(growth, np.finfo(float).tiny))
+        return np.array([1.0, between / max(own, memory) ** 2, 0.0, 0.0, SHORTEST])
+
+    def _level(self, unit: "ErrorModel", i: int) -> float:
+        """Variance of signal i's errors summed along its motion, over that of white noise of 1."""
+        variance = 0.0
+        white = 0.0
+        for number, course in enumerate(self.courses):
+            if self.of[number] == i:
+                row = _innovations(course.moved[None], *unit._filters[number])
+                variance += float(self.scatter(number, row, unit)[0, 0])
+                white += float(np.sum(row**2))
+        if white > 0.0:
+            return variance / white
+        return float(self.numbers[i, 0] + self.numbers[i, 3])  # it stands still
+
+    def courses_of(self, i: int) -> list[Course]:
+        """Return the courses of the channels of signal i."""
+        return [course for course, own in zip(self.courses, self.of, strict=True) if own == i]
 
     def scatter(self, channel: int, rows: Array, fitted: "ErrorModel") -> Array:
         """Covariance of `rows` times a channel's innovations, shape (p, p), where its errors are as here.
@@ -252,31 +299,38 @@ def make_error_model(problem: Problem) -> ErrorModel:
     of_channel = [Signal(channel.joint, channel.quantity) for channel in channels]
     signals = tuple(dict.fromkeys(of_channel))
     numbers = np.zeros((len(signals), len(NUMBERS)))
-    noises = [objective.noise_of(s.joint) if s.quantity == "angle" else None for s in signals]
+    given = np.full(len(signals), np.nan)
     for i, signal in enumerate(signals):
-        noise = noises[i]
-        numbers[i, 0] = LEAST_NOISE[signal.quantity] ** 2 if noise is None else np.deg2rad(noise) ** 2
+        noise = objective.noise_of(signal.joint) if signal.quantity == "angle" else None
+        if noise is not None:
+            given[i] = np.deg2rad(noise) ** 2
+        numbers[i, 0] = np.nan_to_num(given[i], nan=LEAST_NOISE[signal.quantity] ** 2)
         numbers[i, 4] = SHORTEST
     courses = tuple(make_course(channel, logs[channel.log], problem) for channel in channels)
-    given = np.array([noise is not None for noise in noises])
     of = tuple(map(signals.index, of_channel))
     return ErrorModel(signals, numbers, courses, of, given)
 
 
 @record
 class Likelihood:
-    """What least squares minimises: innovations and the priors' scores, all of variance 1.
+    """What least squares minimises: weighed errors and the priors' scores.
 
     Attributes:
         problem: whose output errors these are.
-        errors: the model of these errors.
-        white: whether they are taken for white noise: in stage 1, which is fitted by output errors as in the
-            article, and on the way from afar.
+        shown: the model of these errors, as they are.
+        memory: within which least squares takes an error for drift, at the fastest [s]; inf in stage 1, which
+            is fitted by output errors as in the article, and on the way from afar.
     """
 
     problem: Problem
-    errors: ErrorModel
-    white: bool
+    shown: ErrorModel
+    memory: float
+
+    @cached_property
+    def errors(self) -> ErrorModel:
+        """The model that weighs the errors (`ErrorModel.weighing`)."""
+        alike = self.problem.settings.stage == "mech"  # as in the article
+        return self.shown.weighing(self.memory, alike=alike)
 
     def innovations(self, theta: Array) -> Array:
         """Return innovations [1] of theta, shape (n, P): (n, R); NaN where a simulation diverged."""
@@ -287,30 +341,40 @@ class Likelihood:
         return np.hstack([self.innovations(theta), self.problem.priors.scores(theta)])
 
     def negative_log(self, rows: Array) -> float:
-        """Return the negative logarithm of likelihood and priors of a row of `rows`, but for a constant."""
-        return 0.5 * float(rows @ rows) - float(self.errors.log_scale.sum())
+        """Return the negative log-likelihood, but for a constant, of a row of `rows` with priors.
+
+        It is that of errors as large as they are, whatever the numbers; so it tells starts apart that end
+        with different ones. Each sample counts as if it were independent.
+        """
+        errors = self.errors
+        squares = rows[: self.problem.measured.size] ** 2
+        total = 0.5 * float(np.sum(rows[squares.size :] ** 2))
+        for i, signal in enumerate(errors.signals):
+            courses = errors.courses_of(i)
+            shown = np.concatenate([squares[course.rows][course.used] for course in courses])
+            level = float(np.mean(shown)) * float(errors.numbers[i, 0])
+            total += 0.5 * shown.size * float(np.log(max(level, LEAST_NOISE[signal.quantity] ** 2)))
+        return total
 
     def estimated(self, errors: Array) -> "Likelihood":
         """Return the likelihood for what weighted output errors, (R,), show of their model."""
-        if not self.white:
-            return replace(self, errors=self.errors.estimated(errors))
-        alike = self.problem.settings.stage == "mech"  # as in the article
-        return replace(self, errors=self.errors.white(errors, alike=alike))
+        return replace(self, shown=self.shown.estimated(errors))
 
 
 def make_likelihood(problem: Problem) -> Likelihood:
     """Return the likelihood of a problem whose errors are still to be estimated."""
-    return Likelihood(problem, make_error_model(problem), problem.settings.stage == "mech")
+    memory = np.inf if problem.settings.stage == "mech" else MEMORY
+    return Likelihood(problem, make_error_model(problem), memory)
 
 
 def likelihood_at(problem: Problem, theta: Array, numbers: Array | None = None) -> Likelihood:
     """Return the likelihood of a problem with the errors that it shows at theta, shape (P,).
 
-    With `numbers`, (S, 5), these are taken.
+    With `numbers`, (S, 5), it shows these.
     """
     likelihood = make_likelihood(problem)
     if numbers is not None:
-        return replace(likelihood, errors=replace(likelihood.errors, numbers=numbers))
+        return replace(likelihood, shown=replace(likelihood.shown, numbers=numbers))
     return likelihood.estimated(problem.output_errors(theta[None])[0])
 
 
@@ -350,13 +414,12 @@ def _model(course: Course, numbers: Array) -> tuple[Array, Array]:
     return carry, step
 
 
-def _most_likely(pairs: Sequence[tuple[Course, Array]], numbers: Array, least: float, given: bool) -> Array:
+def _most_likely(pairs: Sequence[tuple[Course, Array]], least: float, given: float) -> Array:
     """Return the most likely NUMBERS of one signal's errors, each of shape (T,), with their courses.
 
-    `least` is the smallest variance of the sensor's noise, which stays where it is `given`. The search is
-    over logarithms. It starts from a guess that is mostly noise, and from the numbers before; without any,
-    from a guess that is mostly drift. A number that was next to none is raised first (`LEAST_GUESS`): on the
-    scale of logarithms nothing would tell that it should grow.
+    `least` is the smallest variance of the sensor's noise; where it is `given`, it is that (NaN: it is not).
+    The search is over logarithms. It starts from a guess that is mostly noise, and from one that is mostly
+    drift.
     """
     square = float(np.mean(np.concatenate([error[course.used] for course, error in pairs]) ** 2))
     square = max(square, least)
@@ -364,8 +427,8 @@ def _most_likely(pairs: Sequence[tuple[Course, Array]], numbers: Array, least: f
     way = max(sum(float(course.way.sum()) for course, _ in pairs) / len(pairs), 1e-3)
     lower = np.array([least, NONE * square, NONE * square, NONE * square, SHORTEST])
     upper = np.array([square * 4, square * 100, square * 1e4, square * 4, LONGEST])
-    if given:
-        lower[0] = upper[0] = numbers[0]
+    if np.isfinite(given):
+        lower[0] = upper[0] = given
     bounds = np.log(np.stack([lower, upper], axis=1))
 
     def cost(logarithms: Array) -> float:
@@ -375,12 +438,11 @@ def _most_likely(pairs: Sequence[tuple[Course, Array]], numbers: Array, least: f
     steady = np.array([0.5, 0.1 / seconds, 0.1 / way, 0.1, 0.0]) * square
     drifting = np.array([1e-3, 10 / seconds, 10 / way, 1e-2, 0.0]) * square
     steady[4] = drifting[4] = 0.3
-    before = np.maximum(numbers, LEAST_GUESS * steady)
-    starts = [steady, before if numbers[1:4].any() else drifting]
+    options = {"maxiter": 60, "ftol": 1e-6}  # of a log-likelihood in the thousands
     ended = list[OptimizeResult]()
-    for start in starts:
+    for start in (steady, drifting):
         begin = np.clip(np.log(np.maximum(start, 1e-300)), *bounds.T)
-        ended.append(minimize(cost, begin, method="L-BFGS-B", bounds=bounds, options={"maxiter": 60}))
+        ended.append(minimize(cost, begin, method="L-BFGS-B", bounds=bounds, options=options))
     return np.exp(min(ended, key=lambda one: one.fun).x)
 
 
@@ -394,7 +456,8 @@ def whitened(rows: Array, period: float, sensor: float, rate: float) -> Array:
     """Return innovations of rows [rad], (n, T), for a sensor's variance and a drift that grows with time."""
     samples = rows.shape[1]
     everywhere = np.ones(samples, dtype=np.bool_)
-    course = Course(slice(0), 1.0, period, np.zeros(samples), ~everywhere, np.inf, everywhere)
+    still = np.zeros(samples)
+    course = Course(slice(0), 1.0, period, still, still, ~everywhere, np.inf, everywhere)
     numbers = np.array([sensor, rate, 0.0, 0.0, SHORTEST])
     return _innovations(np.ascontiguousarray(rows), *make_filter(course, numbers))
 

@@ -105,6 +105,7 @@ class Uncertainty:
         linear: least squares linearised there, in the parameters that vary: free ones, but for those held at
             a bound.
         errors: the model of the output errors, as they are.
+        innovations: what it leaves of them, shape (R,).
         scatters: covariance of the effects by each channel's errors, shape (C, p, p).
         sensitivity: rms change of the output error [rad] per 1 % of each parameter, shape (P,); NaN where
             fixed or where simulations diverge.
@@ -118,6 +119,7 @@ class Uncertainty:
     likelihood: Likelihood
     linear: Linear
     errors: ErrorModel
+    innovations: Array
     scatters: Array
     sensitivity: Array
     posterior: Posterior
@@ -130,6 +132,10 @@ class Uncertainty:
         """The estimate, shape (P,)."""
         return self.linear.box.at
 
+    def variance(self, row: Array) -> float:
+        """Return the variance of the innovations that least squares takes, summed along a row, (R,)."""
+        return float(_scatters(self.likelihood, self.errors, row[None]).sum())
+
     @property
     def standard_deviation(self) -> Array:
         """Of each parameter, in its unit, shape (P,)."""
@@ -141,7 +147,7 @@ def uncertainty(
 ) -> Uncertainty:
     """Return the uncertainty of theta, shape (P,) (`linearised`).
 
-    `numbers` of the error model, (S, 4), are those that least squares ended with; None: those that the errors
+    `numbers` of the errors, (S, 5), are those that least squares ended with; None: those that the errors
     at theta show.
     """
     likelihood = likelihood_at(problem, theta, numbers)
@@ -157,15 +163,9 @@ def uncertainty_from(likelihood: Likelihood, whole: Linear) -> Uncertainty:
     edge = held_by_bound(room, white)
     held = edge & (white <= UNIDENTIFIABLE_ABOVE)
     linear = whole.of(~held | held.all())
-    errors = fitted
-    if problem.settings.stage == "mech":  # least squares took them for white noise
-        errors = fitted.estimated(fitted.errors(whole.innovations[None])[0])
-    scatters = np.array(
-        [
-            errors.scatter(number, linear.effects[:, channel.rows], fitted)
-            for number, channel in enumerate(problem.channels)
-        ]
-    )
+    shown = fitted.errors(whole.innovations[None])
+    errors = likelihood.shown
+    scatters = _scatters(likelihood, errors, linear.effects)
     size = np.linalg.norm(linear.changes, axis=0)  # D V' is (V D^-1)^-1
     half = np.linalg.cholesky(scatters.sum(axis=0) + linear.prior_scatter)
     root = regular(solve_triangular(half, (linear.changes / size**2).T, lower=True))
@@ -186,8 +186,26 @@ def uncertainty_from(likelihood: Likelihood, whole: Linear) -> Uncertainty:
         status[i] = ParameterStatus(flag, side, float(shares[i]), not unknown[i])
     between = ends(problem.parameters, linear.box, NORMAL * relative)
     return Uncertainty(
-        likelihood, linear, errors, scatters, sensitivity, posterior, relative, between, tuple(status)
+        likelihood,
+        linear,
+        errors,
+        errors.innovations(shown)[0],
+        scatters,
+        sensitivity,
+        posterior,
+        relative,
+        between,
+        tuple(status),
     )
+
+
+def _scatters(likelihood: Likelihood, errors: ErrorModel, rows: Array) -> Array:
+    """Covariance of rows, (n, R + ...), times the innovations, by each of C channels' errors, (C, n, n)."""
+    parts = [
+        errors.scatter(number, rows[:, channel.rows], likelihood.errors)
+        for number, channel in enumerate(likelihood.problem.channels)
+    ]
+    return np.array(parts)
 
 
 def ends(parameters: ParameterSet, box: Box, half: Array) -> Array:

@@ -211,7 +211,7 @@ class RunFolder:
     def checkpoints(self) -> CheckpointFile:
         """Return what the run's search and refinements have stored, by name."""
         # what does not change while the run goes on
-        course = ("status", "seconds", "estimate")
+        course = ("status", "seconds", "estimate", "finished")
         fixed = {key: value for key, value in self.identity().items() if key not in course}
         return CheckpointFile(self.path / "checkpoint.npz", digest(fixed))
 

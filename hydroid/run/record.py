@@ -12,7 +12,7 @@ import math
 import os
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import field, replace
 from functools import cache, cached_property
 from itertools import pairwise
 from pathlib import Path
@@ -60,7 +60,8 @@ class FitResult:
     """The arrays of a fit: what its estimates make of its logs, and how they came to be.
 
     The history has shape (G, len(HISTORY)); the front is non-dominated candidates, (n, P), with objectives by
-    segment and overall, (n, S + 1); segments are objectives of each estimate by segment, (S,).
+    segment and overall, (n, S + 1); segments are objectives of each estimate by segment, (S,);
+    starts are costs at which the starts of least squares ended, by joint (0: all joints together).
     """
 
     fitted: tuple[Prediction, ...]
@@ -69,6 +70,7 @@ class FitResult:
     segments: Mapping[str, Array]
     refinements: tuple[Effort, ...]
     baselines: Baselines
+    starts: Mapping[int, tuple[float, ...]] = field(default_factory=dict[int, tuple[float, ...]])
 
 
 @record
@@ -110,6 +112,7 @@ def fit_result(fit: Fit, fitted: tuple[Prediction, ...], baselines: Baselines) -
         {name: estimate.segments for name, estimate in fit.estimates.items()},
         tuple(Effort(n, r.iterations, r.evaluations, r.ending.value) for n, r in fit.refinements.items()),
         baselines,
+        {joint: tuple(costs) for joint, costs in fit.ends.items()},
     )
 
 

@@ -14,15 +14,16 @@ import ctypes
 import logging
 from collections.abc import Callable, Sequence
 from copy import copy
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import llvmlite.binding
 import mujoco
 import numpy as np
-from numba import njit, types
+from numba import njit, typeof, types
 from numba.core import event
+from numba.core.dispatcher import OmittedArg
 from numpy.typing import NDArray
 
 from hydroid.arrays import Array, Index, Structs
@@ -176,6 +177,26 @@ class SteppedArm:
         `state` is its actuators', (J,) of JOINT_STATE: steps change it.
         """
         self._roll(self._handles, plugin, state, course, record)
+
+    @property
+    def handles(self) -> Handles:
+        """What compiled code steps."""
+        return self._handles
+
+    def bind(self, plugin: Plugin, state: Structs, course: Course, record: Record) -> Callable[[], object]:
+        """Return a call of `roll` with these arrays, whatever they hold by then."""
+        return bind(self._roll, self._handles, plugin, state, course, record)
+
+
+def bind(compiled: Any, *arguments: Any) -> Callable[[], object]:
+    """Return a call of a compiled function with these arguments, whose last one, `source`, is left out.
+
+    It takes 3 µs beside the function itself. Without it numba looks at the types at every call, and may take
+    1 ms for those of structured arrays.
+    """
+    (source,) = compiled.py_func.__defaults__
+    kinds = (*map(typeof, arguments), types.Omitted(source))
+    return partial(compiled.compile(kinds), *arguments, OmittedArg(source))
 
 
 @compilable

@@ -146,6 +146,7 @@ def test_a_log_that_diverges_is_named_and_judged_with_the_others(
         return predict(model, log, joints) * (np.nan if log.source == "lost.csv" else 1)
 
     monkeypatch.setattr(validation, "predict", lost)
+    monkeypatch.setattr(validation, "predict_with_pressures", lambda *given: (lost(*given), None))
     done = hydroid_cli("validate", "good.csv", "lost.csv", "--fit=run", "--out=val", "--json")
     assert done.err == "hydroid: warning: run predicts no joint in lost.csv: its simulation diverged\n"
     found = json.loads(done.out)
@@ -218,7 +219,7 @@ def test_analyse_tells_what_a_log_determines(short: Path, hydroid_cli: Run, tmp_
     assert rows["M1"]["source"] == "prior only"
     assert rows["M1"]["data_share"] == 0
     assert rows["S"]["profile_interval"] is not None
-    for name in ("parameters", "directions"):
+    for name in ("parameters", "correlations"):
         assert (tmp_path / "told" / "tables" / f"{name}.csv").stat().st_size > 0
 
 

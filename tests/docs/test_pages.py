@@ -16,7 +16,7 @@ from hydroid.quantity_table import QUANTITIES
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted((ROOT / "docs").glob("*.md"))
-RUN = ("quick_start", "first_log", "recording", "algorithms", "python", "two_arms", "own_arm")
+RUN = ("quick_start", "first_log", "recording", "algorithms", "python", "use", "two_arms", "own_arm")
 """pages whose `sh` and `python` blocks are run, in this order; other blocks are only shown"""
 COMMANDS = {name: click_command(name) for name in NAMES}
 each_page = pytest.mark.parametrize("page", [ROOT / "README.md", *PAGES], ids=lambda page: page.stem)

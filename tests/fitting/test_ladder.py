@@ -41,6 +41,14 @@ def _problem(name, term="pump", **more):
     return Problem(ladder, [noisy(exact, 0.02, 1, exact_start=False)])
 
 
+def _rms_of_the_truth(problem, name):
+    """What the machine itself leaves of its log, noise and start included [deg]."""
+    own = problem.varied(problem.settings.of_estimate(name))
+    values = own.parameters.mapping(own.parameters.start)
+    theta = own.parameters.vector(values | {n: TRUTH[n] for n in TRUTH if n in values}, "truth")
+    return float(np.degrees(own.rms(own.output_errors(theta[None]))[0]))
+
+
 @pytest.mark.parametrize("name", ["refined", "refined+pump", "dynamic", "dynamic+pump"])
 def test_a_fit_keeps_what_the_logs_ask_for(name, monkeypatch):
     """Soft oil shows in the logs, and a droop shows where two joints move together."""
@@ -53,7 +61,7 @@ def test_a_fit_keeps_what_the_logs_ask_for(name, monkeypatch):
     assert steps == sorted(steps)
     assert shown[-1][0] == f"step 4 of 4 ({name}), all joints"
     assert f"rms error {np.degrees(found.best.rms):.3g} deg" in shown[-1][-1]
-    assert np.degrees(found.best.rms) == pytest.approx(0.02, rel=0.1)
+    assert 0.02 < np.degrees(found.best.rms) < 1.01 * _rms_of_the_truth(problem, name)
     if found.best.gained:
         rise, error = found.best.gained
         assert rise > 1.64 * error

@@ -19,7 +19,8 @@ def course_of(samples: int, first: int = 0, weight: float = 1.0, **changes) -> C
     time = 0.05 * np.arange(samples)
     angle = np.cumsum(0.1 * np.sin(time) * (np.sin(0.3 * time) > 0))
     what = {"stops": np.zeros(samples, dtype=bool), "readings": np.inf, "used": np.ones(samples, dtype=bool)}
-    return Course(slice(first, first + samples), weight, 0.05, travelled(angle, 0.05), **(what | changes))
+    rows = slice(first, first + samples)
+    return Course(rows, weight, 0.05, travelled(angle, 0.05), angle - angle[0], **(what | changes))
 
 
 def stopping(samples: int) -> Course:
@@ -30,10 +31,10 @@ def stopping(samples: int) -> Course:
     return course_of(samples, stops=stops, used=used, readings=4.0)
 
 
-def model_of_errors(courses: Sequence[Course], numbers: Array, *, given: bool = False) -> ErrorModel:
+def model_of_errors(courses: Sequence[Course], numbers: Array) -> ErrorModel:
     """The error model of one angle in several logs."""
     of = (0,) * len(courses)
-    return ErrorModel((Signal(2, "angle"),), numbers[None].copy(), tuple(courses), of, np.array([given]))
+    return ErrorModel((Signal(2, "angle"),), numbers[None].copy(), tuple(courses), of, np.array([np.nan]))
 
 
 def reach(course: Course, kept: float) -> Array:

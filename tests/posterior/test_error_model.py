@@ -22,6 +22,7 @@ from scipy.stats import multivariate_normal
 from hydroid import load_settings
 from hydroid.posterior.error_model import (
     LEAST_NOISE,
+    MEMORY,
     SHORTEST,
     at_stops,
     likelihood_at,
@@ -150,7 +151,8 @@ def test_what_is_given_stays_and_nothing_else():
     course = course_of(2000)
     row = drawn(np.random.default_rng(8), course, LASTING)[0]
     stated = np.array([9 * SENSOR, 0.0, 0.0, 0.0, SHORTEST])
-    held = model_of_errors([course], stated, given=True).estimated(row).numbers[0]
+    told = replace(model_of_errors([course], stated), given=stated[:1])
+    held = told.estimated(row).numbers[0]
     assert held[0] == pytest.approx(9 * SENSOR, rel=1e-12)
     assert model_of_errors([course], stated).estimated(row).numbers[0, 0] == pytest.approx(SENSOR, rel=0.2)
 
@@ -181,25 +183,48 @@ def test_the_numbers_are_the_most_likely_from_whatever_numbers_before(before, la
     assert cost(found) == pytest.approx(cost(from_truth), abs=0.5)
 
 
-def test_white_noise_alone_has_its_mean_square_and_no_drift():
+def test_white_noise_alone_is_weighed_by_its_mean_square_and_has_no_drift():
     rng = np.random.default_rng(10)
     course = replace(course_of(1000, weight=2.0), used=np.arange(1000) % 2 == 0)
     row = 2.0 * rng.normal(0.0, 0.01, 1000)
-    white = model_of_errors([course], DRIFTING).white(row)
-    assert white.numbers[0, 0] == pytest.approx(np.mean((row[::2] / 2.0) ** 2))
-    assert not white.numbers[0, 1:4].any()
-    np.testing.assert_allclose(
-        white.innovations(row[None])[0, ::2], row[::2] / np.sqrt(np.mean(row[::2] ** 2))
-    )
-    quiet = model_of_errors([course], DRIFTING).white(1e-9 * row)
-    assert quiet.numbers[0, 0] == pytest.approx(LEAST_NOISE["angle"] ** 2)
-    model = model_of_errors([course], DRIFTING).estimated(row)
-    sensor, rate, way, lasting, _ = model.numbers[0]
+    shown = model_of_errors([course], DRIFTING).estimated(row)
+    sensor, rate, way, lasting, _ = shown.numbers[0]
     # what lasts no longer than from sample to sample is as good as noise
     assert sensor + lasting == pytest.approx(1e-4, rel=0.15)
     assert rate * 50.0 + way * course.way.sum() < 0.1 * 1e-4  # after all of the log
-    densities = [one.log_density(one.innovations(row[None])[0]).sum() for one in (white, model)]
-    assert 0.0 <= densities[1] - densities[0] < 8.0  # chi-square of four numbers more
+    white = shown.weighing(np.inf, alike=False)
+    assert not white.numbers[0, 1:4].any()
+    # a drift that the log cannot exclude is what its errors may tell less than independent ones
+    square = np.mean((row[::2] / 2.0) ** 2)
+    assert square <= white.numbers[0, 0] * (1 + 1e-9) < 10.0 * square
+    quiet = model_of_errors([course], DRIFTING).estimated(1e-9 * row)
+    level = quiet.weighing(np.inf, alike=False).numbers[0, 0]
+    assert level == pytest.approx(LEAST_NOISE["angle"] ** 2, rel=0.01)
+
+
+@pytest.mark.parametrize("memory", [1.0, MEMORY, 30.0])
+def test_an_error_is_followed_within_the_memory_at_the_fastest(memory):
+    """Of a step of the error the weighed errors show 1/e after the memory."""
+    course = course_of(4000)
+    numbers = np.array([1e-8, 1e-3, 0.0, 0.0, SHORTEST])  # a drift that a filter of its own follows at once
+    weighing = model_of_errors([course], numbers).weighing(memory, alike=False)
+    step = np.where(np.arange(4000) >= 2000, 1.0, 0.0)
+    left = weighing.innovations(step[None])[0, 2000:]
+    assert left[round(memory / course.period)] / left[0] == pytest.approx(np.exp(-1.0), rel=0.05)
+
+
+@pytest.mark.parametrize("numbers", [DRIFTING, LASTING, [SENSOR, 1e-4, 0.0, 0.0, SHORTEST]])
+def test_a_speed_is_as_certain_as_its_weighed_errors_say(numbers):
+    """Least squares of one number, the joint's speed: its variance over many logs is 1 over its squares."""
+    course, rng = course_of(1000), np.random.default_rng(14)
+    model = model_of_errors([course], np.array(numbers))
+    rows = drawn(rng, course, np.array(numbers), 400)
+    weighing = model.weighing(MEMORY, alike=False)
+    motion = weighing.innovations(course.moved[None])[0]
+    square = float(motion @ motion)
+    left = weighing.innovations(rows)
+    found = left @ motion / square
+    assert np.var(found) * square == pytest.approx(1.0, rel=0.3)
 
 
 def test_samples_left_out_are_as_if_they_had_not_been_measured():
@@ -237,9 +262,9 @@ def test_an_error_model_of_a_problem_has_the_start_of_the_log_and_the_noise_of_t
     assert course.readings == pytest.approx(max(log.start_samples[1], 1.0))
     assert exact.readings == np.inf
     model = make_error_model(held)
-    assert model.given.tolist() == [True]
+    assert np.degrees(np.sqrt(model.given)) == pytest.approx(0.3)
     assert np.degrees(np.sqrt(model.numbers[0, 0])) == pytest.approx(0.3)
-    assert not make_error_model(free).given.any()
+    assert np.isnan(make_error_model(free).given).all()
     rows = np.random.default_rng(12).normal(size=len(log.time))
     assert np.degrees(np.sqrt(model.estimated(rows).numbers[0, 0])) == pytest.approx(0.3)
     recorded = np.arange(len(log.time)) % 2 == 0
@@ -256,8 +281,11 @@ def test_stage_1_takes_its_errors_for_white_noise():
     theta = problem.parameters.vector(TRUTH, "truth")
     likelihood = likelihood_at(problem, theta)
     assert not likelihood.errors.numbers[:, 1:4].any()
-    rms = np.sqrt(np.mean(problem.output_errors(theta[None]) ** 2))
-    assert np.sqrt(likelihood.errors.numbers[0, 0]) == pytest.approx(rms)
+    errors = problem.output_errors(theta[None])[0]
+    weighed = likelihood.innovations(theta[None])[0]
+    np.testing.assert_allclose(weighed * (errors @ errors) / (weighed @ errors), errors, atol=1e-12)
+    # errors that last tell no more than independent ones
+    assert np.mean(weighed**2) <= 1.0 + 1e-9
 
 
 def test_weights_of_joints_count_in_stage_1():
@@ -267,11 +295,10 @@ def test_weights_of_joints_count_in_stage_1():
     problem = Problem(settings, [log])
     theta = problem.parameters.vector(TRUTH, "truth")[None]
     likelihood = likelihood_at(problem, 1.1 * theta[0])
-    level = np.sqrt(np.mean(problem.output_errors(1.1 * theta) ** 2))
+    level = 1.0 / likelihood.errors.innovations(np.ones((1, problem.measured.size)))[0, 0]
     for one in (theta, 1.2 * theta):
         errors = problem.output_errors(one)
         np.testing.assert_allclose(likelihood.innovations(one) * level, errors, atol=1e-12)
-    assert np.mean(likelihood.innovations(1.1 * theta) ** 2) == pytest.approx(1.0)
 
 
 def test_a_likelihood_adds_the_priors_scores_and_falls_as_its_rows_grow():
@@ -284,7 +311,6 @@ def test_a_likelihood_adds_the_priors_scores_and_falls_as_its_rows_grow():
     more[-1] += 1.0
     change = likelihood.negative_log(more) - likelihood.negative_log(rows[0])
     assert change == pytest.approx(0.5 * (more[-1] ** 2 - rows[0, -1] ** 2))
-    errors = likelihood.errors
-    assert -likelihood.negative_log(rows[0]) == pytest.approx(
-        errors.log_density(rows[0, :-1]).sum() - 0.5 * rows[0, -1] ** 2
-    )
+    twice = np.append(2.0 * rows[0, :-1], rows[0, -1])
+    rise = likelihood.negative_log(twice) - likelihood.negative_log(rows[0])
+    assert rise == pytest.approx(problem.measured.size * np.log(2.0))

@@ -1,0 +1,110 @@
+"""`hydroid follow`: commands that lead the arm along angles over time."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from hydroid.commands.console import Result, written
+from hydroid.commands.inputs import (
+    ModelSource,
+    SettingChanges,
+    Source,
+    command,
+    open_model,
+    refuse_overwriting,
+)
+from hydroid.commands.logs import read_arms
+from hydroid.errors import SettingsError
+from hydroid.files import is_file
+from hydroid.log import Log, open_table, write_log
+from hydroid.words import plain
+
+if TYPE_CHECKING:
+    from hydroid.settings.fit import FitSettings
+    from hydroid.use.follow import Followed
+
+
+@command
+def follow(
+    trajectory: "Source | Log",
+    *,
+    fit: "ModelSource",
+    out: "Source | None" = None,
+    payload: float = 0.0,
+    set: "SettingChanges" = None,
+    repair: bool = False,
+) -> "Result[Followed]":
+    """Find commands that lead the arm along joint angles over time: a feed-forward, to be played open loop.
+
+    Dead band, valve curve, load, pump, delay and lags are in it. Says where a joint cannot move as wished,
+    and then takes the nearest; predicts the tracking error with its band. A page shows the arm in motion.
+
+    Example: hydroid follow TRAJECTORY.csv --fit runs/hyd --out commands.csv
+
+        followed = hydroid.follow("path.csv", fit="runs/a", out="commands.csv").result
+        print(followed.rms(2), followed.missed)
+
+    Args:
+        trajectory (TRAJECTORY.csv): Joint angles over time, in the columns and units of the fit's logs;
+            joints without a column rest in the start pose of the settings.
+        out (LOG.csv): The commands, in the columns and units of the fit's logs, beside the wished angles;
+            the page has the same name [default of the command line: runs/follow/commands.csv].
+        payload (0 or more): Mass in the gripper [kg].
+
+    Raises:
+        LogError: the trajectory cannot be used, or moves a joint that takes no commands.
+        SettingsError: a fit of stage 1, which has no valves, or `out` would overwrite the trajectory.
+        RunError: the simulation diverged, or a file cannot be written.
+    """
+    refuse_overwriting(trajectory, out)
+    model = open_model(fit, overrides=set)
+    if model.settings.stage != "hyd":
+        raise SettingsError("a fit of stage 1 has no valves", model.source, "name a fit of stage 2")
+    settings = _of_its_joints(trajectory, model.settings)
+    (path,) = read_arms(trajectory, settings, None, angles=True, repair=repair).values()
+    from hydroid.reporting.follow_page import follow_page, missed_lines, tracking_table
+    from hydroid.use.follow import follow as find_commands
+
+    found = find_commands(model, path, payload=payload)
+    arm = model.settings.arm
+    name = "commands" if out is None else Path(out).stem
+    page = follow_page(name, found, arm)
+    lines = [tracking_table(found, arm), *missed_lines(found, arm)]
+    if found.lead_s:
+        lines.append(
+            f"The path begins {plain(found.lead_s)} s after the commands: delay and lags take so long."
+        )
+    if out is not None:
+        write_log(Path(out), found.log, model.settings.log, arm=model.settings.arm)
+        lines += [str(out), *written(page, Path(out).parent)]
+    rows = [_joint(found, joint, arm.joint_names[joint - 1]) for joint in found.joints]
+    missed = [{**vars(one), "joint": arm.joint_names[one.joint]} for one in found.missed]
+    content = {"out": out and str(out), "lead_s": found.lead_s, "joints": rows, "missed": missed}
+    return Result(lines, content, found, page)
+
+
+def _of_its_joints(trajectory: "Source | Log", settings: "FitSettings") -> "FitSettings":
+    """Return the settings without the joints that a file has no angle of.
+
+    A file with a column of another name may have misspelt one: there every joint is still asked for.
+    """
+    if isinstance(trajectory, Log) or not is_file(trajectory):
+        return settings
+    columns = settings.log
+    names = {*open_table(Path(trajectory), columns).names} - {columns.time.column}
+    every = range(1, 1 + len(settings.arm.joints))
+    mapped = {joint: columns.columns("angle", joint) for joint in every}
+    absent = [joint for joint, own in mapped.items() if own and not {*own.column} & names]
+    commands = [columns.columns("command", joint) for joint in every]
+    known = {name for own in (*mapped.values(), *commands) if own for name in own.column}
+    if names - known or len(absent) == len(settings.arm.joints):
+        return settings
+    joints = dict(columns.joints) | dict.fromkeys(absent)
+    return settings.changed({"log": columns.changed({"joints": joints})})
+
+
+def _joint(found: "Followed", joint: int, name: str) -> dict[str, object]:
+    import math
+
+    error, wide = found.rms(joint)
+    banded = math.degrees(wide) if math.isfinite(wide) else None
+    return {"joint": joint, "name": name, "rms_deg": math.degrees(error), "rms_with_band_deg": banded}

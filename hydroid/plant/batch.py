@@ -1,0 +1,283 @@
+"""Many plants of one machine, stepped in one call: a population, at its speed.
+
+The plants have settings in common, and each its own parameters, such as draws of what the logs leave open.
+One compiled loop steps a share of them per thread, so that Python is met once per call.
+"""
+
+# pyright: reportMissingParameterType=false
+# a law takes floats or arrays that broadcast, and compiled code whatever has its fields
+
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+from numba import njit, types
+from numba.extending import intrinsic
+from numba.np.numpy_support import carray
+from numpy.typing import ArrayLike
+
+from hydroid.arrays import Array, Ints, Mask
+from hydroid.errors import SettingsError
+from hydroid.hydraulics.kernel import Plugin
+from hydroid.mjcf import quiet_mujoco
+from hydroid.plant.plant import PHYSICS, Plant
+from hydroid.simulation.quasi_static import SOURCE, roll_quasi_static
+from hydroid.simulation.rollout import Course, Handles, Record, bind, roll
+
+
+def _typed_pointer(typing: Any, address: Any) -> Any:
+    """Return the signature of `_pointer` and what makes its code."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.inttoptr(arguments[0], context.get_value_type(signature.return_type))
+
+    return types.voidptr(types.int64), generate
+
+
+_pointer: Any = intrinsic(_typed_pointer)
+"""lets compiled code take an address for that of an array"""
+
+
+class Population(NamedTuple):
+    """What n plants have, each with a row; `places` are addresses in MuJoCo, in the order of `_places`."""
+
+    places: Ints  # (n, 10)
+    coefficients: Any  # (n, J), of COEFFICIENTS
+    state: Any  # (n, J), of JOINT_STATE
+    commands: Array  # (n, past + steps, J)
+    torque: Array  # (n, steps, P)
+    angle: Array  # (n, 1, V)
+    failed: Mask  # (n,)
+
+
+def _places(plant: Plant) -> list[int]:
+    model, data = plant.model, plant.data
+    arrays = [data.qpos, data.qvel, data.M, data.qfrc_applied, model.dof_armature, data.qfrc_bias]
+    addresses = [array.ctypes.data for array in (*arrays, model.qpos_spring, data.warning.number)]
+    return [model._address, data._address, *addresses]  # pyright: ignore[reportPrivateUsage]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _roll_some(
+    rows, shared: Handles, plugin: Plugin, plants: Population, quasi: bool, source: int = SOURCE
+) -> None:
+    """Roll some plants out, from rows[0] to before rows[1]; `shared` has what is alike of all."""
+    joints, entries, nothing = shared.angle.size, shared.mass.size, np.empty(0)
+    for i in range(rows[0], rows[1]):
+        if plants.failed[i]:
+            continue
+        at = plants.places[i]
+        handles = Handles(
+            at[0],
+            at[1],
+            carray(_pointer(at[2]), (joints,), np.float64),
+            carray(_pointer(at[3]), (joints,), np.float64),
+            carray(_pointer(at[4]), (entries,), np.float64),
+            carray(_pointer(at[5]), (joints,), np.float64),
+            carray(_pointer(at[6]), (joints,), np.float64),
+            carray(_pointer(at[9]), (2 * shared.warnings.size - 1,), np.int32)[::2],
+            shared.columns,
+            shared.own,
+            shared.pushed,
+            shared.steps,
+            carray(_pointer(at[7]), (joints,), np.float64),
+            carray(_pointer(at[8]), (joints,), np.float64),
+            shared.limits,
+        )
+        own = Plugin(
+            plants.coefficients[i], plugin.order, plugin.entries, plugin.idle, plugin.period, plugin.substeps
+        )
+        course = Course(plants.commands[i], plants.torque[i], nothing, np.empty((0, 0)))
+        record = Record(plants.angle[i], np.empty((0, plants.state.shape[1]), plants.state.dtype))
+        if quasi:
+            roll_quasi_static(handles, own, plants.state[i], course, record)
+        else:
+            roll(handles, own, plants.state[i], course, record)
+        plants.failed[i] = handles.warnings.any() or not np.isfinite(handles.angle).all()
+
+
+class RowState(NamedTuple):
+    """Where one plant of a batch stands: `PlantBatch.state` makes it."""
+
+    physics: Array
+    mass: Array
+    armature: Array
+    slack: Array
+    coefficients: Any
+    joints: Any
+    commands: Array
+    balance: Array
+    pose: Array
+    angle: Array
+    time: float
+
+
+class PlantBatch:
+    """n plants that are stepped together; no bit depends on the others, or on how many threads there are.
+
+    A plant must not be stepped, reset or changed by itself while it is in a batch.
+
+    Args:
+        plants: of one machine: with the same joints, period and settings but for their parameters.
+        threads: that step them; None: one per core.
+
+    Raises:
+        SettingsError: none, or plants of different kinds.
+    """
+
+    def __init__(self, plants: Sequence[Plant], *, threads: int | None = None) -> None:
+        kinds = {(one.identified.settings.stage, one.joints, one.period, one.quasi_static) for one in plants}
+        if len(kinds) != 1 or len({one.timestep for one in plants}) != 1:
+            raise SettingsError("needs plants with the same joints, period and model", "a batch of plants")
+        self.plants = tuple(plants)
+        count = min(threads or os.cpu_count() or 1, len(plants))
+        self._pool = ThreadPoolExecutor(count)
+        self._shares = np.linspace(0, len(plants), count + 1).astype(np.int64)
+        first = self.plants[0]
+        self._active = np.isin(np.arange(1, 1 + len(first.names)), first.joints)
+        self._past = max(one.past for one in plants)
+        self._time = np.zeros(len(plants))
+        self._gather()
+
+    def __len__(self) -> int:
+        return len(self.plants)
+
+    @property
+    def angle(self) -> Array:
+        """Joint angles [rad], shape (n, J), a copy; NaN of a plant that diverged, until its reset."""
+        angle = self._pose.copy()
+        angle[:, self._columns] = self._angle[:, 0]
+        angle[self._population.failed] = np.nan
+        return angle
+
+    @property
+    def time(self) -> Array:
+        """Since each plant's reset [s], shape (n,), a copy."""
+        return self._time.copy()
+
+    def reset(self, pose: str | ArrayLike | None = None, rows: ArrayLike | None = None) -> Array:
+        """Put plants at rest, in static balance.
+
+        Args:
+            pose: as of `Plant.reset`; of each of the m plants with shape (m, J).
+            rows: which plants, shape (m,); None: all.
+
+        Returns:
+            The joint angles of all plants [rad], shape (n, J).
+        """
+        chosen = np.arange(len(self)) if rows is None else np.asarray(rows, int)
+        one = isinstance(pose, str) or pose is None or np.ndim(pose) == 1
+        poses: Any = [pose] * len(chosen) if one else pose
+        for row, start in zip(chosen.tolist(), poses, strict=True):
+            self.plants[row].reset(start)
+            self._take(row)
+        return self.angle
+
+    def state(self, row: int) -> "RowState":
+        """Return where the plant of a row stands; to `restore` it is a hundredth of a reset."""
+        plant, population = self.plants[row], self._population
+        physics = np.empty(mujoco.mj_stateSize(plant.model, PHYSICS))
+        mujoco.mj_getState(plant.model, plant.data, physics, PHYSICS)
+        return RowState(
+            physics,
+            plant.data.M.copy(),
+            plant.model.dof_armature.copy(),
+            plant.model.qpos_spring.copy(),
+            population.coefficients[row].copy(),
+            population.state[row].copy(),
+            population.commands[row].copy(),
+            self._balance[row].copy(),
+            self._pose[row].copy(),
+            self._angle[row].copy(),
+            float(self._time[row]),
+        )
+
+    def restore(self, row: int, state: "RowState") -> None:
+        """Put the plant of a row where it stood; it then steps to the same bits.
+
+        Its locked joints must stand where they stood then.
+        """
+        plant, population = self.plants[row], self._population
+        mujoco.mj_setState(plant.model, plant.data, state.physics, PHYSICS)
+        plant.data.M[:] = state.mass
+        plant.data.warning.number[:] = 0
+        plant.model.dof_armature[:] = state.armature
+        plant.model.qpos_spring[:] = state.slack
+        population.coefficients[row] = state.coefficients
+        population.state[row] = state.joints
+        population.commands[row] = state.commands
+        population.failed[row] = False
+        self._balance[row] = state.balance
+        self._pose[row] = state.pose
+        self._angle[row] = state.angle
+        self._time[row] = state.time
+
+    def step(self, command: ArrayLike) -> Array:
+        """Hold commands [%] for one period: shape (n, J), or (J,) for all plants; cut to [-100, 100].
+
+        Returns:
+            The joint angles [rad], shape (n, J); NaN of a plant that diverged.
+
+        Raises:
+            ValueError: another shape, or a command that is not finite or for a joint that takes none.
+        """
+        given = np.broadcast_to(np.asarray(command, float), (len(self), len(self._active)))
+        if not np.isfinite(given).all() or given[:, ~self._active].any():
+            raise ValueError("commands must be finite, and 0 of joints that take none")
+        moving = given[:, self._columns].clip(-100.0, 100.0)
+        commands, steps = self._population.commands, self._population.torque.shape[1]
+        commands[:, :-steps] = commands[:, steps:]
+        commands[:, -steps:] = moving[:, None, self._coupled]
+        if self._pushed.size:
+            self._population.torque[:] = (self._gain * moving + self._balance)[:, None, self._pushed]
+        with quiet_mujoco():
+            if len(self._calls) == 1:
+                self._calls[0]()
+            else:
+                for done in [self._pool.submit(call) for call in self._calls]:
+                    done.result()
+        self._time += self.plants[0].period
+        return self.angle
+
+    def _gather(self) -> None:
+        """Stack what the plants have, and bind the compiled calls to it."""
+        first, n = self.plants[0], len(self)
+        parts = first.parts
+        self._columns, self._coupled, self._pushed = parts.columns, parts.chain.columns, parts.chain.pushed
+        steps, joints = parts.course.torque.shape[0], len(self._coupled)
+        self._angle = np.empty((n, 1, len(self._columns)))
+        self._pose = np.empty((n, len(first.names)))
+        self._gain, self._balance = np.empty((2, n, len(self._columns)))
+        self._population = Population(
+            np.empty((n, 10), np.int64),
+            np.zeros((n, joints), parts.plugin.coefficients.dtype),
+            np.zeros((n, joints), parts.state.dtype),
+            np.zeros((n, self._past + steps, joints)),
+            np.zeros((n, steps, len(self._pushed))),
+            self._angle,
+            np.zeros(n, np.bool_),
+        )
+        for row in range(n):
+            self._take(row)
+        shared = parts.arm.handles, parts.plugin
+        pairs = [self._shares[k : k + 2].copy() for k in range(len(self._shares) - 1)]
+        self._calls = [
+            bind(_roll_some, rows, *shared, self._population, first.quasi_static) for rows in pairs
+        ]
+
+    def _take(self, row: int) -> None:
+        """Take over a plant that was reset."""
+        plant, population = self.plants[row], self._population
+        parts = plant.parts
+        population.places[row] = _places(plant)
+        population.coefficients[row] = parts.plugin.coefficients
+        population.state[row] = parts.state
+        population.commands[row] = 0.0
+        population.failed[row] = False
+        self._gain[row], self._balance[row] = parts.gain, parts.balance
+        self._pose[row] = plant.angle
+        self._angle[row, 0] = plant.data.qpos
+        self._time[row] = plant.time

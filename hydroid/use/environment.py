@@ -1,0 +1,286 @@
+"""Environments of gymnasium from any fit: bring joints to angles, on machines that the logs do not rule out.
+
+An action is the command of each joint that takes one, as a part of full command. An observation has for each
+of these joints, in halves of its range, its angle from the middle, how far its target is, and its speed per
+second, as a sensor with the noise of the logs reads them. The reward is minus the mean distance to the
+targets, in halves of the range. An episode begins at rest in a random pose and is cut off after its time.
+
+A machine is the fit's own estimate, or a draw (`use.draws`); its angles drift from the model's as the fit's
+error model says.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from hydroid.arrays import Array
+from hydroid.errors import SettingsError
+from hydroid.identified_model import IdentifiedModel, load_identified
+from hydroid.plant import Plant, PlantBatch
+from hydroid.plant.batch import RowState
+from hydroid.use.draws import DriftingAngles, draw, error_numbers
+
+try:
+    import gymnasium
+    from gymnasium.vector import AutoresetMode, VectorEnv as GymnasiumVectorEnv
+    from gymnasium.vector.utils import batch_space
+except ImportError:
+    raise ImportError("environments need gymnasium: pip install 'hydroid[gym]'") from None
+
+Floats = NDArray[np.float32]
+
+POSES = 16
+"""random poses in which episodes begin: to be put into one that is ready takes a hundredth of a reset"""
+ENDLESS = np.pi
+"""end of the range of a joint that turns without end [rad]"""
+LARGEST = 10.0  # of an observation
+MARGIN = 0.1  # part of a range that starts and targets keep from its ends
+DECISION = 0.05
+"""time that an action is held, about [s]"""
+
+
+class _Machines:
+    """n machines of one model in the same task.
+
+    Args:
+        model: of the fit.
+        thetas: the machines' parameters, (n, P).
+        errors: whether angles drift and sensors have noise.
+        decision: time that an action is held, about [s].
+        threads: None: one per core.
+    """
+
+    def __init__(
+        self, model: IdentifiedModel, thetas: Array, *, errors: bool, decision: float, threads: int | None
+    ) -> None:
+        settings, arm = model.settings, model.settings.arm
+        self.joints = Plant(model).joints
+        period = max(round(decision / settings.log.period_s), 1) * settings.log.period_s
+        bare = [replace(model, theta=theta, summary=None) for theta in thetas]
+        plants = [Plant(one, joints=self.joints, period=period) for one in bare]
+        self.batch, self.period = PlantBatch(plants, threads=threads), period
+        self._columns = np.array(self.joints) - 1
+        low, high = np.clip([arm.lower, arm.upper], -ENDLESS, ENDLESS)[:, self._columns]
+        self._middle, self._half = 0.5 * (low + high), 0.5 * (high - low)
+        self._pose = arm.pose(settings.start_pose)
+        numbers = error_numbers(model)[self._columns]
+        self._drift = DriftingAngles(numbers if errors else np.zeros_like(numbers), len(thetas), period)
+        self._ready: dict[tuple[int, int], RowState] = {}
+        reach = np.random.default_rng(0).uniform(-1.0, 1.0, (POSES, len(self.joints)))
+        self._starts = self._middle + (1.0 - 2.0 * MARGIN) * self._half * reach
+        n = len(thetas)
+        self.target = np.tile(self._middle, (n, 1))
+        self._angle, self._true = self.target.copy(), self.target.copy()
+        self._speed = np.zeros_like(self._angle)
+
+    def begin(self, row: int, rng: Generator, options: dict[str, Any]) -> None:
+        """Put a machine into a random pose, or that of the options, with a target."""
+        if (pose := options.get("pose")) is not None:
+            self.batch.reset(pose, rows=[row])
+        else:
+            number = int(rng.integers(POSES))
+            if (row, number) not in self._ready:
+                start = self._pose.copy()
+                start[self._columns] = self._starts[number]
+                self.batch.reset(start, rows=[row])
+                self._ready[row, number] = self.batch.state(row)
+            self.batch.restore(row, self._ready[row, number])
+        reach = (1.0 - 2.0 * MARGIN) * rng.uniform(-1.0, 1.0, len(self.joints))
+        wished = options.get("target")
+        target = self._middle + self._half * reach if wished is None else np.asarray(wished, float)
+        if target.shape != self._middle.shape:
+            raise ValueError(f"a target needs {len(self.joints)} angles [rad]")
+        self.target[row] = target
+        angle = self.batch.angle[row, self._columns]
+        self._angle[row], self._true[row], self._speed[row] = angle, angle, 0.0
+        self._drift.reset(np.array([row]))
+
+    def step(self, action: Any, rng: Generator) -> None:
+        """Hold actions, (n, K), for a decision."""
+        command = np.zeros((len(self.batch), len(self._pose)))
+        command[:, self._columns] = 100.0 * np.clip(action, -1.0, 1.0)
+        after = self.batch.step(command)[:, self._columns]
+        error = self._drift.step(after - self._true, rng)
+        self._true = after
+        self._speed = (after + error - self._angle) / self.period
+        self._angle = after + error
+
+    def observe(self, rng: Generator) -> Floats:
+        """Return what the sensors read, (n, 3 K)."""
+        noise = self._drift.noise(rng)
+        parts = self._angle + noise - self._middle, self.target - self._angle - noise, self._speed
+        seen = np.nan_to_num(np.hstack([part / self._half for part in parts]))
+        return seen.clip(-LARGEST, LARGEST).astype(np.float32)
+
+    @property
+    def reward(self) -> Array:
+        """Minus the mean distance to the targets in halves of the range, (n,)."""
+        return -np.mean(np.abs(np.nan_to_num(self.target - self._angle, nan=10.0)) / self._half, axis=1)
+
+    @property
+    def diverged(self) -> Any:
+        """Machines whose simulation diverged, (n,)."""
+        return np.isnan(self._true).any(axis=1)
+
+
+def _opened(source: Any) -> IdentifiedModel:
+    """Return the model of a run folder, of the result of a fit, or itself."""
+    return load_identified(source) if isinstance(source, str | Path) else getattr(source, "model", source)
+
+
+def _spaces(joints: int) -> tuple[Any, Any]:
+    """Return the spaces of observations and actions of K joints."""
+    actions = gymnasium.spaces.Box(-1.0, 1.0, (joints,), np.float32)
+    return gymnasium.spaces.Box(-LARGEST, LARGEST, (3 * joints,), np.float32), actions
+
+
+class Env(gymnasium.Env[Floats, Floats]):
+    """A fitted machine whose joints are to be brought to random angles.
+
+        env = hydroid.Env("runs/hyd", draws=20)
+        observation, info = env.reset(seed=1, options={"draw": 3})
+
+    Options of `reset`: `draw`, 0 for the fit's estimate and else the number of a draw, by default a random
+    one of them; `pose`, of all joints [rad] or a name; `target`, angles [rad] of joints that take commands.
+
+    Args:
+        source: a run folder, or the result of a fit.
+        draws: how many other machines there are.
+        seed: of the draws.
+        seconds: of an episode.
+        decision_s: time that an action is held, about [s].
+        errors: whether angles drift and sensors have noise, as the fit's error model says.
+
+    Raises:
+        RunError: the folder holds no estimate, or with draws no covariance.
+    """
+
+    metadata = {"render_modes": []}  # noqa: RUF012  # gymnasium's own name and type
+
+    def __init__(
+        self,
+        source: Any,
+        *,
+        draws: int = 0,
+        seed: int = 0,
+        seconds: float = 5.0,
+        decision_s: float = DECISION,
+        errors: bool = True,
+    ) -> None:
+        self._model, self._seconds = _opened(source), seconds
+        drawn = draw(self._model, draws, seed).theta if draws else np.empty((0, len(self._model.theta)))
+        self._thetas = np.vstack([self._model.theta, drawn])
+        self._errors, self._decision = errors, decision_s
+        self._made: dict[int, _Machines] = {}
+        self._now = self._machine(0)
+        self.joints = self._now.joints
+        self.observation_space, self.action_space = _spaces(len(self.joints))
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Floats, dict[str, Any]]:
+        """Begin an episode; `info` names the draw."""
+        super().reset(seed=seed)
+        options = options or {}
+        number = options.get("draw")
+        number = int(self.np_random.integers(len(self._thetas))) if number is None else int(number)
+        if not 0 <= number < len(self._thetas):
+            raise SettingsError(
+                f"is {number}", "draw", f"0 to {len(self._thetas) - 1}: name more with draws="
+            )
+        self._now = self._machine(number)
+        self._now.begin(0, self.np_random, options)
+        return self._now.observe(self.np_random)[0], {"draw": number}
+
+    def step(self, action: Floats) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
+        """Hold an action for one decision."""
+        now = self._now
+        now.step(action[None], self.np_random)
+        over = bool(now.batch.time[0] >= self._seconds - 1e-9)
+        observation = now.observe(self.np_random)[0]
+        return observation, float(now.reward[0]), bool(now.diverged[0]), over, {}
+
+    @property
+    def plant(self) -> Plant:
+        """The machine of this episode; it is stepped by the environment."""
+        return self._now.batch.plants[0]
+
+    def _machine(self, number: int) -> _Machines:
+        if number not in self._made:
+            self._made[number] = _Machines(
+                self._model,
+                self._thetas[[number]],
+                errors=self._errors,
+                decision=self._decision,
+                threads=1,
+            )
+        return self._made[number]
+
+
+class VectorEnv(GymnasiumVectorEnv[Floats, Floats, Any]):
+    """n such machines in one call, each its own draw: `Env` says what they do.
+
+    An episode that is over begins anew with the next step, whose action is not taken
+    (`AutoresetMode.NEXT_STEP`).
+
+    Args:
+        source: a run folder, or the result of a fit.
+        num_envs: n; the first is the fit's estimate, and the others are draws.
+        draws: whether they are; else all are the estimate.
+        seed, seconds, decision_s, errors: as of `Env`.
+        threads: that step them; None: one per core.
+    """
+
+    metadata = {"autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
+
+    def __init__(
+        self,
+        source: Any,
+        num_envs: int,
+        *,
+        draws: bool = True,
+        seed: int = 0,
+        seconds: float = 5.0,
+        decision_s: float = DECISION,
+        errors: bool = True,
+        threads: int | None = None,
+    ) -> None:
+        model = _opened(source)
+        thetas = np.tile(model.theta, (num_envs, 1))
+        if draws and num_envs > 1:
+            thetas[1:] = draw(model, num_envs - 1, seed).theta
+        self._machines = _Machines(model, thetas, errors=errors, decision=decision_s, threads=threads)
+        self._seconds, self.num_envs, self.joints = seconds, num_envs, self._machines.joints
+        self.single_observation_space, self.single_action_space = _spaces(len(self.joints))
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._over = np.zeros(num_envs, dtype=bool)
+
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Floats, dict[str, Any]]:
+        """Begin an episode of every machine, or of those that `options["reset_mask"]` has, (n,)."""
+        if seed is not None:
+            self._np_random = np.random.default_rng(seed)  # pyright: ignore[reportArgumentType]
+        options = options or {}
+        for row in np.flatnonzero(options.get("reset_mask", np.ones(self.num_envs, dtype=bool))).tolist():
+            self._machines.begin(row, self.np_random, options)
+        self._over[:] = False
+        return self._machines.observe(self.np_random), {}
+
+    def step(self, actions: Floats) -> tuple[Floats, Array, Any, Any, dict[str, Any]]:
+        """Hold the actions, (n, K), for one decision."""
+        machines, began = self._machines, self._over
+        machines.step(actions, self.np_random)
+        for row in np.flatnonzero(began).tolist():
+            machines.begin(row, self.np_random, {})
+        reward = np.where(began, 0.0, machines.reward)
+        terminated = machines.diverged & ~began
+        truncated = (machines.batch.time >= self._seconds - 1e-9) & ~began
+        self._over = terminated | truncated
+        return machines.observe(self.np_random), reward, terminated, truncated, {}

@@ -1,0 +1,267 @@
+"""Commands that lead an arm along angles over time: a feed-forward by inversion, looking ahead.
+
+The wished speeds go through the inverse of the settled speeds (`plant.steady`), earlier by each joint's delay
+and lags. What valves and oil do on the way besides is learnt from the model itself: the commands are
+simulated, and the speeds that are missing are added to the wish, without the frequencies that the lags keep
+from being followed (iterative learning control; D. A. Bristow, M. Tharayil, A. G. Alleyne, *A survey of
+iterative learning control*, 2006). No measurement is needed for that: a model errs the same way every time.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from scipy.signal import butter, sosfiltfilt
+
+from hydroid.arrays import Array, Index, record, rms
+from hydroid.errors import LogError, SettingsError
+from hydroid.identified_model import IdentifiedModel
+from hydroid.log import Log
+from hydroid.plant import Plant
+from hydroid.plant.steady import LEAST_SPEED, Limit
+from hydroid.posterior.band import prediction_bands
+
+MOST_TURNS = 15
+"""simulations in which commands are learnt"""
+GAINED = 0.02
+"""part by which an error must fall for another turn to be worth it"""
+TURNS_WITHOUT = 3  # in a row before learning ends
+PASSED = 0.25
+"""of the speeds that are missing, what is slower than so much over a joint's lags is learnt [cycles]"""
+FASTEST = 0.2  # of that, at most so much of a sample's rate
+QUIET = 0.005
+"""part of a joint's largest wished speed below which it stands: no valve should chatter on its dead band"""
+AWAY, AWAY_SLOW = 0.02, 0.1
+"""part of its largest wished speed by which a joint must miss a wish for a span to be named; the second of
+wishes that are slow, which every path has where it turns round"""
+
+
+@record
+class Missed:
+    """A span in which a joint cannot have its wished speeds, and why.
+
+    `wished` and `had` are the speeds [rad/s], of joints that slide [m/s], where they differ most.
+    """
+
+    joint: int  # 0-based
+    limit: Limit
+    from_s: float
+    to_s: float
+    wished: float
+    had: float
+
+
+@record
+class Followed:
+    """Commands along a path, and what the model makes of them, over T samples of J joints.
+
+    Attributes:
+        log: the commands [%], with the wished angles; it may begin with a rest of `lead_s`.
+        angle: that the commands give [rad], shape (T, J).
+        half: of the 95 % band of this angle [rad], shape (T,), by joint (number, from 1).
+        missed: where a wish cannot be had.
+        lead_s: time by which the path begins later than asked, so that commands can come before it [s].
+        joints: that take commands, numbered from 1.
+        turns: simulations in which commands were learnt.
+    """
+
+    log: Log
+    angle: Array
+    half: Mapping[int, Array]
+    missed: tuple[Missed, ...]
+    lead_s: float
+    joints: tuple[int, ...]
+    turns: int
+
+    def error(self, joint: int) -> Array:
+        """Return wished minus predicted angle of a joint (number, from 1) [rad], shape (T,)."""
+        return self.log.angle[:, joint - 1] - self.angle[:, joint - 1]
+
+    def rms(self, joint: int) -> tuple[float, float]:
+        """Return the predicted rms error of a joint (number, from 1) [rad], and that within its band."""
+        error = self.error(joint)
+        half = self.half.get(joint)
+        wide = np.inf if half is None else float(np.sqrt(np.mean(error**2 + half**2)))
+        return float(rms(error)), wide
+
+
+def follow(model: IdentifiedModel, path: Log, *, payload: float = 0.0) -> Followed:
+    """Return commands that lead the joints along angles.
+
+    Args:
+        model: of stage 2.
+        path: angles over time [rad]; joints that it does not hold rest in its `pose`.
+        payload: mass in the gripper [kg].
+
+    Raises:
+        LogError: a joint that takes no commands should move, or an angle is missing.
+        SettingsError: a model of stage 1.
+        RunError: the simulation diverged.
+    """
+    plant = Plant(model, payload=payload)
+    if model.settings.stage != "hyd":
+        raise SettingsError("a gain gives torques, not speeds", model.source, "name a fit of stage 2")
+    _refuse_unmoved(plant, path)
+    lags = joint_lags(plant)
+    wished, missed = _within_range(plant, _with_rest(path, float(lags.max(initial=0.0))))
+    tracker = _Tracker(plant, wished, lags)
+    missed += tracker.missed()
+    command, angle, turns = tracker.learn()
+    log = replace(wished, command=command)
+    bands = prediction_bands(model, log, angle[:, [j - 1 for j in model.settings.outputs]])
+    half = {joint: band.half for joint, band in bands.items() if joint in plant.joints}
+    lead = (len(log.time) - len(path.time)) * path.period
+    return Followed(log, angle, half, tuple(missed), lead, plant.joints, turns)
+
+
+def joint_lags(plant: Plant) -> Array:
+    """Return by how much joints are late [s], shape (J,): delay and lags, the mean of both sides."""
+    own, lags = plant.actuators, np.zeros(len(plant.names))
+    late = own["opening_lag"] + 0.5 * (own["delay_a"] + own["delay_b"])
+    late = late + 0.5 * (own["pilot_lag_a"] + own["pilot_lag_b"])
+    # at half its stroke the solenoid adds as much stiffness as the spring has
+    damping = 0.5 * (own["plunger_damping_a"] + own["plunger_damping_b"])
+    late = late + 0.5 * damping / own["plunger_stiffness"]
+    late = late + 2.0 * own["oil_damping"] / (2.0 * np.pi * own["oil_frequency"])
+    driven = [joint - 1 for joint in plant.joints]
+    lags[driven] = late[driven]
+    return lags
+
+
+def _refuse_unmoved(plant: Plant, path: Log) -> None:
+    """Refuse a path that moves joints without commands, or that has too few samples to be one."""
+    if len(path.time) < 3:
+        raise LogError("holds no path", path.source, "give three samples at least")
+    still = np.ptp(path.posed, axis=0) < LEAST_SPEED
+    for joint in np.flatnonzero(~still).tolist():
+        if joint + 1 not in plant.joints:
+            named = ", ".join(plant.names[j - 1] for j in plant.joints)
+            what = f"joint {plant.names[joint]} should move, but the fit gives commands to {named} only"
+            raise LogError(what, path.source, "leave its column out, or fit a log that drives it")
+
+
+def _with_rest(path: Log, lag: float) -> Log:
+    """Return a path whose first motion leaves time for commands that come before it."""
+    angle, period = path.posed, path.period
+    moves = np.flatnonzero(np.any(np.abs(angle - angle[0]) > LEAST_SPEED, axis=1))
+    rests = int(moves[0]) - 1 if len(moves) else len(angle)
+    more = max(int(np.ceil(lag / period)) + 1 - rests, 0)
+    angle = np.concatenate([np.repeat(angle[:1], more, axis=0), angle])
+    time = np.arange(len(angle), dtype=float) * period
+    return Log(path.source, time, np.zeros_like(angle), angle, period)
+
+
+def _within_range(plant: Plant, path: Log) -> tuple[Log, list[Missed]]:
+    """Return a path clipped to the joints' ranges, and the spans that were."""
+    arm = plant.identified.settings.arm
+    clipped = path.angle.clip(arm.lower, arm.upper)
+    missed = list[Missed]()
+    for joint in range(path.joints):
+        beyond = np.abs(path.angle[:, joint] - clipped[:, joint])
+        if joint + 1 in plant.joints and beyond.max() > LEAST_SPEED:
+            at = np.flatnonzero(beyond > LEAST_SPEED)
+            wished = float(np.gradient(path.angle[:, joint], path.period)[at[0]])
+            times = float(path.time[at[0]]), float(path.time[at[-1]])
+            missed.append(Missed(joint, Limit.STOP, *times, wished, 0.0))
+    return replace(path, angle=clipped), missed
+
+
+def _named(limit: Limit | None, away: float) -> bool:
+    """Whether a reason is named where a joint misses its wish by a part of its largest one."""
+    if limit is None:
+        return False
+    return away > (AWAY_SLOW if limit in (Limit.SLOWEST, Limit.LEAKS) else AWAY)
+
+
+class _Tracker:
+    """Learns commands along a path of one plant."""
+
+    def __init__(self, plant: Plant, path: Log, lags: Array) -> None:
+        self._plant, self._path, self._lags = plant, path, lags
+        plant.reset(path.angle[0])
+        self._steady = plant.steady()
+        angle = path.angle
+        self._pose = np.concatenate([0.5 * (angle[1:] + angle[:-1]), angle[-1:]])
+        self._speed = np.concatenate([np.diff(angle, axis=0), np.zeros((1, path.joints))]) / path.period
+        self._load = self._steady.weighing.loads(self._pose)
+        self._driven: Index = np.array(plant.joints) - 1
+
+    def missed(self) -> list[Missed]:
+        """Return the spans in which the wished speeds cannot be had as settled ones."""
+        speed, pose, time = self._speed, self._pose, self._path.time
+        command, reached = self._steady.commands(speed, pose, self._load)
+        rows = np.flatnonzero(np.any(np.abs(reached - speed) > self._quiet(), axis=1))
+        limits = self._steady.limits(speed[rows], reached[rows], command[rows], pose[rows])
+        by_row = dict(zip(rows.tolist(), limits, strict=True))
+        found = list[Missed]()
+        for joint in self._driven.tolist():
+            largest = max(float(np.abs(speed[:, joint]).max()), LEAST_SPEED)
+            away = np.abs(reached - speed)[:, joint] / largest
+            at = [row for row in by_row if _named(by_row[row].get(joint), away[row])]
+            for span in np.split(np.array(at, int), np.flatnonzero(np.diff(at) > 1) + 1):
+                if len(span):
+                    worst = int(span[np.argmax(away[span])])
+                    speeds = float(speed[worst, joint]), float(reached[worst, joint])
+                    times = float(time[span[0]]), float(time[span[-1]])
+                    found.append(Missed(joint, by_row[worst][joint], *times, *speeds))
+        return found
+
+    def learn(self) -> tuple[Array, Array, int]:
+        """Return commands [%] and the angles that they give [rad], (T, J), and the simulations it took."""
+        wish = self._speed.copy()
+        command = self._commands(wish)
+        best = command, self._simulate(command)
+        least = self._size(best[1])
+        turns, without = 1, 0
+        angle = best[1]
+        while turns < MOST_TURNS and without < TURNS_WITHOUT:
+            wish = wish + self._learnable(self._path.angle - angle)
+            command = self._commands(wish)
+            angle = self._simulate(command)
+            size = self._size(angle)
+            turns += 1
+            without = 0 if size < (1.0 - GAINED) * least else without + 1
+            if size < least:
+                best, least = (command, angle), size
+        return *best, turns
+
+    def _size(self, angle: Array) -> float:
+        """Rms error of the driven joints [rad]."""
+        return float(rms((self._path.angle - angle)[:, self._driven]))
+
+    def _quiet(self) -> Array:
+        """Speeds of joints that count as standing [rad/s], shape (J,)."""
+        return np.maximum(QUIET * np.abs(self._speed).max(axis=0), LEAST_SPEED)
+
+    def _commands(self, wish: Array) -> Array:
+        """Commands [%] for wished speeds [rad/s], (T, J), earlier by the joints' lags."""
+        time, period = self._path.time, self._path.period
+        ahead, pose, load = np.zeros_like(wish), self._pose.copy(), self._load.copy()
+        for joint in self._driven.tolist():
+            lag = float(self._lags[joint])
+            ahead[:, joint] = np.interp(time + lag, time, wish[:, joint], right=0.0)
+            row = np.minimum(np.arange(len(time)) + round(lag / period), len(time) - 1)
+            pose[:, joint] = self._pose[row, joint]
+            load[:, joint] = self._load[row, joint]
+        ahead[np.abs(ahead) < self._quiet()] = 0.0
+        return self._steady.commands(ahead, pose, load)[0]
+
+    def _simulate(self, command: Array) -> Array:
+        angle = np.empty_like(command)
+        angle[0] = self._plant.reset(self._path.angle[0])
+        for k, given in enumerate(command[:-1]):
+            angle[k + 1] = self._plant.step(given)
+        return angle
+
+    def _learnable(self, error: Array) -> Array:
+        """Speeds that are missing [rad/s] where angles err [rad], both (T, J), as far as lags let them."""
+        period = self._path.period
+        missing = np.concatenate([np.diff(error, axis=0), np.zeros((1, error.shape[1]))]) / period
+        slow = np.zeros_like(missing)
+        for joint in self._driven.tolist():
+            lag = max(float(self._lags[joint]), period)
+            cutoff = min(PASSED / lag, FASTEST / period)
+            sections = butter(2, 2.0 * cutoff * period, output="sos")
+            pad = min(len(missing) - 1, round(3.0 / (cutoff * period)))
+            slow[:, joint] = sosfiltfilt(sections, missing[:, joint], padlen=pad, padtype="constant")
+        return slow

@@ -1,0 +1,89 @@
+"""The environments keep gymnasium's contract, repeat themselves, and are the plant underneath."""
+
+import warnings
+
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from made_logs import HYDRAULIC, TRUTH
+
+import hydroid
+from hydroid import load_settings
+from hydroid.errors import RunError, SettingsError
+from hydroid.identified_model import IdentifiedModel, identified
+from hydroid.plant import Plant
+from hydroid.use.environment import Env, VectorEnv
+
+VALUES = TRUTH | HYDRAULIC | {"open_A": 0.4, "open_B": 0.4, "delay": 0.03, "friction": 20.0}
+
+
+@pytest.fixture(scope="module")
+def model() -> IdentifiedModel:
+    changes = {"start_pose": "study", "simulation.model": "quasi-static", "outputs": [2, 3]}
+    settings = load_settings("fit-hyd", changes)
+    return identified(settings, {n: v for n, v in VALUES.items() if n in settings.parameters}, "test")
+
+
+def test_gymnasium_finds_nothing_wrong(model):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(Env(model), skip_render_check=True)
+
+
+def test_an_action_is_a_command_of_the_plant(model):
+    env = Env(model, errors=False, decision_s=0.04)
+    pose = model.settings.arm.pose("study")
+    _, info = env.reset(seed=1, options={"pose": pose, "target": pose[[1, 2]]})
+    assert info == {"draw": 0}
+    plant = Plant(model, joints=[2, 3])
+    plant.reset(pose)
+    for _ in range(10):
+        _, reward, terminated, truncated, _ = env.step(np.array([0.5, -0.7], np.float32))
+        assert (reward < 0.0, terminated, truncated) == (True, False, False)
+        for _ in range(4):
+            plant.step({"shoulder": 50, "elbow": -70})
+    # actions have half the digits
+    np.testing.assert_allclose(env.plant.data.qpos, plant.angle[[1, 2]], atol=1e-7)
+
+
+def test_episodes_end_in_time_and_repeat_themselves(model):
+    env = Env(model, seconds=0.5)
+
+    def episode(seed):
+        seen, over = [env.reset(seed=seed)[0]], False
+        while not over:
+            observation, _, _, over, _ = env.step(np.array([0.3, 0.9], np.float32))
+            seen.append(observation)
+        return np.array(seen)
+
+    first, again, other = episode(5), episode(5), episode(6)
+    assert len(first) == 11
+    np.testing.assert_array_equal(first, again)
+    assert not np.array_equal(first, other)
+
+
+def test_a_vector_of_machines_is_one_call(model):
+    several = VectorEnv(model, 5, draws=False, seconds=0.5, threads=1, errors=False)
+    first, _ = several.reset(seed=3)
+    assert first.shape == (5, 6)
+    assert several.observation_space.contains(first)
+    action = np.tile(np.array([0.4, -0.4], np.float32), (5, 1))
+    ends = []
+    for _ in range(12):
+        observation, reward, terminated, truncated, _ = several.step(action)
+        assert several.observation_space.contains(observation)
+        assert reward.shape == (5,)
+        assert not terminated.any()
+        ends.append(truncated.copy())
+    assert ends[9].all()  # after half a second all are over, and begin anew with the next step
+    assert not ends[10].any()
+    assert not np.array_equal(first, several.reset()[0])
+    np.testing.assert_array_equal(several.reset(seed=3)[0], first)
+
+
+def test_draws_need_a_fit(model):
+    with pytest.raises(RunError, match="no covariance"):
+        Env(model, draws=2)
+    with pytest.raises(SettingsError, match="name more with draws="):
+        Env(model).reset(options={"draw": 1})
+    assert hydroid.Env is Env

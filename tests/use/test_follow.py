@@ -1,0 +1,160 @@
+"""Commands along a path: played on the model they lead it there, and what cannot be had is said by name."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas
+import pytest
+from made_logs import HYDRAULIC, TRUTH
+
+import hydroid
+from hydroid import load_settings
+from hydroid.errors import HydroidError
+from hydroid.identified_model import IdentifiedModel, identified
+from hydroid.log import Log, write_log
+from hydroid.plant import Limit, Plant
+from hydroid.use.follow import follow, joint_lags
+
+VALUES = (
+    TRUTH
+    | HYDRAULIC
+    | {"open_A": 0.3, "open_B": 0.3, "delay": 0.05, "friction": 20.0, "S": 0.0, "A": 0.05, "C": 0.05}
+)
+JOINTS = {"shoulder": 1, "elbow": 2}
+
+
+def model(kind="quasi-static", **hydraulics) -> IdentifiedModel:
+    values = {"onset_a": 0.05, "onset_b": 0.05, "leakage": 0.0} | hydraulics
+    changes = {f"hydraulics.{name}": value for name, value in values.items()}
+    changes |= {"start_pose": "study", "simulation.model": kind, "outputs": [2, 3]}
+    settings = load_settings("fit-hyd", changes)
+    return identified(settings, {n: v for n, v in VALUES.items() if n in settings.parameters}, "test")
+
+
+def path(one: IdentifiedModel, speed=0.05, seconds=6.0, rest=0.5, joints=JOINTS) -> Log:
+    """Half waves of some joints, after a rest; `speed` [rad/s] is the largest."""
+    period = one.settings.log.period_s
+    time = np.arange(round(seconds / period)) * period
+    angle = np.tile(one.settings.arm.pose(one.settings.start_pose), (len(time), 1))
+    turn = 2 * np.pi / (seconds - rest) * np.maximum(time - rest, 0.0)
+    for joint in joints.values():
+        angle[:, joint] += 0.5 * speed * (seconds - rest) / (2 * np.pi) * (1 - np.cos(turn))
+    return Log("path", time, np.zeros_like(angle), angle, period)
+
+
+@pytest.mark.parametrize("kind", ["quasi-static", "dynamic"])
+@pytest.mark.parametrize(
+    "values",
+    [
+        {},
+        {"dead_band_a": 20.0, "dead_band_b": 15.0, "pilot_lag_a": 0.1, "pilot_lag_b": 0.1},
+        {"opening_lag": 0.15, "opening_exponent_a": 1.7, "pump_flow": 5.0},
+    ],
+)
+def test_the_commands_lead_the_model_along_the_path(kind, values):
+    one = model(kind, **values)
+    wished = path(one)
+    found = follow(one, wished)
+    assert not found.missed
+    plant = Plant(one)
+    angle = [plant.reset(wished.start)]
+    for command in found.log.command[:-1]:
+        angle.append(plant.step(command))
+    np.testing.assert_array_equal(angle, found.angle)  # as predicted, to the bit
+    travel = np.ptp(wished.angle, axis=0)
+    for joint in JOINTS.values():
+        assert found.rms(joint + 1)[0] < 0.01 * travel[joint]
+    assert not found.log.command[:, [0, 3, 4, 5, 6]].any()
+
+
+def test_commands_come_before_the_motion_by_delay_and_lags():
+    """A path that begins at once begins later than its commands, by what the joints are late."""
+    early = path(one := model(), rest=0.0)
+    late_model = model(opening_lag=0.2)
+    first, second = follow(one, early), follow(late_model, early)
+    lags = joint_lags(Plant(one))
+    assert lags[1] >= 0.05  # the delay of the shoulder alone
+    assert first.lead_s >= lags.max()
+    assert second.lead_s - first.lead_s == pytest.approx(0.2, abs=2 * early.period)
+    assert follow(one, path(one, rest=1.0)).lead_s == 0.0
+    np.testing.assert_array_equal(first.log.angle[-len(early.time) :], early.angle)
+
+
+def test_lifting_takes_more_command_than_lowering():
+    one = model()
+    found = follow(one, path(one, joints={"shoulder": 1}))
+    command, speed = found.log.command[:, 1], np.gradient(found.angle[:, 1])
+    there, back = command[speed > 0.8 * speed.max()], command[speed < 0.8 * speed.min()]
+    assert abs(there.mean() + back.mean()) > 0.02 * abs(there.mean() - back.mean())
+
+
+def test_what_cannot_be_had_is_named_and_the_nearest_taken():
+    one = model()
+    fast = follow(one, path(one, speed=2.0, seconds=1.5, joints={"elbow": 2}))
+    assert {(missed.joint, missed.limit) for missed in fast.missed} == {(2, Limit.FULL)}
+    assert np.abs(fast.log.command).max() == 100.0
+    assert all(abs(missed.had) < abs(missed.wished) for missed in fast.missed)
+    beyond = path(one, speed=0.05, joints={"elbow": 2})
+    arm = one.settings.arm
+    beyond.angle[:, 2] += arm.upper[2] - beyond.angle[:, 2].max() + 0.01
+    found = follow(one, beyond)
+    assert Limit.STOP in {missed.limit for missed in found.missed}
+    assert found.angle[:, 2].max() <= arm.upper[2] + 1e-3
+
+
+def test_the_command_line_writes_a_log_that_simulates_to_the_path(tmp_path: Path):
+    one = model()
+    settings = one.settings
+    wished = path(one)
+    write_log(tmp_path / "path.csv", wished, settings.log)
+    out = tmp_path / "out" / "commands.csv"
+    result = hydroid.follow(tmp_path / "path.csv", fit=one, out=out)
+    assert {file.name for file in out.parent.iterdir()} == {"commands.csv", "commands.html", "tables"}
+    again = hydroid.simulate(out, fit=one).log
+    np.testing.assert_allclose(again.angle[:, [1, 2]], wished.angle[:, [1, 2]], atol=np.radians(0.1))
+    rows = result.plain()["joints"]
+    assert [row["name"] for row in rows] == ["shoulder", "elbow"]
+    assert max(row["rms_deg"] for row in rows) < 0.1
+    assert "shoulder" in result._repr_html_()
+
+
+def test_a_joint_without_a_column_rests_and_a_misspelt_one_is_named(tmp_path: Path):
+    """Also where the settings map each joint to a column of its own, as those of `hydroid init` do."""
+    urdf = Path(__file__).parents[2] / "examples" / "urdf"
+    hydroid.init(tmp_path / "mine", arm=urdf / "robot.urdf", log=[urdf / "log_1.csv"])
+    one = hydroid.load_plant(tmp_path / "mine" / "fit.yaml").identified
+    settings = one.settings
+    wished = path(one, seconds=3.0, joints={"boom": 1})
+    write_log(tmp_path / "whole.csv", wished, settings.log)
+    mapped = settings.log.columns("angle", 2)
+    assert mapped is not None
+    own = [settings.log.time.column, mapped.column[0]]
+    whole = pandas.read_csv(tmp_path / "whole.csv")[own]
+    whole.to_csv(tmp_path / "boom.csv", index=False)
+    whole.rename(columns={own[1]: "elbwo"}).to_csv(tmp_path / "elbwo.csv", index=False)
+    found = hydroid.follow(tmp_path / "boom.csv", fit=one).result
+    moved = np.ptp(found.log.angle, axis=0)
+    assert moved[1] == pytest.approx(np.ptp(wished.angle[:, 1]), rel=1e-6)
+    assert not np.delete(moved, 1).any()
+    with pytest.raises(HydroidError, match="unused: elbwo"):
+        hydroid.follow(tmp_path / "elbwo.csv", fit=one)
+
+
+@pytest.mark.parametrize(
+    ("refused", "says"),
+    [
+        (lambda one: path(one, joints={"azimuth": 0}), "azimuth should move"),
+        (lambda one: path(one).part(0, 2), "no path"),
+    ],
+)
+def test_a_path_that_is_none_is_refused(refused, says):
+    one = model()
+    with pytest.raises(HydroidError, match=says):
+        hydroid.follow(refused(one), fit=one)
+
+
+def test_a_fit_of_stage_1_is_refused():
+    settings = load_settings("fit-mech", {"start_pose": "study"})
+    mech = identified(settings, {n: v for n, v in VALUES.items() if n in settings.parameters}, "test")
+    with pytest.raises(HydroidError, match="stage 2"):
+        hydroid.follow(path(model()), fit=mech)

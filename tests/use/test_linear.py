@@ -1,0 +1,92 @@
+"""The linear system against small steps of the plant."""
+
+import json
+
+import numpy as np
+import pytest
+from made_logs import HYDRAULIC, TRUTH
+from scipy.signal import StateSpace, lsim
+
+from hydroid import load_settings
+from hydroid.errors import SettingsError
+from hydroid.identified_model import identified
+from hydroid.plant import Plant
+from hydroid.use.linear import linearise
+
+VALUES = TRUTH | HYDRAULIC | {"open_A": 0.3, "open_B": 0.3, "delay": 0.05, "friction": 20.0, "S": 0.0}
+HELD = {"shoulder": 40.0, "elbow": -50.0}
+
+
+def made(model: str, **hydraulics: float) -> Plant:
+    values = {"leakage": 0.0} | hydraulics
+    changes = {f"hydraulics.{name}": value for name, value in values.items()}
+    changes |= {"start_pose": "study", "simulation.model": model, "log.period_s": 0.002}
+    settings = load_settings("fit-hyd", changes)
+    values = {name: value for name, value in VALUES.items() if name in settings.parameters}
+    return Plant(identified(settings, values, "test"), joints=[2, 3])
+
+
+def response(plant: Plant, change: dict[str, float], seconds: float) -> np.ndarray:
+    """Angles of both joints under held commands that change after a second, (T, 2), from then on."""
+    plant.reset("study")
+    held = dict(HELD)
+    while plant.time < 1.0 - 1e-9:
+        plant.step(held)
+    angle = [plant.angle[[1, 2]]]
+    for _ in range(round(seconds / plant.period)):
+        angle.append(plant.step({name: one + change.get(name, 0.0) for name, one in held.items()})[[1, 2]])
+    return np.array(angle)
+
+
+@pytest.mark.parametrize(
+    ("model", "values", "close"),
+    [
+        ("quasi-static", {}, 0.03),
+        ("quasi-static", {"opening_lag": 0.1, "pilot_lag_a": 0.05, "pilot_lag_b": 0.05}, 0.03),
+        (
+            "quasi-static",
+            {"oil_frequency": 3.0, "oil_damping": 0.3, "pump_flow": 5.0, "pump_droop": 100.0},
+            0.05,
+        ),
+        ("dynamic", {}, 0.1),
+    ],
+)
+@pytest.mark.parametrize("name", ["shoulder", "elbow"])
+def test_a_small_step_moves_the_plant_as_the_linear_system_says(model, values, close, name):
+    plant, seconds = made(model, **values), 0.8
+    before = response(plant, {}, seconds)
+    after = response(plant, {name: 2.0}, seconds)
+    plant.reset("study")
+    while plant.time < 1.0 - 1e-9:
+        plant.step(HELD)
+    command = np.array([HELD.get(one, 0.0) for one in plant.names])
+    linear = linearise(plant, command)
+    time = np.arange(len(before)) * plant.period
+    late = np.searchsorted(time, linear.delay[linear.joints.index(name)] - 1e-9)
+    given = np.zeros((len(time), 2))
+    given[late:, linear.joints.index(name)] = 2.0
+    system = StateSpace(linear.a, linear.b, linear.c, linear.d)
+    found = lsim(system, given, time, interp=False)[1][:, :2]
+    moved = after - before
+    size = np.abs(moved).max()
+    assert np.abs(found - moved).max() < close * size
+
+
+def test_it_reads_as_json_with_names_and_units():
+    plant = made("quasi-static", opening_lag=0.1)
+    command = np.array([HELD.get(one, 0.0) for one in plant.names])
+    read = json.loads(linearise(plant, command).text())
+    assert read["joints"] == ["shoulder", "elbow"]
+    states = len(read["states"])
+    assert np.shape(read["A"]) == (states, states)
+    assert np.shape(read["B"]) == (states, 2)
+    assert np.shape(read["C"]) == (4, states)
+    assert read["delay"][0] == pytest.approx(0.05)
+    speed = plant.speeds(command)[[1, 2]]
+    np.testing.assert_allclose(read["speed"], speed)
+
+
+def test_a_dead_band_has_no_slope():
+    plant = made("quasi-static")
+    with pytest.raises(SettingsError, match="elbow at a command of 0"):
+        linearise(plant, np.array([0, 40.0, 0, 0, 0, 0, 0]))

@@ -1,6 +1,7 @@
 """Fit one problem, with settings and logs that are read: `hydroid.fit`."""
 
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from datetime import date
 from pathlib import Path
@@ -12,7 +13,6 @@ from hydroid.commands.inputs import LogSource, LogSources, ModelSource, Source
 from hydroid.commands.logs import earlier_logs, read_log, read_logs, refuse_undriven
 from hydroid.errors import RunError, SettingsError
 from hydroid.estimate import NAME, FitSummary
-from hydroid.files import write_atomic
 from hydroid.identified_model import IdentifiedModel
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.log import OTHER, log_file
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from hydroid.problem.problem import Problem
     from hydroid.reporting.page import Table
     from hydroid.run.folder import RunFolder
+    from hydroid.run.record import FitRecord
     from hydroid.use.draws import Draws
 
 
@@ -43,8 +44,7 @@ class FitResult(Printed):
         folder: the run folder; None where nothing was written.
         summary: the final estimate with its uncertainty, as in `estimate.yaml`.
         model: at the final estimate.
-        predictions: what its estimates make of its logs.
-        baselines: fitted to the same logs, by joint and name.
+        record: the same that the run folder stores, as `load_record(folder).result` reads it.
         earlier: logs of the fits that it began from, which are no test of it either.
     """
 
@@ -53,12 +53,22 @@ class FitResult(Printed):
     folder: Path | None
     summary: FitSummary
     model: IdentifiedModel
-    predictions: "tuple[Prediction, ...]"
-    baselines: "Baselines"
+    record: "FitRecord"
     earlier: "tuple[Log, ...]" = ()
 
+    @property
+    def predictions(self) -> "tuple[Prediction, ...]":
+        """What the final estimate makes of its logs."""
+        return self.record.fitted
+
+    @property
+    def baselines(self) -> "Baselines":
+        """Simple models fitted to the same logs, by joint and name."""
+        return self.record.baselines
+
     def begun_from(self, *fits: "ModelSource | None") -> "FitResult":
-        """Return the fit with the logs that other fits have seen, which it began from; its run keeps them."""
+        """Return the fit with the logs that other fits have seen, which it began from;
+        its run keeps them."""
         from hydroid.run.record import keep_earlier
 
         earlier = earlier_logs(fits)
@@ -97,7 +107,8 @@ class FitResult(Printed):
         return predicted(self.model, read_log(log, self.model.settings), None)
 
     def validate(self, logs: "LogSources", out: Source | None = None) -> "Result[list[Prediction]]":
-        """Return the verdict on each joint by logs that were not fitted; a page of it is written to `out`.
+        """Return the verdict on each joint by logs that were not fitted;
+        a page of it is written to `out`.
 
         Raises:
             LogError, RunError: as of `hydroid.validate`.
@@ -110,7 +121,8 @@ class FitResult(Printed):
         """Return the parameters, one row each: value, unit, sd, interval, flag, ..."""
         import pandas
 
-        rows = {name: one.model_dump() for name, one in self.summary.estimate.items()}
+        estimate = self.summary.estimate
+        rows = {name: parameter.model_dump() for name, parameter in estimate.items()}
         return pandas.DataFrame.from_dict(rows, orient="index")
 
     def report(self, out: Source) -> Path:
@@ -157,19 +169,15 @@ def fit(
     """
     read = read_logs(logs, settings)
     names = [log_file(log.source).name for log in read]
-    if stray := sorted(set(settings.payloads) - set(names)):  # misspelt, it would be left out silently
-        raise SettingsError("is none of the logs", f"payloads.{stray[0]}", f"logs: {', '.join(names)}")
+    _refuse_stray_payloads(settings, names)
     refuse_undriven(read, settings)
-    groups = {None, OTHER, *map(settings.log.group_of, names)}
-    if empty := [p.per for p in settings.parameters.values() if p.fixed is None and p.per not in groups]:
-        raise SettingsError(
-            "none of the logs is in it", f"log.groups.{empty[0]}", f"logs: {', '.join(names)}"
-        )
+    _refuse_empty_groups(settings, names)
     from hydroid.fitting.fit import fit as run_fit
     from hydroid.problem.problem import Problem
     from hydroid.run.folder import RunFolder
     from hydroid.run.process import log_start
 
+    # a folder of another run is refused before the fit, which takes long
     folder = None if out is None else RunFolder(Path(out))
     if folder is not None and folder.exists and not resume:
         raise RunError("holds a run already", out, "resume it, or choose another folder")
@@ -184,6 +192,23 @@ def fit(
     return result
 
 
+def _refuse_stray_payloads(settings: FitSettings, names: Sequence[str]) -> None:
+    """Refuse a payload of no log: misspelt, it would be left out silently."""
+    stray = sorted(set(settings.payloads) - set(names))
+    if stray:
+        hint = f"logs: {', '.join(names)}"
+        raise SettingsError("is none of the logs", f"payloads.{stray[0]}", hint)
+
+
+def _refuse_empty_groups(settings: FitSettings, names: Sequence[str]) -> None:
+    """Refuse to estimate the effect of a group that no log is in."""
+    groups = {None, OTHER, *map(settings.log.group_of, names)}
+    for parameter in settings.parameters.values():
+        if parameter.fixed is None and parameter.per not in groups:
+            hint = f"logs: {', '.join(names)}"
+            raise SettingsError("none of the logs is in it", f"log.groups.{parameter.per}", hint)
+
+
 def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
     from hydroid.advice.assumptions import assumption_findings, doubts
     from hydroid.fitting.summary import summarise
@@ -192,39 +217,46 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
     from hydroid.reporting.knowledge_report import warnings
     from hydroid.reporting.parameters_report import in_words, parameter_table
     from hydroid.reporting.verdict_table import next_lines, next_step, verdict_lines
+    from hydroid.run.record import fit_record
 
-    settings, predictions = fit.problem.settings, fitted(fit)
+    settings = fit.problem.settings
+    predictions = fitted(fit)
     baselines = baselines_of(settings, problem.logs)
-    verdict, summary = judge(settings, predictions, baselines), summarise(problem, fit)
-    doubted = assumption_findings(settings, problem.logs, doubts(settings, problem.logs))
-    findings = [*summary.findings, *doubted]
-    findings[1:1] = behind(settings, verdict)  # after the first, which may be that time was up
+    verdict = judge(settings, predictions, baselines)
+    summary = summarise(problem, fit)
+    doubted = doubts(settings, problem.logs)
+    findings = [*summary.findings, *assumption_findings(settings, problem.logs, doubted)]
+    # after the first, which may be that time was up
+    findings[1:1] = behind(settings, verdict)
     summary = summary.changed({"verdict": verdict, "findings": tuple(findings)})
     source = "the fit" if folder is None else str(folder / NAME)
-    model = IdentifiedModel(settings, fit.best.theta, source, summary)
     lines: list[Table | str] = verdict_lines({fit.final: verdict})
-    lines += [str(in_words(one, settings)) for one in warnings(summary)]
+    lines += [str(in_words(finding, settings)) for finding in warnings(summary)]
     if folder is not None:
         step = next_step(summary, verdict, str(folder), predictions)
         lines += [*next_lines(step), str(folder / "report.html")]
-    details = [
-        parameter_table(settings, summary),
-        *(str(in_words(one, settings)) for one in summary.findings),
-    ]
-    content = summary.plain() | {"out": folder and str(folder)}
+    said = [str(in_words(finding, settings)) for finding in summary.findings]
     return FitResult(
-        lines, content, problem, fit, folder, summary, model, predictions, baselines, details=details
+        lines=lines,
+        content=summary.plain() | {"out": folder and str(folder)},
+        details=[parameter_table(settings, summary), *said],
+        problem=problem,
+        fit=fit,
+        folder=folder,
+        summary=summary,
+        model=IdentifiedModel(settings, fit.best.theta, source, summary),
+        record=fit_record(fit, predictions, baselines),
     )
 
 
 def _store(folder: "RunFolder", result: FitResult) -> Path:
+    """Write a fit to its run folder, and return its page."""
     from hydroid.reporting.predictions import draw
-    from hydroid.run.archive import pack
-    from hydroid.run.record import RESULT, fit_result, keep_earlier
+    from hydroid.run.record import keep_earlier, write_record
 
     began = time.monotonic()
     folder.write_estimate(result.model, result.problem.logs[0])
-    write_atomic(folder.path / RESULT, pack(fit_result(result.fit, result.predictions, result.baselines)))
+    write_record(folder.path, result.record)
     keep_earlier(folder.path, result.earlier)
     folder.status("running", finished=date.today().isoformat())
     page = draw(folder.path)

@@ -164,7 +164,10 @@ def seen_logs(fit: ModelSource) -> list[Log]:
 
 
 def earlier_logs(fits: "Sequence[ModelSource | None]") -> tuple[Log, ...]:
-    """Return the logs that fits have seen, each once; those of a run that cannot be read are left out."""
+    """Return the logs that fits have seen, each once.
+
+    Those of a run that cannot be read are left out.
+    """
     from hydroid.run.folder import samples
 
     seen = dict[bytes, Log]()

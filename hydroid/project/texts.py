@@ -1,4 +1,5 @@
-"""The texts of a project: the arm's file of an import, and the settings of a fit of the whole chain.
+"""The texts of a project: the arm's file of an import,
+and the settings of a fit of the whole chain.
 
 These have starts and priors from the arm and the log.
 """
@@ -11,9 +12,11 @@ import mujoco
 import numpy as np
 
 from hydroid.arm.model import load_model
+from hydroid.arrays import Array
 from hydroid.cad.importer import ImportedArm
 from hydroid.files import Plain, fill_template, yaml_text
 from hydroid.hydraulics.valve import DENSITY
+from hydroid.log import JointMotion
 from hydroid.project.layout import Layout
 from hydroid.settings.arm import Arm, Joint
 from hydroid.settings.cylinder import LinearActuator
@@ -29,9 +32,11 @@ LIFT = 2.0  # torque of a joint at the pump's pressure, over the largest that gr
 
 
 class JointSize(NamedTuple):
-    """What a joint needs: oil [cm³/rad], valve opening [mm²] and damping [N·m·s/rad] at a speed [rad/s].
+    """What a joint needs: oil [cm³/rad], valve opening [mm²] and damping [N·m·s/rad] at
+    a speed [rad/s].
 
-    Of a joint that slides [mm², mm², N·s/m, m/s]. `area` is the one that pushes its cylinder's rod out [mm²].
+    Of a joint that slides [mm², mm², N·s/m, m/s].
+    `area` is the one that pushes its cylinder's rod out [mm²].
     """
 
     displacement: float
@@ -42,33 +47,53 @@ class JointSize(NamedTuple):
 
 
 def joint_sizes(arm: Arm, speeds: Mapping[int, float]) -> tuple[JointSize, ...]:
-    """Return the size of what moves every joint, (J,): starts and centres of wide priors, not estimates.
+    """Return the size of what moves every joint, (J,): starts and centres of wide priors,
+    not estimates.
 
-    The displacement gives the torque at the pump's pressure; the opening gives the speed while the arm is
-    lifted, and both edges lose the same; the damping holds the speed at full command. `speeds` are those that
-    a log shows, by number of the joint [rad/s, m/s]; USUAL_SPEED for the others.
+    The displacement gives the torque at the pump's pressure; the opening gives the speed while the
+    arm is lifted, and both edges lose the same; the damping holds the speed at full command.
+    `speeds` are those that a log shows, by number of the joint [rad/s, m/s];
+    USUAL_SPEED for the others.
     """
+    pressure = 1e5 * HydraulicSettings().supply_pressure
+    sizes = list[JointSize]()
+    for number, (joint, torque) in enumerate(zip(arm.joints, _torques(arm).tolist(), strict=True), 1):
+        speed = max(speeds.get(number, USUAL_SPEED), 0.01)
+        displacement = 1e6 * torque / pressure
+        sizes.append(
+            JointSize(
+                displacement=displacement,
+                opening=opening_at(displacement, speed),
+                damping=torque / speed,
+                speed=speed,
+                area=displacement / _lever(joint),
+            )
+        )
+    return tuple(sizes)
+
+
+def _torques(arm: Arm) -> Array:
+    """Return the largest torque that each joint needs in random poses [N·m, N], shape (J,)."""
     model = load_model(arm).compile()
     data = mujoco.MjData(model)
-    low, high = np.maximum(arm.lower, -np.pi), np.minimum(arm.upper, np.pi)
-    torque, settings = np.zeros(len(arm.joints)), HydraulicSettings()
+    low = np.maximum(arm.lower, -np.pi)
+    high = np.minimum(arm.upper, np.pi)
+    torque = np.zeros(len(arm.joints))
+    # the same poses every time: a project is written twice with the same bytes
     for pose in np.random.default_rng(0).uniform(low, high, (300, len(low))):
         data.qpos[:] = pose
         mujoco.mj_forward(model, data)
         inertia = np.zeros((model.nv, model.nv))
         mujoco.mj_fullM(model, data, inertia)
         # a joint without weight must give 1 rad/s² at least
-        torque = np.maximum(torque, np.maximum(LIFT * abs(data.qfrc_bias), np.diag(inertia)))
-    pressure, sizes = 1e5 * settings.supply_pressure, list[JointSize]()
-    for joint, most in enumerate(torque.tolist(), 1):
-        speed = max(speeds.get(joint, USUAL_SPEED), 0.01)
-        oil, lever = 1e6 * most / pressure, _lever(arm.joints[joint - 1])
-        sizes.append(JointSize(oil, opening_at(oil, speed), most / speed, speed, oil / lever))
-    return tuple(sizes)
+        wanted = np.maximum(LIFT * abs(data.qfrc_bias), np.diag(inertia))
+        torque = np.maximum(torque, wanted)
+    return torque
 
 
 def opening_at(displacement: float, speed: float) -> float:
-    """Return the valve's opening [mm²] that lets a joint of a displacement [cm³/rad] move at a speed [rad/s].
+    """Return the valve's opening [mm²] that lets a joint of a displacement [cm³/rad] move at
+    a speed [rad/s].
 
     Of a joint that slides [mm², m/s].
     """
@@ -86,38 +111,41 @@ def _lever(joint: Joint) -> float:
 
 
 def _opening(joint: Joint, speed: float) -> str:
-    """Return the nominal opening of a stand-in that was sized before a log told its joint's speed, as YAML.
+    """Return the nominal opening of a stand-in that was sized before a log told its joint's speed,
+    as YAML.
 
     Empty where the arm's file has another one: it holds.
     """
-    own = joint.actuator
-    if own is None:
+    actuator = joint.actuator
+    if actuator is None:
         return ""
-    if isinstance(own, LinearActuator):
-        oil, opening = own.settings.area_a * _lever(joint), own.settings.max_opening
+    if isinstance(actuator, LinearActuator):
+        displacement = actuator.settings.area_a * _lever(joint)
+        opening = actuator.settings.max_opening
     else:
-        oil, opening = own.displacement, own.max_opening
-    if not math.isclose(opening, opening_at(oil, USUAL_SPEED), rel_tol=0.01):
+        displacement = actuator.displacement
+        opening = actuator.max_opening
+    if not math.isclose(opening, opening_at(displacement, USUAL_SPEED), rel_tol=0.01):
         return ""
-    return f"nominal: {short(opening_at(oil, speed))}, "
+    return f"nominal: {short(opening_at(displacement, speed))}, "
 
 
 def arm_text(imported: ImportedArm, arm: Arm | None, sizes: Sequence[JointSize]) -> str:
     """Return the arm's file of an import, with an actuator of each joint of sizes, (J,).
 
-    `arm` is what an earlier text of it says; None: this is that text, and cylinders have a size that nothing
-    uses.
+    `arm` is what an earlier text of it says; None: this is that text, and cylinders have a size
+    that nothing uses.
     """
     actuators = dict[str, Plain]()
     if arm is None:
-        areas = {"area_a": 1000, "area_b": 600, "max_opening": 1}
-        actuators = {name: own | areas for name, own in imported.cylinders.items()}
-    for joint, size in zip(arm.joints if arm else (), sizes, strict=True):
-        own = imported.cylinders.get(joint.name, {"kind": "linear"} if joint.slides else None)
-        oil: Plain = {"kind": "rotary", "displacement": rounded(size.displacement)}
-        if own is not None:  # the rod leaves about 65 % of the area
-            oil = own | {"area_a": rounded(size.area), "area_b": rounded(0.65 * size.area)}
-        actuators[joint.name] = oil | {"max_opening": rounded(size.opening)}
+        unused = {"area_a": 1000, "area_b": 600, "max_opening": 1}
+        for name, cylinder in imported.cylinders.items():
+            actuators[name] = cylinder | unused
+    else:
+        for joint, size in zip(arm.joints, sizes, strict=True):
+            sliding = {"kind": "linear"} if joint.slides else None
+            cylinder = imported.cylinders.get(joint.name, sliding)
+            actuators[joint.name] = _actuator(cylinder, size)
     return fill_template(
         "project/arm.yaml.j2",
         title=imported.title,
@@ -126,6 +154,16 @@ def arm_text(imported: ImportedArm, arm: Arm | None, sizes: Sequence[JointSize])
         actuators=actuators,
         flow=flow,
     )
+
+
+def _actuator(cylinder: Plain | None, size: JointSize) -> Plain:
+    """Return the settings of an actuator of a size: of a cylinder, or of a stand-in for one."""
+    opening = {"max_opening": rounded(size.opening)}
+    if cylinder is None:
+        return {"kind": "rotary", "displacement": rounded(size.displacement)} | opening
+    # the rod leaves about 65 % of the area
+    areas = {"area_a": rounded(size.area), "area_b": rounded(0.65 * size.area)}
+    return cylinder | areas | opening
 
 
 def flow(value: Any) -> str:
@@ -139,45 +177,42 @@ def rounded(value: float) -> float:
 
 
 def fit_text(
-    arm: Arm, layout: Layout, sizes: Sequence[JointSize], file: str, arm_file: str, again: str = ""
+    arm: Arm,
+    layout: Layout,
+    sizes: Sequence[JointSize],
+    file: str,
+    arm_file: str,
+    again: str = "",
 ) -> str:
     """Return the settings of a fit of the whole chain.
 
-    `file` is their own name as a command takes it, and `arm_file` that of the arm as they name it; `again` is
-    the command that goes on once the columns are named.
+    `file` is their own name as a command takes it, and `arm_file` that of the arm as they name it;
+    `again` is the command that goes on once the columns are named.
     """
-    joints, volumes = list[Plain](), list[float]()
-    flows = {joint: 0.06 * sizes[joint - 1].displacement * sizes[joint - 1].speed for joint in layout.outputs}
-    middle = np.median([*flows.values()])
+    flows = dict[int, float]()  # at full speed, by joint [L/min]
     for joint in layout.outputs:
-        name, size, own = arm.joint_names[joint - 1], sizes[joint - 1], arm.joints[joint - 1]
-        motion = layout.motions.get(joint)
-        linear = isinstance(own.actuator, LinearActuator)
-        if not linear:
-            volumes.append(size.displacement * math.radians(own.range[1] - own.range[0]) / 2)
-        joints.append(
-            {
-                "own": name.removesuffix("_joint"),
-                "name": name,
-                "linear": linear,
-                "lever": own.has("lever_slope"),
-                "opening": _opening(own, size.speed) if motion else "",
-                "damping": short(DRAG * size.damping),
-                "delay": min(max(motion.likely_lag - RESPONSE, 0.0), 0.9) if motion else 0.0,
-                "unit": "N·s/m" if own.slides else "N·m·s/rad",
-                # a stand-in's size is a guess, but the valves of one machine let like flows through
-                "draw": 1 if linear else short(middle / flows[joint]),
-                "dead": short(DEAD * min(max(motion.dead_band, 5.0), 40.0) if motion else 10.0),
-            }
-        )
+        size = sizes[joint - 1]
+        flows[joint] = 0.06 * size.displacement * size.speed
+    usual_flow = np.median([*flows.values()])
+    joints = list[Plain]()
+    volumes = list[float]()  # of the chambers of stand-ins [cm³]
+    for number in layout.outputs:
+        joint = arm.joints[number - 1]
+        size = sizes[number - 1]
+        if not isinstance(joint.actuator, LinearActuator):
+            low, high = joint.range
+            volumes.append(size.displacement * math.radians(high - low) / 2)
+        draw = usual_flow / flows[number]
+        joints.append(_joint_text(joint, size, layout.motions.get(number), draw))
     period = layout.section.get("period_s", 0.01)
+    # a whole number of steps, but for the rounding of the division
     steps = math.ceil(period / LONGEST_STEP - 1e-9)
     return fill_template(
         "project/fit.yaml.j2",
         file=file,
         again=again,
         arm=flow(arm_file),
-        outputs=flow([one["name"] for one in joints]),
+        outputs=flow([joint["name"] for joint in joints]),
         layout=layout,
         names=arm.joint_names,
         flow=flow,
@@ -187,6 +222,34 @@ def fit_text(
         most=short(4 * sum(flows.values())),  # so large that it limits no flow
         joints=joints,
     )
+
+
+def _joint_text(joint: Joint, size: JointSize, motion: JointMotion | None, draw: float) -> Plain:
+    """Return what the settings of a fit say of a joint, and of its motion where a log shows any.
+
+    `draw` is the usual flow of the machine's joints over that of this one.
+    """
+    linear = isinstance(joint.actuator, LinearActuator)
+    opening = ""
+    delay = 0.0
+    dead_band = 10.0
+    if motion:
+        opening = _opening(joint, size.speed)
+        delay = min(max(motion.likely_lag - RESPONSE, 0.0), 0.9)
+        dead_band = DEAD * min(max(motion.dead_band, 5.0), 40.0)
+    return {
+        "own": joint.name.removesuffix("_joint"),
+        "name": joint.name,
+        "linear": linear,
+        "lever": joint.has("lever_slope"),
+        "opening": opening,
+        "damping": short(DRAG * size.damping),
+        "delay": delay,
+        "unit": "N·s/m" if joint.slides else "N·m·s/rad",
+        # a stand-in's size is a guess, but the valves of one machine let like flows through
+        "draw": 1 if linear else short(draw),
+        "dead": short(dead_band),
+    }
 
 
 def short(value: float) -> str:

@@ -98,8 +98,8 @@ def test_what_is_left_of_an_error_and_lasts_is_a_finding():
     fit = make_fit(problem)
     assert "error lasts" not in {one.kind for one in summarise(problem, fit).findings}
     row = ar1(np.random.default_rng(1), len(problem.measured), np.exp(-0.01), 1.0)
-    linear = replace(fit.uncertainty.linear, innovations=row)
-    summary = summarise(problem, replace(fit, uncertainty=replace(fit.uncertainty, linear=linear)))
+    known = replace(fit.uncertainty, innovations=row)
+    summary = summarise(problem, replace(fit, uncertainty=known))
     (finding,) = [one for one in summary.findings if one.kind == "error lasts"]
     assert finding.level == "note"
     time = summary.errors["q2"].lasts_s

@@ -9,7 +9,6 @@ what a load, a slower engine or another day changes.
 """
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
@@ -23,6 +22,7 @@ from hydroid.log import Log
 from hydroid.problem.problem import Problem
 from hydroid.progress import Progress
 from hydroid.settings.fit import FitSettings
+from hydroid.settings.log import log_file
 from hydroid.settings.problem import ParameterSettings
 from hydroid.settings.search import MultistartSettings, RefinementSettings
 
@@ -47,7 +47,7 @@ def adapted(model: IdentifiedModel, free: Sequence[str], logs: Sequence[Log] = (
             if parameter.has_prior:
                 changes["nominal"] = value
         parameters[name] = parameter.changed(changes)
-    names = {Path(log.source).name for log in logs}
+    names = {log_file(log.source).name for log in logs}
     kept = {name: mass for name, mass in settings.payloads.items() if name in names}
     kind = settings.simulation.model
     return settings.changed(

@@ -29,6 +29,7 @@ from hydroid.problem.problem import Problem
 from hydroid.progress import Progress
 from hydroid.quantity_table import MECHANICAL
 from hydroid.settings.fit import FitSettings
+from hydroid.settings.log import log_file
 from hydroid.settings.naming import named
 from hydroid.settings.problem import ParameterSettings
 from hydroid.settings.search import RefinementSettings
@@ -277,7 +278,9 @@ def proposed(candidate: Candidate, value: float) -> dict[str, Plain]:
 def freeing_command(problem: Problem, entries: Mapping[str, Any], run: str) -> str:
     """Return the command that fits the same logs again from a run's estimate, with a term freed."""
     words = [f"hydroid fit-{problem.settings.stage}"]
-    words += [shlex.quote(log.source) for log in problem.logs]
+    # the parts of a log with gaps are one file
+    files = dict.fromkeys(str(log_file(log.source)) for log in problem.logs)
+    words += [shlex.quote(file) for file in files]
     words += ["--config", shlex.quote(f"{run}/config.yaml"), "--start", shlex.quote(run)]
     for name, entry in entries.items():
         line = yaml.safe_dump(entry, default_flow_style=True, sort_keys=False, width=math.inf)

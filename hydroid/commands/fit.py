@@ -2,19 +2,20 @@
 
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hydroid.arrays import record
 from hydroid.commands.console import Printed
-from hydroid.commands.inputs import LogSource, LogSources, Source
-from hydroid.commands.logs import read_logs, refuse_undriven
+from hydroid.commands.inputs import LogSource, LogSources, ModelSource, Source
+from hydroid.commands.logs import earlier_logs, read_log, read_logs, refuse_undriven
 from hydroid.errors import RunError, SettingsError
 from hydroid.estimate import NAME, FitSummary
 from hydroid.identified_model import IdentifiedModel
 from hydroid.settings.fit import FitSettings
-from hydroid.settings.log import OTHER
+from hydroid.settings.log import OTHER, log_file
 
 if TYPE_CHECKING:
     import pandas
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from hydroid.fitting.fit import Fit, Watcher
     from hydroid.fitting.validation import Prediction
     from hydroid.fitting.verdict import Baselines
+    from hydroid.log import Log
     from hydroid.parallel.workers import DaskWorkers
     from hydroid.plant import Plant
     from hydroid.problem.problem import Problem
@@ -43,6 +45,7 @@ class FitResult(Printed):
         summary: the final estimate with its uncertainty, as in `estimate.yaml`.
         model: at the final estimate.
         record: the same that the run folder stores, as `load_record(folder).result` reads it.
+        earlier: logs of the fits that it began from, which are no test of it either.
     """
 
     problem: "Problem"
@@ -51,6 +54,7 @@ class FitResult(Printed):
     summary: FitSummary
     model: IdentifiedModel
     record: "FitRecord"
+    earlier: "tuple[Log, ...]" = ()
 
     @property
     def predictions(self) -> "tuple[Prediction, ...]":
@@ -61,6 +65,16 @@ class FitResult(Printed):
     def baselines(self) -> "Baselines":
         """Simple models fitted to the same logs, by joint and name."""
         return self.record.baselines
+
+    def begun_from(self, *fits: "ModelSource | None") -> "FitResult":
+        """Return the fit with the logs that other fits have seen, which it began from;
+        its run keeps them."""
+        from hydroid.run.record import keep_earlier
+
+        earlier = earlier_logs(fits)
+        if self.folder is not None:
+            keep_earlier(self.folder, earlier)
+        return replace(self, earlier=earlier)
 
     def __repr__(self) -> str:
         from hydroid.reporting.verdict_table import lead
@@ -90,8 +104,7 @@ class FitResult(Printed):
         """
         from hydroid.fitting.validation import predicted
 
-        (read,) = read_logs(log, self.model.settings)
-        return predicted(self.model, read, None)
+        return predicted(self.model, read_log(log, self.model.settings), None)
 
     def validate(self, logs: "LogSources", out: Source | None = None) -> "Result[list[Prediction]]":
         """Return the verdict on each joint by logs that were not fitted;
@@ -155,7 +168,7 @@ def fit(
         RunError: `out` holds another run or cannot be written, or every simulation diverged.
     """
     read = read_logs(logs, settings)
-    names = [Path(log.source).name for log in read]
+    names = [log_file(log.source).name for log in read]
     _refuse_stray_payloads(settings, names)
     refuse_undriven(read, settings)
     _refuse_empty_groups(settings, names)
@@ -239,11 +252,12 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
 def _store(folder: "RunFolder", result: FitResult) -> Path:
     """Write a fit to its run folder, and return its page."""
     from hydroid.reporting.predictions import draw
-    from hydroid.run.record import write_record
+    from hydroid.run.record import keep_earlier, write_record
 
     began = time.monotonic()
     folder.write_estimate(result.model, result.problem.logs[0])
     write_record(folder.path, result.record)
+    keep_earlier(folder.path, result.earlier)
     folder.status("running", finished=date.today().isoformat())
     page = draw(folder.path)
     folder.status("done", seconds={**result.fit.seconds, "report": time.monotonic() - began})

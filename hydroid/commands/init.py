@@ -21,6 +21,7 @@ def init(
     log: "Source | Sequence[Source] | None" = None,
     config: "Source | None" = None,
     joints: str | list[str] | None = None,
+    lengths: str | list[str] | None = None,
     tip: str | None = None,
     total_mass: float | None = None,
     force: bool = False,
@@ -49,6 +50,9 @@ def init(
             anew.
         joints (NAME,NAME): Names of the arm's joints in the order of the log's numbers (u1, u2,
             ...) [default: the order in the arm's file].
+        lengths (M,M): Lengths of the links that these joints move [m], in place of --arm: an arm of
+            boxes, as in --joints swing,boom,arm,bucket --lengths 0,3.7,1.6,0.9; 0 for a joint that
+            slews.
         total_mass (KG): Mass of all links that move [kg], to which those of the arm's file are
             scaled.
         force: Replace the files of an earlier project in the folder.
@@ -67,10 +71,12 @@ def init(
     from hydroid.project.project import go_on, write_project
 
     if kept_config is not None:
-        if any((robot, joints, tip, total_mass is not None)):
-            hint = "leave --arm, --joints, --tip and --total-mass out"
+        if any((robot, joints, lengths, tip, total_mass is not None)):
+            hint = "leave --arm, --joints, --lengths, --tip and --total-mass out"
             raise SettingsError("names its arm, which stays as it is", kept_config, hint)
         project = go_on(Path(folder) if folder else None, kept_config, logs, force=force)
+    elif robot is not None and lengths:
+        raise SettingsError("are those of the arm's file", "--lengths", "leave it out, or --arm")
     elif folder is None:
         raise SettingsError("which folder shall the project have?", hint="hydroid init DIR")
     else:
@@ -82,6 +88,7 @@ def init(
             tip=tip,
             total_mass=total_mass,
             force=force,
+            lengths=_numbers(names(lengths)),
         )
     content: Plain = {"out": str(project.folder), "missing": project.missing or None}
     for key in ("files", "notes", "columns", "unused", "commands"):
@@ -123,3 +130,12 @@ def _lines(project: "Project", *, guessed: bool) -> list[str]:
             lines += ["", heading]
             lines += [f"  {line}" for line in section]
     return lines
+
+
+def _numbers(texts: Sequence[str]) -> tuple[float, ...]:
+    """Return the numbers in texts."""
+    try:
+        return tuple(float(text) for text in texts)
+    except ValueError:
+        what = f"{','.join(texts)!r} holds something else than numbers"
+        raise SettingsError(what, "--lengths", "such as 0,3.7,1.6,0.9") from None

@@ -193,8 +193,8 @@ def design(
     commands = None
     if out is not None:
         commands = str(Path(out) / "commands.csv")
-        write_log(Path(commands), result.log, settings.log)
-        write_log(Path(out) / "predicted.csv", result.best.log, settings.log)
+        write_log(Path(commands), result.log, settings.log, arm=settings.arm)
+        write_log(Path(out) / "predicted.csv", result.best.log, settings.log, arm=settings.arm)
         files.insert(0, commands)
     content = {"commands": commands, "precision": rows}
     return Result([table, *findings, *files], content, result)

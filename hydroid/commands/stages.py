@@ -3,7 +3,6 @@
 import builtins
 from collections.abc import Sequence
 from dataclasses import asdict, replace
-from pathlib import Path
 
 from hydroid.arrays import record
 from hydroid.commands.fit import FitResult, fit as run_fit
@@ -30,6 +29,7 @@ from hydroid.parallel.cluster import open_workers
 from hydroid.progress import LOGGER, NOTE
 from hydroid.quantity_table import MECHANICAL
 from hydroid.settings.fit import FitSettings
+from hydroid.settings.log import log_file
 from hydroid.settings.parameters import nominal_value
 from hydroid.settings.problem import ParameterSettings
 from hydroid.units import seconds
@@ -203,7 +203,7 @@ def _fit(stage: str, options: FitOptions, mech: "ModelSource | None" = None) -> 
     budget = options.seconds()
     read = read_logs(options.logs, settings, repair=options.repair)
     with open_workers(options.dask) as workers, FitProgress(settings, budget) as watcher:
-        return run_fit(
+        result = run_fit(
             settings,
             read,
             options.out,
@@ -211,6 +211,7 @@ def _fit(stage: str, options: FitOptions, mech: "ModelSource | None" = None) -> 
             progress=watcher,
             workers=workers,
         )
+    return result.begun_from(mech, options.start)
 
 
 def _starts(start: "ModelSource", settings: FitSettings, held: Plain) -> Plain:
@@ -354,7 +355,7 @@ def adapt(
         raise SettingsError("no parameter lowers the error on parts left out", model.source, hint)
     settings = adapted(model, chosen, read)
     with FitProgress(settings) as watcher:
-        result = run_fit(settings, read, out, progress=watcher)
+        result = run_fit(settings, read, out, progress=watcher).begun_from(fit)
     named = [step | {"parameter": step["parameter"] or "none"} for step in path]
     title = "Parameters freed one after another"
     table = left_out_table(title, {"parameter": "freed"}, named, settings.arm)
@@ -367,4 +368,4 @@ def adapt(
 
 def _own_payloads(fit: "ModelSource", logs: Sequence[Log]) -> builtins.set[str]:
     """Return the logs that may have a payload: these, and those of the fit itself."""
-    return {*open_model(fit).settings.payloads, *(Path(log.source).name for log in logs)}
+    return {*open_model(fit).settings.payloads, *(log_file(log.source).name for log in logs)}

@@ -17,7 +17,7 @@ from hydroid.commands.inputs import (
     command,
     open_model,
 )
-from hydroid.commands.logs import read_logs
+from hydroid.commands.logs import read_logs, seen_logs
 from hydroid.files import Plain
 from hydroid.findings import Finding
 from hydroid.identified_model import IdentifiedModel, warn_of_changes
@@ -108,7 +108,8 @@ def _fitted_lines(predictions: "Sequence[Prediction]") -> list[str]:
     fitted = [p.log.source for p in predictions if p.unseen is False]
     if not fitted:
         return []
-    return [f"The fit was made with {listed(fitted, 3)}: that tests nothing."]
+    what = f"was made with {listed(fitted, 3)}"
+    return [f"The fit, or one that it began from, {what}: that tests nothing."]
 
 
 def _content(
@@ -155,10 +156,11 @@ def _test(
     if record is not None:
         fitted = record.fitted
         baselines = record.baselines
-    fitted_logs = [prediction.log for prediction in fitted]
+    # also those of fits that it began from
+    known = seen_logs(source)
     predictions = list["Prediction"]()
     for log in logs:
-        unseen = _unseen(log, fitted_logs) if fitted_logs else None
+        unseen = _unseen(log, known) if known else None
         predictions.append(predicted(model, log, unseen))
     settings = model.settings
     if tolerance is not None:

@@ -100,7 +100,7 @@ def simulate(
         return Simulated([], content, logs)
     columns = model.settings.log
     with_columns = [(log, columns.of_arm(name) if arm else columns) for name, log in logs.items()]
-    write_logs(Path(out), with_columns)
+    write_logs(Path(out), with_columns, arm=model.settings.arm)
     return Simulated([str(out)], content, logs)
 
 

@@ -8,7 +8,8 @@ import numpy as np
 from hydroid.arrays import Array
 from hydroid.errors import LogError
 from hydroid.log import Table
-from hydroid.log.clues import column_unit, likely_range
+from hydroid.log.clues import column_unit
+from hydroid.log.signals import likely_range
 from hydroid.log.table import Signal
 from hydroid.units import likely_time_unit
 
@@ -46,16 +47,16 @@ def _described(table: Table, name: str) -> str:
         return f"{low:g} throughout"
     unit = column_unit(name, table.units.get(name, ""))
     stated = f", in {unit.name}" if unit else ""
-    choices = " or ".join(_choices(values)) or "neither command nor angle"
-    return f"{low:.4g} to {high:.4g}{stated}; {choices}"
+    choices = " or ".join(_choices(values, unit.name if unit else ""))
+    return f"{low:.4g} to {high:.4g}{stated}; {choices or 'neither command nor angle'}"
 
 
-def _choices(values: Array) -> Iterator[str]:
-    """Yield what numbers could be, by their range and their steps."""
+def _choices(values: Array, unit: str) -> Iterator[str]:
+    """Yield what numbers could be, by their range, their steps and the unit that is stated."""
     steps = np.diff(values)
     if len(steps) and (steps > 0).all():
         yield f"a time in {likely_time_unit(float(np.median(steps))) or 's'}"
-    likely = likely_range(values)
+    likely = likely_range(values, unit=unit)
     if likely and likely.name == "%":
         yield "a command in %"
     elif likely:

@@ -9,6 +9,7 @@ from hydroid.arrays import Array, record
 from hydroid.errors import LogError
 from hydroid.files import Plain
 from hydroid.log import ColumnGuess, JointMotion, Log, Table, check_log, motion_of
+from hydroid.log.clues import column_unit, kind_of
 from hydroid.log.read import angle_margin
 from hydroid.project.columns import column_lines
 from hydroid.project.section import given_section, guessed_section, missing_column
@@ -25,6 +26,8 @@ REVERSED = (
     "follows the angle"
 )
 
+SAID = ("row left out", "cut end", "lost", "gap", "half a command", "unasked", "target")
+"""kinds of findings that say which part of a log is not read, or not told by it"""
 MOVED = 0.5  # travel from which a joint moves [deg]
 FOLLOWED = 1.0  # travel above which a joint that no command drives is followed [deg]
 
@@ -80,7 +83,7 @@ def find_layout(
         guess = _given(table, arm, given)
         return _seen(table, arm, guess, others, GIVEN)
     guess = guessed_section(table, arm, order)
-    missing = missing_column(guess.log)
+    missing = missing_column(guess.log, targets=_has_targets(table))
     if missing:
         return _skeleton(table, arm, guess, missing)
     return _seen(table, arm, guess, others, GUESSED)
@@ -115,7 +118,7 @@ def _seen(table: Table, arm: Arm, guess: ColumnGuess, others: Sequence[Path], or
 def _given(table: Table, arm: Arm, given: LogSettings) -> ColumnGuess:
     """Return the columns that a person has named, which must be enough for a fit."""
     section = given_section(table, arm, given)
-    missing = missing_column(section)
+    missing = missing_column(section, targets=_has_targets(table))
     if missing:
         what = missing.replace("looks like", "is given as")
         raise LogError(what, table.source, "correct the log section")
@@ -159,6 +162,12 @@ def _lacking(entries: Mapping[int, Plain], names: Sequence[str]) -> Iterator[str
             yield f"no {what} found for {listed(lacking)}"
 
 
+def _has_targets(table: Table) -> bool:
+    """Return whether a column seems to hold the position that a controller is to reach."""
+    units = {name: column_unit(name, table.units.get(name, "")) for name in table.names if name}
+    return any(kind_of(name, unit) == "target" for name, unit in units.items())
+
+
 def _skeleton(table: Table, arm: Arm, guess: ColumnGuess, missing: str) -> Layout:
     """Return a layout that a person completes: all joints,
     with placeholders for what is not known."""
@@ -198,12 +207,15 @@ def _read(
     first = Path(table.source)
     logs = list[Log]()
     for path in (first, *others):
-        log, findings = check_log(path, settings, no_limits)
+        log, findings = check_log(path, settings, no_limits, arm=arm)
         if log is None:
             if strict:
                 raise findings[0].error()
             reasons.append(f"the log cannot be used as it is: {findings[0]}")
-            log, _ = check_log(path, settings, no_limits, repair=True)
+            log, _ = check_log(path, settings, no_limits, arm=arm, repair=True)
+        for finding in findings:
+            if finding.level == "warning" and finding.kind in SAID:
+                reasons.append(str(finding))
         if log is not None:
             logs.append(log)
         elif path == first:

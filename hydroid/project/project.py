@@ -5,6 +5,7 @@ import shlex
 import tempfile
 from collections.abc import Generator, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +13,9 @@ from hydroid.arrays import record
 from hydroid.cad.importer import ImportedArm, import_arm
 from hydroid.cad.meshes import MESHES
 from hydroid.errors import HydroidError, SettingsError
-from hydroid.files import fill_template, undisturbed, write_atomic, writing
+from hydroid.files import Plain, fill_template, undisturbed, write_atomic, writing
 from hydroid.log import open_table
+from hydroid.project.boxes import boxes_urdf
 from hydroid.project.layout import Layout, find_layout
 from hydroid.project.texts import JointSize, arm_text, fit_text, joint_sizes
 from hydroid.reporting.figure import arm_picture
@@ -56,11 +58,15 @@ def write_project(
     """Write a project to a folder, new or with other things in it (`hydroid.init` says
     what is given)."""
     _refuse_replacing(folder, FILES, force=options.pop("force", False))
+    lengths = options.pop("lengths", ())
+    boxes = boxes_urdf(joints, lengths) if lengths else ""
     table = open_table(logs[0]) if logs else None
     has_own_file = robot is not None and robot.suffix.lower() in (".yaml", ".yml")
     imported = None
     if robot is not None and not has_own_file:
         imported = import_arm(robot, table.names if table else (), **options)
+    elif boxes:
+        imported = _arm_of_boxes(boxes, options)
     # all is written aside and read back, so that the folder has all of a project or nothing
     with _stage(folder) as stage, _of_the_project(stage, folder, robot):
         if robot is not None and has_own_file:
@@ -80,6 +86,17 @@ def write_project(
         text = fit_text(arm, layout, sizes, str(folder / FIT), reference, steps[0])
         _write_settings(stage, arm, text)
         return _finished(stage, folder, arm.name, layout, notes, steps)
+
+
+def _arm_of_boxes(urdf: str, options: Plain) -> ImportedArm:
+    """Import an arm of boxes as if a person had drawn it."""
+    with tempfile.TemporaryDirectory() as name:
+        path = Path(name) / "boxes.urdf"
+        write_atomic(path, urdf)
+        imported = import_arm(path, **options)
+    what = "the arm is made of boxes of these lengths"
+    guessed = f"{what}: its masses and ranges are guesses; mend them in arm.xml"
+    return replace(imported, notes=(guessed, *imported.notes))
 
 
 def _sizes(arm: Arm, layout: Layout) -> tuple[JointSize, ...]:

@@ -9,6 +9,7 @@ from hydroid.errors import LogError, SettingsError
 from hydroid.files import Plain
 from hydroid.log import ColumnGuess, Table, guess_columns
 from hydroid.log.guess import nearest_period
+from hydroid.log.rods import Rod, rods_of
 from hydroid.log.table import Signal
 from hydroid.project.columns import holds_numbers
 from hydroid.settings.arm import Arm
@@ -30,10 +31,23 @@ def guessed_section(table: Table, arm: Arm, order: Sequence[str]) -> ColumnGuess
             hint = f"the arm's joints: {', '.join(names)}"
             raise SettingsError(f"no joint {name!r}", "--joints", hint)
     places = [names.index(name) for name in order or names]
-    slides = [number for number, place in enumerate(places, 1) if arm.joints[place].slides]
+    slides = list[int]()
+    own_rods = dict[int, Rod]()
+    ranges = dict[int, tuple[float, float]]()
+    rods = rods_of(arm)
+    for number, place in enumerate(places, 1):
+        joint = arm.joints[place]
+        if joint.slides:
+            slides.append(number)
+        if place + 1 in rods:
+            own_rods[number] = rods[place + 1]
+        if not joint.continuous:
+            ranges[number] = joint.limits
     links = [arm.link_names[place] for place in places]
     try:
-        section, reasons, unused = guess_columns(table, order or names, links=links, slides=slides)
+        section, reasons, unused = guess_columns(
+            table, order or names, links=links, slides=slides, rods=own_rods, ranges=ranges
+        )
     except LogError:
         if not holds_numbers(table):
             raise
@@ -104,14 +118,20 @@ def _entry(columns: ColumnMap) -> Plain:
     return entry
 
 
-def missing_column(section: Plain) -> str:
-    """Say what no column looks like; empty: there is all that a fit needs."""
+def missing_column(section: Plain, *, targets: bool) -> str:
+    """Say what no column looks like; empty: there is all that a fit needs.
+
+    `targets`: there are columns of positions that a controller is to reach.
+    """
     if "time" not in section:
         return "no column looks like a time"
     entries = section["joints"].values()
     for kind, words in (("angle", "an angle"), ("command", "a command")):
         if not any(entry[kind] for entry in entries):
-            return f"no column looks like {words}"
+            what = f"no column looks like {words}"
+            if targets and kind == "command":
+                what += ", only like targets of positions: hydroid fits valves"
+            return what
     if not any(entry["angle"] and entry["command"] for entry in entries):
         return "no joint has both a command and an angle"
     return ""

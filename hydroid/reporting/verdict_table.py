@@ -17,6 +17,7 @@ from hydroid.joint_verdict import Comparison, JointVerdict, Verdict
 from hydroid.reporting.page import Cell, Given, Section, Table, short_name
 from hydroid.search.descent import Ending
 from hydroid.settings.arm import Arm
+from hydroid.settings.log import log_file
 from hydroid.words import listed, told_apart, two_digits
 
 _RIVALS = (
@@ -275,10 +276,9 @@ def worst(verdicts: Sequence[JointVerdict]) -> str:
 def next_step(
     summary: FitSummary, verdicts: Sequence[JointVerdict], folder: str, fitted: Sequence[Prediction]
 ) -> Finding:
-    """Return what to do after a fit in a run folder, which made `fitted` of its logs, with the
-    command.
-    """
-    run, files = shlex.quote(folder), shlex.join(one.log.source for one in fitted)
+    """Return what to do after a fit in a run folder, which made `fitted` of its logs, with the command."""
+    run = shlex.quote(folder)
+    files = shlex.join(dict.fromkeys(str(log_file(one.log.source)) for one in fitted))
     joints = [one.name for one in verdicts if one.verdict is Verdict.UNTESTED]
     if summary.ending == Ending.TIME.value:
         command = f"hydroid fit-{summary.stage} {files} --config {run}/config.yaml --out {run} --resume"

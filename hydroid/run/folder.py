@@ -30,6 +30,7 @@ from hydroid.run.archive import CheckpointFile
 from hydroid.run.process import LOCK, locked, run_log
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
+from hydroid.settings.log import log_file
 from hydroid.words import numbered
 
 VERSIONS = {name: version(name) for name in ("hydroid", "mujoco", "numpy")}
@@ -97,7 +98,7 @@ def log_hash(log: Log, settings: FitSettings) -> str:
 
     A file that was moved or saved again is the same log, and one that was repaired is another.
     """
-    name = Path(log.source).name
+    name = log_file(log.source).name
     named = repr((settings.payloads.get(name), settings.log.group_of(name)))
     return hashlib.sha256(samples(log) + named.encode()).hexdigest()
 
@@ -105,7 +106,7 @@ def log_hash(log: Log, settings: FitSettings) -> str:
 def samples(log: Log) -> bytes:
     """Return the digest of a log's samples, wherever they are from."""
     content = hashlib.sha256(repr((log.period, log.rest, log.angle.shape)).encode())
-    for signal in (log.time, log.command, log.angle, log.pressure):
+    for signal in (log.time, log.command, log.angle, log.pressure, log.recorded):
         content.update(b"" if signal is None else signal.tobytes())
     return content.digest()
 
@@ -220,7 +221,7 @@ class RunFolder:
         """Write `estimate.yaml` of a fit's model,
         and the fitted arm in `model/` as it began a log."""
         write_estimate(self.path, model.summarise())
-        payload = model.settings.payloads.get(Path(log.source).name, 0.0)
+        payload = model.settings.payloads.get(log_file(log.source).name, 0.0)
         plant = Plant(model, payload=payload)
         plant.reset(log.start)
         plant.export(self.path / "model")

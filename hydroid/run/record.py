@@ -34,10 +34,13 @@ from hydroid.progress import LOGGER
 from hydroid.run.archive import pack, unpack
 from hydroid.run.folder import RunFolder, difference, samples
 from hydroid.settings.fit import FitSettings
+from hydroid.settings.log import log_file
 from hydroid.words import numbered
 
 RESULT = "result.npz"
 """name of the file of arrays"""
+EARLIER = "earlier.npz"
+"""name of the file of the logs of earlier fits"""
 VALIDATIONS = "validations"
 """name of the folder of unseen logs"""
 LONGEST_NAME = 60
@@ -164,16 +167,43 @@ def validation_name(log: Log) -> str:
     """Return the name of a log's folder among the validations: its file's,
     and a digest of the file's place.
 
-    Of a log that is no file the digest is that of its samples.
+    Of a log that is no file the digest is that of its samples. A part of a file has its number in
+    both.
     """
-    if os.path.exists(log.source):
-        place = Path(os.path.realpath(log.source))
+    file = log_file(log.source)
+    # a name may be longer than Path allows
+    if os.path.exists(file):
+        number = Path(log.source).name[len(file.name) :]
+        place = Path(os.path.realpath(file) + number)
         key = os.fsencode(place)
     else:
         place = Path(log.source)
         key = samples(log)
     name = re.sub(r"[^\w.-]+", "_", place.name).strip(".")[:LONGEST_NAME]
     return f"{name or 'log'}-{hashlib.sha256(key).hexdigest()[:8]}"
+
+
+def keep_earlier(folder: Path, logs: Sequence[Log]) -> None:
+    """Store the logs of the fits that a run began from, in its folder."""
+    if logs:
+        write_atomic(folder / EARLIER, pack(logs))
+
+
+def logs_behind(estimate: Path) -> list[Log]:
+    """Return the logs that the estimate of a run has seen: the run's,
+    and those of fits that it began from.
+
+    Of a file of values that is no run's there are none.
+
+    Raises RunError: the run's cannot be read.
+    """
+    folder = estimate.parent
+    if estimate.name != NAME or not (folder / RESULT).is_file():
+        return []
+    logs = [prediction.log for prediction in _read(folder / RESULT, FitRecord).fitted]
+    if (folder / EARLIER).is_file():
+        logs += _read(folder / EARLIER, tuple[Log, ...])
+    return logs
 
 
 def record_of(model: IdentifiedModel) -> FitRecord | None:

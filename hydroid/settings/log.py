@@ -9,6 +9,7 @@ log:
     7: null                     # not in the log
 """
 
+import re
 from fnmatch import fnmatch
 from pathlib import Path
 from typing import Annotated, Literal, NamedTuple
@@ -19,6 +20,14 @@ from hydroid.errors import SettingsError
 from hydroid.files import Plain
 from hydroid.settings.load import ByJoint, Settings
 from hydroid.words import listed
+
+_PART = re.compile(r"\[\d+\]$")
+
+
+def log_file(source: str | Path) -> Path:
+    """Return the file of a log by its source: FILE[2] is the part of FILE after its first gap."""
+    return Path(_PART.sub("", str(source)))
+
 
 JOINT = "{joint}"
 OTHER = "other"
@@ -59,8 +68,8 @@ class Columns(Settings):
     which pushes to positive angles, and chamber B of a pressure. Default: u{joint}_pct,
     q{joint}_deg, [pA{joint}_bar, pB{joint}_bar]"""
     unit: Literal["%", "deg", "rad", "m", "cm", "mm", "bar", "Pa", "MPa"] | None = None
-    """unit of the scaled cells, of the angle of a joint that slides m, cm or mm; default: %, deg,
-    bar"""
+    """unit of the scaled cells: of the angle of a joint that slides m, cm or mm, which of a joint
+    that turns are the length of its cylinder from pin to pin; default: %, deg, bar"""
     scale: Annotated[Number | None, AfterValidator(_nonzero)] = None
     """factor on the cells; default: 1"""
     offset: Number | None = None
@@ -174,7 +183,7 @@ class LogSettings(Settings):
 
         Raises SettingsError: it is in several.
         """
-        name = Path(log).name
+        name = log_file(log).name
         found = list[str]()
         for group, patterns in self.groups.items():
             if any(fnmatch(name, pattern) for pattern in patterns):

@@ -209,13 +209,15 @@ class Arm(Settings):
 
     @property
     def backward(self) -> tuple[int, ...]:
-        """Joints, from 1, that turn to negative angles as their rods run out,
-        at positive commands."""
-        turned = list[int]()
-        for j, joint in enumerate(self.joints, 1):
-            if isinstance(joint.actuator, LinearActuator) and joint.actuator.sense < 0:
-                turned.append(j)
-        return tuple(turned)
+        """Joints, from 1, that turn to negative angles as their rods run out, at positive commands."""
+        joints = list[int]()
+        for number, joint in enumerate(self.joints, 1):
+            if not isinstance(joint.actuator, LinearActuator):
+                continue
+            # the same throughout the range, which need not hold the angle 0 at which the triangle is given
+            if joint.actuator.moment_arm(sum(joint.limits) / 2) < 0:
+                joints.append(number)
+        return tuple(joints)
 
     @property
     def lower(self) -> Array:

@@ -25,7 +25,7 @@ class LinearActuator:
 
     @property
     def sense(self) -> float:
-        """1 if the rod runs out towards positive angles, else -1."""
+        """1 if the rod runs out towards positive angles at angle 0, else -1."""
         return math.copysign(1.0, self.triangle.theta0)
 
     def length(self, angle: Any) -> Any:

@@ -92,6 +92,18 @@ def test_a_cylinder_between_two_points_of_the_assembled_arm(tmp_path, above):
     assert (same.triangle, same.stroke, same.pivots) == (cylinder.triangle, cylinder.stroke, cylinder.pivots)
 
 
+@pytest.mark.parametrize("above", [1.0, -1.0])
+@pytest.mark.parametrize("limits", ["-60 60", "-175 -135", "135 175"])
+def test_a_positive_command_turns_a_joint_back_whose_rod_runs_out_that_way(tmp_path, above, limits):
+    """The way in its range counts: at angle 0, which it need not reach, the rod may run out the other way."""
+    z = 2.0 + above * np.array([0.4, 0.5])
+    ends = {"parent": [*PARENT[:2], float(z[0])], "child": [*CHILD[:2], float(z[1])]}
+    model = BOOM.replace('range="-60 60"', f'range="{limits}"')
+    arm = write_arm(tmp_path, model, actuators={"tilt": CYLINDER | {"pivots": ends}})
+    low, high = arm.joints[1].actuator.length(np.array(arm.joints[1].limits))
+    assert arm.backward == ((2,) if high < low else ())
+
+
 def text(values):
     return " ".join(map(repr, values.tolist()))
 

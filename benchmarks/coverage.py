@@ -87,7 +87,7 @@ def quantities(given: Any) -> None:
     # planned at the truth once: every fit then states the same quantities
     measure = joint_measure(make_bench(settings, [clean], 2), true)
     columns, actual = zip(*measure(true), strict=True)
-    labels = [f"{c.label}{'' if c.command is None else f' at {c.command:.0f}'} [{c.unit}]" for c in columns]
+    labels = [f"{c.label}{'' if c.at is None else f' at {c.at:g}'} [{c.unit}]" for c in columns]
     positive = np.array([column.positive for column in columns])
 
     def values(theta: np.ndarray) -> np.ndarray:

@@ -48,12 +48,12 @@ def error_model(logs: Sequence[Log], joint: int, limits: tuple[float, float]) ->
         way = travelled(angle, log.period)
         stops = at_stops(angle, limits, log.period)
         used = np.ones(len(angle), dtype=bool)
-        courses.append(Course(rows, 1.0, log.period, way, stops, readings, used))
+        courses.append(Course(rows, 1.0, log.period, way, angle - angle[0], stops, readings, used))
     numbers = np.zeros((1, len(NUMBERS)))
     numbers[0, 0] = LEAST_NOISE["angle"] ** 2
     numbers[0, -1] = SHORTEST
     of = (0,) * len(logs)
-    return ErrorModel((Signal(joint, "angle"),), numbers, tuple(courses), of, np.array([False]))
+    return ErrorModel((Signal(joint, "angle"),), numbers, tuple(courses), of, np.array([np.nan]))
 
 
 def by_innovations(model: Baseline, logs: Sequence[Log], limits: tuple[float, float]) -> Baseline:

@@ -27,11 +27,16 @@ COLORS = 64
 SHOTS = {
     "report": ("hyd/report.html", "", (1000, 1240), "light"),
     "report_phone": ("hyd/report.html", "", (400, 1000), "dark"),
-    "report_motion": ("mech/report.html", "The arm in motion", (1000, 600), "light"),
+    "report_motion": ("mech/report.html", ".beside", (1000, 420), "light"),
+    "report_speed": ("hyd/report.html", "Speed and valve against command", (1000, 760), "light"),
+    "report_step": ("hyd/report.html", "Step and frequency response", (1000, 860), "light"),
+    "report_residuals": ("hyd/report.html", "Are the residuals white?", (1000, 705), "dark"),
 }
-"""page, title of the section (the page's beginning without one), width and height [px], and look"""
-TOP = """[...document.querySelectorAll("section, details")]
-  .find((one) => one.querySelector("h2")?.textContent === "%s").getBoundingClientRect().top + scrollY"""
+"""page, title of the section or a selector (without: the page's beginning), width and height [px], look"""
+TOP = """(document.querySelector("%s".startsWith(".") ? "%s" : "none")
+  ?? [...document.querySelectorAll("section, details")].find(
+    (one) => one.querySelector("h2")?.textContent === "%s")
+).getBoundingClientRect().top + scrollY"""
 FOLD = 'document.querySelectorAll("details").forEach((one) => { one.open = false; })'
 
 
@@ -64,7 +69,7 @@ async def shots(demo: Path) -> None:
         tab = await connected(profile)
         for name, (page, title, (width, height), look) in SHOTS.items():
             await tab.load(demo / page, width, look)
-            top = await tab.value(TOP % title if title else f"{FOLD}, 0")
+            top = await tab.value(TOP % (title, title, title) if title else f"{FOLD}, 0")
             file = HERE / f"{name}.png"
             file.write_bytes(await tab.shot(0, float(top), width, height))
             Image.open(file).convert("RGB").quantize(128, dither=Image.Dither.NONE).save(file, optimize=True)

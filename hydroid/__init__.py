@@ -7,8 +7,8 @@
     plant.reset()
     angle = plant.step({"boom": 50})
 
-Each command of `hydroid --help` is one function here: its arguments come first, its options are keywords,
-and its result prints itself in a notebook. Every name is imported when it is first used.
+Each command of `hydroid --help` is one function here: its arguments come first, its options are
+keywords, and its result prints itself in a notebook. Every name is imported when it is first used.
 """
 
 import ast

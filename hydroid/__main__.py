@@ -1,4 +1,5 @@
-"""`hydroid` and `python -m hydroid`: the command line, which may be stopped while it is imported."""
+"""`hydroid` and `python -m hydroid`: the command line,
+which may be stopped while it is imported."""
 
 import sys
 

@@ -1,4 +1,5 @@
-"""Arrays by what they hold, records of them, and their size; shapes and units stand where one is made."""
+"""Arrays by what they hold, records of them, and their size;
+shapes and units stand where one is made."""
 
 from dataclasses import dataclass, field
 from typing import Any, TypeVar, dataclass_transform
@@ -30,7 +31,8 @@ def rms(values: Array, axis: int | None = None) -> Any:
 
 
 def independent_samples(deviations: Array) -> Array:
-    """Return how many independent samples deviations from their mean, (T, m), are worth: shape (m,).
+    """Return how many independent samples deviations from their mean, (T, m), are worth:
+    shape (m,).
 
     Their correlation from one sample to the next is taken for that of a first-order process.
     """

@@ -1,7 +1,8 @@
-"""Errors that a user can correct: each says what is wrong, where, and what is allowed or what to do.
+"""Errors that a user can correct: each says what is wrong, where,
+and what is allowed or what to do.
 
-The command line shows them as one line and ends with exit status 2. Any other exception is a defect of
-hydroid and keeps its traceback.
+The command line shows them as one line and ends with exit status 2. Any other exception is a defect
+of hydroid and keeps its traceback.
 """
 
 LONGEST = 1500  # largest length of a message, in characters
@@ -17,17 +18,32 @@ class HydroidError(Exception):
     """
 
     def __init__(self, what: str, where: object = "", hint: str = "") -> None:
-        self.what, self.where, self.hint = what, str(where), hint
-        text = f"{where}: {what}" if self.where else what
-        text = f"{text}; {hint}" if hint else text
-        # control characters may come from a file
-        plain = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
-        half = LONGEST // 2
-        super().__init__(plain if len(plain) <= LONGEST else f"{plain[:half]} ... {plain[-half:]}")
+        self.what = what
+        self.where = str(where)
+        self.hint = hint
+        text = what
+        if self.where:
+            text = f"{where}: {text}"
+        if hint:
+            text = f"{text}; {hint}"
+        super().__init__(_shortened(_visible(text)))
 
     def __reduce__(self) -> tuple[object, ...]:
         """Keep the three parts when an error crosses a process boundary."""
         return type(self), (self.what, self.where, self.hint)
+
+
+def _visible(text: str) -> str:
+    """Return a text with its control characters spelt out: they may come from a file."""
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
+def _shortened(text: str) -> str:
+    """Return the beginning and the end of a text that is too long to be read."""
+    if len(text) <= LONGEST:
+        return text
+    half = LONGEST // 2
+    return f"{text[:half]} ... {text[-half:]}"
 
 
 class LogError(HydroidError):
@@ -47,4 +63,5 @@ class RunError(HydroidError):
 
 
 class Stopped(KeyboardInterrupt):
-    """A fit or study that Ctrl-C or a signal ended; its text: what remains of it, and what continues it."""
+    """A fit or study that Ctrl-C or a signal ended; its text: what remains of it,
+    and what continues it."""

@@ -18,7 +18,8 @@ from hydroid.settings.load import JointNumber, NotNegative, Positive, Settings, 
 Interval = tuple[float | None, float | None]  # its ends; null: it has no limit there
 NAME = "estimate.yaml"  # name of the file in a run folder and beside a saved plant
 DESCRIPTION = "run.json"
-"""name of the file that describes a run: versions, seed, hashes of its logs and files, status, seconds"""
+"""name of the file that describes a run: versions, seed, hashes of its logs and files, status,
+seconds"""
 
 
 class ParameterEstimate(Settings):
@@ -32,7 +33,8 @@ class ParameterEstimate(Settings):
     sd: float | None = None
     """standard deviation, in the unit of the value"""
     sd_by_log: float | None = None
-    """the same from the differences between several logs; null where one log alone determines the value"""
+    """the same from the differences between several logs;
+    null where one log alone determines the value"""
     interval: Interval = (None, None)
     """95 % interval"""
     interval_by_log: Interval = (None, None)
@@ -40,9 +42,11 @@ class ParameterEstimate(Settings):
     flag: str | None = None
     """how well the logs determine it: a value of `posterior.uncertainty.Flag`"""
     source: str | None = None
-    """from what it is known: a value of `posterior.uncertainty.Source`; null: it is not known, or fixed"""
+    """from what it is known: a value of `posterior.uncertainty.Source`; null: it is not known,
+    or fixed"""
     data_share: float | None = None
-    """part of the information that the logs gave: 1 - posterior / prior variance; 1 without a prior"""
+    """part of the information that the logs gave: 1 - posterior / prior variance;
+    1 without a prior"""
     at_bound: Literal["lower", "upper"] | None = None
     effect_deg: float | None = None
     """rms change of the compared angles when the parameter changes by 1 % [deg]"""
@@ -57,12 +61,13 @@ class NamedEstimate(Settings):
     objective: float | None = None
     """over the whole record: [deg], or [-] where `objective.relative` is set"""
     gained: tuple[float | None, float | None] | None = None
-    """by how much it foretells parts of the logs left out better than the estimate without its last term: a
-    difference of log-likelihoods, and its standard error"""
+    """by how much it foretells parts of the logs left out better than the estimate without its last
+    term: a difference of log-likelihoods, and its standard error"""
 
 
 class Covariance(Settings):
-    """What is known of the free parameters together: C^-1 = G' G per relative change (`Uncertainty.root`)."""
+    """What is known of the free parameters together:
+    C^-1 = G' G per relative change (`Uncertainty.root`)."""
 
     parameters: tuple[str, ...]
     """the p free ones"""
@@ -75,7 +80,8 @@ class Covariance(Settings):
 
     @model_validator(mode="after")
     def _square(self) -> "Covariance":
-        if {len(self.parameters)} != {len(self.scale), len(self.root), *map(len, self.root)}:
+        sizes = {len(self.scale), len(self.root), *map(len, self.root)}
+        if sizes != {len(self.parameters)}:
             raise ValueError("root must have a row and a column, and scale a value, for each of parameters")
         return self
 
@@ -96,7 +102,8 @@ class QuantityEstimate(Settings):
 
     @property
     def within(self) -> float:
-        """Half of the 95 % interval relative to the value; infinite where the interval has no limit."""
+        """Half of the 95 % interval relative to the value;
+        infinite where the interval has no limit."""
         low, high = self.interval
         if low is None or high is None or self.value == 0:
             return math.inf
@@ -104,7 +111,8 @@ class QuantityEstimate(Settings):
 
 
 class CurveEstimate(Settings):
-    """A quantity against a command or an angle; `value` and `interval` are at the points of `at`."""
+    """A quantity against a command or an angle;
+    `value` and `interval` are at the points of `at`."""
 
     label: str
     joint: int
@@ -139,7 +147,8 @@ class AngleError(Settings):
     lasting_s: Positive
     """time constant of that error [s]"""
     after_10_s_deg: NotNegative
-    """standard deviation of a prediction 10 s ahead, whatever the parameters, at the logs' mean speed [deg]
+    """standard deviation of a prediction 10 s ahead, whatever the parameters,
+    at the logs' mean speed [deg]
     """
     lasts_s: NotNegative = 0.0
     """time for which what is left of the error lasts [s]; 0: it is as the error model says"""
@@ -148,9 +157,13 @@ class AngleError(Settings):
     def numbers(self) -> tuple[float, ...]:
         """The numbers of the error model in rad and s."""
         degree = math.radians(1.0)
-        drifts = degree**2 * self.drift_per_s, degree * self.drift_per_way
-        lasting = (degree * self.lasting_deg) ** 2
-        return (degree * self.sensor_deg) ** 2, *drifts, lasting, self.lasting_s
+        return (
+            (degree * self.sensor_deg) ** 2,
+            degree**2 * self.drift_per_s,
+            degree * self.drift_per_way,
+            (degree * self.lasting_deg) ** 2,
+            self.lasting_s,
+        )
 
 
 class FitSummary(Settings):
@@ -161,7 +174,8 @@ class FitSummary(Settings):
     estimate: dict[str, ParameterEstimate]
     """by parameter"""
     joints: tuple[JointNumber, ...] = ()
-    """joints that take commands, numbered from 1: those that the fit's logs drive or that it compared"""
+    """joints that take commands, numbered from 1:
+    those that the fit's logs drive or that it compared"""
     final: str | None = None
     """name of the final one among `estimates`; `joint`: a joint refinement of both stages"""
     converged: bool | None = None
@@ -191,7 +205,8 @@ class FitSummary(Settings):
     errors: dict[str, AngleError] = {}
     """what the residuals of each compared angle show of its error, by angle: `q2` of joint 2"""
     left_out_deg: dict[str, tuple[float, ...]] = {}
-    """rms error of each compared angle on each fitted log if it is left out [deg]; none of one log"""
+    """rms error of each compared angle on each fitted log if it is left out [deg];
+    none of one log"""
 
     @property
     def values(self) -> dict[str, float]:
@@ -210,26 +225,37 @@ def write_estimate(folder: Path, summary: FitSummary) -> None:
 
 
 def read_estimate(source: Path) -> tuple[Path, Plain, FitSummary | None]:
-    """Read parameter values by name: of a folder, an `estimate.yaml`, or a YAML file of `K: 0.2` lines.
+    """Read parameter values by name: of a folder, an `estimate.yaml`, or a YAML file of `K:
+    0.2` lines.
 
-    Returned are the file, its values, unchecked where they are not an estimate's, and the estimate where
-    there is one.
+    Returned are the file, its values, unchecked where they are not an estimate's, and the estimate
+    where there is one.
+
+    Raises:
+        RunError: a folder that holds no estimate. SettingsError: a file that is none.
     """
-    folder = os.path.isdir(source)  # Path's own raises for a name that no folder can have
-    file = source / NAME if folder else source
-    if folder and not is_file(file):
-        begun = is_file(source / DESCRIPTION)
-        hint = "resume the fit" if begun else "name a run folder, a folder of Plant.save or a YAML file"
-        raise RunError("holds no estimate" + (" yet" if begun else ""), source, hint)
+    file = _estimate_in(source) if os.path.isdir(source) else source
     content, lines = read_yaml(file)
     if "estimate" in content:
         summary = validate(content, FitSummary, str(file), lines)
         return file, summary.values, summary
     values = content.get("parameters", content)
-    if not isinstance(values, dict) or any(isinstance(value, dict) for value in values.values()):
+    is_flat = isinstance(values, dict) and not any(isinstance(v, dict) for v in values.values())
+    if not is_flat:
         hint = "give the run folder, its estimate.yaml, or a YAML file of `K: 0.2` lines"
         raise SettingsError("is no estimate", file, hint)
     return file, values, None
+
+
+def _estimate_in(folder: Path) -> Path:
+    """Return the file of the estimate in a folder."""
+    file = folder / NAME
+    if is_file(file):
+        return file
+    if is_file(folder / DESCRIPTION):
+        raise RunError("holds no estimate yet", folder, "resume the fit")
+    hint = "name a run folder, a folder of Plant.save or a YAML file"
+    raise RunError("holds no estimate", folder, hint)
 
 
 def finite_ends(interval: Array) -> Interval:
@@ -239,4 +265,6 @@ def finite_ends(interval: Array) -> Interval:
 
 def finite(value: float | None) -> float | None:
     """Return a number, or None where it is infinite or NaN, which JSON has no word for."""
-    return None if value is None or not math.isfinite(value) else float(value)
+    if value is None or not math.isfinite(value):
+        return None
+    return float(value)

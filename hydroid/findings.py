@@ -1,4 +1,5 @@
-"""Findings: what an analysis has to say, in the words of `findings.yaml`, for terminal, JSON and report."""
+"""Findings: what an analysis has to say, in the words of `findings.yaml`, for terminal,
+JSON and report."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -20,7 +21,8 @@ class Finding:
         level: how much it matters.
         subjects: names of what it is about: parameters, joints, logs.
         numbers: what the sentence states, by name, in the units that the sentence prints.
-        details: by subject, what stands in brackets behind it. Apart from `numbers`: a user names subjects.
+        details: by subject, what stands in brackets behind it. Apart from `numbers`: a user names
+            subjects.
         where: file with line and column, or a setting; empty where there is none.
     """
 
@@ -33,12 +35,12 @@ class Finding:
 
     @property
     def what(self) -> str:
-        """What it states."""
+        """The sentence that states it."""
         return self._filled(WORDS[self.kind][0])
 
     @property
     def hint(self) -> str:
-        """What to do about it; empty where nothing is to be done."""
+        """The sentence that says what to do about it; empty where nothing is to be done."""
         return self._filled(WORDS[self.kind][1])
 
     def _filled(self, words: str) -> str:

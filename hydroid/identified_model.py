@@ -1,4 +1,5 @@
-"""An estimate with its settings: from a run folder, a saved plant, a file of values, or nominal values."""
+"""An estimate with its settings: from a run folder, a saved plant, a file of values,
+or nominal values."""
 
 import hashlib
 import json
@@ -10,12 +11,15 @@ from typing import Any
 from hydroid.arrays import Array, record
 from hydroid.errors import RunError
 from hydroid.estimate import DESCRIPTION, NAME, FitSummary, ParameterEstimate, read_estimate
-from hydroid.files import find_config, is_file, read_file, write_atomic, yaml_text
+from hydroid.files import Plain, find_config, is_file, read_file, write_atomic, yaml_text
 from hydroid.progress import LOGGER
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load
+from hydroid.settings.problem import ParameterSettings
 
-CONFIG, ARM, MODEL = "config.yaml", "arm.yaml", "model/arm.xml"
+CONFIG = "config.yaml"
+ARM = "arm.yaml"
+MODEL = "model/arm.xml"
 """the files of a folder that `load_identified` reads, beside the estimate"""
 PAIR = "model/pair.xml"  # the machine of two arms
 
@@ -29,8 +33,8 @@ class IdentifiedModel:
         theta: the parameters in the order and units of the settings, shape (P,).
         source: where the estimate came from, for messages.
         summary: the fit's own account of the estimate, where a fit made it.
-        nominal: parameters without a value, whose effect the settings and the arm's file give; they are not
-            among the settings' parameters.
+        nominal: parameters without a value, whose effect the settings and the arm's file give; they
+            are not among the settings' parameters.
     """
 
     settings: FitSettings
@@ -41,7 +45,7 @@ class IdentifiedModel:
 
     @property
     def name(self) -> str:
-        """Of the run folder or the file that the estimate came from."""
+        """Name of the run folder or the file that the estimate came from."""
         file = Path(self.source)
         return file.resolve().parent.name if file.name == NAME else file.stem
 
@@ -79,15 +83,16 @@ def load_identified(
     """Read an estimate and the settings it belongs to.
 
     Args:
-        source: a run folder, the folder of a saved plant, an `estimate.yaml`, or a YAML file of values by
-            name; None: no values.
-        config: settings, a path or a shipped name; left out: those beside the estimate. A file of values
-            without settings beside it has those that are shipped.
+        source: a run folder, the folder of a saved plant, an `estimate.yaml`, or a YAML file of
+            values by name; None: no values.
+        config: settings, a path or a shipped name; left out: those beside the estimate. A file of
+            values without settings beside it has those that are shipped.
         nominal: take parameters without a value as the settings and the arm's file have them.
 
     Raises:
         RunError: the folder holds no estimate, or a fit's settings are not beside its estimate.
-        SettingsError: a file that cannot be read, a parameter that is unknown, or missing and not `nominal`.
+        SettingsError: a file that cannot be read, a parameter that is unknown,
+            or missing and not `nominal`.
     """
     if source is not None and config is None:
         warn_of_changes(Path(source))
@@ -102,37 +107,55 @@ def read_identified(
     nominal: bool = False,
 ) -> IdentifiedModel:
     """Read as `load_identified` does, without a word on what was changed."""
-    file, values, summary = (None, {}, None) if source is None else read_estimate(Path(source))
-    beside = file and file.parent / CONFIG
-    if beside and is_file(beside):
-        own = beside
-    elif summary is None or config is not None:
-        own = "fit-hyd" if nominal else "fit-mech"
-    else:
-        what = f"is missing, and {NAME} says nothing without the settings of its fit"
-        raise RunError(what, beside, "put it back, or name the run folder")
-    chosen = config or own
+    file: Path | None = None
+    values: Plain = {}
+    summary: FitSummary | None = None
+    if source is not None:
+        file, values, summary = read_estimate(Path(source))
+    chosen = config
+    if chosen is None:
+        chosen = _config_beside(file, summary, nominal=nominal)
     settings = load(find_config(chosen), FitSettings, overrides)
+    # a fit's final estimate may have terms, or be of another model than its settings began with
     if config is None and summary is not None:
         settings = settings.of_estimate(summary.final)
-    missing = [n for n, p in settings.parameters.items() if n not in values and p.fixed is None]
+    missing = list[str]()
+    stated = dict[str, ParameterSettings]()
+    for name, parameter in settings.parameters.items():
+        if name in values or parameter.fixed is not None:
+            stated[name] = parameter
+        else:
+            missing.append(name)
     if nominal and missing:
-        known = {n: p for n, p in settings.parameters.items() if n not in missing}
-        settings = settings.changed({"parameters": known})
+        settings = settings.changed({"parameters": stated})
     origin = str(file or chosen)
     theta = settings.parameter_set().vector(values, origin)
     return IdentifiedModel(settings, theta, origin, summary, tuple(missing))
+
+
+def _config_beside(file: Path | None, summary: FitSummary | None, *, nominal: bool) -> str | Path:
+    """Return the settings that an estimate belongs to: those in its folder, or shipped ones."""
+    if file is not None:
+        beside = file.parent / CONFIG
+        if is_file(beside):
+            return beside
+        if summary is not None:
+            what = f"is missing, and {NAME} says nothing without the settings of its fit"
+            raise RunError(what, beside, "put it back, or name the run folder")
+    return "fit-hyd" if nominal else "fit-mech"
 
 
 def own_hashes(folder: Path) -> dict[str, str]:
     """Return hashes of the settings and the model in a run folder, by file."""
     files = [folder / name for name in (CONFIG, ARM, MODEL)]
     files += sorted((folder / MODEL).parent.glob("meshes/*"))
-    return {f.relative_to(folder).as_posix(): file_hash(f) for f in files if f.is_file()}
+    present = filter(Path.is_file, files)
+    return {file.relative_to(folder).as_posix(): file_hash(file) for file in present}
 
 
 def warn_of_changes(source: Path) -> None:
-    """Say which files of a run, given by its folder or its estimate, are not as its fit left them."""
+    """Say which files of a run, given by its folder or its estimate,
+    are not as its fit left them."""
     folder = source if os.path.isdir(source) else source.parent
     for name in changed_files(folder):
         text = "warning: %s: is not as the fit left it; put it back, or fit again"
@@ -140,14 +163,18 @@ def warn_of_changes(source: Path) -> None:
 
 
 def changed_files(folder: Path) -> list[str]:
-    """Return the files of a run folder that are not what its fit wrote; none of a folder that is no run's."""
+    """Return the files of a run folder that are not what its fit wrote;
+    none of a folder that is no run's."""
     try:
         run = json.loads(read_file(folder / DESCRIPTION))
-        written = {**run["files"]} | ({NAME: run["estimate"]} if "estimate" in run else {})
+        written = dict(run["files"])
+        if "estimate" in run:
+            written[NAME] = run["estimate"]
     except (OSError, ValueError, RecursionError, KeyError, TypeError):
-        return []  # whoever needs the description says what is wrong with it
-    there = own_hashes(folder) | {NAME: file_hash(folder / NAME)}
-    return [name for name, known in written.items() if there.get(name) != known]
+        # whoever needs the description says what is wrong with it
+        return []
+    present = own_hashes(folder) | {NAME: file_hash(folder / NAME)}
+    return [name for name, stored in written.items() if present.get(name) != stored]
 
 
 def file_hash(*files: Path) -> str:
@@ -157,13 +184,15 @@ def file_hash(*files: Path) -> str:
 
 
 def start_values(settings: FitSettings) -> IdentifiedModel:
-    """Return the model before any fit, where a search starts: nominal values, or the middle of the bounds."""
+    """Return the model before any fit, where a search starts: nominal values,
+    or the middle of the bounds."""
     return IdentifiedModel(settings, settings.parameter_set().start, "the start values")
 
 
 def write_settings(folder: Path, settings: FitSettings) -> None:
     """Write the settings, the arm and its models to a folder, so that it can be read anywhere."""
-    from hydroid.mjcf import copy_models  # imports MuJoCo
+    # this imports MuJoCo, which takes long
+    from hydroid.mjcf import copy_models
 
     arm = settings.arm
     models = {MODEL: arm.model} | ({PAIR: arm.pair} if arm.pair else {})

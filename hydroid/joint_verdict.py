@@ -1,4 +1,5 @@
-"""The verdict on one joint as `estimate.yaml` and `--json` hold it, and the words that it has everywhere."""
+"""The verdict on one joint as `estimate.yaml` and `--json` hold it,
+and the words that it has everywhere."""
 
 from enum import StrEnum
 
@@ -21,12 +22,12 @@ class Verdict(StrEnum):
 
     @property
     def sign(self) -> str:
-        """What stands before it: ✓ good, ! usable with care, ? the logs do not tell, ✗ bad."""
+        """The sign before its words: ✓ good, ! usable with care, ? the logs do not tell, ✗ bad."""
         return _SIGNS.get(self, "✗")
 
     @property
     def fails(self) -> bool:
-        """Whether it says of unseen or fitted logs that the fit errs by more than is good."""
+        """Whether the fit errs by more than is good, on unseen or on fitted logs."""
         return self.sign == "✗"
 
     def beside(self, model: str | None) -> str:
@@ -57,7 +58,8 @@ class Comparison(Settings):
     outcome: Outcome = Field(strict=False)
     """whether the fit is better or worse, or the logs do not tell"""
     difference_deg2: float | None = None
-    """the fit's mean squared error minus the simple model's [deg²]; null: none, or the fit diverged"""
+    """the fit's mean squared error minus the simple model's [deg²]; null: none,
+    or the fit diverged"""
     sd_deg2: float | None = None
     """standard error of that difference [deg²]; null: it is not known"""
     blocks: int = 0
@@ -65,7 +67,8 @@ class Comparison(Settings):
 
 
 class JointVerdict(Settings):
-    """What a fit is worth for one joint; rms errors over the logs that drive it [deg], null if diverged."""
+    """What a fit is worth for one joint; rms errors over the logs that drive it [deg],
+    null if diverged."""
 
     joint: int
     """numbered from 1"""
@@ -92,8 +95,8 @@ class JointVerdict(Settings):
     horizons_deg: dict[str, tuple[float | None, ...]] = Field(
         default_factory=dict[str, tuple[float | None, ...]]
     )
-    """rms error of the angle's change over 0.5, 1, 2, 5 and 10 s from starts all along the unseen logs, of
-    the fit and of the simple models; empty where there are none"""
+    """rms error of the angle's change over 0.5, 1, 2, 5 and 10 s from starts all along the unseen
+    logs, of the fit and of the simple models; empty where there are none"""
     compared: dict[str, tuple[Comparison, ...]] = Field(default_factory=dict[str, tuple[Comparison, ...]])
     """the fit with each simple model over these times"""
     compared_whole: dict[str, Comparison] = Field(default_factory=dict[str, Comparison])

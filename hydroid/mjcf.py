@@ -1,4 +1,5 @@
-"""MuJoCo's XML of an arm: read, held to what hydroid simulates, copied; MuJoCo's errors as one line."""
+"""MuJoCo's XML of an arm: read, held to what hydroid simulates, copied;
+MuJoCo's errors as one line."""
 
 import warnings
 from collections.abc import Generator, Mapping
@@ -14,62 +15,97 @@ from hydroid.robot_xml import read_robot
 
 
 def read_mjcf(path: Path) -> mujoco.MjSpec:
-    """Read an MJCF whose joints turn or slide, each alone on its body, and whose numbers are finite."""
+    """Read an MJCF whose joints turn or slide, each alone on its body,
+    and whose numbers are finite.
+
+    Raises ModelError: it is another one, or has what hydroid does not simulate.
+    """
     if not is_file(path):
         raise ModelError("no such model", path)
-    read_robot(path)  # MuJoCo takes a NaN for what it likes
+    # MuJoCo takes a NaN for what it likes
+    read_robot(path)
     with mujoco_errors(path):
         spec = mujoco.MjSpec.from_file(str(path))
     if not spec.joints:
         raise ModelError("has no joint", path)
+    _refuse_joints(spec, path)
+    _refuse_forces(spec, path)
     for joint in spec.joints:
-        if not joint.name or not joint.parent.name:
-            raise ModelError(f"joint {joint.name!r} of body {joint.parent.name!r}: both need a name", path)
-        kinds = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
-        if joint.type not in kinds or len(joint.parent.joints) > 1:
-            raise ModelError(f"joint {joint.name!r} must be a hinge or a slide, alone on its body", path)
-    if spec.equalities:
-        raise ModelError("has equality constraints, which hydroid does not simulate", path)
-    lifted = [body.name for body in spec.bodies if body.gravcomp]
-    if lifted:
-        what = f"body {lifted[0]!r} has gravcomp: hydroid does not simulate what takes its weight away"
-        raise ModelError(what, path, "take gravcomp out")
-    if spec.option.density or spec.option.viscosity:
-        raise ModelError("has a density or viscosity of the air, which hydroid does not simulate", path)
-    for joint in spec.joints:
-        if not np.isfinite(joint.range).all():  # both, or `read_robot` refuses it
-            joint.limited, joint.range = mujoco.mjtLimited.mjLIMITED_FALSE, [0.0, 0.0]
+        # both ends are infinite then, or `read_robot` refuses the file
+        if not np.isfinite(joint.range).all():
+            joint.limited = mujoco.mjtLimited.mjLIMITED_FALSE
+            joint.range = [0.0, 0.0]
     return spec
 
 
+def _refuse_joints(spec: mujoco.MjSpec, path: Path) -> None:
+    """Refuse joints without a name, of another kind, or several of one body."""
+    kinds = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
+    for joint in spec.joints:
+        body = joint.parent
+        if not joint.name or not body.name:
+            what = f"joint {joint.name!r} of body {body.name!r}: both need a name"
+            raise ModelError(what, path)
+        if joint.type not in kinds or len(body.joints) > 1:
+            what = f"joint {joint.name!r} must be a hinge or a slide, alone on its body"
+            raise ModelError(what, path)
+
+
+def _refuse_forces(spec: mujoco.MjSpec, path: Path) -> None:
+    """Refuse forces that hydroid does not simulate."""
+    if spec.equalities:
+        raise ModelError("has equality constraints, which hydroid does not simulate", path)
+    for body in spec.bodies:
+        if body.gravcomp:
+            why = "hydroid does not simulate what takes its weight away"
+            raise ModelError(f"body {body.name!r} has gravcomp: {why}", path, "take gravcomp out")
+    if spec.option.density or spec.option.viscosity:
+        what = "has a density or viscosity of the air, which hydroid does not simulate"
+        raise ModelError(what, path)
+
+
 def copy_models(models: Mapping[str, Path], folder: Path) -> None:
-    """Write MJCFs by their new names, with their meshes, to a folder that stands alone."""
-    kept: dict[str, bytes] = {}
+    """Write MJCFs by their new names, with their meshes, to a folder that stands alone.
+
+    Raises RunError: a mesh cannot be read, or the folder cannot be written.
+    """
+    # of the meshes, by their new names
+    contents: dict[str, bytes] = {}
     for name, path in models.items():
-        spec, home = read_mjcf(path), path.resolve().parent
+        spec = read_mjcf(path)
+        home = path.resolve().parent
         for mesh in spec.meshes:
-            if not mesh.file:
-                continue  # its vertices stand in the MJCF
-            source = home / spec.meshdir / mesh.file
-            try:
-                content = source.read_bytes()
-            except OSError as error:
-                raise RunError(f"mesh cannot be read ({error.strerror})", source) from None
-            # meshes of different folders may have one name
-            taken = kept.get(source.name, content) != content
-            mesh.file = f"{len(kept)}_{source.name}" if taken else source.name
-            kept[mesh.file] = content
-            write_atomic(folder / "meshes" / mesh.file, content)
+            # a mesh without a file has its vertices in the MJCF
+            if mesh.file:
+                mesh.file = _copied(home / spec.meshdir / mesh.file, folder, contents)
         for pictures, place in ((spec.textures, spec.texturedir), (spec.hfields, spec.meshdir)):
             for picture in pictures:
-                picture.file = picture.file and str(home / place / picture.file)  # these stay where they are
-        spec.modelfiledir, spec.meshdir = str(folder.resolve()), "meshes"
+                # these stay where they are
+                picture.file = picture.file and str(home / place / picture.file)
+        spec.modelfiledir = str(folder.resolve())
+        spec.meshdir = "meshes"
         write_atomic(folder / name, mjcf_text(spec))
+
+
+def _copied(source: Path, folder: Path, contents: dict[str, bytes]) -> str:
+    """Copy a mesh to a folder, and return its name there: meshes of different folders may have one
+    name."""
+    try:
+        content = source.read_bytes()
+    except OSError as error:
+        raise RunError(f"mesh cannot be read ({error.strerror})", source) from None
+    name = source.name
+    if contents.get(name, content) != content:
+        name = f"{len(contents)}_{name}"
+    contents[name] = content
+    write_atomic(folder / "meshes" / name, content)
+    return name
 
 
 def mjcf_text(spec: mujoco.MjSpec) -> str:
     """Return a spec as XML to the last bit, as it is written and not as it compiles."""
-    spec.compiler.savecompiled = spec.compiler.savecanonical = False  # canonical is six digits
+    # MuJoCo's canonical form has six digits
+    spec.compiler.savecompiled = spec.compiler.savecanonical = False
     return spec.to_xml()
 
 
@@ -85,13 +121,16 @@ def mujoco_errors(where: object) -> Generator[None]:
 
 @contextmanager
 def quiet_mujoco() -> Generator[None]:
-    """Keep MuJoCo from printing a warning for every diverged candidate, and from writing MUJOCO_LOG.TXT."""
-    before, silent = mujoco.MjLogConfig.get(), mujoco.MjLogConfig.get()
+    """Keep MuJoCo from printing a warning for every diverged candidate,
+    and from writing MUJOCO_LOG.TXT."""
+    before = mujoco.MjLogConfig.get()
+    silent = mujoco.MjLogConfig.get()
     silent.logto_console = silent.logto_file = False
     mujoco.MjLogConfig.set(silent)
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # MuJoCo's own, of the same things
+            # MuJoCo warns in Python of the same things
+            warnings.simplefilter("ignore", UserWarning)
             yield
     finally:
         mujoco.MjLogConfig.set(before)

@@ -4,6 +4,7 @@ The search works in the unit box of the *free* parameters; everything else works
 vector theta: one column per parameter, fixed ones included, in the units of the table.
 """
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -16,8 +17,8 @@ from hydroid.errors import SettingsError
 class Prior:
     """What is known of one parameter besides the logs: Gaussian, or log-normal where `log`.
 
-    `nominal` is the most likely value, of a log-normal prior its median; `sd` the standard deviation in the
-    unit, or that of the logarithm.
+    `nominal` is the most likely value, of a log-normal prior its median; `sd` the standard
+    deviation in the unit, or that of the logarithm.
     """
 
     nominal: float
@@ -43,7 +44,8 @@ class Parameter:
         name, unit: its symbol, and the unit of its values.
         lower, upper: its bounds.
         fixed: its value if it is not estimated.
-        log: whether it is searched, refined and reported by its logarithm; the lower bound is then above 0.
+        log: whether it is searched, refined and reported by its logarithm; the lower bound is then
+            above 0.
         start: where a search starts; None: no parameter of the set states a start.
         prior: what is known besides the logs.
         least: what a relative change of 1 is at least, in the unit.
@@ -60,16 +62,20 @@ class Parameter:
     least: float = 0.0
 
     def position(self, value: Array | float) -> Array:
-        """Return where values lie on the parameter's scale: 0 at the lower bound, 1 at the upper one."""
+        """Return where values lie on the parameter's scale: 0 at the lower bound,
+        1 at the upper one."""
         if self.log:
             return np.log(np.asarray(value) / self.lower) / np.log(self.upper / self.lower)
         return (np.asarray(value) - self.lower) / (self.upper - self.lower)
 
     def at(self, position: Array | float) -> Array:
-        """Return the values at positions; the ends are the bounds to the last digit. Equations (15), (16)."""
-        low, high = self.lower, self.upper
-        inner = low * (high / low) ** np.asarray(position) if self.log else low + position * (high - low)
-        return np.where(np.asarray(position) >= 1.0, high, inner)
+        """Return the values at positions; the ends are the bounds to the last digit.
+        Equations (15), (16)."""
+        if self.log:
+            inner = self.lower * (self.upper / self.lower) ** np.asarray(position)
+        else:
+            inner = self.lower + position * (self.upper - self.lower)
+        return np.where(np.asarray(position) >= 1.0, self.upper, inner)
 
 
 @record
@@ -109,13 +115,17 @@ class ParameterSet:
 
     @property
     def start(self) -> Array:
-        """Where a search starts, shape (P,): as stated, or in the middle of the bounds on their scale."""
-        middle = self.from_unit(np.full(int(self.free.sum()), 0.5))
-        stated = [p.start if p.fixed is None else None for p in self.parameters]
-        return np.array([m if s is None else s for m, s in zip(middle, stated, strict=True)])
+        """Where a search starts, shape (P,): as stated,
+        or in the middle of the bounds on their scale."""
+        start = self.from_unit(np.full(int(self.free.sum()), 0.5))
+        for column, parameter in enumerate(self.parameters):
+            if parameter.fixed is None and parameter.start is not None:
+                start[column] = parameter.start
+        return start
 
     def started(self, values: Mapping[str, float]) -> Array:
-        """Return values by name as theta, shape (P,), the others as at the start, all within the bounds."""
+        """Return values by name as theta, shape (P,), the others as at the start,
+        all within the bounds."""
         theta = self.start
         for column, p in enumerate(self.parameters):
             if p.fixed is None and p.name in values:
@@ -124,41 +134,61 @@ class ParameterSet:
 
     def from_unit(self, unit: Array) -> Array:
         """Map points of the unit box, shape (.., free), to theta, shape (.., P)."""
-        theta, places = np.empty((*unit.shape[:-1], len(self.parameters))), iter(np.moveaxis(unit, -1, 0))
-        for column, p in enumerate(self.parameters):
-            theta[..., column] = p.at(next(places)) if p.fixed is None else p.fixed
+        theta = np.empty((*unit.shape[:-1], len(self.parameters)))
+        positions = iter(np.moveaxis(unit, -1, 0))
+        for column, parameter in enumerate(self.parameters):
+            fixed = parameter.fixed
+            theta[..., column] = parameter.at(next(positions)) if fixed is None else fixed
         return theta
 
     def to_unit(self, theta: Array) -> Array:
-        """Map theta, shape (.., P), to the unit box, shape (.., free); values beyond a bound are clipped."""
-        values = np.moveaxis(theta, -1, 0)
-        columns = [p.position(v) for p, v in zip(self.parameters, values, strict=True) if p.fixed is None]
+        """Map theta, shape (.., P), to the unit box, shape (.., free);
+        values beyond a bound are clipped."""
+        columns = [
+            parameter.position(values)
+            for parameter, values in zip(self.parameters, np.moveaxis(theta, -1, 0), strict=True)
+            if parameter.fixed is None
+        ]
         return np.clip(np.stack(columns, axis=-1), 0.0, 1.0)
 
     def width(self, theta: Array) -> Array:
-        """Change of each value per change of its position on its scale, at theta, shape (P,)."""
-        lower, upper = (np.where(self.log, ends, 1.0) for ends in (self.lower, self.upper))
+        """Return the change of each value per change of its position on its scale, at theta,
+        (P,)."""
+        lower = np.where(self.log, self.lower, 1.0)
+        upper = np.where(self.log, self.upper, 1.0)
         return np.where(self.log, theta * np.log(upper / lower), self.upper - self.lower)
 
     def vector(self, values: Mapping[str, object], source: str) -> Array:
-        """Return theta, shape (P,), from values by name; a fixed parameter may be left out."""
+        """Return theta, shape (P,), from values by name; a fixed parameter may be left out.
+
+        Raises SettingsError: a name that does not exist or is missing, or no number, or too small.
+        """
         unknown = [name for name in values if name not in self.names]
         if unknown:
-            raise SettingsError(
-                f"unknown parameter {unknown[0]!r}", source, f"known: {', '.join(self.names)}"
-            )
+            hint = f"known: {', '.join(self.names)}"
+            raise SettingsError(f"unknown parameter {unknown[0]!r}", source, hint)
         theta = list[float]()
-        for p in self.parameters:
-            if (value := values.get(p.name, p.fixed)) is None:
-                raise SettingsError(f"parameter {p.name!r} is missing", source)
-            # most quantities cannot be negative; the comparison is False for NaN, and squares stay finite
-            least = min(p.lower, 0.0)
-            if isinstance(value, bool) or not isinstance(value, int | float) or not least <= value < 1e100:
-                hint = f"a number from {least:g}, in {p.unit}"
-                raise SettingsError(f"parameter {p.name!r} is {value!r}", source, hint)
-            theta.append(float(value))
+        for parameter in self.parameters:
+            value = values.get(parameter.name, parameter.fixed)
+            if value is None:
+                raise SettingsError(f"parameter {parameter.name!r} is missing", source)
+            # most quantities cannot be negative
+            least = min(parameter.lower, 0.0)
+            number = _number(value)
+            # so that squares stay finite
+            if not least <= number < 1e100:
+                hint = f"a number from {least:g}, in {parameter.unit}"
+                raise SettingsError(f"parameter {parameter.name!r} is {value!r}", source, hint)
+            theta.append(number)
         return np.array(theta)
 
     def mapping(self, theta: Array) -> dict[str, float]:
         """Return values by name from theta, shape (P,)."""
         return dict(zip(self.names, theta.tolist(), strict=True))
+
+
+def _number(value: object) -> float:
+    """Return a value as a number; NaN, which no comparison accepts, of one that is none."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return math.nan
+    return float(value) if abs(value) < 1e100 else math.nan

@@ -20,6 +20,24 @@ def predict(model: IdentifiedModel, log: Log, joints: Sequence[int]) -> Array:
     return _respond(model, log, [j - 1 for j in joints]).angle[0]
 
 
+def predict_with_pressures(
+    model: IdentifiedModel, log: Log, joints: Sequence[int]
+) -> tuple[Array, Array | None]:
+    """Return angles as `predict` does, and the chambers' pressures [Pa], shape (T, K, 2).
+
+    The angles are the same to the bit. Pressures are NaN of joints that the log does not drive, and None of
+    a model without hydraulics.
+    """
+    if model.settings.stage != "hyd":
+        return predict(model, log, joints), None
+    columns = [joint - 1 for joint in joints]
+    driven = [column for column in columns if log.driven[column]]
+    response = _respond(model, log, columns, driven)
+    pressures = np.full((len(log.time), len(joints), 2), np.nan)
+    pressures[:, [columns.index(column) for column in driven]] = response.pressure[0]
+    return response.angle[0], pressures
+
+
 def predict_log(model: IdentifiedModel, log: Log) -> Log:
     """Return the log with the angles that the model gives for its commands, from its first pose.
 

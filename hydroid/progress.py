@@ -18,7 +18,8 @@ def no_progress(what: str, done: int, total: int) -> None:
 
 @contextmanager
 def logging_to(handler: logging.Handler, form: str = "") -> Generator[None]:
-    """Let a handler take the lines of hydroid's loggers, INFO and above, in a form or with their times."""
+    """Let a handler take the lines of hydroid's loggers, INFO and above,
+    in a form or with their times."""
     form = form or "%(asctime)s %(levelname)-7s %(message)s"
     handler.setFormatter(logging.Formatter(form, datefmt="%Y-%m-%dT%H:%M:%S%z"))
     level = LOGGER.level

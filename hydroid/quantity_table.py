@@ -1,10 +1,11 @@
-"""The rows of `quantities.yaml`, every quantity that can be stated or estimated, by name and by side.
+"""The rows of `quantities.yaml`, every quantity that can be stated or estimated,
+by name and by side.
 
-Of a quantity with two sides, such as `delay`, `delay_a` acts on motion towards A, which a positive command
-causes, and `delay_b` towards B; the name without an ending sets both.
+Of a quantity with two sides, such as `delay`, `delay_a` acts on motion towards A, which a positive
+command causes, and `delay_b` towards B; the name without an ending sets both.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from itertools import chain
 from typing import Literal, NamedTuple
 
@@ -18,10 +19,12 @@ class Quantity(NamedTuple):
     Attributes:
         name: in settings and as a parameter of a fit.
         unit: of its values.
-        default: value where nothing states one; None: no limit. Of a quantity with two sides a pair.
+        default: value where nothing states one; None: no limit. Of a quantity with two sides a
+            pair.
         plain: what it is, for readers who do not know its symbol.
         note: what those who set it must know besides.
-        span: values of real machines, between which `hydroid suggest` searches a quantity that is not free.
+        span: values of real machines, between which `hydroid suggest` searches a quantity that is
+            not free.
         limits: least and largest value; None: from 0 where 0 is the default, or else above 0.
         of: the kind of actuator that alone has it, as `Joint.has` tells them apart; "": all have.
         optional: whether null is allowed beside a number; where it is the default, it is.
@@ -39,12 +42,13 @@ class Quantity(NamedTuple):
 
     @property
     def meaning(self) -> str:
-        """What it is, with the note."""
+        """The plain words for the quantity, with the note behind them."""
         return f"{self.plain}; {self.note}" if self.note else self.plain
 
     @property
     def factor(self) -> float:
-        """What turns a value in `unit` into SI, but for the command's %; 1 of a plain number."""
+        """Factor that turns a value in `unit` into SI; a command stays in %,
+        and a plain number has 1."""
         return UNITS[self.unit.lower()].factor if self.unit else 1.0
 
     @property
@@ -68,15 +72,19 @@ class Quantity(NamedTuple):
             yield self
             return
         for side, other, default in zip("AB", "BA", self.default, strict=True):
-            name, plain = f"{self.name}_{side.lower()}", f"{self.plain}, side {side}"
             yield self._replace(
-                name=name, default=default, plain=plain, note=self.note.format(side=side, other=other)
+                name=f"{self.name}_{side.lower()}",
+                default=default,
+                plain=f"{self.plain}, side {side}",
+                note=self.note.format(side=side, other=other),
             )
 
 
 def quantity(name: str, row: Plain) -> Quantity:
     """Return the quantity of one row; ValueError if `units.yaml` lacks its unit."""
-    values: Plain = {key: tuple(value) if isinstance(value, list) else value for key, value in row.items()}
+    values: Plain = {}
+    for key, value in row.items():
+        values[key] = tuple(value) if isinstance(value, list) else value
     made = Quantity(name, **values)
     if made.unit and made.unit.lower() not in UNITS:
         raise ValueError(f"quantities.yaml: {name}: units.yaml has no unit {made.unit}")
@@ -89,18 +97,26 @@ _GROUPS = {
 
 ROWS = tuple(chain(*_GROUPS.values()))  # the one table
 
-QUANTITIES = {quantity.name: quantity for row in ROWS for quantity in row.each()}
+
+def _by_side(rows: Iterable[Quantity]) -> dict[str, Quantity]:
+    """Return quantities by name, each side by itself."""
+    sides = chain.from_iterable(row.each() for row in rows)
+    return {quantity.name: quantity for quantity in sides}
+
+
+QUANTITIES = _by_side(ROWS)
 """the quantities by name, each side by itself"""
 
-HYDRAULIC = {quantity.name: quantity for row in _GROUPS["hydraulic"] for quantity in row.each()}
+HYDRAULIC = _by_side(_GROUPS["hydraulic"])
 """those that `hydraulics` sets for all joints"""
 
 CHOICES = {row.name: row for row in ROWS} | QUANTITIES  # what a parameter of a fit can be, by name
 
-TARGETS = {name: tuple(quantity.name for quantity in row.each()) for name, row in CHOICES.items()}
+TARGETS = {name: tuple(_by_side([row])) for name, row in CHOICES.items()}
 """the quantities that a name sets: itself, or both sides"""
 
-MECHANICAL = tuple(row.name for row in _GROUPS["mechanical"])  # the quantities that both stages have
+# the quantities that both stages have
+MECHANICAL = tuple(row.name for row in _GROUPS["mechanical"])
 
+# the factors of a valve's curve, part by part
 CURVE = tuple(row.name for row in _GROUPS["hydraulic"] if row.name.startswith("curve_"))
-"""the factors of a valve's curve, part by part"""

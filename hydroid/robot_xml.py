@@ -1,6 +1,8 @@
-"""A URDF or MJCF as a tree of elements that can be trusted: its size, its names and its numbers are checked.
+"""A URDF or MJCF as a tree of elements that can be trusted: its size,
+its names and its numbers are checked.
 
-MuJoCo itself takes a NaN for 0 or for the default, and ends the program where elements are too deep.
+MuJoCo itself takes a NaN for 0 or for the default,
+and ends the program where elements are too deep.
 """
 
 import math
@@ -26,8 +28,8 @@ COPIES = 2000  # that an MJCF may ask for
 def read_robot(path: Path) -> ElementTree.Element:
     """Read a URDF, or an MJCF with the files that it includes in their places.
 
-    Raises ModelError: a file cannot be read, is too large or too deep, is included twice, or holds the same
-    name twice, or a length, place, angle or limit that is no finite number.
+    Raises ModelError: a file cannot be read, is too large or too deep, is included twice, or holds
+    the same name twice, or a length, place, angle or limit that is no finite number.
     """
     root = _parsed(path)
     _include(root, path, path.resolve().parent, {path.resolve()})
@@ -42,7 +44,9 @@ class _Tree(ElementTree.TreeBuilder):
 
     def __init__(self, path: Path) -> None:
         super().__init__()
-        self._path, self._depth, self._count = path, 0, 0
+        self._path = path
+        self._depth = 0
+        self._count = 0
 
     def start(self, tag: str, attrs: dict[str, str], /) -> ElementTree.Element:
         self._depth += 1
@@ -72,7 +76,8 @@ def _parsed(path: Path) -> ElementTree.Element:
 
 
 def _include(root: ElementTree.Element, path: Path, folder: Path, there: set[Path]) -> None:
-    """Put included files in their places, each once, as MuJoCo does: what includes itself has no end."""
+    """Put included files in their places, each once, as MuJoCo does:
+    what includes itself has no end."""
     for owner, element in _owned(root):
         _check_numbers(owner, element, path)
         _check_limits(owner, element, path)
@@ -101,10 +106,16 @@ def _owned(root: ElementTree.Element) -> Iterator[tuple[str, ElementTree.Element
 
 
 def _check_names(root: ElementTree.Element, path: Path) -> None:
-    """Refuse a name that two links or two joints share: what the file says of it is said of both."""
+    """Refuse a name that two links or two joints share:
+    what the file says of it is said of both."""
+    if root.tag == "robot":
+        elements = [*root]
+    else:
+        elements = list[ElementTree.Element]()
+        for tree in root.findall("worldbody"):
+            elements += tree.iter()
     seen = set[tuple[str, str]]()
-    trees = [root] if root.tag == "robot" else root.findall("worldbody")
-    for element in (one for tree in trees for one in (tree if tree is root else tree.iter())):
+    for element in elements:
         name = element.get("name", "")
         if element.tag not in OWN_NAMES or not name:
             continue
@@ -120,23 +131,33 @@ def _check_chains(root: ElementTree.Element, path: Path) -> None:
     """Refuse links of a URDF that carry themselves, and chains that no program should go along."""
     parents = dict[str, str]()
     for joint in root.iterfind("joint"):
-        ends = (joint.find(end) for end in ("child", "parent"))
-        child, parent = ("" if end is None else end.get("link", "") for end in ends)
-        if child and parent:  # else MuJoCo refuses the joint
+        child = _link(joint.find("child"))
+        parent = _link(joint.find("parent"))
+        # a joint without both MuJoCo refuses
+        if child and parent:
             parents[child] = parent
     for link in parents:
-        above, count = link, 0
+        above = link
+        count = 0
         while above in parents:
-            above, count = parents[above], count + 1
+            above = parents[above]
+            count += 1
             if above == link:
-                raise ModelError(f"link {link!r} is carried by itself", path, "correct parents and children")
+                what = f"link {link!r} is carried by itself"
+                raise ModelError(what, path, "correct parents and children")
             if count > DEEPEST:
                 raise ModelError(f"link {link!r} is carried by more than {DEEPEST} others", path)
 
 
+def _link(end: ElementTree.Element | None) -> str:
+    """Return the link that an end of a joint names; empty where there is none."""
+    return "" if end is None else end.get("link", "")
+
+
 def _check_copies(root: ElementTree.Element, path: Path) -> None:
     """Refuse what MuJoCo would copy without end."""
-    waiting, copies = [(1.0, root)], 0.0
+    copies = 0.0
+    waiting = [(1.0, root)]
     while waiting:
         times, element = waiting.pop()
         if element.tag == "replicate":
@@ -150,31 +171,44 @@ def _check_copies(root: ElementTree.Element, path: Path) -> None:
 def _check_numbers(owner: str, element: ElementTree.Element, path: Path) -> None:
     for name in GEOMETRY.intersection(element.keys()):
         text = element.get(name, "")
-        numbers = [number for word in text.split() if (number := _number(word)) is not None]
-        if not all(abs(number) <= FARTHEST for number in numbers):  # neither is NaN
+        for number in map(_number, text.split()):
+            # False of NaN, too; words that are no numbers MuJoCo refuses
+            if number is None or abs(number) <= FARTHEST:
+                continue
             shown = f'{name}="{text[:60]}"'
             raise ModelError(f"{_place(owner, element)}: {shown} must be finite numbers", path)
 
 
 def _check_limits(owner: str, element: ElementTree.Element, path: Path) -> None:
-    """Refuse limits that are no numbers or reversed, and take infinite ones out: there are none then."""
-    low = high = None
-    if element.tag == "limit":
-        low, high = (_number(element.get(name, "0")) for name in ("lower", "upper"))
-    elif element.tag == "joint" and len(ends := element.get("range", "").split()) == 2:
-        low, high = map(_number, ends)
+    """Refuse limits that are no numbers or reversed, and take infinite ones out:
+    there are none then."""
+    low, high = _limits(element)
     if low is None or high is None:
-        return  # MuJoCo refuses what is no number
+        # MuJoCo refuses what is no number
+        return
+    place = _place(owner, element)
     if math.isnan(low) or math.isnan(high):
-        raise ModelError(f"{_place(owner, element)}: a limit is no number", path)
+        raise ModelError(f"{place}: a limit is no number", path)
     if low > high:
-        raise ModelError(f"{_place(owner, element)}: lower {low:g} above upper {high:g}", path)
-    if math.isinf(low) and math.isinf(high):
+        raise ModelError(f"{place}: lower {low:g} above upper {high:g}", path)
+    infinite = (math.isinf(low), math.isinf(high))
+    if all(infinite):
         for name in ("lower", "upper", "range", "limited"):
             element.attrib.pop(name, None)
-    elif math.isinf(low) or math.isinf(high):
-        what = f"{_place(owner, element)}: one limit is infinite"
-        raise ModelError(what, path, "give both, or none: a joint without limits")
+    elif any(infinite):
+        hint = "give both, or none: a joint without limits"
+        raise ModelError(f"{place}: one limit is infinite", path, hint)
+
+
+def _limits(element: ElementTree.Element) -> tuple[float | None, float | None]:
+    """Return the limits that an element of a URDF or an MJCF states."""
+    if element.tag == "limit":
+        return _number(element.get("lower", "0")), _number(element.get("upper", "0"))
+    ends = element.get("range", "").split()
+    if element.tag == "joint" and len(ends) == 2:
+        low, high = map(_number, ends)
+        return low, high
+    return None, None
 
 
 def _place(owner: str, element: ElementTree.Element) -> str:

@@ -1,9 +1,10 @@
 """A study: every cell of some settings, fitted over every seed, and what is measured of each run.
 
-Each run is a fit of one cell and one seed, and leaves one small file. The file's name is a digest of all that
-decides its content: settings, arm, data and versions. So a study that was killed goes on where it was, and
-studies in one folder share the runs that they have in common. Only the process that was started writes. The
-fits run in processes of their own or on Dask's workers, one thread each.
+Each run is a fit of one cell and one seed, and leaves one small file. The file's name is a digest
+of all that decides its content: settings, arm, data and versions. So a study that was killed goes
+on where it was, and studies in one folder share the runs that they have in common. Only the process
+that was started writes. The fits run in processes of their own or on Dask's workers,
+one thread each.
 """
 
 import json
@@ -13,10 +14,11 @@ import os
 import signal
 import threading
 from collections.abc import Callable, Generator, Mapping, Sequence
-from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -47,56 +49,66 @@ class Task:
 
     def key(self) -> str:
         """Return the digest of all that decides the run's result."""
-        return digest(
-            {
-                "versions": VERSIONS,
-                "settings": deciding(self.settings),
-                "model": model_hash(self.settings.arm),
-                "logs": [log_hash(log, self.settings) for log in self.logs],
-            }
-        )[:24]
+        content = {
+            "versions": VERSIONS,
+            "settings": deciding(self.settings),
+            "model": model_hash(self.settings.arm),
+            "logs": [log_hash(log, self.settings) for log in self.logs],
+        }
+        # 96 bits are enough: no two runs of a study have the same by chance
+        return digest(content)[:24]
 
 
 def perform(task: Task) -> Result:
     """Fit, and return what a study needs of the run, as plain values.
 
     `measures` are those of docs/studies.md, by name. `history` has generation, simulations and best
-    objective; `segment_bests` are the parameters of the best candidate of each segment, as `theta` are those
-    of the estimate.
+    objective; `segment_bests` are the parameters of the best candidate of each segment, as `theta`
+    are those of the estimate.
+
+    Raises RunError: the estimate diverges.
     """
-    result = fit(Problem(task.settings, task.logs))
-    if not result.best.usable:
+    fitted = fit(Problem(task.settings, task.logs))
+    best = fitted.best
+    if not best.usable:
         raise RunError("the estimate diverged when it was simulated")
     # the estimate may have terms, or a model, that the search had not
-    problem, searched = result.problem, task.settings.of_estimate("best").parameter_set()
-    angles = np.degrees(problem.angles(problem.output_errors(result.best.theta[None]))[0])
-    front, values = result.front
+    problem = fitted.problem
+    errors = problem.output_errors(best.theta[None])
+    angles = np.degrees(problem.angles(errors)[0])
     unit = 1.0 if task.settings.objective.relative else 180 / math.pi
-    refined = sum(r.evaluations for r in result.refinements.values())
+    refined = sum(refinement.evaluations for refinement in fitted.refinements.values())
     measures = {
-        "objective": unit * result.best.overall,
+        "objective": unit * best.overall,
         "largest error": np.abs(angles).max(),
         "mean absolute error": np.abs(angles).mean(),
         "rms error": rms(angles),
-        "simulations": int(result.history[-1, 2]) + refined,
-        "diverged": int(result.history[-1, 3]),
-        "seconds": round(sum(result.seconds.values()), 3),
+        "simulations": int(fitted.history[-1, 2]) + refined,
+        "diverged": int(fitted.history[-1, 3]),
+        "seconds": round(sum(fitted.seconds.values()), 3),
     }
-    bests = front[segment_best(values[:, :-1])]
+    searched = task.settings.of_estimate("best").parameter_set()
+    front, objectives = fitted.front
+    bests = front[segment_best(objectives[:, :-1])]
+    history = list[list[Any]]()
+    for generation, _, simulated, _, objective, _ in fitted.history:
+        history.append([int(generation), int(simulated), finite(unit * objective)])
     return {
         "measures": measures,
-        "theta": problem.parameters.mapping(result.best.theta),
+        "theta": problem.parameters.mapping(best.theta),
         "segment_bests": [searched.mapping(theta) for theta in bests],
-        "history": [[int(g), int(n), finite(unit * best)] for g, _, n, _, best, _ in result.history],
+        "history": history,
     }
 
 
-Read = Callable[[Sequence[Path], FitSettings], list[Log]]  # reads logs as settings map their columns
+# reads logs as settings map their columns
+Read = Callable[[Sequence[Path], FitSettings], list[Log]]
 
 
 @record
 class Row:
-    """One run: its cell and seed, its measures by name (empty where it failed), and why it failed."""
+    """One run: its cell and seed, its measures by name (empty where it failed),
+    and why it failed."""
 
     cell: str
     seed: int
@@ -107,48 +119,74 @@ class Row:
 def run_study(
     path: Path, folder: Path, read: Read, executor: Executor, progress: Progress
 ) -> tuple[Row, ...]:
-    """Perform the runs of a study that `folder` does not have yet; return the measures of all, by seed."""
+    """Perform the runs of a study that `folder` does not have yet; return the measures of all,
+    by seed."""
     study = load(path, StudySettings)
     cells = cell_settings(study, path)
-    logs = read([path.parent / name for name in study.logs], next(iter(cells.values())))
+    any_cell = next(iter(cells.values()))
+    logs = read([path.parent / name for name in study.logs], any_cell)
     tasks = make_tasks(cells, study.seeds, logs)
     files = [folder / "runs" / f"{task.key()}.json" for task in tasks]
     results = {file: _read(file) for file in files if file.is_file()}
+    # cells that say the same are one run
     missing = {file: task for file, task in zip(files, tasks, strict=True) if file not in results}
-    known, total = len(results), len(results) + len(missing)
-    if known and missing:
-        LOGGER.log(NOTE, "%d of %d runs found, goes on", known, total)
-    progress("runs", known, total)
+    if results and missing:
+        total = len(results) + len(missing)
+        LOGGER.log(NOTE, "%d of %d runs found, goes on", len(results), total)
+    _perform_all(missing, results, executor, progress)
+    return tuple(map(measured, tasks, [results[file] for file in files]))
+
+
+def _perform_all(
+    missing: Mapping[Path, Task],
+    results: dict[Path, Result],
+    executor: Executor,
+    progress: Progress,
+) -> None:
+    """Perform the runs that are missing, and add their results to those that are there."""
+    there = len(results)
+    total = there + len(missing)
+    progress("runs", there, total)
     futures = {executor.submit(perform, task): file for file, task in missing.items()}
     try:
-        for done, future in enumerate(as_completed(futures), known + 1):
-            file, lasting = futures.pop(future), True
-            try:
-                results[file] = future.result()
-            except BrokenProcessPool:
-                hint = "the same command goes on from here; with less memory, use fewer processes"
-                raise RunError("a process of the study was killed", hint=hint) from None
-            except Exception as error:
-                lasting = isinstance(error, HydroidError)  # what is no fault of the input may pass
-                words = str(error) if lasting else f"{type(error).__name__}: {error}"
-                LOGGER.warning("%s, seed %d failed: %s", missing[file].cell, missing[file].seed, words)
-                results[file] = {"failed": words}
+        for done, future in enumerate(as_completed(futures), there + 1):
+            file = futures.pop(future)
+            results[file], lasting = _ended(future, missing[file])
             if lasting:
-                write_atomic(file, json.dumps(results[file], indent=1, allow_nan=False) + "\n")
+                text = json.dumps(results[file], indent=1, allow_nan=False)
+                write_atomic(file, text + "\n")
             progress("runs", done, total)
     finally:
         for future in futures:
             future.cancel()
-    return tuple(measured(task, results[file]) for task, file in zip(tasks, files, strict=True))
+
+
+def _ended(future: Future[Result], task: Task) -> tuple[Result, bool]:
+    """Return the result of a run that has ended, and whether it would end so again.
+
+    What is no fault of the input may pass: a failure of that kind is not kept.
+    """
+    try:
+        return future.result(), True
+    except BrokenProcessPool:
+        hint = "the same command goes on from here; with less memory, use fewer processes"
+        raise RunError("a process of the study was killed", hint=hint) from None
+    except Exception as error:
+        lasting = isinstance(error, HydroidError)
+        words = str(error) if lasting else f"{type(error).__name__}: {error}"
+        LOGGER.warning("%s, seed %d failed: %s", task.cell, task.seed, words)
+        return {"failed": words}, lasting
 
 
 def make_tasks(cells: Mapping[str, FitSettings], seeds: int, logs: Sequence[Log]) -> list[Task]:
-    """Return all runs of a study, seed by seed, with one thread: the runs are what is shared out."""
-    return [
-        Task(name, seed, settings.changed({"search.seed": seed, "simulation.threads": 1}), tuple(logs))
-        for seed in range(1, seeds + 1)
-        for name, settings in cells.items()
-    ]
+    """Return all runs of a study, seed by seed, with one thread:
+    the runs are what is shared out."""
+    tasks = list[Task]()
+    for seed in range(1, seeds + 1):
+        for name, settings in cells.items():
+            changes = {"search.seed": seed, "simulation.threads": 1}
+            tasks.append(Task(name, seed, settings.changed(changes), tuple(logs)))
+    return tasks
 
 
 def measured(task: Task, result: Result) -> Row:
@@ -172,7 +210,8 @@ def _read(file: Path) -> Result:
 @contextmanager
 def processes(count: int = 0) -> Generator[Executor]:
     """Open that many processes, one per core for 0; they end with this one, however it ends."""
-    context = multiprocessing.get_context("spawn")  # threads of the simulation do not survive a fork
+    # threads of the simulation do not survive a fork
+    context = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(count or None, context, initializer=_end_with_parent)
     try:
         yield pool

@@ -1,4 +1,5 @@
-"""Units as files, settings and data sheets write them: what each measures, and what one of it is in SI."""
+"""Units as files, settings and data sheets write them: what each measures,
+and what one of it is in SI."""
 
 import math
 import re
@@ -15,25 +16,36 @@ class Unit(NamedTuple):
     factor: float
 
 
-UNITS = {
-    spelling.lower(): Unit(names.split()[0], quantity, factor)
-    for quantity, units in read_table("units.yaml").items()
-    for names, factor in units.items()
-    for spelling in names.split()
-}
+def _units() -> dict[str, Unit]:
+    """Return the rows of `units.yaml`, by each spelling in lower case."""
+    units = dict[str, Unit]()
+    for quantity, rows in read_table("units.yaml").items():
+        for names, factor in rows.items():
+            spellings = names.split()
+            for spelling in spellings:
+                units[spelling.lower()] = Unit(spellings[0], quantity, factor)
+    return units
+
+
+UNITS = _units()
 """by their spelling in lower case"""
 
 
 def unit_of(text: str) -> Unit | None:
-    """Return the unit that a text spells, with or without brackets around it; None where it spells none."""
+    """Return the unit that a text spells, with or without brackets around it;
+    None where it spells none."""
     return UNITS.get(bare(text).lower())
 
 
 def seconds(text: str) -> float | None:
     """Return the time that a text such as 5min says [s]; None where it says none."""
     parts = re.fullmatch(r"\s*(\d+\.?\d*)\s*(\w+)\s*", text)
-    unit = unit_of(parts[2]) if parts else None
-    return float(parts[1]) * unit.factor if parts and unit and unit.quantity == "time" else None
+    if parts is None:
+        return None
+    unit = unit_of(parts[2])
+    if unit is None or unit.quantity != "time":
+        return None
+    return float(parts[1]) * unit.factor
 
 
 def bare(text: str) -> str:
@@ -42,10 +54,12 @@ def bare(text: str) -> str:
 
 
 def likely_time_unit(step: float) -> str:
-    """Return the unit in which a step between samples is one of 2 to 1000 samples a second; "": in none."""
-    return next(
-        (name for name in ("s", "ms", "us", "ns", "min", "day") if 9e-4 < step * UNITS[name].factor < 0.6), ""
-    )
+    """Return the unit in which a step between samples is one of 2 to 1000 samples a second; "":
+    in none."""
+    for name in ("s", "ms", "us", "ns", "min", "day"):
+        if 9e-4 < step * UNITS[name].factor < 0.6:
+            return name
+    return ""
 
 
 def way(degrees: float, *, slides: bool) -> str:

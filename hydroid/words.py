@@ -52,6 +52,28 @@ def two_digits(value: float) -> str:
     return f"{value:.0f}" if abs(value) >= 100 else f"{value:.2g}"
 
 
+def three_digits(value: float) -> str:
+    """Write three significant digits, or all before the point; a dash if not finite."""
+    if not math.isfinite(value):
+        return "–"
+    return f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}"
+
+
+def interval_words(low: float | None, high: float | None) -> str:
+    """Write an interval by two digits of its width, and of each end; nothing where it has no limit."""
+    if low is None or high is None:
+        if low is None and high is None:
+            return ""
+        return f"up to {three_digits(high)}" if high is not None else f"from {three_digits(low or 0.0)}"
+    ends = [f"{end:.{max(_decimals(high - low), _decimals(end))}f}" for end in (low, high)]
+    return " to ".join(ends)
+
+
+def _decimals(size: float) -> int:
+    """Return how many decimals show two digits of a number; 0 of one from 10 on, and of 0."""
+    return max(0, 1 - math.floor(math.log10(abs(size)))) if size else 0
+
+
 def told_apart(first: float, second: float) -> tuple[str, str]:
     """Write two numbers beside each other: two significant digits, three where two would tie."""
     two = _significant(first, 2), _significant(second, 2)

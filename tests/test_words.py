@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from hydroid.findings import WORDS, Finding
-from hydroid.words import listed, printable, told_apart
+from hydroid.words import interval_words, listed, printable, told_apart
 
 ROOT = Path(__file__).parents[1] / "hydroid"
 
@@ -60,3 +60,21 @@ def test_a_long_list_ends_with_how_many_more():
 )
 def test_numbers_side_by_side_have_two_digits_and_three_where_two_would_tie(pair, shown):
     assert told_apart(*pair) == shown
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "expected"),
+    [
+        (10.889, 28.371, "11 to 28"),
+        (11.991, 12.032, "11.991 to 12.032"),
+        (0.01142, 0.02861, "0.011 to 0.029"),
+        (0.1871, 12731.2, "0.19 to 12731"),
+        (0.0, 1.0, "0.0 to 1.0"),
+        (None, 4.56789, "up to 4.57"),
+        (4.56789, None, "from 4.57"),
+        (None, None, ""),
+        (2.0, 2.0, "2.0 to 2.0"),
+    ],
+)
+def test_an_interval_shows_two_digits_of_its_width_and_of_its_ends(low, high, expected: str):
+    assert interval_words(low, high) == expected

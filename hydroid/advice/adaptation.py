@@ -1,13 +1,14 @@
-"""Adaptation: a fit moved to a changed machine by a few of its parameters, all others held at its estimate.
+"""Adaptation: a fit moved to a changed machine by a few of its parameters,
+all others held at its estimate.
 
-Which few is found by trying: the one whose fit foretells parts of the logs left out best is freed, then the
-next, until none foretells them clearly better (`fitting.left_out`).
-Candidates are what all joints share, such as the pump and the masses, and the effects of the logs' groups:
+Which few is found by trying: the one whose fit foretells parts of the logs left out best is freed,
+then the next, until none foretells them clearly better (`fitting.left_out`).
+Candidates are what all joints share, such as the pump and the masses, and the effects of the logs'
+groups:
 what a load, a slower engine or another day changes.
 """
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
@@ -21,71 +22,104 @@ from hydroid.log import Log
 from hydroid.problem.problem import Problem
 from hydroid.progress import Progress
 from hydroid.settings.fit import FitSettings
+from hydroid.settings.log import log_file
+from hydroid.settings.problem import ParameterSettings
 from hydroid.settings.search import MultistartSettings, RefinementSettings
 
 
 def adapted(model: IdentifiedModel, free: Sequence[str], logs: Sequence[Log] = ()) -> FitSettings:
-    """Return the settings in which only some parameters of a model are free, by name, from its estimate.
+    """Return the settings in which only some parameters of a model are free, by name,
+    from its estimate.
 
-    Their priors stay as wide as they were, around the estimate. Of the payloads those of these logs stay.
+    Their priors stay as wide as they were, around the estimate. Of the payloads those of these logs
+    stay.
+
     Raises SettingsError: a name that is none of a parameter with bounds or a prior.
     """
-    settings, parameters = model.settings, dict(model.settings.parameters)
-    possible = [name for name, own in parameters.items() if own.can_be_free]
-    for name in free:
-        if name not in possible:
-            what = f"no parameter {name!r} has bounds or a prior"
-            raise SettingsError(what, "--free", f"one of {', '.join(possible)}")
-    for name, own in parameters.items():
+    settings = model.settings
+    _refuse_unknown(free, settings)
+    parameters: dict[str, ParameterSettings] = {}
+    for name, parameter in settings.parameters.items():
         value = model.values[name]
-        freed = {"fixed": None, "start": value} | ({"nominal": value} if own.has_prior else {})
-        parameters[name] = own.changed({"term": None} | (freed if name in free else {"fixed": value}))
-    names = {Path(log.source).name for log in logs}
-    ladder = settings.simulation.model == "ladder"
+        changes: Plain = {"term": None, "fixed": value}
+        if name in free:
+            changes |= {"fixed": None, "start": value}
+            if parameter.has_prior:
+                changes["nominal"] = value
+        parameters[name] = parameter.changed(changes)
+    names = {log_file(log.source).name for log in logs}
+    kept = {name: mass for name, mass in settings.payloads.items() if name in names}
+    kind = settings.simulation.model
     return settings.changed(
         {
             "parameters": parameters,
-            "payloads": {name: mass for name, mass in settings.payloads.items() if name in names},
-            "simulation.model": "quasi-static" if ladder else settings.simulation.model,
+            "payloads": kept,
+            # a ladder that kept the quasi-static model: the dynamic one is not tried again
+            "simulation.model": "quasi-static" if kind == "ladder" else kind,
             "search.algorithm": "multistart",
+            # a search in name only: the refinement goes on from the fit's own estimate
             "search.multistart": MultistartSettings(starts=1, horizons=(), iterations=20),
             "refinement": settings.refinement or RefinementSettings(),
         }
     )
 
 
+def _refuse_unknown(names: Sequence[str], settings: FitSettings) -> None:
+    """Refuse names of no parameter that could be free."""
+    possible = [name for name, p in settings.parameters.items() if p.can_be_free]
+    for name in names:
+        if name not in possible:
+            what = f"no parameter {name!r} has bounds or a prior"
+            raise SettingsError(what, "--free", f"one of {', '.join(possible)}")
+
+
 def steps(
     model: IdentifiedModel, logs: Sequence[Log], free: Sequence[str], progress: Progress
 ) -> list[Plain]:
-    """Return what freeing parameters one after another does, after the model as it is (""), as JSON has it.
+    """Return what freeing parameters one after another does, after the model as it is (""),
+    as JSON has it.
 
-    `free` are those to be freed; without any, those that pay. Errors are those of parts of the logs left out.
+    `free` are those to be freed; without any, those that pay.
+    Errors are those of parts of the logs left out.
     """
-    groups = {model.settings.log.group_of(log.source) for log in logs}
-    pool = list(free) or [
-        name
-        for name, p in model.settings.parameters.items()
-        if (p.joints is None if p.per is None else p.per in groups)
-        and p.can_be_free
-        and (p.fixed is None or p.term is not None)
-    ]
-    problem, taken = Problem(adapted(model, pool, logs), logs), list[str]()
+    pool = list(free) or _candidates(model.settings, logs)
+    problem = Problem(adapted(model, pool, logs), logs)
+    taken = list[str]()
     last = _as_it_is(problem, model)
     path = list[Plain]()
     name = ""
     while True:
         path.append({"parameter": name, "left_out_deg": last.by_joint})
         trials = dict[str, LeftOut]()
+        rises = dict[str, float]()
+        # parameters that are asked for are freed in their order
         for trial in pool[:1] if free else pool:
             progress(f"freeing {trial}", len(taken), len(taken) + len(pool))
-            own = problem.varied(adapted(model, [*taken, trial], logs))
-            trials[trial] = predict_parts(own, last.thetas, refitted)
-        rises = {trial: gain(one, last)[0] for trial, one in trials.items()}
-        name = max(rises, key=lambda trial: rises[trial], default="")
-        if not name or (not free and not is_better(trials[name], last)):
+            freed = problem.varied(adapted(model, [*taken, trial], logs))
+            trials[trial] = predict_parts(freed, last.thetas, refitted)
+            rises[trial], _ = gain(trials[trial], last)
+        name = max(rises, key=rises.__getitem__, default="")
+        if not name:
             return path
-        taken, last = [*taken, name], trials[name]
+        if not free and not is_better(trials[name], last):
+            return path
+        taken.append(name)
+        last = trials[name]
         pool.remove(name)
+
+
+def _candidates(settings: FitSettings, logs: Sequence[Log]) -> list[str]:
+    """Return the parameters that another day may change: those that all joints share, and the
+    effects of the logs' groups."""
+    groups = {settings.log.group_of(log.source) for log in logs}
+    names = list[str]()
+    for name, parameter in settings.parameters.items():
+        is_effect = parameter.per is not None
+        changes = parameter.per in groups if is_effect else parameter.joints is None
+        estimated = parameter.fixed is None or parameter.term is not None
+        if changes and estimated and parameter.can_be_free:
+            names.append(name)
+    return names
 
 
 def _as_it_is(problem: Problem, model: IdentifiedModel) -> LeftOut:
@@ -96,7 +130,10 @@ def _as_it_is(problem: Problem, model: IdentifiedModel) -> LeftOut:
 
 
 def load_findings(settings: FitSettings) -> tuple[Finding, ...]:
-    """Return which masses an adaptation has freed, although a load at the tip has no payload to be in."""
-    own = settings.parameters.items()
-    freed = tuple(name for name, p in own if p.quantity == "mass" and p.fixed is None)
-    return (Finding("load as mass", "warning", freed),) if freed and not settings.payloads else ()
+    """Return which masses an adaptation has freed,
+    although a load at the tip has no payload to be in."""
+    parameters = settings.parameters.items()
+    freed = tuple(name for name, p in parameters if p.quantity == "mass" and p.fixed is None)
+    if not freed or settings.payloads:
+        return ()
+    return (Finding("load as mass", "warning", freed),)

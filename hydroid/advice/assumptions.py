@@ -1,13 +1,15 @@
 """Tests of what a fit takes for granted: which way an angle counts, and which columns are whose.
 
-Gravity slows what lifts and speeds up what lowers. So a joint's speed follows its command, late and unevenly,
-times what its lever arm and the pump do, less a part in proportion to the load: the torque that holds the arm
-in its pose. This law is linear in its unknowns, and needs no simulation. Where the angle of a joint counts
-the wrong way, the loads are those of other poses. With n independent samples, and sums of squares S and S' of
-what the laws of all joints leave, the logs make a joint turned round more likely by (S / S')^(n/2).
+Gravity slows what lifts and speeds up what lowers. So a joint's speed follows its command, late and
+unevenly, times what its lever arm and the pump do, less a part in proportion to the load: the
+torque that holds the arm in its pose. This law is linear in its unknowns, and needs no simulation.
+Where the angle of a joint counts the wrong way, the loads are those of other poses. With n
+independent samples, and sums of squares S and S' of what the laws of all joints leave,
+the logs make a joint turned round more likely by (S / S')^(n/2).
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import combinations
 
 import mujoco
 import numpy as np
@@ -20,15 +22,18 @@ from hydroid.settings.fit import FitSettings
 
 ENOUGH = 6.0  # evidence that names a joint: turned round is 400 times as likely
 LOWER = 0.99
-"""part of the laws' rms error, on geometric average, that turning a joint round must leave at most"""
+"""part of the laws' rms error, on geometric average,
+that turning a joint round must leave at most"""
 FOLLOWED = 0.2
-"""by how much a joint's speed must correlate better with another joint's command than with its own"""
-PERIOD, WINDOW, LATEST = 0.05, 0.2, 0.8
-"""of the samples; over which speeds and commands are averaged; from a command to its effect at most [s]"""
+"""by how much a joint's speed must correlate better with another joint's command than
+with its own"""
+PERIOD = 0.05  # between samples [s]
+WINDOW = 0.2  # over which speeds and commands are averaged [s]
+LATEST = 0.8  # from a command to its effect at most [s]
 TAPS = (0.0, 0.1, 0.2, 0.3, 0.4)  # between the commands that a speed follows [s]
 KNOTS = np.linspace(-100.0, 100.0, 11)  # of the piecewise linear effect of each of them [%]
-FROM_STOPS, FROM_ZERO = 0.02, 3.0
-"""angle from a stop [rad], and largest command [%], above which a sample counts"""
+FROM_STOPS = 0.02  # angle from a stop above which a sample counts [rad]
+FROM_ZERO = 3.0  # largest command above which a sample counts [%]
 TINY = np.finfo(float).tiny
 
 
@@ -36,8 +41,8 @@ TINY = np.finfo(float).tiny
 class _Motion:
     """What logs show in short windows: speeds [rad/s] and angles [rad] of all joints, shape (n, J).
 
-    joints: those that a log drives and all measure, 0-based. commands: means of each log's, shape (m, J) [%],
-    over windows that begin `period` [s] after each other.
+    joints: those that a log drives and all measure, 0-based. commands: means of each log's, shape
+    (m, J) [%], over windows that begin `period` [s] after each other.
     """
 
     joints: list[int]
@@ -47,63 +52,103 @@ class _Motion:
     commands: Sequence[Array]
 
     def command(self, joint: int, earlier: int) -> Array:
-        """A joint's commands some windows earlier, shape (n,)."""
-        return np.concatenate(
-            [np.pad(one[:, joint], (earlier, 0), "edge")[: len(one)] for one in self.commands]
-        )
+        """Return a joint's commands some windows earlier, shape (n,)."""
+        late = list[Array]()
+        for commands in self.commands:
+            padded = np.pad(commands[:, joint], (earlier, 0), "edge")
+            late.append(padded[: len(commands)])
+        return np.concatenate(late)
 
     def follows(self, joint: int, other: int) -> tuple[float, int]:
-        """How a joint's speed correlates with a joint's command, and the windows after which it does most."""
-        speed, found = self.speed[:, joint] - self.speed[:, joint].mean(), list[tuple[float, int]]()
+        """Return how a joint's speed correlates with a joint's command, and after how many windows
+        it does most."""
+        speed = self.speed[:, joint] - self.speed[:, joint].mean()
+        correlations = list[tuple[float, int]]()
         for late in range(round(LATEST / self.period) + 1):
             command = self.command(other, late)
             command -= command.mean()
             size = np.linalg.norm(command) * np.linalg.norm(speed)
-            found.append((abs(command @ speed) / max(size, TINY), -late))
-        best, late = max(found)
+            # of equal ones the earliest
+            correlations.append((abs(command @ speed) / max(size, TINY), -late))
+        best, late = max(correlations)
         return best, -late
 
 
 def doubts(settings: FitSettings, logs: Sequence[Log]) -> dict[int, float]:
-    """Return the joints (number, from 1) whose logged angle counts the wrong way, with the evidence for it.
+    """Return the joints (number, from 1) whose logged angle counts the wrong way,
+    with the evidence for it.
 
     The clearest comes first. Stage 1 has no law of speed.
     """
-    motion, laws = _motion(settings, logs), dict[int, Callable[[Array], Array]]()
+    motion = _motion(settings, logs)
+    laws = dict[int, Law]()
     for joint in motion.joints:
         if settings.stage == "hyd" and joint + 1 in settings.outputs:
-            laws |= _law(settings, motion, joint)
-    model, numbers = load_model(settings.arm).compile(), np.arange(len(settings.arm.joints))
-    data = mujoco.MjData(model)
+            law = _law(settings, motion, joint)
+            if law is not None:
+                laws[joint] = law
+    loads_of = _Loads(settings, motion.angle)
 
     def left(turned: int | None = None) -> list[Array]:
-        signs = np.where(numbers == turned, -1.0, 1.0)
-        poses, loads = signs * motion.angle, np.empty_like(motion.angle)
-        for pose, load in zip(poses, loads, strict=True):  # what holds the arm
-            data.qpos[:] = pose
-            mujoco.mj_kinematics(model, data)
-            mujoco.mj_comPos(model, data)
-            mujoco.mj_rne(model, data, 0, load)
-        loads *= signs
+        """Return what each law leaves of its joint's speeds, with one joint turned round."""
+        loads = loads_of(turned)
         return [law(loads[:, joint]) for joint, law in laws.items()]
 
-    before, found = left(), dict[int, float]()
-    samples = [float(independent_samples(one[:, None])[0]) for one in before]
+    before = left()
+    sizes_before = _sizes(before)
+    samples = [float(independent_samples(rest[:, None])[0]) for rest in before]
+    doubted = dict[int, float]()
     for joint in laws:
-        sizes = np.array([[np.linalg.norm(one) for one in each] for each in (before, left(joint))])
-        gains = np.log(sizes[0] / sizes[1])
+        gains = np.log(sizes_before / _sizes(left(joint)))
         evidence = float(np.dot(samples, gains))
         if evidence >= ENOUGH and gains.mean() > -np.log(LOWER):
-            found[joint + 1] = evidence
-    return dict(sorted(found.items(), key=lambda one: -one[1]))
+            doubted[joint + 1] = evidence
+    return dict(sorted(doubted.items(), key=lambda entry: -entry[1]))
+
+
+def _sizes(rows: Sequence[Array]) -> Array:
+    """Return the lengths of rows, shape (n,)."""
+    return np.array([float(np.linalg.norm(row)) for row in rows])
+
+
+class _Loads:
+    """The torques that hold an arm in the poses of a motion, shape (n, J) [N·m]."""
+
+    def __init__(self, settings: FitSettings, angle: Array) -> None:
+        self._model = load_model(settings.arm).compile()
+        self._data = mujoco.MjData(self._model)
+        self._numbers = np.arange(len(settings.arm.joints))
+        self._angle = angle
+
+    def __call__(self, turned: int | None) -> Array:
+        """Return the torques where the angle of one joint (0-based) counts the wrong way."""
+        signs = np.where(self._numbers == turned, -1.0, 1.0)
+        poses = signs * self._angle
+        loads = np.empty_like(self._angle)
+        for pose, load in zip(poses, loads, strict=True):
+            self._data.qpos[:] = pose
+            mujoco.mj_kinematics(self._model, self._data)
+            mujoco.mj_comPos(self._model, self._data)
+            mujoco.mj_rne(self._model, self._data, 0, load)
+        loads *= signs
+        return loads
 
 
 def exchanged(settings: FitSettings, logs: Sequence[Log]) -> tuple[tuple[int, int], ...]:
-    """Return pairs of joints (numbers, from 1) each of which follows the other's command, not its own."""
+    """Return pairs of joints (numbers, from 1) each of which follows the other's command,
+    not its own."""
     motion = _motion(settings, logs)
-    follows = {(j, k): motion.follows(j, k)[0] for j in motion.joints for k in motion.joints}
-    prefers = {(j, k) for (j, k), size in follows.items() if size > follows[j, j] + FOLLOWED}
-    return tuple((j + 1, k + 1) for j, k in sorted(prefers) if j < k and (k, j) in prefers)
+
+    def prefers(joint: int, other: int) -> bool:
+        own, _ = motion.follows(joint, joint)
+        others, _ = motion.follows(joint, other)
+        return others > own + FOLLOWED
+
+    pairs = list[tuple[int, int]]()
+    for first, second in combinations(motion.joints, 2):
+        if prefers(first, second) and prefers(second, first):
+            pairs.append((first + 1, second + 1))
+    return tuple(pairs)
 
 
 def assumption_findings(
@@ -118,43 +163,58 @@ def assumption_findings(
 
 
 def _motion(settings: FitSettings, logs: Sequence[Log]) -> _Motion:
-    """The motion in all logs that are long enough and show the pose; what is not driven may be unmeasured."""
-    step = max(round(PERIOD / logs[0].period), 1)
-    period, pose = step * logs[0].period, settings.arm.pose(settings.start_pose)
-    width, windows = step * max(round(WINDOW / period), 1), list[tuple[Array, ...]]()
-    logs = [log for log in logs if log.duration > 2 * LATEST + WINDOW and log.measured[log.driven].all()]
-    for log in logs:
-        angle = np.where(log.measured, log.angle, pose)
-        begin, end = angle[:-width:step], angle[width::step]
-        total = np.cumsum(np.pad(log.command, ((1, 0), (0, 0))), axis=0)
-        command = (total[width:-1:step] - total[: -width - 1 : step]) / width
-        windows.append(((end - begin) / (width * log.period), (end + begin) / 2, command))
-    if not windows:
+    """Return the motion in all logs that are long enough and show the pose;
+    what is not driven may be unmeasured."""
+    sample = logs[0].period
+    step = max(round(PERIOD / sample), 1)
+    period = step * sample
+    width = step * max(round(WINDOW / period), 1)
+    pose = settings.arm.pose(settings.start_pose)
+    longest = 2 * LATEST + WINDOW
+    usable = [log for log in logs if log.duration > longest and log.measured[log.driven].all()]
+    if not usable:
         return _Motion([], period, pose[None], pose[None], ())
-    driven, measured = (np.array([getattr(log, what) for log in logs]) for what in ("driven", "measured"))
-    speed, angle, commands = zip(*windows, strict=True)
-    joints = np.flatnonzero(driven.any(axis=0) & measured.all(axis=0)).tolist()
-    return _Motion(joints, period, np.concatenate(speed), np.concatenate(angle), commands)
+    speeds = list[Array]()
+    angles = list[Array]()
+    commands = list[Array]()
+    for log in usable:
+        angle = np.where(log.measured, log.angle, pose)
+        begin = angle[:-width:step]
+        end = angle[width::step]
+        speeds.append((end - begin) / (width * log.period))
+        angles.append((end + begin) / 2)
+        # means over windows, by the differences of a running sum
+        total = np.cumsum(np.pad(log.command, ((1, 0), (0, 0))), axis=0)
+        commands.append((total[width:-1:step] - total[: -width - 1 : step]) / width)
+    driven = np.any([log.driven for log in usable], axis=0)
+    measured = np.all([log.measured for log in usable], axis=0)
+    joints = np.flatnonzero(driven & measured).tolist()
+    return _Motion(joints, period, np.concatenate(speeds), np.concatenate(angles), tuple(commands))
 
 
-def _law(settings: FitSettings, motion: _Motion, joint: int) -> dict[int, Callable[[Array], Array]]:
-    """What a joint's law leaves of its speeds, by loads, shape (n,); nothing where it moves too little."""
-    taps = [round(tap / motion.period) for tap in TAPS]
-    first = max(motion.follows(joint, joint)[1] - taps[-1] // 2, 0)
-    commands = np.stack([motion.command(joint, first + tap) for tap in taps], axis=1)
-    angle, (low, high) = motion.angle[:, joint], settings.arm.joints[joint].limits
+Law = Callable[[Array], Array]
+"""what a joint's law leaves of its speeds, (m,), by the loads in all windows, (n,)"""
+
+
+def _law(settings: FitSettings, motion: _Motion, joint: int) -> Law | None:
+    """Fit a joint's law of speed; None where it moves too little."""
+    commands = _late_commands(motion, joint)
+    low, high = settings.arm.joints[joint].limits
+    angle = motion.angle[:, joint]
     used = (angle > low + FROM_STOPS) & (angle < high - FROM_STOPS)
     used &= np.abs(commands).max(axis=1) > FROM_ZERO
-    angle, speeds = angle[used], motion.speed[used]
-    hats = np.maximum(1 - np.abs(commands[used, :, None] - KNOTS) / (KNOTS[1] - KNOTS[0]), 0)
-    rows = hats.reshape(len(hats), -1)
-    rows = rows[:, rows.sum(axis=0) > 3]
+    angle = angle[used]
+    speeds = motion.speed[used]
+    rows = _by_command(commands[used])
     if len(rows) < 2 * rows.shape[1] or not speeds[:, joint].any():
-        return {}
+        return None
+    # the speed by the commands alone; lever arm and pump then change it by a factor
     speed = rows @ np.linalg.lstsq(rows, speeds[:, joint])[0]
-    off, others = angle - angle.mean(), speeds[:, [k for k in motion.joints if k != joint]]
-    factors = np.column_stack([off, off**2, np.maximum(others, 0), np.minimum(others, 0)])
-    basis, sizes, _ = np.linalg.svd(np.hstack([rows, speed[:, None] * factors]), full_matrices=False)
+    off_centre = angle - angle.mean()
+    others = speeds[:, [k for k in motion.joints if k != joint]]
+    factors = np.column_stack([off_centre, off_centre**2, np.maximum(others, 0), np.minimum(others, 0)])
+    unknowns = np.hstack([rows, speed[:, None] * factors])
+    basis, sizes, _ = np.linalg.svd(unknowns, full_matrices=False)
     basis = basis[:, sizes > 1e-9 * sizes[0]]
     rest = speeds[:, joint] - basis @ (basis.T @ speeds[:, joint])
 
@@ -162,6 +222,27 @@ def _law(settings: FitSettings, motion: _Motion, joint: int) -> dict[int, Callab
         """A load slows what lifts it; it cannot do the contrary."""
         effect = -np.abs(speed) * load[used]
         effect -= basis @ (basis.T @ effect)
-        return rest - max(effect @ rest, 0.0) / max(effect @ effect, TINY) * effect
+        factor = max(effect @ rest, 0.0) / max(effect @ effect, TINY)
+        return rest - factor * effect
 
-    return {joint: left}
+    return left
+
+
+def _late_commands(motion: _Motion, joint: int) -> Array:
+    """Return a joint's commands TAPS before each window, about the delay that fits best, (n,
+    TAPS)."""
+    taps = [round(tap / motion.period) for tap in TAPS]
+    _, delay = motion.follows(joint, joint)
+    first = max(delay - taps[-1] // 2, 0)
+    return np.stack([motion.command(joint, first + tap) for tap in taps], axis=1)
+
+
+def _by_command(commands: Array) -> Array:
+    """Return what each of KNOTS contributes to a speed that is piecewise linear in commands, (n,
+    k).
+
+    Knots that few windows are near to are left out.
+    """
+    distance = np.abs(commands[:, :, None] - KNOTS) / (KNOTS[1] - KNOTS[0])
+    rows = np.maximum(1 - distance, 0).reshape(len(commands), -1)
+    return rows[:, rows.sum(axis=0) > 3]

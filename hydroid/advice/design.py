@@ -1,9 +1,11 @@
-"""The search for the next experiment: start pose, joints and commands with the most useful information.
+"""The search for the next experiment: start pose,
+joints and commands with the most useful information.
 
-Optimal experiment design (V. V. Fedorov, 1972; E. Walter and L. Pronzato, 1997) by random draws and random
-changes of the best. The design is local: motions and sensitivities are simulated at the present estimate.
-Where that is far from the truth, design again after the next fit.
-Only the simulated motion is kept within the limits; an arm that differs from the model moves differently.
+Optimal experiment design (V. V. Fedorov, 1972; E. Walter and L. Pronzato, 1997) by random draws and
+random changes of the best. The design is local: motions and sensitivities are simulated at the
+present estimate. Where that is far from the truth, design again after the next fit.
+Only the simulated motion is kept within the limits;
+an arm that differs from the model moves differently.
 """
 
 from collections import Counter
@@ -39,8 +41,9 @@ from hydroid.settings.search import DesignSettings
 from hydroid.words import listed
 
 PRIOR_SD = 1.0
-"""relative standard deviation that a forecast assumes of every parameter at most (ours): a fit's own prior is
-so weak that a direction which stays unknown would outweigh all that an experiment can do"""
+"""relative standard deviation that a forecast assumes of every parameter at most (ours): a fit's
+own prior is so weak that a direction which stays unknown would outweigh all that an
+experiment can do"""
 
 
 def forecast(known: Posterior) -> Posterior:
@@ -51,17 +54,22 @@ def forecast(known: Posterior) -> Posterior:
 def measured(settings: DesignSettings, signals: Sequence[Array], period: float) -> Array:
     """Return rows N of the information N' N that signals of the joints' angles give, shape (p, p).
 
-    `signals` are derivatives by p parameters [rad], (p, T). The errors of a future log are those of an error
-    model: the sensor's noise, and a drift.
+    `signals` are derivatives by p parameters [rad], (p, T). The errors of a future log are those of
+    an error model: the sensor's noise, and a drift.
     """
     noise, drift = np.radians([settings.noise_deg, settings.drift_deg])
-    rows = [whitened(one, period, noise**2, drift**2 / 10.0) for one in signals]
+    # the drift is stated after 10 s, and its variance grows with time
+    rows = [whitened(signal, period, noise**2, drift**2 / 10.0) for signal in signals]
     p = len(rows[0])
-    floor = 1e-6 * max(float(np.abs(row).max()) for row in rows) + np.finfo(float).tiny
+    largest = max(float(np.abs(row).max()) for row in rows)
+    # a little information about everything, so that what nothing shows stays finite
+    floor = 1e-6 * largest + np.finfo(float).tiny
     return regular(np.vstack([floor * np.eye(p), *(row.T for row in rows)]))
 
 
 POSES = 50  # that show which distances change
+ATTEMPTS = 60  # to make an experiment keep the limits
+ELITE = 4  # experiments that are changed at random, the best so far
 DIVERGES = "a simulation diverges"
 MOVED = 0.9
 """part of its deviation before up to which an experiment must bring a parameter that counts"""
@@ -70,8 +78,8 @@ MOVED = 0.9
 class Trial(NamedTuple):
     """A simulated experiment that keeps the limits.
 
-    experiment: its commands. gained: rows of its information (`measured`), shape (p, p). log: its commands
-    with the simulated angles.
+    experiment: its commands. gained: rows of its information (`measured`), shape (p, p). log: its
+    commands with the simulated angles.
     """
 
     experiment: Experiment
@@ -80,7 +88,8 @@ class Trial(NamedTuple):
 
 
 class Broken(NamedTuple):
-    """Why an experiment cannot be made: what it does, against which setting, in what part of its time."""
+    """Why an experiment cannot be made: what it does, against which setting,
+    in what part of its time."""
 
     what: str
     setting: str
@@ -94,43 +103,53 @@ class ExperimentSimulator:
     """Simulates experiments at an estimate within the limits of the settings."""
 
     def __init__(self, settings: FitSettings, known: Posterior) -> None:
-        if settings.simulation.other_joints == "measured":  # an experiment has no measured motion
+        # an experiment has no measured motion
+        if settings.simulation.other_joints == "measured":
             settings = settings.changed({"simulation.other_joints": "locked"})
-        self._settings, self._bindings = settings, Bindings(settings)
+        arm = settings.arm
+        self._settings = settings
+        self._bindings = Bindings(settings)
         self._outputs = [j - 1 for j in settings.outputs]
-        arm, self._margin = settings.arm, settings.design.clearance_m
-        self._spec, self._pose = load_model(arm), arm.pose(settings.start_pose)
-        self._machine = None if self._margin is None else load_machine(arm, pair=arm.pair is not None)
-        # no command can keep bodies apart whose distance no joint changes
+        self._spec = load_model(arm)
+        self._pose = arm.pose(settings.start_pose)
+        self._box = known.box
+        # steps so short that curvature matters little
+        self._axes = known.axes(1e-5).one_sided
+        self._margin = settings.design.clearance_m
+        self._machine = None
         self._counted = np.empty(0, bool)
-        if self._machine is not None:
+        if self._margin is not None:
+            self._machine = load_machine(arm, pair=arm.pair is not None)
+            # no command can keep bodies apart whose distance no joint changes
             low, high = np.array([joint.limits for joint in arm.joints]).T
-            drawn = np.random.default_rng(0).uniform(low, high, (POSES, len(low)))
-            rest = dict.fromkeys(self._machine.sides, drawn)
-            self._counted = self._machine.checker.changing(self._machine.joined(rest, self._pose))
-        self._box, self._axes = known.box, known.axes(1e-5).one_sided  # little curvature
+            poses = np.random.default_rng(0).uniform(low, high, (POSES, len(low)))
+            motion = self._machine.joined(dict.fromkeys(self._machine.sides, poses), self._pose)
+            self._counted = self._machine.checker.changing(motion)
 
     def trial(self, experiment: Experiment) -> Trial | Broken:
-        """Return the experiment, levels reversed or reduced until it keeps the limits, and its information.
+        """Return the experiment, levels reversed or reduced until it keeps the limits,
+        and its information.
 
         Or the limit that it still breaks.
         """
-        for left in range(59, -1, -1):
+        for attempt in range(ATTEMPTS):
             (angle,) = self._simulate(experiment, self._box.at[None])
             if not np.isfinite(angle).all():
                 return DIVERGED
-            beyond_limits = violation(angle, self._settings)
-            first = beyond_limits or self._meeting(angle)
+            of_joint = violation(angle, self._settings)
+            first = of_joint or self._meeting(angle)
             if first is None:
                 return self._kept(experiment, angle)
-            if not left or first.sample == 0:  # the start pose itself
-                return self._broken(angle, beyond_limits)
+            in_start_pose = first.sample == 0
+            if in_start_pose or attempt == ATTEMPTS - 1:
+                return self._broken(angle, of_joint)
             experiment = repaired(experiment, first)
         return DIVERGED
 
     def _meeting(self, angle: Array) -> Violation | None:
-        """Where bodies first come too near in a motion of all joints, (T, J)."""
-        if (machine := self._machine) is None:
+        """Return where bodies first come too near in a motion of all joints, (T, J)."""
+        machine = self._machine
+        if machine is None:
             return None
         motion = machine.joined({machine.sides[0]: angle}, self._pose)
         near = machine.checker.first_below(motion, self._margin or 0.0, self._counted)
@@ -141,22 +160,33 @@ class ExperimentSimulator:
         return Violation(near, int(np.argmax(turned)), False)
 
     def _broken(self, angle: Array, first: Violation | None) -> Broken:
-        """What a motion of all joints, (T, J), breaks: at first a joint's limits, or None: bodies meet."""
+        """Return what a motion of all joints, (T, J), breaks: at first a joint's limits, or None:
+        bodies meet."""
+        if first is None:
+            return self._too_near(angle)
         limits = self._settings.design
-        if first is not None:
-            out, fast = (float(one[:, first.joint].mean()) for one in beyond(angle, self._settings))
-            name = self._settings.arm.joint_names[first.joint]
-            if first.fast:
-                return Broken(f"{name} faster than {limits.speed_deg_s:g} deg/s", "design.speed_deg_s", fast)
-            what = f"{name} nearer than {limits.margin_deg:g} deg to an end of its range"
-            return Broken(what, "design.margin_deg", out)
-        assert self._machine is not None
-        motion = self._machine.joined({self._machine.sides[0]: angle}, self._pose)
-        pair, share = self._machine.checker.below(motion, self._margin or 0.0, self._counted)
-        return Broken(f"{listed(pair)} nearer than {self._margin:g} m", "design.clearance_m", share)
+        name = self._settings.arm.joint_names[first.joint]
+        outside, fast = beyond(angle, self._settings)
+        if first.fast:
+            share = float(fast[:, first.joint].mean())
+            what = f"{name} faster than {limits.speed_deg_s:g} deg/s"
+            return Broken(what, "design.speed_deg_s", share)
+        share = float(outside[:, first.joint].mean())
+        what = f"{name} nearer than {limits.margin_deg:g} deg to an end of its range"
+        return Broken(what, "design.margin_deg", share)
+
+    def _too_near(self, angle: Array) -> Broken:
+        """Return which bodies are too near in a motion of all joints, (T, J)."""
+        machine = self._machine
+        assert machine is not None
+        motion = machine.joined({machine.sides[0]: angle}, self._pose)
+        pair, share = machine.checker.below(motion, self._margin or 0.0, self._counted)
+        what = f"{listed(pair)} nearer than {self._margin:g} m"
+        return Broken(what, "design.clearance_m", share)
 
     def _kept(self, experiment: Experiment, angle: Array) -> Trial | Broken:
-        """The trial of an experiment whose angles are known, (T, J); it may diverge beside them."""
+        """Return the trial of an experiment whose angles are known, (T, J); it may diverge beside
+        them."""
 
         def outputs(theta: Array) -> Array:
             return self._simulate(experiment, theta)[:, :, self._outputs].reshape(len(theta), -1)
@@ -164,15 +194,19 @@ class ExperimentSimulator:
         slopes = differentiate(outputs, self._box, self._axes, angle[:, self._outputs].ravel())
         if not np.isfinite(slopes).all():
             return DIVERGED
-        each = np.moveaxis(slopes.reshape(len(slopes), -1, len(self._outputs)), -1, 0)
-        gained = measured(self._settings.design, [*each], self._settings.log.period_s)
-        return Trial(experiment, gained, replace(experiment.log(self._settings), angle=angle))
+        of_angles = slopes.reshape(len(slopes), -1, len(self._outputs))
+        signals = [*np.moveaxis(of_angles, -1, 0)]
+        gained = measured(self._settings.design, signals, self._settings.log.period_s)
+        log = replace(experiment.log(self._settings), angle=angle)
+        return Trial(experiment, gained, log)
 
     def _simulate(self, experiment: Experiment, theta: Array) -> Array:
-        """All joints' angles [rad] of candidates, (n, P) -> (n, T, J); NaN of what moves if one diverged."""
+        """Return all joints' angles [rad] of candidates, (n, P) -> (n, T, J);
+        NaN of what moves if one diverged."""
         log = experiment.log(self._settings)
         passive = self._settings.simulation.other_joints == "passive"
-        moving = np.flatnonzero(log.driven | passive | np.isin(np.arange(log.joints), self._outputs))
+        is_output = np.isin(np.arange(log.joints), self._outputs)
+        moving = np.flatnonzero(log.driven | passive | is_output)
         simulation = make_simulation(self._spec, log, moving.tolist(), self._settings)
         angle = np.tile(log.angle, (len(theta), 1, 1))
         angle[:, :, moving] = simulation.simulate(self._bindings.candidates(theta)).angle
@@ -183,9 +217,9 @@ class ExperimentSimulator:
 class Design:
     """A designed experiment beside the random ones it was chosen from.
 
-    random: those drawn at random that keep the limits. known: what is known without it. moved: which of the p
-    parameters any of these improves (`MOVED`), but for effects of a group of logs, which belong to another
-    day, (p,); the others must not hide them. names: of the parameters.
+    random: those drawn at random that keep the limits. known: what is known without it. moved:
+    which of the p parameters any of these improves (`MOVED`), but for effects of a group of logs,
+    which belong to another day, (p,); the others must not hide them. names: of the parameters.
     """
 
     best: Trial
@@ -202,77 +236,117 @@ class Design:
 
     @property
     def after(self) -> Posterior:
-        """What is known after the experiment."""
+        """The posterior after the experiment."""
         return self.known.add(self.best.gained)
 
     @property
     def random_deviations(self) -> Array:
-        """Relative standard deviation of each parameter after a random experiment, the median; (p,)."""
+        """Relative standard deviation of each parameter after a random experiment, the median;
+        (p,)."""
         return np.median([self.known.add(t.gained).deviations for t in self.random], axis=0)
 
 
 def typical(known: Posterior, moved: Mask) -> float:
-    """Return the geometric mean of the relative standard deviations of some parameters, a mask (p,)."""
+    """Return the geometric mean of the relative standard deviations of some parameters,
+    a mask (p,)."""
     return float(np.exp(np.mean(np.log(known.deviations[moved]))))
 
 
 def broken_limits(broken: Sequence[Broken]) -> SettingsError:
-    """Return the error that no experiment keeps the limits: it names the one that is broken most often."""
-    often = Counter(one[:2] for one in broken)
-    ((what, setting), times) = often.most_common(1)[0]
-    shares = [one.share for one in broken if one.what == what]
+    """Return the error that no experiment keeps the limits:
+    it names the one that is broken most often."""
+    counts = Counter((limit.what, limit.setting) for limit in broken)
+    ((what, setting), times) = counts.most_common(1)[0]
+    share = np.mean([limit.share for limit in broken if limit.what == what])
     return SettingsError(
-        f"none of {len(broken)} random experiments keeps the limits in simulation: {what} in {times} of "
-        f"them, there for {100 * np.mean(shares):.0f} % of the time",
+        f"none of {len(broken)} random experiments keeps the limits in simulation: {what} in "
+        f"{times} of them, there for {100 * share:.0f} % of the time",
         setting,
         "allow more speed, less margin or clearance, a smaller command, or other poses",
     )
 
 
 def design(settings: FitSettings, theta: Array, logs: Sequence[Log], seed: int, progress: Progress) -> Design:
-    """Choose start pose, joints and commands of an experiment at an estimate, shape (P,), beside its logs.
+    """Choose start pose, joints and commands of an experiment at an estimate, shape (P,),
+    beside its logs.
 
-    Random experiments are drawn and kept within the limits. The best few are then changed at random, and a
-    changed one replaces the worst of them where it is better. The same seed gives the same experiment.
+    Random experiments are drawn and kept within the limits. The best few are then changed at
+    random, and a changed one replaces the worst of them where it is better.
+    The same seed gives the same experiment.
+
+    Raises SettingsError: no random experiment keeps the limits.
     """
-    effort, parameters = settings.design.effort, settings.parameter_set()
+    parameters = settings.parameter_set()
+    known = forecast(_known(settings, theta, logs))
     rng = np.random.default_rng(seed)
-    if logs:
-        fitted = uncertainty(Problem(settings, logs), theta).posterior
-    else:
-        box = estimate_box(parameters, theta)
-        fitted = white_posterior(box, prior_slopes(Priors(settings.priors, parameters), box))
-    known = forecast(fitted)
-    experiments, simulator = RandomExperiments(settings, rng), ExperimentSimulator(settings, known)
-    random, broken = list[Trial](), list[Broken]()
-    first = max(min(8, effort), effort // 6)  # one in six is drawn at random
-    for drawn in range(1, first + 1):
-        trial = simulator.trial(experiments.draw())
-        if isinstance(trial, Trial):
-            random.append(trial)
-        else:
-            broken.append(trial)
-        progress("random experiments", drawn, effort)
-    if not random:
-        raise broken_limits(broken)
+    experiments = RandomExperiments(settings, rng)
+    simulator = ExperimentSimulator(settings, known)
+    random = _random_trials(settings, experiments, simulator, progress)
     names = parameters.named(known.box.varied)
-    moved = moved_by(random, known, np.array([settings.parameters[name].per is None for name in names]))
+    lasting = np.array([settings.parameters[name].per is None for name in names])
+    moved = moved_by(random, known, lasting)
 
     def score(trial: Trial) -> float:
         return -typical(known.add(trial.gained), moved)
 
-    elite = sorted(((score(t), i, t) for i, t in enumerate(random)), reverse=True)[:4]
-    for tried in range(first + 1, effort + 1):
-        parent = elite[min(rng.integers(len(elite)), rng.integers(len(elite)))][2]
+    # the number breaks ties: trials themselves cannot be compared
+    scored = [(score(trial), number, trial) for number, trial in enumerate(random)]
+    elite = sorted(scored, reverse=True)[:ELITE]
+    effort = settings.design.effort
+    for tried in range(_random_effort(effort) + 1, effort + 1):
+        # of two drawn the better: those at the front are changed more often
+        place = min(rng.integers(len(elite)), rng.integers(len(elite)))
+        _, _, parent = elite[place]
         child = simulator.trial(experiments.change(parent.experiment))
         if isinstance(child, Trial) and score(child) > elite[-1][0]:
             elite = sorted([*elite[:-1], (score(child), tried, child)], reverse=True)
-        progress(f"improving: typically {-100 * elite[0][0]:.3g} %", tried, effort)
-    return Design(elite[0][2], tuple(random), known, moved, names)
+        best_score, _, best = elite[0]
+        progress(f"improving: typically {-100 * best_score:.3g} %", tried, effort)
+    _, _, best = elite[0]
+    return Design(best, tuple(random), known, moved, names)
+
+
+def _known(settings: FitSettings, theta: Array, logs: Sequence[Log]) -> Posterior:
+    """Return what logs and priors say at an estimate, shape (P,)."""
+    if logs:
+        return uncertainty(Problem(settings, logs), theta).posterior
+    parameters = settings.parameter_set()
+    box = estimate_box(parameters, theta)
+    return white_posterior(box, prior_slopes(Priors(settings.priors, parameters), box))
+
+
+def _random_effort(effort: int) -> int:
+    """Return how many experiments are drawn at random, of all that are tried: one in six."""
+    return max(min(8, effort), effort // 6)
+
+
+def _random_trials(
+    settings: FitSettings,
+    experiments: RandomExperiments,
+    simulator: ExperimentSimulator,
+    progress: Progress,
+) -> list[Trial]:
+    """Return the random experiments that keep the limits, one at least."""
+    effort = settings.design.effort
+    kept = list[Trial]()
+    broken = list[Broken]()
+    for drawn in range(1, _random_effort(effort) + 1):
+        trial = simulator.trial(experiments.draw())
+        if isinstance(trial, Trial):
+            kept.append(trial)
+        else:
+            broken.append(trial)
+        progress("random experiments", drawn, effort)
+    if not kept:
+        raise broken_limits(broken)
+    return kept
 
 
 def moved_by(random: Sequence[Trial], known: Posterior, counted: Mask) -> Mask:
-    """Return which counted parameters any random experiment improves, (p,); all counted if there is none."""
-    least = np.min([known.add(trial.gained).deviations for trial in random], axis=0)
-    moved = counted & (least < MOVED * known.deviations)
-    return moved if moved.any() else counted | ~counted.any()
+    """Return which counted parameters any random experiment improves, (p,);
+    all counted if there is none."""
+    deviations = [known.add(trial.gained).deviations for trial in random]
+    moved = counted & (np.min(deviations, axis=0) < MOVED * known.deviations)
+    if moved.any():
+        return moved
+    return counted if counted.any() else np.ones_like(counted)

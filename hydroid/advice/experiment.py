@@ -1,4 +1,5 @@
-"""Experiments: a start pose and pseudo-random commands, drawn and changed at random, kept within the limits.
+"""Experiments: a start pose and pseudo-random commands, drawn and changed at random,
+kept within the limits.
 
 A command is a sequence of levels, each held for a random time, as in the article's figure 17.
 """
@@ -18,7 +19,8 @@ from hydroid.settings.fit import FitSettings
 
 
 class Input(NamedTuple):
-    """One joint's command: `level[i]` [%] from sample `start[i]` to the next, and none before the first."""
+    """One joint's command: `level[i]` [%] from sample `start[i]` to the next,
+    and none before the first."""
 
     start: Ints
     level: Array
@@ -33,23 +35,34 @@ class Experiment:
 
     def log(self, settings: FitSettings) -> Log:
         """Return commands without motion: every angle stays in the start pose."""
-        period, slew = settings.log.period_s, settings.design.slew_pct_s
-        samples, step = experiment_samples(settings), np.inf if slew is None else slew * period
+        period = settings.log.period_s
+        slew = settings.design.slew_pct_s
+        largest_step = np.inf if slew is None else slew * period
+        samples = experiment_samples(settings)
         command = np.zeros((samples, len(self.pose)))
         for joint, signal in self.inputs.items():
             held = np.diff(np.append(signal.start, samples))
             command[signal.start[0] :, joint] = np.repeat(signal.level, held)
-            wanted = command[:, joint].tolist()
-            slow = accumulate(wanted, lambda now, to: min(max(to, now - step), now + step), initial=0.0)
-            command[:, joint] = [*slow][1:]
+            command[:, joint] = _slewed(command[:, joint], largest_step)
         angle = np.tile(self.pose, (samples, 1))
         return Log("design", period * np.arange(samples, dtype=float), command, angle, period)
 
     def with_level(self, joint: int, place: slice | int, level: Array | float) -> "Experiment":
         """Return the experiment with other levels of one joint, rounded to 0.1 %."""
-        start, levels = self.inputs[joint].start, self.inputs[joint].level.copy()
+        signal = self.inputs[joint]
+        levels = signal.level.copy()
         levels[place] = np.round(level, 1)
-        return replace(self, inputs={**self.inputs, joint: Input(start, levels)})
+        return replace(self, inputs={**self.inputs, joint: Input(signal.start, levels)})
+
+
+def _slewed(command: Array, largest_step: float) -> Array:
+    """Return a command, (T,), that follows another by steps of a largest size, from 0."""
+
+    def followed(now: float, wanted: float) -> float:
+        return min(max(wanted, now - largest_step), now + largest_step)
+
+    _, *commands = accumulate(command.tolist(), followed, initial=0.0)
+    return np.array(commands)
 
 
 def experiment_samples(settings: FitSettings) -> int:
@@ -61,63 +74,67 @@ class RandomExperiments:
     """Draws experiments, and random changes of them, that the settings allow."""
 
     def __init__(self, settings: FitSettings, rng: np.random.Generator) -> None:
-        limits, arm, period = settings.design, settings.arm, settings.log.period_s
-        self._rng, self._limit, self._any_pose = rng, limits.command_pct, limits.poses == "any"
-        count, joints = len(arm.joints), sorted(limits.joints or settings.outputs)
+        limits = settings.design
+        arm = settings.arm
+        period = settings.log.period_s
+        self._rng = rng
+        self._limit = limits.command_pct
+        self._any_pose = limits.poses == "any"
+        count = len(arm.joints)
+        joints = sorted(limits.joints or settings.outputs)
         if joints[-1] > count:
             raise SettingsError(f"the arm has joints 1 to {count}", "design.joints")
         driven = np.isin(np.arange(count) + 1, joints)
         Bindings(settings).refuse_idle(driven, [j - 1 for j in settings.outputs])
         self._joints = np.flatnonzero(driven).tolist()
-        # named poses in which the joints that move are within their limits
-        names = tuple(arm.poses) if limits.poses is None or limits.poses == "any" else limits.poses
-        poses = np.array([arm.pose(name) for name in names])
-        moving = [j - 1 for j in {*(limits.joints or ()), *settings.outputs}]
-        margin = np.radians(limits.margin_deg)
-        inside = (poses >= arm.lower + margin) & (poses <= arm.upper - margin)
-        self._poses = poses[inside[:, moving].all(axis=1)]
-        if not len(self._poses) and limits.poses != "any":
-            raise SettingsError(
-                f"no pose of {', '.join(names)} is {limits.margin_deg:g} deg inside the ranges of what moves",
-                "design.poses",
-                "add one to the arm's file, reduce design.margin_deg, or set design.poses=any",
-            )
+        self._poses = _possible_poses(settings)
         lower, upper = np.array([joint.limits for joint in arm.joints]).T
-        inward = np.minimum(margin, 0.5 * (upper - lower))
-        self._lower, self._upper = lower + inward, upper - inward
-        self._samples, self._rest = experiment_samples(settings), round(limits.rest_s / period)
+        inward = np.minimum(np.radians(limits.margin_deg), 0.5 * (upper - lower))
+        self._lower = lower + inward
+        self._upper = upper - inward
+        self._samples = experiment_samples(settings)
+        self._rest = round(limits.rest_s / period)
         self._shortest, self._longest = (max(1, round(t / period)) for t in limits.dwell_s)
 
     def draw(self) -> Experiment:
-        """Draw an experiment: half of them drive all allowed joints, the others a random part of them."""
+        """Draw an experiment: half of them drive all allowed joints,
+        the others a random part of them."""
         some = self._rng.random(len(self._joints)) < 0.5
-        driven = self._joints if self._rng.random() < 0.5 or not some.any() else np.array(self._joints)[some]
+        driven = self._joints
+        if self._rng.random() >= 0.5 and some.any():
+            driven = np.array(self._joints)[some]
         return Experiment(self._pose(), {j: self._input() for j in driven})
 
     def change(self, experiment: Experiment) -> Experiment:
-        """Change an experiment in one to three places: its pose, a joint's input, or some levels of it."""
-        rng, limit = self._rng, self._limit
-        for _ in range(rng.integers(1, 4)):
-            kind, joint = rng.random(), rng.choice(self._joints)
-            if kind < 0.1:
-                experiment = replace(experiment, pose=self._moved(experiment.pose))
-            elif kind < 0.25 or joint not in experiment.inputs:
-                experiment = replace(experiment, inputs={**experiment.inputs, joint: self._input()})
-            else:
-                level = experiment.inputs[joint].level
-                first = rng.integers(len(level))
-                place = slice(first, first + 1 + rng.integers(4))
-                near = np.clip(level[place] + rng.normal(0.0, 0.25 * limit), -limit, limit)
-                far = self._levels(len(near))
-                experiment = experiment.with_level(joint, place, near if kind < 0.5 else far)
+        """Change an experiment in one to three places: its pose, a joint's input,
+        or some levels of it."""
+        for _ in range(self._rng.integers(1, 4)):
+            experiment = self._changed_once(experiment)
         return experiment
 
+    def _changed_once(self, experiment: Experiment) -> Experiment:
+        kind = self._rng.random()
+        joint = self._rng.choice(self._joints)
+        if kind < 0.1:
+            return replace(experiment, pose=self._moved(experiment.pose))
+        if kind < 0.25 or joint not in experiment.inputs:
+            return replace(experiment, inputs={**experiment.inputs, joint: self._input()})
+        level = experiment.inputs[joint].level
+        first = self._rng.integers(len(level))
+        place = slice(first, first + 1 + self._rng.integers(4))
+        steps = self._rng.normal(0.0, 0.25 * self._limit)
+        near = np.clip(level[place] + steps, -self._limit, self._limit)
+        # drawn even where it is not taken: the generator's state is part of the result
+        far = self._levels(len(near))
+        return experiment.with_level(joint, place, near if kind < 0.5 else far)
+
     def _input(self) -> Input:
-        starts, start = list[int](), self._rest
-        while not starts or start < self._samples - self._shortest:
+        starts = [self._rest]
+        while True:
+            start = starts[-1] + int(self._rng.integers(self._shortest, self._longest + 1))
+            if start >= self._samples - self._shortest:
+                return Input(np.array(starts), self._levels(len(starts)))
             starts.append(start)
-            start += int(self._rng.integers(self._shortest, self._longest + 1))
-        return Input(np.array(starts), self._levels(len(starts)))
 
     def _levels(self, count: int) -> Array:
         return np.round(self._rng.uniform(-self._limit, self._limit, count), 1)
@@ -134,8 +151,34 @@ class RandomExperiments:
         return np.clip(pose + step, self._lower, self._upper)
 
 
+def _possible_poses(settings: FitSettings) -> Array:
+    """Return the named poses in which the joints that move are within their limits [rad], (n, J).
+
+    Raises SettingsError: there are none, and others are not allowed.
+    """
+    limits = settings.design
+    arm = settings.arm
+    names = limits.poses
+    if names is None or names == "any":
+        names = tuple(arm.poses)
+    poses = np.array([arm.pose(name) for name in names])
+    moving = [j - 1 for j in {*(limits.joints or ()), *settings.outputs}]
+    margin = np.radians(limits.margin_deg)
+    inside = (poses >= arm.lower + margin) & (poses <= arm.upper - margin)
+    possible = poses[inside[:, moving].all(axis=1)]
+    if not len(possible) and limits.poses != "any":
+        within = f"{limits.margin_deg:g} deg inside the ranges of what moves"
+        raise SettingsError(
+            f"no pose of {', '.join(names)} is {within}",
+            "design.poses",
+            "add one to the arm's file, reduce design.margin_deg, or set design.poses=any",
+        )
+    return possible
+
+
 class Violation(NamedTuple):
-    """The first sample at which a joint (0-based) leaves its range, is too fast, or makes bodies meet."""
+    """A limit that a motion breaks: the first sample at which a joint (0-based) leaves its range,
+    is too fast, or makes bodies meet."""
 
     sample: int
     joint: int
@@ -143,31 +186,39 @@ class Violation(NamedTuple):
 
 
 def violation(angle: Array, settings: FitSettings) -> Violation | None:
-    """Return where a motion [rad], shape (T, J), first leaves the joints' ranges or is too fast; or None."""
-    out, fast = beyond(angle, settings)
-    for sample, joint in np.argwhere(out | fast)[:1].tolist():
-        return Violation(sample, joint, not out[sample, joint])
-    return None
+    """Return where a motion [rad], shape (T, J), first leaves the joints' ranges or is too fast;
+    or None."""
+    outside, fast = beyond(angle, settings)
+    broken = np.argwhere(outside | fast)
+    if not len(broken):
+        return None
+    sample, joint = broken[0].tolist()
+    return Violation(sample, joint, not outside[sample, joint])
 
 
 def beyond(angle: Array, settings: FitSettings) -> tuple[Mask, Mask]:
-    """Return where joints of a motion [rad], (T, J), are outside their ranges, and too fast: both (T, J)."""
-    limits, arm = settings.design, settings.arm
-    margin, speed = np.radians([limits.margin_deg, limits.speed_deg_s])
-    fast = np.abs(np.diff(angle, axis=0, prepend=angle[:1])) / settings.log.period_s > speed
+    """Return where joints of a motion [rad], (T, J), are outside their ranges, and too fast:
+    both (T, J)."""
+    limits = settings.design
+    arm = settings.arm
+    margin, largest_speed = np.radians([limits.margin_deg, limits.speed_deg_s])
+    speed = np.abs(np.diff(angle, axis=0, prepend=angle[:1])) / settings.log.period_s
+    outside = (angle < arm.lower + margin) | (angle > arm.upper - margin)
     # a joint that stands at the end of its range, and never moves, breaks no limit
-    out = ((angle < arm.lower + margin) | (angle > arm.upper - margin)) & (np.ptp(angle, axis=0) > 0)
-    return out, fast
+    moves = np.ptp(angle, axis=0) > 0
+    return outside & moves, speed > largest_speed
 
 
 def repaired(experiment: Experiment, first: Violation) -> Experiment:
     """Reduce the last level before a violation; turn it round where it leads out of a range."""
-    if (signal := experiment.inputs.get(first.joint)) is not None:
-        left = np.flatnonzero((signal.start < first.sample) & (signal.level != 0.0))
-        if len(left):
-            level = (0.7 if first.fast else -0.7) * signal.level[left[-1]]
+    signal = experiment.inputs.get(first.joint)
+    if signal is not None:
+        earlier = np.flatnonzero((signal.start < first.sample) & (signal.level != 0.0))
+        if len(earlier):
+            last = earlier[-1]
+            level = (0.7 if first.fast else -0.7) * signal.level[last]
             # below 10 % an earlier level is to blame
-            return experiment.with_level(first.joint, left[-1], level if abs(level) > 10.0 else 0.0)
-    for joint, one in experiment.inputs.items():
-        experiment = experiment.with_level(joint, slice(None), 0.7 * one.level)
+            return experiment.with_level(first.joint, last, level if abs(level) > 10.0 else 0.0)
+    for joint, signal in experiment.inputs.items():
+        experiment = experiment.with_level(joint, slice(None), 0.7 * signal.level)
     return experiment

@@ -1,21 +1,24 @@
-"""Growth: the terms that a model lacks, and whether they lower the error on parts of the logs left out.
+"""Growth: the terms that a model lacks, and whether they lower the error on parts of
+the logs left out.
 
-A small change of each term changes the residual. What the free parameters cannot do as well tells how
-clearly the term is missing, and how much freeing it would gain (`score`). That is cheap: some simulations a
-term. The best few are then really freed: least squares goes on from the estimate, once with all samples and
-once without each part of them, on which the result is judged. A term that only follows the noise loses there.
+A small change of each term changes the residual. What the free parameters cannot do as well tells
+how clearly the term is missing, and how much freeing it would gain (`score`). That is cheap: some
+simulations a term. The best few are then really freed: least squares goes on from the estimate,
+once with all samples and once without each part of them, on which the result is judged.
+A term that only follows the noise loses there.
 
-The score test: let r be the innovations at a maximum of the likelihood and d the change of them with a
-quantity that the fit holds. What the free parameters can do as well as d, the fit has done already. So d is
-projected off their effects, with the priors' scores as further rows: d' = d - U' U d with orthonormal rows U.
-The statistic is the score of C. R. Rao (1948), a standard normal variable where the model lacks nothing:
+The score test: let r be the innovations at a maximum of the likelihood and d the change of them
+with a quantity that the fit holds. What the free parameters can do as well as d, the fit has done
+already. So d is projected off their effects, with the priors' scores as further rows: d' = d - U' U
+d with orthonormal rows U. The statistic is the score of C. R. Rao (1948),
+a standard normal variable where the model lacks nothing:
 
     z = -d' r / √(Var d' r),
 
 whose variance is that of the errors as they are, whatever least squares weighs them by.
 
-The change of the quantity that would explain most is a = -d' r / |d'|². It raises the log-likelihood by
-z² / 2.
+The change of the quantity that would explain most is a = -d' r / |d'|². It raises the
+log-likelihood that least squares takes by a² |d'|² / 2.
 """
 
 import math
@@ -35,19 +38,15 @@ from hydroid.progress import Progress
 class Score:
     """Statistic z of one change of the model, positive where the change lowers the error.
 
-    By the linear approximation the `amount` of it that lowers the error most raises the log-likelihood by
-    `gain`. `strength` is the statistic that the whole change would have without noise: what can be seen at
-    all.
+    By the linear approximation the `amount` of it that lowers the error most raises the
+    log-likelihood that least squares takes by `gain`. `strength` is the statistic that the whole
+    change would have without noise: what can be seen at all.
     """
 
     statistic: float
     amount: float
     strength: float
-
-    @property
-    def gain(self) -> float:
-        """Rise of the log-likelihood by the best amount of the change."""
-        return 0.5 * self.statistic**2
+    gain: float
 
     def chance(self, *, one_sided: bool) -> float:
         """Return the probability of such a statistic where the model lacks nothing."""
@@ -75,18 +74,20 @@ class Explained:
         row -= self.effects.T @ (self.effects @ row)
         square = float(row @ row)
         if not square > 0:
-            return Score(0.0, 0.0, 0.0)
+            return Score(0.0, 0.0, 0.0, 0.0)
         deviation = math.sqrt(self.variance(row))
         amount = -float(row @ self.left) / square
-        return Score(amount * square / deviation, amount, square / deviation)
+        gain = 0.5 * amount**2 * square
+        return Score(amount * square / deviation, amount, square / deviation, gain)
 
 
 def explained(problem: Problem, known: Uncertainty) -> Explained:
     """Return what a fit has explained at an estimate. Parameters at bounds are held."""
     linear = known.linear
-    weak = np.zeros(len(linear.slopes))  # the estimate does not depend on the weak priors
-    scores = problem.priors.weighed_at(known.theta)(known.theta[None])[0]
-    left = np.concatenate([linear.innovations, scores, weak])
+    # the estimate does not depend on the weak priors
+    weak = np.zeros(len(linear.slopes))
+    of_priors = problem.priors.weighed_at(known.theta)(known.theta[None])[0]
+    left = np.concatenate([linear.innovations, of_priors, weak])
 
     def variance(row: Array) -> float:
         samples = problem.measured.size
@@ -96,7 +97,8 @@ def explained(problem: Problem, known: Uncertainty) -> Explained:
 
 
 def holm(chances: Sequence[float], level: float) -> Mask:
-    """Return which findings hold, any false one with at most a probability `level` (S. Holm, 1979)."""
+    """Return which findings hold, any false one with at most a probability `level` (S. Holm,
+    1979)."""
     p = np.array(chances, dtype=float)
     order = np.argsort(p)
     holds = p[order] <= level / np.arange(len(p), 0, -1)
@@ -107,9 +109,11 @@ def holm(chances: Sequence[float], level: float) -> Mask:
 
 LEVEL = 0.05  # probability that any term is a candidate where none is missing
 MIN_GAIN = 2.0
-"""rise of the log-likelihood that a candidate must promise: that of one more parameter by Akaike's measure"""
+"""rise of the log-likelihood that a candidate must promise:
+that of one more parameter by Akaike's measure"""
 VISIBLE = 3.0
-"""statistic of the largest change, without noise; a term below it cannot be told from the free parameters"""
+"""statistic of the largest change, without noise;
+a term below it cannot be told from the free parameters"""
 LARGEST_EFFECT = 0.5
 """rms effect of the change that is tested, in rms innovations: large enough for terms
 that act beyond a threshold, small enough for a derivative"""
@@ -117,7 +121,8 @@ that act beyond a threshold, small enough for a derivative"""
 
 @record
 class Candidate:
-    """A change of the settings that frees one more parameter, to be refined from `start`, in its unit.
+    """A change of the settings that frees one more parameter, to be refined from `start`,
+    in its unit.
 
     Attributes:
         score: how clearly the residual shows its effect, in standard deviations.
@@ -134,48 +139,74 @@ class Candidate:
 
 def score_terms(problem: Problem, known: Uncertainty, progress: Progress) -> list[Candidate]:
     """Test every term of a problem at an estimate; those that the logs cannot show are left out."""
-    every, fit, tests = terms(problem, known.theta), explained(problem, known), list[Candidate]()
+    every = terms(problem, known.theta)
+    fit = explained(problem, known)
+    candidates = list[Candidate]()
     for done, term in enumerate(every):
         progress("terms", done, len(every))
-        tests += _tested(term, known, fit)
-    return tests
+        candidate = _tested(term, known, fit)
+        if candidate is not None:
+            candidates.append(candidate)
+    return candidates
 
 
 def promising(tests: Sequence[Candidate]) -> list[Candidate]:
-    """Return those that are significant among all (S. Holm, 1979) and promise MIN_GAIN, the best first.
+    """Return those that are significant among all (S. Holm, 1979) and promise MIN_GAIN,
+    the best first.
 
     Of one quantity of one joint only the best: a side, or both.
     """
-    significant, best = holm([one.chance for one in tests], LEVEL), dict[object, Candidate]()
-    for one, holds in sorted(zip(tests, significant, strict=True), key=lambda pair: -pair[0].gain):
-        if holds and one.gain >= MIN_GAIN:
-            best.setdefault(one.term.kind, one)
+    significant = holm([candidate.chance for candidate in tests], LEVEL)
+    kept = [
+        candidate
+        for candidate, holds in zip(tests, significant, strict=True)
+        if holds and candidate.gain >= MIN_GAIN
+    ]
+    best = dict[object, Candidate]()
+    for candidate in sorted(kept, key=lambda candidate: -candidate.gain):
+        best.setdefault(candidate.term.kind, candidate)
     return list(best.values())
 
 
-def _tested(term: Term, known: Uncertainty, fit: Explained) -> list[Candidate]:
-    """Test one term by the largest change whose effect is small, a limit by each that acts."""
-    (low, high), limit = term.span, math.isinf(term.value)
-    end = high if high - term.value >= term.value - low else low
-    parts = np.zeros(16) if limit else 4.0 ** np.arange(-5.0, 1.0)
-    values = np.geomspace(high, low, 16) if limit else term.value + parts * (end - term.value)
-    likelihood = known.likelihood
-    effects = term.innovations(likelihood, known.theta, values.tolist()) - known.linear.innovations
-    sizes = rms(effects, axis=1) / max(float(rms(known.linear.innovations)), np.finfo(float).tiny)
+def _tested(term: Term, known: Uncertainty, fit: Explained) -> Candidate | None:
+    """Test one term by the largest change whose effect is small, a limit by each that acts.
+
+    None: the logs cannot show it.
+    """
+    low, high = term.span
+    is_limit = math.isinf(term.value)
+    if is_limit:
+        values = np.geomspace(high, low, 16)
+        parts = np.zeros(16)
+    else:
+        end = high if high - term.value >= term.value - low else low
+        parts = 4.0 ** np.arange(-5.0, 1.0)
+        values = term.value + parts * (end - term.value)
+    innovations = term.innovations(known.likelihood, known.theta, values.tolist())
+    effects = innovations - known.linear.innovations
+    noise = max(float(rms(known.linear.innovations)), np.finfo(float).tiny)
+    sizes = rms(effects, axis=1) / noise
     acting = np.flatnonzero(np.isfinite(sizes) & (sizes > 0))
-    if not limit:
-        acting = acting[: max(np.sum(sizes[acting] <= LARGEST_EFFECT), 1)][-1:]
-    one_sided = limit or term.value in term.span
-    scores = list[tuple[float, Score, float]]()
+    if not is_limit:
+        small = np.sum(sizes[acting] <= LARGEST_EFFECT)
+        acting = acting[: max(small, 1)][-1:]
+    one_sided = is_limit or term.value in term.span
+    # gain, score, and where a refinement starts
+    tried = list[tuple[float, Score, float]]()
     for i in acting:
         score = fit.score(effects[i])
-        if score.strength >= VISIBLE * parts[i]:
-            gain = 0.0 if one_sided and score.statistic <= 0 else score.gain
-            away = values[i] - term.value
-            start = values[i] if limit else term.value + np.copysign(away, away * score.amount)
-            scores.append((gain, score, np.clip(start, low, high)))
-    if not scores:
-        return []
-    gain, score, start = max(scores, key=lambda one: one[0])
-    chance = min(len(scores) * score.chance(one_sided=one_sided), 1.0)
-    return [Candidate(term, start, score.statistic if one_sided else abs(score.statistic), chance, gain)]
+        if score.strength < VISIBLE * parts[i]:
+            continue
+        gain = 0.0 if one_sided and score.statistic <= 0 else score.gain
+        start = values[i]
+        if not is_limit:
+            change = values[i] - term.value
+            start = term.value + np.copysign(change, change * score.amount)
+        tried.append((gain, score, np.clip(start, low, high)))
+    if not tried:
+        return None
+    gain, score, start = max(tried, key=lambda trial: trial[0])
+    # as many limits as were tried may each look significant by chance (C. E. Bonferroni)
+    chance = min(len(tried) * score.chance(one_sided=one_sided), 1.0)
+    statistic = score.statistic if one_sided else abs(score.statistic)
+    return Candidate(term, start, statistic, chance, gain)

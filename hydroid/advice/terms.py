@@ -1,21 +1,22 @@
 """Terms: changes of the settings that give a model one more parameter.
 
-A term is a quantity that the fit holds fixed, one that it leaves at its nominal value, or the share of one
-side or joint in a parameter that serves several.
+A term is a quantity that the fit holds fixed, one that it leaves at its nominal value, or the share
+of one side or joint in a parameter that serves several.
 """
 
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any
+from itertools import product
 
 import numpy as np
 
 from hydroid.arrays import Array, record
+from hydroid.files import Plain
 from hydroid.hydraulics.actuator import START_PRESSURE
 from hydroid.posterior.error_model import Likelihood
 from hydroid.problem.problem import Problem
-from hydroid.quantity_table import CHOICES, MECHANICAL, QUANTITIES, ROWS, TARGETS
+from hydroid.quantity_table import CHOICES, MECHANICAL, QUANTITIES, ROWS, TARGETS, Quantity
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.hydraulics import actuator_values
 from hydroid.settings.problem import ParameterSettings
@@ -23,7 +24,8 @@ from hydroid.settings.problem import ParameterSettings
 
 @record
 class Term:
-    """One more free parameter: the settings' entries that add it, its own and that of what it is split from.
+    """One more free parameter: the settings' entries that add it,
+    its own and that of what it is split from.
 
     `value` is what it has now; inf of a limit that is switched off.
     """
@@ -44,21 +46,25 @@ class Term:
         return problem.varied(problem.settings.with_parameters(self.entries))
 
     def theta(self, problem: Problem, theta: Array, value: float) -> Array:
-        """Return an estimate of a problem, (P,), for the problem `added_to`, with the term at a value."""
+        """Return an estimate of a problem, (P,), for the problem `added_to`,
+        with the term at a value."""
         values = problem.parameters.mapping(theta) | {self.name: value}
         return np.array([values[name] for name in problem.settings.parameters | dict(self.entries)])
 
     def innovations(self, likelihood: Likelihood, theta: Array, values: Sequence[float]) -> Array:
-        """Innovations of a likelihood at an estimate, (P,), with the term at n values, shape (n, R)."""
+        """Innovations of a likelihood at an estimate, (P,), with the term at n values, shape (n,
+        R)."""
         problem = likelihood.problem
         thetas = np.array([self.theta(problem, theta, value) for value in values])
         return likelihood.errors.innovations(self.added_to(problem).output_errors(thetas))
 
     @property
     def kind(self) -> tuple[object, ...]:
-        """What it is, with both sides of an actuator alike: the same for `delay` and `delay_a` of a joint."""
-        own = self.entries[self.name]
-        return own.quantity.removesuffix("_a").removesuffix("_b"), own.joints, own.link
+        """Quantity, joints and link, with both sides of an actuator alike: `delay` and `delay_a` of
+        a joint are of one kind."""
+        parameter = self.entries[self.name]
+        quantity = parameter.quantity.removesuffix("_a").removesuffix("_b")
+        return quantity, parameter.joints, parameter.link
 
 
 def terms(problem: Problem, theta: Array) -> tuple[Term, ...]:
@@ -67,22 +73,30 @@ def terms(problem: Problem, theta: Array) -> tuple[Term, ...]:
 
 
 def _held(problem: Problem) -> Iterator[Term]:
-    for name, p in problem.settings.parameters.items():
-        if p.fixed is not None and _means_something(problem, p):
-            # without bounds from a quarter to four times the value
-            low, high = p.bounds or CHOICES[p.quantity].span or (p.fixed / 4.0, 4.0 * p.fixed)
-            span = min(low, p.fixed), max(high, p.fixed)
-            if span[0] < span[1]:
-                yield Term(name, {name: p.changed({"fixed": None, "bounds": span})}, p.fixed)
+    """Yield the parameters that the fit holds at a value."""
+    for name, parameter in problem.settings.parameters.items():
+        fixed = parameter.fixed
+        if fixed is None or not _means_something(problem, parameter):
+            continue
+        # without bounds from a quarter to four times the value
+        around = (fixed / 4.0, 4.0 * fixed)
+        low, high = parameter.bounds or CHOICES[parameter.quantity].span or around
+        low = min(low, fixed)
+        high = max(high, fixed)
+        if low < high:
+            freed = parameter.changed({"fixed": None, "bounds": (low, high)})
+            yield Term(name, {name: freed}, fixed)
 
 
-def _means_something(problem: Problem, p: ParameterSettings) -> bool:
-    """Whether what moves the joints has such a quantity, and an effect of a group has logs beside it."""
-    acts_on = joints_of(problem.settings, p)
-    groups = {problem.settings.log.group_of(log.source) for log in problem.logs}
-    if p.per is not None and (p.per not in groups or len(groups) == 1):
-        return False
-    return not acts_on or bool(_moving(problem, p.quantity, acts_on))
+def _means_something(problem: Problem, parameter: ParameterSettings) -> bool:
+    """Return whether what moves the joints has such a quantity,
+    and an effect of a group has logs beside it."""
+    if parameter.per is not None:
+        groups = {problem.settings.log.group_of(log.source) for log in problem.logs}
+        if parameter.per not in groups or len(groups) == 1:
+            return False
+    joints = joints_of(problem.settings, parameter)
+    return not joints or bool(_moving(problem, parameter.quantity, joints))
 
 
 def _moving(problem: Problem, quantity: str, joints: Iterable[int]) -> tuple[int, ...]:
@@ -92,54 +106,111 @@ def _moving(problem: Problem, quantity: str, joints: Iterable[int]) -> tuple[int
 
 
 def _split(problem: Problem, theta: Array) -> Iterator[Term]:
-    """Yield the share of side B, or of one joint that moves, in a free parameter that serves several."""
+    """Yield the share of side B, or of one joint that moves,
+    in a free parameter that serves several."""
     settings = problem.settings
     for parameter, value in zip(problem.parameters.parameters, theta.tolist(), strict=True):
-        name, p = parameter.name, settings.parameters[parameter.name]
-        if p.fixed is not None or p.per is not None:
+        name = parameter.name
+        shared = settings.parameters[name]
+        if shared.fixed is not None or shared.per is not None:
             continue
-        sides, joints, parts = TARGETS[p.quantity], joints_of(settings, p), dict[str, list[dict[str, Any]]]()
-        if len(sides) == 2:
-            parts["b"] = [{"quantity": side} for side in sides]
-        if len(moving := _moving(problem, p.quantity, joints)) > 1:
-            for own in moving:
-                others = tuple(joint for joint in joints if joint != own)
-                parts[_label(settings, own)] = [{"joints": others}, {"joints": (own,)}]
-        free = p.changed({"bounds": (parameter.lower, parameter.upper)})
-        for ending, (rest, own) in parts.items():
-            if (new := f"{name}_{ending}") not in settings.parameters:
-                yield Term(new, {name: free.changed(rest), new: free.changed(own)}, value)
+        free = shared.changed({"bounds": (parameter.lower, parameter.upper)})
+        for ending, (rest, share) in _shares(problem, shared).items():
+            new = f"{name}_{ending}"
+            if new not in settings.parameters:
+                entries = {name: free.changed(rest), new: free.changed(share)}
+                yield Term(new, entries, value)
+
+
+def _shares(problem: Problem, shared: ParameterSettings) -> dict[str, tuple[Plain, Plain]]:
+    """Return how a parameter can be split: what the rest of it serves, and what the share, by the
+    share's ending."""
+    settings = problem.settings
+    shares = dict[str, tuple[Plain, Plain]]()
+    sides = TARGETS[shared.quantity]
+    if len(sides) == 2:
+        side_a, side_b = sides
+        shares["b"] = {"quantity": side_a}, {"quantity": side_b}
+    joints = joints_of(settings, shared)
+    moving = _moving(problem, shared.quantity, joints)
+    if len(moving) > 1:
+        for joint in moving:
+            others = tuple(other for other in joints if other != joint)
+            shares[_label(settings, joint)] = {"joints": others}, {"joints": (joint,)}
+    return shares
 
 
 def _nominal(problem: Problem) -> Iterator[Term]:
-    """Yield what no parameter sets: of all joints together and each, of both sides together and each."""
-    settings, moving = problem.settings, problem.active_joints
-    always = [p for p in settings.parameters.values() if p.per is None]
-    taken = {(t, j) for p in always for t in TARGETS[p.quantity] for j in joints_of(settings, p) or (0,)}
-    gauged, alone = any(log.pressure is not None for log in problem.logs), len(moving) == 1
+    """Yield what no parameter sets: of all joints together and each,
+    of both sides together and each."""
+    taken = _set_by_parameters(problem.settings)
     for row in ROWS:
-        pump = row.of_the_pump
-        # the pump of one actuator is no more than its flow limit; the logs may say the pressure
-        known = (pump and alone) or (row.name == "start_pressure" and gauged)
-        if row.span is None or known or (settings.stage == "mech" and row.name not in MECHANICAL):
+        if row.span is None or not _may_lack(problem, row):
             continue
-        joints = _moving(problem, row.name, moving)
+        joints = _moving(problem, row.name, problem.active_joints)
         for quantity in dict.fromkeys((row.name, *TARGETS[row.name])):
-            groups: list[tuple[int, ...]] = [(0,)] if pump else [(joint,) for joint in joints]
-            if quantity == row.name and not pump and len(joints) > 1:
-                groups.append(joints)
-            for group in groups:
-                atoms = [(target, joint) for target in TARGETS[quantity] for joint in group]
-                values = {_nominal_value(settings, target, joint or 1) for target, joint in atoms}
-                if len(values) == 1 and taken.isdisjoint(atoms):
-                    one = not (alone or pump or group[1:])
-                    name = f"{quantity}_{_label(settings, *group)}" if one else quantity
-                    while name in settings.parameters:
-                        name += "_"
-                    own = ParameterSettings(
-                        quantity=quantity, joints=None if pump else group, bounds=row.span
-                    )
-                    yield Term(name, {name: own}, values.pop())
+            for group in _groups(row, quantity, joints):
+                if taken.isdisjoint(product(TARGETS[quantity], group)):
+                    yield from _new_term(problem, row, quantity, group)
+
+
+def _new_term(problem: Problem, row: Quantity, quantity: str, group: tuple[int, ...]) -> Iterator[Term]:
+    """Yield a quantity of a group of joints as a term, if it has one value there."""
+    # the pump is no joint's: the first has its values as well as any
+    values = {
+        _nominal_value(problem.settings, target, joint or 1)
+        for target, joint in product(TARGETS[quantity], group)
+    }
+    if len(values) != 1:
+        return
+    name = _new_name(problem, row, quantity, group)
+    joints = None if row.of_the_pump else group
+    parameter = ParameterSettings(quantity=quantity, joints=joints, bounds=row.span)
+    yield Term(name, {name: parameter}, values.pop())
+
+
+def _set_by_parameters(settings: FitSettings) -> set[tuple[str, int]]:
+    """Return the quantities that parameters set, with their joints; 0 for what is no joint's."""
+    taken = set[tuple[str, int]]()
+    for parameter in settings.parameters.values():
+        if parameter.per is None:
+            joints = joints_of(settings, parameter) or (0,)
+            taken.update(product(TARGETS[parameter.quantity], joints))
+    return taken
+
+
+def _may_lack(problem: Problem, row: Quantity) -> bool:
+    """Return whether the model of this stage has a quantity, and the logs do not say it already."""
+    if problem.settings.stage == "mech" and row.name not in MECHANICAL:
+        return False
+    if row.of_the_pump:
+        # the pump of one actuator is no more than its flow limit
+        return len(problem.active_joints) != 1
+    gauged = any(log.pressure is not None for log in problem.logs)
+    return not (row.name == "start_pressure" and gauged)
+
+
+def _groups(row: Quantity, quantity: str, joints: tuple[int, ...]) -> list[tuple[int, ...]]:
+    """Return the groups of joints that may share a value: each alone, and all of them where both
+    sides do, too."""
+    if row.of_the_pump:
+        return [(0,)]
+    groups: list[tuple[int, ...]] = [(joint,) for joint in joints]
+    if quantity == row.name and len(joints) > 1:
+        groups.append(joints)
+    return groups
+
+
+def _new_name(problem: Problem, row: Quantity, quantity: str, group: tuple[int, ...]) -> str:
+    """Return a name for a new parameter, with that of its joint where it is one of several."""
+    settings = problem.settings
+    name = quantity
+    is_one_of_several = len(problem.active_joints) != 1 and len(group) == 1
+    if is_one_of_several and not row.of_the_pump:
+        name = f"{quantity}_{_label(settings, *group)}"
+    while name in settings.parameters:
+        name += "_"
+    return name
 
 
 def _label(settings: FitSettings, joint: int) -> str:
@@ -147,16 +218,21 @@ def _label(settings: FitSettings, joint: int) -> str:
     return re.sub(r"\W", "_", settings.arm.joint_names[joint - 1])
 
 
-def joints_of(settings: FitSettings, p: ParameterSettings) -> tuple[int, ...]:
-    """Return the joints that a parameter acts on; a link's mass, and the pump's numbers, act on none."""
-    if p.link is not None or CHOICES[p.quantity].of_the_pump:
+def joints_of(settings: FitSettings, parameter: ParameterSettings) -> tuple[int, ...]:
+    """Return the joints that a parameter acts on; a link's mass, and the pump's numbers,
+    act on none."""
+    if parameter.link is not None or CHOICES[parameter.quantity].of_the_pump:
         return ()
-    return p.joints or tuple(range(1, len(settings.arm.joints) + 1))
+    return parameter.joints or tuple(range(1, len(settings.arm.joints) + 1))
 
 
 def _nominal_value(settings: FitSettings, quantity: str, joint: int) -> float:
-    """Value of a quantity that no parameter sets; inf of a limit that is switched off."""
-    value = actuator_values(settings.arm.joints[joint - 1].actuator, settings.hydraulics)[quantity]
-    if value is None:
-        return START_PRESSURE / QUANTITIES[quantity].factor if quantity == "start_pressure" else math.inf
-    return value
+    """Return the value of a quantity that no parameter sets;
+    inf of a limit that is switched off."""
+    actuator = settings.arm.joints[joint - 1].actuator
+    value = actuator_values(actuator, settings.hydraulics)[quantity]
+    if value is not None:
+        return value
+    if quantity == "start_pressure":
+        return START_PRESSURE / QUANTITIES[quantity].factor
+    return math.inf

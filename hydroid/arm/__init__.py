@@ -1,1 +1,2 @@
-"""The arm: meshes and settings -> MJCF, its cylinders' geometry, and the smallest model that moves alike."""
+"""The arm: meshes and settings -> MJCF, its cylinders' geometry,
+and the smallest model that moves alike."""

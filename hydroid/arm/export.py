@@ -1,11 +1,12 @@
-"""An arm with locked joints as an MJCF with its looks: what a plant steps and shows, and what is exported.
+"""An arm with locked joints as an MJCF with its looks: what a plant steps and shows,
+and what is exported.
 
-The bodies are those of `hydroid.arm.locked`, with the inertia of all that is fused into them. Shapes, sites,
-cameras and lights of a fused body hang on the body that carries it; contacts are off, as in every simulation.
+The bodies are those of `hydroid.arm.locked`, with the inertia of all that is fused into them.
+Shapes, sites, cameras and lights of a fused body hang on the body that carries it;
+contacts are off, as in every simulation.
 """
 
 import math
-from itertools import chain
 from pathlib import Path
 
 import mujoco
@@ -26,8 +27,8 @@ _FIELDS = (
 def dressed_model(spec: mujoco.MjSpec, locked: LockedArm) -> mujoco.MjModel:
     """Return the locked arm's model with shapes, cameras and one idle motor per joint.
 
-    It steps as `locked.model` does, bit for bit: motors are switched off, and their controls are free to hold
-    commands in %.
+    It steps as `locked.model` does, bit for bit: motors are switched off, and their controls are
+    free to hold commands in %.
     """
     source = locked_spec(spec, locked, locked.model, np.zeros((2, len(locked.joints))))
     with quiet_mujoco():
@@ -43,36 +44,36 @@ def locked_spec(
 ) -> mujoco.MjSpec:
     """Return an arm's MJCF with joints locked; inertia, joints and time step are those of `model`.
 
-    `motors` are torque per command [N·m/%] and torque without one [N·m] of the moving joints, shape (2, V);
-    shape (2, 0): no motors.
+    `motors` are torque per command [N·m/%] and torque without one [N·m] of the moving joints, shape
+    (2, V); shape (2, 0): no motors.
     """
     source = spec.copy()
-    forces = source.actuators, source.sensors, source.equalities, source.keys, source.excludes, source.pairs
-    for part in [*chain(*forces, source.flexes, source.skins)]:
+    forces = [*source.actuators, *source.sensors, *source.equalities]
+    others = [*source.keys, *source.excludes, *source.pairs, *source.flexes, *source.skins]
+    for part in forces + others:
         source.delete(part)
     _draw_tendons(source)
     for name, (position, turn) in locked.held.items():
         body = source.body(name)
-        body.set_frame(body.parent.add_frame())  # its own one is part of the place
-        body.pos, body.quat, body.alt.type = position, turn, mujoco.mjtOrientation.mjORIENTATION_QUAT
+        # the body's own frame is part of its place
+        body.set_frame(body.parent.add_frame())
+        body.pos = position
+        body.quat = turn
+        body.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
         source.delete(body.first_joint())
     source.fuse_static()
+    # inertias stand in the file to the last bit, and nothing is to change them
     compiler = source.compiler
     compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
-    compiler.balanceinertia, compiler.boundmass, compiler.boundinertia = False, 0.0, 0.0
-    compiler.settotalmass, compiler.fusestatic = -1.0, False
+    compiler.balanceinertia = False
+    compiler.boundmass = compiler.boundinertia = 0.0
+    compiler.settotalmass = -1.0
+    compiler.fusestatic = False
     source.option.timestep = model.opt.timestep
     source.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
-    for j, joint in enumerate(map(source.joint, locked.joints)):
-        body, k, slack = joint.parent, model.jnt_bodyid[j], model.qpos_spring[j]
-        body.explicitinertial, body.mass, body.ipos = True, model.body_mass[k], model.body_ipos[k]
-        body.iquat, body.ialt.type = model.body_iquat[k], mujoco.mjtOrientation.mjORIENTATION_QUAT
-        body.inertia, body.fullinertia = model.body_inertia[k], [np.nan, 0, 0, 0, 0, 0]
-        joint.damping, joint.stiffness = [model.dof_damping[j], 0, 0], [model.jnt_stiffness[j], 0, 0]
-        joint.frictionloss, joint.armature = model.dof_frictionloss[j], model.dof_armature[j]
-        joint.actfrclimited = mujoco.mjtLimited.mjLIMITED_FALSE  # a URDF's effort is of another motor
-        turns = joint.type == mujoco.mjtJoint.mjJNT_HINGE
-        joint.springref = math.degrees(slack) if compiler.degree and turns else slack
+    for number, joint in enumerate(map(source.joint, locked.joints)):
+        _take_inertia(joint.parent, model, model.jnt_bodyid[number])
+        _take_joint(joint, model, number, in_degrees=bool(compiler.degree))
     for name, gain, bias in zip(locked.joints, *motors, strict=False):
         source.add_actuator(
             name=name,
@@ -88,6 +89,31 @@ def locked_spec(
     return source
 
 
+def _take_inertia(body: mujoco.MjsBody, model: mujoco.MjModel, number: int) -> None:
+    """Give a body what one of a model weighs."""
+    body.explicitinertial = True
+    body.mass = model.body_mass[number]
+    body.ipos = model.body_ipos[number]
+    body.iquat = model.body_iquat[number]
+    body.ialt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
+    body.inertia = model.body_inertia[number]
+    # MuJoCo's word for one that is not given
+    body.fullinertia = [np.nan, 0, 0, 0, 0, 0]
+
+
+def _take_joint(joint: mujoco.MjsJoint, model: mujoco.MjModel, number: int, *, in_degrees: bool) -> None:
+    """Give a joint the damper, spring and friction of one of a model."""
+    joint.damping = [model.dof_damping[number], 0, 0]
+    joint.stiffness = [model.jnt_stiffness[number], 0, 0]
+    joint.frictionloss = model.dof_frictionloss[number]
+    joint.armature = model.dof_armature[number]
+    # a URDF's effort is of another motor
+    joint.actfrclimited = mujoco.mjtLimited.mjLIMITED_FALSE
+    rest = model.qpos_spring[number]
+    turns = joint.type == mujoco.mjtJoint.mjJNT_HINGE
+    joint.springref = math.degrees(rest) if in_degrees and turns else rest
+
+
 def _draw_tendons(spec: mujoco.MjSpec) -> None:
     """Keep tendons as drawings of cylinders: none of their forces is simulated."""
     for tendon in list(spec.tendons):
@@ -100,10 +126,11 @@ def _draw_tendons(spec: mujoco.MjSpec) -> None:
 
 
 def write_fitted(folder: Path, fitted: mujoco.MjSpec, joints: str, actuators: Plain) -> None:
-    """Write the fitted arm to `model/`, beside `arm.xml`, and a README that says what it is good for.
+    """Write the fitted arm to `model/`, beside `arm.xml`,
+    and a README that says what it is good for.
 
-    `joints` names those that take commands; `actuators` are hydraulic parameters by joint; of stage 1
-    there are none: the MJCF has motors.
+    `joints` names those that take commands; `actuators` are hydraulic parameters by joint; of stage
+    1 there are none: the MJCF has motors.
     """
     name = "fitted"
     if actuators:

@@ -1,9 +1,10 @@
 """The smallest model that moves exactly like the arm with some of its joints locked.
 
-A locked joint makes its link one rigid body with the link before it. `lock` builds the model of those
-rigid bodies, and `LockedArm.inertials` gives their mass, centre and inertia for any masses of the links, by
-Steiner's theorem; links that cannot move at all become part of the world and drop out. With every joint
-moving nothing but the fixed parts is fused, and the result is the whole arm without shapes or contacts.
+A locked joint makes its link one rigid body with the link before it. `lock` builds the model of
+those rigid bodies, and `LockedArm.inertials` gives their mass, centre and inertia for any masses of
+the links, by Steiner's theorem; links that cannot move at all become part of the world and drop
+out. With every joint moving nothing but the fixed parts is fused,
+and the result is the whole arm without shapes or contacts.
 """
 
 from collections.abc import Sequence
@@ -18,21 +19,38 @@ from hydroid.mjcf import quiet_mujoco
 from hydroid.settings.arm import Arm
 
 _OPTIONS = (
-    "timestep", "gravity", "integrator", "solver", "iterations", "tolerance", "jacobian", "enableflags"
+    "timestep", "gravity", "integrator", "solver", "iterations", "tolerance", "jacobian",
+    "enableflags"
 )  # fmt: skip
 _JOINT_FIELDS = (
     "jnt_range", "jnt_limited", "jnt_margin", "jnt_solref", "jnt_solimp", "jnt_stiffness",
-    "jnt_stiffnesspoly", "dof_solref", "dof_solimp", "dof_damping", "dof_dampingpoly", "dof_armature",
-    "dof_frictionloss", "qpos0", "qpos_spring"
+    "jnt_stiffnesspoly", "dof_solref", "dof_solimp", "dof_damping", "dof_dampingpoly",
+    "dof_armature", "dof_frictionloss", "qpos0", "qpos_spring"
 )  # fmt: skip
+
+
+_OFF = mujoco.mjtDisableBit
+IDLE = (
+    # looking for what the chain lacks takes a tenth of a step
+    _OFF.mjDSBL_ACTUATION
+    | _OFF.mjDSBL_SENSOR
+    | _OFF.mjDSBL_EQUALITY
+    | _OFF.mjDSBL_CONTACT
+    # a diverged candidate must stay diverged
+    | _OFF.mjDSBL_AUTORESET
+    # which are taken for all arms of a model or for none
+    | _OFF.mjDSBL_ISLAND
+    | _OFF.mjDSBL_WARMSTART
+)
+"""what a simulation of the chain does not need, as MuJoCo's flags"""
 
 
 PART = np.dtype(
     [("body", int), ("column", int), ("mass", float), ("centre", float, 3), ("inertia", float, (3, 3))]
 )
-"""a link, or another body of the model, as a rigid part of a fused body and in its frame: that body; the
-column of its mass in `masses`, -1 where no setting names it; its mass in the model [kg]; its centre [m]; its
-inertia about that for 1 kg [m²]"""
+"""a link, or another body of the model, as a rigid part of a fused body and in its frame: that
+body; the column of its mass in `masses`, -1 where no setting names it; its mass in the model [kg];
+its centre [m]; its inertia about that for 1 kg [m²]"""
 
 
 @record
@@ -40,58 +58,76 @@ class LockedArm:
     """A model with only the moving joints, and the way from link masses to its bodies."""
 
     model: mujoco.MjModel
-    """one body per moving joint, no actuator: torques go to qfrc_applied [N·m]; contacts, auto-reset off"""
+    """one body per moving joint, no actuator: torques go to qfrc_applied [N·m]; contacts,
+    auto-reset off"""
     joints: tuple[str, ...]  # the moving joints in the order of qpos and qvel, (V,)
     columns: Index  # the same among the arm's joints, 0-based, shape (V,)
     pose: Array  # where they start [rad], shape (V,)
     parts: Any  # what the bodies consist of, (P,) of PART
     held: dict[str, tuple[Array, Array]]
-    """place in its parent of a locked joint's body, by name: [m], (3,), and a quaternion (w, x, y, z)"""
+    """place in its parent of a locked joint's body, by name: [m], (3,), and a quaternion (w, x, y,
+    z)"""
 
     def inertials(self, masses: Array) -> dict[str, Array]:
-        """Fuse links of some masses [kg], shape (n, L); row k depends on masses[k] alone, to the last bit.
+        """Fuse links of some masses [kg], shape (n, L); row k depends on masses[k] alone,
+        to the last bit.
 
         Returns:
-            The fields of mjModel that describe the B bodies, the world first: body_mass [kg], shape (n, B);
-            body_ipos [m], shape (n, B, 3); body_iquat (w, x, y, z), shape (n, B, 4); body_inertia [kg·m²],
-            shape (n, B, 3).
+            The fields of mjModel that describe the B bodies, the world first: body_mass [kg], shape
+            (n, B); body_ipos [m], shape (n, B, 3); body_iquat (w, x, y, z), shape (n, B, 4);
+            body_inertia [kg·m²], shape (n, B, 3).
         """
         shapes = (len(masses), self.model.nbody)
-        mass, ipos, tensor = np.zeros(shapes), np.zeros((*shapes, 3)), np.zeros((*shapes, 3, 3))
-        part, at = self.parts, cast(Any, (slice(None), self.parts.body))
+        part = self.parts
+        body_of_part = cast(Any, (slice(None), part.body))
         weight = np.where(part.column < 0, part.mass, masses[:, part.column])
-        np.add.at(mass, at, weight)
-        np.add.at(ipos, at, weight[..., None] * part.centre)
-        ipos[:, 1:] /= mass[:, 1:, None]
-        away = part.centre - ipos[:, part.body]
+        mass = np.zeros(shapes)
+        np.add.at(mass, body_of_part, weight)
+        centre = np.zeros((*shapes, 3))
+        np.add.at(centre, body_of_part, weight[..., None] * part.centre)
+        centre[:, 1:] /= mass[:, 1:, None]
+        # Steiner's theorem, from each part's centre to that of its body
+        away = part.centre - centre[:, part.body]
         square = np.sum(away * away, axis=-1)[..., None, None]
-        unit = part.inertia + (square * np.eye(3) - away[..., :, None] * away[..., None, :])
-        np.add.at(tensor, at, weight[..., None, None] * unit)
+        moved = square * np.eye(3) - away[..., :, None] * away[..., None, :]
+        per_mass = part.inertia + moved
+        tensor = np.zeros((*shapes, 3, 3))
+        np.add.at(tensor, body_of_part, weight[..., None, None] * per_mass)
         inertia, axes = np.linalg.eigh(tensor)
-        axes[..., 2] *= np.sign(np.linalg.det(axes))[..., None]  # right-handed
-        quat = np.roll(Rotation.from_matrix(axes.reshape(-1, 3, 3)).as_quat(), 1, axis=-1)
-        iquat = quat.reshape(*shapes, 4)
-        return {"body_mass": mass, "body_ipos": ipos, "body_iquat": iquat, "body_inertia": inertia}
+        # the axes form a right-handed frame
+        axes[..., 2] *= np.sign(np.linalg.det(axes))[..., None]
+        scalar_last = Rotation.from_matrix(axes.reshape(-1, 3, 3)).as_quat()
+        quaternion = np.roll(scalar_last, 1, axis=-1).reshape(*shapes, 4)
+        return {
+            "body_mass": mass,
+            "body_ipos": centre,
+            "body_iquat": quaternion,
+            "body_inertia": inertia,
+        }
 
 
 def lock(spec: mujoco.MjSpec, arm: Arm, moving: Mask, pose: Array) -> LockedArm:
     """Lock all joints of an arm's model but the `moving` ones, (J,), one at least.
 
-    `pose` has the angles [rad], shape (J,), in the order of `arm.joint_names`; a moving joint's is its start.
+    `pose` has the angles [rad], shape (J,), in the order of `arm.joint_names`;
+    a moving joint's is its start.
     """
-    names, columns = np.array(arm.joint_names), np.flatnonzero(moving)
+    names = np.array(arm.joint_names)
+    columns = np.flatnonzero(moving)
+    fixed = np.flatnonzero(~moving)
     with quiet_mujoco():
         full = spec.compile()
-    data, places = mujoco.MjData(full), dict[str, tuple[Array, Array]]()
-    fixed = np.flatnonzero(~moving)
+    data = mujoco.MjData(full)
     for joint in fixed:
         data.joint(names[joint]).qpos[0] = pose[joint]
     mujoco.mj_kinematics(full, data)
-    for body in [int(full.joint(name).bodyid[0]) for name in names[fixed]]:
-        places[full.body(body).name] = _place(data, body, int(full.body_parentid[body]))
+    held = dict[str, tuple[Array, Array]]()
+    for name in names[fixed]:
+        body = int(full.joint(name).bodyid[0])
+        held[full.body(body).name] = _place(data, body, int(full.body_parentid[body]))
     joints = tuple(names[columns].tolist())
     model, parts = _fused(full, data, arm, joints)
-    locked = LockedArm(model, joints, columns, pose[columns], parts, places)
+    locked = LockedArm(model, joints, columns, pose[columns], parts, held)
     for name, value in locked.inertials(arm.masses[None]).items():
         getattr(model, name)[:] = value[0]
     with quiet_mujoco():
@@ -100,61 +136,79 @@ def lock(spec: mujoco.MjSpec, arm: Arm, moving: Mask, pose: Array) -> LockedArm:
 
 
 def _place(data: mujoco.MjData, body: int, above: int) -> tuple[Array, Array]:
+    """Return a body's place in another's frame: [m], (3,), and a quaternion (w, x, y, z)."""
     turn = np.empty(4)
-    mujoco.mju_mulQuat(turn, data.xquat[above] * [1, -1, -1, -1], data.xquat[body])
-    return data.xmat[above].reshape(3, 3).T @ (data.xpos[body] - data.xpos[above]), turn
+    inverse = data.xquat[above] * [1, -1, -1, -1]
+    mujoco.mju_mulQuat(turn, inverse, data.xquat[body])
+    frame = data.xmat[above].reshape(3, 3)
+    return frame.T @ (data.xpos[body] - data.xpos[above]), turn
 
 
 def _fused(
     full: mujoco.MjModel, data: mujoco.MjData, arm: Arm, joints: Sequence[str]
 ) -> tuple[mujoco.MjModel, Any]:
-    """The chain of bodies that joints move, without what they weigh, and every body that is part of them."""
-    spec, kept, carriers, parts = mujoco.MjSpec(), [0], list[int](), list[tuple[Any, ...]]()
-    bodies = [spec.worldbody]
-    column = {full.body(name).id: place for place, name in enumerate(arm.link_names)}
+    """Return the chain of bodies that joints move, without what they weigh,
+    and every body that is part of them."""
+    column_of = {full.body(name).id: column for column, name in enumerate(arm.link_names)}
     moved = {int(joint.bodyid[0]): joint for joint in map(full.joint, joints)}
+    spec = mujoco.MjSpec()
+    bodies = [spec.worldbody]
+    # the body of `full` that each of `bodies` is
+    kept = [0]
+    # place in `bodies` of what each body of `full` is part of
+    carriers = list[int]()
+    parts = list[tuple[Any, ...]]()
     for number, parent in enumerate(full.body_parentid):
-        above = carriers[parent] if number else 0
+        carrier = carriers[parent] if number else 0
         if number in moved:
-            position, turn = _place(data, number, kept[above])
-            bodies.append(_add(bodies[above], full.body(number).name, position, turn, moved[number]))
+            position, turn = _place(data, number, kept[carrier])
+            name = full.body(number).name
+            bodies.append(_add(bodies[carrier], name, position, turn, moved[number]))
             kept.append(number)
-            above = len(kept) - 1
-        carriers.append(above)
-        if mass := above and float(full.body_mass[number]):
-            inverse = data.xmat[kept[above]].reshape(3, 3).T
-            axes = inverse @ data.ximat[number].reshape(3, 3)
-            centre = inverse @ (data.xipos[number] - data.xpos[kept[above]])
-            inertia = (axes * (full.body_inertia[number] / mass)) @ axes.T
-            parts.append((above, column.get(number, -1), mass, centre, inertia))
+            carrier = len(kept) - 1
+        carriers.append(carrier)
+        # the world, and what cannot move, weighs nothing in a simulation
+        if carrier and full.body_mass[number]:
+            column = column_of.get(number, -1)
+            parts.append((carrier, column, *_part(full, data, number, kept[carrier])))
     with quiet_mujoco():
         model = spec.compile()
     _take_over(model, full, [moved[number].id for number in kept[1:]])
-    off = mujoco.mjtDisableBit
-    # looking for what the chain lacks takes a tenth of a step; a diverged candidate must stay diverged
-    idle = off.mjDSBL_ACTUATION | off.mjDSBL_SENSOR | off.mjDSBL_EQUALITY
-    idle |= off.mjDSBL_ISLAND | off.mjDSBL_WARMSTART  # which is taken for all arms of a model or for none
-    model.opt.disableflags = full.opt.disableflags | off.mjDSBL_CONTACT | off.mjDSBL_AUTORESET | idle
+    model.opt.disableflags = full.opt.disableflags | IDLE
     return model, np.array(parts, PART).view(np.recarray)
 
 
+def _part(full: mujoco.MjModel, data: mujoco.MjData, body: int, carrier: int) -> tuple[float, Array, Array]:
+    """Return a body's mass [kg], its centre [m], (3,), and its inertia for 1 kg [m²], (3, 3), in
+    the frame of the body that it is part of."""
+    mass = float(full.body_mass[body])
+    inverse = data.xmat[carrier].reshape(3, 3).T
+    axes = inverse @ data.ximat[body].reshape(3, 3)
+    centre = inverse @ (data.xipos[body] - data.xpos[carrier])
+    inertia = (axes * (full.body_inertia[body] / mass)) @ axes.T
+    return mass, centre, inertia
+
+
 def repeat(model: mujoco.MjModel, copies: int) -> mujoco.MjModel:
-    """Return a `LockedArm`'s model as often as asked for, side by side; bodies weigh nothing in particular.
+    """Return a `LockedArm`'s model as often as asked for, side by side;
+    bodies weigh nothing in particular.
 
     None changes a bit of another, and a step of many costs little more than a step of one.
     """
     spec = mujoco.MjSpec()
     for copy in range(copies):
         bodies = [spec.worldbody]
-        for number, joint in enumerate(map(model.joint, range(model.njnt)), 1):  # a body each
+        # each joint has a body of its own
+        for number, joint in enumerate(map(model.joint, range(model.njnt)), 1):
             body = model.body(number)
-            above, name = bodies[body.parentid[0]], f"{body.name} {copy}"
+            above = bodies[body.parentid[0]]
+            name = f"{body.name} {copy}"
             bodies.append(_add(above, name, body.pos, body.quat, joint, copy))
     with quiet_mujoco():
         many = spec.compile()
-    many.body_pos[1:], many.body_quat[1:] = (
-        np.tile(field[1:], (copies, 1)) for field in (model.body_pos, model.body_quat)
-    )
+    # as they are in the model, to the last bit
+    many.body_pos[1:] = np.tile(model.body_pos[1:], (copies, 1))
+    many.body_quat[1:] = np.tile(model.body_quat[1:], (copies, 1))
     _take_over(many, model, [*range(model.njnt)] * copies)
     many.stat.meaninertia = model.stat.meaninertia
     many.opt.disableflags = model.opt.disableflags & ~int(mujoco.mjtDisableBit.mjDSBL_ISLAND)
@@ -162,7 +216,7 @@ def repeat(model: mujoco.MjModel, copies: int) -> mujoco.MjModel:
 
 
 def _add(above: Any, name: str, position: Array, turn: Array, joint: Any, copy: int | str = "") -> Any:
-    """A body in another that moves like a model's joint, without what it weighs."""
+    """Add a body to another that moves like a model's joint, without what it weighs."""
     body = above.add_body(
         name=name,
         pos=position,

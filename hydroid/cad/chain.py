@@ -1,6 +1,7 @@
-"""Which joints of a robot are the arm: those from its base to one of its ends; all others are held."""
+"""Which joints of a robot are the arm: those from its base to one of its ends;
+all others are held."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 import mujoco
@@ -18,100 +19,149 @@ SIDES = {"left", "right", "l", "r"}
 def choose_chain(
     spec: mujoco.MjSpec, path: Path, notes: Notes, columns: Sequence[str], tip: str | None
 ) -> None:
-    """Choose the joints from the base to `tip`, or else to the tip that fits best, and delete the others.
+    """Choose the joints from the base to `tip`, or else to the tip that fits best,
+    and delete the others.
 
-    The best tip is the one with the most joints that the columns of a log name, then the one with the most
-    joints, then the first. Rods and tubes of cylinders are no tips, nor are fingers that the log does not
-    name. What is left out is held, and its mass belongs to the link that carries it.
+    The best tip is the one with the most joints that the columns of a log name, then the one with
+    the most joints, then the first. Rods and tubes of cylinders are no tips, nor are fingers that
+    the log does not name. What is left out is held, and its mass belongs to the link that carries
+    it.
+
+    Raises:
+        ModelError: no joint can be moved, a body has several, or no joint moves `tip`.
     """
     _hold(spec, notes)
+    tips = _tips(spec, path)
+    if tip is None:
+        chain, why = _best(spec, tips, columns)
+    else:
+        link = spec.body(tip)
+        chain = () if link is None else _path(link)
+        why = "as asked"
+        if not chain:
+            raise ModelError(f"no joint moves a link {tip!r}", path, f"tips: {', '.join(tips)}")
+    left_out = [joint for joint in spec.joints if joint.name not in chain]
+    if left_out:
+        others = [f"--tip {link}" for link, other in tips.items() if other != chain]
+        held = _held(spec, left_out, columns)
+        notes.add(
+            f"the arm is {' - '.join(chain)} ({why}); held at 0, on no way to its end: {held}. "
+            f"Other ends: {listed(others, 6) or 'none'}"
+        )
+    for joint in left_out:
+        spec.delete(joint)
+
+
+def _held(spec: mujoco.MjSpec, joints: Sequence[mujoco.MjsJoint], columns: Sequence[str]) -> str:
+    """Return which joints are held, and loudly those that a log names."""
+    names = [joint.name for joint in joints]
+    named = [name for name in names if _named(spec, [name], columns)]
+    warning = f"; THE LOG NAMES {', '.join(named)}" if named else ""
+    return f"{listed(names, 12)}{warning}"
+
+
+def _tips(spec: mujoco.MjSpec, path: Path) -> dict[str, tuple[str, ...]]:
+    """Return the joints from the base to each link that carries no further joint, by the link."""
     chains: dict[str, tuple[str, ...]] = {}
     for joint in spec.joints:
         if len(joint.parent.joints) > 1:
             hint = "put a small body between them: hydroid moves one joint per link"
             raise ModelError(f"body {joint.parent.name!r} has several joints", path, hint)
         chains[joint.parent.name] = _path(joint.parent)
-    inner = {name for chain in chains.values() for name in chain[:-1]}
+    inner = set[str]()
+    for chain in chains.values():
+        inner.update(chain[:-1])
     tips = {link: chain for link, chain in chains.items() if chain[-1] not in inner}
     if not tips:
         raise ModelError("has no joint that hydroid could move", path)
-    if tip is None:
-        arms = [_without_fingers(spec, chain, columns) for chain in tips.values()]
-        wanted = max(arms, key=lambda chain: (_named(spec, chain, columns), len(chain)))
-        why = "the log names most of its joints" if _named(spec, wanted, columns) else "the longest branch"
-    else:
-        link, why = spec.body(tip), "as asked"
-        wanted = () if link is None else _path(link)
-        if not wanted:
-            raise ModelError(f"no joint moves a link {tip!r}", path, f"tips: {', '.join(tips)}")
-    left = [joint for joint in spec.joints if joint.name not in wanted]
-    if left:
-        others = listed([f"--tip {link}" for link, chain in tips.items() if chain != wanted], 6)
-        named = [joint.name for joint in left if _named(spec, [joint.name], columns)]
-        warning = f"; THE LOG NAMES {', '.join(named)}" if named else ""
-        held = listed([joint.name for joint in left], 12)
-        notes.add(
-            f"the arm is {' - '.join(wanted)} ({why}); held at 0, on no way to its end: {held}{warning}. "
-            f"Other ends: {others or 'none'}"
-        )
-    for joint in left:
-        spec.delete(joint)
+    return tips
+
+
+def _best(
+    spec: mujoco.MjSpec, tips: Mapping[str, tuple[str, ...]], columns: Sequence[str]
+) -> tuple[tuple[str, ...], str]:
+    """Return the chain that fits the columns of a log best, and why it is taken."""
+    arms = [_without_fingers(spec, chain, columns) for chain in tips.values()]
+    best = max(arms, key=lambda chain: (_named(spec, chain, columns), len(chain)))
+    if _named(spec, best, columns):
+        return best, "the log names most of its joints"
+    return best, "the longest branch"
 
 
 def _without_fingers(spec: mujoco.MjSpec, chain: tuple[str, ...], columns: Sequence[str]) -> tuple[str, ...]:
-    """Return a chain without the fingers at its end that no column names: they grip, and are no arm."""
-    while len(chain) > 1 and _is_finger(spec, chain[-1]) and not _named(spec, chain[-1:], columns):
+    """Return a chain without the fingers at its end that no column names: they grip,
+    and are no arm."""
+    while len(chain) > 1 and _is_finger(spec, chain[-1]):
+        if _named(spec, chain[-1:], columns):
+            break
         chain = chain[:-1]
     return chain
 
 
 def _is_finger(spec: mujoco.MjSpec, name: str) -> bool:
-    """Return whether a joint's name or its link's says so, or another beside it differs by its side only."""
+    """Return whether a joint's name or its link's says so,
+    or another beside it differs by its side only."""
     joint = spec.joint(name)
-    told = {*words(joint.name), *words(joint.parent.name)}
-    if told & FINGERS:
+    in_names = {*words(joint.name), *words(joint.parent.name)}
+    if in_names & FINGERS:
         return True
     above = joint.parent.parent
-    beside = [other.name for other in spec.joints if other.parent.parent == above and other.name != name]
-    return _without_side(name) in map(_without_side, beside)
+    for other in spec.joints:
+        is_beside = other.parent.parent == above and other.name != name
+        if is_beside and _without_side(other.name) == _without_side(name):
+            return True
+    return False
 
 
 def _without_side(name: str) -> tuple[str, ...]:
-    return tuple(one for one in words(name) if one not in SIDES and not one.isdecimal())
+    return tuple(word for word in words(name) if word not in SIDES and not word.isdecimal())
 
 
 def _hold(spec: mujoco.MjSpec, notes: Notes) -> None:
     """Delete the joints that hydroid does not move, or that follow others, and say so."""
-    followers = {e.name1: e.name2 for e in spec.equalities if e.type == mujoco.mjtEq.mjEQ_JOINT}
+    followers = {e.name1 for e in spec.equalities if e.type == mujoco.mjtEq.mjEQ_JOINT}
     for joint in list(spec.joints):
         if joint.type == mujoco.mjtJoint.mjJNT_FREE:
             notes.add("free to float in the file: fixed to the world", joint.parent.name)
-        elif joint.name in followers:
-            notes.add("following another joint, which hydroid does not model: held at 0", joint.name)
-        elif joint.type == mujoco.mjtJoint.mjJNT_BALL:
-            notes.add("a ball joint, which hydroid does not model: held at 0", joint.name)
-        elif is_part_of_cylinder(joint):
-            what = "part of a cylinder that the file pins at one end: held. Give both pivots in arm.yaml"
-            notes.add(what, joint.name)
-        else:
+            spec.delete(joint)
             continue
-        spec.delete(joint)
-    for one in spec.equalities:
-        if one.type != mujoco.mjtEq.mjEQ_JOINT:
-            kind = one.type.name.removeprefix("mjEQ_").lower()
+        why = _why_held(joint, followers)
+        if why:
+            notes.add(why, joint.name)
+            spec.delete(joint)
+    for equality in spec.equalities:
+        if equality.type != mujoco.mjtEq.mjEQ_JOINT:
+            kind = equality.type.name.removeprefix("mjEQ_").lower()
             what = f"a {kind} of the file ties them, which hydroid does not simulate: left out"
-            notes.add(what, *ends_of(spec, one))
+            notes.add(what, *ends_of(spec, equality))
     for part in (*spec.equalities, *spec.actuators, *spec.tendons):
         spec.delete(part)
 
 
+def _why_held(joint: mujoco.MjsJoint, followers: Collection[str]) -> str:
+    """Return why hydroid does not move a joint; empty where it does."""
+    if joint.name in followers:
+        return "following another joint, which hydroid does not model: held at 0"
+    if joint.type == mujoco.mjtJoint.mjJNT_BALL:
+        return "a ball joint, which hydroid does not model: held at 0"
+    if is_part_of_cylinder(joint):
+        return "part of a cylinder that the file pins at one end: held. Give both pivots in arm.yaml"
+    return ""
+
+
 def _path(body: mujoco.MjsBody | None) -> tuple[str, ...]:
-    return () if body is None else (*_path(body.parent), *(joint.name for joint in body.joints))
+    """Return the names of the joints from the world to a body."""
+    if body is None:
+        return ()
+    own = tuple(joint.name for joint in body.joints)
+    return _path(body.parent) + own
 
 
 def _named(spec: mujoco.MjSpec, chain: Sequence[str], columns: Sequence[str]) -> int:
-    """Number of the chain's joints whose name, or whose link's, stands in the name of a column."""
+    """Return how many of the chain's joints, or of their links, are named by columns."""
     names = [joint.name for joint in spec.joints]
     links = [joint.parent.name for joint in spec.joints]
-    hits = {joint_of(column, of) for column in columns for of in (names, links)} - {None}
-    return sum(names.index(name) + 1 in hits for name in chain)
+    named = set[int | None]()
+    for column in columns:
+        named |= {joint_of(column, names), joint_of(column, links)}
+    return sum(names.index(name) + 1 in named for name in chain)

@@ -1,15 +1,17 @@
 """Cylinders that a robot's file models as links of their own -> where they are pinned.
 
-A tube that turns on one link, a rod that slides in it and is pinned to another: in an MJCF by an equality
-constraint, which closes the loop. Between rod and moved link there may be a rocker and a coupler (a bucket's
-four-bar linkage). Where one is recognised its links are held, so that their mass is part of the links that
-carry them, and the joint that it moves gets the cylinder. A URDF cannot close loops: its rods end nowhere.
+A tube that turns on one link, a rod that slides in it and is pinned to another: in an MJCF by an
+equality constraint, which closes the loop. Between rod and moved link there may be a rocker and a
+coupler (a bucket's four-bar linkage). Where one is recognised its links are held, so that their
+mass is part of the links that carry them, and the joint that it moves gets the cylinder.
+A URDF cannot close loops: its rods end nowhere.
 """
 
 import math
 import re
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterator, Sequence
+from itertools import product
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -27,7 +29,8 @@ ENDS = "parent", "child"  # of the sites that show where a cylinder is pinned
 
 @record
 class _Pin:
-    """Where two bodies turn on each other [m], shape (3,), in the file's pose; `joint` None: an equality."""
+    """Where two bodies turn on each other [m], shape (3,), in the file's pose; `joint` None:
+    an equality."""
 
     bodies: tuple[str, str]
     at: Array
@@ -38,145 +41,236 @@ class _Pin:
 
 
 def take_cylinders(spec: mujoco.MjSpec, notes: Notes) -> dict[str, Plain]:
-    """Hold the links of cylinders and return what an arm's file says of them, by the joint that they move.
+    """Hold the links of cylinders and return what an arm's file says of them,
+    by the joint that they move.
 
-    Pivots become sites of the links. A joint needs limits, or its cylinder might pass a dead centre. The
-    constraints that close the loops of what is held are deleted; others stay.
+    Pivots become sites of the links. A joint needs limits, or its cylinder might pass a dead
+    centre. The constraints that close the loops of what is held are deleted; others stay.
     """
-    if not any(one.type == mujoco.mjtEq.mjEQ_CONNECT for one in spec.equalities):
+    if not any(equality.type == mujoco.mjtEq.mjEQ_CONNECT for equality in spec.equalities):
         return {}
     _, data = bare_model(spec, notes.path)
-    pins, helpers, found = _pins(spec, data), set[str](), dict[str, Plain]()
-    for slide in [joint for joint in spec.joints if joint.type == mujoco.mjtJoint.mjJNT_SLIDE]:
-        rod, tube = slide.parent.name, slide.parent.parent.name
-        for foot in _at(pins, tube, rod):
-            for eye in _at(pins, rod, tube):
-                made = _linkage(pins, foot, eye, (tube, rod), data)
-                if made is None:
-                    continue
-                joint, own, links = made
-                helpers |= {tube, rod, *links}
-                if not joint.range[0] < joint.range[1]:
-                    notes.add("without limits: the file's cylinder that moves it is not taken", joint.name)
-                    continue
-                found[joint.name] = own
-                if not links:
-                    carrier = joint.parent.parent.name
-                    ends = (foot, eye) if foot.other(tube) == carrier else (eye, foot)
-                    places = zip(ENDS, ends, (carrier, joint.parent.name), strict=True)
-                    for end, pin, body in places:
-                        place = data.body(body).xmat.reshape(3, 3).T @ (pin.at - data.body(body).xpos)
-                        spec.body(body).add_site(name=f"{joint.name}_pivot_{end}", pos=place)
-                notes.add("cylinders of the file give these joints' pivots", joint.name)
-    for name in helpers:  # and all that hangs on them
+    pins = _pins(spec, data)
+    held = set[str]()
+    cylinders = dict[str, Plain]()
+    for made in _linkages(spec, pins, data):
+        held |= {made.tube, made.rod, *made.bars}
+        joint = made.joint
+        low, high = joint.range
+        if not low < high:
+            notes.add("without limits: the file's cylinder that moves it is not taken", joint.name)
+            continue
+        cylinders[joint.name] = made.settings
+        if not made.bars:
+            _show_pivots(spec, made, data)
+        notes.add("cylinders of the file give these joints' pivots", joint.name)
+    # with them all that hangs on them
+    for name in held:
         for joint in spec.body(name).find_all("joint"):
             spec.delete(joint)
-    for one in [one for one in spec.equalities if helpers.intersection(ends_of(spec, one))]:
-        spec.delete(one)
-    return found
+    for equality in list(spec.equalities):
+        if held.intersection(ends_of(spec, equality)):
+            spec.delete(equality)
+    return cylinders
+
+
+def _linkages(spec: mujoco.MjSpec, pins: Sequence[_Pin], data: mujoco.MjData) -> Iterator["_Linkage"]:
+    """Yield every cylinder: a rod that slides in a tube,
+    both pinned to links that a joint connects."""
+    for slide in spec.joints:
+        if slide.type != mujoco.mjtJoint.mjJNT_SLIDE:
+            continue
+        rod = slide.parent.name
+        tube = slide.parent.parent.name
+        for foot, eye in product(_at(pins, tube, rod), _at(pins, rod, tube)):
+            made = _linkage(pins, foot, eye, (tube, rod), data)
+            if made is not None:
+                yield made
+
+
+def _show_pivots(spec: mujoco.MjSpec, made: "_Linkage", data: mujoco.MjData) -> None:
+    """Add the two sites by which an arm's file finds the pivots of a cylinder."""
+    carrier = made.joint.parent.parent.name
+    moved = made.joint.parent.name
+    pins = [made.foot, made.eye]
+    # the cylinder stands on its head
+    if made.foot.other(made.tube) != carrier:
+        pins.reverse()
+    for end, pin, body in zip(ENDS, pins, (carrier, moved), strict=True):
+        frame = data.body(body)
+        place = frame.xmat.reshape(3, 3).T @ (pin.at - frame.xpos)
+        spec.body(body).add_site(name=f"{made.joint.name}_pivot_{end}", pos=place)
 
 
 def take_sites(spec: mujoco.MjSpec, notes: Notes) -> dict[str, Plain]:
     """Return what an arm's file says of the cylinders that pairs of sites show, by joint.
 
-    The sites are called JOINT_pivot_parent and JOINT_pivot_child; the name of the joint may lack its ending
-    `_joint`, or be that of the link, and is completed.
+    The sites are called JOINT_pivot_parent and JOINT_pivot_child; the name of the joint may lack
+    its ending `_joint`, or be that of the link, and is completed.
     """
-    found, sites = dict[str, Plain](), {word(site.name): site for site in spec.sites}
+    cylinders = dict[str, Plain]()
+    sites = {word(site.name): site for site in spec.sites}
     for joint in spec.joints:
         for name in (joint.name, joint.name.removesuffix("_joint"), joint.parent.name):
-            pair = [sites[f"{name}_pivot_{end}"] for end in ENDS if f"{name}_pivot_{end}" in sites]
-            if len(pair) == len(ENDS):
-                for site, end in zip(pair, ENDS, strict=True):
-                    site.name = f"{joint.name}_pivot_{end}"
-                found[joint.name] = {"kind": "linear"}
-                notes.add("sites of the file give these joints' pivots", joint.name)
-                break
-    return found
+            site_names = [f"{name}_pivot_{end}" for end in ENDS]
+            if not sites.keys() >= {*site_names}:
+                continue
+            for site_name, end in zip(site_names, ENDS, strict=True):
+                sites[site_name].name = f"{joint.name}_pivot_{end}"
+            cylinders[joint.name] = {"kind": "linear"}
+            notes.add("sites of the file give these joints' pivots", joint.name)
+            break
+    return cylinders
 
 
 def ends_of(spec: mujoco.MjSpec, constraint: Any) -> tuple[str, str]:
     """Return the names of the two bodies, or joints, that a constraint ties to each other."""
-    ends = constraint.name1, constraint.name2
+    ends = (constraint.name1, constraint.name2)
     if constraint.objtype == mujoco.mjtObj.mjOBJ_SITE:
         ends = tuple(spec.site(name).parent.name for name in ends)
     return ends[0], ends[1] or "world"
 
 
 def is_part_of_cylinder(joint: mujoco.MjsJoint) -> bool:
-    """Return whether the names of a joint and its link tell a cylinder's tube or rod, which moves no link."""
-    return all({*re.split(r"[\W_\d]+", name.lower())} & PARTS for name in (joint.name, joint.parent.name))
+    """Return whether the names of a joint and its link tell a cylinder's tube or rod,
+    which moves no link."""
+    for name in (joint.name, joint.parent.name):
+        if not PARTS.intersection(re.split(r"[\W_\d]+", name.lower())):
+            return False
+    return True
 
 
 def _pins(spec: mujoco.MjSpec, data: mujoco.MjData) -> list[_Pin]:
     """Return where bodies turn on each other: hinges and points that equalities connect."""
-    hinge, connect = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtEq.mjEQ_CONNECT
-    pins = [
-        _Pin((joint.parent.name, joint.parent.parent.name), data.joint(joint.name).xanchor, joint)
-        for joint in spec.joints
-        if joint.type == hinge
-    ]
-    for one in spec.equalities:
-        if one.type == connect and one.objtype == mujoco.mjtObj.mjOBJ_SITE:
-            first, second = (spec.site(name) for name in (one.name1, one.name2))
-            pins.append(_Pin((first.parent.name, second.parent.name), data.site(one.name1).xpos))
-        elif one.type == connect:
-            body = data.body(one.name1)
-            at = body.xpos + body.xmat.reshape(3, 3) @ np.array(one.data[:3])
-            pins.append(_Pin((one.name1, one.name2 or "world"), at))
+    pins = list[_Pin]()
+    for joint in spec.joints:
+        if joint.type == mujoco.mjtJoint.mjJNT_HINGE:
+            bodies = (joint.parent.name, joint.parent.parent.name)
+            pins.append(_Pin(bodies, data.joint(joint.name).xanchor, joint))
+    for equality in spec.equalities:
+        if equality.type != mujoco.mjtEq.mjEQ_CONNECT:
+            continue
+        if equality.objtype == mujoco.mjtObj.mjOBJ_SITE:
+            at = data.site(equality.name1).xpos
+        else:
+            body = data.body(equality.name1)
+            at = body.xpos + body.xmat.reshape(3, 3) @ np.array(equality.data[:3])
+        pins.append(_Pin(ends_of(spec, equality), at))
     return pins
 
 
 def _at(pins: Sequence[_Pin], body: str, *without: str) -> list[_Pin]:
+    """Return the pins of a body, but for those to some other bodies."""
     return [pin for pin in pins if body in pin.bodies and pin.other(body) not in without]
+
+
+@record
+class _Linkage:
+    """A cylinder, how it is pinned, the joint that it moves, and the settings that say so.
+
+    `foot` pins the tube to a link, `eye` the rod to another; `bars` are the rocker and the coupler
+    between rod and moved link, if there are any.
+    """
+
+    tube: str
+    rod: str
+    foot: _Pin
+    eye: _Pin
+    joint: Any
+    settings: Plain
+    bars: tuple[str, ...] = ()
 
 
 def _linkage(
     pins: Sequence[_Pin], foot: _Pin, eye: _Pin, cylinder: tuple[str, str], data: mujoco.MjData
-) -> tuple[Any, Plain, tuple[str, ...]] | None:
-    """Return the joint that a cylinder moves, its settings, and links between them; None: it moves none.
-    `foot` pins the tube to a link, `eye` the rod to another.
-    """
+) -> _Linkage | None:
+    """Return what a cylinder, (tube, rod), moves, by a rocker and a coupler or directly; None: it
+    moves no joint."""
     tube, rod = cylinder
-    base, moved = foot.other(tube), eye.other(rod)
-    for ground in _at(pins, moved, rod):  # a rocker on the same link, with a coupler to the link that moves
-        for pin in _at(pins, moved, rod, base) if ground.other(moved) == base else ():
-            coupler = pin.other(moved)
-            for end in _at(pins, coupler, moved):
-                joint = _joint(pins, base, end.other(coupler))
-                if joint and end.other(coupler) != base:
-                    bars = _four_bar(data.joint(joint.name), (ground, pin, end, foot, eye))
-                    return (joint, bars, (moved, coupler)) if bars else None
+    base = foot.other(tube)
+    moved = eye.other(rod)
+    for pinned in _rockers(pins, base, moved, rod):
+        coupler = pinned.coupler.other(moved)
+        child = pinned.child.other(coupler)
+        joint = _joint(pins, base, child)
+        if not joint or child == base:
+            continue
+        places = (pinned.rocker, pinned.coupler, pinned.child, foot, eye)
+        settings = _four_bar(data.joint(joint.name), places)
+        if settings is None:
+            return None
+        return _Linkage(tube, rod, foot, eye, joint, settings, (moved, coupler))
     joint = _joint(pins, base, moved)
-    return (joint, {"kind": "linear"}, ()) if joint else None
+    if not joint:
+        return None
+    return _Linkage(tube, rod, foot, eye, joint, {"kind": "linear"})
+
+
+class _FourBarPins(NamedTuple):
+    """Where a rocker turns on the link that carries the cylinder, where a coupler turns on the
+    rocker, and where the moved link turns on the coupler."""
+
+    rocker: _Pin
+    coupler: _Pin
+    child: _Pin
+
+
+def _rockers(pins: Sequence[_Pin], base: str, rocker: str, rod: str) -> Iterator[_FourBarPins]:
+    """Yield the pins of four-bar linkages whose rocker a rod moves and a base carries."""
+    for ground in _at(pins, rocker, rod):
+        if ground.other(rocker) != base:
+            continue
+        for pin in _at(pins, rocker, rod, base):
+            for end in _at(pins, pin.other(rocker), rocker):
+                yield _FourBarPins(ground, pin, end)
 
 
 def _joint(pins: Sequence[_Pin], first: str, second: str) -> Any:
-    return next((pin.joint for pin in pins if {*pin.bodies} == {first, second} and pin.joint), None)
+    """Return the joint between two bodies, in either order; None where there is none."""
+    for pin in pins:
+        if pin.joint and {*pin.bodies} == {first, second}:
+            return pin.joint
+    return None
 
 
 def _four_bar(joint: Any, pins: Sequence[_Pin]) -> Plain | None:
-    """Return the settings of a cylinder that turns a joint by a rocker and a coupler, as the file stands.
+    """Return the settings of a cylinder that turns a joint by a rocker and a coupler,
+    as the file stands.
 
-    The pins are those of rocker and link, rocker and coupler, coupler and child, of the tube, of the rod.
+    The pins are those of rocker and link, rocker and coupler, coupler and child, of the tube,
+    of the rod.
     """
+    # points in the plane across the joint's axis, as complex numbers from the joint [m]
     axis = joint.xaxis
     x = np.cross([0.0, 1.0, 0.0] if abs(axis[1]) < 0.9 else [1.0, 0.0, 0.0], axis)
     x /= np.linalg.norm(x)
-    y, away = np.cross(axis, x), [one.at - joint.xanchor for one in pins]  # in a plane across the axis [m]
-    ground, pin, child, foot, eye = (complex(one @ x, one @ y) for one in away)
-    turn = abs(ground) / ground  # the rocker's pivot lies at (ground, 0)
-    side = "left" if ((pin - ground) * np.conj(child - ground)).imag > 0 else "right"
-    sides = {"ground": ground, "rocker": pin - ground, "coupler": child - pin, "child": child}
-    phase = round(math.degrees(np.angle(child * turn) - joint.qpos[0]), 6)
-    bars = FourBar(**{n: round(abs(way), 6) for n, way in sides.items()}, phase_deg=phase, side=side)
-    psi, first, _ = map(float, four_bar(joint.qpos[0], bars))
-    if not math.isfinite(psi):
+    y = np.cross(axis, x)
+    offsets = [pin.at - joint.xanchor for pin in pins]
+    ground, pin, child, foot, eye = (complex(offset @ x, offset @ y) for offset in offsets)
+    # the rocker's pivot lies at (ground, 0)
+    turn = abs(ground) / ground
+    is_left = ((pin - ground) * np.conj(child - ground)).imag > 0
+    bars = FourBar(
+        ground=round(abs(ground), 6),
+        rocker=round(abs(pin - ground), 6),
+        coupler=round(abs(child - pin), 6),
+        child=round(abs(child), 6),
+        phase_deg=round(math.degrees(np.angle(child * turn) - joint.qpos[0]), 6),
+        side="left" if is_left else "right",
+    )
+    rocker_angle, per_joint_angle, _ = map(float, four_bar(joint.qpos[0], bars))
+    if not math.isfinite(rocker_angle):
         return None
-    theta = float(np.angle((eye - ground) * np.conj(foot - ground)))
-    sense = 1.0 if math.sin(theta) * first > 0 else -1.0  # the rod's pin turns with the rocker, by psi
-    theta0 = math.degrees(math.remainder(theta - psi, math.tau))
-    theta0 += 360.0 * sense if theta0 * sense < 0 else 0.0  # its sign is the rod's way
-    a, b = (round(abs(pivot - ground), 6) for pivot in (foot, eye))
-    shape = {"a": a, "b": b, "theta0": round(theta0, 6)}
-    return {"kind": "linear", "triangle": shape, "four_bar": bars.model_dump()}
+    between_pivots = float(np.angle((eye - ground) * np.conj(foot - ground)))
+    # the rod's pin turns with the rocker
+    sense = 1.0 if math.sin(between_pivots) * per_joint_angle > 0 else -1.0
+    theta0 = math.degrees(math.remainder(between_pivots - rocker_angle, math.tau))
+    # the sign of theta0 says which way the rod moves
+    if theta0 * sense < 0:
+        theta0 += 360.0 * sense
+    triangle = {
+        "a": round(abs(foot - ground), 6),
+        "b": round(abs(eye - ground), 6),
+        "theta0": round(theta0, 6),
+    }
+    return {"kind": "linear", "triangle": triangle, "four_bar": bars.model_dump()}

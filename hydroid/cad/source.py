@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Sequence
-from itertools import chain, islice
+from itertools import islice, product
 from pathlib import Path
 from urllib.parse import unquote
 from xml.etree import ElementTree
@@ -16,7 +16,18 @@ from hydroid.mjcf import mujoco_errors
 from hydroid.robot_xml import read_robot
 from hydroid.words import listed
 
-SHOWN, HIDDEN = 2, 3  # groups of shapes that are seen, and of those that only collide
+SHOWN = 2
+"""group of shapes that are seen"""
+HIDDEN = 3
+"""group of shapes that only collide"""
+UNSAID_COLOUR = (0.5, 0.5, 0.5, 1.0)
+"""MuJoCo's of shapes of which the file says nothing"""
+COLOUR = (0.94, 0.53, 0.08, 1.0)
+"""of these, here: a machine's orange"""
+MOST_FILES = 20_000
+"""below the robot's folder, among which a mesh is looked for by its name"""
+USD = (".usd", ".usda", ".usdc", ".usdz")
+"""endings of USD stages"""
 URDF_OPTIONS = {"discardvisual": "false", "fusestatic": "false", "strippath": "true"}
 """keep what MuJoCo drops from a URDF by default: visuals, and links that no joint moves"""
 REFUSED = {
@@ -40,56 +51,71 @@ class Notes:
         self._parts: dict[str, list[str]] = {}
 
     def add(self, sentence: str, *parts: str) -> None:
-        """Say a sentence about parts of the robot; the parts of equal sentences stand in one line."""
+        """Say a sentence about parts of the robot;
+        the parts of equal sentences stand in one line."""
         names = self._parts.setdefault(sentence, [])
         names += [part for part in parts if part not in names]
 
     def lines(self) -> Sequence[str]:
         """Return a line for each sentence."""
-        return [f"{listed(parts, 4)}: {what}" if parts else what for what, parts in self._parts.items()]
+        lines = list[str]()
+        for sentence, parts in self._parts.items():
+            lines.append(f"{listed(parts, 4)}: {sentence}" if parts else sentence)
+        return lines
 
 
 def read_source(path: Path, notes: Notes) -> tuple[mujoco.MjSpec, dict[str, Path], bool]:
-    """Read a URDF or an MJCF: its spec, where each mesh file that it names lies, and whether it is a URDF."""
-    usd = path.suffix.lower() in (".usd", ".usda", ".usdc", ".usdz")
-    root = ElementTree.Element("usd") if usd else read_robot(path)
-    kind = "xacro" if any("xacro" in str(part.tag).lower() for part in root.iter()) else str(root.tag)
+    """Read a URDF or an MJCF: its spec, where each mesh file that it names lies,
+    and whether it is a URDF.
+
+    Raises:
+        ModelError: a file of another kind, or one that MuJoCo refuses.
+    """
+    # a USD stage is no XML
+    is_usd = path.suffix.lower() in USD
+    root = ElementTree.Element("usd") if is_usd else read_robot(path)
+    is_xacro = any("xacro" in str(part.tag).lower() for part in root.iter())
+    kind = "xacro" if is_xacro else str(root.tag)
     if kind in REFUSED:
         what, hint = REFUSED[kind]
         raise ModelError(what, path, hint.format(name=path.name))
-    urdf, folder = kind == "robot", path.resolve().parent
-    if not urdf and kind != "mujoco":
-        what = f"is neither URDF nor MJCF: its root element is <{root.tag}>"
-        raise ModelError(what, path, "export the arm as URDF")
-    files = _prepare_urdf(root, notes) if urdf else {}
-    if not urdf:
+    folder = path.resolve().parent
+    if kind == "robot":
+        files = _prepare_urdf(root, notes)
+        spec = _spec(root, path)
+        return spec, _found(files, folder, notes), True
+    if kind == "mujoco":
         _prepare_mjcf(root)
-    with mujoco_errors(path):
-        spec = mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
-    if not urdf:
+        spec = _spec(root, path)
         files = {mesh.file: mesh.file for mesh in spec.meshes if mesh.file}
-        folder /= spec.meshdir
-    return spec, _found(files, folder, notes), urdf
+        return spec, _found(files, folder / spec.meshdir, notes), False
+    what = f"is neither URDF nor MJCF: its root element is <{root.tag}>"
+    raise ModelError(what, path, "export the arm as URDF")
+
+
+def _spec(root: ElementTree.Element, path: Path) -> mujoco.MjSpec:
+    with mujoco_errors(path):
+        return mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
 
 
 def _found(files: dict[str, str], folder: Path, notes: Notes) -> dict[str, Path]:
     """Return where mesh files lie, by the names that the spec has for them.
 
-    A file is where it is said to be, or else there from the folder or one of its parents, by as many of its
-    last folders as are there; or it has its name below the folder.
+    A file is where it is said to be, or else there from the folder or one of its parents, by as
+    many of its last folders as are there; or it has its name below the folder.
     """
-    below = {path.name.lower(): path for path in islice(folder.rglob("*"), 20_000)} if files else {}
+    by_name: dict[str, Path] = {}
+    if files:
+        by_name = {path.name.lower(): path for path in islice(folder.rglob("*"), MOST_FILES)}
     found = dict[str, Path]()
     for name, given in files.items():
-        scheme, colon, rest = given.partition(":")
-        is_uri = colon and len(scheme) > 1  # C: is a disk
-        text = unquote(rest.removeprefix("//")) if is_uri else given
-        plain = Path(text.replace("\\", "/"))
-        parts = [part for part in plain.parts if part != plain.anchor]
-        tails = [plain, *(Path(*parts[k:]) for k in range(len(parts) - 1))]
-        tried = (place / tail for tail in tails for place in (folder, *islice(folder.parents, 4)))
-        alike = below.get(plain.name.lower(), folder)  # a folder is no file
-        if place := next(filter(is_file, chain(tried, [alike])), None):
+        path = _plain_path(given)
+        places = _places(path, folder)
+        alike = by_name.get(path.name.lower())
+        if alike is not None:
+            places.append(alike)
+        place = next(filter(is_file, places), None)
+        if place:
             found[name] = place
         else:
             what = "nor by name below it: these shapes are not shown"
@@ -97,45 +123,75 @@ def _found(files: dict[str, str], folder: Path, notes: Notes) -> dict[str, Path]
     return found
 
 
+def _plain_path(given: str) -> Path:
+    """Return the path that a mesh's file name or URI means."""
+    scheme, colon, rest = given.partition(":")
+    # C: is a disk, and no scheme
+    is_uri = colon and len(scheme) > 1
+    text = unquote(rest.removeprefix("//")) if is_uri else given
+    return Path(text.replace("\\", "/"))
+
+
+def _places(path: Path, folder: Path) -> list[Path]:
+    """Return where a file may lie, the likeliest first: by its path,
+    and by ever fewer of its folders."""
+    parts = [part for part in path.parts if part != path.anchor]
+    tails = [path]
+    tails += [Path(*parts[k:]) for k in range(len(parts) - 1)]
+    folders = [folder, *islice(folder.parents, 4)]
+    return [place / tail for tail, place in product(tails, folders)]
+
+
 def _prepare_urdf(root: ElementTree.Element, notes: Notes) -> dict[str, str]:
     """Let MuJoCo keep all of a URDF, and return what it says of each mesh by a plain file name."""
     children = {child.get("link") for child in root.iterfind("joint/child")}
     for link in root.iterfind("link"):
         if link.get("name") not in children:
-            notes.add("root link, the fixed base: its mass does not matter", str(link.get("name")))
-    for joint in root.iterfind("joint[@type='planar']"):  # MuJoCo makes three joints of it
+            what = "root link, the fixed base: its mass does not matter"
+            notes.add(what, str(link.get("name")))
+    # MuJoCo makes three joints of it
+    for joint in root.iterfind("joint[@type='planar']"):
         joint.set("type", "fixed")
-        notes.add("moving in a plane, which hydroid does not model: held at 0", str(joint.get("name")))
+        what = "moving in a plane, which hydroid does not model: held at 0"
+        notes.add(what, str(joint.get("name")))
     names: dict[str, str] = {}
     for mesh in root.iterfind("link/*/geometry/mesh"):
-        mesh.set("filename", names.setdefault(str(mesh.get("filename")), f"mesh{len(names)}.stl"))
-    section = root
-    for tag in ("mujoco", "compiler"):
-        there = section.find(tag)
-        section = ElementTree.SubElement(section, tag) if there is None else there
-    section.attrib.update(URDF_OPTIONS)
+        given = str(mesh.get("filename"))
+        mesh.set("filename", names.setdefault(given, f"mesh{len(names)}.stl"))
+    compiler = _child(_child(root, "mujoco"), "compiler")
+    compiler.attrib.update(URDF_OPTIONS)
     return {name: given for given, name in names.items()}
+
+
+def _child(element: ElementTree.Element, tag: str) -> ElementTree.Element:
+    """Return the child of an element with a tag; a new one where there is none."""
+    child = element.find(tag)
+    return ElementTree.SubElement(element, tag) if child is None else child
 
 
 def _prepare_mjcf(root: ElementTree.Element) -> None:
     """Take out what the arm does not need."""
+    ignored = IGNORED.split()
     for parent in [*root.iter()]:
         for part in [*parent]:
-            if part.tag in IGNORED.split() or "hfield" in (part.get("type"), *part.keys()):
+            is_height_field = "hfield" in (part.get("type"), *part.keys())
+            if part.tag in ignored or is_height_field:
                 parent.remove(part)
             elif part.tag == "material":
                 part.attrib.pop("texture", None)
 
 
 def sort_shapes(spec: mujoco.MjSpec) -> None:
-    """Show what the file shows, or else what collides; let collide what collides, or else what is shown."""
+    """Show what the file shows, or else what collides; let collide what collides,
+    or else what is shown."""
     for body in spec.bodies:
         collide = [bool(geom.contype or geom.conaffinity) for geom in body.geoms]
-        for geom, solid in zip(body.geoms, collide, strict=True):
-            geom.group = HIDDEN if solid and not all(collide) else SHOWN
-            geom.contype = geom.conaffinity = int(solid or not any(collide))
-            if not geom.material and np.allclose(geom.rgba, (0.5, 0.5, 0.5, 1.0)):
-                geom.rgba = (0.94, 0.53, 0.08, 1.0)
+        for geom, collides in zip(body.geoms, collide, strict=True):
+            geom.group = HIDDEN if collides and not all(collide) else SHOWN
+            solid = collides or not any(collide)
+            geom.contype = geom.conaffinity = int(solid)
+            if not geom.material and np.allclose(geom.rgba, UNSAID_COLOUR):
+                geom.rgba = COLOUR
 
 
 def word(name: str) -> str:

@@ -1,1 +1,2 @@
-"""Every command as one function, for the terminal and for Python; a result knows how it is printed."""
+"""Every command as one function, for the terminal and for Python;
+a result knows how it is printed."""

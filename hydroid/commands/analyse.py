@@ -1,8 +1,9 @@
-"""`hydroid analyse` and `hydroid.quantity`: what logs determine of the parameters, and of what follows."""
+"""`hydroid analyse` and `hydroid.quantity`: what logs determine of the parameters,
+and of what follows."""
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,6 +25,7 @@ from hydroid.commands.logs import problem_of
 from hydroid.commands.progress import Progress
 from hydroid.errors import RunError
 from hydroid.estimate import finite
+from hydroid.files import Plain
 from hydroid.findings import Finding
 from hydroid.identified_model import start_values
 
@@ -35,7 +37,8 @@ if TYPE_CHECKING:
 
 @record
 class Analysis:
-    """What logs determine at an estimate: intervals, directions, and the profiles that were asked for."""
+    """What logs determine at an estimate: intervals, directions,
+    and the profiles that were asked for."""
 
     uncertainty: "Uncertainty"
     identifiability: "Identifiability"
@@ -72,8 +75,9 @@ def analyse(
 ) -> Result[Analysis]:
     """Find which parameters, and which combinations of parameters, the logs determine.
 
-    Prints the standard deviation and the 95 % interval of each parameter, and the combinations that the logs
-    do not determine.
+    Prints the standard deviation and the 95 % interval of each parameter, and the combinations that
+    the logs do not determine. The page shows priors beside posteriors, correlations, and profiles as
+    curves.
 
     Example: hydroid analyse LOG.csv --fit runs/hyd --profile A_A
 
@@ -82,8 +86,8 @@ def analyse(
 
     Args:
         logs (LOG): Logs of commands and joint angles [default: those of the run].
-        fit (RUN|YAML): An estimate, as a run folder or a YAML file [default: the start values of the
-            parameters].
+        fit (RUN|YAML): An estimate, as a run folder or a YAML file [default: the start values of
+            the parameters].
         profile (K,D): Parameters to profile. Each point of a profile takes a refinement.
 
     Raises:
@@ -98,29 +102,35 @@ def analyse(
     from hydroid.fitting.summary import account
     from hydroid.posterior import identifiability
     from hydroid.posterior.uncertainty import uncertainty
-    from hydroid.reporting.parameters_report import parameter_table, unknown_sections
+    from hydroid.reporting.analysis import analysis_page
+    from hydroid.reporting.parameters_report import in_words, parameter_table
 
+    wanted = names(profile)
+    profiles: dict[str, Profile] = {}
     with Progress() as progress:
         known = uncertainty(problem, model.theta)
-        profiles: dict[str, Profile] = {}
-        for done, name in enumerate(names(profile)):
-            progress("profiles", done, len(names(profile)))
+        for done, name in enumerate(wanted):
+            progress("profiles", done, len(wanted))
             profiles[name] = identifiability.profile(problem, known, name)
     identified = identifiability.identifiability(problem, known)
     summary = account(problem, known)
-    better = tuple(name for name, one in profiles.items() if one.better_optimum)
-    findings = (*([Finding("better optimum", "warning", better)] if better else []), *summary.findings)
-    intervals = {name: one.interval for name, one in profiles.items()}
+    findings = summary.findings
+    better = tuple(name for name, found in profiles.items() if found.better_optimum)
+    if better:
+        findings = (Finding("better optimum", "warning", better), *findings)
+    intervals = {name: found.interval for name, found in profiles.items()}
     table = parameter_table(problem.settings, summary, intervals)
-    tables = {"parameters": table} | {n: t for s in unknown_sections(summary) for n, t in s.tables.items()}
-    content: dict[str, Any] = {"at": model.source, "rank": identified.rank}
-    content |= summary.changed({"findings": findings}).model_dump(
-        mode="json", include={"findings", "estimate"}
-    )
+    content: Plain = {"at": model.source, "rank": identified.rank}
+    stated = summary.changed({"findings": findings})
+    content |= stated.model_dump(mode="json", include={"findings", "estimate"})
     for name, parameter in content["estimate"].items():
-        parameter["profile_interval"] = [*map(finite, intervals[name])] if name in intervals else None
-    lines = [table, *(f"- {finding}" for finding in findings), *written(tables, out)]
-    return Result(lines, content, Analysis(known, identified, profiles))
+        interval = intervals.get(name)
+        parameter["profile_interval"] = None if interval is None else [*map(finite, interval)]
+    page = analysis_page(problem.settings, stated, profiles)
+    page = replace(page, files={**page.files, "parameters": table})
+    said = [f"- {in_words(finding, problem.settings)}" for finding in findings]
+    lines = [table, *said, *written(page, out)]
+    return Result(lines, content, Analysis(known, identified, profiles), page)
 
 
 def quantity(
@@ -138,8 +148,9 @@ def quantity(
 
     Args:
         model: the run folder of a fit, or a plant saved from one.
-        function: takes a `Plant` and returns a number or an array. It is called with 2 p + 1 plants, p free
-            parameters, and should be smooth in them: interpolate an event between two samples.
+        function: takes a `Plant` and returns a number or an array. It is called with 2 p + 1
+            plants, p free parameters, and should be smooth in them: interpolate an event between
+            two samples.
         unit: of the value, for the reader.
         positive: the quantity cannot be negative; its interval is then multiplicative.
 

@@ -8,6 +8,7 @@ import inspect
 import os
 import sys
 from collections.abc import Callable
+from itertools import chain
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -50,7 +51,7 @@ GROUPS = {
     "Compare settings": {"study": "fit with several settings, each over many seeds"},
 }
 """every command with a summary, by the heading of its group"""
-COMMANDS = [name for commands in GROUPS.values() for name in commands]
+COMMANDS = [*chain.from_iterable(GROUPS.values())]
 PLAIN: Any = {"add_completion": False, "rich_markup_mode": None, "pretty_exceptions_enable": False}
 """of typer's apps; plain help: importing rich would triple the time it takes"""
 
@@ -60,12 +61,16 @@ OUT = {"simulate": "runs/simulated.csv", "follow": "runs/follow/commands.csv"}
 SYSTEM = (errno.ENAMETOOLONG, errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EIO, errno.EMFILE)
 """what a system refuses that no program can help"""
 ONE_THREAD = ("OPENBLAS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
-"""what keeps linear algebra from sums over several threads, whose last bits depend on how many there are"""
+"""what keeps linear algebra from sums over several threads,
+whose last bits depend on how many there are"""
+STOPPED = 130
+"""exit status of what was interrupted, as in shells"""
 VERBOSE = "Also print all tables, findings, and the lines that go to run.log."
 
 
 class LazyGroup(TyperGroup):
-    """Imports a command's module when the command is called, and lists the commands under their headings."""
+    """Imports a command's module when the command is called,
+    and lists the commands under their headings."""
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of all commands."""
@@ -77,10 +82,12 @@ class LazyGroup(TyperGroup):
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write one section for each group."""
+        # of all groups, so that their columns are aligned
         width = max(map(len, COMMANDS))
         for heading, commands in GROUPS.items():
+            rows = [(name.ljust(width), summary) for name, summary in commands.items()]
             with formatter.section(heading):
-                formatter.write_dl([(name.ljust(width), summary) for name, summary in commands.items()])
+                formatter.write_dl(rows)
 
 
 def click_command(command: str) -> "TyperCommand":
@@ -99,7 +106,8 @@ def click_command(command: str) -> "TyperCommand":
         verbose: Annotated[bool, typer.Option("-v", "--verbose", help=VERBOSE)] = False,
         **given: Any,
     ) -> None:
-        if given.get("out", "") is None and command != "view":  # in Python nothing is written then
+        # in Python nothing is written then
+        if given.get("out", "") is None and command != "view":
             given["out"] = OUT.get(command, f"runs/{command}")
         VISIBLE.set(not (quiet or json))
         with log_lines(verbose=verbose, quiet=quiet):
@@ -116,14 +124,13 @@ def click_command(command: str) -> "TyperCommand":
     return typer.main.get_command(alone)  # pyright: ignore[reportReturnType]  # a group only of several commands
 
 
-app = typer.Typer(
-    name="hydroid",
-    cls=LazyGroup,
-    help="Estimate the physical parameters of a hydraulic arm from logs of commands and joint angles.",
-    epilog="Where to start: with the shipped arm, hydroid check and hydroid fit-mech; with your own arm, "
-    "hydroid init. 'The article' is Montazeri et al. 2017, whose method hydroid follows.",
-    **PLAIN,
+ABOUT = "Estimate the physical parameters of a hydraulic arm from logs of commands and joint angles."
+WHERE_TO_START = (
+    "Where to start: with the shipped arm, hydroid check and hydroid fit-mech; with your own arm, "
+    "hydroid init. 'The article' is Montazeri et al. 2017, whose method hydroid follows."
 )
+
+app = typer.Typer(name="hydroid", cls=LazyGroup, help=ABOUT, epilog=WHERE_TO_START, **PLAIN)
 
 
 def _version(wanted: bool) -> None:
@@ -142,33 +149,52 @@ def _root(  # pyright: ignore[reportUnusedFunction]  # typer calls it
 
 
 def main() -> None:
-    """Run a command: exit 0 when it is done, 2 for an error of the input, 130 when it was stopped."""
-    code, kept = 0, None
-    for variable in ONE_THREAD:  # numpy is not imported yet
+    """Run a command: exit 0 when it is done, 2 for an error of the input,
+    130 when it was stopped."""
+    # numpy is not imported yet
+    for variable in ONE_THREAD:
         os.environ.setdefault(variable, "1")
+    code = 0
+    kept: str | None = None
+    try:
+        code = _run()
+    except KeyboardInterrupt as stop:
+        code = STOPPED
+        kept = str(stop) if isinstance(stop, Stopped) else None
+    except BrokenPipeError:
+        # the reader has left; Python would complain at exit
+        sys.stderr.close()
+    except Exception as error:
+        code = _ending(error)
+    if code == STOPPED:
+        rest = "" if kept is None else f"; {kept or 'nothing was written'}"
+        typer.echo(f"hydroid: stopped{rest}", err=True)
+    sys.exit(code)
+
+
+def _run() -> int:
+    """Run the command of the command line, and return its exit status."""
     try:
         listen()
         group: Any = typer.main.get_command(app)
         with group.make_context(program(), sys.argv[1:] or ["--help"]) as context:
             group.invoke(context)
     except typer.Exit as end:
-        code = end.exit_code
-    except KeyboardInterrupt as stop:
-        code, kept = 130, str(stop) if isinstance(stop, Stopped) else None
-    except BrokenPipeError:
-        sys.stderr.close()  # the reader has left; Python would complain at exit
-    except Exception as error:
-        if isinstance(error, HydroidError) or hasattr(error, "format_message"):
-            show_error(error)
-            code = 2
-        elif isinstance(error, OSError) and error.errno in SYSTEM:
-            show_error(RunError(f"cannot be used ({error.strerror})", error.filename or "the system"))
-            code = 2
-        elif stopped():  # what the interrupt met may have made another error of it
-            code = 130
-        else:
-            raise  # a defect of hydroid
-    if code == 130:  # as in shells
-        rest = "" if kept is None else f"; {kept or 'nothing was written'}"
-        typer.echo(f"hydroid: stopped{rest}", err=True)
-    sys.exit(code)
+        return end.exit_code
+    return 0
+
+
+def _ending(error: Exception) -> int:
+    """Say what is wrong, and return the exit status; raise a defect of hydroid again."""
+    is_users = isinstance(error, HydroidError) or hasattr(error, "format_message")
+    if is_users:
+        show_error(error)
+        return 2
+    if isinstance(error, OSError) and error.errno in SYSTEM:
+        what = f"cannot be used ({error.strerror})"
+        show_error(RunError(what, error.filename or "the system"))
+        return 2
+    # what the interrupt met may have made another error of it
+    if stopped():
+        return STOPPED
+    raise error

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hydroid.arrays import Array
 from hydroid.commands.console import Result
 from hydroid.commands.inputs import (
     ConfigSource,
@@ -25,7 +26,7 @@ from hydroid.log import (
     Log,
     LogFinding,
     by_level,
-    check_log,
+    check_parts,
     driven_joints,
     grouped,
     guess_columns,
@@ -38,7 +39,10 @@ from hydroid.units import way
 
 
 class LogCheck(NamedTuple):
-    """One file; its log is None if it cannot be read, findings are errors first, travel is by joints."""
+    """One log, or one part of a file with gaps; travel is by the joints' names.
+
+    The log is None if the file cannot be used. Findings are errors first, those of a file at its first part.
+    """
 
     path: Path
     log: Log | None
@@ -47,7 +51,10 @@ class LogCheck(NamedTuple):
 
 
 class Converted(NamedTuple):
-    """What was written, and what each column was taken for; None where settings say it."""
+    """What was written, or its longest part between gaps, and what each column was taken for.
+
+    The guess is None where settings say it.
+    """
 
     log: Log
     guess: ColumnGuess | None
@@ -73,22 +80,28 @@ def check(
     settings = load_settings(config, set)
     names, slides = settings.arm.joint_names, settings.arm.slides
     checks, rows, sizes = list[LogCheck](), list[Plain](), list[str]()
-    read = [(path, *check_file(path, settings, repair=repair)) for path in map(Path, as_list(logs))]
+    read = list[tuple[Path, Log | None, list[LogFinding]]]()
+    for path in map(Path, as_list(logs)):
+        parts, findings = check_file(path, settings, repair=repair)
+        read.append((path, parts[0] if parts else None, findings))
+        read += [(path, part, []) for part in parts[1:]]
     there, refused = [log for _, log, _ in read if log is not None], False
     motion = [*undriven_findings(there, settings), *motion_findings(there, settings.arm)]
     for path, log, findings in read:
+        source = str(path) if log is None else log.source
         motions = {} if log is None else driven_joints(log)
         moved = {names[j - 1]: one.travel for j, one in motions.items()}
         if log is not None:
             findings = by_level([*findings, *(one for one in motion if one.source == log.source)])
             ways = (f"{names[j - 1]} by {way(m.travel, slides=j in slides)}" for j, m in motions.items())
             moves = ", ".join(ways) or "nothing"
-            sizes.append(f"{path}: {len(log.time)} samples, {log.duration:.2f} s; driven and moved: {moves}")
+            size = f"{len(log.time)} samples, {log.duration:.2f} s"
+            sizes.append(f"{source}: {size}; driven and moved: {moves}")
         usable = all(finding.level != "error" for finding in findings)
         refused |= not usable
         rows.append(
             {
-                "log": str(path),
+                "log": source,
                 "usable": usable,
                 "samples": log and len(log.time),
                 "duration_s": log and log.duration,
@@ -136,19 +149,22 @@ def convert(
     refuse_overwriting(path, out)
     if config is not None or set:
         settings = load_settings(config or "fit-mech", set)
-        layout, ranges = settings.log, settings.arm.ranges
+        layout, ranges, arm = settings.log, settings.arm.ranges, settings.arm
     else:
+        arm = None
         most = [f"joint {number}" for number in range(1, 13)]  # more joints than an arm has
         guess = guess_columns(open_table(path), most)
         layout = LogSettings.model_validate(guess.log)
         ranges = {str(number): (-np.inf, np.inf) for number in range(1, 1 + max(layout.joints, default=1))}
         reasons = [*guess.reasons]
-    read, findings = check_log(path, layout, ranges, repair=repair)
-    if read is None:
+    parts, findings = check_parts(path, layout, ranges, arm=arm, repair=repair)
+    if not parts:
         raise findings[0].error()
+    read = _with_gaps(parts)
     write_log(Path(out), read, _plain_layout(read), exact=True)
     said = (f"{finding.level}: {finding}" for finding in findings)
     size = f"{out}: {len(read.time)} samples, {read.duration:.2f} s, every {read.period:g} s"
+    longest = max(parts, key=lambda part: part.duration)
     content = {
         "out": str(out),
         "samples": len(read.time),
@@ -158,7 +174,26 @@ def convert(
         "log": guess and guess.log,
         "reasons": reasons,
     }
-    return Result([*reasons, *said, size], content, Converted(replace(read, source=str(out)), guess))
+    return Result([*reasons, *said, size], content, Converted(replace(longest, source=str(out)), guess))
+
+
+def _with_gaps(parts: Sequence[Log]) -> Log:
+    """Return the parts of a log as one, to be written; its gaps are longer by less than a sample."""
+    first = parts[0]
+    if len(parts) == 1:
+        return first
+    times = list[Array]()
+    for part in parts:
+        samples = np.ceil((part.begin - first.begin) / first.period - 1e-6)
+        times.append(first.period * (samples + np.arange(len(part.time))))
+    pressures = [part.pressure for part in parts if part.pressure is not None]
+    return replace(
+        first,
+        time=np.concatenate(times),
+        command=np.concatenate([part.command for part in parts]),
+        angle=np.concatenate([part.angle for part in parts]),
+        pressure=np.concatenate(pressures) if pressures else None,
+    )
 
 
 def _plain_layout(log: Log) -> LogSettings:

@@ -37,7 +37,7 @@ T_co = TypeVar("T_co", covariant=True)
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Printed:
-    """What prints itself.
+    """A result that prints itself.
 
     Attributes:
         lines: what a terminal and a notebook show: tables and sentences.
@@ -92,36 +92,50 @@ def show(result: Printed, *, as_json: bool, verbose: bool = False) -> None:
     if as_json:
         _print_json(result.plain())
         return
-    for line in [*(result.details if verbose else ()), *result.lines]:
-        if isinstance(line, str):
-            command = line.lstrip().startswith("hydroid ")
-            typer.echo(printable(line.replace("hydroid", program(), 1) if command else line))
-        else:
+    details = result.details if verbose else ()
+    for line in (*details, *result.lines):
+        if not isinstance(line, str):
             line.show()
+            continue
+        if line.lstrip().startswith("hydroid "):
+            # a command to be pasted: as this shell finds it
+            line = line.replace("hydroid", program(), 1)
+        typer.echo(printable(line))
 
 
 def program() -> str:
     """Return hydroid as the user typed it, where a shell does not find it by its name."""
     typed = sys.argv[0]
-    found = Path(typed).stem != "hydroid" or which("hydroid") == os.path.abspath(typed)
-    return "hydroid" if found else shlex.quote(typed)
+    is_other = Path(typed).stem == "hydroid" and which("hydroid") != os.path.abspath(typed)
+    return shlex.quote(typed) if is_other else "hydroid"
 
 
 def show_error(error: Any) -> None:
-    """Print a `HydroidError`, or typer's, in one line or as JSON, by the option that set what is wrong."""
-    if usage := hasattr(error, "format_message"):
+    """Print a `HydroidError`, or typer's, in one line or as JSON,
+    by the option that set what is wrong."""
+    is_usage = hasattr(error, "format_message")
+    if is_usage:
         text = error.format_message().rstrip(".")
-        error = HydroidError(text[:1].lower() + text[1:], hint=f"see {error.ctx.command_path} --help")
-    what, where, hint = error.what, error.where, error.hint
+        hint = f"see {error.ctx.command_path} --help"
+        error = HydroidError(text[:1].lower() + text[1:], hint=hint)
+    what = error.what
+    where = error.where
     key = where.removeprefix("--set ")
-    if key in OPTIONS and any(word.partition("=")[0] == OPTIONS[key] for word in sys.argv[1:]):
-        where, what = OPTIONS[key], what.removeprefix(f"{key}: ")
+    if key in OPTIONS and _is_given(OPTIONS[key]):
+        where = OPTIONS[key]
+        what = what.removeprefix(f"{key}: ")
     if "--json" in sys.argv[1:]:
-        kind = "usage" if usage else type(error).__name__.removesuffix("Error").lower()
-        _print_json({"error": {"kind": kind, "what": what, "where": where, "hint": hint}})
-    else:
-        text = str(type(error)(what, where, hint))
-        typer.echo(printable(f"hydroid: {' '.join(text.split())}"), err=True)
+        kind = "usage" if is_usage else type(error).__name__.removesuffix("Error").lower()
+        parts = {"kind": kind, "what": what, "where": where, "hint": error.hint}
+        _print_json({"error": parts})
+        return
+    text = str(type(error)(what, where, error.hint))
+    typer.echo(printable(f"hydroid: {' '.join(text.split())}"), err=True)
+
+
+def _is_given(option: str) -> bool:
+    """Return whether the command line has an option."""
+    return any(word.partition("=")[0] == option for word in sys.argv[1:])
 
 
 def _print_json(content: Plain) -> None:
@@ -130,9 +144,15 @@ def _print_json(content: Plain) -> None:
 
 
 def log_lines(*, verbose: bool, quiet: bool) -> AbstractContextManager[None]:
-    """Print hydroid's warnings and notes, all lines if verbose; errors are printed where a command ends."""
+    """Print hydroid's warnings and notes, all lines if verbose;
+    errors are printed where a command ends."""
+
+    def is_shown(line: logging.LogRecord) -> bool:
+        is_for_users = logging.INFO < line.levelno < logging.ERROR
+        return verbose or (is_for_users and not quiet)
+
     handler = _Terminal()
-    handler.addFilter(lambda record: verbose or (logging.INFO < record.levelno < logging.ERROR and not quiet))
+    handler.addFilter(is_shown)
     return logging_to(handler, "" if verbose else "hydroid: %(message)s")
 
 

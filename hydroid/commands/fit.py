@@ -1,19 +1,21 @@
 """Fit one problem, with settings and logs that are read: `hydroid.fit`."""
 
 import time
+from collections.abc import Sequence
+from dataclasses import replace
+from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hydroid.arrays import record
 from hydroid.commands.console import Printed
-from hydroid.commands.inputs import LogSource, LogSources, Source
-from hydroid.commands.logs import read_logs, refuse_undriven
+from hydroid.commands.inputs import LogSource, LogSources, ModelSource, Source
+from hydroid.commands.logs import earlier_logs, read_log, read_logs, refuse_undriven
 from hydroid.errors import RunError, SettingsError
 from hydroid.estimate import NAME, FitSummary
-from hydroid.files import write_atomic
 from hydroid.identified_model import IdentifiedModel
 from hydroid.settings.fit import FitSettings
-from hydroid.settings.log import OTHER
+from hydroid.settings.log import OTHER, log_file
 
 if TYPE_CHECKING:
     import pandas
@@ -22,11 +24,13 @@ if TYPE_CHECKING:
     from hydroid.fitting.fit import Fit, Watcher
     from hydroid.fitting.validation import Prediction
     from hydroid.fitting.verdict import Baselines
+    from hydroid.log import Log
     from hydroid.parallel.workers import DaskWorkers
     from hydroid.plant import Plant
     from hydroid.problem.problem import Problem
     from hydroid.reporting.page import Table
     from hydroid.run.folder import RunFolder
+    from hydroid.run.record import FitRecord
     from hydroid.use.draws import Draws
 
 
@@ -40,8 +44,8 @@ class FitResult(Printed):
         folder: the run folder; None where nothing was written.
         summary: the final estimate with its uncertainty, as in `estimate.yaml`.
         model: at the final estimate.
-        predictions: what its estimates make of its logs.
-        baselines: fitted to the same logs, by joint and name.
+        record: the same that the run folder stores, as `load_record(folder).result` reads it.
+        earlier: logs of the fits that it began from, which are no test of it either.
     """
 
     problem: "Problem"
@@ -49,8 +53,33 @@ class FitResult(Printed):
     folder: Path | None
     summary: FitSummary
     model: IdentifiedModel
-    predictions: "tuple[Prediction, ...]"
-    baselines: "Baselines"
+    record: "FitRecord"
+    earlier: "tuple[Log, ...]" = ()
+
+    @property
+    def predictions(self) -> "tuple[Prediction, ...]":
+        """What the final estimate makes of its logs."""
+        return self.record.fitted
+
+    @property
+    def baselines(self) -> "Baselines":
+        """Simple models fitted to the same logs, by joint and name."""
+        return self.record.baselines
+
+    def begun_from(self, *fits: "ModelSource | None") -> "FitResult":
+        """Return the fit with the logs that other fits have seen, which it began from;
+        its run keeps them."""
+        from hydroid.run.record import keep_earlier
+
+        earlier = earlier_logs(fits)
+        if self.folder is not None:
+            keep_earlier(self.folder, earlier)
+        return replace(self, earlier=earlier)
+
+    def __repr__(self) -> str:
+        from hydroid.reporting.verdict_table import lead
+
+        return f"<FitResult: {lead({'': self.summary.verdict})}>"
 
     def plant(self, **how: Any) -> "Plant":
         """Return the identified arm to be stepped; the keywords are those of `Plant`."""
@@ -67,16 +96,19 @@ class FitResult(Printed):
     def predict(self, log: "LogSource") -> "Prediction":
         """Predict a log from its commands and its first angles; NaN if the simulation diverges.
 
+            predicted = fitted.predict("b.csv")
+            print(predicted["boom"].error, predicted.to_frame())
+
         Raises:
             LogError: the log cannot be used.
         """
         from hydroid.fitting.validation import predicted
 
-        (read,) = read_logs(log, self.model.settings)
-        return predicted(self.model, read, None)
+        return predicted(self.model, read_log(log, self.model.settings), None)
 
     def validate(self, logs: "LogSources", out: Source | None = None) -> "Result[list[Prediction]]":
-        """Return the verdict on each joint by logs that were not fitted; a page of it is written to `out`.
+        """Return the verdict on each joint by logs that were not fitted;
+        a page of it is written to `out`.
 
         Raises:
             LogError, RunError: as of `hydroid.validate`.
@@ -89,7 +121,8 @@ class FitResult(Printed):
         """Return the parameters, one row each: value, unit, sd, interval, flag, ..."""
         import pandas
 
-        rows = {name: one.model_dump() for name, one in self.summary.estimate.items()}
+        estimate = self.summary.estimate
+        rows = {name: parameter.model_dump() for name, parameter in estimate.items()}
         return pandas.DataFrame.from_dict(rows, orient="index")
 
     def report(self, out: Source) -> Path:
@@ -135,20 +168,16 @@ def fit(
         RunError: `out` holds another run or cannot be written, or every simulation diverged.
     """
     read = read_logs(logs, settings)
-    names = [Path(log.source).name for log in read]
-    if stray := sorted(set(settings.payloads) - set(names)):  # misspelt, it would be left out silently
-        raise SettingsError("is none of the logs", f"payloads.{stray[0]}", f"logs: {', '.join(names)}")
+    names = [log_file(log.source).name for log in read]
+    _refuse_stray_payloads(settings, names)
     refuse_undriven(read, settings)
-    groups = {None, OTHER, *map(settings.log.group_of, names)}
-    if empty := [p.per for p in settings.parameters.values() if p.fixed is None and p.per not in groups]:
-        raise SettingsError(
-            "none of the logs is in it", f"log.groups.{empty[0]}", f"logs: {', '.join(names)}"
-        )
+    _refuse_empty_groups(settings, names)
     from hydroid.fitting.fit import fit as run_fit
     from hydroid.problem.problem import Problem
     from hydroid.run.folder import RunFolder
     from hydroid.run.process import log_start
 
+    # a folder of another run is refused before the fit, which takes long
     folder = None if out is None else RunFolder(Path(out))
     if folder is not None and folder.exists and not resume:
         raise RunError("holds a run already", out, "resume it, or choose another folder")
@@ -163,42 +192,73 @@ def fit(
     return result
 
 
+def _refuse_stray_payloads(settings: FitSettings, names: Sequence[str]) -> None:
+    """Refuse a payload of no log: misspelt, it would be left out silently."""
+    stray = sorted(set(settings.payloads) - set(names))
+    if stray:
+        hint = f"logs: {', '.join(names)}"
+        raise SettingsError("is none of the logs", f"payloads.{stray[0]}", hint)
+
+
+def _refuse_empty_groups(settings: FitSettings, names: Sequence[str]) -> None:
+    """Refuse to estimate the effect of a group that no log is in."""
+    groups = {None, OTHER, *map(settings.log.group_of, names)}
+    for parameter in settings.parameters.values():
+        if parameter.fixed is None and parameter.per not in groups:
+            hint = f"logs: {', '.join(names)}"
+            raise SettingsError("none of the logs is in it", f"log.groups.{parameter.per}", hint)
+
+
 def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
     from hydroid.advice.assumptions import assumption_findings, doubts
     from hydroid.fitting.summary import summarise
     from hydroid.fitting.validation import fitted
     from hydroid.fitting.verdict import baselines_of, behind, judge
-    from hydroid.reporting.parameters_report import parameter_table, warnings
+    from hydroid.reporting.knowledge_report import warnings
+    from hydroid.reporting.parameters_report import in_words, parameter_table
     from hydroid.reporting.verdict_table import next_lines, next_step, verdict_lines
+    from hydroid.run.record import fit_record
 
-    settings, predictions = fit.problem.settings, fitted(fit)
+    settings = fit.problem.settings
+    predictions = fitted(fit)
     baselines = baselines_of(settings, problem.logs)
-    verdict, summary = judge(settings, predictions, baselines), summarise(problem, fit)
-    doubted = assumption_findings(settings, problem.logs, doubts(settings, problem.logs))
-    findings = [*summary.findings, *doubted]
-    findings[1:1] = behind(settings, verdict)  # after the first, which may be that time was up
+    verdict = judge(settings, predictions, baselines)
+    summary = summarise(problem, fit)
+    doubted = doubts(settings, problem.logs)
+    findings = [*summary.findings, *assumption_findings(settings, problem.logs, doubted)]
+    # after the first, which may be that time was up
+    findings[1:1] = behind(settings, verdict)
     summary = summary.changed({"verdict": verdict, "findings": tuple(findings)})
     source = "the fit" if folder is None else str(folder / NAME)
-    model = IdentifiedModel(settings, fit.best.theta, source, summary)
-    lines: list[Table | str] = [*verdict_lines({fit.final: verdict}), *warnings(summary)]
+    lines: list[Table | str] = verdict_lines({fit.final: verdict})
+    lines += [str(in_words(finding, settings)) for finding in warnings(summary)]
     if folder is not None:
         step = next_step(summary, verdict, str(folder), predictions)
         lines += [*next_lines(step), str(folder / "report.html")]
-    details = [parameter_table(settings, summary), *map(str, summary.findings)]
-    content = summary.plain() | {"out": folder and str(folder)}
+    said = [str(in_words(finding, settings)) for finding in summary.findings]
     return FitResult(
-        lines, content, problem, fit, folder, summary, model, predictions, baselines, details=details
+        lines=lines,
+        content=summary.plain() | {"out": folder and str(folder)},
+        details=[parameter_table(settings, summary), *said],
+        problem=problem,
+        fit=fit,
+        folder=folder,
+        summary=summary,
+        model=IdentifiedModel(settings, fit.best.theta, source, summary),
+        record=fit_record(fit, predictions, baselines),
     )
 
 
 def _store(folder: "RunFolder", result: FitResult) -> Path:
+    """Write a fit to its run folder, and return its page."""
     from hydroid.reporting.predictions import draw
-    from hydroid.run.archive import pack
-    from hydroid.run.record import RESULT, fit_result
+    from hydroid.run.record import keep_earlier, write_record
 
     began = time.monotonic()
     folder.write_estimate(result.model, result.problem.logs[0])
-    write_atomic(folder.path / RESULT, pack(fit_result(result.fit, result.predictions, result.baselines)))
+    write_record(folder.path, result.record)
+    keep_earlier(folder.path, result.earlier)
+    folder.status("running", finished=date.today().isoformat())
     page = draw(folder.path)
     folder.status("done", seconds={**result.fit.seconds, "report": time.monotonic() - began})
     return page

@@ -74,7 +74,7 @@ def follow(
             f"The path begins {plain(found.lead_s)} s after the commands: delay and lags take so long."
         )
     if out is not None:
-        write_log(Path(out), found.log, model.settings.log)
+        write_log(Path(out), found.log, model.settings.log, arm=model.settings.arm)
         lines += [str(out), *written(page, Path(out).parent)]
     rows = [_joint(found, joint, arm.joint_names[joint - 1]) for joint in found.joints]
     missed = [{**vars(one), "joint": arm.joint_names[one.joint]} for one in found.missed]

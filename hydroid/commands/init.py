@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from hydroid.commands.console import Result
 from hydroid.commands.inputs import Source, as_list, command, names
 from hydroid.errors import SettingsError
-from hydroid.files import is_file
+from hydroid.files import Plain, is_file
 
 if TYPE_CHECKING:
     from hydroid.project.project import Project
@@ -21,6 +21,7 @@ def init(
     log: "Source | Sequence[Source] | None" = None,
     config: "Source | None" = None,
     joints: str | list[str] | None = None,
+    lengths: str | list[str] | None = None,
     tip: str | None = None,
     total_mass: float | None = None,
     force: bool = False,
@@ -30,8 +31,8 @@ def init(
     It has the arm's file and model, settings of a fit with starts and priors from the arm's size, a
     picture to check the arm by, and the commands to run next.
 
-    A log whose columns it does not know ends with status 2, and a project whose fit.yaml lists them. Name
-    them there, and go on with --config.
+    A log whose columns it does not know ends with status 2, and a project whose fit.yaml lists
+    them. Name them there, and go on with --config.
 
     Example: hydroid init mine --arm robot.urdf --log a.csv
 
@@ -40,62 +41,101 @@ def init(
 
     Args:
         folder (DIR): Folder of the project, new or not [default: that of --config].
-        arm (robot.urdf): URDF or MJCF of the arm, or an arm's YAML file [default: a template of boxes].
-        log (LOG): A log; its columns are guessed. Repeat it for several logs: the next steps keep the last to
-            validate on.
-        config (YAML): Settings whose `log` section you have completed, such as mine/fit.yaml: its columns are
-            taken in place of guesses, its arm stays, and the other settings are written anew.
-        joints (NAME,NAME): Names of the arm's joints in the order of the log's numbers (u1, u2, ...)
-            [default: the order in the arm's file].
-        total_mass (KG): Mass of all links that move [kg], to which those of the arm's file are scaled.
+        arm (robot.urdf): URDF or MJCF of the arm, or an arm's YAML file [default: a template of
+            boxes].
+        log (LOG): A log; its columns are guessed. Repeat it for several logs: the next steps keep
+            the last to validate on.
+        config (YAML): Settings whose `log` section you have completed, such as mine/fit.yaml: its
+            columns are taken in place of guesses, its arm stays, and the other settings are written
+            anew.
+        joints (NAME,NAME): Names of the arm's joints in the order of the log's numbers (u1, u2,
+            ...) [default: the order in the arm's file].
+        lengths (M,M): Lengths of the links that these joints move [m], in place of --arm: an arm of
+            boxes, as in --joints swing,boom,arm,bucket --lengths 0,3.7,1.6,0.9; 0 for a joint that
+            slews.
+        total_mass (KG): Mass of all links that move [kg], to which those of the arm's file are
+            scaled.
         force: Replace the files of an earlier project in the folder.
-        tip (LINK): Last link of the arm, if the robot has several branches [default: the end of the branch
-            whose joints the log names, or else of the longest branch].
+        tip (LINK): Last link of the arm, if the robot has several branches [default: the end of the
+            branch whose joints the log names, or else of the longest branch].
 
     Raises:
         SettingsError: a file of the project is there already, or no joint has one of the names.
-        ModelError, MeshError: the arm's file cannot be used. LogError: the first log cannot, or no joint is
-            driven and moves in the logs.
+        ModelError, MeshError: the arm's file cannot be used.
+        LogError: the first log cannot, or no joint is driven and moves in the logs.
         RunError: the folder cannot be written.
     """
-    logs, robots, configs = ([Path(path) for path in as_list(given)] for given in (log, arm, config))
-    for path in (*logs, *robots, *configs):
-        if not (is_file(path) or is_file(path / "metadata.yaml")):  # a ROS 2 bag is a folder
-            raise SettingsError("no such file", path)
+    logs = [_existing(path) for path in as_list(log)]
+    robot = None if arm is None else _existing(arm)
+    kept_config = None if config is None else _existing(config)
     from hydroid.project.project import go_on, write_project
 
-    if configs:
-        if robots or joints or tip or total_mass is not None:
-            hint = "leave --arm, --joints, --tip and --total-mass out"
-            raise SettingsError("names its arm, which stays as it is", configs[0], hint)
-        project = go_on(Path(folder) if folder else None, configs[0], logs, force=force)
+    if kept_config is not None:
+        if any((robot, joints, lengths, tip, total_mass is not None)):
+            hint = "leave --arm, --joints, --lengths, --tip and --total-mass out"
+            raise SettingsError("names its arm, which stays as it is", kept_config, hint)
+        project = go_on(Path(folder) if folder else None, kept_config, logs, force=force)
+    elif robot is not None and lengths:
+        raise SettingsError("are those of the arm's file", "--lengths", "leave it out, or --arm")
     elif folder is None:
         raise SettingsError("which folder shall the project have?", hint="hydroid init DIR")
     else:
         project = write_project(
             Path(folder),
-            robots[0] if robots else None,
+            robot,
             logs,
             names(joints),
             tip=tip,
             total_mass=total_mass,
             force=force,
+            lengths=_numbers(names(lengths)),
         )
-    lines = [f"{project.folder}: {', '.join(project.files)}"]
-    guessed = "The log's columns, guessed. Check them, and correct them in fit.yaml:"
-    look = f"Next: look at {project.folder / 'arm.png'}, then (--budget 5min stops a fit at its best model):"
-    if configs:
-        guessed = "Of the log, by the columns that you gave:"
-    if project.missing:
-        guessed = "Of the log's columns:"
-        settings = project.folder / "fit.yaml"
-        look = f"{project.missing}. Complete the log section of {settings}, which lists the columns, then:"
-        look = f"The log cannot be fitted yet: {look}"
-    parts = {"The arm:": project.notes, guessed: project.columns, look: project.commands}
-    for heading, group in parts.items():
-        lines += ["", heading, *(f"  {line}" for line in group)] if group else []
-    keys = ("files", "notes", "columns", "unused", "commands")
-    content = {"out": str(project.folder), "missing": project.missing or None} | {
-        key: [*getattr(project, key)] for key in keys
-    }
+    content: Plain = {"out": str(project.folder), "missing": project.missing or None}
+    for key in ("files", "notes", "columns", "unused", "commands"):
+        content[key] = [*getattr(project, key)]
+    lines = _lines(project, guessed=kept_config is None)
     return Result(lines, content, project, exit_status=2 if project.missing else 0)
+
+
+def _existing(given: "Source") -> Path:
+    """Return a path that is a file, or a ROS 2 bag, which is a folder."""
+    path = Path(given)
+    if is_file(path) or is_file(path / "metadata.yaml"):
+        return path
+    raise SettingsError("no such file", path)
+
+
+def _lines(project: "Project", *, guessed: bool) -> list[str]:
+    """Return what was written, what was found, and the commands to run next.
+
+    `guessed`: nobody has named the log's columns.
+    """
+    if project.missing:
+        columns = "Of the log's columns:"
+        settings = project.folder / "fit.yaml"
+        look = (
+            f"The log cannot be fitted yet: {project.missing}. "
+            f"Complete the log section of {settings}, which lists the columns, then:"
+        )
+    else:
+        columns = "Of the log, by the columns that you gave:"
+        if guessed:
+            columns = "The log's columns, guessed. Check them, and correct them in fit.yaml:"
+        picture = project.folder / "arm.png"
+        look = f"Next: look at {picture}, then (--budget 5min stops a fit at its best model):"
+    lines = [f"{project.folder}: {', '.join(project.files)}"]
+    sections = {"The arm:": project.notes, columns: project.columns, look: project.commands}
+    for heading, section in sections.items():
+        if section:
+            lines += ["", heading]
+            lines += [f"  {line}" for line in section]
+    return lines
+
+
+def _numbers(texts: Sequence[str]) -> tuple[float, ...]:
+    """Return the numbers in texts."""
+    try:
+        return tuple(float(text) for text in texts)
+    except ValueError:
+        what = f"{','.join(texts)!r} holds something else than numbers"
+        raise SettingsError(what, "--lengths", "such as 0,3.7,1.6,0.9") from None

@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hydroid.commands.inputs import LogSource, LogSources, as_list
-from hydroid.errors import RunError, SettingsError
+from hydroid.commands.inputs import LogSource, LogSources, ModelSource, as_list
+from hydroid.errors import LogError, RunError, SettingsError
+from hydroid.estimate import read_estimate
 from hydroid.files import is_file
 from hydroid.identified_model import IdentifiedModel
-from hydroid.log import Log, LogFinding, check_log, grouped, log_finding, open_table
+from hydroid.log import Log, LogFinding, check_parts, grouped, log_finding, open_table
 from hydroid.progress import LOGGER, NOTE
 from hydroid.settings.fit import FitSettings
-from hydroid.settings.log import LogSettings
+from hydroid.settings.log import LogSettings, log_file
 
 if TYPE_CHECKING:
     from hydroid.problem.problem import Problem
@@ -27,6 +28,8 @@ def read_logs(
     """Read logs as the settings map them; warnings and notes go to the `hydroid` logger.
 
         logs = hydroid.read_logs(["a.csv", "b.csv"], hydroid.load_settings("fit-mech"))
+
+    A file with long gaps gives a log for each part between them, whose source is FILE[1], FILE[2], ...
 
     Args:
         logs: files, or logs that were read before; one or several.
@@ -46,26 +49,39 @@ def read_logs(
                 source if source.measured.all() or source.pose is not None else replace(source, pose=pose)
             )
             continue
-        log, more = check_file(Path(source), settings, repair=repair, angles=angles)
-        if log is None:
+        parts, more = check_file(Path(source), settings, repair=repair, angles=angles)
+        if not parts:
             raise more[0].error()
         findings += more
-        read.append(replace(log, pose=pose))
+        read += [replace(part, pose=pose) for part in parts]
     for level, line in grouped(findings):
         LOGGER.log(logging.WARNING if level == "warning" else NOTE, "%s: %s", level, line)
     return read
 
 
+def read_log(log: LogSource, settings: FitSettings, *, repair: bool = False, angles: bool = True) -> Log:
+    """Read one log, as `read_logs` does.
+
+    Raises:
+        LogError: it cannot be used, or gaps split it.
+    """
+    read = read_logs(log, settings, repair=repair, angles=angles)
+    if len(read) > 1:
+        what = f"gaps split it into {len(read)} parts, and one log is needed"
+        raise LogError(what, log_file(read[0].source), "cut the file at its gaps, and name one part")
+    return read[0]
+
+
 def check_file(
     path: Path, settings: FitSettings, *, repair: bool, angles: bool = True
-) -> tuple[Log | None, list[LogFinding]]:
-    """Read a log as the settings map it; None if it cannot be used.
+) -> tuple[list[Log], list[LogFinding]]:
+    """Read a file as the settings map it: its parts between gaps, none if it cannot be used.
 
     A bag that is given as `.` or `..` has its folder's name: by names payloads and groups find their logs.
     """
     path = path.resolve() if path.name in ("", "..") else path
     arm, outputs = settings.arm, settings.outputs if angles else None
-    return check_log(path, settings.log, arm.ranges, outputs=outputs, backward=arm.backward, repair=repair)
+    return check_parts(path, settings.log, arm.ranges, outputs=outputs, arm=arm, repair=repair)
 
 
 def undriven_findings(logs: Sequence[Log], settings: FitSettings) -> list[LogFinding]:
@@ -123,7 +139,7 @@ def read_arms(
 
     def read(columns: LogSettings) -> Log:
         layout = {"log": columns} | ({"outputs": ()} if angles else {})
-        (one,) = read_logs(log, settings.changed(layout), repair=repair, angles=angles)
+        one = read_log(log, settings.changed(layout), repair=repair, angles=angles)
         if pose is None:
             return one
         return replace(one, angle=np.full_like(one.angle, np.nan), pose=settings.arm.pose(pose))
@@ -133,6 +149,38 @@ def read_arms(
     return dict.fromkeys(moving, read(columns))
 
 
+def seen_logs(fit: ModelSource) -> list[Log]:
+    """Return the logs that a fit has seen: its own, and those of fits that it began from.
+
+    Of values that are from no run there are none. Raises RunError: the run's logs cannot be read.
+    """
+    from hydroid.run.record import logs_behind
+
+    if isinstance(fit, str | Path):
+        return logs_behind(read_estimate(Path(fit))[0])
+    if isinstance(fit, IdentifiedModel):
+        return logs_behind(Path(fit.source))
+    return [*(one.log for one in fit.predictions), *fit.earlier]
+
+
+def earlier_logs(fits: "Sequence[ModelSource | None]") -> tuple[Log, ...]:
+    """Return the logs that fits have seen, each once.
+
+    Those of a run that cannot be read are left out.
+    """
+    from hydroid.run.folder import samples
+
+    seen = dict[bytes, Log]()
+    for fit in fits:
+        if fit is None:
+            continue
+        try:
+            seen |= {samples(log): log for log in seen_logs(fit)}
+        except RunError as error:
+            LOGGER.warning("warning: %s; the logs of that fit will count as unseen", error)
+    return tuple(seen.values())
+
+
 def run_logs(folder: Path) -> list[Path]:
     """Return the logs that a run folder was fitted to."""
     if not is_file(folder / "run.json"):
@@ -140,7 +188,7 @@ def run_logs(folder: Path) -> list[Path]:
         raise SettingsError("no log is given", hint=hint)
     from hydroid.run.folder import RunFolder
 
-    logs = [Path(name) for name in RunFolder(folder).identity().get("logs", {})]
+    logs = [*dict.fromkeys(map(log_file, RunFolder(folder).identity().get("logs", {})))]
     missing = [str(log) for log in logs if not log.exists()]  # a bag is a folder
     if missing or not logs:
         raise RunError(f"its log {', '.join(missing)} is not there", folder, "name the log")

@@ -55,10 +55,10 @@ def suggest(
 ) -> "Result[tuple[Finding, ...]]":
     """Find what the model lacks, and what to do next.
 
-    Tests every parameter that is kept fixed, switched off or shared, such as a delay or dry friction. The
-    most promising ones are freed: does that lower the error on parts of the logs left out? Tests whether the
-    logs contradict the sign of an angle, and predicts for the best actions, from weighing a
-    link to a new experiment, how much each would reduce the uncertainty.
+    Tests every parameter that is kept fixed, switched off or shared, such as a delay or dry
+    friction. The most promising ones are freed: does that lower the error on parts of the logs left
+    out? Tests whether the logs contradict the sign of an angle, and predicts for the best actions,
+    from weighing a link to a new experiment, how much each would reduce the uncertainty.
 
     Example: hydroid suggest --fit runs/hyd
 
@@ -71,7 +71,8 @@ def suggest(
     Raises:
         LogError: a log cannot be used.
         SettingsError: no log is given, and the estimate is not in a run folder.
-        RunError: the simulation diverged, a log of the run is not there, or the folder cannot be written.
+        RunError: the simulation diverged, a log of the run is not there,
+            or the folder cannot be written.
     """
     model = open_model(fit, config, set)
     problem = problem_of(model, logs, repair=repair)
@@ -84,23 +85,33 @@ def suggest(
     run = str(folder) if is_file(folder / CONFIG) else "RUN"
     with Progress() as progress:
         content, findings = advice(problem, uncertainty(problem, model.theta), run, progress)
-    verdicts = load_record(finished).verdict if (finished := run_of(model)) else ()
-    if bad := tuple(one.name for one in verdicts if one.unseen_logs and one.verdict.fails):
-        findings = (Finding("fails unseen", "warning", bad), *findings)
+    finished = run_of(model)
+    if finished:
+        verdicts = load_record(finished).verdict
+        failing = tuple(v.name for v in verdicts if v.unseen_logs and v.verdict.fails)
+        if failing:
+            findings = (Finding("fails unseen", "warning", failing), *findings)
     note = (
-        f"Of {content['tested']} quantities that the fit holds. promised: rise of the log-likelihood by "
-        "freeing it. "
+        f"Of {content['tested']} quantities that the fit holds. promised: rise of the "
+        "log-likelihood by freeing it. "
     )
-    terms = [
-        term
-        | {"verdict": "free it" if "command" in term else "leave it" if "freed" in term else "others first"}
-        for term in content["terms"]
-    ]
-    rows = [{**content, "name": "none of them"}, *terms]
+    rows = [{**content, "name": "none of them"}]
+    rows += [term | {"verdict": _advised(term)} for term in content["terms"]]
     table = left_out_table("Quantities that the fit holds", TERMS, rows, model.settings.arm, note)
-    said = [line for one in findings for line in (f"- {one}", f"  {one.numbers.get('command', '')}")]
+    lines = list[str]()
+    for finding in findings:
+        lines.append(f"- {finding}")
+        if "command" in finding.numbers:
+            lines.append(f"  {finding.numbers['command']}")
     files = written({"missing_terms": table}, out)
-    return Result([table, *filter(str.strip, said), *files], content, findings)
+    return Result([table, *lines, *files], content, findings)
+
+
+def _advised(term: Plain) -> str:
+    """Return what to do with a term: free it, or not, where freeing it was tried."""
+    if "command" in term:
+        return "free it"
+    return "leave it" if "freed" in term else "others first"
 
 
 @command
@@ -116,15 +127,16 @@ def design(
     set: "SettingChanges" = None,
     repair: bool = False,
 ) -> "Result[Design]":
-    """Design the next experiment: start pose and commands that best reduce the uncertainty of the estimate.
+    """Design the next experiment: start pose and commands that best reduce the uncertainty
+    of the estimate.
 
     SAFETY: Keep a hand on the emergency stop during the first run. The limits (design.speed_deg_s,
-    design.margin_deg, design.clearance_m) are checked only in simulation with the present estimate; the
-    real arm may exceed them. Collisions are checked with the shapes of the model, which knows no hoses and
-    nothing that stands around the machine.
+    design.margin_deg, design.clearance_m) are checked only in simulation with the present estimate;
+    the real arm may exceed them. Collisions are checked with the shapes of the model, which knows
+    no hoses and nothing that stands around the machine.
 
-    Writes commands.csv (the experiment) and predicted.csv (the simulated motion, no measurement). The
-    settings define the compared joints, the free parameters and the limits.
+    Writes commands.csv (the experiment) and predicted.csv (the simulated motion, no measurement).
+    The settings define the compared joints, the free parameters and the limits.
 
     Example: hydroid design LOG.csv --fit runs/mech --duration 30
 
@@ -149,39 +161,40 @@ def design(
     with Progress() as progress:
         existing = read_logs(logs, settings, repair=repair)
         result = best_experiment(settings, model.theta, existing, seed, progress)
-    rows: list[Plain] = [
-        {
-            "parameter": name,
-            "estimate": model.values[name],
-            "before_percent": 100 * before,
-            "random_percent": 100 * random,
-            "designed_percent": 100 * after,
-            "gain": random / after,
-            "moved": moved,
-            "flag": flag_of(after).value,
-        }
-        for name, before, random, after, moved in zip(
-            result.names,
-            result.known.deviations,
-            result.random_deviations,
-            result.after.deviations,
-            result.moved.tolist(),
-            strict=True,
+    rows = list[Plain]()
+    for i, name in enumerate(result.names):
+        before = result.known.deviations[i]
+        random = result.random_deviations[i]
+        after = result.after.deviations[i]
+        rows.append(
+            {
+                "parameter": name,
+                "estimate": model.values[name],
+                "before_percent": 100 * before,
+                "random_percent": 100 * random,
+                "designed_percent": 100 * after,
+                "gain": random / after,
+                "moved": bool(result.moved[i]),
+                "flag": flag_of(after).value,
+            }
         )
-    ]
-    still = tuple(name for name, moved in zip(result.names, result.moved, strict=True) if not moved)
-    findings = (Finding("no experiment moves", "note", still),) if still else ()
+    findings = list[str]()
+    still = tuple(row["parameter"] for row in rows if not row["moved"])
+    if still:
+        unmoved = Finding("no experiment moves", "note", still)
+        findings.append(f"- {unmoved}")
     note = (
-        f"Noise: {settings.design.noise_deg:g} deg. before: every parameter ±100 % unless logs say more. "
-        f"random: median of {len(result.random)} experiments of the same length and limits. "
+        f"Noise: {settings.design.noise_deg:g} deg. before: every parameter ±100 % unless logs say "
+        f"more. random: median of {len(result.random)} experiments of the same length and limits. "
     )
     safety = Finding("run the experiment", "note").hint
     table = Table.of("Predicted relative standard deviations", PRECISION, rows, note + safety)
-    files, commands = written({"design": table}, out), None
+    files = written({"design": table}, out)
+    commands = None
     if out is not None:
         commands = str(Path(out) / "commands.csv")
-        write_log(Path(commands), result.log, settings.log)
-        write_log(Path(out) / "predicted.csv", result.best.log, settings.log)
+        write_log(Path(commands), result.log, settings.log, arm=settings.arm)
+        write_log(Path(out) / "predicted.csv", result.best.log, settings.log, arm=settings.arm)
         files.insert(0, commands)
     content = {"commands": commands, "precision": rows}
-    return Result([table, *(f"- {one}" for one in findings), *files], content, result)
+    return Result([table, *findings, *files], content, result)

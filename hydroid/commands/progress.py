@@ -1,7 +1,7 @@
 """How far a command is, and whether it is to stop.
 
-A bar shows it on a terminal, plain lines elsewhere, and nothing in Python or with -q. A cluster's notice that
-time is nearly up ends a run as Ctrl-C does: with a checkpoint.
+A bar shows it on a terminal, plain lines elsewhere, and nothing in Python or with -q. A cluster's
+notice that time is nearly up ends a run as Ctrl-C does: with a checkpoint.
 """
 
 import math
@@ -10,7 +10,7 @@ import sys
 import time
 from contextvars import ContextVar
 from types import FrameType
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import typer
 
@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from hydroid.fitting.step import Step
     from hydroid.settings.fit import FitSettings
 
+BETWEEN_LINES = 30.0
+"""time between lines of progress where there is no terminal [s]"""
 VISIBLE: ContextVar[bool] = ContextVar("visible", default=False)
 """whether progress is shown: the command line sets it"""
 
@@ -41,8 +43,8 @@ def listen() -> None:
 def stopped() -> bool:
     """Whether a notice has come.
 
-    Python drops an exception that is raised in a finalizer. Who asks here between two pieces of work does not
-    miss the notice.
+    Python drops an exception that is raised in a finalizer. Who asks here between two pieces of
+    work does not miss the notice.
     """
     return _stopped
 
@@ -59,7 +61,8 @@ class Progress:
     """Shows the progress of a command, as `hydroid.progress.Progress`; use it as a context."""
 
     def __init__(self) -> None:
-        self._bar, self._shown = None, time.monotonic()
+        self._bar: Any = None
+        self._shown = time.monotonic()
 
     def __enter__(self) -> Self:
         return self
@@ -77,22 +80,28 @@ class Progress:
         line = f"{what}:" if total is None else f"{what} {done:.0f} of {total:.0f}"
         line = printable(f"{line} {text}".strip())
         if sys.stderr.isatty():
-            from rich.markup import escape  # a joint may be called [/b]
-
-            if self._bar is None:
-                from rich.console import Console
-                from rich.progress import Progress as Bar
-
-                columns = reversed(Bar.get_default_columns())  # the line last: its length varies
-                self._bar = Bar(*columns, console=Console(stderr=True), transient=True)
-                self._bar.add_task("", total=None)
-                self._bar.start()
-            task = self._bar.tasks[0]
-            task.total = total  # `update` takes None for no change
-            self._bar.update(task.id, completed=done, description=escape(line))
-        elif time.monotonic() - self._shown > 30.0:  # seconds between plain lines
+            self._move_bar(line, done, total)
+        elif time.monotonic() - self._shown > BETWEEN_LINES:
             self._shown = time.monotonic()
             typer.echo(line, err=True)
+
+    def _move_bar(self, line: str, done: float, total: float | None) -> None:
+        from rich.markup import escape
+
+        if self._bar is None:
+            from rich.console import Console
+            from rich.progress import Progress as Bar
+
+            # the line last: its length varies
+            columns = reversed(Bar.get_default_columns())
+            self._bar = Bar(*columns, console=Console(stderr=True), transient=True)
+            self._bar.add_task("", total=None)
+            self._bar.start()
+        task = self._bar.tasks[0]
+        # `update` takes None for no change
+        task.total = total
+        # a joint may be called [/b]
+        self._bar.update(task.id, completed=done, description=escape(line))
 
 
 class FitProgress(Progress):
@@ -104,10 +113,13 @@ class FitProgress(Progress):
     def __init__(self, settings: "FitSettings", budget: float | None = None) -> None:
         super().__init__()
         self._end = math.inf if budget is None else time.monotonic() + budget
-        self._settings, search = settings, settings.search
+        self._settings = settings
+        search = settings.search
         self._total = 1 + getattr(search, search.algorithm).generations
-        self._terms, self._number = settings.terms(), 1
-        self._rungs = 2 + len(self._terms) + (settings.simulation.model == "ladder")
+        self._terms = settings.terms()
+        self._number = 1
+        is_ladder = settings.simulation.model == "ladder"
+        self._rungs = 2 + len(self._terms) + is_ladder
 
     def generation(self, row: "Array") -> bool:
         """Take a row of `fitting.search.HISTORY`; return whether time is up."""
@@ -117,29 +129,36 @@ class FitProgress(Progress):
     def refining(self, step: "Step", simulated: int, rms: float) -> bool:
         """Take a step of the fit, its number of simulations, and its rms error [rad] so far.
 
-        A rung is the search, or a model or term of the ladder; what is kept is refined as the last one.
-        Returns whether time is up.
+        A rung is the search, or a model or term of the ladder; what is kept is refined as the last
+        one. Returns whether time is up.
         """
         from hydroid.units import way
 
-        arm, outputs = self._settings.arm, self._settings.outputs
-        joints = (step.joint,) if step.joint else outputs
+        arm = self._settings.arm
+        joints = (step.joint,) if step.joint else self._settings.outputs
         about = arm.joint_names[joints[0] - 1] if len(joints) == 1 else "all joints"
-        error = way(math.degrees(rms), slides={*joints} <= {*arm.slides})
-        self(self._rung(step) + f", {about}", simulated, None, f"rms error {error}, {simulated} simulations")
+        all_slide = {*joints} <= {*arm.slides}
+        error = way(math.degrees(rms), slides=all_slide)
+        text = f"rms error {error}, {simulated} simulations"
+        self(f"{self._rung(step)}, {about}", simulated, None, text)
         return time.monotonic() > self._end
 
     def _rung(self, step: "Step") -> str:
         """Return which step of how many it is, and what is done there."""
         total = self._rungs
-        number = total  # in which what is kept is refined
+        # the last step, in which what is kept is refined
+        number = total
         if step.phase or step.without or step.start:
             models = {"start": 1, "refined": 2, "joint": 2, "dynamic": total}
-            terms = [number for number, term in enumerate(self._terms, 3) if term in step.terms]
-            number = max([models.get(step.model, 1), *terms])
+            number = models.get(step.model, 1)
+            for rung, term in enumerate(self._terms, 3):
+                if term in step.terms:
+                    number = max(number, rung)
         # a rung is compared with the one below: that leads no step back
-        number = self._number = max(number, self._number)
+        self._number = max(number, self._number)
         words = f"start {step.start}" if step.start else step.estimate
-        words += " from nine numbers" if step.numbers else ""
-        words += f" without part {step.without} of the logs" if step.without else ""
-        return f"step {number} of {total} ({words})"
+        if step.numbers:
+            words += " from nine numbers"
+        if step.without:
+            words += f" without part {step.without} of the logs"
+        return f"step {self._number} of {total} ({words})"

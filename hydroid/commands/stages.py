@@ -1,11 +1,10 @@
 """`hydroid fit-mech`, `hydroid fit-hyd` and `hydroid adapt`: fits, from files to run folders."""
 
 import builtins
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, replace
-from pathlib import Path
-from typing import Any
 
+from hydroid.arrays import record
 from hydroid.commands.fit import FitResult, fit as run_fit
 from hydroid.commands.inputs import (
     ConfigSource,
@@ -23,13 +22,16 @@ from hydroid.commands.inputs import (
 from hydroid.commands.logs import read_logs, refuse_undriven
 from hydroid.commands.progress import FitProgress, Progress
 from hydroid.errors import SettingsError
+from hydroid.estimate import FitSummary
 from hydroid.files import Plain
 from hydroid.log import Log
 from hydroid.parallel.cluster import open_workers
 from hydroid.progress import LOGGER, NOTE
 from hydroid.quantity_table import MECHANICAL
 from hydroid.settings.fit import FitSettings
+from hydroid.settings.log import log_file
 from hydroid.settings.parameters import nominal_value
+from hydroid.settings.problem import ParameterSettings
 from hydroid.units import seconds
 
 
@@ -52,8 +54,8 @@ def fit_mech(
 ) -> FitResult:
     """Estimate gain, damping, stiffness and link masses from logs (stage 1).
 
-    Writes a run folder with report.html, estimate.yaml, tables and the fitted arm. Then test the estimate on
-    a log that it was not fitted to: `hydroid validate`.
+    Writes a run folder with report.html, estimate.yaml, tables and the fitted arm. Then test the
+    estimate on a log that it was not fitted to: `hydroid validate`.
 
     Example: hydroid fit-mech LOG.csv --out runs/mech
 
@@ -66,7 +68,22 @@ def fit_mech(
     Raises:
         HydroidError: an input or a folder that cannot be used.
     """
-    return _fit("mech", locals())
+    options = FitOptions(
+        logs=logs,
+        out=out,
+        algorithm=algorithm,
+        seed=seed,
+        start=start,
+        resume=resume,
+        refinement=refinement,
+        threads=threads,
+        budget=budget,
+        dask=dask,
+        config=config,
+        set=set,
+        repair=repair,
+    )
+    return _fit("mech", options)
 
 
 @command
@@ -89,8 +106,9 @@ def fit_hyd(
 ) -> FitResult:
     """Estimate the hydraulic actuators (stage 2); the arm's parameters come from stage 1.
 
-    By default it estimates piston areas, valve openings, onsets, delay and damping. The config can free more,
-    such as the amplifier's currents and the solenoid. Writes a run folder as fit-mech does.
+    By default it estimates piston areas, valve openings, onsets, delay and damping. The config can
+    free more, such as the amplifier's currents and the solenoid.
+    Writes a run folder as fit-mech does.
 
     Example: hydroid fit-hyd LOG.csv --config mine/fit.yaml --out runs/hyd
 
@@ -104,86 +122,187 @@ def fit_hyd(
     Raises:
         HydroidError: an input or a folder that cannot be used.
     """
-    return _fit("hyd", locals())
+    options = FitOptions(
+        logs=logs,
+        out=out,
+        algorithm=algorithm,
+        seed=seed,
+        start=start,
+        resume=resume,
+        refinement=refinement,
+        threads=threads,
+        budget=budget,
+        dask=dask,
+        config=config,
+        set=set,
+        repair=repair,
+    )
+    return _fit("hyd", options, mech)
 
 
-def _fit(stage: str, given: Mapping[str, Any]) -> FitResult:
-    options = {
-        "search.algorithm": given["algorithm"],
-        "search.seed": given["seed"],
-        "simulation.threads": given["threads"],
-    }
-    changes = setting_changes(given["set"], options)
-    if given["refinement"] is False:
-        changes["refinement"] = None
-    config, start = given["config"], given["start"]
-    settings, more = load_settings(config, changes), Plain()
+@record
+class FitOptions:
+    """What both stages take on the command line, and in Python."""
+
+    logs: "LogSources"
+    out: "Source | None"
+    algorithm: str | None
+    seed: int | None
+    start: "ModelSource | None"
+    resume: bool
+    refinement: bool | None
+    threads: int | None
+    budget: str | None
+    dask: str | None
+    config: "ConfigSource"
+    set: "SettingChanges"
+    repair: bool
+
+    def changes(self) -> Plain:
+        """Return the settings that the options replace, by dotted key."""
+        options = {
+            "search.algorithm": self.algorithm,
+            "search.seed": self.seed,
+            "simulation.threads": self.threads,
+        }
+        changes = setting_changes(self.set, options)
+        if self.refinement is False:
+            changes["refinement"] = None
+        return changes
+
+    def seconds(self) -> float | None:
+        """Return the time for search and refinement [s]; None: as much as they need."""
+        if self.budget is None:
+            return None
+        budget = seconds(self.budget)
+        if not budget:
+            hint = "such as 90s, 5min or 2h"
+            raise SettingsError(f"is no time: {self.budget!r}", "--budget", hint)
+        return budget
+
+
+def _fit(stage: str, options: FitOptions, mech: "ModelSource | None" = None) -> FitResult:
+    config = options.config
+    changes = options.changes()
+    settings = load_settings(config, changes)
     if settings.stage != stage:
         what = f"has stage: {settings.stage}, but hydroid fit-{stage} needs stage: {stage}"
         raise SettingsError(what, config, f"use hydroid fit-{settings.stage}, or another --config")
+    # what stage 1 and --start say are settings like any others: they are read with them once more
+    known = Plain()
     if stage == "hyd":
-        more |= held_mechanics(given["mech"], settings, changes)
-    if start is not None:
-        values, _ = open_values(start)
-        starts = {
-            f"parameters.{name}.start": values[name]
-            for name, p in settings.parameters.items()
-            if p.fixed is None and name in values and f"parameters.{name}.fixed" not in more
-        }
-        if not starts:
-            raise SettingsError("has a value of none of the free parameters", start)
-        more |= starts
-    if more:
-        settings = load_settings(config, {**changes, **more, **changes})
+        known |= held_mechanics(mech, settings, changes)
+    if options.start is not None:
+        known |= _starts(options.start, settings, known)
+    if known:
+        # what --set says has the last word, and keeps its place among the changes
+        settings = load_settings(config, {**changes, **known, **changes})
     if config == f"fit-{stage}":
         what = f"note: the arm is the shipped {settings.arm.name}"
         LOGGER.log(NOTE, f"{what}: for your machine give --config, which `hydroid init` writes")
-    limit = given["budget"]
-    budget = limit and seconds(limit)
-    if limit is not None and not budget:
-        raise SettingsError(f"is no time: {limit!r}", "--budget", "such as 90s, 5min or 2h")
-    read = read_logs(given["logs"], settings, repair=given["repair"])
-    with open_workers(given["dask"]) as workers, FitProgress(settings, budget) as watcher:
-        return run_fit(
-            settings, read, given["out"], resume=given["resume"], progress=watcher, workers=workers
+    budget = options.seconds()
+    read = read_logs(options.logs, settings, repair=options.repair)
+    with open_workers(options.dask) as workers, FitProgress(settings, budget) as watcher:
+        result = run_fit(
+            settings,
+            read,
+            options.out,
+            resume=options.resume,
+            progress=watcher,
+            workers=workers,
         )
+    return result.begun_from(mech, options.start)
+
+
+def _starts(start: "ModelSource", settings: FitSettings, held: Plain) -> Plain:
+    """Return the starts of free parameters that an estimate has values of,
+    as settings to replace."""
+    values, _ = open_values(start)
+    starts = Plain()
+    for name, parameter in settings.parameters.items():
+        is_free = parameter.fixed is None and f"parameters.{name}.fixed" not in held
+        if is_free and name in values:
+            starts[f"parameters.{name}.start"] = values[name]
+    if not starts:
+        raise SettingsError("has a value of none of the free parameters", start)
+    return starts
 
 
 def held_mechanics(mech: "ModelSource | None", settings: FitSettings, changes: Plain) -> Plain:
-    """Return what of stage 2's settings, read with `changes`, stage 1 says: its parameters at its estimate.
+    """Return what of stage 2's settings, read with `changes`, stage 1 says:
+    its parameters at its estimate.
 
-    Of a run folder or a result of stage 1, or a YAML file of values by name, the masses hold, and damping and
-    stiffness where the settings state no start or nominal value of their own. None: the settings fix them, or
-    say what is known of them (a prior or a start), and they are estimated with the others. `changes` have the
-    last word. Raises RunError, SettingsError: no values there, or one that stage 2 needs is missing.
+    Of a run folder or a result of stage 1, or a YAML file of values by name, the masses hold, and
+    damping and stiffness where the settings state no start or nominal value of their own. None: the
+    settings fix them, or say what is known of them (a prior or a start), and they are estimated
+    with the others. `changes` have the last word.
+
+    Raises:
+        RunError, SettingsError: no values there, or one that stage 2 needs is missing.
     """
-    values, summary = ({}, None) if mech is None else open_values(mech)
-    if summary is not None and summary.stage != "mech":
-        hint = "name a run of fit-mech, or begin at this fit with --start"
-        raise SettingsError("is a fit of stage 2, but --mech takes one of stage 1", mech, hint)
-    held, missing = Plain(), list[str]()
-    for name, p in settings.parameters.items():
-        if p.quantity not in MECHANICAL or p.quantity == "gain":
+    values, summary = _stage_1(mech)
+    mechanical = _mechanical(settings)
+    held = Plain()
+    for name, parameter in mechanical.items():
+        key = f"parameters.{name}.fixed"
+        estimated_anew = parameter.states_start and parameter.quantity != "mass"
+        if name not in values or key in changes or estimated_anew:
             continue
-        value, key, mass = values.get(name), f"parameters.{name}.fixed", p.quantity == "mass"
-        if value is None and p.fixed is None and (mech is not None or not p.states_start):
-            missing.append(name)
-        if value is None or key in changes or (p.states_start and not mass):
-            continue
-        held[key] = value
-        nominal = nominal_value(settings.arm, settings.hydraulics, p)
-        flag = summary and summary.estimate[name].flag
-        doubtful = mass and flag not in (None, "identifiable", "fixed")
-        if doubtful and nominal and abs(value - nominal) > 0.1 * nominal:
-            LOGGER.warning(
-                f"{name} is held at {value:.3g} kg, which the logs of stage 1 do not determine ({flag}). "
-                f"Expected was {nominal:.3g} kg; to take that: --set parameters.{name}.fixed={nominal:.3g}"
-            )
+        held[key] = values[name]
+        if summary is not None:
+            _warn_of_doubtful_mass(name, values[name], summary.estimate[name].flag, settings)
+    missing = [
+        name for name, parameter in mechanical.items() if name not in values and _needs_value(parameter, mech)
+    ]
     if missing:
         hint = "give the run of stage 1 with --mech RUN, or set fixed, nominal or start for each"
         what = f"stage 2 needs the values of {', '.join(missing)} from stage 1"
         raise SettingsError(what, mech or "", hint)
     return held
+
+
+def _stage_1(mech: "ModelSource | None") -> tuple[Plain, FitSummary | None]:
+    """Return the values of stage 1 by name, and the fit's own account of them where
+    there is one."""
+    if mech is None:
+        return {}, None
+    values, summary = open_values(mech)
+    if summary is not None and summary.stage != "mech":
+        hint = "name a run of fit-mech, or begin at this fit with --start"
+        raise SettingsError("is a fit of stage 2, but --mech takes one of stage 1", mech, hint)
+    return values, summary
+
+
+def _mechanical(settings: FitSettings) -> dict[str, ParameterSettings]:
+    """Return the parameters of stage 2 that stage 1 has, too."""
+    return {
+        name: parameter
+        for name, parameter in settings.parameters.items()
+        if parameter.quantity in MECHANICAL and parameter.quantity != "gain"
+    }
+
+
+def _needs_value(parameter: ParameterSettings, mech: "ModelSource | None") -> bool:
+    """Return whether nothing but stage 1 tells a parameter; where it is named,
+    it is to tell all."""
+    if parameter.fixed is not None:
+        return False
+    return mech is not None or not parameter.states_start
+
+
+def _warn_of_doubtful_mass(name: str, value: float, flag: str | None, settings: FitSettings) -> None:
+    """Warn where a mass is held that stage 1 did not determine, far from what was expected."""
+    parameter = settings.parameters[name]
+    if parameter.quantity != "mass" or flag in (None, "identifiable", "fixed"):
+        return
+    expected = nominal_value(settings.arm, settings.hydraulics, parameter)
+    if not expected or abs(value - expected) <= 0.1 * expected:
+        return
+    LOGGER.warning(
+        f"{name} is held at {value:.3g} kg, which the logs of stage 1 do not determine ({flag}). "
+        f"Expected was {expected:.3g} kg; to take that: "
+        f"--set parameters.{name}.fixed={expected:.3g}"
+    )
 
 
 @command
@@ -198,9 +317,9 @@ def adapt(
 ) -> FitResult:
     """Adapt a fit to new logs: a few parameters are freed, all others are held at its estimate.
 
-    For a slower engine, a colder day, another tool. A load of known mass is no parameter but a payload of the
-    logs: --set 'payloads={LOADED.csv: 250}'. Writes a run that every command takes. Judges each
-    freed parameter by parts of the logs left out.
+    For a slower engine, a colder day, another tool. A load of known mass is no parameter but a
+    payload of the logs: --set 'payloads={LOADED.csv: 250}'. Writes a run that every command takes.
+    Judges each freed parameter by parts of the logs left out.
 
     Example: hydroid adapt LOADED.csv --fit runs/hyd --free P_flow,P_droop
 
@@ -209,8 +328,9 @@ def adapt(
 
     Args:
         logs (LOG): The new logs.
-        free (NAME,NAME): Parameters to be freed [default: masses, pump and effects of the logs' groups, one
-            after the other, as long as the error falls on every part of the logs left out].
+        free (NAME,NAME): Parameters to be freed [default: masses, pump and effects of the logs'
+            groups, one after the other, as long as the error falls on every part of the logs left
+            out].
         out (DIR): Run folder [default of the command line: runs/adapt].
         set (KEY=VALUE): Replace a setting of the fit, such as refinement.iterations=100.
 
@@ -219,8 +339,10 @@ def adapt(
     """
     model = open_model(fit, overrides=set)
     read = read_logs(logs, model.settings, repair=repair)
-    if set and (stray := model.settings.payloads.keys() - _own_payloads(fit, read)):
-        raise SettingsError("is none of the logs", f"payloads.{min(stray)}")
+    if set:
+        stray = model.settings.payloads.keys() - _own_payloads(fit, read)
+        if stray:
+            raise SettingsError("is none of the logs", f"payloads.{min(stray)}")
     refuse_undriven(read, model.settings)
     from hydroid.advice.adaptation import adapted, load_findings, steps
     from hydroid.reporting.verdict_table import left_out_table
@@ -233,14 +355,17 @@ def adapt(
         raise SettingsError("no parameter lowers the error on parts left out", model.source, hint)
     settings = adapted(model, chosen, read)
     with FitProgress(settings) as watcher:
-        result = run_fit(settings, read, out, progress=watcher)
+        result = run_fit(settings, read, out, progress=watcher).begun_from(fit)
     named = [step | {"parameter": step["parameter"] or "none"} for step in path]
-    table = left_out_table("Parameters freed one after another", {"parameter": "freed"}, named, settings.arm)
-    said = load_findings(settings)
-    content = {**result.content, "steps": path, "findings": [*result.content["findings"], *map(asdict, said)]}
-    return replace(result, lines=[table, *map(str, said), *result.lines], content=content)
+    title = "Parameters freed one after another"
+    table = left_out_table(title, {"parameter": "freed"}, named, settings.arm)
+    of_loads = load_findings(settings)
+    findings = [*result.content["findings"], *map(asdict, of_loads)]
+    content = {**result.content, "steps": path, "findings": findings}
+    lines = [table, *map(str, of_loads), *result.lines]
+    return replace(result, lines=lines, content=content)
 
 
 def _own_payloads(fit: "ModelSource", logs: Sequence[Log]) -> builtins.set[str]:
     """Return the logs that may have a payload: these, and those of the fit itself."""
-    return {*open_model(fit).settings.payloads, *(Path(log.source).name for log in logs)}
+    return {*open_model(fit).settings.payloads, *(log_file(log.source).name for log in logs)}

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,11 +11,16 @@ from hydroid.commands.inputs import Source, command
 from hydroid.commands.logs import read_logs
 from hydroid.commands.progress import Progress
 from hydroid.errors import Stopped
+from hydroid.files import Plain
 from hydroid.settings.fit import StudySettings
 from hydroid.settings.load import load
 
 if TYPE_CHECKING:
     from hydroid.studies import Row
+
+
+MEASURES = ("rms error", "mean absolute error", "simulations")
+"""of a run, whose medians a study's table shows"""
 
 
 @command
@@ -27,9 +32,9 @@ def study(
 ) -> "Result[tuple[Row, ...]]":
     """Compare settings over many seeds.
 
-    The file names a config, the settings that vary, and the logs. Every run leaves a small file in DIR/runs
-    when it ends. To continue a study that was stopped, give the same command again: it ends with the same
-    bits.
+    The file names a config, the settings that vary, and the logs. Every run leaves a small file in
+    DIR/runs when it ends. To continue a study that was stopped, give the same command again: it
+    ends with the same bits.
 
     Example: hydroid study my-study.yaml --out runs/my-study
 
@@ -44,8 +49,10 @@ def study(
         SettingsError: a key or value of the file that is not allowed.
         RunError: the folder cannot be written or is in use, or a process died.
     """
-    path, folder = Path(file), Path(out)
-    load(path, StudySettings)  # a wrong file is refused before anything heavy is imported
+    path = Path(file)
+    folder = Path(out)
+    # a wrong file is refused before anything heavy is imported
+    load(path, StudySettings)
     from hydroid.estimate import finite
     from hydroid.reporting.page import Table
     from hydroid.run.process import locked
@@ -57,27 +64,46 @@ def study(
     except KeyboardInterrupt:
         count = len(list(folder.glob("runs/*.json")))
         raise Stopped(f"{folder} holds {count} runs that have ended; the same command goes on") from None
-    each = [
-        {"cell": row.cell, "seed": row.seed, "failed": row.failed or None}
-        | {name: finite(value) for name, value in row.values.items()}
-        for row in runs
-    ]
-    measures, cells = ("rms error", "mean absolute error", "simulations"), list[dict[str, Any]]()
-    for cell in dict.fromkeys(row.cell for row in runs):
-        good = [row.values for row in runs if row.cell == cell and not row.failed]
-        medians = {name: _median([values[name] for values in good]) for name in measures}
-        cells.append({"cell": cell, "runs": len(good)} | medians)
+    run_rows = list[Plain]()
+    names = set[str]()
+    failures = list[str]()
+    for run in runs:
+        values = {name: finite(value) for name, value in run.values.items()}
+        row = {"cell": run.cell, "seed": run.seed, "failed": run.failed or None}
+        run_rows.append(row | values)
+        names |= values.keys()
+        if run.failed:
+            failures.append(f"failed: {run.cell}, seed {run.seed}: {run.failed}")
+    columns = ("cell", "seed", "failed", *sorted(names))
     title = "Median over the seeds [lowest, highest], errors in deg"
-    columns = sorted({name for row in runs for name in row.values})
+    cell_columns = ("cell", "runs", *MEASURES)
     tables = {
-        "cells": Table.of(title, {name: name for name in ("cell", "runs", *measures)}, cells),
-        "runs": Table.of("Runs", {name: name for name in ("cell", "seed", "failed", *columns)}, each),
+        "cells": Table.of(title, _headed(cell_columns), _cells(runs)),
+        "runs": Table.of("Runs", _headed(columns), run_rows),
     }
-    failures = [f"failed: {row.cell}, seed {row.seed}: {row.failed}" for row in runs if row.failed]
     lines = [tables["cells"], *failures, *written(tables, folder)]
-    return Result(lines, {"out": str(folder), "runs": each}, runs)
+    return Result(lines, {"out": str(folder), "runs": run_rows}, runs)
+
+
+def _headed(columns: Sequence[str]) -> dict[str, str]:
+    """Return columns of a table that are called by their keys."""
+    return dict(zip(columns, columns, strict=True))
+
+
+def _cells(runs: "Sequence[Row]") -> list[Plain]:
+    """Return a row for each cell of a study: its medians over the seeds."""
+    rows = list[Plain]()
+    for cell in dict.fromkeys(run.cell for run in runs):
+        finished = [run.values for run in runs if run.cell == cell and not run.failed]
+        row: Plain = {"cell": cell, "runs": len(finished)}
+        for measure in MEASURES:
+            row[measure] = _median([values[measure] for values in finished])
+        rows.append(row)
+    return rows
 
 
 def _median(values: Sequence[float]) -> str:
     finite = [value for value in values if np.isfinite(value)]
-    return f"{np.median(finite):.3g} [{min(finite):.3g}, {max(finite):.3g}]" if finite else ""
+    if not finite:
+        return ""
+    return f"{np.median(finite):.3g} [{min(finite):.3g}, {max(finite):.3g}]"

@@ -1,10 +1,12 @@
-"""`hydroid validate` and `hydroid report`: fits on logs that they were not fitted to; reports drawn anew."""
+"""`hydroid validate` and `hydroid report`: fits on logs that they were not fitted to;
+reports drawn anew."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from hydroid.arrays import record
 from hydroid.commands.console import Result, written
 from hydroid.commands.inputs import (
     LogSources,
@@ -15,8 +17,9 @@ from hydroid.commands.inputs import (
     command,
     open_model,
 )
-from hydroid.commands.logs import read_logs
+from hydroid.commands.logs import read_logs, seen_logs
 from hydroid.files import Plain
+from hydroid.findings import Finding
 from hydroid.identified_model import IdentifiedModel, warn_of_changes
 from hydroid.log import Log
 from hydroid.log.overlap import KNOWN, overlap
@@ -25,6 +28,8 @@ from hydroid.words import listed, numbered
 
 if TYPE_CHECKING:
     from hydroid.fitting.validation import Prediction
+    from hydroid.fitting.verdict import Baselines
+    from hydroid.joint_verdict import JointVerdict
     from hydroid.run.record import Record
 
 
@@ -39,71 +44,143 @@ def validate(
     set: "SettingChanges" = None,
     repair: bool = False,
 ) -> "Result[list[Prediction]]":
-    """Test fits on logs that they have not seen: a verdict on each joint, beside the errors of simple models.
+    """Test fits on logs that they have not seen: a verdict on each joint,
+    beside the errors of simple models.
 
-    Each fit reads the logs with its own settings. The page shows every response with its errors (article,
-    table 9). From then on, the report of the fit's own run shows these logs too.
+    Each fit reads the logs with its own settings. The page shows every response with its errors
+    (article, table 9). From then on, the report of the fit's own run shows these logs too.
 
     Example: hydroid validate OTHER.csv --fit runs/mech --fit runs/hyd
 
         validated = hydroid.validate("b.csv", fit="runs/a")
-        print(validated.result[0].indices[2].rms)  # of joint 2 [rad]
+        print(validated.result[0]["shoulder"].rms)  # [deg]
 
     Args:
-        fit (RUN|YAML): An estimate: a run folder, a folder written by Plant.save (Python), or a YAML file.
-            Repeat the option for several estimates.
-        tolerance (0.001 to 90): The rms error [deg] that you accept for every joint; config.yaml can
-            hold one for each (tolerance_deg) [default: that of the fit, or else 2 % of a joint's travel].
-        apart: These logs are of other conditions than the fit's, such as another load: its own report shows
-            them, and does not count them in its verdict. Without it, they count again.
+        fit (RUN|YAML): An estimate: a run folder, a folder written by Plant.save (Python), or a
+            YAML file. Repeat the option for several estimates.
+        tolerance (0.001 to 90): The rms error [deg] that you accept for every joint; config.yaml
+            can hold one for each (tolerance_deg) [default: that of the fit, or else 2 % of a
+            joint's travel].
+        apart: These logs are of other conditions than the fit's, such as another load: its own
+            report shows them, and does not count them in its verdict. Without it, they count again.
 
     Raises:
         LogError: a log cannot be used.
         RunError: the folder cannot be written.
     """
-    given: list[ModelSource] = as_list(fit)
-    models = [open_model(one, None, set) for one in given]
+    sources: list[ModelSource] = as_list(fit)
+    models = [open_model(source, None, set) for source in sources]
     read = [read_logs(logs, model.settings, repair=repair) for model in models]
-    from hydroid.fitting.validation import predicted
-    from hydroid.fitting.verdict import judge, standing_out
-    from hydroid.reporting.predictions import draw, validation_page
+    from hydroid.fitting.verdict import standing_out
+    from hydroid.reporting.predictions import validation_page
     from hydroid.reporting.verdict_table import next_lines, next_step, ordered, verdict_lines
-    from hydroid.run.record import fitted_by, keep_validation, run_of
+    from hydroid.run.record import run_of
 
-    stated = {} if tolerance is None else {"tolerance_deg": tolerance}
-    results, verdicts, own_logs = Plain(), Plain(), Plain()
-    named = dict(zip(numbered(model.name for model in models), models, strict=True))
-    for one, own, (name, model) in zip(given, read, named.items(), strict=True):
-        fitted, baselines = fitted_by(model)
-        if not isinstance(one, str | Path | IdentifiedModel):
-            fitted, baselines = one.predictions, one.baselines
-        known = [prediction.log for prediction in fitted]
-        predictions = [predicted(model, log, _unseen(log, known) if known else None) for log in own]
-        kept = [replace(one, apart=apart) for one in predictions]
-        if out is not None and (run := keep_validation(model, kept)):
-            draw(run)
-        own_logs[name] = fitted
-        verdicts[name] = judge(model.settings.changed(stated), fitted, baselines, predictions)
-        results[name] = [replace(prediction, fit=name) for prediction in predictions]
-    fits, arm = ordered(verdicts), models[0].settings.arm
-    every = [prediction for name in fits for prediction in results[name]]
-    best = next(iter(fits))
-    run = run_of(named[best])
-    steps = [next_step(named[best].summarise(), fits[best], str(run), own_logs[best])] if run else []
-    page = validation_page(every, fits, arm, *steps)
-    content = {
-        "verdict": [{"fit": name} | one.model_dump() for name in fits for one in fits[name]],
-        "results": [row for one in every for row in one.plain(arm.joint_names)],
-    }
-    lines = [*verdict_lines(fits), *(line for step in steps for line in next_lines(step))]
-    lines += map(str, standing_out(results[best], fits[best], str(run or "RUN")))
-    if seen := [one.log.source for one in results[best] if one.unseen is False]:
-        lines.insert(1, f"The fit was made with {listed(seen, 3)}: that tests nothing.")
-    return Result([*lines, *written(page, out)], content, every, page, details=[page.tables["errors"]])
+    tested: dict[str, _Tested] = {}
+    names = numbered(model.name for model in models)
+    for source, model, unseen, name in zip(sources, models, read, names, strict=True):
+        tested[name] = _test(source, model, unseen, tolerance)
+        if out is not None:
+            _keep(tested[name], apart=apart)
+    fits = ordered({name: test.verdict for name, test in tested.items()})
+    arm = models[0].settings.arm
+    predictions = list["Prediction"]()
+    for name in fits:
+        predictions += [replace(p, fit=name) for p in tested[name].predictions]
+    best = tested[next(iter(fits))]
+    run = run_of(best.model)
+    lines = verdict_lines(fits)
+    steps = list[Finding]()
+    if run:
+        step = next_step(best.model.summarise(), best.verdict, str(run), best.fitted)
+        steps.append(step)
+        lines += next_lines(step)
+    page = validation_page(predictions, fits, arm, *steps)
+    lines += map(str, standing_out(best.predictions, best.verdict, str(run or "RUN")))
+    lines[1:1] = _fitted_lines(best.predictions)
+    lines += written(page, out)
+    content = _content(fits, predictions, arm.joint_names)
+    return Result(lines, content, predictions, page, details=[page.tables["errors"]])
+
+
+def _fitted_lines(predictions: "Sequence[Prediction]") -> list[str]:
+    """Return which logs test nothing, because the fit was made with them."""
+    fitted = [p.log.source for p in predictions if p.unseen is False]
+    if not fitted:
+        return []
+    what = f"was made with {listed(fitted, 3)}"
+    return [f"The fit, or one that it began from, {what}: that tests nothing."]
+
+
+def _content(
+    fits: "Mapping[str, Sequence[JointVerdict]]",
+    predictions: "Sequence[Prediction]",
+    joint_names: Sequence[str],
+) -> Plain:
+    """Return verdicts and errors as JSON has them, of the best fit first."""
+    verdicts = list[Plain]()
+    for name, verdict in fits.items():
+        verdicts += [{"fit": name} | joint.model_dump() for joint in verdict]
+    results = list[Plain]()
+    for prediction in predictions:
+        results += prediction.plain(joint_names)
+    return {"verdict": verdicts, "results": results}
+
+
+@record
+class _Tested:
+    """A fit, what it makes of its own logs and of those that test it, and the verdict."""
+
+    model: IdentifiedModel
+    fitted: "Sequence[Prediction]"
+    predictions: "list[Prediction]"
+    verdict: "tuple[JointVerdict, ...]"
+
+
+def _test(
+    source: ModelSource,
+    model: IdentifiedModel,
+    logs: Sequence[Log],
+    tolerance: float | None,
+) -> _Tested:
+    """Test a fit on logs that were read with its settings."""
+    from hydroid.fitting.validation import predicted
+    from hydroid.fitting.verdict import judge
+    from hydroid.run.record import record_of
+
+    # a fit in memory brings its record along
+    is_fit = not isinstance(source, str | Path | IdentifiedModel)
+    record = source.record if is_fit else record_of(model)
+    fitted: Sequence[Prediction] = ()
+    baselines: Baselines = {}
+    if record is not None:
+        fitted = record.fitted
+        baselines = record.baselines
+    # also those of fits that it began from
+    known = seen_logs(source)
+    predictions = list["Prediction"]()
+    for log in logs:
+        unseen = _unseen(log, known) if known else None
+        predictions.append(predicted(model, log, unseen))
+    settings = model.settings
+    if tolerance is not None:
+        settings = settings.changed({"tolerance_deg": tolerance})
+    return _Tested(model, fitted, predictions, judge(settings, fitted, baselines, predictions))
+
+
+def _keep(test: _Tested, *, apart: bool) -> None:
+    """Store what a fit makes of unseen logs in its own run, whose report shows them from now on."""
+    from hydroid.reporting.predictions import draw
+    from hydroid.run.record import keep_validation
+
+    run = keep_validation(test.model, [replace(p, apart=apart) for p in test.predictions])
+    if run:
+        draw(run)
 
 
 def _unseen(log: Log, fitted: Sequence[Log]) -> bool:
-    """Return whether a log is none of the fitted ones, in whatever file, and holds no large part of them."""
+    """Return whether a log is none of the fitted ones, in whatever file,
+    and holds no large part of them."""
     part = overlap(log, fitted)
     if 0 < part < 1:
         counts = "unseen" if part < KNOWN else "fitted"
@@ -122,8 +199,8 @@ def report(
 ) -> "Result[tuple[Record, ...]]":
     """Draw the reports of finished runs anew, or merge runs of one fit with different seeds.
 
-    Nothing is simulated, and no log is needed: a run stores all that its report shows, which is written again
-    in its folder. `hydroid validate` compares several fits.
+    Nothing is simulated, and no log is needed: a run stores all that its report shows, which is
+    written again in its folder. `hydroid validate` compares several fits.
 
     Example: hydroid report runs/mech runs/hyd
 
@@ -138,30 +215,37 @@ def report(
         out (DIR): Folder for the tables of --merge.
 
     Raises:
-        RunError: a folder holds no finished run of this version, runs to be merged differ in more than their
-            seeds, or the page cannot be written.
+        RunError: a folder holds no finished run of this version, runs to be merged differ in more
+            than their seeds, or the page cannot be written.
     """
-    if not merge:
-        from hydroid.reporting.predictions import draw
+    folders = as_list(runs)
+    if merge:
+        return _merged([str(folder) for folder in folders], out)
+    from hydroid.reporting.predictions import draw
 
-        for run in as_list(runs):
-            warn_of_changes(Path(run))
-        files = [str(draw(run, figures=figures)) for run in as_list(runs)]
-        return Result(files, {"files": files}, ())
-    from hydroid.reporting.parameters_report import merged_tables
+    for folder in folders:
+        warn_of_changes(Path(folder))
+    files = [str(draw(folder, figures=figures)) for folder in folders]
+    return Result(files, {"files": files}, ())
+
+
+def _merged(folders: Sequence[str], out: "Source | None") -> "Result[tuple[Record, ...]]":
+    """Return median and spread of the estimates of one fit with different seeds."""
+    from hydroid.reporting.merged_report import merged_tables
     from hydroid.run.record import read_runs
 
-    collected = read_runs([str(run) for run in as_list(runs)], out)
-    tables, best = merged_tables(collected), min(collected, key=lambda run: run.rms_deg)
-    line = f"smallest error: {best.folder} (seed {best.seed})"
+    collected = read_runs(folders, out)
+    tables = merged_tables(collected)
+    best = min(collected, key=lambda run: run.rms_deg)
     spread = tables["spread"]
-    content = {
+    content: Plain = {
         "out": out and str(out),
         "best": best.folder,
-        "runs": {
-            run.folder: {"seed": run.seed, "fitted_deg": {v.name: v.fitted_deg for v in run.summary.verdict}}
-            for run in collected
-        },
+        "runs": {},
         "parameters": [dict(zip(spread.header, row, strict=True)) for row in spread.rows],
     }
+    for run in collected:
+        fitted_deg = {joint.name: joint.fitted_deg for joint in run.summary.verdict}
+        content["runs"][run.folder] = {"seed": run.seed, "fitted_deg": fitted_deg}
+    line = f"smallest error: {best.folder} (seed {best.seed})"
     return Result([spread, line, *written(tables, out)], content, collected)

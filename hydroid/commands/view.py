@@ -1,4 +1,5 @@
-"""`hydroid simulate` and `hydroid view`: what a model predicts as a log, and as an arm in motion."""
+"""`hydroid simulate` and `hydroid view`: what a model predicts as a log,
+and as an arm in motion."""
 
 from contextlib import suppress
 from dataclasses import replace
@@ -28,6 +29,7 @@ from hydroid.viewer import choose_platform
 
 if TYPE_CHECKING:
     from hydroid.arm.model import Clearance
+    from hydroid.identified_model import IdentifiedModel
     from hydroid.settings.fit import FitSettings
 
 
@@ -55,7 +57,8 @@ def simulate(
     set: "SettingChanges" = None,
     repair: bool = False,
 ) -> Simulated:
-    """Simulate commands with an estimate and write the log: a prediction, or synthetic data to test a fit.
+    """Simulate commands with an estimate and write the log: a prediction,
+    or synthetic data to test a fit.
 
     Of two arms neither feels the other: the carrier stands still, and they share no pump.
 
@@ -64,7 +67,8 @@ def simulate(
         log = hydroid.simulate("commands.csv", fit="runs/a", out="predicted.csv").log
 
     Args:
-        commands (COMMANDS.csv): A log of commands. Its angles before the first command give the start pose.
+        commands (COMMANDS.csv): A log of commands. Its angles before the first command give the
+            start pose.
         out (LOG.csv): The log to write [default of the command line: runs/simulated.csv].
         noise_deg (0 to 90): Standard deviation of Gaussian noise on the angles [deg].
 
@@ -81,15 +85,23 @@ def simulate(
     logs: dict[str, Log] = {}
     for number, (name, log) in enumerate(read.items()):
         predicted = predict_log(model, log)
-        noise = np.random.default_rng(seed + number).normal(0.0, np.deg2rad(noise_deg), log.angle.shape)
-        source = str(out or f"simulated {Path(log.source).name}")  # no longer the log of the commands
+        generator = np.random.default_rng(seed + number)
+        noise = generator.normal(0.0, np.deg2rad(noise_deg), log.angle.shape)
+        # no longer the log of the commands
+        source = str(out or f"simulated {Path(log.source).name}")
         logs[name] = replace(predicted, angle=predicted.angle + noise, source=source)
+    first = next(iter(logs.values()))
+    content = {
+        "out": out and str(out),
+        "samples": len(first.time),
+        "duration_s": first.duration,
+    }
+    if out is None:
+        return Simulated([], content, logs)
     columns = model.settings.log
-    if out is not None:
-        write_logs(Path(out), [(log, columns.of_arm(n) if arm else columns) for n, log in logs.items()])
-    first, file = next(iter(logs.values())), out and str(out)
-    content = {"out": file, "samples": len(first.time), "duration_s": first.duration}
-    return Simulated([file] if file else [], content, logs)
+    with_columns = [(log, columns.of_arm(name) if arm else columns) for name, log in logs.items()]
+    write_logs(Path(out), with_columns, arm=model.settings.arm)
+    return Simulated([str(out)], content, logs)
 
 
 @command
@@ -108,9 +120,10 @@ def view(
 ) -> "Result[Clearance | None]":
     """Show the moving arm in MuJoCo's viewer, in real time, beside the ghost of the measured one.
 
-    Without a log, the sliders in the panel "Control" on the right set the commands in %. Backspace restarts.
-    With -o FILE it writes a film or a picture instead. This needs no display, but OpenGL by EGL or OSMesa. In
-    a program of your own, set MUJOCO_GL to egl or osmesa before anything is imported.
+    Without a log, the sliders in the panel "Control" on the right set the commands in %. Backspace
+    restarts. With -o FILE it writes a film or a picture instead. This needs no display, but OpenGL
+    by EGL or OSMesa. In a program of your own,
+    set MUJOCO_GL to egl or osmesa before anything is imported.
 
     Example: hydroid view runs/hyd -o arm.mp4
 
@@ -118,55 +131,81 @@ def view(
 
     Args:
         source (RUN|LOG): A run folder, whose first log drives the arm; or a log, with --fit.
-        out (FILE): Write a film (.mp4, .gif) or the beginning of the span (.png) instead of opening a window.
-        fit (RUN|YAML): An estimate, as a run folder or a YAML file [default: the arm's file and `hydraulics`
-            in the settings].
+        out (FILE): Write a film (.mp4, .gif) or the beginning of the span (.png) instead of opening
+            a window.
+        fit (RUN|YAML): An estimate, as a run folder or a YAML file [default: the arm's file and
+            `hydraulics` in the settings].
         span (FROM:TO): Part of the log to film [s], such as 10:20 [default: all].
-        collisions: Instead, find which bodies meet along the log's joint angles: of the arm, its base and the
-            floor; with --arm also of the carrier and the other arm. The exit status is 1 if bodies meet.
-        config (YAML): Settings [default: config.yaml in the folder of the estimate, or else fit-hyd].
+        collisions: Instead, find which bodies meet along the log's joint angles: of the arm, its
+            base and the floor; with --arm also of the carrier and the other arm. The exit status is
+            1 if bodies meet.
+        config (YAML): Settings [default: config.yaml in the folder of the estimate,
+            or else fit-hyd].
 
     Raises:
         RunError: no window, no OpenGL, no package that writes films, or the simulation diverged.
         SettingsError: another kind of file, no such arm or pose, a span without time.
     """
     if out is not None:
-        choose_platform()  # before anything here imports MuJoCo
+        # before anything here imports MuJoCo
+        choose_platform()
     log = source
     if isinstance(source, str | Path) and is_file(Path(source) / "run.json"):
         if fit is not None:
             raise SettingsError("is a run itself", source, f"name a log, or leave out --fit {fit}")
-        fit, log = source, run_logs(Path(source))[0]
-    wanting = {"--collisions": collisions, "--arm": arm, "--out": out}
-    if log is None and (where := next((name for name, given in wanting.items() if given), None)):
-        raise SettingsError("needs a log or a run", where, "name the log")
+        # a run names both its fit and its logs
+        fit = source
+        log = run_logs(Path(source))[0]
+    if log is None:
+        # only the sliders need no log
+        for option, given in {"--collisions": collisions, "--arm": arm, "--out": out}.items():
+            if given:
+                raise SettingsError("needs a log or a run", option, "name the log")
+        _show(open_model(fit, config, set, nominal=True), None, pose)
+        return Result([], {}, None)
     if collisions:
-        known = open_model(fit, config, set, nominal=True).settings if fit else None
-        settings = known or load_settings(config or "fit-hyd", set)
-        return _collisions(read_arms(log or "", settings, arm, angles=True, repair=repair), settings)
+        if fit:
+            settings = open_model(fit, config, set, nominal=True).settings
+        else:
+            settings = load_settings(config or "fit-hyd", set)
+        logs = read_arms(log, settings, arm, angles=True, repair=repair)
+        return _collisions(logs, settings)
     model = open_model(fit, config, set, nominal=True)
-    logs = None if log is None else read_arms(log, model.settings, arm, pose=pose, repair=repair)
+    logs = read_arms(log, model.settings, arm, pose=pose, repair=repair)
+    if out is None:
+        _show(model, logs, pose)
+        return Result([], {}, None)
+    _write_film(model, logs, Path(out), _span(span))
+    return Result([str(out)], {"out": str(out)}, None)
+
+
+def _write_film(
+    model: "IdentifiedModel", logs: "dict[str, Log]", out: Path, span: tuple[float, float]
+) -> None:
+    """Write a film or a picture of simulated logs, by its ending, of a span [s]."""
+    from hydroid.viewer.film import KINDS, render_motion
     from hydroid.viewer.motion import simulated_motion
 
-    if out is not None:
-        from hydroid.viewer.film import KINDS, render_motion
+    kind = out.suffix.lower()
+    if kind not in KINDS:
+        raise SettingsError("is no film or picture", out, f"end it in {', '.join(KINDS)}")
+    with Progress() as progress:
+        film = render_motion(simulated_motion(model, logs), kind, span, progress)
+    write_atomic(out, film)
 
-        kind, part = Path(out).suffix.lower(), _span(span)
-        if kind not in KINDS:
-            raise SettingsError("is no film or picture", out, f"end it in {', '.join(KINDS)}")
-        with Progress() as progress:
-            film = render_motion(simulated_motion(model, logs or {}), kind, part, progress)
-        write_atomic(Path(out), film)
-        return Result([str(out)], {"out": str(out)}, None)
+
+def _show(model: "IdentifiedModel", logs: "dict[str, Log] | None", pose: str | None) -> None:
+    """Show simulated logs in a window; without logs the arm, moved by sliders."""
     from hydroid.plant import Plant
     from hydroid.viewer.film import show
-    from hydroid.viewer.motion import Replay, Sliders
+    from hydroid.viewer.motion import Replay, Sliders, simulated_motion
 
     with suppress(KeyboardInterrupt):  # as good as closing the window
-        every = range(1, 1 + len(model.settings.arm.joints))
-        shown = Sliders(Plant(model, joints=every), pose) if logs is None else None
-        show(shown or Replay(simulated_motion(model, logs or {})))
-    return Result([], {}, None)
+        if logs is None:
+            every = range(1, 1 + len(model.settings.arm.joints))
+            show(Sliders(Plant(model, joints=every), pose))
+        else:
+            show(Replay(simulated_motion(model, logs)))
 
 
 def _collisions(logs: "dict[str, Log]", settings: "FitSettings") -> "Result[Clearance]":
@@ -175,27 +214,35 @@ def _collisions(logs: "dict[str, Log]", settings: "FitSettings") -> "Result[Clea
     machine = load_machine(settings.arm, pair=ALONE not in logs)
     rest = settings.arm.pose(settings.start_pose)
     angle = machine.joined({side: log.posed for side, log in logs.items()}, rest)
-    result = machine.checker.clearance(next(iter(logs.values())).time, angle)
+    first = next(iter(logs.values()))
+    result = machine.checker.clearance(first.time, angle)
     nearest = result.distance.argmin()
+    distance = result.distance[nearest]
+    moment = result.time[nearest]
+    bodies = result.nearest[nearest]
     content = {
         "free": not result.meetings,
-        "clearance_m": result.distance[nearest],
-        "clearance_at_s": result.time[nearest],
-        "clearance_between": [*result.nearest[nearest]],
+        "clearance_m": distance,
+        "clearance_at_s": moment,
+        "clearance_between": [*bodies],
         "collisions": [*map(vars, result.meetings)],
         "checked_pairs": result.checked,
         "excluded": [[*pair] for pair in result.excluded],
     }
-    lines = [
-        f"{' and '.join(m.bodies)} meet from {m.from_s:.2f} to {m.to_s:.2f} s, {1e3 * m.depth_m:.1f} mm deep"
-        for m in result.meetings
-    ]
-    pair, size = " and ".join(result.nearest[nearest]), f"{1e3 * result.distance[nearest]:.1f} mm"
-    none = f"no bodies meet; the nearest are {pair}: {size} at {result.time[nearest]:.2f} s"
-    return Result(lines or [none], content, result, exit_status=1 if lines else 0)
+    lines = list[str]()
+    for meeting in result.meetings:
+        when = f"from {meeting.from_s:.2f} to {meeting.to_s:.2f} s"
+        depth = f"{1e3 * meeting.depth_m:.1f} mm deep"
+        lines.append(f"{' and '.join(meeting.bodies)} meet {when}, {depth}")
+    if lines:
+        return Result(lines, content, result, exit_status=1)
+    pair = " and ".join(bodies)
+    line = f"no bodies meet; the nearest are {pair}: {1e3 * distance:.1f} mm at {moment:.2f} s"
+    return Result([line], content, result)
 
 
 def _span(text: str) -> tuple[float, float]:
+    """Return the ends of a span [s] such as 10:20, 10: or :20."""
     begin, _, end = text.partition(":")
     try:
         return float(begin or 0.0), float(end or "inf")

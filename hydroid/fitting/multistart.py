@@ -63,6 +63,15 @@ class Multistart:
         self.ends = defaultdict[int, list[float]](list)
         """negative log-likelihoods at which starts ended, by the joint fitted alone, 0: all together"""
 
+    @property
+    def generations(self) -> int:
+        """Starts after the first one."""
+        return self.settings.generations
+
+    def theta(self, chromosomes: Genes) -> Array:
+        """Return the candidates that chromosomes stand for, which they are, shape (n, P)."""
+        return chromosomes
+
     def ask(self, population: Population | None, rng: Generator) -> Genes:
         """The point that the next start reaches, shape (1, P)."""
         number = 0 if population is None else len(population.chromosomes)

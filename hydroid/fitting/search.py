@@ -1,8 +1,11 @@
-"""The search over a problem: ask for candidates, simulate them, tell their objectives, store a checkpoint."""
+"""The search over a problem: ask for candidates, simulate them, tell their objectives,
+store a checkpoint."""
 
 from collections.abc import Mapping, Sequence
+from typing import Protocol
 
 import numpy as np
+from numpy.random import Generator
 
 from hydroid.arrays import Array, record
 from hydroid.fitting.checkpoints import Arrays, Checkpoints, Memo, saving
@@ -13,18 +16,21 @@ from hydroid.problem.problem import Problem
 from hydroid.progress import LOGGER
 from hydroid.search.chromosomes import Genes
 from hydroid.search.genetic import Nsga2, Population, SimpleGa
+from hydroid.search.moo import PymooSearch
+from hydroid.search.protocol import BoxSearch
 
 HISTORY = ("generation", "evaluations", "simulated", "infeasible", "best", "median")
-"""Columns of a run's history; `best` is over the run so far, `median` over the population, both of (18) or
-(19) over the whole record."""
+"""Columns of a run's history; `best` is over the run so far, `median` over the population, both of
+(18) or (19) over the whole record."""
 
 
 @record
 class Searched:
-    """Result of a search: its last population, theta (n, P), all candidates simulated, and its history.
+    """Result of a search: its last population, theta (n, P), all candidates simulated,
+    and its history.
 
-    `single`: whether it minimised one objective, not that of each segment. `ends`: costs at which the starts
-    of a multi-start ended, by the joint that was fitted alone (0: all together).
+    `single`: whether it minimised one objective, not that of each segment. `ends`: costs at which
+    the starts of a multi-start ended, by the joint that was fitted alone (0: all together).
     """
 
     theta: Array
@@ -35,14 +41,76 @@ class Searched:
     ends: Mapping[int, Sequence[float]]
 
 
+class Search(Protocol):
+    """What the loop of `search` asks of an algorithm whose chromosomes stand for
+    candidates theta."""
+
+    @property
+    def single(self) -> bool:
+        """Whether it minimises one objective, not that of each segment."""
+        ...
+
+    @property
+    def generations(self) -> int:
+        """Number of populations after the first one."""
+        ...
+
+    @property
+    def ends(self) -> Mapping[int, Sequence[float]]:
+        """Costs at which starts ended, by the joint that was fitted alone (0: all together)."""
+        ...
+
+    def theta(self, chromosomes: Genes) -> Array:
+        """Return the candidates that chromosomes stand for, shape (n, P)."""
+        ...
+
+    def ask(self, population: Population | None, rng: Generator) -> Genes:
+        """Return chromosomes to be evaluated; None: there is no population yet."""
+        ...
+
+    def tell(self, population: Population | None, offspring: Population) -> Population:
+        """Take what was evaluated, and return the population from which the search goes on."""
+        ...
+
+
+class InBox:
+    """A search in the unit box of a problem's free parameters, as a `Search`."""
+
+    ends: Mapping[int, Sequence[float]] = {}
+
+    def __init__(self, problem: Problem, algorithm: BoxSearch) -> None:
+        self._problem = problem
+        self._algorithm = algorithm
+        self.single = algorithm.single
+        self.generations = algorithm.generations
+        self.ask = algorithm.ask
+        self.tell = algorithm.tell
+
+    def theta(self, chromosomes: Genes) -> Array:
+        """Return the candidates that chromosomes stand for, shape (n, P)."""
+        return self._problem.theta(self._algorithm.coding.decode(chromosomes))
+
+
+def box_search(problem: Problem) -> BoxSearch:
+    """Return the algorithm that the settings name, in the unit box of the free parameters."""
+    settings = problem.settings.search
+    free = int(problem.parameters.free.sum())
+    if settings.algorithm == "ga":
+        return SimpleGa(settings.ga, free, problem.start)
+    if settings.algorithm == "pymoo":
+        return PymooSearch(settings.pymoo, free, problem.settings.objective.segments, problem.start)
+    return Nsga2(settings.nsga2, free, problem.start)
+
+
 def search(problem: Problem, watch: Watcher, checkpoints: Checkpoints) -> Searched:
     """Search to the last generation, from the seed or from what `checkpoints` holds as "search".
 
-    `watch` takes a row of HISTORY after every generation, but for those that a resumed run repeats, and says
-    whether that was the last; it also watches least squares within multi-start. Raises RunError: the search
-    does not repeat what it did before the checkpoint.
+    `watch` takes a row of HISTORY after every generation, but for those that a resumed run repeats,
+    and says whether that was the last; it also watches least squares within multi-start.
+
+    Raises RunError: the search does not repeat what it did before the checkpoint.
     """
-    settings, free, late = problem.settings.search, int(problem.parameters.free.sum()), False
+    late = False
 
     def refining(step: Step, simulated: int, rms: float) -> bool:
         nonlocal late
@@ -50,49 +118,44 @@ def search(problem: Problem, watch: Watcher, checkpoints: Checkpoints) -> Search
         return late
 
     memo = Memo(problem, checkpoints.get("search"))
-    if settings.algorithm == "multistart":
+    algorithm: Search
+    if problem.settings.search.algorithm == "multistart":
         algorithm = Multistart(problem, memo, refining, checkpoints)
-    elif settings.algorithm == "ga":
-        algorithm = SimpleGa(settings.ga, free, problem.start)
     else:
-        algorithm = Nsga2(settings.nsga2, free, problem.start)
-
-    def theta(chromosomes: Genes) -> Array:
-        if isinstance(algorithm, Multistart):  # its chromosomes are theta
-            return chromosomes
-        return problem.theta(algorithm.coding.decode(chromosomes))
+        algorithm = InBox(problem, box_search(problem))
 
     def state() -> Arrays:
-        words = "checkpoint: generation %d, %d evaluated, %d simulated, %d diverged, best objective %.6g"
-        LOGGER.info(words, *history[-1, :5])
+        words = "checkpoint: generation %d, %d evaluated, %d simulated, %d diverged"
+        LOGGER.info(f"{words}, best objective %.6g", *history[-1, :5])
         return memo.arrays()
 
-    generations, rng = 1 + algorithm.settings.generations, np.random.default_rng(settings.seed)
-    population, history, evaluations = None, np.empty((0, len(HISTORY))), 0
+    rng = np.random.default_rng(problem.settings.search.seed)
+    population = None
+    history = np.empty((0, len(HISTORY)))
+    evaluations = 0
     with saving(checkpoints, "search") as keep:
-        while population is None or (len(history) < generations and not late):
+        while population is None or (len(history) <= algorithm.generations and not late):
             repeats = bool(memo.stored)
             chromosomes = algorithm.ask(population, rng)
-            result = memo.evaluate(theta(chromosomes))
+            result = memo.evaluate(algorithm.theta(chromosomes))
             evaluations += len(chromosomes)
             objectives = result[:, -1:] if algorithm.single else result[:, :-1]
             population = algorithm.tell(population, Population(chromosomes, objectives))
-            overall = memo.evaluate(theta(population.chromosomes))[:, -1]
+            overall = memo.evaluate(algorithm.theta(population.chromosomes))[:, -1]
             finite = overall[np.isfinite(overall)]
-            best = min(history[-1, 4] if len(history) else np.inf, result[:, -1].min())
-            median = np.median(finite) if finite.size else np.inf
+            best_before = history[-1, 4] if len(history) else np.inf
             row = [
                 len(history) + 1,
                 evaluations + memo.elsewhere,
                 memo.simulated,
                 memo.infeasible,
-                best,
-                median,
+                min(best_before, result[:, -1].min()),
+                np.median(finite) if finite.size else np.inf,
             ]
             history = np.vstack([history, row])
             if not repeats:
                 if not late:  # else a start may not have been refined to its end
                     keep(state)
                 late = watch.generation(history[-1]) or late
-    ends = algorithm.ends if isinstance(algorithm, Multistart) else {}
-    return Searched(theta(population.chromosomes), population, algorithm.single, history, memo, ends)
+    theta = algorithm.theta(population.chromosomes)
+    return Searched(theta, population, algorithm.single, history, memo, algorithm.ends)

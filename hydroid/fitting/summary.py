@@ -8,12 +8,14 @@ import numpy as np
 from hydroid.estimate import AngleError, FitSummary, NamedEstimate, ParameterEstimate, finite, finite_ends
 from hydroid.findings import Finding
 from hydroid.fitting.fit import Fit
+from hydroid.parameters import Parameter
 from hydroid.posterior.by_log import by_log
 from hydroid.posterior.error_model import ErrorModel
 from hydroid.posterior.identifiability import identifiability
 from hydroid.posterior.uncertainty import Flag, Source, Uncertainty
 from hydroid.posterior.whiteness import lasting
 from hydroid.problem.problem import Problem
+from hydroid.quantity_table import CHOICES
 from hydroid.search.descent import Ending
 
 STRAINED_ABOVE = 2.0
@@ -21,7 +23,15 @@ STRAINED_ABOVE = 2.0
 SAME_OPTIMUM = 10.0
 """log-likelihood below the best up to which a start has found the same optimum"""
 _WARNINGS = "at bound", "effect unknown"
-_KINDS = (*_WARNINGS, "at zero", "no effect", "not identifiable", "prior only", "weakly identifiable")
+_KINDS = (
+    *_WARNINGS,
+    "at zero",
+    "at limit",
+    "no effect",
+    "not identifiable",
+    "prior only",
+    "weakly identifiable",
+)
 """of what is found about single parameters, the most important first"""
 
 
@@ -172,9 +182,10 @@ def _parameter_findings(problem: Problem, estimate: Mapping[str, ParameterEstima
     kinds = defaultdict[tuple[str, str], list[str]](list)
     for parameter in problem.parameters.parameters:
         one = estimate[parameter.name]
-        idle, zero = one.flag == Flag.NO_EFFECT, one.at_bound == "lower" and parameter.lower == 0
+        idle = one.flag == Flag.NO_EFFECT
         if one.at_bound and not idle:
-            kinds["at zero" if zero else "at bound", one.at_bound].append(parameter.name)
+            kind = _at_bound(problem, parameter, one.at_bound)
+            kinds[kind, one.at_bound].append(parameter.name)
         if idle and problem.settings.parameters[parameter.name].per:
             continue
         kind = one.source if one.source == Source.PRIOR and not idle else one.flag
@@ -189,3 +200,11 @@ def _parameter_findings(problem: Problem, estimate: Mapping[str, ParameterEstima
         for (own, side), names in kinds.items()
         if own == kind
     ]
+
+
+def _at_bound(problem: Problem, parameter: Parameter, side: str) -> str:
+    """Return the kind of finding of an estimate at a bound: none asks to widen what nobody can widen."""
+    if side == "lower":
+        return "at zero" if parameter.lower == 0 else "at bound"
+    limits = CHOICES[problem.settings.parameters[parameter.name].quantity].limits
+    return "at limit" if limits is not None and parameter.upper >= limits[1] else "at bound"

@@ -1,9 +1,13 @@
-"""How well a model predicts a log: its response with a band, and the article's error indices (table 9)."""
+"""How well a model predicts a log: its response with a band, and the article's error indices (table
+9).
+"""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import field, replace
 from functools import partial
 from math import degrees
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,8 +18,12 @@ from hydroid.fitting.fit import Fit
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
 from hydroid.posterior.band import Band, fitted_bands, prediction_bands
-from hydroid.prediction import predict
+from hydroid.prediction import predict, predict_with_pressures
 from hydroid.progress import LOGGER
+from hydroid.words import listed, three_digits
+
+if TYPE_CHECKING:
+    import pandas
 
 HORIZONS = (0.5, 1.0, 2.0, 5.0, 10.0)
 """over which a predicted change of an angle is compared [s]"""
@@ -27,8 +35,8 @@ SETTLING = 2.0
 class ErrorIndices:
     """Indices of an output error: mean absolute, rms and largest [rad], and fit [%].
 
-    fit = 100 (1 - |y - y_hat| / |y - mean(y)|), 100 for a perfect response, 0 for the mean of the data;
-    NaN where the data do not move.
+    fit = 100 (1 - |y - y_hat| / |y - mean(y)|), 100 for a perfect response, 0 for the mean of the
+    data; NaN where the data do not move.
     """
 
     mean_absolute: float
@@ -38,8 +46,43 @@ class ErrorIndices:
 
 
 @record
+class JointPrediction:
+    """What a model makes of one joint in a log, in deg, or in mm of a joint that slides.
+
+    Attributes:
+        name: of the joint.
+        unit: `deg` or `mm`.
+        time: [s], shape (T,).
+        measured: angle or position, shape (T,).
+        response: that of the model, shape (T,).
+        half: half of the 95 % prediction band, shape (T,); None: the model is no fit.
+    """
+
+    name: str
+    unit: str
+    time: Array
+    measured: Array
+    response: Array
+    half: Array | None
+
+    @property
+    def error(self) -> Array:
+        """Measured minus response, shape (T,)."""
+        return self.measured - self.response
+
+    @property
+    def rms(self) -> float:
+        """The rms of the error; NaN if the simulation diverged."""
+        return float(rms(self.error))
+
+
+@record
 class Prediction:
     """What a model makes of a log's commands.
+
+        prediction = fitted.predict("b.csv")
+        print(prediction["boom"].error)  # [deg]
+        prediction.to_frame()["boom"].plot()
 
     Attributes:
         fit: name of the model.
@@ -48,7 +91,12 @@ class Prediction:
         response: their angles [rad], shape (T, K).
         bands: prediction bands by joint; empty of a model that is no fit.
         unseen: whether the model was made without this log; None: not known.
-        apart: whether a user has said that it is of other conditions than the fit's: no verdict counts it.
+        apart: whether a user has said that it is of other conditions than the fit's: no verdict
+            counts it.
+        pressure: of both chambers of the joints [Pa], shape (T, K, 2); NaN of those without
+            commands; None: the model has no hydraulics.
+        names: of the joints; empty: their numbers stand for them.
+        slides: numbers of those joints that slide.
         ahead: `errors_ahead` of the joints [rad], shape (N, HORIZONS, K); none where N is 0.
     """
 
@@ -60,6 +108,67 @@ class Prediction:
     unseen: bool | None
     ahead: Array = field(default_factory=partial(np.empty, (0, len(HORIZONS), 0)))
     apart: bool = False
+    names: tuple[str, ...] = ()
+    slides: tuple[int, ...] = ()
+    pressure: Array | None = None
+
+    def __getitem__(self, joint: str | int) -> JointPrediction:
+        """Return what is predicted of a joint, by its name or its number from 1.
+
+        Raises KeyError: the model compares no such joint.
+        """
+        named = dict(zip(self._named, self.joints, strict=True))
+        number = named.get(joint, joint) if isinstance(joint, str) else joint
+        if number not in self.joints:
+            raise KeyError(f"no joint {joint!r} is predicted; there {_are(self._named)}")
+        slides = number in self.slides
+        factor = 1e3 if slides else degrees(1.0)
+        column = self.joints.index(number)
+        band = self.bands.get(number)
+        return JointPrediction(
+            name=self._named[column],
+            unit="mm" if slides else "deg",
+            time=self.log.time,
+            measured=factor * self.log.angle[:, number - 1],
+            response=factor * self.response[:, column],
+            half=None if band is None else factor * band.half,
+        )
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._named)
+
+    @property
+    def _named(self) -> tuple[str, ...]:
+        return self.names or tuple(map(str, self.joints))
+
+    def to_frame(self) -> "pandas.DataFrame":
+        """Return one row per sample, by its time [s].
+
+        Columns are, for each joint, `measured`, `response`, `error`, and where there is a band
+        `half` of it, in deg, or in mm of a joint that slides.
+        """
+        import pandas
+
+        columns = dict[tuple[str, str], Array]()
+        for name in self:
+            one = self[name]
+            columns[name, "measured"] = one.measured
+            columns[name, "response"] = one.response
+            columns[name, "error"] = one.error
+            if one.half is not None:
+                columns[name, "half"] = one.half
+        index = pandas.Index(self.log.time, name="time [s]")
+        return pandas.DataFrame(columns, index=index)
+
+    def __repr__(self) -> str:
+        seen = {True: ", unseen", False: ", fitted", None: ""}[self.unseen]
+        errors = [f"{one.name} {three_digits(one.rms)} {one.unit}" for one in map(self.__getitem__, self)]
+        name = next(iter(self), "JOINT")
+        return (
+            f"{self.fit} on {Path(self.log.source).name}: {self.log.duration:.0f} s{seen}\n"
+            f"rms error: {listed(errors)}\n"
+            f'more: prediction["{name}"].error, prediction.to_frame()'
+        )
 
     @property
     def indices(self) -> dict[int, ErrorIndices]:
@@ -71,7 +180,10 @@ class Prediction:
         return self.log.angle[:, joint - 1] - self.response[:, self.joints.index(joint)]
 
     def plain(self, names: Sequence[str]) -> list[Plain]:
-        """Return one mapping per joint, as JSON has them (docs/json.md); `names` are of all joints."""
+        """Return one mapping per joint, as JSON has them (docs/json.md).
+
+        `names` are of all joints.
+        """
         rows: list[Plain] = []
         for joint, one in self.indices.items():
             row = Plain({"fit": self.fit, "log": self.log.source, "joint": joint, "name": names[joint - 1]})
@@ -84,6 +196,10 @@ class Prediction:
         return rows
 
 
+def _are(names: Sequence[str]) -> str:
+    return f"is {names[0]}" if len(names) == 1 else f"are {listed(names)}"
+
+
 def error_indices(measured: Array, error: Array) -> ErrorIndices:
     """Return the indices of an error of the measured angle [rad], both of shape (T,)."""
     size, spread, part = rms(error), np.std(measured), np.abs(error)
@@ -94,7 +210,8 @@ def error_indices(measured: Array, error: Array) -> ErrorIndices:
 def predicted(model: IdentifiedModel, log: Log, unseen: bool | None) -> Prediction:
     """Return a model's prediction of a log: NaN, with a warning, where the simulation diverges."""
     joints = tuple(model.settings.outputs)
-    response, bands = predict(model, log, joints), dict[int, Band]()
+    response, pressure = predict_with_pressures(model, log, joints)
+    bands = dict[int, Band]()
     if np.isfinite(response).all():
         bands = prediction_bands(model, log, response)
     else:
@@ -103,17 +220,30 @@ def predicted(model: IdentifiedModel, log: Log, unseen: bool | None) -> Predicti
     def errors(part: Log) -> Array:
         return part.angle[:, [j - 1 for j in joints]] - predict(model, part, joints)
 
-    found = Prediction(model.name, log, joints, response, bands, unseen)
+    arm = model.settings.arm
+    named = tuple(arm.joint_names[joint - 1] for joint in joints)
+    found = Prediction(
+        model.name,
+        log,
+        joints,
+        response,
+        bands,
+        unseen,
+        names=named,
+        slides=tuple(arm.slides),
+        pressure=pressure,
+    )
     return found if unseen is False else replace(found, ahead=errors_ahead(log, errors))
 
 
 def errors_ahead(log: Log, errors: Callable[[Log], Array]) -> Array:
-    """Return by how much predicted changes of angles over HORIZONS are off, from starts all along a log.
+    """Return by how much predicted changes of angles over HORIZONS are off, from starts all along a
+    log.
 
-    Each start is simulated from SETTLING before it, at the angles measured there: valves, pilot stages and
-    pump are then as the commands have left them. `errors` are those of a part of the log [rad], shape (T,) or
-    (T, K). Each start has a row [rad], shape (N, HORIZONS) or (N, HORIZONS, K); NaN where the log ends
-    before.
+    Each start is simulated from SETTLING before it, at the angles measured there: valves, pilot
+    stages and pump are then as the commands have left them. `errors` are those of a part of the log
+    [rad], shape (T,) or (T, K). Each start has a row [rad], shape (N, HORIZONS) or
+    (N, HORIZONS, K); NaN where the log ends before.
     """
     before, rows = round(SETTLING / log.period), list[Array]()
     steps = np.array([before + round(seconds / log.period) for seconds in HORIZONS])
@@ -127,7 +257,23 @@ def errors_ahead(log: Log, errors: Callable[[Log], Array]) -> Array:
 
 def fitted(fit: Fit) -> tuple[Prediction, ...]:
     """Return what the final estimate of a fit makes of its own logs."""
-    joints, responses = tuple(fit.problem.settings.outputs), fit.best.responses
+    settings = fit.problem.settings
+    joints = tuple(settings.outputs)
+    model = IdentifiedModel(settings, fit.best.theta, fit.final)
+    responses = fit.best.responses
     bands = fitted_bands(fit.problem, fit.uncertainty, responses)
-    logs = zip(fit.problem.logs, responses, bands, strict=True)
-    return tuple(Prediction(fit.final, log, joints, angles, bands, False) for log, angles, bands in logs)
+    predictions = list[Prediction]()
+    for log, angles, of_log in zip(fit.problem.logs, responses, bands, strict=True):
+        one = Prediction(
+            fit.final,
+            log,
+            joints,
+            angles,
+            of_log,
+            False,
+            names=tuple(settings.arm.joint_names[joint - 1] for joint in joints),
+            slides=tuple(settings.arm.slides),
+            pressure=predict_with_pressures(model, log, joints)[1] if settings.stage == "hyd" else None,
+        )
+        predictions.append(one)
+    return tuple(predictions)

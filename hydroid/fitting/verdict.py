@@ -1,20 +1,25 @@
 """The verdict on a fit, joint by joint: what it predicts, beside what anybody would try first.
 
-Errors are rms over the logs that drive the joint. The tolerance is `tolerance_deg` of the settings, or 2 % of
-the joint's travel in the unseen logs. With each simple model the fit is compared in pairs at JUDGED times
-ahead (`fitting.comparison`). It is ahead of one if it is better at one of these times. The first of these
-that is true is the verdict:
+Errors are rms over the logs that drive the joint. The tolerance is `tolerance_deg` of the settings,
+or 2 % of the joint's travel in the unseen logs. With each simple model the fit is compared in pairs
+at JUDGED times ahead (`fitting.comparison`). It is ahead of one if it is better at one of these
+times. The first of these that is true is the verdict:
 
 1. predicts: the error on the unseen logs is within the tolerance, whatever the simple models do;
-2. does not fit: on the fitted logs the error is outside the tolerance, and a simple model's is smaller; where
+2. does not fit: on the fitted logs the error is outside the tolerance, and a simple model's is
+smaller; where
    there are unseen logs, the fit is not ahead of each simple model there either;
 3. not tested: no unseen log drives the joint;
-4. predicts no better than a simple model: it is not ahead of that one, and at one of these times it is worse;
+4. predicts no better than a simple model: it is not ahead of that one, and at one of these times it
+is worse;
    the simplest such is named;
-5. predicts worse than it fits: the error on the unseen logs is more than twice that on the fitted ones, or
+5. predicts worse than it fits: the error on the unseen logs is more than twice that on the fitted
+ones, or
    it diverges;
-6. predicts little: the error on the unseen logs is more than half of what standing still errs by there;
-7. cannot be told from a simple model: it is not ahead of that one, and at none of these times worse; of
+6. predicts little: the error on the unseen logs is more than half of what standing still errs by
+there;
+7. cannot be told from a simple model: it is not ahead of that one, and at none of these times
+worse; of
    several such that with the smallest error is named;
 8. predicts roughly: none of these. It is ahead of every simple model, and outside the tolerance.
 """
@@ -40,7 +45,8 @@ SHARE = 0.02
 CLEARLY = 0.9
 """part of another model's error on the fitted logs that a better one stays below"""
 LEAST_TOLERANCE = 0.001
-"""the least that a tolerance can be [deg]; none follows from a joint that is never driven, or never moves"""
+"""the least that a tolerance can be [deg]; none follows from a joint that is never driven,
+or never moves"""
 WORSE = 2.0
 """times the error on fitted logs, beyond which a fit predicts worse than it fits"""
 LITTLE = 0.5
@@ -69,15 +75,16 @@ def judge(
 ) -> tuple[JointVerdict, ...]:
     """Return the verdict on each compared joint.
 
-    `fitted` is what the fit makes of its own logs; none of values that are no fit's. `baselines` are fitted
-    to the same logs; none: a joint is compared with standing still. Of the predictions `unseen`, those of
-    logs that the fit has seen test nothing, and those that are `apart` do not count.
+    `fitted` is what the fit makes of its own logs; none of values that are no fit's. `baselines`
+    are fitted to the same logs; none: a joint is compared with standing still. Of the predictions
+    `unseen`, those of logs that the fit has seen test nothing, and those that are `apart` do not
+    count.
     """
     verdicts = list[JointVerdict]()
     for joint in settings.outputs:
         models = baselines.get(joint) or {NAMES[0]: Baseline(joint, ANYWHERE)}
-        own = [p for p in fitted if p.log.driven[joint - 1]]
-        verdicts.append(_judged(settings, models, own, _tests(unseen, joint), joint))
+        fitted_there = [p for p in fitted if p.log.driven[joint - 1]]
+        verdicts.append(_judged(settings, models, fitted_there, _tests(unseen, joint), joint))
     return tuple(verdicts)
 
 
@@ -88,7 +95,8 @@ def _tests(unseen: Sequence[Prediction], joint: int) -> list[Prediction]:
 
 @record
 class _Errors:
-    """Rms errors of one joint over some logs [deg]: of the fit, None without logs, and of simple models."""
+    """Rms errors of one joint over some logs [deg]: of the fit, None without logs,
+    and of simple models."""
 
     fit: float | None
     simple: Mapping[str, float]
@@ -97,59 +105,61 @@ class _Errors:
 def _judged(
     settings: FitSettings,
     models: Mapping[str, Baseline],
-    own: Sequence[Prediction],
-    new: Sequence[Prediction],
+    fitted: Sequence[Prediction],
+    unseen: Sequence[Prediction],
     joint: int,
 ) -> JointVerdict:
-    """Return the verdict on a joint by logs that drive it: `own` are fitted, `new` unseen."""
-    tolerance = _tolerance(settings, own, new, joint)
-    there = _errors(models, own, joint)
-    here = _errors(models, new, joint)
-    ahead = _ahead(models, new, joint)
-    compared = {name: _compared(ahead[THE_FIT], ahead[name]) for name in models if ahead}
-    whole = {
-        name: compare([p.error(joint) for p in new], [model.errors([p.log]) for p in new])
-        for name, model in models.items()
-        if new
-    }
-    beside = {name: _beside(compared.get(name), whole[name]) for name in whole}
-    verdict, named = _verdict(there, here, beside, tolerance)
-    banded = [p for p in new if joint in p.bands]
+    """Return the verdict on a joint by the logs that drive it."""
+    tolerance = _tolerance(settings, fitted, unseen, joint)
+    fitted_errors = _errors(models, fitted, joint)
+    unseen_errors = _errors(models, unseen, joint)
+    ahead = _ahead(models, unseen, joint)
+    compared: dict[str, tuple[Comparison, ...]] = {}
+    if ahead:
+        compared = {name: _compared(ahead[THE_FIT], ahead[name]) for name in models}
+    compared_whole = _compared_whole(models, unseen, joint)
+    outcomes = {name: _outcome(compared.get(name), whole) for name, whole in compared_whole.items()}
+    verdict, beside = _verdict(fitted_errors, unseen_errors, outcomes, tolerance)
+    banded = [p for p in unseen if joint in p.bands]
     return JointVerdict(
         joint=joint,
         name=settings.arm.joint_names[joint - 1],
         slides=settings.arm.joints[joint - 1].slides,
         verdict=verdict,
-        beside=named,
-        fitted_deg=finite(there.fit),
-        unseen_deg=finite(here.fit),
-        unseen_logs=len(new),
+        beside=beside,
+        fitted_deg=finite(fitted_errors.fit),
+        unseen_deg=finite(unseen_errors.fit),
+        unseen_logs=len(unseen),
         tolerance_deg=tolerance,
         inside_percent=_inside(banded, joint),
-        expected_deg=_expected(banded, joint) if len(own) > 1 else None,
-        baselines_deg=dict(here.simple or there.simple),
+        expected_deg=_expected(banded, joint) if len(fitted) > 1 else None,
+        baselines_deg=dict(unseen_errors.simple or fitted_errors.simple),
         horizons_deg={name: _rms_ahead(np.concatenate(rows)) for name, rows in ahead.items()},
         compared=compared,
-        compared_whole=whole,
+        compared_whole=compared_whole,
     )
 
 
 def _tolerance(
-    settings: FitSettings, own: Sequence[Prediction], new: Sequence[Prediction], joint: int
+    settings: FitSettings, fitted: Sequence[Prediction], unseen: Sequence[Prediction], joint: int
 ) -> float:
+    """Return the tolerance of a joint [deg]: the stated one, or a share of its travel."""
     stated = settings.tolerance_deg
     if isinstance(stated, dict):
         stated = stated.get(joint)
     if stated:
         return stated
-    travel = max((np.ptp(p.log.angle[:, joint - 1]) for p in new or own), default=0.0)
-    return max(float(np.degrees(SHARE * travel)), LEAST_TOLERANCE)
+    travels = [np.ptp(p.log.angle[:, joint - 1]) for p in unseen or fitted]
+    share = SHARE * max(travels, default=0.0)
+    return max(float(np.degrees(share)), LEAST_TOLERANCE)
 
 
 def _errors(models: Mapping[str, Baseline], predictions: Sequence[Prediction], joint: int) -> _Errors:
     if not predictions:
         return _Errors(None, {})
-    simple = {name: rms_deg(model.errors([p.log]) for p in predictions) for name, model in models.items()}
+    simple = dict[str, float]()
+    for name, model in models.items():
+        simple[name] = rms_deg(model.errors([p.log]) for p in predictions)
     return _Errors(rms_deg(p.error(joint) for p in predictions), simple)
 
 
@@ -158,7 +168,7 @@ def _inside(banded: Sequence[Prediction], joint: int) -> float | None:
     if not banded:
         return None
     parts = [p.bands[joint].inside for p in banded]
-    return 100 * float(np.average(parts, weights=[len(p.log.time) for p in banded]))
+    return 100 * float(np.average(parts, weights=_samples(banded)))
 
 
 def _expected(banded: Sequence[Prediction], joint: int) -> float | None:
@@ -166,40 +176,78 @@ def _expected(banded: Sequence[Prediction], joint: int) -> float | None:
     if not banded:
         return None
     errors = [p.bands[joint].expected for p in banded]
-    return finite(rms_deg([np.repeat(errors, [len(p.log.time) for p in banded])]))
+    return finite(rms_deg([np.repeat(errors, _samples(banded))]))
 
 
-def _ahead(models: Mapping[str, Baseline], new: Sequence[Prediction], joint: int) -> dict[str, list[Array]]:
-    """Return errors of predicted changes, (N, HORIZONS) of each log, by model; empty where no log has any.
+def _samples(predictions: Sequence[Prediction]) -> list[int]:
+    """Return the number of samples of each prediction."""
+    return [len(p.log.time) for p in predictions]
+
+
+def _ahead(
+    models: Mapping[str, Baseline], unseen: Sequence[Prediction], joint: int
+) -> dict[str, list[Array]]:
+    """Return errors of predicted changes, (N, HORIZONS) of each log, by model; empty where no log
+    has any.
 
     A log that is shorter than the shortest horizon has no starts.
     """
-    long = [p for p in new if len(p.ahead)]
-    if not long:
+    with_starts = [p for p in unseen if len(p.ahead)]
+    if not with_starts:
         return {}
-    ahead = {THE_FIT: [p.ahead[..., p.joints.index(joint)] for p in long]}
+    ahead = {THE_FIT: [p.ahead[..., p.joints.index(joint)] for p in with_starts]}
     for name, model in models.items():
-        ahead[name] = [errors_ahead(p.log, lambda part, model=model: model.errors([part])) for p in long]
+        ahead[name] = [_ahead_of(model, p.log) for p in with_starts]
     return ahead
+
+
+def _ahead_of(model: Baseline, log: Log) -> Array:
+    """Return a simple model's errors of predicted changes of a log, shape (N, HORIZONS)."""
+    return errors_ahead(log, lambda part: model.errors([part]))
 
 
 def _compared(ours: Sequence[Array], theirs: Sequence[Array]) -> tuple[Comparison, ...]:
     """Compare the fit with a simple model at each of HORIZONS; errors are those of `_ahead`."""
-    result = list[Comparison]()
+    comparisons = list[Comparison]()
     for column in range(len(HORIZONS)):
-        pair = [
-            [block for log in rows for block in in_blocks(log[:, column], SETTLING)]
-            for rows in (ours, theirs)
-        ]
-        result.append(compare(*pair))
-    return tuple(result)
+        our_blocks = _blocks(ours, column)
+        their_blocks = _blocks(theirs, column)
+        comparisons.append(compare(our_blocks, their_blocks))
+    return tuple(comparisons)
 
 
-def _beside(compared: Sequence[Comparison] | None, whole: Comparison) -> Outcome:
-    """Return whether the fit is ahead of a simple model at all, by JUDGED times; without starts by logs."""
+def _blocks(errors: Sequence[Array], column: int) -> list[Array]:
+    """Return the errors of all logs at one of HORIZONS, in blocks that are independent enough."""
+    blocks = list[Array]()
+    for log in errors:
+        blocks += in_blocks(log[:, column], SETTLING)
+    return blocks
+
+
+def _compared_whole(
+    models: Mapping[str, Baseline], unseen: Sequence[Prediction], joint: int
+) -> dict[str, Comparison]:
+    """Compare the fit with each simple model over whole logs."""
+    if not unseen:
+        return {}
+    ours = [p.error(joint) for p in unseen]
+    compared = dict[str, Comparison]()
+    for name, model in models.items():
+        theirs = [model.errors([p.log]) for p in unseen]
+        compared[name] = compare(ours, theirs)
+    return compared
+
+
+def _outcome(compared: Sequence[Comparison] | None, whole: Comparison) -> Outcome:
+    """Return whether the fit is ahead of a simple model at all, by JUDGED times; without starts by
+    whole logs."""
     if compared is None:
         return whole.outcome
-    outcomes = [one.outcome for seconds, one in zip(HORIZONS, compared, strict=True) if seconds in JUDGED]
+    outcomes = [
+        comparison.outcome
+        for seconds, comparison in zip(HORIZONS, compared, strict=True)
+        if seconds in JUDGED
+    ]
     for decided in (Outcome.BETTER, Outcome.WORSE):
         if decided in outcomes:
             return decided
@@ -207,63 +255,105 @@ def _beside(compared: Sequence[Comparison] | None, whole: Comparison) -> Outcome
 
 
 def _verdict(
-    there: _Errors, here: _Errors, beside: Mapping[str, Outcome], tolerance: float
+    fitted: _Errors, unseen: _Errors, outcomes: Mapping[str, Outcome], tolerance: float
 ) -> tuple[Verdict, str | None]:
     """Return the verdict, and the simple model that it names.
 
-    Errors are those on the fitted logs, `there`, and on the unseen ones, `here`; `beside` are `_beside`.
+    Errors are those on the fitted and on the unseen logs; `outcomes` are those of `_outcome` by
+    simple model, the simplest first.
     """
-    fitted, unseen = there.fit, here.fit
-    if unseen is not None and unseen <= tolerance:
+    if _is_within(unseen.fit, tolerance):
         return Verdict.PREDICTS, None
-    not_ahead = [name for name, outcome in beside.items() if outcome is not Outcome.BETTER]
-    misfit = fitted is not None and not fitted <= tolerance and not fitted < min(there.simple.values())
-    if misfit and (unseen is None or not_ahead):
+    not_ahead = [name for name, outcome in outcomes.items() if outcome is not Outcome.BETTER]
+    if _misfits(fitted, tolerance) and (unseen.fit is None or not_ahead):
         return Verdict.MISFIT, None
-    if unseen is None:
+    if unseen.fit is None:
         return Verdict.UNTESTED, None
-    worse = [name for name in not_ahead if beside[name] is Outcome.WORSE]
     # of a fit that fits, and diverges elsewhere, that is the news
-    if worse and (fitted is None or np.isfinite(unseen)):
-        return Verdict.NO_BETTER, worse[0]
-    if fitted is not None and not unseen <= WORSE * fitted:
+    diverged_alone = fitted.fit is not None and not np.isfinite(unseen.fit)
+    if not diverged_alone:
+        for name in not_ahead:
+            if outcomes[name] is Outcome.WORSE:
+                return Verdict.NO_BETTER, name
+    return _rough_verdict(fitted.fit, unseen.fit, unseen.simple, not_ahead)
+
+
+def _rough_verdict(
+    fitted: float | None, unseen: float, simple: Mapping[str, float], not_ahead: Sequence[str]
+) -> tuple[Verdict, str | None]:
+    """Return the verdict on a fit that is outside the tolerance, and no worse than a simple model.
+
+    Errors are the fit's, and those of simple models on unseen logs; `not_ahead` are the simple
+    models that the fit cannot be told from.
+    """
+    if fitted is not None and _is_beyond(unseen, WORSE * fitted):
         return Verdict.WORSE_THAN_FITTED, None
-    if not unseen <= LITTLE * here.simple[NAMES[0]]:
+    if _is_beyond(unseen, LITTLE * simple[NAMES[0]]):
         return Verdict.LITTLE, None
     if not_ahead:
-        return Verdict.UNTOLD, min(not_ahead, key=here.simple.__getitem__)
+        return Verdict.UNTOLD, min(not_ahead, key=simple.__getitem__)
     return Verdict.ROUGHLY, None
+
+
+def _is_within(error: float | None, limit: float) -> bool:
+    """Return whether there is an error, and it is at most a limit."""
+    return error is not None and error <= limit
+
+
+def _is_beyond(error: float, limit: float) -> bool:
+    """Return whether an error is above a limit, or NaN: that of a simulation that diverged."""
+    return not error <= limit
+
+
+def _misfits(fitted: _Errors, tolerance: float) -> bool:
+    """Return whether the fit errs beyond the tolerance, and more than a simple model,
+    on fitted logs."""
+    if fitted.fit is None or _is_within(fitted.fit, tolerance):
+        return False
+    return not fitted.fit < min(fitted.simple.values())
 
 
 def standing_out(
     unseen: Sequence[Prediction], verdicts: Sequence[JointVerdict], where: str = "RUN"
 ) -> list[Finding]:
-    """Return which unseen logs err by more than STANDING_OUT times what the other ones do, in any joint.
+    """Return which unseen logs err by more than STANDING_OUT times what the other ones do, in any
+    joint.
 
-    Three logs at least, and beyond the tolerance. Whether such a log counts is for its user to say: the
-    hint has the command, with the run's folder `where`.
+    Three logs at least, and beyond the tolerance. Whether such a log counts is for its user to say:
+    the hint has the command, with the run's folder `where`.
     """
     names = list[str]()
-    for one in verdicts:
-        new = _tests(unseen, one.joint)
-        errors = np.nan_to_num([rms_deg([p.error(one.joint)]) for p in new], nan=np.inf)
-        for i, own in enumerate(new if len(new) > 2 else ()):
-            usual = max(float(np.median(np.delete(errors, i))), one.tolerance_deg)
+    for verdict in verdicts:
+        tests = _tests(unseen, verdict.joint)
+        if len(tests) < 3:
+            continue
+        errors = np.array([rms_deg([p.error(verdict.joint)]) for p in tests])
+        errors[np.isnan(errors)] = np.inf
+        for i, test in enumerate(tests):
+            others = float(np.median(np.delete(errors, i)))
+            usual = max(others, verdict.tolerance_deg)
             if errors[i] > STANDING_OUT * usual:
-                names.append(own.log.source)
+                names.append(test.log.source)
+    if not names:
+        return []
     logs = tuple(dict.fromkeys(names))
-    return [Finding("log stands out", "note", logs, {"run": where})] if logs else []
+    return [Finding("log stands out", "note", logs, {"run": where})]
 
 
 def behind(settings: FitSettings, verdicts: Sequence[JointVerdict]) -> list[Finding]:
-    """Return that a fit of the hydraulics errs more on its own logs than nine numbers do, which it holds."""
-    joints = tuple(
-        one.name
-        for one in verdicts
-        if one.baselines_deg.get(NAMES[-1], np.inf) < CLEARLY * (one.fitted_deg or 0.0)
-    )
+    """Return that a fit of the hydraulics errs more on its own logs than nine numbers do, which it
+    holds."""
+    if settings.stage != "hyd":
+        return []
+    joints = list[str]()
+    for verdict in verdicts:
+        nine_numbers = verdict.baselines_deg.get(NAMES[-1], np.inf)
+        if nine_numbers < CLEARLY * (verdict.fitted_deg or 0.0):
+            joints.append(verdict.name)
+    if not joints:
+        return []
     kind = "behind nine numbers" if settings.seeded else "behind nine numbers from its start"
-    return [Finding(kind, "warning", joints)] if joints and settings.stage == "hyd" else []
+    return [Finding(kind, "warning", tuple(joints))]
 
 
 def rms_deg(errors: Iterable[Array]) -> float:
@@ -272,7 +362,8 @@ def rms_deg(errors: Iterable[Array]) -> float:
 
 
 def _rms_ahead(errors: Array) -> tuple[float | None, ...]:
-    """Return the rms of errors of predicted changes [rad], shape (N, HORIZONS), over the starts [deg]."""
+    """Return the rms of errors of predicted changes [rad], shape (N, HORIZONS),
+    over the starts [deg]."""
     there = ~np.isnan(errors)
     with np.errstate(all="ignore"):
         mean = np.sum(errors**2, axis=0, where=there) / there.sum(axis=0)

@@ -18,6 +18,7 @@ from hydroid.log.motion import (
 )
 from hydroid.log.read import (
     check_log as check_log,
+    check_parts as check_parts,
     open_table as open_table,
     write_log as write_log,
     write_logs as write_logs,

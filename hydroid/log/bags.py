@@ -181,9 +181,9 @@ def open_bag(path: Path, settings: LogSettings) -> BagTable:
 
 
 def _set_back(path: Path) -> dict[str, tuple[int, float, float]]:
-    """Return topics of a ROS 2 bag whose recorder's clock went back: message, its time and the one before.
+    """Return the topics of a ROS 2 bag whose recorder's clock went back, as `BagTable.set_back`.
 
-    rosbags sorts messages by their time [s], which would interleave what was recorded one after the other.
+    rosbags sorts messages by their time, which would interleave what was recorded one after the other.
     """
     found = dict[str, tuple[int, float, float]]()
     for file in sorted(path.glob("*.db3")) if path.is_dir() else ():

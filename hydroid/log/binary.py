@@ -4,46 +4,157 @@ Of a .mat a vector is a column of the variable's name; column k of a matrix is `
 longer axis is the time; fields of structs follow after a dot; element k of a cell array is `name[k]`.
 """
 
-from collections.abc import Iterator
+import struct
+import zlib
+from collections.abc import Generator, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hydroid.arrays import record
 from hydroid.errors import LogError
 from hydroid.log.bags import open_bag
-from hydroid.log.table import Table, format_library
+from hydroid.log.table import MOST_NUMBERS, Table, TextColumn, format_library, refuse_large
 from hydroid.settings.log import LogSettings
 from hydroid.words import listed
+
+COMPRESSED = 15
+"""type of a compressed element of a MATLAB file"""
+TEXTS = ("string", "large_string", "binary", "large_binary")
+"""types of columns of text in a Parquet file; others hold numbers or times"""
+TEXTS_AT_ONCE = 1024
 
 
 def open_mat(path: Path, _settings: LogSettings) -> Table:
     """Read all variables of a file, which is HDF5 from version 7.3 on."""
     hdf5 = HDF5 in first_bytes(path)
     package = "h5py" if hdf5 else "scipy.io"
+    large = list[str]()
     with format_library(package, "mat", path, "a MATLAB file") as library:
         if hdf5:
             with library.File(path, "r") as file:
-                variables = _without_hdf5(file)
+                variables = _without_hdf5(file, large)
         else:
-            variables = library.loadmat(str(path), simplify_cells=True)
+            names = [name for name, *_ in library.whosmat(str(path))]
+            large += _large_variables(path, names)
+            wanted = [name for name in names if name not in large]
+            variables = library.loadmat(str(path), simplify_cells=True, variable_names=wanted)
         columns = dict(_columns("", variables))
+    remarks = tuple(f"{name} holds more than {MOST_NUMBERS:,} numbers and is left out" for name in large)
+    if not columns and large:
+        raise LogError(remarks[0], path, "save what is needed of it")
     if not columns:
         hint = (
             "save commands, angles and time as arrays or structs; of a timeseries ts in MATLAB: "
             "time = ts.Time; data = ts.Data; save('arrays.mat', 'time', 'data')"
         )
         raise LogError("holds no array of numbers", path, hint)
-    return Table(source=str(path), names=tuple(columns), columns=columns)
+    return Table(source=str(path), names=tuple(columns), columns=columns, remarks=remarks)
+
+
+def _large_variables(path: Path, names: Sequence[str]) -> list[str]:
+    """Return the compressed variables of a file that unpack to more than can be read.
+
+    They are unpacked piece by piece, and not kept. Version 4 has none, and the file's size is that of others.
+    """
+    with path.open("rb") as file:
+        head = file.read(128)
+        if head[126:] not in (b"IM", b"MI"):
+            return []
+        order, sizes = "<" if head[126:] == b"IM" else ">", list[int]()
+        while len(tag := file.read(8)) == 8:
+            kind, size = struct.unpack(f"{order}2I", tag)
+            end = file.tell() + size
+            sizes.append(_unpacked_size(file, size) if kind == COMPRESSED else size)
+            file.seek(end)
+    return [name for name, size in zip(names, sizes, strict=False) if size > 8 * MOST_NUMBERS]
+
+
+def _unpacked_size(file: BinaryIO, size: int) -> int:
+    """Return what the next bytes of a file, compressed, unpack to; not much more than the limit."""
+    unpacker, total = zlib.decompressobj(), 0
+    data = b""
+    while total <= 8 * MOST_NUMBERS:
+        data = unpacker.unconsumed_tail or file.read(min(size, 1 << 16))
+        size -= 0 if unpacker.unconsumed_tail else len(data)
+        if not data:
+            break
+        total += len(unpacker.decompress(data, 1 << 20))
+    return total
+
+
+@record
+class ParquetTable(Table):
+    """Columns of a Parquet file, each of which is read where it is used."""
+
+    def text(self, name: str, row: int) -> str:
+        """Read a cell anew, for a message."""
+        assert isinstance(self.columns, ParquetColumns)
+        cell = self.columns.cell(name, row)
+        return cell if isinstance(cell, str) else ""
+
+
+class ParquetColumns(Mapping[str, NDArray[Any]]):
+    """The columns of a Parquet file by name; the last one that was read is kept."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._last: tuple[str, NDArray[Any]] | None = None
+        with self._open() as file:
+            refuse_large(str(path), file.metadata.num_rows, 1)
+            fields = file.schema_arrow
+            nested = {field.name for field in fields if field.type.num_fields}
+            texts = {field.name for field in fields if str(field.type) in TEXTS or "dict" in str(field.type)}
+        self._names = [name for name in fields.names if name not in nested]
+        self._texts = texts
+
+    @contextmanager
+    def _open(self) -> Generator[Any]:
+        library = format_library("pyarrow.parquet", "parquet", self._path, "Parquet")
+        with library as parquet, parquet.ParquetFile(str(self._path)) as file:
+            yield file
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        if name not in self._names:
+            raise KeyError(name)
+        if self._last is None or self._last[0] != name:
+            self._last = name, self._read(name)
+        return self._last[1]
+
+    def _read(self, name: str) -> NDArray[Any]:
+        with self._open() as file:
+            if name not in self._texts:
+                return file.read(columns=[name])[name].to_numpy()
+            column = TextColumn()
+            for batch in file.iter_batches(TEXTS_AT_ONCE, columns=[name]):
+                column.extend(["" if cell is None else str(cell) for cell in batch.column(0).to_pylist()])
+        return column.values()
+
+    def cell(self, name: str, row: int) -> object:
+        """Return one cell of a column of text; None of other columns."""
+        if name not in self._texts:
+            return None
+        with self._open() as file:
+            for batch in file.iter_batches(TEXTS_AT_ONCE, columns=[name]):
+                if row < len(batch):
+                    return batch.column(0)[row].as_py()
+                row -= len(batch)
+        return None
 
 
 def open_parquet(path: Path, _settings: LogSettings) -> Table:
-    """Read all columns of a file."""
-    with format_library("pyarrow.parquet", "parquet", path, "Parquet") as parquet:
-        table = parquet.read_table(str(path))
-        columns = {name: table[name].to_numpy() for name in table.column_names}
-    return Table(source=str(path), names=tuple(columns), columns=columns)
+    """Open a file, whose columns are read where they are used."""
+    columns = ParquetColumns(path)
+    return ParquetTable(source=str(path), names=tuple(columns), columns=columns)
 
 
 def _columns(name: str, value: Any) -> Iterator[tuple[str, NDArray[Any]]]:
@@ -63,10 +174,16 @@ def _columns(name: str, value: Any) -> Iterator[tuple[str, NDArray[Any]]]:
             yield (name if len(parts) == 1 else f"{name}[{k}]"), values
 
 
-def _without_hdf5(item: Any) -> Any:
-    """Return a group as a dict and an array as MATLAB shows it: a v7.3 file stores arrays transposed."""
+def _without_hdf5(item: Any, large: list[str]) -> Any:
+    """Return a group as a dict and an array as MATLAB shows it: a v7.3 file stores arrays transposed.
+
+    Names of arrays that are too large go to `large`.
+    """
     if hasattr(item, "items"):
-        return {name: _without_hdf5(inner) for name, inner in item.items()}
+        return {name: _without_hdf5(inner, large) for name, inner in item.items()}
+    if item.size is not None and item.size > MOST_NUMBERS:
+        large.append(item.name.lstrip("/"))
+        return None
     text = item.attrs.get("MATLAB_class") == b"char" or "MATLAB_empty" in item.attrs
     return None if text or item.dtype.kind not in "fiub" else np.asarray(item[()]).T
 

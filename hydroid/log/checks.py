@@ -1,17 +1,18 @@
 """Checks of a recording and of the motion in it: what is wrong, where, and what to do."""
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from itertools import product
 from typing import Any
 
 import numpy as np
 
 from hydroid.arrays import Array
-from hydroid.log.clues import CLUES, column_unit, likely_range
+from hydroid.log.clues import CLUES, column_unit
 from hydroid.log.log import Log, LogFinding, log_finding
-from hydroid.log.motion import END, driven_joints, motion_of
-from hydroid.log.repair import GAP, sample_period
+from hydroid.log.motion import END, LEAST_PATH, JointMotion, driven_joints, motion_of
+from hydroid.log.repair import GAP, SHORTEST, sample_period
 from hydroid.log.sensors import check_sensors
+from hydroid.log.signals import likely_range
 from hydroid.log.table import Recording, Signal
 from hydroid.settings.arm import Arm
 from hydroid.settings.log import LogSettings
@@ -20,11 +21,13 @@ from hydroid.units import UNITS, likely_time_unit, way
 SMALL = ("±1", "±10 V")
 """ranges of commands whose numbers are possible commands in %, too"""
 DEGREE = UNITS["deg"].factor
+UNASKED = 0.2
+"""part of its travel that a joint moves without a command, above which commands are missing"""
 FULL = 50.0  # [%], which most joints' commands reach where single ones of 10 are in another range
 
 
-def check_recording(recording: Recording, settings: LogSettings, *, repaired: bool) -> Iterator[LogFinding]:
-    """Yield the faults in the order to mend them; `repaired`: gaps up to `settings.repair_s` are none."""
+def check_recording(recording: Recording, settings: LogSettings) -> Iterator[LogFinding]:
+    """Yield the faults in the order to mend them."""
     table, longest = recording.table, settings.repair_s
     torn = np.isnan(recording.values).all(axis=1)
     if torn.any():
@@ -32,43 +35,41 @@ def check_recording(recording: Recording, settings: LogSettings, *, repaired: bo
     for signal, values in zip(recording.signals, recording.values.T, strict=True):
         rows = np.flatnonzero(np.isnan(values) & ~torn)
         if len(rows):
-            cell = table.columns[signal.name][recording.rows[rows[0]]]
-            what = f"{cell[:30]!r} is not a number" if isinstance(cell, str) and cell else "no value is there"
+            cell = table.text(signal.name, int(recording.rows[rows[0]]))
+            what = f"{cell[:30]!r} is not a number" if cell else "no value is there"
             kind = "no time" if signal.kind == "time" else "hole"
             yield recording.finding("error", kind, rows, signal, what=what, longest=longest)
-    yield from _time(recording, settings, longest if repaired else 0.0)
+    yield from _time(recording, settings)
     yield from _values(recording)
     yield from _units(recording)
     yield from check_sensors(recording)
 
 
-def _time(recording: Recording, settings: LogSettings, repaired: float) -> Iterator[LogFinding]:
-    """A time that falls, is too short or slow, or has gaps longer than `repaired` [s]; else its period."""
+def _time(recording: Recording, settings: LogSettings) -> Iterator[LogFinding]:
+    """A time that falls, is too short or slow; else its period."""
     signal, known = recording.signals[0], recording.time[~np.isnan(recording.time)]
     if len(recording.time) > len(known) == 0:
         return  # a finding about its cells says why
     steps, period = np.diff(recording.time), sample_period(recording.time)  # NaN beside a row without time
     falls = 1 + np.flatnonzero(steps <= 0)
-    gaps = 1 + np.flatnonzero((steps > GAP * period) & (steps > repaired * (1 + 1e-9) + period))
     duration = np.ptp(known) if len(known) else 0.0
     slowest = 10 * settings.period_s  # else held commands would not explain the motion
-    kind, rows = ("time order", falls) if len(falls) else ("gap", gaps)
-    if not len(falls) and (duration < 0.5 or period > slowest):
-        kind, rows = "too short" if duration < 0.5 else "too slow", gaps[:0]
-    elif not len(rows):
-        uneven = np.nanmax(np.abs(steps - period)) > 0.25 * period
+    if len(falls):
+        before, after = recording.time[falls[0] - 1 : falls[0] + 1]
+        yield recording.finding("error", "time order", falls, signal, time=after, before=before)
+    elif duration < SHORTEST or period > slowest:
+        kind = "too short" if duration < SHORTEST else "too slow"
+        unit, remedy = likely_time_unit(period / signal.gain), "check log.time.unit and log.period_s"
+        if unit and UNITS[unit].factor != signal.gain:
+            remedy = f"if its unit is {unit}, set log.time.unit: {unit}"
+        numbers = {"duration": duration, "samples": float(len(known)), "period": period, "slowest": slowest}
+        yield recording.finding("error", kind, (), signal, remedy=remedy, **numbers)
+    else:
+        steps = steps[steps <= GAP * period]  # gaps are spoken of where they split the log
+        uneven = np.abs(steps - period).max(initial=0.0) > 0.25 * period
         if uneven or abs(period - settings.period_s) > 0.01 * settings.period_s:
-            step = f"{np.nanmin(steps):.4g} to {np.nanmax(steps):.4g}" if uneven else f"{period:.4g}"
+            step = f"{steps.min():.4g} to {steps.max():.4g}" if uneven else f"{period:.4g}"
             yield recording.finding("note", "resampled", (), signal, step=step, period=settings.period_s)
-        return
-    unit, remedy = likely_time_unit(period / signal.gain), "check log.time.unit and log.period_s"
-    if unit and UNITS[unit].factor != signal.gain:
-        remedy = f"if its unit is {unit}, set log.time.unit: {unit}"
-    numbers = {"duration": duration, "samples": float(len(known)), "period": period, "slowest": slowest}
-    if len(rows):
-        before, after = recording.time[rows[0] - 1 : rows[0] + 1]
-        numbers |= {"time": after, "before": before, "gap": after - before, "longest": settings.repair_s}
-    yield recording.finding("error", kind, rows, signal, remedy=remedy, **numbers)
 
 
 def _values(recording: Recording) -> Iterator[LogFinding]:
@@ -160,6 +161,7 @@ def check_motion(
             kind, part = ("straight", 1 - against) if joint in backward else ("turned", against)
             scale = f"{-command.gain:g}"
             yield warning(kind, command, path=way(path, slides=slides), part=part, scale=scale)
+        yield from _half_told(motion, command, warning, slides=slides)
         if span := motion.frozen:
             over = span[1] > log.duration - 1.5 * log.period
             when = f"from {span[0]:.4g} s on" if over else f"from {span[0]:.4g} to {span[1]:.4g} s"
@@ -168,6 +170,22 @@ def check_motion(
             yield warning("no motion", angle, most=way(motion.travel, slides=slides))
         if ahead := motion.ahead:
             yield warning("late", command, lag=ahead, delay=delay - ahead)
+
+
+def _half_told(
+    motion: JointMotion, command: Signal, warning: Callable[..., LogFinding], *, slides: bool
+) -> Iterator[LogFinding]:
+    """Yield what the log does not tell of a joint's commands: one direction, or any valve's opening."""
+    given = motion.log.command[:, motion.joint - 1]
+    by_degrees = max(motion.unasked)
+    if by_degrees > max(LEAST_PATH, UNASKED * motion.travel):
+        upwards = motion.unasked[0] > motion.unasked[1]
+        one_way = (given >= 0).all() or (given <= 0).all()
+        kind = "half a command" if one_way else "unasked"
+        by = way(by_degrees, slides=slides)
+        yield warning(kind, command, by=by, path="positive" if upwards else "negative")
+    if motion.is_target:
+        yield warning("target", command)
 
 
 def motion_findings(logs: Sequence[Log], arm: Arm) -> Iterator[LogFinding]:

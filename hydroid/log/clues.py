@@ -1,64 +1,12 @@
-"""What the name, the unit and the numbers of a column say about it."""
+"""What the name and the unit of a column say about it."""
 
 import re
 from collections.abc import Sequence
-from typing import NamedTuple
 
-import numpy as np
-
-from hydroid.arrays import Array
 from hydroid.files import read_table
 from hydroid.units import Unit, unit_of
 
 CLUES = read_table("log/clues.yaml")
-
-
-class CommandRange(NamedTuple):
-    """A range by its name, and what brings it to percent: command [%] = scale · cell + offset."""
-
-    name: str
-    scale: float
-    offset: float
-
-    def remedy(self, gain: float, offset: float) -> dict[str, str]:
-        """Return its name, and the settings that bring it to percent where those of the log are given."""
-        offset = self.offset + self.scale * offset
-        more = f" and log.command.offset: {offset:g}" if offset else ""
-        return {"range": self.name, "scale": f"{self.scale * gain:g}{more}"}
-
-
-def likely_range(values: Array, negative: Array | None = None) -> CommandRange | None:
-    """Return the range that fits the cells of a command, shape (R,), or of its two directions, or None.
-
-    Converters overshoot, and joysticks do not rest exactly in the middle. A range with a positive middle must
-    be used on both sides of it, and rest there: first or most of the time, unless 0 is common.
-    """
-    if negative is not None:
-        both = np.stack([values, negative])
-        both = both[:, ~np.isnan(both).any(axis=0)]
-        if not both.size:
-            return None
-        values, negative = both
-        at_rest = np.mean((abs(both - 4) <= 0.48).any(axis=0))
-        if both.min() >= 3.52 and both.max() <= 20.48 and at_rest > 0.95:
-            return CommandRange("4 to 20 mA on each side", 6.25, -25.0)
-        values = both[0] - both[1]
-    values = values[~np.isnan(values)]
-    if not values.any():
-        return None
-    low, high = values.min(), values.max()
-    kinds, counts = np.unique(values, return_counts=True)
-    rests = np.array([values[0], kinds[counts.argmax()]])
-    raised = low >= 0 and 0 not in kinds[counts >= 0.05 * len(values)]
-    for name, (start, end) in CLUES["ranges"].items():
-        middle, half = (start + end) / 2, (end - start) / 2
-        slack = 0.06 * half / (1 + (start < 0))
-        if low < start - slack or high > end + slack:
-            continue
-        used = low < middle - 0.1 * half and high > middle + 0.1 * half
-        if start < 0 or (raised and used and (abs(rests - middle) <= slack).any()):
-            return CommandRange(name, 100 / half, -100 * middle / half)
-    return None
 
 
 def words(name: str) -> list[str]:
@@ -78,6 +26,8 @@ def kind_of(name: str, unit: Unit | None) -> str:
     there = words(name)
     if {*there} & {*CLUES["derived"]}:
         return "other"
+    if {*there} & {*CLUES["targets"]} and unit and unit.quantity in ("angle", "length"):
+        return "target"
     if unit:
         return CLUES["units"].get(unit.quantity, "other")
     if {*there} & {"cmd", "command", "commands", "joystick", "joy"}:

@@ -9,73 +9,169 @@ line below the names is left out only if it holds no number: any other fault the
 """
 
 import csv
+from array import array
+from codecs import getincrementaldecoder
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
-from itertools import chain
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from itertools import chain, islice, pairwise
 from pathlib import Path
 
 import numpy as np
 
+from hydroid.arrays import record
 from hydroid.errors import LogError
 from hydroid.log.binary import FORMATS
-from hydroid.log.table import Table, clock, number
+from hydroid.log.table import Recording, Signal, Table, TextColumn, clock, number
 from hydroid.units import bare, unit_of
+from hydroid.words import listed
 
 SEPARATORS = "\t;,| "
 csv.field_size_limit(2**31 - 1)  # a longer cell is no number, which is said, with its place
 IS_CSV = f"formats of logs are {FORMATS}; a CSV file has a header and one row per sample"
 
 
+SAMPLE = 400  # lines by which separator, names and width are recognised
+PIECE = 256  # lines whose cells are held as text at a time
+
+
+@record
+class CsvTable(Table):
+    """The numbers of a CSV file; the text of a cell is read again where a message shows it."""
+
+    encoding: str
+    split_row: Callable[[str], list[str]]
+
+    def read(self, signals: Sequence[Signal]) -> Recording:
+        """Read columns; the recording does not keep the others."""
+        recording = super().read(signals)
+        return replace(recording, table=replace(self, columns={}))
+
+    def text(self, name: str, row: int) -> str:
+        """Read a cell anew, for a message; empty where its line has none."""
+        assert self.lines is not None
+        with Path(self.source).open(encoding=self.encoding) as file:
+            line = next(islice(file, int(self.lines[row]) - 1, None), "")
+        cells = self.split_row(line.rstrip("\n"))
+        return cells[self.names.index(name)]
+
+
 def open_csv(path: Path) -> Table:
-    """Find the table in a file."""
-    data = path.read_bytes()
-    lines = _decode(path, data).replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    content = [k for k, line in enumerate(lines) if _is_content(line)]
-    if not content:
+    """Find the table in a file, whose lines are read one after the other."""
+    encoding = _encoding(path)
+    try:
+        with path.open(encoding=encoding) as file:
+            return _read_table(path, encoding, file)
+    except UnicodeDecodeError:
+        raise _no_text(path) from None
+
+
+def _read_table(path: Path, encoding: str, file: Iterable[str]) -> Table:
+    lines = enumerate((line.rstrip("\n") for line in file), 1)
+    sample = dict(islice(((k, line) for k, line in lines if _is_content(line)), SAMPLE))
+    if not sample:
         raise LogError("is empty", path, IS_CSV)
-    separator = _separator([lines[k] for k in content[:400]])
-    rows = {k: split(lines[k], separator) for k in content[:400]}
+    separator = _separator([*sample.values()])
+    rows = {k: split(line, separator) for k, line in sample.items()}
     header, left_out = _header(rows)
-    names, width = rows[header], len(rows[header])
+    names = rows[header]
     if all(number(name.replace(",", ".")) is not None for name in names if name):
         hint = "write the columns' names above it (a line that starts with # is a comment)"
-        raise LogError("has no header: this line holds numbers", f"{path}, line {header + 1}", hint)
-    if width == 1:
+        raise LogError("has no header: this line holds numbers", f"{path}, line {header}", hint)
+    if len(names) == 1:
         raise LogError("has one column only", path, "part cells by , ; | tabs or spaces")
-    above = f"the names are in line {header + 1}; what stands above is left out"
-    remarks = [above] if content[0] < header else []
-    remarks += [f"line {k + 1} is text and left out" for k in left_out]
+    above = f"the names are in line {header}; what stands above is left out"
+    remarks = [above] if next(iter(sample)) < header else []
+    remarks += [f"line {k} is text and left out" for k in left_out]
     cells_of_units = (zip(names, map(bare, rows[k]), strict=True) for k in left_out if _are_units(rows[k]))
     units = dict(chain.from_iterable(cells_of_units))
-    below = [k for k in content if k > header and k not in left_out and _is_content(lines[k], separator)]
-    commas = separator != "," and any("," in lines[k] for k in below)
+    below = {k: line for k, line in sample.items() if k > header and k not in left_out}
+    usual = _usual_width([rows[k] for k in below], len(names))
+    if usual < len(names):
+        remarks.append(f"lines hold {usual} cells: {listed(names[usual:], 3)} has none")
+    elif usual > len(names):
+        remarks.append("the first column has no name")
+        names = ["", *names]
+    decimal_comma = separator != ","
+
+    def split_row(line: str) -> list[str]:
+        """Return as many cells as there are names; empty ones of a line that has fewer or more."""
+        if decimal_comma and "," in line:
+            line = line.replace(",", ".")
+        row = split(line, separator)
+        if len(row) == usual < len(names):
+            return row + [""] * (len(names) - usual)
+        whole = len(row) >= len(names) and not any(row[len(names) :])
+        return row[: len(names)] if whole else [""] * len(names)
+
+    columns, at, commas = [TextColumn() for _ in names], array("q"), False
+    data = ((k, line) for k, line in chain(below.items(), lines) if _is_content(line, separator))
+    while piece := [*islice(data, PIECE)]:
+        commas |= decimal_comma and any("," in line for _, line in piece)
+        at.extend(k for k, _ in piece)
+        cells = [split_row(line) for _, line in piece]
+        for column, own in zip(columns, zip(*cells, strict=True), strict=True):
+            column.extend(own)
     if commas:
         remarks.append("commas are read as decimal points")
-    cells = [split(lines[k].replace(",", ".") if commas else lines[k], separator) for k in below]
-    # rows of fewer or more cells count as empty
-    whole = (row[:width] if len(row) >= width and not any(row[width:]) else [""] * width for row in cells)
-    table = np.array([*whole], dtype=object).reshape(-1, width)
-    return Table(
+    return CsvTable(
         source=str(path),
         names=tuple(names),
-        columns=dict(zip(names, table.T, strict=True)),
-        header=header + 1,
+        columns={name: column.values() for name, column in zip(names, columns, strict=True)},
+        header=header,
         units=units,
         remarks=tuple(remarks),
-        lines=np.array(below, np.int64) + 1,
+        lines=np.frombuffer(at, np.int64) if at else np.zeros(0, np.int64),
+        encoding=encoding,
+        split_row=split_row,
     )
 
 
-def _decode(path: Path, data: bytes) -> str:
-    wide = data.startswith((b"\xff\xfe", b"\xfe\xff"))
-    for encoding in ("utf-16",) if wide else ("utf-8-sig", "latin-1"):
-        with suppress(UnicodeDecodeError):
-            text = data.decode(encoding)
-            if "\0" not in text:
-                return text
+def _usual_width(rows: Sequence[Sequence[str]], names: int) -> int:
+    """Return how many cells lines have, where that is not as many as names: fewer, or a row's number more.
+
+    Lines that differ from each other are torn ones, but for separators at their ends.
+    """
+    widths = {len(row) for row in rows}
+    if len(rows) < 2 or len(widths) > 1:
+        return names
+    (width,) = widths
+    if width == names + 1:
+        numbers = [number(row[0]) for row in rows]
+        named = all(row[-1] for row in rows) and _counts_up(numbers)
+        return width if named else names
+    return width if names // 2 < width < names else names
+
+
+def _counts_up(numbers: Sequence[float | None]) -> bool:
+    return all(one is not None and other == one + 1 for one, other in pairwise(numbers))
+
+
+def _encoding(path: Path) -> str:
+    """Return how a text is encoded: a byte that is no UTF-8 makes it Latin-1, wherever it stands."""
+    with path.open("rb") as file:
+        if file.read(2) in (b"\xff\xfe", b"\xfe\xff"):
+            return "utf-16"
+        file.seek(0)
+        decoder, encoding = getincrementaldecoder("utf-8-sig")(), "utf-8-sig"
+        while piece := file.read(1 << 16):
+            if b"\0" in piece:
+                raise _no_text(path)
+            if encoding == "utf-8-sig":
+                try:
+                    decoder.decode(piece)
+                except UnicodeDecodeError:
+                    encoding = "latin-1"
+        try:
+            decoder.decode(b"", final=True)
+        except UnicodeDecodeError:
+            return "latin-1"
+        return encoding
+
+
+def _no_text(path: Path) -> LogError:
     hint = "save the sheet as CSV" if path.suffix.startswith(".xls") else IS_CSV
-    raise LogError("is not a text file", path, hint)
+    return LogError("is not a text file", path, hint)
 
 
 def split(line: str, separator: str) -> list[str]:

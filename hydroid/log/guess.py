@@ -6,7 +6,7 @@ no column of a kind has a joint they are given to the joints in order; beside co
 without is left out and named.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from typing import Any, NamedTuple
 
@@ -15,12 +15,20 @@ import numpy as np
 from hydroid.arrays import Array
 from hydroid.errors import LogError
 from hydroid.files import Plain
-from hydroid.log.clues import CLUES, column_unit, direction, joint_of, kind_of, likely_range, number_in, words
+from hydroid.log.clues import CLUES, column_unit, direction, joint_of, kind_of, number_in, words
+from hydroid.log.rods import Rod
+from hydroid.log.signals import likely_range
 from hydroid.log.table import Signal, Table
 from hydroid.units import UNITS, likely_time_unit
 from hydroid.words import listed
 
 PERIODS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2)  # [s], of which a guess takes the nearest
+
+LENGTHS = ("m", "cm", "mm")
+NO_RODS: Mapping[int, Rod] = {}
+NO_RANGES: Mapping[int, tuple[float, float]] = {}
+LARGEST_ANGLE = np.radians(400.0)
+"""of an arm's joint [rad]; larger numbers are lengths or counts"""
 
 
 class ColumnGuess(NamedTuple):
@@ -46,12 +54,19 @@ _Pairs = dict[int, tuple[list[_Column], str]]
 
 
 def guess_columns(
-    table: Table, joints: Sequence[str], *, links: Sequence[str] = (), slides: Sequence[int] = ()
+    table: Table,
+    joints: Sequence[str],
+    *,
+    links: Sequence[str] = (),
+    slides: Sequence[int] = (),
+    rods: Mapping[int, Rod] = NO_RODS,
+    ranges: Mapping[int, tuple[float, float]] = NO_RANGES,
 ) -> ColumnGuess:
     """Guess which columns are time, commands and angles, of which joints, in which units.
 
     Columns may have the names of the links that the joints move instead; positions of joints (from 1) that
-    slide are in m.
+    slide are in m. Lengths of the cylinders of joints, `rods`, stand for their angles. Counts of an encoder
+    or a converter are taken for the `ranges` of the joints [rad].
     """
     columns = [*_columns(table, (*joints, *links))]
     time = max((c for c in columns if c.kind == "time"), key=lambda c: _rises(c.values), default=None)
@@ -63,7 +78,7 @@ def guess_columns(
     step *= UNITS[unit].factor
     reasons = [f"{time.name}: time in {unit}, every {step:.3g} s"]
     commands, angles = (
-        _by_joint([c for c in columns if c.kind == kind], (joints, links), slides, reasons)
+        _by_joint(_angles_first(columns, kind), (joints, links), (slides, rods), reasons)
         for kind in ("command", "angle")
     )
     unitless = [c.values for joint, ((c,), _) in angles.items() if joint not in slides and not c.unit]
@@ -77,11 +92,17 @@ def guess_columns(
             entry["command"], said = _command(table, pair)
             reasons.append(f"{said} of {of}, {why}")
         if joint in angles:
-            ((column,), why), what, usual = angles[joint], "angle", default
-            if joint in slides:  # no telescope is 50 m long
-                what, usual = "position", "mm" if np.nanmax(np.abs(column.values)) > 50 else "m"
-            entry["angle"] = {"column": column.name, "unit": column.unit or usual}
-            reasons.append(f"{column.name}: {what} in {column.unit or usual} of {of}, {why}")
+            (column,), why = angles[joint]
+            slide = joint in slides
+            entry["angle"], said = _angle(
+                column, default, slides=slide, rod=rods.get(joint), limits=ranges.get(joint)
+            )
+            reasons.append(f"{said} of {of}, {why}")
+    for column in columns:
+        if column.kind == "target":
+            reasons.append(
+                f"{column.name}: a target of a position, no valve's opening; a controller lies between"
+            )
     used = {time.name} | {c.name for pairs in (commands, angles) for pair, _ in pairs.values() for c in pair}
     log: Plain = {
         "time": {"column": time.name, "unit": unit},
@@ -93,6 +114,66 @@ def guess_columns(
     unused = tuple(name for name in table.names if name and name not in used)
     reasons += [f"not used: {listed(unused)}"] if unused else []
     return ColumnGuess(log, tuple(reasons), unused)
+
+
+def _angle(
+    column: _Column,
+    usual: str,
+    *,
+    slides: bool,
+    rod: Rod | None,
+    limits: tuple[float, float] | None,
+) -> tuple[Plain, str]:
+    """Return the settings of the column of a joint's angle, and what it is taken for."""
+    known = column.values[np.isfinite(column.values)]
+    low, high = float(known.min()), float(known.max())
+    largest = max(abs(low), abs(high))
+    if slides:  # no telescope is 50 m long
+        unit = column.unit or ("mm" if largest > 50 else "m")
+        return {"column": column.name, "unit": unit}, f"{column.name}: position in {unit}"
+    if length := _length(column, rod, usual):
+        unit, offset = length
+        entry: Plain = {"column": column.name, "unit": unit}
+        if not offset:
+            return entry, f"{column.name}: length of the cylinder in {unit}"
+        with_it_in = f"whose cylinder is {offset:.6g} {unit} long with it in,"
+        said = f"{column.name}: travel of the rod in {unit}, {with_it_in}"
+        return entry | {"offset": offset}, said
+    unit = column.unit or usual
+    if column.unit or largest * UNITS[unit].factor <= LARGEST_ANGLE or not limits or high == low:
+        return {"column": column.name, "unit": unit}, f"{column.name}: angle in {unit}"
+    least, most = np.degrees(limits)
+    scale = float(f"{(most - least) / (high - low):.6g}")
+    entry = {
+        "column": column.name,
+        "unit": "deg",
+        "scale": scale,
+        "offset": float(f"{least - scale * low:.6g}"),
+    }
+    what = f"counts from {low:g} to {high:g}, taken for the whole range of {least:.4g} to {most:.4g} deg"
+    return entry, f"{column.name}: {what}: correct scale and offset where the log does not reach both ends,"
+
+
+def _angles_first(columns: Sequence[_Column], kind: str) -> list[_Column]:
+    """Return the columns of a kind; lengths last, for a joint whose angle is there needs none."""
+    return sorted((c for c in columns if c.kind == kind), key=_is_length)
+
+
+def _is_length(column: _Column) -> bool:
+    return column.unit in LENGTHS or not {*words(column.name)}.isdisjoint(CLUES["lengths"])
+
+
+def _length(column: _Column, rod: Rod | None, unit: str) -> tuple[str, float] | None:
+    """Return unit and offset of a column that holds the length of a joint's cylinder; None: it does not.
+
+    A column without a unit holds angles if its name does not say otherwise and they are in a joint's reach.
+    """
+    if rod is None or (column.unit and column.unit not in LENGTHS):
+        return None
+    angles = np.nanmax(np.abs(column.values)) * UNITS[unit].factor <= LARGEST_ANGLE
+    if not _is_length(column) and angles:
+        return None
+    return rod.reading(column.values, column.unit)
 
 
 def nearest_period(step: float) -> float:
@@ -115,23 +196,33 @@ def _columns(table: Table, names: Sequence[str]) -> Iterator[_Column]:
         if length == max(lengths, key=lengths.count):
             with suppress(LogError):  # a channel of a single message
                 recording = table.read([Signal(name, kind)])
-                if np.isfinite(recording.time).any():
-                    unit = units[name]
-                    yield _Column(name, kind, unit.name if unit else "", recording.time)
+                values = recording.time
+                unit = units[name]
+                stated = unit.name if unit else ""
+                if kind == "time" and not _rises(values) and likely_range(values, unit=stated):
+                    kind = "command"  # pulses
+                if np.isfinite(values).any():
+                    yield _Column(name, kind, stated, values)
 
 
 def _rises(values: Array) -> bool:
     steps = np.diff(values[np.isfinite(values)])
-    return bool(len(steps) and (steps > 0).all() and np.median(steps) > 0.5 * steps.mean())
+    if not len(steps):
+        return False
+    return bool(np.mean(steps > 0) > 0.99 and np.median(steps) > 0.5 * steps.mean())
 
 
 def _by_joint(
     columns: Sequence[_Column],
     known: tuple[Sequence[str], Sequence[str]],
-    slides: Sequence[int],
+    lengths: tuple[Collection[int], Collection[int]],
     reasons: list[str],
 ) -> _Pairs:
-    """Give columns of one kind to the joints; say what is uncertain or left out."""
+    """Give columns of one kind to the joints; say what is uncertain or left out.
+
+    `lengths`: joints that slide, and those that a cylinder turns.
+    """
+    slides, rods = lengths
     groups, given, names = dict[Any, list[_Column]](), _Pairs(), known[0]
     kind = columns[0].kind if columns else ""
     for column in columns:
@@ -143,7 +234,9 @@ def _by_joint(
     def give(pair: list[_Column], joint: int, why: str) -> bool:
         """Give columns to a joint that has none yet and moves in their unit; return whether it does."""
         unit = pair[0].unit
-        fits = kind == "command" or not unit or (UNITS[unit].quantity == "length") == (joint in slides)
+        length = unit in LENGTHS
+        takes = (length and joint in rods) or length == (joint in slides)
+        fits = kind == "command" or not unit or takes
         free = fits and 0 < joint <= len(names) and joint not in given
         if free:
             given[joint] = pair, why
@@ -172,7 +265,8 @@ def _by_joint(
 def _command(table: Table, columns: Sequence[_Column]) -> tuple[Plain, str]:
     names = [column.name for column in columns]
     signals = [Signal(name, "command", rest=np.nan) for name in names]
-    likely = likely_range(*table.read(signals).values.T)
+    cells = table.read(signals).values.T
+    likely = likely_range(cells[0], cells[1] if len(cells) > 1 else None, columns[0].unit)
     entry: Plain = {"column": names[0] if len(names) == 1 else names}
     if likely is None or "%" in (columns[0].unit, likely.name):
         return entry, f"{' and '.join(names)}: command in %"

@@ -27,6 +27,7 @@ class Log:
         recorded: samples that stand in for a row of the file, shape (T,): angles of the others lie between
             two rows, and say nothing new. None: all do.
         pose: in which joints stand that are not measured [rad], shape (J,); None: it is not known.
+        begin: time of its first sample in the recording, of which it may be a part [s].
     """
 
     source: str
@@ -38,6 +39,7 @@ class Log:
     rest: int | None = None
     recorded: Mask | None = None
     pose: Array | None = None
+    begin: float = 0.0
 
     @property
     def joints(self) -> int:
@@ -110,6 +112,7 @@ class Log:
         return replace(
             self,
             time=self.time[at] - self.time[first],
+            begin=self.begin + float(self.time[first]),
             command=self.command[at],
             angle=self.angle[at],
             pressure=None if self.pressure is None else self.pressure[at],

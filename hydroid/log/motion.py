@@ -12,6 +12,10 @@ LEAST_PATH = 3.0  # [deg] that tell a direction
 AGAINST = 0.75  # of the path goes against the command: it is logged the other way around
 END = 0.02  # part of a joint's travel that counts as its end
 MOVING = 0.2  # part of a joint's speed above which it moves
+UNASKED_AFTER = 1.5
+"""how long after a command a joint may still move by it [s]"""
+TARGET, VALVE, TARGET_WITHIN = 0.98, 0.7, 1.0
+"""least correlation of a target with the angle, largest one with its speed, and by how much it leads [s]"""
 LEAST_PUSH, LEAST_FROZEN = 20.0, 0.75
 """command [%], and how long it must last [s], that would move a joint whose angle does not change"""
 
@@ -23,12 +27,12 @@ class JointMotion:
     log: Log
     joint: int
 
-    @property
+    @cached_property
     def reach(self) -> tuple[float, float]:
         """Its least and largest angle but for the noise [rad]."""
         return self._slow[1].min(), self._slow[1].max()
 
-    @property
+    @cached_property
     def travel(self) -> float:
         """Range of its angle but for the noise [deg]."""
         return np.rad2deg(np.ptp(self._slow[1]))
@@ -132,6 +136,33 @@ class JointMotion:
             return None
         return begin * period, end * period
 
+    @cached_property
+    def unasked(self) -> tuple[float, float]:
+        """Its way upwards and downwards while no command has been given for a while [deg].
+
+        Only what is as quick as a valve moves it: an arm that leaks sinks slowly.
+        """
+        period = self.log.period
+        given = np.flatnonzero(self._logged)
+        if not len(given):
+            return 0.0, 0.0
+        samples = np.arange(len(self._logged))
+        last = given[np.searchsorted(given, samples, side="right") - 1]
+        idle = (samples < given[0]) | (samples - last > UNASKED_AFTER / period)
+        speed = self._slow[2]
+        moves = np.flatnonzero(idle & (np.abs(speed) > MOVING * self.speed))
+        steps = np.rad2deg(speed[moves]) * period
+        return float(steps.clip(0).sum()), float(-steps.clip(None, 0).sum())
+
+    @cached_property
+    def is_target(self) -> bool:
+        """Whether its command is where it shall be, which its angle follows, and no opening of a valve."""
+        if self.log.duration < 5 or not np.ptp(self._logged) or self.travel < LEAST_PATH:
+            return False
+        lags = min(round(TARGET_WITHIN / self.log.period), len(self._logged) // 2)
+        follows = _correlations(self._logged, self._slow[1], lags)
+        return follows.max(initial=0.0) > TARGET and self._following.max(initial=0.0) < VALVE
+
     @property
     def _logged(self) -> Array:
         return self.log.command[:, self.joint - 1]
@@ -140,26 +171,29 @@ class JointMotion:
     def _following(self) -> Array:
         return _correlations(self._logged, self._quick[2], round(0.8 / self.log.period))
 
-    @cached_property
+    @property
     def _quick(self) -> tuple[Array, ...]:
-        return self._smoothed(QUICK)
+        return _smoothed(self.log, self.joint, QUICK)
 
-    @cached_property
+    @property
     def _slow(self) -> tuple[Array, ...]:
-        return self._smoothed(SLOW)
+        return _smoothed(self.log, self.joint, SLOW)
 
-    def _smoothed(self, seconds: float) -> tuple[Array, ...]:
-        """Return command [%], angle [rad] and speed [rad/s], each (T,), behind a Gaussian."""
-        width, angle = seconds / self.log.period, self.log.angle[:, self.joint - 1]
-        reach = int(4 * width + 0.5)
-        at = np.arange(-reach, reach + 1)
-        bell = np.exp(-0.5 * (at / width) ** 2)
-        bell /= bell.sum()
-        slope = -at / width**2 * bell / self.log.period
-        return tuple(
-            np.convolve(np.pad(signal, reach, "symmetric"), by, "valid").astype(np.float64)
-            for signal, by in ((self._logged, bell), (angle, bell), (angle, slope))
-        )
+
+@lru_cache(maxsize=2)  # a long log's signals are large
+def _smoothed(log: Log, joint: int, seconds: float) -> tuple[Array, ...]:
+    """Return command [%], angle [rad] and speed [rad/s], each (T,), behind a Gaussian."""
+    width = seconds / log.period
+    command, angle = log.command[:, joint - 1], log.angle[:, joint - 1]
+    reach = int(4 * width + 0.5)
+    at = np.arange(-reach, reach + 1)
+    bell = np.exp(-0.5 * (at / width) ** 2)
+    bell /= bell.sum()
+    slope = -at / width**2 * bell / log.period
+    return tuple(
+        np.convolve(np.pad(signal, reach, "symmetric"), by, "valid").astype(np.float64)
+        for signal, by in ((command, bell), (angle, bell), (angle, slope))
+    )
 
 
 def _correlations(leading: Array, following: Array, most: int) -> Array:

@@ -1,9 +1,10 @@
 """A log file -> `Log`: open, map, repair, check, resample; and back to CSV, which reads the same."""
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 
@@ -13,8 +14,10 @@ from hydroid.log.binary import BINARY, first_bytes
 from hydroid.log.checks import check_motion, check_recording
 from hydroid.log.csv import open_csv
 from hydroid.log.log import Log, LogFinding, by_level, log_finding
-from hydroid.log.repair import fill, hold, resample, unwrap
-from hydroid.log.table import Signal, Table
+from hydroid.log.repair import between_gaps, hold, resample, without_bad_rows
+from hydroid.log.rods import as_angles, rods_of
+from hydroid.log.table import Recording, Signal, Table
+from hydroid.settings.arm import Arm
 from hydroid.settings.log import Kind, LogSettings
 from hydroid.units import UNITS
 from hydroid.words import listed
@@ -22,6 +25,8 @@ from hydroid.words import listed
 DEFAULT = LogSettings()
 SHOWN = {"command": "%", "angle": "deg", "length": "mm", "pressure": "bar"}
 """units in which messages state what is measured"""
+LENGTHS = ("m", "cm", "mm")
+"""units of positions, and of the lengths of cylinders"""
 
 
 Ranges = Mapping[str, tuple[float, float]]
@@ -53,26 +58,40 @@ def _first_bytes(path: Path) -> bytes:
 
 
 def check_log(
+    path: Path, settings: LogSettings, ranges: Ranges, **how: Any
+) -> tuple[Log | None, list[LogFinding]]:
+    """Return the longest part of a log between its gaps, None if it cannot be used, and all findings.
+
+    The arguments are those of `check_parts`.
+    """
+    parts, findings = check_parts(path, settings, ranges, **how)
+    return max(parts, key=lambda part: part.duration, default=None), findings
+
+
+def check_parts(
     path: Path,
     settings: LogSettings,
     ranges: Ranges,
     *,
     outputs: Sequence[int] | None = (),
-    backward: Collection[int] = (),
+    arm: Arm | None = None,
     repair: bool = False,
-) -> tuple[Log | None, list[LogFinding]]:
-    """Find everything that is wrong with a log: return it, None if any finding is an error, and all findings.
+) -> tuple[list[Log], list[LogFinding]]:
+    """Find everything that is wrong with a log: return its parts between gaps, and all findings.
+
+    There are no parts if any finding is an error, and one if there is no long gap.
 
     Args:
         ranges: (-inf, inf) for a continuous joint. Findings call joints by these names.
         outputs: joints (numbers, from 1) whose angles a fit compares; None: a joint whose angle column the
             file lacks is unmeasured, which else is an error.
-        backward: joints (from 1) that a positive command turns to negative angles.
+        arm: whose cylinders have lengths that stand for angles; a positive command turns its joints
+            `backward` to negative angles.
         repair: fill holes up to `settings.repair_s`.
     """
-    source, log, findings, compared = str(path), None, list[LogFinding](), outputs or ()
+    source, parts, findings, compared = str(path), list[Log](), list[LogFinding](), outputs or ()
     try:
-        needed, signals = {*compared, *settings.joints}, map_signals(settings, ranges)
+        needed, signals = {*compared, *settings.joints}, map_signals(settings, ranges, arm)
         if (last := max(needed, default=0)) > len(ranges):
             what = f"no joint {last}; the arm has joints 1 to {len(ranges)}"
             raise LogError(what, source, "correct outputs or log.joints")
@@ -82,23 +101,46 @@ def check_log(
         table = open_table(path, settings)
         if outputs is None:
             signals = [s for s in signals if s.kind in ("time", "command") or s.name in table.names]
-        recording = table.read(_match(table, signals, needed, findings))
+        signals = _match(table, signals, needed, findings)
+        recording = table.read(signals)
+        del table  # with the columns that are not used
         findings += [log_finding("note", "layout", source, what=one) for one in recording.table.remarks]
-        recording = unwrap(recording, findings)
-        if repair:
-            recording = fill(recording, settings.repair_s, findings)
-        findings += check_recording(recording, settings, repaired=repair)
+        recording = as_angles(recording, findings)
+        recording = without_bad_rows(recording, settings, findings, repair=repair)
+        findings += check_recording(recording, settings)
         if all(finding.level != "error" for finding in findings):
-            log = resample(recording, settings, len(ranges))
-            findings += check_motion(log, recording.signals, compared, backward, settings.delay_s)
+            parts = _parts(recording, settings, len(ranges), findings, repair=repair)
+            del recording
+            backward = arm.backward if arm else ()
+            for part in parts:
+                findings += check_motion(part, signals, compared, backward, settings.delay_s)
     except LogError as error:
         numbers = {"what": error.what, "hint": error.hint}
         findings.append(LogFinding("unreadable", "error", (), numbers, error.where, source))
-    return log, by_level(findings)
+        parts = []
+    return parts, by_level(findings)
 
 
-def map_signals(settings: LogSettings, ranges: Ranges) -> list[Signal]:
-    """Return the signals that the settings ask for, time first."""
+def _parts(
+    recording: Recording, settings: LogSettings, joints: int, findings: list[LogFinding], *, repair: bool
+) -> list[Log]:
+    """Return the parts of a recording between its gaps as logs."""
+    parts = list[Log]()
+    for piece in between_gaps(recording, settings, findings, repair=repair):
+        begin = float(piece.time[0] - recording.time[0])
+        rest = 0 if begin else None  # after a gap the arm may be moving
+        parts.append(replace(resample(piece, settings, joints), begin=begin, rest=rest))
+    if len(parts) == 1:
+        return parts
+    return [replace(one, source=f"{one.source}[{k}]") for k, one in enumerate(parts, 1)]
+
+
+def map_signals(settings: LogSettings, ranges: Ranges, arm: Arm | None = None) -> list[Signal]:
+    """Return the signals that the settings ask for, time first.
+
+    Raises LogError: lengths stand for the angles of a joint of the arm that no known cylinder turns.
+    """
+    rods = rods_of(arm) if arm and _has_lengths(settings) else {}
     signals = [Signal(settings.time.column, "time", gain=UNITS[settings.time.unit].factor)]
     for kind in get_args(Kind):
         for joint, (owner, (low, high)) in enumerate(ranges.items(), 1):
@@ -111,10 +153,20 @@ def map_signals(settings: LogSettings, ranges: Ranges) -> list[Signal]:
                 }[kind]
                 unit = UNITS[columns.unit.lower()]
                 scale = columns.scale * unit.factor, columns.offset * unit.factor
+                shown, rod = SHOWN[unit.quantity], None
+                if unit.quantity == "length" and arm and joint not in arm.slides:
+                    shown, rod = "deg", rods.get(joint)
+                    if rod is None:
+                        what = f"{listed(columns.column)} is a length, but no cylinder of {owner} is known"
+                        raise LogError(what, arm.where, f"give {owner} a cylinder with its pivots there")
                 for part, name in enumerate(columns.column):
-                    shown = SHOWN[unit.quantity]
-                    signals.append(Signal(name, kind, joint, part, *scale, *limits, shown, owner))
+                    signals.append(Signal(name, kind, joint, part, *scale, *limits, shown, owner, rod=rod))
     return signals
+
+
+def _has_lengths(settings: LogSettings) -> bool:
+    every = (settings.angle, *(own and own.angle for own in settings.joints.values()))
+    return any(columns and columns.unit in LENGTHS for columns in every)
 
 
 def angle_margin(low: float, high: float) -> float:
@@ -159,8 +211,10 @@ def _match(
     return wanted
 
 
-def write_log(path: Path, log: Log, settings: LogSettings, *, exact: bool = False) -> None:
-    """Write a log, whole or not at all.
+def write_log(
+    path: Path, log: Log, settings: LogSettings, *, exact: bool = False, arm: Arm | None = None
+) -> None:
+    """Write a log, whole or not at all. The `arm` has the cylinders whose lengths stand for angles.
 
     Cells have ten digits, or with `exact` as many as it takes to read the same bits back; where no cell does
     (degrees for a value that was in radians) the last bit may differ. The command is written ahead by
@@ -169,14 +223,17 @@ def write_log(path: Path, log: Log, settings: LogSettings, *, exact: bool = Fals
     Raises LogError: the settings map no column for a joint that is driven, or one for an angle that was not
     measured.
     """
-    write_logs(path, [(log, settings)], exact=exact)
+    write_logs(path, [(log, settings)], exact=exact, arm=arm)
 
 
-def write_logs(path: Path, logs: Sequence[tuple[Log, LogSettings]], *, exact: bool = False) -> None:
+def write_logs(
+    path: Path, logs: Sequence[tuple[Log, LogSettings]], *, exact: bool = False, arm: Arm | None = None
+) -> None:
     """Write logs of the same time side by side into one file, each with its settings, as `write_log` does."""
     columns: dict[str, list[str]] = {}
     for log, settings in logs:
-        signals = map_signals(settings, dict.fromkeys(map(str, range(1, 1 + log.joints)), (np.inf, np.inf)))
+        free = dict.fromkeys(map(str, range(1, 1 + log.joints)), (np.inf, np.inf))
+        signals = map_signals(settings, free, arm)
         mapped = {(signal.kind, signal.joint) for signal in signals}
         for joint, (driven, measured) in enumerate(zip(log.driven, log.measured, strict=True), 1):
             if driven and ("command", joint) not in mapped:
@@ -191,7 +248,8 @@ def write_logs(path: Path, logs: Sequence[tuple[Log, LogSettings]], *, exact: bo
             if signal.kind == "command":
                 values = (-command if signal.part else command)[:, joint].clip(min=signal.low)
             elif signal.kind == "angle":
-                values = log.angle[:, joint]
+                angle = log.angle[:, joint]
+                values = angle if signal.rod is None else signal.rod.cylinder.length(angle)
             elif signal.kind == "pressure":
                 if log.pressure is None:
                     continue

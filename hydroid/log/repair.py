@@ -9,15 +9,23 @@ the angle.
 """
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
 from hydroid.arrays import Array
+from hydroid.errors import LogError
 from hydroid.log.log import Log, LogFinding
 from hydroid.log.table import Recording
 from hydroid.settings.log import LogSettings
 
 GAP = 1.95  # in sample periods: a longer step is a gap, a shorter one jitter; one dropped sample makes it 2
+BRIDGED = 3.05  # in periods of the samples or of the settings: a gap that is no longer is bridged
+SHORTEST = 0.5  # of a log [s]
+MOST_LEFT_OUT = 0.05
+"""part of the rows that may hold no numbers"""
+MOST_AGAIN = 0.005
+"""part of the rows that may stand at a time which has been: more are a clock that was set back"""
 
 
 def sample_period(time: Array) -> float:
@@ -31,7 +39,10 @@ def unwrap(recording: Recording, findings: list[LogFinding]) -> Recording:
 
     None turns by 180 deg within one sample: other jumps are errors.
     """
-    values, turn = recording.values.copy(), 2 * np.pi
+    values, turn = recording.values, 2 * np.pi
+    if all(np.isfinite(signal.high) for signal in recording.signals if signal.unit == "deg"):
+        return recording
+    values = values.copy()
     for signal, column in zip(recording.signals, values.T, strict=True):
         if signal.unit == "deg" and not np.isfinite(signal.high):
             rows = np.flatnonzero(~np.isnan(column))
@@ -75,38 +86,123 @@ def fill(recording: Recording, longest: float, findings: list[LogFinding]) -> Re
     return replace(recording, values=values, rows=rows)
 
 
+def without_bad_rows(
+    recording: Recording, settings: LogSettings, findings: list[LogFinding], *, repair: bool
+) -> Recording:
+    """Return the rows that can be used, with angles unwrapped and, on request, holes filled.
+
+    A row is left out if a cell in it holds no number, or if its time does not follow that of the rows before.
+    Where many rows are such, none is left out: the file holds something else than the settings say.
+    """
+    if repair:
+        recording = fill(unwrap(recording, findings), settings.repair_s, findings)
+    else:
+        recording = unwrap(without_cut_end(recording, findings), findings)
+    values = recording.values
+    bad = np.isnan(values).any(axis=1)
+    if 0 < bad.sum() <= max(MOST_LEFT_OUT * len(values), 1):
+        rows = np.flatnonzero(bad)
+        column = int(np.isnan(values[rows[0]]).argmax())
+        torn = np.isnan(values[rows[0]]).all()
+        signal = None if torn else recording.signals[column]
+        text = "" if signal is None else recording.table.text(signal.name, int(recording.rows[rows[0]]))
+        what = f"{text[:30]!r} is not a number" if text else "no value is there"
+        what = f"does not hold {len(recording.table.names)} cells with numbers" if torn else what
+        findings.append(recording.finding("warning", "row left out", rows, signal, what=what))
+        recording = recording.kept(np.flatnonzero(~bad))
+    elif bad.any():
+        return recording
+    time = recording.time
+    again = time[1:] <= np.maximum.accumulate(time)[:-1]
+    if 0 < again.sum() <= max(MOST_AGAIN * len(time), 1):
+        rows = 1 + np.flatnonzero(again)
+        what = f"time does not increase: {time[rows[0]]:.6g} s follows {time[rows[0] - 1]:.6g} s"
+        findings.append(recording.finding("warning", "row left out", rows, recording.signals[0], what=what))
+        recording = recording.kept(np.delete(np.arange(len(time)), rows))
+    return recording
+
+
+def without_cut_end(recording: Recording, findings: list[LogFinding]) -> Recording:
+    """Leave out the last row if it is cut off, as when a logger is killed: its last cell holds no number."""
+    table, values = recording.table, recording.values
+    if table.header is None or len(values) < 2:
+        return recording
+    ends = [column for column, signal in enumerate(recording.signals) if signal.name == table.names[-1]]
+    cut = np.isnan(values[-1]).all() or any(np.isnan(values[-1, column]) for column in ends)
+    if not cut or np.isnan(values[-2]).all():
+        return recording
+    findings.append(recording.finding("warning", "cut end", [len(values) - 1]))
+    return recording.kept(slice(None, -1))
+
+
+def between_gaps(
+    recording: Recording, settings: LogSettings, findings: list[LogFinding], *, repair: bool
+) -> list[Recording]:
+    """Return the parts of a recording between gaps, without those shorter than SHORTEST.
+
+    Gaps of up to two samples, or with `repair` of up to `settings.repair_s` besides the usual step, are none:
+    `resample` bridges them. Raises LogError: no part is long enough.
+    """
+    time, signal = recording.time, recording.signals[0]
+    steps, period = np.diff(time), sample_period(time)
+    bridged = BRIDGED * max(period, settings.period_s)
+    if repair:
+        bridged = max(bridged, settings.repair_s * (1 + 1e-9) + period)
+    lost = 1 + np.flatnonzero((steps > GAP * period) & (steps <= bridged))
+    if len(lost) and not repair:
+        samples = float(np.rint(steps[lost - 1] / period - 1).sum())
+        findings.append(recording.finding("warning", "lost", lost, signal, samples=samples))
+    gaps = 1 + np.flatnonzero(steps > bridged)
+    ends = [0, *gaps.tolist(), len(time)]
+    every = [slice(first, end) for first, end in pairwise(ends)]
+    kept = [rows for rows in every if time[rows.stop - 1] - time[rows.start] >= SHORTEST]
+    if not kept:
+        hint = "log at a higher rate, or use --repair"
+        raise LogError(f"has no part of {SHORTEST} s without a gap", recording.table.source, hint)
+    if len(gaps):
+        first, left = gaps[0], len(every) - len(kept)
+        numbers = {"gap": time[first] - time[first - 1], "period": period, "parts": float(len(kept))}
+        more = f", {left} shorter than {SHORTEST:g} s left out" if left else ""
+        findings.append(recording.finding("warning", "gap", gaps, signal, **numbers, left=more))
+    return [recording.kept(at) for at in kept]
+
+
 def resample(recording: Recording, settings: LogSettings, joints: int) -> Log:
     """Bring a recording without holes to the period of the settings, from its first sample to its last.
 
     Commands act `settings.delay_s` later than logged, and are 0 % before the first one acts. On a finer grid
     they change on a line from sample to sample: when between them is not known.
     """
-    rows, period, time = len(recording.time), settings.period_s, recording.time - recording.time[0]
-    command, measured = np.zeros((rows, joints)), np.full((rows, joints, 3), np.nan)
-    for signal, values in zip(recording.signals[1:], recording.values.T[1:], strict=True):
-        if signal.kind == "command":
-            command[:, signal.joint - 1] += -values if signal.part else values
-        else:
-            measured[:, signal.joint - 1, (signal.kind == "pressure") + signal.part] = values
+    period, time = settings.period_s, recording.time - recording.time[0]
     grid = period * np.arange(int(time[-1] / period + 0.01) + 1, dtype=np.float64)
     exact = on_grid(time, period)
     time = time if exact is None else exact  # on the grid values pass unchanged
-    measured = np.stack([np.interp(grid, time, column) for column in measured.reshape(rows, -1).T], axis=1)
-    measured = measured.reshape(-1, joints, 3)
-    at, command = grid - settings.delay_s, command.clip(-100, 100)
-    if period > 0.8 * sample_period(time):
-        command = hold(time, command, at, period)
-    else:
-        middle = at + 0.5 * period
-        command = np.stack([np.interp(middle, time, column, left=0.0) for column in command.T], axis=1)
-    pressure = measured[..., 1:] if any(signal.kind == "pressure" for signal in recording.signals) else None
+    shape = len(grid), joints
+    command, angle, pressure = np.zeros(shape), np.full(shape, np.nan), None
+    given = dict[int, Array]()
+    for signal, values in zip(recording.signals[1:], recording.values.T[1:], strict=True):
+        joint = signal.joint - 1
+        if signal.kind == "command":
+            given[joint] = given.get(joint, 0.0) + (-values if signal.part else values)
+        elif signal.kind == "angle":
+            angle[:, joint] = np.interp(grid, time, values)
+        else:
+            pressure = np.full((*shape, 2), np.nan) if pressure is None else pressure
+            pressure[:, joint, signal.part] = np.interp(grid, time, values)
+    at, slower = grid - settings.delay_s, period <= 0.8 * sample_period(time)
+    for joint, own in given.items():
+        values = own.clip(-100, 100)
+        if slower:
+            command[:, joint] = np.interp(at + 0.5 * period, time, values, left=0.0)
+        else:
+            command[:, joint] = hold(time, values[:, None], at, period)[:, 0]
     recorded = np.zeros(len(grid), dtype=bool)
     recorded[np.minimum(np.rint(time / period).astype(np.int64), len(grid) - 1)] = True
     return Log(
         recording.table.source,
         grid,
-        command.clip(-100, 100),
-        measured[..., 0],
+        command.clip(-100, 100, out=command),
+        angle,
         period,
         pressure,
         recorded=None if recorded.all() else recorded,

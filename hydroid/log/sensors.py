@@ -1,8 +1,7 @@
 """Faults of a sensor or a logger that the readings of one angle show: leaps, and steps that are too coarse.
 
-A spike, a drop-out to zero, a zero point that shifts, and seconds that were cut out and renumbered all
-make an
-angle leap within one sample, as no joint moves: faster than it ever does elsewhere, and in between samples
+A spike, a drop-out to zero, a zero point that shifts, and seconds that were cut out and renumbered all make
+an angle leap within one sample, as no joint moves: faster than it ever does elsewhere, and in between samples
 in which it hardly moves.
 """
 
@@ -54,12 +53,13 @@ def leaps(time: Array, angle: Array) -> Index:
     steps = np.where(whole & np.isfinite(steps), steps, 0.0)
     if len(steps) < 10:
         return np.flatnonzero(steps < 0)
-    around = np.pad(steps, 4, "edge")
-    # a leap and the one back may be up to three samples apart: the largest step nearby does not count
-    near = np.sort([around[4 + k : 4 + k + len(steps)] for k in (-4, -3, -2, 2, 3, 4)], axis=0)[-2]
     usual = np.percentile(steps, NEARLY_ALL)
     least = max(LEAST_LEAP, LEAST_SPEED * period, ABOVE_USUAL * usual)
-    return 1 + np.flatnonzero((steps > least) & (steps > ABOVE_NEAR * near))
+    large = np.flatnonzero(steps > least)
+    # a leap and the one back may be up to three samples apart: the largest step nearby does not count
+    around = np.clip(large[:, None] + [-4, -3, -2, 2, 3, 4], 0, len(steps) - 1)
+    near = np.sort(steps[around], axis=1)[:, -2]
+    return 1 + large[steps[large] > ABOVE_NEAR * near]
 
 
 def resolution(angle: Array) -> float:

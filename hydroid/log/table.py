@@ -1,22 +1,27 @@
 """What every file format is read as: a table of named columns, some of which are read into a recording."""
 
 import re
+from array import array
 from collections.abc import Generator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import KW_ONLY, field
+from contextlib import contextmanager, suppress
+from dataclasses import KW_ONLY, field, replace
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hydroid.arrays import Array, Ints, record
+from hydroid.arrays import Array, Index, Ints, record
 from hydroid.errors import LogError
 from hydroid.findings import Level
 from hydroid.log.log import LogFinding, log_finding
 
+if TYPE_CHECKING:
+    from hydroid.log.rods import Rod
+
 _DAY = 86_400 * 10**9  # [ns]
+_NO_TIME = np.iinfo(np.int64).min  # NaT of numpy
 _TIME = re.compile(
     r"(?:.*[T ])?(\d{1,2}):(\d{2}):(\d{2})(?:[.,](\d{1,9})\d*)? *([AaPp])?\.?[Mm]?\.?(?:Z|[+-][\d:]+)?"
 )
@@ -30,7 +35,8 @@ class Signal:
     `name` is that in the header, `kind` time, command, angle or pressure, `joint` a number from 1, or 0 for
     the time, `owner` the joint's name. `part` is 0, or 1 for the column of a command's negative direction and
     of the pressure in chamber B. `unit` is the one to be read: %, deg, mm of a joint that slides, or bar.
-    `rest` is the value of a command before its first message, in a format of messages.
+    `rest` is the value of a command before its first message, in a format of messages. `rod` is the cylinder
+    whose length the cells of an angle are.
     """
 
     name: str
@@ -44,6 +50,7 @@ class Signal:
     unit: str = ""
     owner: str = ""
     rest: float = 0.0
+    rod: "Rod | None" = None
 
     def __str__(self) -> str:
         return f"{self.kind} of joint {self.owner}" if self.joint else self.kind
@@ -70,6 +77,11 @@ class Table:
     units: Mapping[str, str] = field(default_factory=dict[str, str])
     remarks: tuple[str, ...] = ()
     lines: Ints | None = None
+
+    def text(self, name: str, row: int) -> str:
+        """Return the text of a cell that holds no number, for a message; empty where it is no text."""
+        cell = self.columns[name][row]
+        return cell if isinstance(cell, str) else ""
 
     def read(self, signals: Sequence[Signal]) -> "Recording":
         """Read the columns of signals; a number that is too large counts as none."""
@@ -106,6 +118,10 @@ class Recording:
     def time(self) -> Array:
         """Time [s], shape (R,)."""
         return self.values[:, 0]
+
+    def kept(self, rows: Index | slice) -> "Recording":
+        """Return some of its rows."""
+        return replace(self, values=self.values[rows], rows=self.rows[rows])
 
     def finding(
         self,
@@ -144,25 +160,61 @@ def clock(cell: str) -> int | None:
     return ((hours * 60 + int(minute)) * 60 + int(second)) * 10**9 + int((fraction or "0").ljust(9, "0"))
 
 
-def _as_numbers(cells: NDArray[Any]) -> tuple[Array, bool]:
-    """Return cells as numbers, NaN for those that hold none, and whether they are times [s] from the first.
+class TextColumn:
+    """The numbers in a column of text, which comes in pieces; or times, if its first cell with text is one.
 
-    Dates in text do not count, which programs write in many ways: a time of day that falls by more than half
-    a day has passed midnight.
+    Dates do not count, which programs write in many ways: a time of day that falls by more than half a day
+    has passed midnight.
     """
+
+    def __init__(self) -> None:
+        self._numbers = array("d")
+        self._ticks: array[int] | None = None
+        self._begun = False
+
+    def extend(self, cells: Sequence[str]) -> None:
+        """Take the next cells."""
+        if not self._begun and (first := next(filter(None, cells), "")):
+            self._begun = True
+            if clock(first) is not None:
+                self._ticks = array("q", [_NO_TIME] * len(self._numbers))
+        if self._ticks is not None:
+            clocks = map(clock, cells)
+            self._ticks.extend(_NO_TIME if tick is None else tick for tick in clocks)
+        else:
+            self._numbers.extend(_numbers(cells))
+
+    def values(self) -> NDArray[Any]:
+        """Return numbers, NaN where there is none, or times, NaT where there is none; shape (R,)."""
+        if self._ticks is None:
+            return np.frombuffer(self._numbers, np.float64) if self._numbers else np.zeros(0)
+        ticks = np.array(self._ticks, np.int64)
+        there = ticks != _NO_TIME
+        days = np.cumsum(np.diff(ticks[there], prepend=ticks[there][:1]) < -_DAY // 2)
+        ticks[there] += _DAY * days
+        return ticks.view("M8[ns]")
+
+
+def _numbers(cells: Sequence[str]) -> "array[float]":
+    """Return the numbers in cells, NaN where there is none."""
+    if not any("_" in cell for cell in cells):
+        with suppress(ValueError):
+            return array("d", map(float, cells))
+    numbers = map(number, cells)
+    return array("d", [np.nan if one is None else one for one in numbers])
+
+
+def _as_numbers(cells: NDArray[Any]) -> tuple[Array, bool]:
+    """Return cells as numbers, NaN where there is none, and whether they are times [s] from the first."""
     if cells.dtype.kind in "fiub":
         return cells.astype(np.float64), False
     if cells.dtype.kind == "M":
         there = ~np.isnat(cells)
         ticks = (cells[there] - cells[there][:1]).astype("m8[ns]").astype(np.int64)
     else:
-        texts = [str(cell) for cell in cells]
-        if clock(next(filter(None, texts), "")) is None:
-            return np.array([number(text) for text in texts], np.float64), False
-        clocks = [clock(text) for text in texts]
-        there = np.array([tick is not None for tick in clocks])
-        ticks = np.array([tick for tick in clocks if tick is not None], np.int64)
-        ticks += _DAY * np.cumsum(np.diff(ticks, prepend=ticks[0]) < -_DAY // 2)
+        column = TextColumn()
+        column.extend([str(cell) for cell in cells])
+        return _as_numbers(column.values())
     seconds = np.full(len(cells), np.nan)
     seconds[there] = (ticks - ticks[:1]) / 1e9
     return seconds, True
@@ -175,8 +227,8 @@ MOST_NUMBERS = 30_000_000
 def refuse_large(source: str, rows: int, columns: int) -> None:
     """Raise a LogError where a log is too long for the memory of a usual computer."""
     if rows * columns > MOST_NUMBERS:
-        most = MOST_NUMBERS // columns
-        what = f"has {rows:,} rows, of which {columns} columns are read; at most {most:,} can be"
+        most = f"at most {MOST_NUMBERS // columns:,} rows of {columns} columns can be read"
+        what = f"has {rows:,} rows; {most}"
         raise LogError(what, source, "cut it, or record at a lower rate")
 
 

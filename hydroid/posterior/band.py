@@ -16,8 +16,9 @@ from scipy.stats import t as student
 from hydroid.arrays import Array, record, rms
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
-from hydroid.posterior.error_model import ErrorModel, make_error_model, travelled
+from hydroid.posterior.error_model import ErrorModel, travelled
 from hydroid.posterior.posterior import COVERAGE, NORMAL, STEP, Posterior, stored_posterior
+from hydroid.posterior.stored_errors import stored_error_model
 from hydroid.posterior.uncertainty import Uncertainty
 from hydroid.problem.problem import Problem
 from hydroid.search.axes import differentiate
@@ -79,12 +80,7 @@ def prediction_bands(model: IdentifiedModel, log: Log, response: Array) -> dict[
     def angles(theta: Array) -> Array:
         return problem.responses(theta)[0].angle.reshape(len(theta), -1)
 
-    errors = make_error_model(problem)
-    numbers = errors.numbers.copy()
-    for i, signal in enumerate(errors.signals):
-        if signal.quantity == "angle":
-            numbers[i] = stored[f"q{signal.joint}"].numbers
-    errors = replace(errors, numbers=numbers)
+    errors = stored_error_model(problem, stored)
     slopes = differentiate(angles, known.box, known.axes(STEP))
     parts = known.parts(slopes).reshape(-1, *response.shape)
     slopes = slopes.reshape(parts.shape)

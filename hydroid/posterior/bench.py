@@ -10,7 +10,8 @@ import numpy as np
 
 from hydroid.arm.model import load_model
 from hydroid.arrays import Array, record
-from hydroid.hydraulics.records import Records
+from hydroid.hydraulics.cylinder import rod_motion
+from hydroid.hydraulics.records import Records, coefficients
 from hydroid.log import Log, only_command
 from hydroid.log.command_sizes import ONE_SIZE
 from hydroid.mjcf import quiet_mujoco
@@ -20,6 +21,10 @@ from hydroid.simulation import Candidates, Simulation
 from hydroid.simulation.rollout import SteppedArm
 from hydroid.simulation.scenario import Scenario
 from hydroid.simulation.steady import NEAR, steady_velocity
+
+ONSET, RISEN = 0.1, 1.0 - np.exp(-1.0)
+"""parts of the steady speed: it takes the dead time to reach the first, and from there the time constant to
+reach the second"""
 
 
 @record
@@ -128,8 +133,12 @@ class Movement:
 
     def speeds(self, candidates: Candidates) -> Array:
         """Return speeds between samples, shape (n, samples)."""
+        return self.speeds_of(self.angles(candidates))
+
+    def speeds_of(self, angles: Array) -> Array:
+        """Return the speeds between angles of this movement, (n, 1 + samples) [rad]."""
         factor = self.sign * self.bench.unit[0] / self.bench.period
-        return factor * np.diff(self.angles(candidates), axis=1)
+        return factor * np.diff(angles, axis=1)
 
     def reaches(self, speeds: Array, level: Array) -> Array:
         """Return when speeds, shape (n, samples), first reach a level, shape (n,) [s]; NaN where never."""
@@ -156,3 +165,15 @@ def make_bench(settings: FitSettings, logs: Sequence[Log], joint: int) -> Bench:
     scenario = Scenario(load_model(arm), arm, rest, [joint - 1], alone)
     only = only_command(logs, joint, 1.0), only_command(logs, joint, -1.0)
     return Bench(settings, joint, float(middle), period, scenario, only)
+
+
+def actuator(bench: Bench, candidates: Candidates) -> tuple[Records, Array, Array]:
+    """Return n candidates' COEFFICIENTS of the joint, and travel and moment arm [m] at its angle, (n,) each.
+
+    Of a rotary actuator, whose areas are displacements, the travel is the angle and the moment arm is 1.
+    """
+    j = bench.joint - 1
+    joints: Records = candidates.joints[:, [j]]  # pyright: ignore[reportAssignmentType]
+    c: Records = coefficients(joints)[:, 0]  # pyright: ignore[reportAssignmentType]
+    travel, arm, _ = rod_motion(np.full(len(c), bench.angle), c)
+    return c, travel, arm

@@ -22,11 +22,13 @@ STEPS = 6  # points on each side before the steps grow: they reach three standar
 class Profile:
     """What a profile shows: where the deviance is below THRESHOLD, infinite where it never exceeds it.
 
-    `lowest` is the least deviance of all points; clearly below 0 the estimate is no optimum.
+    `lowest` is the least deviance of all points; clearly below 0 the estimate is no optimum. `points` are
+    values and their deviances, from the lowest value up, shape (n, 2).
     """
 
     interval: tuple[float, float]
     lowest: float
+    points: Array
 
     @property
     def better_optimum(self) -> bool:
@@ -39,8 +41,7 @@ def profile(problem: Problem, uncertainty: Uncertainty, name: str) -> Profile:
 
     The rise of the sum of squares is the deviance. Stage 1 minimises output errors, whose sum of squares is
     no likelihood: it is scaled so that its curvature is the estimate's variance (L. Pace, A. Salvan, N.
-    Sartori,
-    2011).
+    Sartori, 2011).
     """
     parameters, linear, theta = problem.parameters, uncertainty.linear, uncertainty.theta
     free = parameters.named(parameters.free)
@@ -64,7 +65,8 @@ def profile(problem: Problem, uncertainty: Uncertainty, name: str) -> Profile:
 
     reach = 3.0 * uncertainty.standard_deviation[i]
     reach = np.inf if np.isnan(reach) else reach  # it lies at a bound
-    ends, lowest = list[float](), 0.0
+    ends = list[float]()
+    points = [(float(theta[i]), 0.0)]
     for bound, end in ((parameters.lower[i], -np.inf), (parameters.upper[i], np.inf)):
         # from the estimate outwards, until beyond THRESHOLD or at the bound, or after twelve points
         near, start, value, crossing = 0.0, theta, theta[i], end
@@ -74,7 +76,7 @@ def profile(problem: Problem, uncertainty: Uncertainty, name: str) -> Profile:
             value = bound if (bound - value - length) / length < 1e-6 else value + length
             start, square = fit_others(start, value)
             deviance = (square - cost) / unit
-            lowest = min(lowest, deviance)
+            points.append((float(value), float(deviance)))
             if deviance > THRESHOLD:  # the root is about linear
                 roots = np.sqrt(np.maximum([near, deviance], 0.0))
                 crossing = np.interp(np.sqrt(THRESHOLD), roots, [before, value])
@@ -82,7 +84,8 @@ def profile(problem: Problem, uncertainty: Uncertainty, name: str) -> Profile:
                 break
             near = deviance
         ends.append(crossing)
-    return Profile((ends[0], ends[1]), lowest)
+    lowest = min(deviance for _, deviance in points)
+    return Profile((ends[0], ends[1]), lowest, np.array(sorted(points)))
 
 
 @record

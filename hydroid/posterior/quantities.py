@@ -1,39 +1,22 @@
 """All quantities of a fit: what its logs determine, in the words of an engineer."""
 
-from collections.abc import Callable, Iterator
-from typing import NamedTuple, TypeAlias
+from collections import defaultdict
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from hydroid.arrays import Array
 from hydroid.estimate import CurveEstimate, Interval, QuantityEstimate, finite, finite_ends
-from hydroid.hydraulics.cylinder import rod_motion, volume
-from hydroid.hydraulics.records import LINEAR, Records, coefficients
+from hydroid.hydraulics.cylinder import volume
+from hydroid.hydraulics.records import LINEAR
 from hydroid.hydraulics.solenoid import FULL_SCALE, drive, resting_stroke
-from hydroid.posterior.bench import Bench, make_bench
+from hydroid.posterior.bench import ONSET, RISEN, Bench, actuator, make_bench
+from hydroid.posterior.column import Column, Measured
+from hydroid.posterior.curves import opening_curve, step_curves
+from hydroid.posterior.posterior import Known
 from hydroid.posterior.uncertainty import Uncertainty
 from hydroid.problem.problem import Problem
 from hydroid.simulation import Candidates
-
-
-class Column(NamedTuple):
-    """One quantity of a joint, or one point of its curve of speed against the command.
-
-    name: plain ASCII. label: the same in words. positive: it cannot be negative, and its interval is
-    multiplicative. command: where the point of the curve is [%].
-    """
-
-    name: str
-    label: str
-    unit: str
-    positive: bool = True
-    command: float | None = None
-
-
-Measured: TypeAlias = Iterator[tuple[Column, Array]]
-"""quantities of n candidates, each of shape (n,), the same for every population;
-NaN where one is undefined"""
-
 
 Measure = Callable[[Candidates], Measured]
 Test = Callable[[Candidates, Array], Measured]
@@ -49,50 +32,83 @@ def quantities(problem: Problem, uncertainty: Uncertainty) -> Quantities:
 
     Those that no free parameter changes are left out: the settings give them, not the logs.
     """
-    scalars, curves = dict[str, QuantityEstimate](), dict[str, CurveEstimate]()
-    candidates = problem.bindings.candidates
-    estimate = candidates(uncertainty.theta[None])
+    scalars = dict[str, QuantityEstimate]()
+    curves = dict[str, CurveEstimate]()
     for joint in problem.settings.outputs:
-        named = problem.settings.arm.joint_names[joint - 1]
-        bench = make_bench(problem.settings, problem.logs, joint)
-        measure = joint_measure(bench, estimate)
-        columns = [column for column, _ in measure(estimate)]
-
-        def values(theta: Array, measure: Measure = measure) -> Array:
-            return np.stack([value for _, value in measure(candidates(theta))], axis=1)
-
-        parameters = problem.settings.parameters.values()
-        concerned = np.array([p.joints is None or joint in p.joints for p in parameters])
-        positive = np.array([column.positive for column in columns])
-        known = uncertainty.posterior.propagate(values, positive, concerned)
-        curve, given, of_curve = list[tuple[float, float, Interval]](), True, ""
-        for i in np.flatnonzero(np.isfinite(known.value)).tolist():
-            (name, label, unit, _, command), value = columns[i], float(known.value[i])
-            interval = finite_ends(known.interval[i])
-            if command is not None:
-                curve.append((command, value, interval))
-                given, of_curve = given and known.given[i], label
-            elif not known.given[i]:
-                sd = finite(known.sd[i])
-                scalars[f"{named}_{name}"] = QuantityEstimate(
-                    label=label, joint=joint, value=value, unit=unit, sd=sd, interval=interval
-                )
-        if not given and curve:
-            at, value, interval = zip(*sorted(curve), strict=True)
-            curves[f"{named}_speed"] = CurveEstimate(
-                label=of_curve,
-                joint=joint,
-                unit=f"{bench.unit[1]}/s",
-                along="command [%]",
-                at=at,
-                value=value,
-                interval=interval,
-            )
+        of_joint = _joint_quantities(problem, uncertainty, joint)
+        scalars |= of_joint[0]
+        curves |= of_joint[1]
     return scalars, curves
 
 
+def _joint_quantities(problem: Problem, uncertainty: Uncertainty, joint: int) -> Quantities:
+    """Return the quantities of one joint, numbered from 1."""
+    candidates = problem.bindings.candidates
+    estimate = candidates(uncertainty.theta[None])
+    measure = joint_measure(make_bench(problem.settings, problem.logs, joint), estimate)
+    columns = [column for column, _ in measure(estimate)]
+
+    def values(theta: Array) -> Array:
+        return np.stack([value for _, value in measure(candidates(theta))], axis=1)
+
+    parameters = problem.settings.parameters.values()
+    concerned = np.array([p.joints is None or joint in p.joints for p in parameters])
+    positive = np.array([column.positive for column in columns])
+    known = uncertainty.posterior.propagate(values, positive, concerned)
+
+    named = problem.settings.arm.joint_names[joint - 1]
+    scalars = dict[str, QuantityEstimate]()
+    points = defaultdict[str, list[int]](list)
+    for i in np.flatnonzero(np.isfinite(known.value)).tolist():
+        column = columns[i]
+        if column.at is not None:
+            points[column.name].append(i)
+        elif not known.given[i]:
+            scalars[f"{named}_{column.name}"] = QuantityEstimate(
+                label=column.label,
+                joint=joint,
+                value=float(known.value[i]),
+                unit=column.unit,
+                sd=finite(known.sd[i]),
+                interval=finite_ends(known.interval[i]),
+            )
+    curves = dict[str, CurveEstimate]()
+    for name, of_curve in points.items():
+        if not known.given[of_curve].all():
+            curves[f"{named}_{name}"] = _curve([columns[i] for i in of_curve], known, of_curve, joint)
+    return scalars, curves
+
+
+def _curve(columns: Sequence[Column], known: Known, rows: Sequence[int], joint: int) -> CurveEstimate:
+    """Return the curve of a joint whose points, at least one, are `rows` of what is known."""
+    order = sorted(range(len(rows)), key=lambda i: columns[i].at or 0.0)
+    last = columns[-1]
+    return CurveEstimate(
+        label=last.label,
+        joint=joint,
+        unit=last.unit,
+        along=last.along,
+        at=tuple(_rounded(columns[i].at) for i in order),
+        value=tuple(_rounded(known.value[rows[i]]) for i in order),
+        interval=tuple(_rounded_ends(known.interval[rows[i]]) for i in order),
+    )
+
+
+def _rounded(value: float | None) -> float:
+    """Six digits: nobody calculates with the points of a curve, and a file holds hundreds."""
+    return float(f"{value:.6g}")
+
+
+def _rounded_ends(interval: Array) -> Interval:
+    low, high = finite_ends(interval)
+    return None if low is None else _rounded(low), None if high is None else _rounded(high)
+
+
 def joint_measure(bench: Bench, estimate: Candidates) -> Measure:
-    """Return what computes the quantities of one joint; what is tested is planned at the estimate."""
+    """Return what computes the quantities of one joint.
+
+    What is tested is planned at the estimate.
+    """
     tests, further = list[Test](), gain_model
     if bench.settings.stage == "hyd":
         torque, signs = bench.weigh(estimate)[0][0], ("positive", "negative")
@@ -114,7 +130,9 @@ def joint_measure(bench: Bench, estimate: Candidates) -> Measure:
 
 
 def gain_model(bench: Bench, candidates: Candidates, inertia: Array) -> Measured:
-    """Stage 1: what the joint does under K u = D q̇ + F_c sign(q̇), before springs and gravity's change act."""
+    """Stage 1: what the joint does under K u = D q̇ + F_c sign(q̇), before springs and gravity's
+    change act.
+    """
     joint = candidates.joints[:, bench.joint - 1]
     gain, damping, friction = joint["gain"], joint["damping"], joint["friction"]
     factor, unit = bench.unit
@@ -131,8 +149,8 @@ def gain_model(bench: Bench, candidates: Candidates, inertia: Array) -> Measured
 def oil(bench: Bench, candidates: Candidates, inertia: Array) -> Measured:
     """Stage 2: the arm on its oil with the valve shut, and the ratio of areas.
 
-    The oil is a spring of stiffness r² β (A_A²/V_A + A_B²/V_B) at the joint. Leakage and the seals' friction
-    are left out of the damping.
+    The oil is a spring of stiffness r² β (A_A²/V_A + A_B²/V_B) at the joint. Leakage and the seals'
+    friction are left out of the damping.
     """
     c, travel, arm = actuator(bench, candidates)
     volumes = c.dead_volume, c.dead_volume
@@ -147,23 +165,8 @@ def oil(bench: Bench, candidates: Candidates, inertia: Array) -> Measured:
     yield Column("area_ratio", "ratio of areas, A/B", ""), c.a.area / c.b.area
 
 
-def actuator(bench: Bench, candidates: Candidates) -> tuple[Records, Array, Array]:
-    """Return n candidates' COEFFICIENTS of the joint, and travel and moment arm [m] at its angle, (n,) each.
-
-    Of a rotary actuator, whose areas are displacements, the travel is the angle and the moment arm is 1.
-    """
-    j = bench.joint - 1
-    joints: Records = candidates.joints[:, [j]]  # pyright: ignore[reportAssignmentType]
-    c: Records = coefficients(joints)[:, 0]  # pyright: ignore[reportAssignmentType]
-    travel, arm, _ = rod_motion(np.full(len(c), bench.angle), c)
-    return c, travel, arm
-
-
 COMMANDS = (5.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0, 100.0)  # of the curve of speed [%]
 LASTS = 3.0  # how long the step is held in which dead time and time constant are sought [s]
-ONSET, RISEN = 0.1, 1.0 - np.exp(-1.0)
-"""parts of the steady speed: it takes the dead time to reach the first, and from there the time constant to
-reach the second"""
 
 
 def direction_test(bench: Bench, estimate: Candidates, sign: float, ending: str, word: str) -> Test:
@@ -180,7 +183,9 @@ def direction_test(bench: Bench, estimate: Candidates, sign: float, ending: str,
     # the smallest command from 50 % that clearly moves the joint, or the largest
     clear = (u for u in told if u >= 50.0 and planned[u] > ONSET * planned[100.0])
     rise = next(clear, told[-1] if told else 100.0)
-    step, opens_later = bench.movement(sign * rise, LASTS), valve_opens(bench, estimate, sign)[1][0] > 0.0
+    step = bench.movement(sign * rise, LASTS)
+    after_step = step_curves(step, estimate, ending, word)
+    opens_later = valve_opens(bench, estimate, sign)[1][0] > 0.0
 
     def measure(candidates: Candidates, loads: Array) -> Measured:
         steady = bench.steady(candidates, commands, loads)
@@ -208,15 +213,20 @@ def direction_test(bench: Bench, estimate: Candidates, sign: float, ending: str,
                 yield Column(f"{name}_{ending}", f"{label}, {word}", own_unit), value
         if opens_later:
             band = np.add(*valve_opens(bench, candidates, sign))
-            yield Column(f"dead_band_{ending}", f"dead band, {word}", "%"), band
+            yield Column(f"dead_band_{ending}", f"dead band with the spool's overlap, {word}", "%"), band
+        yield from opening_curve(bench, candidates, sign)
+        if planned[rise] != 0.0:
+            yield from after_step(run)
 
     return measure
 
 
 def valve_opens(bench: Bench, candidates: Candidates, sign: float) -> tuple[Array, Array]:
-    """Return the parameter `dead_band` of a direction [%], and how much further its valve opens, (n,) each.
+    """Return the parameter `dead_band` of a direction [%], and how much further its valve opens,
+    (n,) each.
 
-    The pilot stage passes nothing up to the first. From there on the spool crosses its overlap, unless the
+    The pilot stage passes nothing up to the first. From there on the spool crosses its overlap,
+    unless the
     voltage at the smallest command has done it: then the second is not above 0.
     """
     c, *_ = actuator(bench, candidates)

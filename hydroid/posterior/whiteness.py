@@ -1,45 +1,118 @@
-"""Whether innovations are white: what else is left of an error is the model's, not the sensor's.
+"""Whether innovations are white, and owe nothing to the command: else the model errs, not the
+sensor.
 
-The error of a joint lasts until the autocorrelation of its innovations, over all logs, has fallen to 1/e of
-that between two samples, or below `FAINT`. Of a first-order process that is its time constant, however
-much white
-noise is added. It is said only where the innovations are not white (G. M. Ljung and G. E. P. Box, 1978), and
-clearly so: with thousands of samples the test alone finds what does not matter.
+The error of a joint lasts until the autocorrelation of its innovations, over all logs, has fallen
+to 1/e of that between two samples, or below `FAINT`. Of a first-order process that is its time
+constant, however much white noise is added. It is said only where the innovations are not white (G.
+M. Ljung and G. E. P. Box, 1978), and clearly so: with thousands of samples the test alone finds
+what does not matter.
+
+Innovations of a model that takes from a command all that is in it are not correlated with it at any
+lag (L. Ljung, *System Identification*, 1999, chapter 16). At negative lags only a controller would
+correlate
+them: there the command answers to the error.
 """
+
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.stats import chi2
 
-from hydroid.arrays import Array
+from hydroid.arrays import Array, record
+from hydroid.log import Log
 from hydroid.posterior.error_model import Course, ErrorModel
+from hydroid.posterior.posterior import NORMAL
 
 LONGEST = 5.0  # lag up to which innovations are compared [s]
 LEVEL = 0.01  # probability of the finding where innovations are white
 CLEAR = 0.05
-"""sum of the squares of the autocorrelations from which innovations are not white for any use of them"""
+"""sum of the squares of the autocorrelations from which innovations are not white for any use of
+them"""
 FAINT = 0.1  # autocorrelation that counts as none
+SHOWN = 3.0  # lag up to which the tests of a residual show correlations [s]
+
+
+@record
+class ResidualTest:
+    """Correlations of the innovations of one joint's angle over all logs.
+
+    Attributes:
+        lags: between two samples [s], from the first one on, shape (L,).
+        autocorrelation: of the innovations at these lags, shape (L,).
+        command_lags: from a command to an innovation [s], negative ones too, shape (M,).
+        with_command: correlation with the joint's own command at these, shape (M,).
+        bound: within which 95 % of either lie if nothing is left.
+    """
+
+    lags: Array
+    autocorrelation: Array
+    command_lags: Array
+    with_command: Array
+    bound: float
+
+    @property
+    def outside(self) -> tuple[float, float]:
+        """Parts of the autocorrelations, and of the correlations with the command, beyond the
+        bound.
+        """
+        beyond = [
+            np.mean(np.abs(values) > self.bound) for values in (self.autocorrelation, self.with_command)
+        ]
+        return float(beyond[0]), float(beyond[1])
+
+
+def residual_tests(errors: ErrorModel, innovations: Array, logs: Sequence[Log]) -> dict[int, ResidualTest]:
+    """Return the tests of each joint's angle, by joint (from 1).
+
+    `innovations` are a row of all the channels of the logs, shape (R,).
+    """
+    tests = dict[int, ResidualTest]()
+    for i, signal in enumerate(errors.signals):
+        if signal.quantity != "angle":
+            continue
+        courses = _courses(errors, i)
+        rows = [innovations[course.rows] for course in courses]
+        used = [row[course.used] for course, row in zip(courses, rows, strict=True)]
+        commands = [log.command[:, signal.joint - 1] for log in logs]
+        period = _between(courses)
+        lags = _lags(SHOWN, period, used)
+        # every sample has a command, whether it counts or not
+        steps = _lags(SHOWN, courses[0].period, rows)
+        tests[signal.joint] = ResidualTest(
+            lags=period * np.arange(1.0, lags + 1),
+            autocorrelation=autocorrelation(used, lags),
+            command_lags=courses[0].period * np.arange(-steps, steps + 1.0),
+            with_command=cross_correlation(rows, commands, steps),
+            bound=NORMAL / float(np.sqrt(sum(map(len, used)))),
+        )
+    return tests
 
 
 def lasting(errors: ErrorModel, innovations: Array) -> dict[int, float]:
-    """Return for how long what is left of each joint's angle error lasts [s], by joint (from 1); 0: white.
+    """Return for how long what is left of each joint's angle error lasts [s], by joint (from 1).
+
+    0: white.
 
     `innovations` are a row, shape (R,).
     """
     result = dict[int, float]()
     for i, signal in enumerate(errors.signals):
         if signal.quantity == "angle":
-            courses = [course for course, own in zip(errors.courses, errors.of, strict=True) if own == i]
-            result[signal.joint] = _lasting(courses, innovations)
+            result[signal.joint] = _lasting(_courses(errors, i), innovations)
     return result
+
+
+def _courses(errors: ErrorModel, signal: int) -> list[Course]:
+    """Return the courses of a signal, given by its index."""
+    return [course for course, own in zip(errors.courses, errors.of, strict=True) if own == signal]
 
 
 def _lasting(courses: list[Course], innovations: Array) -> float:
     """Return for how long what is left of one signal's error lasts [s]."""
     logs = [innovations[course.rows][course.used] for course in courses]
-    samples, shortest = sum(map(len, logs)), min(map(len, logs))
-    # between those that count
-    period = sum(course.period * len(course.used) for course in courses) / max(samples, 1)
-    lags = max(min(round(LONGEST / period), shortest // 4), 1)
+    samples = sum(map(len, logs))
+    period = _between(courses)
+    lags = _lags(LONGEST, period, logs)
     correlation = autocorrelation(logs, lags)
     square = float(np.sum(correlation**2))
     if chi2.sf(samples * square, lags) > LEVEL or square < CLEAR:
@@ -49,8 +122,43 @@ def _lasting(courses: list[Course], innovations: Array) -> float:
     return period * max(below, 1)
 
 
+def _between(courses: Sequence[Course]) -> float:
+    """Return the mean time between two samples that count [s]."""
+    samples = sum(int(np.sum(course.used)) for course in courses)
+    return sum(course.period * len(course.used) for course in courses) / max(samples, 1)
+
+
+def _lags(longest: float, period: float, logs: Sequence[Array]) -> int:
+    """Return how many lags go up to the longest one [s].
+
+    Of short logs, up to a quarter of the shortest.
+    """
+    return max(min(round(longest / period), min(map(len, logs)) // 4), 1)
+
+
 def autocorrelation(logs: list[Array], lags: int) -> Array:
-    """Return the autocorrelation at lags 1 to `lags` of signals of mean zero, pooled, shape (lags,)."""
+    """Return the autocorrelation at lags 1 to `lags` of signals of mean zero, pooled, shape
+    (lags,).
+    """
     square = sum(float(log @ log) for log in logs)
     products = [sum(float(log[lag:] @ log[:-lag]) for log in logs) for lag in range(1, lags + 1)]
     return np.array(products) / max(square, np.finfo(float).tiny)
+
+
+def cross_correlation(logs: list[Array], causes: list[Array], lags: int) -> Array:
+    """Return the correlation of signals with causes `-lags` to `lags` samples before, shape (2 lags
+    + 1,).
+
+    The signals have mean zero; each cause is taken without its mean, and all logs count together. 0
+    where a cause never changes.
+    """
+    products = np.zeros(2 * lags + 1)
+    squares = np.zeros(2)
+    for log, cause in zip(logs, causes, strict=True):
+        change = cause - cause.mean()
+        squares += log @ log, change @ change
+        for lag in range(lags + 1):
+            late = len(log) - lag
+            products[lags + lag] += log[lag:] @ change[:late]
+            products[lags - lag] += log[:late] @ change[lag:] if lag else 0.0
+    return products / max(np.sqrt(squares.prod()), np.finfo(float).tiny)

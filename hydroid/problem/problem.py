@@ -6,7 +6,6 @@ simulated by threads of this process, or on workers (`DaskWorkers`); no bit of a
 
 from collections.abc import Collection, Sequence
 from functools import cached_property
-from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -26,6 +25,7 @@ from hydroid.problem.channels import (
 )
 from hydroid.problem.priors import Priors
 from hydroid.settings.fit import FitSettings
+from hydroid.settings.log import log_file
 from hydroid.simulation import Response, Simulation
 from hydroid.simulation.scenario import Scenario
 
@@ -173,7 +173,7 @@ def make_simulation(
 
     Its response has the angles of the joints `outputs` and the chamber pressures of `pressures`, 0-based.
     """
-    payload = settings.payloads.get(Path(log.source).name)
+    payload = settings.payloads.get(log_file(log.source).name)
     if payload:
         spec = add_payload(spec, settings.arm, payload)
     scenario = Scenario(spec, settings.arm, log, outputs, settings.simulation)

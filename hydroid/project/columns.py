@@ -1,29 +1,35 @@
-"""What the columns of a log could be, told by their numbers alone: for a person who knows the machine."""
+"""What the columns of a log could be, told by their numbers alone:
+for a person who knows the machine."""
 
 from collections.abc import Iterator
-from contextlib import suppress
 
 import numpy as np
 
 from hydroid.arrays import Array
 from hydroid.errors import LogError
 from hydroid.log import Table
-from hydroid.log.clues import column_unit, likely_range
+from hydroid.log.clues import column_unit
+from hydroid.log.signals import likely_range
 from hydroid.log.table import Signal
 from hydroid.units import likely_time_unit
 
 MOST = 60  # columns that are listed
-RADIANS, DEGREES, METRES = 6.3, 400.0, 50.0  # largest values of angles and positions
+RADIANS = 6.3  # largest value of an angle in rad
+DEGREES = 400.0  # largest value of an angle in deg
+METRES = 50.0  # largest value of a position in m
 
 
 def column_lines(table: Table) -> tuple[str, ...]:
-    """Return a line for each column: its name, its smallest and largest value, and what it could be."""
+    """Return a line for each column: its name, its smallest and largest value,
+    and what it could be."""
     names = [name for name in dict.fromkeys(table.names) if name]
-    lines = [
-        f"{ascii(name)[1:-1] if not name.isprintable() else name}: {_told(table, name)}" for name in names
-    ]
-    more = [f"and {len(lines) - MOST} more columns"] if len(lines) > MOST else []
-    return (*lines[:MOST], *more)
+    lines = list[str]()
+    for name in names[:MOST]:
+        shown = name if name.isprintable() else ascii(name)[1:-1]
+        lines.append(f"{shown}: {_described(table, name)}")
+    if len(names) > MOST:
+        lines.append(f"and {len(names) - MOST} more columns")
+    return tuple(lines)
 
 
 def holds_numbers(table: Table) -> bool:
@@ -31,26 +37,31 @@ def holds_numbers(table: Table) -> bool:
     return sum(_numbers(table, name) is not None for name in {*table.names} - {""}) > 1
 
 
-def _told(table: Table, name: str) -> str:
+def _described(table: Table, name: str) -> str:
     values = _numbers(table, name)
     if values is None:
         return "no numbers"
-    low, high = values.min(), values.max()
+    low = values.min()
+    high = values.max()
     if low == high:
         return f"{low:g} throughout"
     unit = column_unit(name, table.units.get(name, ""))
     stated = f", in {unit.name}" if unit else ""
-    return f"{low:.4g} to {high:.4g}{stated}; {' or '.join(_choices(values)) or 'neither command nor angle'}"
+    choices = " or ".join(_choices(values, unit.name if unit else ""))
+    return f"{low:.4g} to {high:.4g}{stated}; {choices or 'neither command nor angle'}"
 
 
-def _choices(values: Array) -> Iterator[str]:
+def _choices(values: Array, unit: str) -> Iterator[str]:
+    """Yield what numbers could be, by their range, their steps and the unit that is stated."""
     steps = np.diff(values)
     if len(steps) and (steps > 0).all():
         yield f"a time in {likely_time_unit(float(np.median(steps))) or 's'}"
-    if likely := likely_range(values):
-        scale = "" if likely.name == "%" else f" (scale: {likely.scale:.4g}"
-        scale += f", offset: {likely.offset:.4g}" if likely.offset else ""
-        yield f"a command in {likely.name}{scale}{')' if scale else ''}"
+    likely = likely_range(values, unit=unit)
+    if likely and likely.name == "%":
+        yield "a command in %"
+    elif likely:
+        offset = f", offset: {likely.offset:.4g}" if likely.offset else ""
+        yield f"a command in {likely.name} (scale: {likely.scale:.4g}{offset})"
     most = np.abs(values).max()
     if most <= RADIANS:
         yield "an angle in rad"
@@ -62,8 +73,9 @@ def _choices(values: Array) -> Iterator[str]:
 
 def _numbers(table: Table, name: str) -> Array | None:
     """Return the numbers of a column, (n,); None: it has none."""
-    with suppress(LogError, KeyError):
+    try:
         values = table.read([Signal(name, "command")]).time
-        values = values[np.isfinite(values)]
-        return values if len(values) else None
-    return None
+    except (LogError, KeyError):
+        return None
+    values = values[np.isfinite(values)]
+    return values if len(values) else None

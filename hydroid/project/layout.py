@@ -1,16 +1,17 @@
 """What a log holds: its columns, and how the joints move in it."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import field
 from pathlib import Path
 
 import numpy as np
 
-from hydroid.arrays import record
+from hydroid.arrays import Array, record
 from hydroid.errors import LogError
 from hydroid.files import Plain
 from hydroid.fitting.valve_start import JointStart, fitted_valve
 from hydroid.log import ColumnGuess, JointMotion, Log, Table, check_log, motion_of
+from hydroid.log.clues import column_unit, kind_of
 from hydroid.log.read import angle_margin
 from hydroid.project.columns import column_lines
 from hydroid.project.section import given_section, guessed_section, missing_column
@@ -19,23 +20,29 @@ from hydroid.settings.load import validate
 from hydroid.settings.log import LogSettings
 from hydroid.words import listed
 
+GUESSED = "GUESSED from the log: check every line."
+GIVEN = "As you gave them, compared with the log."
 REVERSED = (
-    "a reversed command suits a valve that is wired the other way. If a sensor counts the other way instead "
-    "(compare arm.png), set scale: -1 at its angle and not at its command: gravity follows the angle"
+    "a reversed command suits a valve that is wired the other way. If a sensor counts the other "
+    "way instead (compare arm.png), set scale: -1 at its angle and not at its command: gravity "
+    "follows the angle"
 )
 
+SAID = ("row left out", "cut end", "lost", "gap", "half a command", "unasked", "target")
+"""kinds of findings that say which part of a log is not read, or not told by it"""
 MOVED = 0.5  # travel from which a joint moves [deg]
+FOLLOWED = 1.0  # travel above which a joint that no command drives is followed [deg]
 
 
 @record
 class Layout:
     """The columns of a log, as the `log` section of a fit's settings, and what its numbers say.
 
-    `outputs` are joints that a log drives and measures, `motions` how the measured ones move, by number from
-    1, and `valves` those by which the outputs follow commands of the sign that these have in the section;
-    `reasons` have a line for each column that is not `unused`; `followed`: a joint that no command drives
-    moves. `missing` says which columns a person must name, in a section that is then no more than a start;
-    `candidates` are lines about what each could be.
+    `outputs` are joints that a log drives and measures, `motions` how the measured ones move, by
+    number from 1, and `valves` those by which the outputs follow commands of the sign that these
+    have in the section; `reasons` have a line for each column that is not `unused`; `followed`: a
+    joint that no command drives moves. `missing` says which columns a person must name, in a section
+    that is then no more than a start; `candidates` are lines about what each could be.
     """
 
     section: Plain
@@ -45,7 +52,7 @@ class Layout:
     motions: Mapping[int, JointMotion]
     followed: bool
     valves: Mapping[int, JointStart] = field(default_factory=dict[int, JointStart])
-    origin: str = "GUESSED from the log: check every line."
+    origin: str = GUESSED
     missing: str = ""
     candidates: tuple[str, ...] = ()
 
@@ -58,7 +65,8 @@ def find_layout(
     given: LogSettings | None = None,
     others: Sequence[Path] = (),
 ) -> Layout:
-    """Guess the columns of a log, turn commands that act against the angle, and see how fast joints are.
+    """Guess the columns of a log, turn commands that act against the angle,
+    and see how fast joints are.
 
     Without a log all joints have a command and an angle, and none is seen to move.
 
@@ -69,63 +77,139 @@ def find_layout(
 
     Raises:
         SettingsError: no joint has one of the names.
-        LogError: no column holds numbers, `given` does not fit the log, or no joint is driven and moves.
+        LogError: no column holds numbers, `given` does not fit the log,
+            or no joint is driven and moves.
     """
     if table is None:
-        every = range(1, len(arm.joints) + 1)
-        return Layout({"period_s": 0.01, "joints": {}}, tuple(every), (), (), {}, followed=False)
-    guess = (
-        ColumnGuess(given_section(table, arm, given), (), ()) if given else guessed_section(table, arm, order)
-    )
-    section, reasons = guess.log, [*guess.reasons]
-    if missing := missing_column(section):
-        if given is not None:
-            raise LogError(
-                missing.replace("looks like", "is given as"), table.source, "correct the log section"
-            )
+        every = tuple(range(1, len(arm.joints) + 1))
+        return Layout({"period_s": 0.01, "joints": {}}, every, (), (), {}, followed=False)
+    if given is not None:
+        guess = _given(table, arm, given)
+        return _seen(table, arm, guess, others, GIVEN)
+    guess = guessed_section(table, arm, order)
+    missing = missing_column(guess.log, targets=_has_targets(table))
+    if missing:
         return _skeleton(table, arm, guess, missing)
-    entries, names = section["joints"], arm.joint_names
+    return _seen(table, arm, guess, others, GUESSED)
+
+
+def _seen(table: Table, arm: Arm, guess: ColumnGuess, others: Sequence[Path], origin: str) -> Layout:
+    """Return the layout of columns, with what the logs show of the joints' motion."""
+    entries = guess.log["joints"]
+    reasons = [*guess.reasons]
+    logs = _read(table, guess.log, arm, others, reasons, strict=origin == GIVEN)
     measured = [joint for joint, entry in entries.items() if entry["angle"]]
-    logs = _read(table, section, arm, others, reasons, strict=given is not None)
-    motions = {joint: motion_of(logs[0], joint) for joint in measured} if logs else {}
     driven = [joint for joint in measured if entries[joint]["command"] is not None]
+    motions = dict[int, JointMotion]()
     if logs:
-        _refuse_rest(table, driven, logs, names)
-        idle = [names[j - 1] for j in driven if not any(log.driven[j - 1] for log in logs)]
-        driven = [joint for joint in driven if names[joint - 1] not in idle]
-        reasons += [f"{listed(idle)}: no command in the logs, so not compared"] if idle else []
-    wrong = [j for j, m in motions.items() if m.contradicts(backward=j in arm.backward)]
+        motions = {joint: motion_of(logs[0], joint) for joint in measured}
+        _refuse_rest(table, driven, logs, arm.joint_names)
+        driven = _driven(driven, logs, arm.joint_names, reasons)
+    wrong = _turn_commands(entries, motions, arm, reasons)
+    reasons += _lacking(entries, arm.joint_names)
+    undriven = [motion for joint, motion in motions.items() if joint not in driven]
+    return Layout(
+        guess.log,
+        tuple(driven),
+        tuple(reasons),
+        guess.unused,
+        motions,
+        followed=any(motion.travel > FOLLOWED for motion in undriven),
+        valves=_valves(logs, driven, wrong),
+        origin=origin,
+    )
+
+
+def _given(table: Table, arm: Arm, given: LogSettings) -> ColumnGuess:
+    """Return the columns that a person has named, which must be enough for a fit."""
+    section = given_section(table, arm, given)
+    missing = missing_column(section, targets=_has_targets(table))
+    if missing:
+        what = missing.replace("looks like", "is given as")
+        raise LogError(what, table.source, "correct the log section")
+    return ColumnGuess(section, (), ())
+
+
+def _driven(
+    joints: Sequence[int], logs: Sequence[Log], names: Sequence[str], reasons: list[str]
+) -> list[int]:
+    """Return the joints that any log drives; of the others say so."""
+    driven = [joint for joint in joints if any(log.driven[joint - 1] for log in logs)]
+    idle = [names[joint - 1] for joint in joints if joint not in driven]
+    if idle:
+        reasons.append(f"{listed(idle)}: no command in the logs, so not compared")
+    return driven
+
+
+def _turn_commands(
+    entries: dict[int, Plain], motions: Mapping[int, JointMotion], arm: Arm, reasons: list[str]
+) -> list[int]:
+    """Turn commands that act against the angle, and say what else is odd in how joints move.
+
+    Returns the joints whose commands were turned.
+    """
+    wrong = list[int]()
     for joint, motion in motions.items():
-        reasons += _remarks(motion, arm.joints[joint - 1], joint in wrong)
-        if joint in wrong:
+        is_wrong = motion.contradicts(backward=joint in arm.backward)
+        reasons += _remarks(motion, arm.joints[joint - 1], is_wrong)
+        if is_wrong:
             entries[joint]["command"] = turned(entries[joint]["command"])
-    reasons += [REVERSED] if wrong else []
-    for what in "angle", "command":
-        lacking = [name for place, name in enumerate(names, 1) if not entries.get(place, {}).get(what)]
-        reasons += [f"no {what} found for {listed(lacking)}"] if lacking else []
-    followed = any(m.travel > 1 for joint, m in motions.items() if joint not in driven)  # [deg]
-    shown = {joint: fitted_valve(logs, joint) for joint in driven}
-    valves = {j: valve.turned if j in wrong else valve for j, valve in shown.items() if valve is not None}
-    made = Layout(section, tuple(driven), tuple(reasons), guess.unused, motions, followed, valves)
-    return made if given is None else replace(made, origin="As you gave them, compared with the log.")
+            wrong.append(joint)
+    if wrong:
+        reasons.append(REVERSED)
+    return wrong
+
+
+def _valves(logs: Sequence[Log], joints: Sequence[int], wrong: Sequence[int]) -> dict[int, JointStart]:
+    """Return the valves of joints that follow their logged commands.
+
+    `logs` have the commands as they were recorded, of which those of `wrong` joints are then turned.
+    """
+    valves = dict[int, JointStart]()
+    for joint in joints:
+        valve = fitted_valve(logs, joint)
+        if valve is not None:
+            valves[joint] = valve.turned if joint in wrong else valve
+    return valves
+
+
+def _lacking(entries: Mapping[int, Plain], names: Sequence[str]) -> Iterator[str]:
+    """Yield for which joints the log has no angle, and no command."""
+    for what in ("angle", "command"):
+        lacking = list[str]()
+        for joint, name in enumerate(names, 1):
+            if not entries.get(joint, {}).get(what):
+                lacking.append(name)
+        if lacking:
+            yield f"no {what} found for {listed(lacking)}"
+
+
+def _has_targets(table: Table) -> bool:
+    """Return whether a column seems to hold the position that a controller is to reach."""
+    units = {name: column_unit(name, table.units.get(name, "")) for name in table.names if name}
+    return any(kind_of(name, unit) == "target" for name, unit in units.items())
 
 
 def _skeleton(table: Table, arm: Arm, guess: ColumnGuess, missing: str) -> Layout:
-    """Return a layout that a person completes: all joints, with placeholders for what is not known."""
-    section = guess.log
-    entries = {
-        joint: dict(section["joints"].get(joint, {"command": None, "angle": None}))
-        for joint in range(1, len(arm.joints) + 1)
-    }
-    for joint, entry in entries.items():
-        unit = "m" if arm.joints[joint - 1].slides else "deg"
+    """Return a layout that a person completes: all joints,
+    with placeholders for what is not known."""
+    entries = dict[int, Plain]()
+    for number, joint in enumerate(arm.joints, 1):
+        entry = dict(guess.log["joints"].get(number, {"command": None, "angle": None}))
         entry["command"] = entry["command"] or {"column": "COMMAND", "scale": 1}
+        unit = "m" if joint.slides else "deg"
         entry["angle"] = entry["angle"] or {"column": "ANGLE", "unit": unit}
-    section = {"time": {"column": "TIME", "unit": "s"}, "command": None, "angle": None} | section
-    section["joints"] = entries
-    lines = column_lines(table)
+        entries[number] = entry
+    placeholders = {"time": {"column": "TIME", "unit": "s"}, "command": None, "angle": None}
     return Layout(
-        section, tuple(entries), guess.reasons, (), {}, followed=False, missing=missing, candidates=lines
+        placeholders | guess.log | {"joints": entries},
+        tuple(entries),
+        guess.reasons,
+        (),
+        {},
+        followed=False,
+        missing=missing,
+        candidates=column_lines(table),
     )
 
 
@@ -138,19 +222,27 @@ def _read(
     *,
     strict: bool,
 ) -> list[Log]:
-    """Read logs by a section; an error of the first one is a reason, or ends the command if `strict`."""
-    free = dict.fromkeys(arm.joint_names, (-np.inf, np.inf))
-    settings, logs = validate(section, LogSettings, table.source), list[Log]()
-    for path in (Path(table.source), *others):
-        log, findings = check_log(path, settings, free)
+    """Read logs by a section; an error of the first one is a reason,
+    or ends the command if `strict`."""
+    no_limits = dict.fromkeys(arm.joint_names, (-np.inf, np.inf))
+    settings = validate(section, LogSettings, table.source)
+    first = Path(table.source)
+    logs = list[Log]()
+    for path in (first, *others):
+        log, findings = check_log(path, settings, no_limits, arm=arm)
         if log is None:
             if strict:
                 raise findings[0].error()
             reasons.append(f"the log cannot be used as it is: {findings[0]}")
-            log, _ = check_log(path, settings, free, repair=True)
-        if log is None and path == Path(table.source):
-            return []  # what its joints do is not known
-        logs += [log] if log else []
+            log, _ = check_log(path, settings, no_limits, arm=arm, repair=True)
+        for finding in findings:
+            if finding.level == "warning" and finding.kind in SAID:
+                reasons.append(str(finding))
+        if log is not None:
+            logs.append(log)
+        elif path == first:
+            # what its joints do is not known
+            return []
     return logs
 
 
@@ -163,27 +255,22 @@ def _refuse_rest(table: Table, driven: Sequence[int], logs: Sequence[Log], names
             travels[joint] = max(moved)
     if any(travel > MOVED for travel in travels.values()):
         return
-    hint = (
-        "give a log in which it is; or write the project without --log, correct `log` in its fit.yaml, and "
-    )
-    hint += "go on with --config"
     what = "no command is ever given"
     if travels:
         what = f"{listed([names[joint - 1] for joint in travels])} driven, but nothing moves"
+    hint = (
+        "give a log in which it is; or write the project without --log, correct `log` in its "
+        "fit.yaml, and go on with --config"
+    )
     raise LogError(f"no joint is driven and moves: {what}", table.source, hint)
 
 
 def _remarks(motion: JointMotion, joint: Joint, wrong: bool) -> Iterator[str]:
-    angle, against = motion.log.angle[:, motion.joint - 1], motion.directed[1]
-    what, unit, factor = ("positions", "m", 1.0) if joint.slides else ("angles", "deg", np.degrees(1))
-    low, high, margin = angle.min(), angle.max(), angle_margin(*joint.limits)
-    if not joint.continuous and (low < joint.limits[0] - margin or high > joint.limits[1] + margin):
-        yield (
-            f"{joint.name}: {what} in the log run from {low * factor:.4g} to {high * factor:.4g} {unit}, but "
-            f"the arm allows {joint.range[0]:.6g} to {joint.range[1]:.6g}: give them an offset or a scale of "
-            "-1, or change the range in arm.xml"
-        )
+    angle = motion.log.angle[:, motion.joint - 1]
+    if not joint.continuous:
+        yield from _beyond_range(angle, joint)
     if wrong:
+        _, against = motion.directed
         share = f"on {max(against, 1 - against):.0%} of its way"
         yield f"{joint.name} moves against its command ({share}): the command's sign is reversed"
     if motion.log.driven[motion.joint - 1] and motion.dead_band > 10:
@@ -191,9 +278,34 @@ def _remarks(motion: JointMotion, joint: Joint, wrong: bool) -> Iterator[str]:
         yield f"{joint.name} hardly moves {below}: a dead band, or little opening"
 
 
+def _beyond_range(angle: Array, joint: Joint) -> Iterator[str]:
+    """Yield that a joint's angles, (T,), are not those that the arm allows."""
+    low = angle.min()
+    high = angle.max()
+    lowest, highest = joint.limits
+    margin = angle_margin(lowest, highest)
+    if low >= lowest - margin and high <= highest + margin:
+        return
+    if joint.slides:
+        what = "positions"
+        run = f"run from {low:.4g} to {high:.4g} m"
+    else:
+        what = "angles"
+        run = f"run from {np.degrees(low):.4g} to {np.degrees(high):.4g} deg"
+    allowed = f"{joint.range[0]:.6g} to {joint.range[1]:.6g}"
+    yield (
+        f"{joint.name}: {what} in the log {run}, but the arm allows {allowed}: give them an offset "
+        "or a scale of -1, or change the range in arm.xml"
+    )
+
+
 def turned(command: Plain) -> Plain:
     """Return the settings of a command of the other sign."""
-    if isinstance(command["column"], list):
-        return command | {"column": command["column"][::-1]}
-    offset = {"offset": -command["offset"]} if command.get("offset") else {}
-    return command | {"scale": -command.get("scale", 1.0)} | offset
+    columns = command["column"]
+    # the positive and the negative direction
+    if isinstance(columns, list):
+        return command | {"column": columns[::-1]}
+    changes = {"scale": -command.get("scale", 1.0)}
+    if command.get("offset"):
+        changes["offset"] = -command["offset"]
+    return command | changes

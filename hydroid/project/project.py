@@ -3,8 +3,9 @@
 import os
 import shlex
 import tempfile
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +13,9 @@ from hydroid.arrays import record
 from hydroid.cad.importer import ImportedArm, import_arm
 from hydroid.cad.meshes import MESHES
 from hydroid.errors import HydroidError, SettingsError
-from hydroid.files import fill_template, undisturbed, write_atomic, writing
+from hydroid.files import Plain, fill_template, undisturbed, write_atomic, writing
 from hydroid.log import open_table
+from hydroid.project.boxes import boxes_urdf
 from hydroid.project.layout import Layout, find_layout
 from hydroid.project.texts import JointSize, arm_text, fit_text, joint_sizes
 from hydroid.reporting.figure import arm_picture
@@ -24,8 +26,12 @@ from hydroid.settings.linkage import RotaryActuator
 from hydroid.settings.load import load, validate
 from hydroid.words import listed
 
-ARM, MODEL, PICTURE = "arm.yaml", "arm.xml", "arm.png"
-FIT, STEPS, OLD = "fit.yaml", "next-steps.md", "fit.old.yaml"
+ARM = "arm.yaml"
+MODEL = "arm.xml"
+PICTURE = "arm.png"
+FIT = "fit.yaml"
+STEPS = "next-steps.md"
+OLD = "fit.old.yaml"
 FILES = (ARM, MODEL, PICTURE, FIT, STEPS, OLD, MESHES)
 
 
@@ -33,8 +39,8 @@ FILES = (ARM, MODEL, PICTURE, FIT, STEPS, OLD, MESHES)
 class Project:
     """A project that was written: its folder, and the names of its files and folders there.
 
-    `notes`: what the import assumed; `columns`: what each of the log is taken for; `unused`: the others;
-    `missing`: which columns of the log a person must name in the settings, empty if none.
+    `notes`: what the import assumed; `columns`: what each of the log is taken for; `unused`: the
+    others; `missing`: which columns of the log a person must name in the settings, empty if none.
     """
 
     folder: Path
@@ -49,33 +55,66 @@ class Project:
 def write_project(
     folder: Path, robot: Path | None, logs: Sequence[Path], joints: Sequence[str], **options: Any
 ) -> Project:
-    """Write a project to a folder, new or with other things in it (`hydroid.init` says what is given)."""
+    """Write a project to a folder, new or with other things in it (`hydroid.init` says
+    what is given)."""
     _refuse_replacing(folder, FILES, force=options.pop("force", False))
+    lengths = options.pop("lengths", ())
+    boxes = boxes_urdf(joints, lengths) if lengths else ""
     table = open_table(logs[0]) if logs else None
-    imported, reference, own = None, ARM, None
-    if robot is not None and robot.suffix.lower() in (".yaml", ".yml"):
-        own, reference = robot, _seen_from(folder, robot)
-    elif robot is not None:
+    has_own_file = robot is not None and robot.suffix.lower() in (".yaml", ".yml")
+    imported = None
+    if robot is not None and not has_own_file:
         imported = import_arm(robot, table.names if table else (), **options)
+    elif boxes:
+        imported = _arm_of_boxes(boxes, options)
+    # all is written aside and read back, so that the folder has all of a project or nothing
     with _stage(folder) as stage, _of_the_project(stage, folder, robot):
-        arm = load_arm(own) if own else _write_arm(stage, imported)
+        if robot is not None and has_own_file:
+            reference = _seen_from(folder, robot)
+            arm = load_arm(robot)
+        else:
+            reference = ARM
+            arm = _write_arm(stage, imported)
         layout = find_layout(table, arm, joints, others=_fitted(logs)[1:])
-        sizes = joint_sizes(arm, {j: m.speed for j, m in layout.motions.items()})
+        sizes = _sizes(arm, layout)
+        notes = list[str]()
         if imported is not None:
+            # again, with the actuators' sizes by the speeds that the log shows
             arm = _write_arm(stage, imported, arm, sizes)
-        notes = [*imported.notes] if imported else []
-        guessed = [joint.name for joint in arm.joints if isinstance(joint.actuator, RotaryActuator)]
-        if imported and guessed:
-            what = "no cylinder is known. A stand-in predicts angles; its pressures and forces mean nothing"
-            notes.append(f"{listed(guessed)}: {what}")
+            notes += [*imported.notes, *_stand_ins(arm)]
         steps = _steps(folder, logs, layout)
         text = fit_text(arm, layout, sizes, str(folder / FIT), reference, steps[0])
         _write_settings(stage, arm, text)
         return _finished(stage, folder, arm.name, layout, notes, steps)
 
 
+def _arm_of_boxes(urdf: str, options: Plain) -> ImportedArm:
+    """Import an arm of boxes as if a person had drawn it."""
+    with tempfile.TemporaryDirectory() as name:
+        path = Path(name) / "boxes.urdf"
+        write_atomic(path, urdf)
+        imported = import_arm(path, **options)
+    what = "the arm is made of boxes of these lengths"
+    guessed = f"{what}: its masses and ranges are guesses; mend them in arm.xml"
+    return replace(imported, notes=(guessed, *imported.notes))
+
+
+def _sizes(arm: Arm, layout: Layout) -> tuple[JointSize, ...]:
+    """Return the sizes of what moves the joints, by the speeds that a log shows."""
+    return joint_sizes(arm, {joint: motion.speed for joint, motion in layout.motions.items()})
+
+
+def _stand_ins(arm: Arm) -> Iterator[str]:
+    """Yield which joints have a stand-in for a cylinder that nobody has named."""
+    names = [joint.name for joint in arm.joints if isinstance(joint.actuator, RotaryActuator)]
+    if names:
+        what = "no cylinder is known. A stand-in predicts angles"
+        yield f"{listed(names)}: {what}; its pressures and forces mean nothing"
+
+
 def go_on(folder: Path | None, config: Path, logs: Sequence[Path], *, force: bool) -> Project:
-    """Write the settings anew, with starts from the logs, whose columns a person has named in `config`.
+    """Write the settings anew, with starts from the logs,
+    whose columns a person has named in `config`.
 
     Its arm stays as it is. Settings that are replaced are kept as OLD.
     """
@@ -85,16 +124,18 @@ def go_on(folder: Path | None, config: Path, logs: Sequence[Path], *, force: boo
         raise SettingsError("has no log section", config, hint)
     if not logs:
         raise SettingsError("needs the log", "--config", "give --log LOG")
-    settings, folder = load(config, FitSettings), folder or config.parent
-    arm, home = settings.arm, config.resolve() == (folder / FIT).resolve()
-    _refuse_replacing(folder, (FIT, STEPS, PICTURE), force=force or home)
+    settings = load(config, FitSettings)
+    arm = settings.arm
+    folder = folder or config.parent
+    replaces_config = config.resolve() == (folder / FIT).resolve()
+    _refuse_replacing(folder, (FIT, STEPS, PICTURE), force=force or replaces_config)
     table = open_table(logs[0], settings.log)
     layout = find_layout(table, arm, given=settings.log, others=_fitted(logs)[1:])
-    sizes = joint_sizes(arm, {j: m.speed for j, m in layout.motions.items()})
     steps = _steps(folder, logs, layout)
-    text = fit_text(arm, layout, sizes, str(folder / FIT), _seen_from(folder, Path(arm.where)), steps[0])
+    reference = _seen_from(folder, Path(arm.where))
+    text = fit_text(arm, layout, _sizes(arm, layout), str(folder / FIT), reference, steps[0])
     with _stage(folder) as stage, _of_the_project(stage, folder, config):
-        if home:
+        if replaces_config:
             write_atomic(stage / OLD, config.read_bytes())
         _write_settings(stage, arm, text)
         return _finished(stage, folder, arm.name, layout, (), steps)
@@ -119,36 +160,63 @@ def _fitted(logs: Sequence[Path]) -> Sequence[Path]:
 def _steps(folder: Path, logs: Sequence[Path], layout: Layout) -> tuple[str, ...]:
     """Return the commands that come next."""
     names = [shlex.quote(str(log)) for log in logs or ("LOG.csv", "OTHER.csv")]
-    fitted, other = " ".join(names[:-1] or names), names[-1] if names[1:] else "OTHER.csv"
     home = shlex.quote(str(folder))
-    config, run = f"--config {home}/fit.yaml", f"{home}/runs/fit"
+    config = f"--config {home}/fit.yaml"
     if layout.missing:
-        return (" ".join([f"hydroid init {config}", *(f"--log {name}" for name in names)]),)
+        given = [f"--log {name}" for name in names]
+        return (" ".join([f"hydroid init {config}", *given]),)
+    *fitted, other = names
+    # a single log is fitted, and another one is still to be recorded
+    if not fitted:
+        fitted = names
+        other = "OTHER.csv"
+    fitted_logs = " ".join(fitted)
+    run = f"{home}/runs/fit"
     return (
         f"hydroid check {' '.join(names)} {config}",
-        f"hydroid fit-hyd {fitted} {config} --out {run}",
+        f"hydroid fit-hyd {fitted_logs} {config} --out {run}",
         f"hydroid validate {other} --fit {run} --out {home}/runs/validation",
-        f"hydroid suggest {fitted} --fit {run} --out {home}/runs/suggestions",
+        f"hydroid suggest {fitted_logs} --fit {run} --out {home}/runs/suggestions",
     )
 
 
 def _write_settings(stage: Path, arm: Arm, text: str) -> None:
     """Write the settings of a fit, which can be read, and the picture of the arm."""
     write_atomic(stage / FIT, text)
-    validate(read_yaml(stage / FIT)[0] | {"arm": arm}, FitSettings, FIT)
+    values, _ = read_yaml(stage / FIT)
+    validate(values | {"arm": arm}, FitSettings, FIT)
     caption = f"{arm.name}, all joints at or near 0: does it look and turn like yours?"
-    write_atomic(stage / PICTURE, arm_picture(arm, caption)[0])
+    picture, *_ = arm_picture(arm, caption)
+    write_atomic(stage / PICTURE, picture)
 
 
 def _finished(
-    stage: Path, folder: Path, name: str, layout: Layout, notes: Sequence[str], steps: tuple[str, ...]
+    stage: Path,
+    folder: Path,
+    name: str,
+    layout: Layout,
+    notes: Sequence[str],
+    steps: tuple[str, ...],
 ) -> Project:
     """Write the next steps, and move all to the folder."""
-    told = {"steps": steps, "notes": notes, "reasons": layout.reasons, "missing": layout.missing}
-    write_atomic(stage / STEPS, fill_template("project/next-steps.md.j2", name=name, **told))
+    text = fill_template(
+        "project/next-steps.md.j2",
+        name=name,
+        steps=steps,
+        notes=notes,
+        reasons=layout.reasons,
+        missing=layout.missing,
+    )
+    write_atomic(stage / STEPS, text)
     written = _move(stage, folder)
     return Project(
-        folder, written, tuple(notes), layout.reasons, layout.unused, steps, missing=layout.missing
+        folder=folder,
+        files=written,
+        notes=tuple(notes),
+        columns=layout.reasons,
+        unused=layout.unused,
+        commands=steps,
+        missing=layout.missing,
     )
 
 
@@ -160,16 +228,23 @@ def _of_the_project(stage: Path, folder: Path, source: Path | None) -> Generator
     except HydroidError as error:
         if str(stage) not in str(error):
             raise
-        what, hint = (text.replace(str(stage), str(folder)) for text in (error.what, error.hint))
+        what = error.what.replace(str(stage), str(folder))
+        hint = error.hint.replace(str(stage), str(folder))
         raise type(error)(what, source or folder, hint) from None
 
 
 def _write_arm(
-    stage: Path, imported: ImportedArm | None, arm: Arm | None = None, sizes: Sequence[JointSize] = ()
+    stage: Path,
+    imported: ImportedArm | None,
+    arm: Arm | None = None,
+    sizes: Sequence[JointSize] = (),
 ) -> Arm:
+    files: dict[str, Any]
     if imported is None:
-        files: dict[str, Any] = {MODEL: fill_template("project/boxes.xml.j2")}
-        files[ARM] = fill_template("project/boxes.yaml")
+        files = {
+            MODEL: fill_template("project/boxes.xml.j2"),
+            ARM: fill_template("project/boxes.yaml"),
+        }
     else:
         files = {MODEL: imported.mjcf, ARM: arm_text(imported, arm, sizes), **imported.meshes}
     for name, content in files.items():
@@ -179,7 +254,7 @@ def _write_arm(
 
 @contextmanager
 def _stage(folder: Path) -> Generator[Path]:
-    """A folder beside the project, or in it where it exists, that disappears."""
+    """Make a folder beside the project, or in it where it exists, that disappears."""
     home = next(filter(Path.is_dir, (folder.absolute(), *folder.absolute().parents)))
     with writing(folder):
         stage = tempfile.TemporaryDirectory(prefix=".hydroid-init-", dir=home, ignore_cleanup_errors=True)
@@ -188,19 +263,27 @@ def _stage(folder: Path) -> Generator[Path]:
 
 
 def _move(stage: Path, folder: Path) -> tuple[str, ...]:
-    names, old = tuple(name for name in FILES if (stage / name).exists()), stage / "old"
+    """Move all files of a project to its folder, or none; return their names."""
+    names = tuple(name for name in FILES if (stage / name).exists())
+    old = stage / "old"
     old.mkdir()
     with undisturbed(), writing(folder):
         try:
             folder.mkdir(parents=True, exist_ok=True)
             for name in names:
-                if os.path.lexists(folder / name):  # of an earlier project
+                # a file of an earlier project
+                if os.path.lexists(folder / name):
                     os.rename(folder / name, old / name)
                 os.rename(stage / name, folder / name)
         except OSError:
             for name in names:
-                for place, back in ((folder, stage), (old, folder)):
-                    if os.path.lexists(place / name) and not os.path.lexists(back / name):
-                        os.rename(place / name, back / name)
+                _move_back(folder / name, stage / name)
+                _move_back(old / name, folder / name)
             raise
     return names
+
+
+def _move_back(now: Path, before: Path) -> None:
+    """Move a file to where it was, if it has moved."""
+    if os.path.lexists(now) and not os.path.lexists(before):
+        os.rename(now, before)

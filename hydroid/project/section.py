@@ -1,4 +1,5 @@
-"""The `log` section of a fit's settings: guessed from a log, or as a person gave it, joint by joint."""
+"""The `log` section of a fit's settings: guessed from a log, or as a person gave it,
+joint by joint."""
 
 from collections.abc import Sequence
 
@@ -8,32 +9,51 @@ from hydroid.errors import LogError, SettingsError
 from hydroid.files import Plain
 from hydroid.log import ColumnGuess, Table, guess_columns
 from hydroid.log.guess import nearest_period
+from hydroid.log.rods import Rod, rods_of
 from hydroid.log.table import Signal
 from hydroid.project.columns import holds_numbers
 from hydroid.settings.arm import Arm
-from hydroid.settings.log import ColumnMap, LogSettings
+from hydroid.settings.log import ColumnMap, Kind, LogSettings
 from hydroid.units import UNITS
 
+KINDS: tuple[Kind, ...] = ("command", "angle", "pressure")
 PERIOD = 0.02  # of a simulation of quick logs [s]
 
 
 def guessed_section(table: Table, arm: Arm, order: Sequence[str]) -> ColumnGuess:
-    """Guess the columns; joints have the numbers of the arm."""
+    """Guess the columns; joints have the numbers of the arm.
+
+    `order` are names of the arm's joints in the order of the log's numbers; none: the arm's order.
+    """
     names = arm.joint_names
     for name in order:
         if name not in names:
-            raise SettingsError(f"no joint {name!r}", "--joints", f"the arm's joints: {', '.join(names)}")
+            hint = f"the arm's joints: {', '.join(names)}"
+            raise SettingsError(f"no joint {name!r}", "--joints", hint)
     places = [names.index(name) for name in order or names]
-    slides = [k for k, place in enumerate(places, 1) if arm.joints[place].slides]
+    slides = list[int]()
+    own_rods = dict[int, Rod]()
+    ranges = dict[int, tuple[float, float]]()
+    rods = rods_of(arm)
+    for number, place in enumerate(places, 1):
+        joint = arm.joints[place]
+        if joint.slides:
+            slides.append(number)
+        if place + 1 in rods:
+            own_rods[number] = rods[place + 1]
+        if not joint.continuous:
+            ranges[number] = joint.limits
     links = [arm.link_names[place] for place in places]
     try:
-        section, reasons, unused = guess_columns(table, order or names, links=links, slides=slides)
+        section, reasons, unused = guess_columns(
+            table, order or names, links=links, slides=slides, rods=own_rods, ranges=ranges
+        )
     except LogError:
         if not holds_numbers(table):
             raise
         return ColumnGuess({"joints": {}}, (), ())
     section["period_s"] = _period(section["period_s"])
-    entries = {places[k - 1] + 1: entry for k, entry in section["joints"].items()}
+    entries = {places[number - 1] + 1: entry for number, entry in section["joints"].items()}
     section["joints"] = dict(sorted(entries.items()))
     return ColumnGuess(section, reasons, unused)
 
@@ -41,7 +61,8 @@ def guessed_section(table: Table, arm: Arm, order: Sequence[str]) -> ColumnGuess
 def _period(period: float) -> float:
     """Return the period of a simulation [s] for a log's.
 
-    A slow log is simulated in two steps a sample; what a fast one adds is not seen on such machines.
+    A slow log is simulated in two steps a sample;
+    what a fast one adds is not seen on such machines.
     """
     if period < 0.03:
         return max(period, PERIOD)
@@ -52,35 +73,65 @@ def given_section(table: Table, arm: Arm, given: LogSettings) -> Plain:
     """Return what a person says of the columns, joint by joint."""
     entries = dict[int, Plain]()
     for joint in range(1, len(arm.joints) + 1):
-        maps = {kind: given.columns(kind, joint) for kind in ("command", "angle", "pressure")}
-        own = {kind: _entry(columns) for kind, columns in maps.items() if columns is not None}
-        if own:
-            entries[joint] = {"command": None, "angle": None} | own
-    section = given.model_dump(mode="json", exclude_defaults=True) | {"joints": entries}
-    section |= {"time": given.time.model_dump(), "command": None, "angle": None}
-    section |= {"pressure": None} if given.pressure is not None else {}
+        entry = _joint_entry(given, joint)
+        if entry:
+            entries[joint] = {"command": None, "angle": None} | entry
+    section = given.model_dump(mode="json", exclude_defaults=True)
+    section["joints"] = entries
+    section["time"] = given.time.model_dump()
+    # joint by joint: nothing is common to all
+    section["command"] = section["angle"] = None
+    if given.pressure is not None:
+        section["pressure"] = None
     if "period_s" not in given.model_fields_set:
-        (time,) = table.read([Signal(given.time.column, "time", gain=UNITS[given.time.unit].factor)]).values.T
-        section["period_s"] = _period(nearest_period(float(np.nanmedian(np.diff(time)))))
+        section["period_s"] = _period(_sample_time(table, given))
     return section
 
 
+def _joint_entry(given: LogSettings, joint: int) -> Plain:
+    """Return the columns of one joint, by what they hold."""
+    entry: Plain = {}
+    for kind in KINDS:
+        columns = given.columns(kind, joint)
+        if columns is not None:
+            entry[kind] = _entry(columns)
+    return entry
+
+
+def _sample_time(table: Table, given: LogSettings) -> float:
+    """Return the usual time between samples of a log [s]."""
+    time = Signal(given.time.column, "time", gain=UNITS[given.time.unit].factor)
+    (times,) = table.read([time]).values.T
+    return nearest_period(float(np.nanmedian(np.diff(times))))
+
+
 def _entry(columns: ColumnMap) -> Plain:
-    one = columns.column[0] if len(columns.column) == 1 else [*columns.column]
-    entry: Plain = {"column": one}
+    """Return the settings of columns without what is usual."""
+    names = [*columns.column]
+    entry: Plain = {"column": names[0] if len(names) == 1 else names}
     if columns.unit != "%":
         entry["unit"] = columns.unit
-    numbers = {"scale": (columns.scale, 1.0), "offset": (columns.offset, 0.0)}
-    return entry | {key: value for key, (value, usual) in numbers.items() if value != usual}
+    if columns.scale != 1.0:
+        entry["scale"] = columns.scale
+    if columns.offset != 0.0:
+        entry["offset"] = columns.offset
+    return entry
 
 
-def missing_column(section: Plain) -> str:
-    """Say what no column looks like; empty: there is all that a fit needs."""
+def missing_column(section: Plain, *, targets: bool) -> str:
+    """Say what no column looks like; empty: there is all that a fit needs.
+
+    `targets`: there are columns of positions that a controller is to reach.
+    """
     if "time" not in section:
         return "no column looks like a time"
     entries = section["joints"].values()
-    for kind in "angle", "command":
+    for kind, words in (("angle", "an angle"), ("command", "a command")):
         if not any(entry[kind] for entry in entries):
-            return f"no column looks like {'an' if kind == 'angle' else 'a'} {kind}"
-    both = any(entry["angle"] and entry["command"] for entry in entries)
-    return "" if both else "no joint has both a command and an angle"
+            what = f"no column looks like {words}"
+            if targets and kind == "command":
+                what += ", only like targets of positions: hydroid fits valves"
+            return what
+    if not any(entry["angle"] and entry["command"] for entry in entries):
+        return "no joint has both a command and an angle"
+    return ""

@@ -1,4 +1,5 @@
-"""The texts of a project: the arm's file of an import, and the settings of a fit of the whole chain.
+"""The texts of a project: the arm's file of an import,
+and the settings of a fit of the whole chain.
 
 These have starts and priors from the arm and the log.
 """
@@ -11,6 +12,7 @@ import mujoco
 import numpy as np
 
 from hydroid.arm.model import load_model
+from hydroid.arrays import Array
 from hydroid.cad.importer import ImportedArm
 from hydroid.files import Plain, fill_template, yaml_text
 from hydroid.fitting.valve_start import EXPONENT, USUAL_LAG, JointStart
@@ -24,19 +26,22 @@ from hydroid.settings.hydraulics import HydraulicSettings
 LONGEST_STEP = 0.025  # of MuJoCo [s], in a log of fewer samples
 VALVE_STEP = 0.002  # of valves and oil [s]
 DEAD = 0.8  # part of the command below which a joint seems to stand that its dead band is
-UNKNOWN_DEAD, MOST_DEAD = (
-    10.0,
-    85.0,
-)  # dead band of a joint that no log moves, and the largest to start at [%]
+UNKNOWN_DEAD = 10.0  # dead band of a joint that no log moves [%]
+MOST_DEAD = 85.0  # the largest dead band to start at [%]
+UNKNOWN_LAG = 0.05  # of the opening of a joint that no log moves [s]
+LONGEST_DELAY = 0.9  # to start at [s]
+LONGEST_LAG = 0.5  # to start at [s]
 DRAG = 0.02  # part of the torque at the pump's pressure that damping takes at full speed
 USUAL_SPEED = 0.5  # of a joint of which no log tells its own [rad/s, m/s]
 LIFT = 2.0  # torque of a joint at the pump's pressure, over the largest that gravity asks of it
 
 
 class JointSize(NamedTuple):
-    """What a joint needs: oil [cm³/rad], valve opening [mm²] and damping [N·m·s/rad] at a speed [rad/s].
+    """What a joint needs: oil [cm³/rad], valve opening [mm²] and damping [N·m·s/rad] at
+    a speed [rad/s].
 
-    Of a joint that slides [mm², mm², N·s/m, m/s]. `area` is the one that pushes its cylinder's rod out [mm²].
+    Of a joint that slides [mm², mm², N·s/m, m/s].
+    `area` is the one that pushes its cylinder's rod out [mm²].
     """
 
     displacement: float
@@ -47,33 +52,53 @@ class JointSize(NamedTuple):
 
 
 def joint_sizes(arm: Arm, speeds: Mapping[int, float]) -> tuple[JointSize, ...]:
-    """Return the size of what moves every joint, (J,): starts and centres of wide priors, not estimates.
+    """Return the size of what moves every joint, (J,): starts and centres of wide priors,
+    not estimates.
 
-    The displacement gives the torque at the pump's pressure; the opening gives the speed while the arm is
-    lifted, and both edges lose the same; the damping holds the speed at full command. `speeds` are those that
-    a log shows, by number of the joint [rad/s, m/s]; USUAL_SPEED for the others.
+    The displacement gives the torque at the pump's pressure; the opening gives the speed while the
+    arm is lifted, and both edges lose the same; the damping holds the speed at full command.
+    `speeds` are those that a log shows, by number of the joint [rad/s, m/s];
+    USUAL_SPEED for the others.
     """
+    pressure = 1e5 * HydraulicSettings().supply_pressure
+    sizes = list[JointSize]()
+    for number, (joint, torque) in enumerate(zip(arm.joints, _torques(arm).tolist(), strict=True), 1):
+        speed = max(speeds.get(number, USUAL_SPEED), 0.01)
+        displacement = 1e6 * torque / pressure
+        sizes.append(
+            JointSize(
+                displacement=displacement,
+                opening=opening_at(displacement, speed),
+                damping=torque / speed,
+                speed=speed,
+                area=displacement / _lever(joint),
+            )
+        )
+    return tuple(sizes)
+
+
+def _torques(arm: Arm) -> Array:
+    """Return the largest torque that each joint needs in random poses [N·m, N], shape (J,)."""
     model = load_model(arm).compile()
     data = mujoco.MjData(model)
-    low, high = np.maximum(arm.lower, -np.pi), np.minimum(arm.upper, np.pi)
-    torque, settings = np.zeros(len(arm.joints)), HydraulicSettings()
+    low = np.maximum(arm.lower, -np.pi)
+    high = np.minimum(arm.upper, np.pi)
+    torque = np.zeros(len(arm.joints))
+    # the same poses every time: a project is written twice with the same bytes
     for pose in np.random.default_rng(0).uniform(low, high, (300, len(low))):
         data.qpos[:] = pose
         mujoco.mj_forward(model, data)
         inertia = np.zeros((model.nv, model.nv))
         mujoco.mj_fullM(model, data, inertia)
         # a joint without weight must give 1 rad/s² at least
-        torque = np.maximum(torque, np.maximum(LIFT * abs(data.qfrc_bias), np.diag(inertia)))
-    pressure, sizes = 1e5 * settings.supply_pressure, list[JointSize]()
-    for joint, most in enumerate(torque.tolist(), 1):
-        speed = max(speeds.get(joint, USUAL_SPEED), 0.01)
-        oil, lever = 1e6 * most / pressure, _lever(arm.joints[joint - 1])
-        sizes.append(JointSize(oil, opening_at(oil, speed), most / speed, speed, oil / lever))
-    return tuple(sizes)
+        wanted = np.maximum(LIFT * abs(data.qfrc_bias), np.diag(inertia))
+        torque = np.maximum(torque, wanted)
+    return torque
 
 
 def opening_at(displacement: float, speed: float) -> float:
-    """Return the valve's opening [mm²] that lets a joint of a displacement [cm³/rad] move at a speed [rad/s].
+    """Return the valve's opening [mm²] that lets a joint of a displacement [cm³/rad] move at
+    a speed [rad/s].
 
     Of a joint that slides [mm², m/s].
     """
@@ -95,17 +120,19 @@ def _opening(joint: Joint, speed: float, usual: float) -> str:
 
     Empty where the arm's file has an opening that no `usual` speed of the joint gives: it holds.
     """
-    own = joint.actuator
-    if own is None:
+    actuator = joint.actuator
+    if actuator is None:
         return ""
-    if isinstance(own, LinearActuator):
-        oil, opening = own.settings.area_a * _lever(joint), own.settings.max_opening
+    if isinstance(actuator, LinearActuator):
+        displacement = actuator.settings.area_a * _lever(joint)
+        opening = actuator.settings.max_opening
     else:
-        oil, opening = own.displacement, own.max_opening
-    sized = [opening_at(oil, one) for one in (USUAL_SPEED, usual)]
+        displacement = actuator.displacement
+        opening = actuator.max_opening
+    sized = [opening_at(displacement, one) for one in (USUAL_SPEED, usual)]
     if not any(math.isclose(opening, one, rel_tol=0.01) for one in sized):
         return ""
-    return f"nominal: {short(opening_at(oil, speed))}, "
+    return f"nominal: {short(opening_at(displacement, speed))}, "
 
 
 class ValveSide(NamedTuple):
@@ -145,19 +172,19 @@ def _sides(
 def arm_text(imported: ImportedArm, arm: Arm | None, sizes: Sequence[JointSize]) -> str:
     """Return the arm's file of an import, with an actuator of each joint of sizes, (J,).
 
-    `arm` is what an earlier text of it says; None: this is that text, and cylinders have a size that nothing
-    uses.
+    `arm` is what an earlier text of it says; None: this is that text, and cylinders have a size
+    that nothing uses.
     """
     actuators = dict[str, Plain]()
     if arm is None:
-        areas = {"area_a": 1000, "area_b": 600, "max_opening": 1}
-        actuators = {name: own | areas for name, own in imported.cylinders.items()}
-    for joint, size in zip(arm.joints if arm else (), sizes, strict=True):
-        own = imported.cylinders.get(joint.name, {"kind": "linear"} if joint.slides else None)
-        oil: Plain = {"kind": "rotary", "displacement": rounded(size.displacement)}
-        if own is not None:  # the rod leaves about 65 % of the area
-            oil = own | {"area_a": rounded(size.area), "area_b": rounded(0.65 * size.area)}
-        actuators[joint.name] = oil | {"max_opening": rounded(size.opening)}
+        unused = {"area_a": 1000, "area_b": 600, "max_opening": 1}
+        for name, cylinder in imported.cylinders.items():
+            actuators[name] = cylinder | unused
+    else:
+        for joint, size in zip(arm.joints, sizes, strict=True):
+            sliding = {"kind": "linear"} if joint.slides else None
+            cylinder = imported.cylinders.get(joint.name, sliding)
+            actuators[joint.name] = _actuator(cylinder, size)
     return fill_template(
         "project/arm.yaml.j2",
         title=imported.title,
@@ -166,6 +193,16 @@ def arm_text(imported: ImportedArm, arm: Arm | None, sizes: Sequence[JointSize])
         actuators=actuators,
         flow=flow,
     )
+
+
+def _actuator(cylinder: Plain | None, size: JointSize) -> Plain:
+    """Return the settings of an actuator of a size: of a cylinder, or of a stand-in for one."""
+    opening = {"max_opening": rounded(size.opening)}
+    if cylinder is None:
+        return {"kind": "rotary", "displacement": rounded(size.displacement)} | opening
+    # the rod leaves about 65 % of the area
+    areas = {"area_a": rounded(size.area), "area_b": rounded(0.65 * size.area)}
+    return cylinder | areas | opening
 
 
 def flow(value: Any) -> str:
@@ -179,46 +216,43 @@ def rounded(value: float) -> float:
 
 
 def fit_text(
-    arm: Arm, layout: Layout, sizes: Sequence[JointSize], file: str, arm_file: str, again: str = ""
+    arm: Arm,
+    layout: Layout,
+    sizes: Sequence[JointSize],
+    file: str,
+    arm_file: str,
+    again: str = "",
 ) -> str:
     """Return the settings of a fit of the whole chain.
 
-    `file` is their own name as a command takes it, and `arm_file` that of the arm as they name it; `again` is
-    the command that goes on once the columns are named.
+    `file` is their own name as a command takes it, and `arm_file` that of the arm as they name it;
+    `again` is the command that goes on once the columns are named.
     """
-    joints, volumes = list[Plain](), list[float]()
-    flows = {joint: 0.06 * sizes[joint - 1].displacement * sizes[joint - 1].speed for joint in layout.outputs}
-    middle = np.median([*flows.values()])
+    flows = dict[int, float]()  # at full speed, by joint [L/min]
     for joint in layout.outputs:
-        name, size, own = arm.joint_names[joint - 1], sizes[joint - 1], arm.joints[joint - 1]
-        motion, valve = layout.motions.get(joint), layout.valves.get(joint)
-        delay = max(motion.likely_lag - USUAL_LAG, 0.0) if motion else 0.0
-        linear = isinstance(own.actuator, LinearActuator)
-        if not linear:
-            volumes.append(size.displacement * math.radians(own.range[1] - own.range[0]) / 2)
-        joints.append(
-            {
-                "own": name.removesuffix("_joint"),
-                "name": name,
-                "linear": linear,
-                "lever": own.has("lever_slope"),
-                "sides": _sides(own, valve, motion, size.speed),
-                "damping": short(DRAG * size.damping),
-                "delay": min(valve.delay if valve else delay, 0.9),
-                "lag": min(valve.lag if valve else 0.05, 0.5),
-                "unit": "N·s/m" if own.slides else "N·m·s/rad",
-                # a stand-in's size is a guess, but the valves of one machine let like flows through
-                "draw": 1 if linear else short(middle / flows[joint]),
-            }
-        )
+        size = sizes[joint - 1]
+        flows[joint] = 0.06 * size.displacement * size.speed
+    usual_flow = np.median([*flows.values()])
+    joints = list[Plain]()
+    volumes = list[float]()  # of the chambers of stand-ins [cm³]
+    for number in layout.outputs:
+        joint = arm.joints[number - 1]
+        size = sizes[number - 1]
+        if not isinstance(joint.actuator, LinearActuator):
+            low, high = joint.range
+            volumes.append(size.displacement * math.radians(high - low) / 2)
+        draw = usual_flow / flows[number]
+        valve = layout.valves.get(number)
+        joints.append(_joint_text(joint, size, layout.motions.get(number), valve, draw))
     period = layout.section.get("period_s", 0.01)
+    # a whole number of steps, but for the rounding of the division
     steps = math.ceil(period / LONGEST_STEP - 1e-9)
     return fill_template(
         "project/fit.yaml.j2",
         file=file,
         again=again,
         arm=flow(arm_file),
-        outputs=flow([one["name"] for one in joints]),
+        outputs=flow([joint["name"] for joint in joints]),
         layout=layout,
         names=arm.joint_names,
         flow=flow,
@@ -228,6 +262,37 @@ def fit_text(
         most=short(4 * sum(flows.values())),  # so large that it limits no flow
         joints=joints,
     )
+
+
+def _joint_text(
+    joint: Joint, size: JointSize, motion: JointMotion | None, valve: JointStart | None, draw: float
+) -> Plain:
+    """Return what the settings of a fit say of a joint, and of its motion and valve where a log
+    shows them.
+
+    `draw` is the usual flow of the machine's joints over that of this one.
+    """
+    linear = isinstance(joint.actuator, LinearActuator)
+    delay = 0.0
+    lag = UNKNOWN_LAG
+    if valve:
+        delay = valve.delay
+        lag = valve.lag
+    elif motion:
+        delay = max(motion.likely_lag - USUAL_LAG, 0.0)
+    return {
+        "own": joint.name.removesuffix("_joint"),
+        "name": joint.name,
+        "linear": linear,
+        "lever": joint.has("lever_slope"),
+        "sides": _sides(joint, valve, motion, size.speed),
+        "damping": short(DRAG * size.damping),
+        "delay": min(delay, LONGEST_DELAY),
+        "lag": min(lag, LONGEST_LAG),
+        "unit": "N·s/m" if joint.slides else "N·m·s/rad",
+        # a stand-in's size is a guess, but the valves of one machine let like flows through
+        "draw": 1 if linear else short(draw),
+    }
 
 
 def short(value: float) -> str:

@@ -1,7 +1,9 @@
-"""A chart: panels of marks, described once; the page draws it (`charts.js`), and `figure` as a file.
+"""A chart: panels of marks, described once.
 
-Colours are named after Okabe and Ito's, which colour-blind readers tell apart; each look of the page has its
-own shade of them.
+The page draws it (`charts.js`), and `figure` as a file.
+
+Colours are named after Okabe and Ito's, which colour-blind readers tell apart; each look of the
+page has its own shade of them.
 """
 
 from dataclasses import field, replace
@@ -23,17 +25,20 @@ class Mark:
     """One thing drawn in a panel.
 
     Attributes:
-        kind: `line` or `step` through (x, y), with gaps at NaN; `points`; `band` from y to `end`; `spans`,
-            from x to `end` over the whole height; `rule` at a value y.
+        kind: `line` or `step` through (x, y), with gaps at NaN; `points`; `band` from y to `end`;
+            `spans`, from x to `end` over the whole height; `rule` at a value y; `bars` from x to
+            `end` in row y; `cells` in column x and row y, whose `end`, -1 to 1, is how strongly
+            they are coloured: blue above 0, orange below.
         x, y, end: as the kind says, shapes (n,).
         color: its name.
-        label: in the legend; marks with one label are shown and hidden together. Empty: not in the legend.
+        label: in the legend; marks with one label are shown and hidden together. Empty: not in the
+            legend.
         width: of a line, or the size of a point [px].
         off: it is hidden until the reader asks for it. Files leave it out.
         alpha: opacity.
     """
 
-    kind: Literal["line", "step", "points", "band", "spans", "rule"]
+    kind: Literal["line", "step", "points", "band", "spans", "rule", "bars", "cells"]
     x: Array = field(default_factory=_none)
     y: Array = field(default_factory=_none)
     end: Array = field(default_factory=_none)
@@ -46,10 +51,12 @@ class Mark:
     def thinned(self, bins: int) -> "Mark":
         """Return a curve by the lowest and the highest sample of each of at most `bins` parts.
 
-        It is drawn as the whole curve would be. A short curve and what is no curve stay as they are.
+        It is drawn as the whole curve would be. A short curve and what is no curve stay as they
+        are.
         """
         size = -(-len(self.y) // bins)
-        if self.kind not in ("line", "step", "band") or size <= 2 or not np.all(np.diff(self.x) > 0):
+        curve = self.kind in ("line", "step", "band")
+        if not curve or size <= 2 or not np.all(np.diff(self.x) > 0):
             return self
         last = len(self.y) - 1
         keep = [np.array([0, last])]
@@ -59,14 +66,17 @@ class Mark:
                 lowest = np.where(np.isfinite(parts), parts, np.inf).argmin(axis=1)
                 keep.append(lowest + size * np.arange(len(parts)))
         at = np.unique(np.minimum(np.concatenate(keep), last))
-        return replace(self, x=self.x[at], y=self.y[at], end=self.end[at] if len(self.end) else self.end)
+        end = self.end[at] if len(self.end) else self.end
+        return replace(self, x=self.x[at], y=self.y[at], end=end)
 
 
 @record
 class Panel:
-    """A pair of axes, with marks in the order in which they are drawn, and its height in the page [px].
+    """A pair of axes, with marks in the order in which they are drawn, and its height in the page
+    [px].
 
-    `x`, `y` label the axes; `y_limits` None: around all that is drawn.
+    `x`, `y` label the axes; `y_limits` None: around all that is drawn. Where there are `rows`,
+    these are the names of y = 0, 1, ..., from the top down; `columns` are those of x.
     """
 
     x: str
@@ -75,15 +85,18 @@ class Panel:
     title: str = ""
     height: int = 220
     y_limits: tuple[float, float] | None = None
+    log_x: bool = False
     log_y: bool = False
+    rows: tuple[str, ...] = ()
+    columns: tuple[str, ...] = ()
 
 
 @record
 class Chart:
     """Panels that belong together, with one legend, one below the other.
 
-    Where `linked`, all share their x axis. Of a curve the lowest and the highest sample of `bins` parts is
-    drawn.
+    Where `linked`, all share their x axis. Of a curve the lowest and the highest sample of `bins`
+    parts is drawn.
     """
 
     panels: tuple[Panel, ...]
@@ -92,7 +105,10 @@ class Chart:
 
     def thinned(self) -> "Chart":
         """Return the chart with what is drawn of its curves."""
-        panels = (replace(p, marks=tuple(m.thinned(self.bins) for m in p.marks)) for p in self.panels)
+        panels = list[Panel]()
+        for panel in self.panels:
+            marks = tuple(mark.thinned(self.bins) for mark in panel.marks)
+            panels.append(replace(panel, marks=marks))
         return replace(self, panels=tuple(panels))
 
 

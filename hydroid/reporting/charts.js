@@ -5,6 +5,7 @@
   const dark = matchMedia("(prefers-color-scheme: dark)");
   const touch = matchMedia("(pointer: coarse)").matches;
   const drawn = new Map(); // host element -> {figures, x ranges, visible labels}
+  const zooms = new Map(); // row of a matrix -> [start, end] to which its charts are zoomed
 
   async function unpack(id) {
     const bytes = Uint8Array.from(atob(document.getElementById(id).textContent), (c) => c.charCodeAt(0));
@@ -16,23 +17,38 @@
 
   // [low, high] of all marks that are shown along an axis, with a margin
   function extent(panel, axis, shown) {
+    const names = axis === "y" ? panel.rows : panel.columns;
+    if (names.length) return axis === "y" ? [names.length - 0.5, -0.5] : [-0.5, names.length - 0.5];
     let low = Infinity, high = -Infinity;
     const log = panel[`log_${axis}`];
     for (const mark of panel.marks) {
       if (mark.label && shown.get(mark.label) === false) continue;
       if (mark.kind === "spans" || (mark.kind === "rule" && axis === "x")) continue;
-      const others = axis === "y" && mark.kind === "band" ? ["y", "end"] : [axis];
+      const ends = mark.kind === (axis === "y" ? "band" : "bars");
+      const others = ends ? [axis, "end"] : [axis];
       for (const name of others) for (const v of mark[name] ?? [])
         if (v !== null && (!log || v > 0)) { low = Math.min(low, v); high = Math.max(high, v); }
     }
     if (!(low <= high)) return log ? [0.1, 1] : [0, 1];
-    if (log) return [low / 1.4, high * 1.4];
+    if (log) return axis === "x" ? [low, high] : [low / 1.4, high * 1.4];
     const linear = axis === "x" && panel.marks.some((m) => m.kind === "line" || m.kind === "step");
     const margin = linear ? 0 : (0.07 * (high - low) || 0.05 * Math.abs(high) || 1);
     return [low - margin, high + margin];
   }
 
-  function addMark(figure, mark, shown) {
+  // squares in the colours of their sign, as strong as their value
+  function cells(figure, panel, mark) {
+    const value = numbers(mark.end), x = numbers(mark.x), y = numbers(mark.y);
+    const data = { x, y, value, name: x.map((column, i) => `${panel.rows[y[i]]}, ${panel.columns[column]}`),
+      paint: value.map((v) => color(v > 0 ? "blue" : "orange")), strength: value.map(Math.abs) };
+    const source = new Bokeh.ColumnDataSource({ data }), field = (name) => ({ field: name });
+    const made = figure.rect(field("x"), field("y"), 1, 1,
+      { source, fill_color: field("paint"), fill_alpha: field("strength"), line_color: null });
+    if (!touch) figure.add_tools(new Bokeh.HoverTool({ renderers: [made], tooltips: [["", "@name"], ["", "@value{0.00}"]] }));
+    return made;
+  }
+
+  function addMark(figure, panel, mark, shown) {
     const paint = color(mark.color), alpha = mark.alpha;
     const x = numbers(mark.x), y = numbers(mark.y), end = numbers(mark.end);
     const line = { line_color: paint, line_alpha: alpha, line_width: mark.width };
@@ -42,6 +58,9 @@
     else if (mark.kind === "points")
       made = [figure.scatter({ x, y, marker: "circle", size: mark.width, fill_color: paint,
         fill_alpha: alpha, line_color: color("paper") })];
+    else if (mark.kind === "bars")
+      made = [figure.hbar({ y, left: x, right: end, height: 0.6, fill_color: paint, fill_alpha: alpha, line_color: null })];
+    else if (mark.kind === "cells") made = [cells(figure, panel, mark)];
     else if (mark.kind === "band")
       made = [figure.varea({ x, y1: y, y2: end, fill_color: paint, fill_alpha: alpha })];
     else {
@@ -72,6 +91,16 @@
     Object.assign(figure, { background_fill_color: null, border_fill_color: null, outline_line_color: null });
   }
 
+  // names of rows or columns in place of an axis's numbers, as large as the room allows [px]
+  function nameTicks(axis, names, room, orientation) {
+    if (!names.length) return;
+    const size = Math.max(6, Math.min(12, Math.floor((0.9 * room) / names.length)));
+    axis.ticker = new Bokeh.FixedTicker({ ticks: names.map((_, i) => i) });
+    // two dollars would begin a formula
+    axis.major_label_overrides = new Map(names.map((name, i) => [i, name.replaceAll("$$", "$ $")]));
+    Object.assign(axis, { major_label_text_font_size: `${size}px`, major_label_orientation: orientation, major_label_policy: new Bokeh.AllLabels(), major_tick_line_color: null });
+  }
+
   function addPanel(panel, shared, shown, width) {
     const xs = extent(panel, "x", shown), ys = panel.y_limits ?? extent(panel, "y", shown);
     const x_range = shared ?? new Bokeh.Range1d({ start: xs[0], end: xs[1] });
@@ -79,14 +108,24 @@
     const figure = Bokeh.Plotting.figure({
       output_backend: "svg", // sharp on paper too
       height: panel.height, sizing_mode: "stretch_width", toolbar_location: null, tools: touch ? "" : "xbox_zoom",
-      x_range, y_range, y_axis_type: panel.log_y ? "log" : "linear",
+      x_range, y_range, x_axis_type: panel.log_x ? "log" : "linear", y_axis_type: panel.log_y ? "log" : "linear",
       x_axis_label: panel.x || null, y_axis_label: panel.y || null,
       min_border_left: 64, min_border_right: 16, min_border_top: 8, min_border_bottom: 8,
     });
     if (width < 480) for (const axis of figure.xaxes) axis.ticker.desired_num_ticks = 4;
-    if (panel.log_y) figure.yaxes[0].ticker.mantissas = [1, 2, 5]; // else less than two decades have one tick or two
+    for (const [axis, log] of [[figure.xaxes[0], panel.log_x], [figure.yaxes[0], panel.log_y]])
+      if (log) {
+        axis.ticker.mantissas = [1, 2, 5]; // else less than two decades have one tick or two
+        axis.formatter = new Bokeh.BasicTickFormatter(); // 0.1, not a power of ten
+      }
     axisLook(figure);
-    const made = panel.marks.flatMap((mark) => addMark(figure, mark, shown));
+    // lines between rows or columns would only cross what is drawn there
+    for (const grid of figure.center.filter((one) => one.dimension !== undefined))
+      if ((grid.dimension === 0 ? panel.columns : panel.rows).length) grid.visible = false;
+    nameTicks(figure.yaxes[0], panel.rows, panel.height - 60, "horizontal");
+    // no room for the names of many columns: those of the rows are the same
+    nameTicks(figure.xaxes[0], width < 600 || panel.columns.length > 40 ? panel.columns.map(() => "") : panel.columns, Infinity, "vertical");
+    const made = panel.marks.flatMap((mark) => addMark(figure, panel, mark, shown));
     return { panel, figure, made, x_range, y_range, home: xs };
   }
 
@@ -126,9 +165,22 @@
     panels.forEach((one) => bokeh.add_root(one.figure));
     await Bokeh.embed.add_document_standalone(bokeh, cells, elements);
     drawn.set(host, { document: bokeh, panels, shown, chart });
+    const row = chart.linked && host.closest("[data-row]")?.dataset.row;
+    if (row) {
+      const range = panels[0].x_range;
+      for (const end of [range.properties.start, range.properties.end])
+        end.change.connect(() => zooms.set(row, [range.start, range.end]));
+    }
+    zoomAlike(host);
     host.classList.toggle("drawn-dark", dark.matches);
     host.querySelector(":scope > .controls").replaceChildren(
       ...legend(panels, shown), ...(host.dataset.zoom ? [zoomButtons(panels)] : []));
+  }
+
+  // charts of one log are zoomed together
+  function zoomAlike(host) {
+    const zoom = zooms.get(host.closest("[data-row]")?.dataset.row), panels = drawn.get(host)?.panels;
+    if (zoom && panels) panels[0].x_range.setv({ start: zoom[0], end: zoom[1] });
   }
 
   // one button per label, that shows or hides its marks in some panels
@@ -183,7 +235,17 @@
   let drawings = {};
   async function drawVisible(again = false) {
     for (const host of document.querySelectorAll(".chart"))
-      if (host.offsetParent !== null && (again || !drawn.has(host))) { await draw(host, drawings[host.dataset.drawing]); await idle(); }
+      if (host.offsetParent !== null && !again && drawn.has(host)) zoomAlike(host);
+      else if (host.offsetParent !== null) { await draw(host, drawings[host.dataset.drawing]); await idle(); }
+  }
+
+  // of what stands beside the tabs, show that of a row, or the note that there is none
+  function besides(section, row) {
+    const all = [...section.querySelectorAll(".beside")], own = all.find((one) => one.dataset.row === row);
+    for (const one of all) {
+      one.hidden = one !== (own ?? all.at(-1));
+      if (one.hidden) one.querySelector(".moving")?.dispatchEvent(new Event("leave"));
+    }
   }
 
   function tabs(list) {
@@ -195,6 +257,7 @@
         one.tabIndex = on ? 0 : -1;
         document.getElementById(one.getAttribute("aria-controls")).hidden = !on;
       }
+      besides(list.closest("section, details"), tab.dataset.row);
       drawVisible();
     };
     all.forEach((tab, i) => {
@@ -208,6 +271,11 @@
       };
     });
   }
+
+  // what must stand on paper though it is folded
+  const opened = [];
+  addEventListener("beforeprint", () => document.querySelectorAll("details.printed:not([open])").forEach((one) => { one.open = true; opened.push(one); }));
+  addEventListener("afterprint", () => opened.splice(0).forEach((one) => { one.open = false; }));
 
   async function start() {
     document.querySelectorAll("[role=tablist]").forEach(tabs);

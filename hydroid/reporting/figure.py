@@ -1,4 +1,6 @@
-"""Pictures drawn with matplotlib, the same bytes every time: charts as files, and one to check an arm by."""
+"""Pictures drawn with matplotlib, the same bytes every time: charts as files, and one to check an
+arm by.
+"""
 
 import io
 import warnings
@@ -10,13 +12,14 @@ import mujoco
 import numpy as np
 from matplotlib import style as styles
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from scipy.spatial import ConvexHull, QhullError
 
 from hydroid.arm.model import load_model
 from hydroid.arrays import Array
 from hydroid.files import Plain
-from hydroid.reporting.chart import SERIES, Chart
+from hydroid.reporting.chart import SERIES, Chart, Mark, Panel
 from hydroid.reporting.outlines import Shape, body_poses, placed, shapes, sight
 from hydroid.settings.arm import Arm
 from hydroid.settings.cylinder import LinearActuator
@@ -72,28 +75,55 @@ def figure(chart: Chart) -> Figure:
     axes = drawing.subplots(len(heights), squeeze=False, sharex=chart.linked, height_ratios=heights).ravel()
     for one, panel in zip(axes, chart.thinned().panels, strict=True):
         for mark in panel.marks:
-            if mark.off:
-                continue
-            x, y, end = mark.x, mark.y, mark.end
-            look: Plain = {"color": SHADES[mark.color], "alpha": mark.alpha, "label": mark.label or None}
-            match mark.kind:
-                case "line" | "step":
-                    drawn = "default" if mark.kind == "line" else "steps-post"
-                    one.plot(x, y, lw=mark.width, drawstyle=drawn, **look)
-                case "points":
-                    one.plot(x, y, "o", ms=mark.width, zorder=3, **look)
-                case "band":
-                    one.fill_between(x, y, end, lw=0, **look)
-                case "spans":
-                    for low, high in zip(x, end, strict=True):
-                        one.axvspan(low, high, lw=0, zorder=0, **look)
-                case "rule":
-                    for value in y:
-                        one.axhline(value, lw=mark.width, **look)
-        one.set(title=panel.title, xlabel=panel.x, ylabel=panel.y, ylim=panel.y_limits)
-        one.set_yscale("log" if panel.log_y else "linear")
+            if not mark.off:
+                _draw(one, mark)
+        _name_axes(one, panel)
     legend(drawing)
     return drawing
+
+
+def _draw(axes: Axes, mark: Mark) -> None:
+    """Draw a mark in a panel."""
+    x, y, end = mark.x, mark.y, mark.end
+    look: Plain = {"color": SHADES[mark.color], "alpha": mark.alpha, "label": mark.label or None}
+    match mark.kind:
+        case "line":
+            axes.plot(x, y, lw=mark.width, **look)
+        case "step":
+            axes.plot(x, y, lw=mark.width, drawstyle="steps-post", **look)
+        case "points":
+            axes.plot(x, y, "o", ms=mark.width, zorder=3, **look)
+        case "band":
+            axes.fill_between(x, y, end, lw=0, **look)
+        case "spans":
+            for low, high in zip(x, end, strict=True):
+                axes.axvspan(low, high, lw=0, zorder=0, **look)
+        case "rule":
+            for value in y:
+                axes.axhline(value, lw=mark.width, **look)
+        case "bars":
+            axes.barh(y, end - x, left=x, height=0.6, **look)
+        case "cells":
+            for sign, color in (1, "blue"), (-1, "orange"):
+                chosen = sign * end > 0
+                shade = [to_rgba(SHADES[color], alpha) for alpha in np.abs(end[chosen])]
+                axes.bar(x[chosen], 1.0, 1.0, y[chosen] - 0.5, color=shade)
+
+
+def _name_axes(axes: Axes, panel: Panel) -> None:
+    """Name the axes of a panel, and set their limits and scales."""
+    axes.set(title=panel.title, xlabel=panel.x, ylabel=panel.y, ylim=panel.y_limits)
+    axes.set_yscale("log" if panel.log_y else "linear")
+    axes.set_xscale("log" if panel.log_x else "linear")
+    if panel.rows:
+        size = min(8.0, 50.0 * panel.height / 80 / len(panel.rows))  # [pt], of 72 in an inch
+        axes.set_yticks(range(len(panel.rows)), panel.rows, fontsize=size)
+        axes.set_ylim(len(panel.rows) - 0.5, -0.5)
+        axes.grid(axis="y", visible=False)
+    if panel.columns:
+        axes.set_xticks(range(len(panel.columns)), panel.columns, fontsize=6, rotation=90)
+        axes.set_xlim(-0.5, len(panel.columns) - 0.5)
+        axes.grid(axis="x", visible=False)
 
 
 def legend(drawing: Figure) -> None:
@@ -108,11 +138,15 @@ def legend(drawing: Figure) -> None:
 VIEWS = {"from the right (-y)": (0.0, "z [m]"), "from above": (-90.0, "y [m]")}
 """elevation of the sight [deg], and what points upwards; x points to the right"""
 ACROSS = 0.7
-"""part of an axis's direction that points out of the picture, from which on its sense of rotation is named"""
+"""part of an axis's direction that points out of the picture, from which on its sense of rotation
+is named"""
 
 
 def arm_picture(arm: Arm, title: str) -> tuple[bytes, bytes]:
-    """Draw an arm with all joints at 0, or at the ends of their ranges that are nearest; PNG and SVG."""
+    """Draw an arm with all joints at 0, or at the ends of their ranges that are nearest.
+
+    PNG and SVG.
+    """
     model = load_model(arm).compile()
     data, angles = mujoco.MjData(model), np.clip(0.0, arm.lower, arm.upper)
     data.qpos[:] = angles
@@ -143,7 +177,10 @@ def arm_picture(arm: Arm, title: str) -> tuple[bytes, bytes]:
 
 
 def _view(axes: Axes, arm: Arm, data: Any, outlines: Sequence[Shape], poses: Array, name: str) -> None:
-    """Draw links, joints' axes and pivots in one of the VIEWS; the outlines' corners are in the world."""
+    """Draw links, joints' axes and pivots in one of the VIEWS.
+
+    The outlines' corners are in the world.
+    """
     elevation, upwards = VIEWS[name]
     *across, ahead = sight(90.0, elevation)
     model, onto = data.model, np.transpose(across)

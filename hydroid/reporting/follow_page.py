@@ -7,8 +7,8 @@ import numpy as np
 
 from hydroid.fitting.validation import Prediction
 from hydroid.reporting.chart import Chart, Mark, Panel
-from hydroid.reporting.outlines import motion_section
 from hydroid.reporting.page import Page, Plot, Section, Table
+from hydroid.reporting.response_report import motion_section
 from hydroid.settings.arm import Arm
 from hydroid.use.follow import Followed, Missed
 from hydroid.words import listed, number, two_digits

@@ -1,18 +1,26 @@
 // Draws an arm in motion: the measured arm, over it the simulated one, and a button and a slider for the time.
 "use strict";
 function moveArm(host, arm) {
-  const [width, height] = arm.size, last = arm.time.length - 1;
-  const picture = host.querySelector("svg"), play = host.querySelector("button");
-  const slider = host.querySelector("input"), words = host.querySelector("output");
-  picture.setAttribute("viewBox", `0 0 ${width} ${height}`);
-  const polygons = ["measured", "simulated"].flatMap((name) => arm.shapes.map((shape) => {
-    const poses = arm.poses[name][shape.body];
-    if (name === "measured" && poses.length === 1) return null; // what stands still is drawn once
-    const polygon = document.createElementNS("http://www.w3.org/2000/svg", "polygon");
-    polygon.setAttribute("class", poses.length === 1 ? "still" : name);
-    picture.append(polygon);
-    return { polygon, poses, corners: shape.corners };
-  })).filter(Boolean);
+  const last = arm.time.length - 1;
+  const play = host.querySelector("button"), slider = host.querySelector("input"), words = host.querySelector("output");
+  const pictures = host.querySelector(".views");
+  const svg = (name) => document.createElementNS("http://www.w3.org/2000/svg", name);
+
+  const views = Object.entries(arm.views).map(([name, view]) => {
+    const picture = pictures.appendChild(svg("svg"));
+    picture.setAttribute("viewBox", `0 0 ${view.size[0]} ${view.size[1]}`);
+    picture.setAttribute("role", "img");
+    picture.setAttribute("aria-label", `The arm from ${name === "side" ? "the side" : name}`);
+    picture.style.flexGrow = view.size[0]; // both to the same scale
+    const polygons = ["measured", "simulated"].flatMap((which) => view.order.map((number) => {
+      const shape = arm.shapes[number], poses = arm.poses[which][shape.body];
+      if (which === "measured" && poses.length === 1) return null; // what stands still is drawn once
+      const polygon = picture.appendChild(svg("polygon"));
+      polygon.setAttribute("class", poses.length === 1 ? "still" : which);
+      return { polygon, poses, corners: shape.corners };
+    })).filter(Boolean);
+    return { axes: view.axes, corner: view.corner, polygons };
+  });
 
   // the outline of points: Andrew's monotone chain
   function outline(points) {
@@ -36,10 +44,17 @@ function moveArm(host, arm) {
     if (k < 0) k = last - 1;
     const share = Math.min(1, (time - arm.time[k]) / (arm.time[k + 1] - arm.time[k]));
     const between = (a, b) => a + share * (b - a);
-    for (const { polygon, poses, corners } of polygons) {
-      const a = poses[k] ?? poses[0], b = poses[k + 1] ?? a, m = a.map((v, i) => between(v, b[i]));
-      const places = corners.map(([x, y, z]) => [m[0] * x + m[1] * y + m[2] * z + m[3], m[4] * x + m[5] * y + m[6] * z + m[7]]);
-      polygon.setAttribute("points", outline(places).map((p) => p.map((v) => v.toFixed(1)).join()).join(" "));
+    const at = (rows) => { const a = rows[k] ?? rows[0], b = rows[k + 1] ?? a; return a.map((v, i) => between(v, b[i])); };
+    for (const { axes, corner, polygons } of views) {
+      const camera = at(axes);
+      for (const { polygon, poses, corners } of polygons) {
+        const m = at(poses);
+        // from the part to the picture, in one step
+        const row = (i, j) => camera[3 * i] * m[j] + camera[3 * i + 1] * m[4 + j] + camera[3 * i + 2] * m[8 + j];
+        const [a, b] = [0, 1].map((i) => [row(i, 0), row(i, 1), row(i, 2), row(i, 3) + corner[i]]);
+        const places = corners.map(([x, y, z]) => [a[0] * x + a[1] * y + a[2] * z + a[3], b[0] * x + b[1] * y + b[2] * z + b[3]]);
+        polygon.setAttribute("points", outline(places).map((p) => p.map((v) => v.toFixed(1)).join()).join(" "));
+      }
     }
     slider.value = time;
     const errors = Object.entries(arm.errors).map(([name, e]) => `${name} ${between(e[k], e[k + 1]).toFixed(2).replace("-", "−")}${arm.units[name]}`);
@@ -62,6 +77,7 @@ function moveArm(host, arm) {
   Object.assign(slider, { min: arm.time[0], max: arm.time[last], step: 0.05 });
   slider.oninput = () => { run(false); show(+slider.value); };
   play.onclick = () => run(!running);
+  host.addEventListener("leave", () => run(false));
   run(false);
   show(arm.time[arm.start]);
 }

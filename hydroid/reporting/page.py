@@ -1,6 +1,10 @@
-"""A report as data: tables for readers and scripts, sections, charts, steps; `page_file` writes it."""
+"""A report as data: tables for readers and scripts, sections, charts, steps.
+
+`page_file` writes it.
+"""
 
 import os
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import field
 from functools import cached_property
@@ -15,6 +19,11 @@ from hydroid.words import number, numbered, plain
 if TYPE_CHECKING:
     import rich.table
 
+FIGURE_SPACE, POINT_SPACE = "\u2007", "\u2008"
+"""blanks as wide as a digit and as a point"""
+_NUMBER = re.compile(r"([-−]?\d+)(\.\d+)?(?= |$)")
+SHORT = 20
+"""letters of a cell up to which it stands in one line"""
 Cell = str | int | float | None  # text, a count, a measured number, or nothing
 
 
@@ -26,7 +35,8 @@ class Given(float):
 class Table:
     """A table; each row has one cell per column of the header.
 
-    The note stands below it. A narrow terminal leaves out `optional` columns, the least important first.
+    The note stands below it. A narrow terminal leaves out `optional` columns, the least important
+    first.
     """
 
     title: str
@@ -44,7 +54,10 @@ class Table:
         note: str = "",
         optional: tuple[str, ...] = (),
     ) -> "Table":
-        """Return a table of rows by key; `columns` are the keys that are shown, and the columns' names."""
+        """Return a table of rows by key.
+
+        `columns` are the keys that are shown, and the columns' names.
+        """
         cells = tuple(tuple(row.get(key) for key in columns) for row in rows)
         return cls(title, tuple(columns.values()), cells, note, optional)
 
@@ -53,10 +66,12 @@ class Table:
         return csv_text([self.header, *self.rows])
 
     def show(self) -> None:
-        """Print the table within the width of the terminal or of COLUMNS; elsewhere lines have any length.
+        """Print the table within the width of the terminal or of COLUMNS.
 
-        Columns of text wrap at words. Where that does not suffice, `optional` columns are named below it
-        instead.
+        Elsewhere lines have any length.
+
+        Columns of text wrap at words. Where that does not suffice, `optional` columns are named
+        below it instead.
         """
         from rich.console import Console
 
@@ -77,11 +92,29 @@ class Table:
         """The text of each cell for a reader."""
         return [[shown(cell) for cell in row] for row in self.rows]
 
+    def aligned(self, digit: str = FIGURE_SPACE, point: str = POINT_SPACE) -> list[list[str]]:
+        """Return `shown` with numbers under each other at the point.
+
+        The blanks are as wide as a digit and a point. A column of text is aligned where each of its
+        cells begins with a number.
+        """
+        columns = list[list[str]]()
+        for i, right in enumerate(self.numeric):
+            cells = [row[i] for row in self.shown]
+            columns.append(_aligned(cells, digit, point, right=right))
+        return [list(row) for row in zip(*columns, strict=True)]
+
     @cached_property
     def numeric(self) -> tuple[bool, ...]:
         """Columns that hold numbers only."""
-        kinds = ({type(row[i]) for row in self.rows} - {type(None)} for i in range(len(self.header)))
+        kinds = ({type(row[i]) for row in self.rows} for i in range(len(self.header)))
         return tuple(bool(kind) and str not in kind for kind in kinds)
+
+    @cached_property
+    def short(self) -> tuple[bool, ...]:
+        """Columns of text whose cells are too short to be broken into lines."""
+        columns = zip(*self.shown, strict=True) if self.rows else [()] * len(self.header)
+        return tuple(max(map(len, column), default=0) <= SHORT for column in columns)
 
     def _rich(self, left_out: Sequence[str]) -> "rich.table.Table":
         """Return the table for a terminal; headers of numbers are broken into words."""
@@ -105,9 +138,30 @@ class Table:
                 min_width=None if right else min(widest, 18),  # before that optional columns go
                 overflow="fold",
             )
-        for row in self.shown:
+        for row in self.aligned(" ", " "):
             table.add_row(*(Text(row[i]) for i in kept))
         return table
+
+
+def _aligned(cells: list[str], digit: str, point: str, *, right: bool) -> list[str]:
+    """Return the cells of a column, which stands at the `right` or left, with their numbers at the
+    point.
+    """
+    numbers = [_NUMBER.match(cell) for cell in cells]
+    if not right and any(cell and not number for cell, number in zip(cells, numbers, strict=True)):
+        return cells
+    parts = [number.groups("") if number else ("", "") for number in numbers]
+    widest = max((len(whole) for whole, _ in parts), default=0)
+    longest = max((len(rest) for _, rest in parts), default=0)
+    result = list[str]()
+    for cell, (whole, rest) in zip(cells, parts, strict=True):
+        if not right:
+            result.append(digit * (widest - len(whole)) + cell if cell else cell)
+        elif rest or not longest:
+            result.append(cell + digit * (longest - len(rest)))
+        else:
+            result.append(cell + point + digit * (longest - 1) if whole else cell)
+    return result
 
 
 def shown(cell: Cell) -> str:
@@ -121,9 +175,10 @@ def shown(cell: Cell) -> str:
 class Plot:
     """A figure: its name on the page, what it shows in words, and the function that makes it.
 
-    That returns a `Chart`, which the page shows with buttons to zoom it if `zoom`, or a `MovingArm`. Of
-    several figures of which a reader sees one at a time, `button` chooses it. The button stands in a `row`
-    and a `column`, where these are given; its `state` (`good`, `fair`, `bad`) gives the colour.
+    That returns a `Chart`, which the page shows with buttons to zoom it if `zoom`, or a
+    `MovingArm`. Of several figures of which a reader sees one at a time, `button` chooses it. The
+    button stands in a `row` and a `column`, where these are given; its `state` (`good`, `fair`,
+    `bad`) gives the colour.
     """
 
     name: str
@@ -138,10 +193,14 @@ class Plot:
 
 @record
 class Section:
-    """A heading with text, points to note, tables by file name, and figures; folded sections open on demand.
+    """A heading with text, points to note, tables by file name, and figures.
 
-    `steps` are findings that say what to do and what it would bring; their number `command` does it. `cards`
-    are small tables side by side.
+    Folded sections open on demand.
+
+    Of the figures `beside`, which a note explains, the one of the row of the chosen tab is shown. A
+    folded section says its `answer` beside its heading, and stands on paper if it is `printed`.
+    `steps` are findings that say what to do and what it would bring; their number `command` does
+    it. `cards` are small tables side by side.
     """
 
     title: str
@@ -151,16 +210,24 @@ class Section:
     cards: Mapping[str, Table] = field(default_factory=dict[str, Table])
     plots: tuple[Plot, ...] = ()
     tabs: tuple[Plot, ...] = ()
+    beside: tuple[Plot, ...] = ()
+    beside_note: str = ""
     steps: tuple[Finding, ...] = ()
     folded: bool = False
+    answer: str = ""
+    printed: bool = False
 
 
 @record
 class Page:
-    """A report: the answer in a sentence, `lead`, and its sections; its file has the `name`, and an ending.
+    """A report: the answer in a sentence, `lead`, and its sections.
 
-    `warnings` must be read before using the answer, and stand behind the first section; `versions` of the
-    software stand at the foot; `data` are further files by name, such as CSV for scripts.
+    Its file has the `name`, and an ending.
+
+    `warnings` must be read before using the answer, and stand behind the first section. What the
+    page was `made_from` and `versions` of the software stand at the foot. `data` are further files
+    by name, such as CSV for scripts; `files` are tables that stand in files alone, in place of
+    shorter ones of their names.
     """
 
     name: str
@@ -170,17 +237,22 @@ class Page:
     warnings: tuple[str, ...]
     versions: Mapping[str, str] = field(default_factory=dict[str, str])
     data: Mapping[str, str] = field(default_factory=dict[str, str])
+    files: Mapping[str, Table] = field(default_factory=dict[str, Table])
+    made_from: tuple[str, ...] = ()
 
     @property
     def plots(self) -> Iterator[Plot]:
         """All figures."""
         for section in self.sections:
-            yield from (*section.plots, *section.tabs)
+            yield from (*section.plots, *section.tabs, *section.beside)
 
     @property
     def tables(self) -> dict[str, Table]:
         """All tables by file name."""
-        return {name: table for s in self.sections for name, table in {**s.tables, **s.cards}.items()}
+        tables = dict[str, Table]()
+        for section in self.sections:
+            tables |= {**section.tables, **section.cards}
+        return tables | dict(self.files)
 
 
 def log_names(sources: Iterable[str]) -> dict[str, str]:
@@ -190,6 +262,8 @@ def log_names(sources: Iterable[str]) -> dict[str, str]:
 
 
 def short_name(name: str) -> str:
-    """Return a name with unprintable characters replaced and the middle of one over 40 letters left out."""
+    """Return a name with unprintable characters replaced and the middle of one over 40 letters left
+    out.
+    """
     text = "".join(c if c.isprintable() else "?" for c in name)
     return text if len(text) <= 40 else f"{text[:19]}…{text[-20:]}"

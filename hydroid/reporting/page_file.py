@@ -31,7 +31,8 @@ def write_page(page: Page, out: Path) -> Path:
 def write_tables(tables: Mapping[str, Table], out: Path, **more: str) -> Path:
     """Write tables as CSV, to tables/ in the folder `out`, and more files by name; return the last.
 
-    A table's name, which may hold a joint's, leads nowhere else: what is no letter or digit becomes `_`.
+    A table's name, which may hold a joint's, leads nowhere else: what is no letter or digit becomes
+    `_`.
     """
     content, taken = dict[str, str](), set[str]()
     for name, table in tables.items():
@@ -59,7 +60,10 @@ def write_figures(page: Page, out: Path) -> list[Path]:
 
 
 def plain(drawn: Any) -> Any:
-    """Return what JSON has of a drawing or a part of it: numbers have five digits; null is not finite."""
+    """Return what JSON has of a drawing or a part of it: numbers have five digits.
+
+    Null is not finite.
+    """
     match drawn:
         case Chart():
             return vars(drawn.thinned())

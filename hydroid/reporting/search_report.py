@@ -1,5 +1,6 @@
 """How the search went: its learning curve, the Pareto set, and what each refinement took."""
 
+from collections.abc import Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -7,42 +8,76 @@ import numpy as np
 from hydroid.arrays import Array
 from hydroid.reporting.chart import SERIES, Chart, Mark, Panel, finite
 from hydroid.reporting.page import Plot, Section
-from hydroid.run.record import Record
+from hydroid.run.record import Effort, Record
 from hydroid.settings.problem import ObjectiveSettings
 from hydroid.words import two_digits
 
 
 def search_section(record: Record) -> Section:
-    """Return the section of a run's search, folded."""
-    result, objective, points = record.result, record.settings.objective, list[str]()
+    """Return the section of a run's search, folded.
+
+    Only a search over generations has curves of it.
+    """
+    result = record.result
+    objective = record.settings.objective
+    points = list[str]()
     if len(result.history):
         _, tried, simulated, diverged = (f"{int(v):,}" for v in result.history[-1, :4])
         name = record.settings.search.algorithm
         points.append(f"{name}: {tried} candidates, {simulated} simulated, {diverged} of them diverged.")
-    for one in result.refinements:
-        points.append(
-            f"{one.name}: {one.iterations} iterations, {one.simulations:,} simulations; {one.ending}."
-        )
-        rise, error = record.summary.estimates[one.name].gained or (None, None)
-        if rise is not None and error is not None:
-            better = f"by {two_digits(rise)} ± {two_digits(error)}"
-            points[-1] += f" It foretells parts of the logs left out better {better} (log-likelihood)."
-    final = str(record.summary.final)
-    segments = {final: result.segments[final], **result.segments}
-    plots = (
-        Plot("learning", "Best candidate so far.", partial(learning, result.history, objective)),
-        Plot(
-            "pareto",
-            "The Pareto set: lower fits that segment better.",
-            partial(pareto, result.front[1], segments, objective),
-        ),
-    )
-    return Section("How the search went", points=tuple(points), plots=plots, folded=True)
+    points += [_refined(record, one) for one in result.refinements]
+    plots = list[Plot]()
+    if len(result.history) > 1:
+        final = str(record.summary.final)
+        segments = {final: result.segments[final], **result.segments}
+        shown = partial(learning, result.history, objective)
+        plots.append(Plot("learning", "Best candidate so far.", shown))
+        front = partial(pareto, result.front[1], segments, objective)
+        plots.append(Plot("pareto", "The Pareto set: lower fits that segment better.", front))
+    if any(len(costs) > 1 for costs in result.starts.values()):
+        caption = "Where least squares ended from each start: starts at 0 found the best optimum."
+        drawing = partial(starts, record.settings.arm.joint_names, result.starts)
+        plots.append(Plot("starts", caption, drawing))
+    efforts = sum(one.simulations for one in result.refinements)
+    answer = f"{efforts:,} simulations of the refinement" if efforts else ""
+    title = "How the search went"
+    return Section(title, points=tuple(points), plots=tuple(plots), folded=True, answer=answer)
+
+
+def _refined(record: Record, one: Effort) -> str:
+    """Say what a refinement took, and what it brought."""
+    said = f"{one.name}: {one.iterations} iterations, {one.simulations:,} simulations; {one.ending}."
+    rise, error = record.summary.estimates[one.name].gained or (None, None)
+    if rise is None or error is None:
+        return said
+    better = f"by {two_digits(rise)} ± {two_digits(error)}"
+    return f"{said} It foretells parts of the logs left out better {better} (log-likelihood)."
+
+
+def starts(names: Sequence[str], costs: Mapping[int, Sequence[float]]) -> Chart:
+    """Draw how far above the best optimum each start ended, by joint (from 1.
+
+    0: all joints together).
+    """
+    rows = list[str]()
+    x = list[float]()
+    y = list[float]()
+    for joint, ended in costs.items():
+        finite_ones = [cost for cost in ended if np.isfinite(cost)]
+        if not finite_ones:
+            continue
+        x += [cost - min(finite_ones) for cost in finite_ones]
+        y += [float(len(rows))] * len(finite_ones)
+        rows.append(names[joint - 1] if joint else "all joints")
+    marks = (Mark("points", np.array(x), np.array(y), color="blue", width=8, alpha=0.6),)
+    label = "negative log-likelihood above the best start's"
+    return Chart((Panel(label, "", marks, height=80 + 30 * len(rows), rows=tuple(rows)),))
 
 
 def learning(history: Array, objective: ObjectiveSettings) -> Chart:
     """Draw the best objective so far and the population's median against evaluations."""
-    tried, (best, median) = history[:, 1], _shown(objective, history[:, 4:6].T)
+    tried = history[:, 1]
+    best, median = _shown(objective, history[:, 4:6].T)
     return _chart(
         "candidates evaluated",
         objective,
@@ -53,9 +88,11 @@ def learning(history: Array, objective: ObjectiveSettings) -> Chart:
 
 
 def pareto(objectives: Array, estimates: dict[str, Array], objective: ObjectiveSettings) -> Chart:
-    """Draw each candidate of the Pareto set, and the estimates, as a line over the segments' objectives.
+    """Draw each candidate of the Pareto set, and the estimates, as a line over the segments'
+    objectives.
 
-    `objectives`, shape (n, S + 1), end with that over the whole record; the 100 lowest there are drawn.
+    `objectives`, shape (n, S + 1), end with that over the whole record; the 100 lowest there are
+    drawn.
     """
     front = _shown(objective, objectives[np.argsort(objectives[:, -1], kind="stable")[:100], :-1])
     at = np.arange(1.0, front.shape[1] + 1)

@@ -2,6 +2,7 @@
 
 import shlex
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,18 +17,21 @@ from hydroid.joint_verdict import Comparison, JointVerdict, Verdict
 from hydroid.reporting.page import Cell, Given, Section, Table, short_name
 from hydroid.search.descent import Ending
 from hydroid.settings.arm import Arm
+from hydroid.settings.log import log_file
 from hydroid.words import listed, told_apart, two_digits
 
+_RIVALS = (
+    "Simple models are: standing still; speed tables, the mean speed at each command; and nine numbers a "
+    "joint, which are dead band, exponent, top speed and lag of each direction, and one delay."
+)
 _FITTED = (
-    "rms errors in deg on the fitted logs: no unseen log tests the fit. Last three columns: simple models."
+    "Rms errors{unit} on the fitted logs: no unseen log, one that was not fitted, tests the fit yet. Last "
+    "three columns: simple models."
 )
 _TESTED = (
-    "rms errors in deg (unseen logs: {count}) of the change over 1, 5 and 10 s, and over whole logs. In "
-    "brackets: the best simple model, than which the fit is better, worse, or from which it cannot be told."
-)
-_RIVALS = (
-    "Beside the fit stand simple models: no motion, mean speeds by command, and nine numbers (dead band, "
-    "exponent, speed, lag)."
+    "Rms errors{unit} on {count} unseen log{s} (not fitted): of the change over 1, 5 and 10 s, and over "
+    "whole logs. In brackets: the best simple model, than which the fit is better, worse, or from which it "
+    "cannot be told."
 )
 WHOLE = "whole logs"
 """name of a column"""
@@ -42,15 +46,20 @@ def verdict_table(fits: Verdicts) -> Table:
 
     Where unseen logs test a joint, its errors stand beside those of the best simple model there.
     """
-    count = max(one.unseen_logs for verdicts in fits.values() for one in verdicts)
+    every = [one for verdicts in fits.values() for one in verdicts]
+    count = max(one.unseen_logs for one in every)
+    slides = any(one.slides for one in every)
+    unit = "" if slides else " [deg]"
     if count:
         names = ("joint", "verdict", *map(column_of, JUDGED), WHOLE, "fitted")
         optional = ("fitted", column_of(JUDGED[1]), WHOLE)
-        note = _TESTED.format(count=count)
+        note = _TESTED.format(unit=unit, count=count, s="s" if count > 1 else "")
     else:
         names = ("joint", "verdict", "fitted", *NAMES)
         optional = NAMES[:2]
-        note = _FITTED
+        note = _FITTED.format(unit=unit)
+    if slides:
+        names = (*names[:2], "unit", *names[2:])
     if len(fits) > 1:
         names = ("fit", *names)
     rows = [
@@ -71,6 +80,7 @@ def _row(one: JointVerdict, *, tested: bool) -> dict[str, Cell]:
     row: dict[str, Cell] = {
         "joint": one.name,
         "verdict": f"{one.verdict.sign} {one.text}",
+        "unit": "mm" if one.slides else "deg",
         "fitted": _shown(one.fitted_deg, one.slides),
     }
     if not tested:
@@ -95,26 +105,27 @@ def _beside_best(
 ) -> str | None:
     """Return the fit's error beside that of the best simple model, as "2.1 (2.3) cannot be told".
 
-    Nothing where the logs are too short for the prediction time; no word of fewer than `least` blocks.
+    Nothing where the logs are too short for the prediction time; no word of fewer than `least`
+    blocks.
     """
     simple = {name: error for name, error in errors.items() if name in compared and error is not None}
     if not simple:
         return None
     best = min(simple, key=simple.__getitem__)
-    fit, scale, unit = errors[THE_FIT], 1.0, ""
-    if slides:
-        scale, unit = 1e3 * np.radians(1.0), " mm"
+    fit = errors[THE_FIT]
+    scale = 1e3 * np.radians(1.0) if slides else 1.0
     if fit is None:
-        return f"diverged ({two_digits(scale * simple[best])}{unit})"
+        return f"diverged ({two_digits(scale * simple[best])})"
     ours, theirs = told_apart(scale * fit, scale * simple[best])
     word = f" {compared[best].outcome}" if compared[best].blocks >= least else ""
-    return f"{ours}{unit} ({theirs}){word}"
+    return f"{ours} ({theirs}){word}"
 
 
 def _shown(error: float | None, slides: bool) -> Cell:
+    """Return an error [deg] as a table shows it, of a joint that slides in mm."""
     if error is None:
         return None
-    return f"{two_digits(1e3 * np.radians(error))} mm" if slides else Given(two_digits(error))
+    return Given(two_digits(1e3 * np.radians(error) if slides else error))
 
 
 def left_out_table(
@@ -129,13 +140,18 @@ def left_out_table(
         for name, error in row.get("left_out_deg", {}).items():
             key = f"left_out_deg.{name}"
             keys[key] = name
-            cells[-1][key] = _shown(error, name in slides)
+            shown = _shown(error, name in slides)
+            cells[-1][key] = shown if shown is None or name not in slides else f"{shown:g} mm"
     return Table.of(title, columns | keys, cells, note + _LEFT_OUT)
 
 
 def verdict_sections(fits: Verdicts, *steps: Finding) -> tuple[Section, ...]:
-    """Return the sections that every page of predictions begins with: the verdicts, and what to do next."""
-    verdict = Section("Verdict", _RIVALS, tables={"verdict": verdict_table(fits)})
+    """Return the sections that every page of predictions begins with: the verdicts, and what to do
+    next.
+    """
+    table = verdict_table(fits)
+    table = replace(table, note=f"{table.note} {_RIVALS}")
+    verdict = Section("Verdict", tables={"verdict": table})
     return (verdict, Section("Next", steps=steps)) if steps else (verdict,)
 
 
@@ -147,23 +163,29 @@ def horizon_section(fits: Verdicts) -> Section | None:
             whole = {THE_FIT: one.unseen_deg} | one.baselines_deg
             for name, errors in one.horizons_deg.items():
                 of = short_name(fit) if name == THE_FIT and len(fits) > 1 else name
-                row: dict[str, Cell] = {"joint": one.name, "of": of}
+                unit = "mm" if one.slides else "deg"
+                row: dict[str, Cell] = {"joint": one.name, "of": of, "unit": unit}
                 for seconds, error in zip(HORIZONS, errors, strict=True):
                     row[column_of(seconds)] = _shown(error, one.slides)
-                rows.append(row | {WHOLE: _shown(whole[name], one.slides)})
-    names = ("joint", "of", *map(column_of, HORIZONS), WHOLE)
+                row[WHOLE] = _shown(whole[name], one.slides)
+                if row not in rows:  # the simple models of fits to the same logs are the same
+                    rows.append(row)
+    names = ("joint", "of", "unit", *map(column_of, HORIZONS), WHOLE)
     columns = {name: name for name in names}
     note = (
-        "rms error [deg] of how far the angle turns in this time, from starts every 2 s of the unseen logs. "
-        "Each is simulated from 2 s before, at the measured angles. Last column: of the angle, over whole "
-        "logs."
+        "Rms error of how far the joint moves in this time, from starts every 2 s of the unseen logs. Each "
+        "is simulated from 2 s before, at the measured angles. Last column: of the angle, over whole logs."
     )
     table = Table.of("Error by prediction time", columns, rows, note)
-    return Section(table.title, tables={"horizons": table}, folded=True) if rows else None
+    if not rows:
+        return None
+    answer = f"the fit beside simple models over {HORIZONS[0]:g} to {HORIZONS[-1]:g} s"
+    return Section(table.title, tables={"horizons": table}, folded=True, answer=answer)
 
 
 def ordered(fits: Verdicts) -> Verdicts:
-    """Return the fits, the smallest errors first: in parts of the tolerances of the joints that all compare.
+    """Return the fits, the smallest errors first: in parts of the tolerances of the joints that all
+    compare.
 
     Where there is no such joint, each fit counts by the mean of its own ones.
     """
@@ -176,19 +198,26 @@ def ordered(fits: Verdicts) -> Verdicts:
 
 
 def _error(one: JointVerdict) -> float:
-    """Return the error on the unseen logs, or of a joint that they do not test on the fitted ones [deg]."""
+    """Return the error on the unseen logs, or of a joint that they do not test on the fitted ones
+    [deg].
+    """
     error = one.unseen_deg if one.unseen_logs else one.fitted_deg
     return np.inf if error is None else error  # it diverged
 
 
 def _size(one: JointVerdict) -> float:
-    """Return the error in parts of the tolerance; 0 of a joint that no log drives, which has none."""
+    """Return the error in parts of the tolerance.
+
+    0 of a joint that no log drives, which has none.
+    """
     driven = one.unseen_logs or one.fitted_deg is not None or one.verdict is not Verdict.UNTESTED
     return _error(one) / one.tolerance_deg if driven else 0.0
 
 
 def verdict_lines(fits: Verdicts) -> list[Table | str]:
-    """Return the verdicts as a terminal shows them: the table, and what is worst about the first fit."""
+    """Return the verdicts as a terminal shows them: the table, and what is worst about the first
+    fit.
+    """
     first = next(iter(fits.values()))
     return [verdict_table(fits), *filter(None, [worst(first)]), *outside(first)]
 
@@ -199,7 +228,9 @@ def next_lines(step: Finding) -> tuple[str, str]:
 
 
 def lead(fits: Verdicts) -> str:
-    """Say of the first of the fits which joints it predicts, what is wrong with the others, and the worst."""
+    """Say of the first of the fits which joints it predicts, what is wrong with the others, and the
+    worst.
+    """
     name, verdicts = next(iter(fits.items()))
     of = f"{short_name(name)} is best. " if len(fits) > 1 else ""
     by_word: dict[str, list[str]] = {}
@@ -212,7 +243,10 @@ def lead(fits: Verdicts) -> str:
 
 
 def outside(verdicts: Sequence[JointVerdict]) -> tuple[str, ...]:
-    """Say of which joints the prediction bands are too narrow; nothing where all hold their samples."""
+    """Say of which joints the prediction bands are too narrow.
+
+    Nothing where all hold their samples.
+    """
     # a right model's hold somewhat less than 95 % where the start of a log is off
     missed = [
         f"{part:.0f} % of the {one.name}'s"
@@ -243,7 +277,8 @@ def next_step(
     summary: FitSummary, verdicts: Sequence[JointVerdict], folder: str, fitted: Sequence[Prediction]
 ) -> Finding:
     """Return what to do after a fit in a run folder, which made `fitted` of its logs, with the command."""
-    run, files = shlex.quote(folder), shlex.join(one.log.source for one in fitted)
+    run = shlex.quote(folder)
+    files = shlex.join(dict.fromkeys(str(log_file(one.log.source)) for one in fitted))
     joints = [one.name for one in verdicts if one.verdict is Verdict.UNTESTED]
     if summary.ending == Ending.TIME.value:
         command = f"hydroid fit-{summary.stage} {files} --config {run}/config.yaml --out {run} --resume"
@@ -269,7 +304,10 @@ def next_step(
 
 
 def _too_short(verdicts: Sequence[JointVerdict]) -> list[str]:
-    """Return the joints whose unseen logs are too short to tell; none where any joint is known to fail."""
+    """Return the joints whose unseen logs are too short to tell.
+
+    None where any joint is known to fail.
+    """
     if any(one.verdict.fails for one in verdicts):
         return []
     untold = [one for one in verdicts if one.verdict is Verdict.UNTOLD]

@@ -1,4 +1,5 @@
-"""What a run stores as npz without pickle: trees of dataclasses, mappings and arrays, and its checkpoints.
+"""What a run stores as npz without pickle: trees of dataclasses, mappings and arrays,
+and its checkpoints.
 
 Every file is checked before it is believed.
 """
@@ -35,16 +36,20 @@ def pack(tree: object, *, compressed: bool = True) -> bytes:
     def plain(value: Any) -> Any:
         """Return what JSON takes in place of a value that it does not know."""
         if isinstance(value, np.ndarray):
-            arrays[name := f"a{len(arrays)}"] = value
+            name = f"a{len(arrays)}"
+            arrays[name] = value
             return {"array": name}
         if is_dataclass(value):
             return {field.name: getattr(value, field.name) for field in fields(value)}
         return dict(value) if isinstance(value, Mapping) else value.item()
 
-    content = np.frombuffer(json.dumps(tree, default=plain).encode(), dtype=np.uint8)
-    buffer, save = io.BytesIO(), np.savez_compressed if compressed else np.savez
+    text = json.dumps(tree, default=plain)
+    content = np.frombuffer(text.encode(), dtype=np.uint8)
+    buffer = io.BytesIO()
+    save = np.savez_compressed if compressed else np.savez
     save(buffer, content=content, **arrays)  # pyright: ignore[reportArgumentType]
-    return buffer.getvalue() + hashlib.sha256(buffer.getvalue()).digest()
+    packed = buffer.getvalue()
+    return packed + hashlib.sha256(packed).digest()
 
 
 def unpack(file: Path) -> Any:
@@ -54,7 +59,8 @@ def unpack(file: Path) -> Any:
     more than LARGEST.
     """
     packed = read_file(file)
-    data, digest = packed[:-32], packed[-32:]
+    data = packed[:-32]
+    digest = packed[-32:]
     if hashlib.sha256(data).digest() != digest:
         raise ValueError("checksum")
     try:
@@ -69,7 +75,8 @@ def unpack(file: Path) -> Any:
 
 
 def _arrays(data: bytes) -> dict[str, np.ndarray]:
-    """Return the arrays of an npz by name: numbers only, and none larger than the bytes that it has.
+    """Return the arrays of an npz by name: numbers only,
+    and none larger than the bytes that it has.
 
     `np.load` makes room for what an array's header says before it looks at its bytes.
     """
@@ -92,17 +99,19 @@ def _arrays(data: bytes) -> dict[str, np.ndarray]:
 
 
 class CheckpointFile(UserDict[str, Arrays]):
-    """Checkpoints by name; every change is written to one file, which is made with the first of a run's id.
+    """Checkpoints by name; every change is written to one file,
+    which is made with the first of a run's id.
 
-    The file before it is kept as `checkpoint.previous.npz`. Where the newest one is damaged, it is put aside
-    as `checkpoint.damaged.npz` with a warning, and the one before it is taken: what the run did since is done
-    again, to the same bits. Raises RunError: none is whole, or it is that of another run; on a change, it
-    cannot be written, and both files are as they were.
+    The file before it is kept as `checkpoint.previous.npz`. Where the newest one is damaged, it is
+    put aside as `checkpoint.damaged.npz` with a warning, and the one before it is taken: what the
+    run did since is done again, to the same bits. Raises RunError: none is whole, or it is that of
+    another run; on a change, it cannot be written, and both files are as they were.
     """
 
     def __init__(self, file: Path, run: str) -> None:
         super().__init__()
-        self._file, self._run = file, run
+        self._file = file
+        self._run = run
         self._previous = file.with_suffix(f".previous{file.suffix}")
         present = [path for path in (file, self._previous) if path.exists()]
         if present:
@@ -136,7 +145,11 @@ class CheckpointFile(UserDict[str, Arrays]):
 
 def _are_parts(parts: Any) -> bool:
     """Return whether what a file holds are arrays by name, by part of a fit."""
-    return isinstance(parts, dict) and all(
-        isinstance(arrays, dict) and all(isinstance(one, np.ndarray) for one in arrays.values())
-        for arrays in parts.values()
-    )
+    return isinstance(parts, dict) and all(map(_are_arrays, parts.values()))
+
+
+def _are_arrays(arrays: Any) -> bool:
+    """Return whether a value is arrays by name."""
+    if not isinstance(arrays, dict):
+        return False
+    return all(isinstance(array, np.ndarray) for array in arrays.values())

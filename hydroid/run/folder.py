@@ -30,6 +30,7 @@ from hydroid.run.archive import CheckpointFile
 from hydroid.run.process import LOCK, locked, run_log
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
+from hydroid.settings.log import log_file
 from hydroid.words import numbered
 
 VERSIONS = {name: version(name) for name in ("hydroid", "mujoco", "numpy")}
@@ -49,11 +50,16 @@ def identity(settings: FitSettings, logs: Sequence[Log]) -> Plain:
 
 
 def deciding(settings: FitSettings) -> Plain:
-    """Return the settings that decide a result, the arm's too: no threads, unused searches, or paths."""
-    values, search = portable(settings), settings.search.algorithm
+    """Return the settings that decide a result, the arm's too: no threads, unused searches,
+    or paths."""
+    values = portable(settings)
     del values["simulation"]["threads"]
-    values["search"] = {n: v for n, v in values["search"].items() if n == search or not isinstance(v, dict)}
-    return values | {"arm": settings.arm.model_dump(mode="json", exclude={"model", "pair"})}
+    used = settings.search.algorithm
+    values["search"] = {
+        name: value for name, value in values["search"].items() if name == used or not isinstance(value, dict)
+    }
+    arm = settings.arm.model_dump(mode="json", exclude={"model", "pair"})
+    return values | {"arm": arm}
 
 
 def difference(run: Mapping[str, Any], other: Mapping[str, Any], but: str = "") -> str:
@@ -64,14 +70,20 @@ def difference(run: Mapping[str, Any], other: Mapping[str, Any], but: str = "") 
     for key in ("hydroid", "mujoco"):
         if run.get(key) != other.get(key):
             return f"was made by {key} {run.get(key)}, not {other.get(key)}"
-    logs, others = run.get("logs", {}), other.get("logs", {})
-    if [*logs.values()] != [*others.values()]:  # the files may have moved
-        return f"has other logs, or others' contents: {', '.join(logs)}, not {', '.join(others)}"
-    one, two = _flat(run.get("settings")), _flat(other.get("settings"))
-    for key in sorted(one.keys() | two.keys()):
-        if one.get(key) != two.get(key) and key != but:
-            return f"has {key} = {one.get(key)}, not {two.get(key)}"
-    return "" if run.get("origin") == other.get("origin") else "has another model of the arm"
+    logs = run.get("logs", {})
+    other_logs = other.get("logs", {})
+    # the files may have moved
+    if [*logs.values()] != [*other_logs.values()]:
+        names = ", ".join(logs)
+        return f"has other logs, or others' contents: {names}, not {', '.join(other_logs)}"
+    settings = _flat(run.get("settings"))
+    other_settings = _flat(other.get("settings"))
+    for key in sorted(settings.keys() | other_settings.keys()):
+        if settings.get(key) != other_settings.get(key) and key != but:
+            return f"has {key} = {settings.get(key)}, not {other_settings.get(key)}"
+    if run.get("origin") != other.get("origin"):
+        return "has another model of the arm"
+    return ""
 
 
 def model_hash(arm: Arm) -> str:
@@ -86,7 +98,7 @@ def log_hash(log: Log, settings: FitSettings) -> str:
 
     A file that was moved or saved again is the same log, and one that was repaired is another.
     """
-    name = Path(log.source).name
+    name = log_file(log.source).name
     named = repr((settings.payloads.get(name), settings.log.group_of(name)))
     return hashlib.sha256(samples(log) + named.encode()).hexdigest()
 
@@ -94,7 +106,7 @@ def log_hash(log: Log, settings: FitSettings) -> str:
 def samples(log: Log) -> bytes:
     """Return the digest of a log's samples, wherever they are from."""
     content = hashlib.sha256(repr((log.period, log.rest, log.angle.shape)).encode())
-    for signal in (log.time, log.command, log.angle, log.pressure):
+    for signal in (log.time, log.command, log.angle, log.pressure, log.recorded):
         content.update(b"" if signal is None else signal.tobytes())
     return content.digest()
 
@@ -110,10 +122,13 @@ def _names(values: Any) -> bool:
 
 
 def _flat(values: Any, prefix: str = "") -> Plain:
+    """Return the values of nested mappings by dotted key."""
     if not isinstance(values, dict):
         return {prefix: values}
-    inner = (_flat(value, f"{prefix}.{key}".lstrip(".")) for key, value in values.items())
-    return {key: value for flat in inner for key, value in flat.items()}
+    flat: Plain = {}
+    for key, value in values.items():
+        flat |= _flat(value, f"{prefix}.{key}".lstrip("."))
+    return flat
 
 
 @record
@@ -129,13 +144,13 @@ class RunFolder:
 
     @contextmanager
     def owned(self) -> Generator[None]:
-        """Hold the folder against other processes, and write the `hydroid` logger's lines to `run.log`."""
-        # it is the run's if it is empty, or holds a run's description or at least its lock
-        other = os.path.exists(self.path) and not (self.exists or (self.path / LOCK).exists())
-        if other and (not self.path.is_dir() or any(self.path.iterdir())):
+        """Hold the folder against other processes,
+        and write the `hydroid` logger's lines to `run.log`."""
+        if self._is_of_others():
             raise RunError("exists and holds no run", self.path, "choose another folder with --out")
         with locked(self.path), run_log(self.path / "run.log"):
-            for part in self.path.rglob(f".*{PART}"):  # nobody else writes here
+            # nobody else writes here
+            for part in self.path.rglob(f".*{PART}"):
                 LOGGER.info("removed %s, left by a process that was killed while it wrote", part.name)
                 part.unlink(missing_ok=True)
             try:
@@ -148,17 +163,30 @@ class RunFolder:
                 raise
             LOGGER.info("done")
 
+    def _is_of_others(self) -> bool:
+        """Return whether the folder holds something else.
+
+        It is the run's if it is empty, or holds a run's description or at least its lock.
+        """
+        if not os.path.exists(self.path):
+            return False
+        if self.exists or (self.path / LOCK).exists():
+            return False
+        return not self.path.is_dir() or any(self.path.iterdir())
+
     def begin(self, settings: FitSettings, logs: Sequence[Log]) -> CheckpointFile:
         """Describe a new run, or check that the run here is the same; return its checkpoints."""
-        own = identity(settings, logs)
+        wanted = identity(settings, logs)
         if not self.exists:
             write_settings(self.path, settings)
-            self._describe(own | {"files": own_hashes(self.path), "status": "running"})
+            self._describe(wanted | {"files": own_hashes(self.path), "status": "running"})
             return self.checkpoints()
         self.refuse_changes()
-        if (self.path / MODEL).samefile(settings.arm.model):  # its own copy, to the last bit
-            own["origin"] = self.identity().get("origin")
-        if other := difference(self.identity(), own):
+        # its own copy, to the last bit
+        if (self.path / MODEL).samefile(settings.arm.model):
+            wanted["origin"] = self.identity().get("origin")
+        other = difference(self.identity(), wanted)
+        if other:
             hint = "continue it with the command that began it, or choose another folder"
             raise RunError(f"the run here {other}", self.path, hint)
         checkpoints = self.checkpoints()
@@ -169,8 +197,8 @@ class RunFolder:
     def refuse_changes(self) -> None:
         """Refuse a run whose settings or model were changed since it began."""
         hashes = own_hashes(self.path)
-        for name, known in self.identity().get("files", {}).items():
-            if hashes.get(name) != known:
+        for name, stored in self.identity().get("files", {}).items():
+            if hashes.get(name) != stored:
                 hint = "put it back as it was, or choose another folder"
                 raise RunError("has changed since the run began", self.path / name, hint)
 
@@ -180,16 +208,21 @@ class RunFolder:
         try:
             content = json.loads(read_file(file))
         except (OSError, ValueError, RecursionError) as error:
-            what = f"cannot be read as a run ({getattr(error, 'strerror', None) or 'it is damaged'})"
-            raise RunError(what, file, "name a folder that a fit has made") from None
-        if not (isinstance(content, dict) and all(_names(content.get(key, {})) for key in ("logs", "files"))):
+            why = getattr(error, "strerror", None) or "it is damaged"
+            hint = "name a folder that a fit has made"
+            raise RunError(f"cannot be read as a run ({why})", file, hint) from None
+        if not isinstance(content, dict):
+            raise RunError("is not a run's description", file)
+        if not all(_names(content.get(key, {})) for key in ("logs", "files")):
             raise RunError("is not a run's description", file)
         return content
 
     def write_estimate(self, model: IdentifiedModel, log: Log) -> None:
-        """Write `estimate.yaml` of a fit's model, and the fitted arm in `model/` as it began a log."""
+        """Write `estimate.yaml` of a fit's model,
+        and the fitted arm in `model/` as it began a log."""
         write_estimate(self.path, model.summarise())
-        plant = Plant(model, payload=model.settings.payloads.get(Path(log.source).name, 0.0))
+        payload = model.settings.payloads.get(log_file(log.source).name, 0.0)
+        plant = Plant(model, payload=payload)
         plant.reset(log.start)
         plant.export(self.path / "model")
 
@@ -200,7 +233,8 @@ class RunFolder:
         self._describe(self.identity() | {"status": word} | more)
 
     def interrupt(self) -> str:
-        """Record the status `interrupted`, and return what is kept, empty where nothing was written."""
+        """Record the status `interrupted`, and return what is kept,
+        empty where nothing was written."""
         if not self.exists:
             return ""
         self.status("interrupted")
@@ -209,10 +243,11 @@ class RunFolder:
 
     def checkpoints(self) -> CheckpointFile:
         """Return what the run's search and refinements have stored, by name."""
-        # what does not change while the run goes on
-        course = ("status", "seconds", "estimate")
-        fixed = {key: value for key, value in self.identity().items() if key not in course}
-        return CheckpointFile(self.path / "checkpoint.npz", digest(fixed))
+        # checkpoints belong to a run by what does not change while it goes on
+        lasting = self.identity()
+        for key in ("status", "seconds", "estimate", "finished"):
+            lasting.pop(key, None)
+        return CheckpointFile(self.path / "checkpoint.npz", digest(lasting))
 
     def _describe(self, content: Plain) -> None:
         write_atomic(self.path / DESCRIPTION, json.dumps(content, indent=2) + "\n")

@@ -12,7 +12,7 @@ import math
 import os
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import field, replace
 from functools import cache, cached_property
 from itertools import pairwise
 from pathlib import Path
@@ -34,10 +34,15 @@ from hydroid.progress import LOGGER
 from hydroid.run.archive import pack, unpack
 from hydroid.run.folder import RunFolder, difference, samples
 from hydroid.settings.fit import FitSettings
+from hydroid.settings.log import log_file
 from hydroid.words import numbered
 
-RESULT, VALIDATIONS = "result.npz", "validations"
-"""names of the file of arrays, and of the folder of unseen logs"""
+RESULT = "result.npz"
+"""name of the file of arrays"""
+EARLIER = "earlier.npz"
+"""name of the file of the logs of earlier fits"""
+VALIDATIONS = "validations"
+"""name of the folder of unseen logs"""
 LONGEST_NAME = 60
 """characters of a log's name in that of its validation; file systems take 255 bytes"""
 
@@ -55,11 +60,18 @@ class Effort:
 
 
 @record
-class FitResult:
-    """The arrays of a fit: what its estimates make of its logs, and how they came to be.
+class FitRecord:
+    """What a finished fit is, beside its summary: the same in memory and in a run's `result.npz`.
 
-    The history has shape (G, len(HISTORY)); the front is non-dominated candidates, (n, P), with objectives by
-    segment and overall, (n, S + 1); segments are objectives of each estimate by segment, (S,).
+    Attributes:
+        fitted: what its final estimate makes of its logs.
+        history: of the search, shape (G, len(HISTORY)).
+        front: non-dominated candidates, (n, P), and their objectives by segment and overall,
+            (n, S + 1).
+        segments: objectives of each estimate by segment, (S,), by its name.
+        refinements: what each took.
+        baselines: simple models fitted to the same logs, by joint and name.
+        starts: costs at which the starts of least squares ended, by joint (0: all joints together).
     """
 
     fitted: tuple[Prediction, ...]
@@ -68,11 +80,13 @@ class FitResult:
     segments: Mapping[str, Array]
     refinements: tuple[Effort, ...]
     baselines: Baselines
+    starts: Mapping[int, tuple[float, ...]] = field(default_factory=dict[int, tuple[float, ...]])
 
 
 @record
 class Record:
-    """A finished run: its folder, as a command takes it, versions and hashes of its logs, what it found.
+    """A finished run: its folder, as a command takes it, the versions and the hashes of its logs,
+    and what it has found.
 
     After a joint refinement every parameter that was refined is free in the settings.
     """
@@ -81,12 +95,12 @@ class Record:
     identity: Mapping[str, Any]
     settings: FitSettings
     summary: FitSummary
-    result: FitResult
+    result: FitRecord
     validations: Mapping[str, Prediction]
 
     @property
     def seed(self) -> int:
-        """Of the search."""
+        """Seed of the search."""
         return self.settings.search.seed
 
     @property
@@ -96,60 +110,106 @@ class Record:
 
     @cached_property
     def verdict(self) -> tuple[JointVerdict, ...]:
-        """By its logs and the unseen ones."""
-        return judge(self.settings, self.result.fitted, self.result.baselines, [*self.validations.values()])
+        """The verdict on each joint, by the fitted logs and the unseen ones."""
+        unseen = [*self.validations.values()]
+        return judge(self.settings, self.result.fitted, self.result.baselines, unseen)
 
 
-def fit_result(fit: Fit, fitted: tuple[Prediction, ...], baselines: Baselines) -> FitResult:
-    """Return what a run stores beside its summary."""
-    return FitResult(
-        fitted,
-        fit.history,
-        fit.front,
-        {name: estimate.segments for name, estimate in fit.estimates.items()},
-        tuple(Effort(n, r.iterations, r.evaluations, r.ending.value) for n, r in fit.refinements.items()),
-        baselines,
+def fit_record(fit: Fit, fitted: tuple[Prediction, ...], baselines: Baselines) -> FitRecord:
+    """Return the record of a fit, with what it makes of its logs and the baselines of these."""
+    efforts = [
+        Effort(name, refinement.iterations, refinement.evaluations, refinement.ending.value)
+        for name, refinement in fit.refinements.items()
+    ]
+    return FitRecord(
+        fitted=fitted,
+        history=fit.history,
+        front=fit.front,
+        segments={name: estimate.segments for name, estimate in fit.estimates.items()},
+        refinements=tuple(efforts),
+        baselines=baselines,
+        starts={joint: tuple(costs) for joint, costs in fit.ends.items()},
     )
+
+
+def write_record(folder: Path, fit: FitRecord) -> None:
+    """Write the record of a fit to its run folder."""
+    write_atomic(folder / RESULT, pack(fit))
 
 
 def run_of(model: IdentifiedModel) -> Path | None:
     """Return the folder of the finished run that a model is from."""
     file = Path(model.source)
-    return file.parent if file.name == NAME and (file.parent / RESULT).is_file() else None
+    is_finished = file.name == NAME and (file.parent / RESULT).is_file()
+    return file.parent if is_finished else None
 
 
 def keep_validation(model: IdentifiedModel, predictions: Sequence[Prediction]) -> Path | None:
     """Store predictions of unseen logs in the run that a model is from; return it.
 
-    Nothing is stored of a model that is from no run, or whose settings are not the run's. What was stored of
-    the same file before is replaced.
+    Nothing is stored of a model that is from no run, or whose settings are not the run's. What was
+    stored of the same file before is replaced.
     """
-    folder, unseen = run_of(model), [p for p in predictions if p.unseen]
-    if folder is None or not unseen or read_identified(folder).settings != model.settings:
+    folder = run_of(model)
+    unseen = [prediction for prediction in predictions if prediction.unseen]
+    if folder is None or not unseen:
         return None
-    for one in unseen:
-        write_atomic(folder / VALIDATIONS / validation_name(one.log) / RESULT, pack(one))
+    # with other settings, such as by --set, it is another model than the run's
+    if read_identified(folder).settings != model.settings:
+        return None
+    for prediction in unseen:
+        name = validation_name(prediction.log)
+        write_atomic(folder / VALIDATIONS / name / RESULT, pack(prediction))
     return folder
 
 
 def validation_name(log: Log) -> str:
-    """Return the name of a log's folder among the validations: its file's, and a digest of the file's place.
+    """Return the name of a log's folder among the validations: its file's,
+    and a digest of the file's place.
 
-    Of a log that is no file the digest is that of its samples.
+    Of a log that is no file the digest is that of its samples. A part of a file has its number in
+    both.
     """
-    there = os.path.exists(log.source)
-    place = Path(os.path.realpath(log.source)) if there else Path(log.source)
-    key = os.fsencode(place) if there else samples(log)
+    file = log_file(log.source)
+    # a name may be longer than Path allows
+    if os.path.exists(file):
+        number = Path(log.source).name[len(file.name) :]
+        place = Path(os.path.realpath(file) + number)
+        key = os.fsencode(place)
+    else:
+        place = Path(log.source)
+        key = samples(log)
     name = re.sub(r"[^\w.-]+", "_", place.name).strip(".")[:LONGEST_NAME]
     return f"{name or 'log'}-{hashlib.sha256(key).hexdigest()[:8]}"
 
 
-def fitted_by(model: IdentifiedModel) -> tuple[Sequence[Prediction], Baselines]:
-    """Return what a model's run made of its logs, and the baselines; nothing if it is from no run."""
-    if (folder := run_of(model)) is None:
-        return (), {}
-    result = _read(folder / RESULT, FitResult)
-    return result.fitted, result.baselines
+def keep_earlier(folder: Path, logs: Sequence[Log]) -> None:
+    """Store the logs of the fits that a run began from, in its folder."""
+    if logs:
+        write_atomic(folder / EARLIER, pack(logs))
+
+
+def logs_behind(estimate: Path) -> list[Log]:
+    """Return the logs that the estimate of a run has seen: the run's,
+    and those of fits that it began from.
+
+    Of a file of values that is no run's there are none.
+
+    Raises RunError: the run's cannot be read.
+    """
+    folder = estimate.parent
+    if estimate.name != NAME or not (folder / RESULT).is_file():
+        return []
+    logs = [prediction.log for prediction in _read(folder / RESULT, FitRecord).fitted]
+    if (folder / EARLIER).is_file():
+        logs += _read(folder / EARLIER, tuple[Log, ...])
+    return logs
+
+
+def record_of(model: IdentifiedModel) -> FitRecord | None:
+    """Return the record of the fit that a model is from; None if it is from no run."""
+    folder = run_of(model)
+    return None if folder is None else _read(folder / RESULT, FitRecord)
 
 
 def load_record(folder: str | Path) -> Record:
@@ -158,75 +218,90 @@ def load_record(folder: str | Path) -> Record:
     Logs of one name have different ones there: `log.csv` and `log.csv (2)`.
     """
     path = Path(folder)
-    identity, model = RunFolder(path).identity(), read_identified(path)
-    result = _read(path / RESULT, FitResult)
+    identity = RunFolder(path).identity()
+    model = read_identified(path)
+    result = _read(path / RESULT, FitRecord)
     unseen = _validations(path)
-    every = [*result.fitted, *unseen.values()]
-    sources = numbered(one.log.source for one in every)
-    named = [
-        replace(one, log=replace(one.log, source=source)) for one, source in zip(every, sources, strict=True)
-    ]
+    fitted = _with_distinct_names([*result.fitted, *unseen.values()])
     count = len(result.fitted)
-    validations = dict(zip(unseen, named[count:], strict=True))
-    result = replace(result, fitted=tuple(named[:count]))
-    return Record(str(folder), identity, model.settings, model.summarise(), result, validations)
+    return Record(
+        folder=str(folder),
+        identity=identity,
+        settings=model.settings,
+        summary=model.summarise(),
+        result=replace(result, fitted=tuple(fitted[:count])),
+        validations=dict(zip(unseen, fitted[count:], strict=True)),
+    )
+
+
+def _with_distinct_names(predictions: Sequence[Prediction]) -> list[Prediction]:
+    """Return predictions whose logs all have names of their own."""
+    sources = numbered(prediction.log.source for prediction in predictions)
+    return [
+        replace(prediction, log=replace(prediction.log, source=source))
+        for prediction, source in zip(predictions, sources, strict=True)
+    ]
 
 
 def _validations(folder: Path) -> dict[str, Prediction]:
     """Read the validations of a run, by their folders' names; a copy of a log counts once."""
-    unseen, known = dict[str, Prediction](), set[bytes]()
+    unseen = dict[str, Prediction]()
+    contents = set[bytes]()
     for file in sorted(folder.glob(f"{VALIDATIONS}/*/{RESULT}")):
         try:
-            one = _read(file, Prediction, "validate again")
+            prediction = _read(file, Prediction, "validate again")
         except RunError as error:
             LOGGER.warning("left out: %s", error)
             continue
-        if (content := samples(one.log)) not in known:
-            known.add(content)
-            unseen[file.parent.name] = one
+        content = samples(prediction.log)
+        if content not in contents:
+            contents.add(content)
+            unseen[file.parent.name] = prediction
     return unseen
 
 
 def _read(file: Path, kind: type[T], hint: str = "fit again with this version") -> T:
+    """Read what `pack` wrote of a dataclass.
+
+    Raises RunError: it is not there, or not of this kind.
+    """
     try:
-        return _adapter(kind).validate_python((unpack(file),))[0]
+        (tree,) = _adapter(kind).validate_python((unpack(file),))
     except FileNotFoundError:
         raise RunError("holds no result", file.parent, "finish the fit: --resume") from None
     except (OSError, ValueError, KeyError, EOFError, ValidationError) as error:
         what = f"cannot be read ({type(error).__name__})"
         raise RunError(what, file, hint) from None
+    return tree
 
 
 @cache
 def _adapter(kind: type[Any]) -> TypeAdapter[Any]:
     # inside a tuple: pydantic takes a configuration for no dataclass by itself
-    one: Any = tuple.__class_getitem__((kind,))
-    return TypeAdapter(one, config=ConfigDict(arbitrary_types_allowed=True))
+    in_tuple: Any = tuple.__class_getitem__((kind,))
+    return TypeAdapter(in_tuple, config=ConfigDict(arbitrary_types_allowed=True))
 
 
 def read_runs(names: Sequence[str], out: str | Path | None) -> tuple[Record, ...]:
-    """Read finished runs that differ in nothing but their seeds, in their order, and leave out the others.
+    """Read finished runs that differ in nothing but their seeds, in their order,
+    and leave out the others.
 
-    `names` are run folders, or patterns of them; `out` is the folder for what is to be written about them.
+    `names` are run folders, or patterns of them;
+    `out` is the folder for what is to be written about them.
+
+    Raises RunError: no finished run is there, or two differ in more than their seeds.
     """
     if out is not None and RunFolder(Path(out)).exists:
         raise RunError("is a run itself", out, "name another folder")
-    runs: list[Record] = []
-    groups = ([name] if os.path.exists(name) else glob.glob(name) or [name] for name in names)
-    for path in sorted({path for group in groups for path in group}):
+    runs = list[Record]()
+    for path in _matching(names):
         try:
-            folder = RunFolder(Path(path))
-            if (status := folder.identity().get("status")) != "done":
-                raise RunError(f"is not finished ({status})", path, "resume it")
-            folder.refuse_changes()
-            record = load_record(path)
-            if record.summary.rms_deg is None:
-                raise RunError("has no final estimate that could be simulated", path)
-            runs.append(record)
+            runs.append(_finished_run(path))
         except HydroidError as error:
             LOGGER.warning("left out: %s", error)
     if not runs:
-        raise RunError("no finished run is there", " ".join(names), "resume those that were stopped")
+        where = " ".join(names)
+        raise RunError("no finished run is there", where, "resume those that were stopped")
     runs.sort(key=lambda run: run.seed)
     for before, run in pairwise(runs):
         other = difference(run.identity, before.identity, but="search.seed")
@@ -235,3 +310,25 @@ def read_runs(names: Sequence[str], out: str | Path | None) -> tuple[Record, ...
         if other:
             raise RunError(other, run.folder, "leave it out, or merge it apart")
     return tuple(runs)
+
+
+def _matching(names: Sequence[str]) -> list[str]:
+    """Return the paths that names mean, each once: a name that is no path may be a pattern."""
+    paths = set[str]()
+    for name in names:
+        found = [] if os.path.exists(name) else glob.glob(name)
+        paths.update(found or [name])
+    return sorted(paths)
+
+
+def _finished_run(path: str) -> Record:
+    """Read a finished run that can be merged with others."""
+    folder = RunFolder(Path(path))
+    status = folder.identity().get("status")
+    if status != "done":
+        raise RunError(f"is not finished ({status})", path, "resume it")
+    folder.refuse_changes()
+    record = load_record(path)
+    if record.summary.rms_deg is None:
+        raise RunError("has no final estimate that could be simulated", path)
+    return record

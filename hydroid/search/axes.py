@@ -1,9 +1,10 @@
-"""Derivatives by finite differences along the axes of a covariance, with steps as wide as the uncertainty.
+"""Derivatives by finite differences along the axes of a covariance,
+with steps as wide as the uncertainty.
 
-Where parameters trade, their effects nearly cancel: what is left of the derivatives of single parameters is
-the error of their differences. So the step goes along the combination itself, as far as the combination is
-uncertain. Its effect is then as large as the noise, and large against rounding and the small jumps that
-events make.
+Where parameters trade, their effects nearly cancel: what is left of the derivatives of single
+parameters is the error of their differences. So the step goes along the combination itself, as far
+as the combination is uncertain. Its effect is then as large as the noise, and large against
+rounding and the small jumps that events make.
 """
 
 from collections.abc import Callable
@@ -17,17 +18,21 @@ Function = Callable[[Array], Array]
 """points (n, P) -> values (n, R); a row that is not finite is a point that cannot be simulated"""
 
 LARGEST = 0.1
-"""largest relative change of a coordinate in a step: nothing holds over the width of an unknown direction"""
+"""largest relative change of a coordinate in a step:
+nothing holds over the width of an unknown direction"""
 EDGE = 0.1  # standard deviations from a bound, below which a coordinate counts as held by it
-UNBALANCED = 0.3  # part of a step within which both sides must have room; else it goes twice to one side
+# part of a step within which both sides must have room; else it goes twice to one side
+UNBALANCED = 0.3
 SHORTER = 0.1  # a step whose effect may be mostly curvature is taken again, this part as long
 CURVED = 0.3
-"""part of the long step's slope; where the short step's is smaller, the long one's is mostly curvature"""
+"""part of the long step's slope; where the short step's is smaller,
+the long one's is mostly curvature"""
 
 
 @record
 class Box:
-    """A point between its bounds, (P,), what a relative change of 1 is, and which p coordinates move."""
+    """A point between its bounds, (P,), what a relative change of 1 is,
+    and which p coordinates move."""
 
     at: Array
     lower: Array
@@ -48,7 +53,8 @@ class Box:
         return np.maximum(away, 0.0) / self.scale[self.varied]
 
     def points(self, changes: Array) -> Array:
-        """Return points, (n, P), at relative changes, (n, p); rounding does not lead out of the bounds."""
+        """Return points, (n, P), at relative changes, (n, p);
+        rounding does not lead out of the bounds."""
         moved = np.tile(self.at, (len(changes), 1))
         moved[:, self.varied] += changes * self.scale[self.varied]
         return np.clip(moved, np.minimum(self.lower, self.at), np.maximum(self.upper, self.at))
@@ -56,10 +62,11 @@ class Box:
 
 @record
 class Axes:
-    """Steps from a point along p directions of its varied coordinates, one a row, all within the bounds.
+    """Steps from a point along p directions of its varied coordinates, one a row,
+    all within the bounds.
 
-    `steps` are signed lengths along each: to both sides, or one and two steps to one side, shape (p, 2); to
-    one side only, shape (p, 1).
+    `steps` are signed lengths along each: to both sides, or one and two steps to one side, shape
+    (p, 2); to one side only, shape (p, 1).
     """
 
     directions: Array
@@ -67,42 +74,52 @@ class Axes:
 
     @property
     def one_sided(self) -> "Axes":
-        """The same with half the steps: for derivatives of first order."""
+        """These axes with a step to one side only, as derivatives of first order need them."""
         return Axes(self.directions, self.steps[:, :1])
 
 
 def differentiate(
-    function: Function, at: Box, axes: Axes, value: Array | None = None, former: Array | None = None
+    function: Function,
+    at: Box,
+    axes: Axes,
+    value: Array | None = None,
+    former: Array | None = None,
 ) -> Array:
-    """Differentiate a function at a point by relative changes of its p varied coordinates, shape (p, R).
+    """Differentiate a function at a point by relative changes of its p varied coordinates,
+    shape (p, R).
 
-    Along each axis the derivative is that of the parabola through the values at the point and at both steps,
-    or of the line where there is one step or where one of two fails. Where both sides differ more than they
-    have in common, or where the slope exceeds the former one by far, a shorter step tells whether the effect
-    of the long one is mostly curvature.
+    Along each axis the derivative is that of the parabola through the values at the point and at
+    both steps, or of the line where there is one step or where one of two fails. Where both sides
+    differ more than they have in common, or where the slope exceeds the former one by far, a
+    shorter step tells whether the effect of the long one is mostly curvature.
 
-    The function is called with all points of the differences at once, and with those of the shorter steps.
-    Its `value` at the point, shape (R,), is given where it is known. `former` derivatives, (p, R), are kept
-    along axes that fail; without them, axes that are not single coordinates must not: a coordinate's row is
-    NaN.
+    The function is called with all points of the differences at once, and with those of the shorter
+    steps. Its `value` at the point, shape (R,), is given where it is known. `former` derivatives,
+    (p, R), are kept along axes that fail; without them, axes that are not single coordinates must
+    not: a coordinate's row is NaN.
     """
     centre = function(at.at[None])[0] if value is None else value
     expected = None if former is None else axes.directions @ former
     slopes, curved = _slopes(function, at, axes, centre)
     if axes.steps.shape[1] == 2:
         if expected is not None:
-            curved |= np.linalg.norm(expected, axis=1) < CURVED * np.linalg.norm(slopes, axis=1)
+            curved |= _far_below(expected, slopes)
         if curved.any():
             shorter = Axes(axes.directions[curved], SHORTER * axes.steps[curved])
-            short = _slopes(function, at, shorter, centre)[0]
-            mostly = np.linalg.norm(short, axis=1) < CURVED * np.linalg.norm(slopes[curved], axis=1)
-            slopes[np.flatnonzero(curved)[mostly]] = short[mostly]
+            short, _ = _slopes(function, at, shorter, centre)
+            mostly_curvature = _far_below(short, slopes[curved])
+            slopes[np.flatnonzero(curved)[mostly_curvature]] = short[mostly_curvature]
     failed = ~np.isfinite(slopes).all(axis=1)
     if expected is not None:
         slopes[failed] = expected[failed]
     if np.array_equal(axes.directions, np.eye(len(slopes))):
         return slopes
     return np.linalg.solve(axes.directions, slopes).astype(float)
+
+
+def _far_below(slopes: Array, others: Array) -> Mask:
+    """Return where slopes, (p, R), are shorter than CURVED times others, (p,)."""
+    return np.linalg.norm(slopes, axis=1) < CURVED * np.linalg.norm(others, axis=1)
 
 
 def single_axes(at: Box, step: float) -> Axes:
@@ -114,55 +131,73 @@ def single_axes(at: Box, step: float) -> Axes:
 def covariance_axes(at: Box, root: Array, step: float) -> Axes:
     """Return steps of so many standard deviations along the axes of a covariance.
 
-    The axes are those of the coordinates off their bounds. A coordinate at a bound has a direction of its
-    own: the others change with it as the covariance says. So no direction leads out of the bounds to both
-    sides. `root` is G of C^-1 = G' G, of full rank, (p, p): a relative change v is |G v| standard deviations
-    long.
+    The axes are those of the coordinates off their bounds. A coordinate at a bound has a direction
+    of its own: the others change with it as the covariance says. So no direction leads out of the
+    bounds to both sides. `root` is G of C^-1 = G' G, of full rank, (p, p): a relative change v is
+    |G v| standard deviations long.
     """
     room = at.room
     deviation = np.linalg.norm(np.linalg.inv(root), axis=1)
-    edge = held_by_bound(room, deviation)
-    inner, at_edge = np.flatnonzero(~edge), np.flatnonzero(edge)
-    directions = np.eye(len(root))[[*inner, *at_edge]]
+    held = held_by_bound(room, deviation)
+    inner = np.flatnonzero(~held)
+    at_bound = np.flatnonzero(held)
+    directions = np.eye(len(root))[[*inner, *at_bound]]
     if len(inner):
         left, values, axes = np.linalg.svd(root[:, inner], full_matrices=False)
         directions[: len(inner), inner] = axes
-        follow = axes.T @ ((left.T @ root[:, at_edge]) / values[:, None])
+        # the change of the others that keeps a coordinate at its bound as short as can be
+        follow = axes.T @ ((left.T @ root[:, at_bound]) / values[:, None])
         directions[len(inner) :, inner] = -follow.T
-    return _fitted(directions, step / np.linalg.norm(root @ directions.T, axis=0), room)
+    lengths = np.linalg.norm(root @ directions.T, axis=0)
+    return _fitted(directions, step / lengths, room)
 
 
 def held_by_bound(room: Array, deviation: Array) -> Mask:
-    """Whether coordinates are held by a bound, (p,), from the room to both, (2, p), and their deviations."""
+    """Return whether coordinates are held by a bound, (p,), from the room to both, (2, p),
+    and their deviations."""
     return room.min(axis=0) < EDGE * np.minimum(deviation, LARGEST)
 
 
 def _slopes(function: Function, at: Box, axes: Axes, value: Array) -> tuple[Array, Mask]:
-    """Slopes along each axis, (p, R), and where both sides differ more than they have in common, (p,)."""
+    """Return slopes along each axis, (p, R), and where both sides differ more than they have in
+    common, (p,)."""
     steps = axes.steps.T[:, :, None]
     changes = (steps * axes.directions).reshape(-1, axes.directions.shape[1])
     rows = function(at.points(changes)).reshape(*steps.shape[:2], -1)
     with np.errstate(all="ignore"):
-        near, far = (rows[0] - value) / steps[0], (rows[-1] - value) / steps[-1]
+        first = (rows[0] - value) / steps[0]
         if len(steps) == 1:
-            return near, np.zeros(len(near), dtype=bool)
-        both = (near * steps[1] - far * steps[0]) / (steps[1] - steps[0])
-        curved = np.linalg.norm(near - both, axis=1) > np.linalg.norm(both, axis=1)
-    slopes = np.where(np.isfinite(both), both, np.where(np.isfinite(near), near, far))
-    return slopes, curved
+            return first, np.zeros(len(first), dtype=bool)
+        second = (rows[1] - value) / steps[1]
+        # the slope at the point of the parabola through all three
+        parabola = (first * steps[1] - second * steps[0]) / (steps[1] - steps[0])
+        curved = np.linalg.norm(first - parabola, axis=1) > np.linalg.norm(parabola, axis=1)
+    line = np.where(np.isfinite(first), first, second)
+    return np.where(np.isfinite(parabola), parabola, line), curved
 
 
 def _fitted(directions: Array, wanted: Array, room: Array) -> Axes:
     """Return steps of wanted lengths, (p,), shortened to LARGEST and to the room, (2, p)."""
-    share = np.abs(directions)
-    wanted = np.minimum(wanted, LARGEST / share.max(axis=1))
-    with np.errstate(all="ignore"):
-        ahead, behind = (
-            np.where(share > 0, np.where(directions > 0, *sides) / share, np.inf).min(axis=1)
-            for sides in (room[::-1], room)
-        )
+    wanted = np.minimum(wanted, LARGEST / np.abs(directions).max(axis=1))
+    below, above = room
+    ahead = _longest(directions, above, below)
+    behind = _longest(directions, below, above)
     both = np.minimum(wanted, np.minimum(ahead, behind))
     one = np.minimum(wanted, np.maximum(ahead, behind) / 2)
     balanced = (both >= UNBALANCED * wanted) | (both >= one)
-    first = np.where(balanced, both, np.where(ahead >= behind, one, -one))
-    return Axes(directions, np.stack([first, np.where(balanced, -first, 2 * first)], axis=1))
+    towards_more_room = np.where(ahead >= behind, one, -one)
+    first = np.where(balanced, both, towards_more_room)
+    second = np.where(balanced, -first, 2 * first)
+    return Axes(directions, np.stack([first, second], axis=1))
+
+
+def _longest(directions: Array, rising: Array, falling: Array) -> Array:
+    """Return how far one can go along directions, (p, p), before a coordinate meets a bound, (p,).
+
+    `rising` and `falling` are the room of coordinates that the direction raises or lowers, (p,).
+    """
+    share = np.abs(directions)
+    room = np.where(directions > 0, rising, falling)
+    with np.errstate(all="ignore"):
+        lengths = np.where(share > 0, room / share, np.inf)
+    return lengths.min(axis=1)

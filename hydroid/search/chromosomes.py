@@ -1,13 +1,16 @@
-"""Chromosomes: the codings of equation (23), article 4.1 and 5.4, and roulette, crossover and mutation, 4.1.
+"""Chromosomes: the codings of equation (23), article 4.1 and 5.4, and roulette,
+crossover and mutation, 4.1.
 
 A chromosome is a row of genes; each element of equation (23), one parameter, owns `width` of them.
 Both codings divide a parameter's range into the same 65,535 steps, ends included.
 
-- Gray: the article's multivariable binary string. An element is 16 bits, highest first, in Gray code:
-  neighbouring values differ in one bit, so a flipped bit or a cut through an element need not jump.
+- Gray: the article's multivariable binary string. An element is 16 bits, highest first, in Gray
+  code: neighbouring values differ in one bit, so a flipped bit or a cut through an element need not
+  jump.
 - Integer: an element is one number from 0 to 65,535; operators never cut through a parameter.
 
-The operators work on whole populations, leave their arguments alone, and draw from the generator passed in.
+The operators work on whole populations, leave their arguments alone,
+and draw from the generator passed in.
 """
 
 from typing import Any
@@ -37,8 +40,9 @@ class GrayCoding:
         return rng.integers(0, 2, (n, self.parameters * BITS), dtype=np.uint8)
 
     def decode(self, chromosomes: Genes) -> Array:
-        """Points of the unit box, shape (n, parameters)."""
-        bits = np.bitwise_xor.accumulate(chromosomes.reshape(-1, self.parameters, BITS), axis=-1)
+        """Return points of the unit box, shape (n, parameters)."""
+        gray = chromosomes.reshape(-1, self.parameters, BITS)
+        bits = np.bitwise_xor.accumulate(gray, axis=-1)
         return bits @ 2.0 ** np.arange(BITS - 1, -1, -1) / STEPS
 
     def encode(self, points: Array) -> Genes:
@@ -89,12 +93,13 @@ CUTS = 2  # of the pointwise crossover (ours; the article gives none)
 
 
 def roulette(objectives: Array, count: int, rng: Generator) -> Ints:
-    """Indices of `count` parents from the weighted roulette wheel, with replacement, by objectives J, (n, 1).
+    """Indices of `count` parents from the weighted roulette wheel, with replacement,
+    by objectives J, (n, 1).
 
-    The wheel needs a fitness to be proportional to, and the objective is to be small: the fitness is the
-    distance to the worst feasible candidate of this population, max(J) - J. The worst itself and infeasible
-    candidates, whose J is not finite, are never drawn; among equals, and where no candidate is feasible, all
-    are equally likely.
+    The wheel needs a fitness to be proportional to, and the objective is to be small: the fitness
+    is the distance to the worst feasible candidate of this population, max(J) - J. The worst itself
+    and infeasible candidates, whose J is not finite, are never drawn; among equals, and where no
+    candidate is feasible, all are equally likely.
     """
     objective = objectives[:, 0]
     feasible = np.isfinite(objective)
@@ -109,9 +114,11 @@ def roulette(objectives: Array, count: int, rng: Generator) -> Ints:
 
 
 def pointwise_swaps(pairs: int, length: int, points: int, rng: Generator) -> Mask:
-    """Genes that n-point crossover swaps, (pairs, length): every other stretch between randomly placed cuts.
+    """Genes that n-point crossover swaps, (pairs, length):
+    every other stretch between randomly placed cuts.
 
-    Cuts are distinct, between genes and uniformly placed; a string has no more than length - 1 of them.
+    Cuts are distinct, between genes and uniformly placed;
+    a string has no more than length - 1 of them.
     """
     order = rng.random((pairs, length - 1)).argsort(axis=1)
     starts = np.zeros((pairs, length), dtype=bool)
@@ -120,11 +127,13 @@ def pointwise_swaps(pairs: int, length: int, points: int, rng: Generator) -> Mas
 
 
 def crossover(parents: Genes, settings: GeneticSettings, rng: Generator) -> Genes:
-    """Children of neighbouring parents (0 with 1, 2 with 3, ...), shape (n, length), n even, as the parents'.
+    """Children of neighbouring parents (0 with 1, 2 with 3, ...), shape (n, length), n even,
+    as the parents'.
 
     At each gene the two children of a pair hold what its two parents held.
     """
-    first, second = parents[0::2], parents[1::2]
+    first = parents[0::2]
+    second = parents[1::2]
     pairs, length = first.shape
     if settings.crossover == "pointwise":
         swaps = pointwise_swaps(pairs, length, CUTS, rng)
@@ -138,9 +147,12 @@ def crossover(parents: Genes, settings: GeneticSettings, rng: Generator) -> Gene
 
 
 def mutate(chromosomes: Genes, rate: float, coding: Coding, rng: Generator) -> Genes:
-    """Mutate each element (each parameter) of each chromosome, (n, length), with chance P_m = `rate`.
+    """Mutate each element (each parameter) of each chromosome, (n, length),
+    with chance P_m = `rate`.
 
-    What changes in an element is the coding's: one random bit flips (binary), or it is redrawn (integer).
+    What changes in an element is the coding's: one random bit flips (binary),
+    or it is redrawn (integer).
     """
     hit = rng.random((len(chromosomes), coding.parameters)) < rate
-    return np.where(np.repeat(hit, coding.width, axis=1), coding.altered(chromosomes, rng), chromosomes)
+    hit_genes = np.repeat(hit, coding.width, axis=1)
+    return np.where(hit_genes, coding.altered(chromosomes, rng), chromosomes)

@@ -1,4 +1,5 @@
-"""Where least squares stands: the state between two steps, why it ended, and the residual's linear model."""
+"""Where least squares stands: the state between two steps, why it ended,
+and the residual's linear model."""
 
 from dataclasses import fields
 from enum import Enum
@@ -15,7 +16,8 @@ WIDTH = 2.0**-26  # of the differences: the root of the rounding unit
 WIDER = 2.0**10  # how much wider the step is that tells a weak effect from rounding noise
 SUSPECT = 1e-3  # a column this much shorter than the longest one may be noise, and is taken twice
 TOLERANCE = 1e-12
-"""of the box-constrained minimum: slope, in units of a column and the residual, that is only rounding"""
+"""of the box-constrained minimum: slope, in units of a column and the residual,
+that is only rounding"""
 DAMPING = 1e-3  # λ at the start
 BLOCK = 4096  # rows of a tall matrix that are factorised at a time
 
@@ -81,16 +83,19 @@ class Descent:
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Return arrays by name, to be stored; without the residual once it has ended."""
-        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
         values["ending"] = self.ending.name
         if self.ended:
-            values["residual"] = []  # the Jacobian is where the uncertainty begins
+            # the Jacobian is where the uncertainty begins
+            values["residual"] = []
         return {name: np.asarray(value) for name, value in values.items()}
 
     @classmethod
     def from_arrays(cls, arrays: dict[str, NDArray[Any]]) -> Self:
         """Return the descent that `arrays` stored."""
-        values: dict[str, Any] = {name: a if a.ndim else a.item() for name, a in arrays.items()}
+        values: dict[str, Any] = {}
+        for name, array in arrays.items():
+            values[name] = array if array.ndim else array.item()
         values["ending"] = Ending[values["ending"]]
         return cls(**values)
 
@@ -115,7 +120,8 @@ def no_jacobian(point: Array) -> Array:
 
 
 class LinearModel:
-    """The linear model r + J s of the residual around a descent's point, for the parameters with effect.
+    """The linear model r + J s of the residual around a descent's point,
+    for the parameters with effect.
 
     A column of J of a parameter without effect is 0; `scale` has the lengths of the others.
     """
@@ -139,13 +145,17 @@ class LinearModel:
         size = np.linalg.norm(right)
         if not size:
             return np.zeros_like(right)
-        # in lengths of the columns and of the residual, in which the solver's tolerances mean something
-        there, unit = self.at.point[self._moving], self.scale / size
+        # in lengths of the columns and of the residual, in which the solver's tolerances mean
+        # something
+        unit = self.scale / size
+        point = self.at.point[self._moving]
         matrix = np.vstack([triangle / self.scale, np.sqrt(damping) * np.eye(len(unit))])
         target = np.append(-right / size, np.zeros(len(unit)))
-        limits = -there * unit, (1 - there) * unit
-        most = 20 * len(unit) + 20  # changes of the active set: far more than it takes
-        return lsq_linear(matrix, target, limits, method="bvls", tol=TOLERANCE, max_iter=most).x / unit
+        limits = (-point * unit, (1 - point) * unit)
+        # changes of the active set: far more than it takes
+        most = 20 * len(unit) + 20
+        solved = lsq_linear(matrix, target, limits, method="bvls", tol=TOLERANCE, max_iter=most)
+        return solved.x / unit
 
     def gain(self, s: Array) -> float:
         """Part of the cost that the linear model promises to save by a step."""
@@ -162,7 +172,8 @@ class LinearModel:
 def triangle(rows: Array) -> Array:
     """Return the upper triangle R, (p, p), of Q R = rows, shape (m, p).
 
-    Tall matrices are factorised block by block, which keeps each block in the cache: four times as fast.
+    Tall matrices are factorised block by block, which keeps each block in the cache:
+    four times as fast.
     """
     blocks = np.array_split(rows, max(len(rows) // BLOCK, 1))
     if len(blocks) > 1:
@@ -171,14 +182,16 @@ def triangle(rows: Array) -> Array:
 
 
 def derivatives(residuals: Function, point: Array, row: Array) -> Array:
-    """Derivatives by each parameter at a point of the box, (p,), with its residuals, (R,): shape (p, R).
+    """Return derivatives by each parameter at a point of the box, (p,), with its residuals, (R,):
+    shape (p, R).
 
-    They are 0 without effect. All differences are one batch. Those that fail are taken to the other side in
-    a second batch; where that fails too, they are not finite.
+    They are 0 without effect. All differences are one batch. Those that fail are taken to the other
+    side in a second batch; where that fails too, they are not finite.
     """
 
     def quotients(which: Ints, width: float) -> Array:
-        steps = np.where(point + abs(width) <= 1.0, width, -width)[which]
+        inwards = np.where(point + abs(width) <= 1.0, width, -width)
+        steps = inwards[which]
         points = np.tile(point, (len(which), 1))
         points[np.arange(len(which)), which] += steps
         with np.errstate(all="ignore"):
@@ -191,7 +204,9 @@ def derivatives(residuals: Function, point: Array, row: Array) -> Array:
     length = np.linalg.norm(columns, axis=1)
     suspect = np.flatnonzero((length > 0) & (length < SUSPECT * length.max()))
     if len(suspect):
-        # a derivative does not depend on the step; rounding noise divided by a wider step becomes smaller
+        # a derivative does not depend on the step; rounding noise divided by a wider step becomes
+        # smaller
         wider = np.linalg.norm(quotients(suspect, WIDER * WIDTH), axis=1)
-        columns[suspect[wider < 0.1 * length[suspect]]] = 0.0
+        noise = wider < 0.1 * length[suspect]
+        columns[suspect[noise]] = 0.0
     return columns

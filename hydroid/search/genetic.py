@@ -1,13 +1,6 @@
 """The article's two searches: the simple genetic algorithm (4.1, figure 12), and NSGA-II (4.2).
 
-A search is deterministic: it draws from the generator passed in alone. So a run is continued by running it
-again from its seed, with the objectives that are known (`fitting.checkpoints`).
-
-    population = None
-    for _ in range(1 + generations):
-        chromosomes = algorithm.ask(population, rng)
-        offspring = Population(chromosomes, objectives(algorithm.coding.decode(chromosomes)))
-        population = algorithm.tell(population, offspring)
+Both are a `hydroid.search.protocol.BoxSearch`.
 """
 
 from typing import ClassVar
@@ -23,7 +16,8 @@ from hydroid.settings.search import GeneticSettings
 
 @record
 class Population:
-    """Candidates, (n, length), and objectives to be minimised, (n, m); nothing ever writes into its arrays.
+    """Candidates, (n, length), and objectives to be minimised, (n, m);
+    nothing ever writes into its arrays.
 
     A candidate with an objective that is not finite is infeasible.
     """
@@ -44,7 +38,8 @@ class Population:
 
 
 def crowded_order(objectives: Array) -> Ints:
-    """Return candidates, (n,), from best to worst by their objectives, (n, m); equals keep their order.
+    """Return candidates, (n,), from best to worst by their objectives, (n, m);
+    equals keep their order.
 
     That is the crowded comparison: lower rank first, then more room around them.
     """
@@ -53,18 +48,22 @@ def crowded_order(objectives: Array) -> Ints:
 
 
 def tournament(objectives: Array, count: int, rng: Generator) -> Ints:
-    """Return winners, (count,), of binary tournaments by the crowded comparison of objectives, (n, m).
+    """Return winners, (count,), of binary tournaments by the crowded comparison of objectives,
+    (n, m).
 
-    The contestants of each round are a random permutation of the population, so that every candidate
-    competes equally often. No infeasible candidate beats a feasible one.
+    The contestants of each round are a random permutation of the population, so that every
+    candidate competes equally often. No infeasible candidate beats a feasible one.
     """
     rank = ranks(objectives)
     room = crowding(objectives, rank)
     rounds = -(-2 * count // len(rank))
-    contestants = np.concatenate([rng.permutation(len(rank)) for _ in range(rounds)])[: 2 * count]
-    a, b = contestants[0::2], contestants[1::2]
-    a_wins = (rank[a] < rank[b]) | ((rank[a] == rank[b]) & (room[a] >= room[b]))
-    return np.where(a_wins, a, b)
+    drawn = [rng.permutation(len(rank)) for _ in range(rounds)]
+    contestants = np.concatenate(drawn)[: 2 * count]
+    first = contestants[0::2]
+    second = contestants[1::2]
+    as_good = (rank[first] == rank[second]) & (room[first] >= room[second])
+    first_wins = (rank[first] < rank[second]) | as_good
+    return np.where(first_wins, first, second)
 
 
 @record
@@ -76,7 +75,8 @@ class SimpleGa:
         parameters: dimensions p of the unit box.
         start: point of the box that joins the first population, shape (p,).
         single: whether it minimises one objective, shape (n, 1), rather than several at once.
-        elite: best candidates that survive unchanged, and are not simulated again (the article gives none).
+        elite: best candidates that survive unchanged,
+            and are not simulated again (the article gives none).
     """
 
     settings: GeneticSettings
@@ -87,9 +87,15 @@ class SimpleGa:
     select = staticmethod(roulette)
 
     @property
+    def generations(self) -> int:
+        """Number of populations after the first one."""
+        return self.settings.generations
+
+    @property
     def coding(self) -> Coding:
         """How candidates are written as chromosomes."""
-        return (GrayCoding if self.settings.coding == "binary" else IntegerCoding)(self.parameters)
+        kind = GrayCoding if self.settings.coding == "binary" else IntegerCoding
+        return kind(self.parameters)
 
     def ask(self, population: Population | None, rng: Generator) -> Genes:
         """Return chromosomes to be evaluated: the first population, or the offspring of one."""
@@ -99,6 +105,7 @@ class SimpleGa:
                 chromosomes[:1] = self.coding.encode(self.start[None])
             return chromosomes
         count = self.settings.population - self.elite
+        # parents come in pairs: of an odd number of children the last one's sibling is left out
         parents = self.select(population.objectives, count + count % 2, rng)
         children = crossover(population.chromosomes[parents], self.settings, rng)[:count]
         return mutate(children, self.settings.mutation_rate, self.coding, rng)
@@ -114,10 +121,12 @@ class SimpleGa:
 class Nsga2(SimpleGa):
     """NSGA-II (Deb, Pratap, Agarwal, Meyarivan 2002) on the simple GA's operators.
 
-    Non-dominated sorting, crowding, crowded tournament, and survival of the best of parents and children.
+    Non-dominated sorting, crowding, crowded tournament,
+    and survival of the best of parents and children.
     """
 
-    single, elite = False, 0
+    single: ClassVar[bool] = False
+    elite: ClassVar[int] = 0
     select = staticmethod(tournament)
 
     def tell(self, population: Population | None, offspring: Population) -> Population:

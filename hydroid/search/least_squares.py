@@ -6,17 +6,19 @@
 
 `step` is a pure function of a `Descent`: a stored one continues to the same bits.
 
-One step is one of two things. *Without a Jacobian* it takes one, by finite differences in one batch, and
-ends where the linear model promises no gain. *With one* it tries a step s that minimises
-|r + J s|² + λ |D s|² inside the box, D the lengths of J's columns, with Nielsen's rule for the damping λ.
-What differs from a textbook:
+One step is one of two things. *Without a Jacobian* it takes one, by finite differences in one
+batch, and ends where the linear model promises no gain. *With one* it tries a step s that minimises
+|r + J s|² + λ |D s|² inside the box, D the lengths of J's columns, with Nielsen's rule for the
+damping λ. What differs from a textbook:
 
-- A Jacobian of p simulations is expensive. After a step it is updated from that step (C. G. Broyden, 1965) as
-  long as the updated one lowers the logarithm of the cost by as much per simulation as the one before did.
-- Beside each step from a new Jacobian a second one is tried, corrected for the curvature of the residual
-  along the first (geodesic acceleration, M. K. Transtrum and J. P. Sethna, 2012). It follows the curved
-  valleys of problems whose parameters compensate each other.
-- A parameter without effect stays where it is: its column of J is zero, or rounding noise (`derivatives`).
+- A Jacobian of p simulations is expensive. After a step it is updated from that step (C. G.
+  Broyden, 1965) as long as the updated one lowers the logarithm of the cost by as much per
+  simulation as the one before did.
+- Beside each step from a new Jacobian a second one is tried, corrected for the curvature of the
+  residual along the first (geodesic acceleration, M. K. Transtrum and J. P. Sethna, 2012). It
+  follows the curved valleys of problems whose parameters compensate each other.
+- A parameter without effect stays where it is: its column of J is zero, or rounding noise
+  (`derivatives`).
 - A candidate whose simulation fails is a step that does not help.
 """
 
@@ -58,7 +60,8 @@ SLOW_STEPS = 2
 
 
 def least_squares(start_at: Array, residuals: Function, settings: RefinementSettings) -> Descent:
-    """Minimise the sum of squared residuals from a point of the unit box, shape (p,); return the last state.
+    """Minimise the sum of squared residuals from a point of the unit box, shape (p,);
+    return the last state.
 
     Its point is the best one evaluated, and its ending says whether that is an optimum.
     """
@@ -77,7 +80,9 @@ def step(now: State, residuals: Function, settings: RefinementSettings) -> State
         simulated += len(points)
         return residuals(points)
 
-    after = (_advance if len(now.jacobian) else _differentiate)(now, counted, settings)
+    has_jacobian = len(now.jacobian) > 0
+    move = _advance if has_jacobian else _differentiate
+    after = move(now, counted, settings)
     return replace(after, evaluations=now.evaluations + simulated)
 
 
@@ -95,49 +100,84 @@ def _differentiate(now: State, residuals: Function, settings: RefinementSettings
 def _advance(now: State, residuals: Function, settings: RefinementSettings) -> State:
     """Try a step, or two; take the better one if it helps."""
     model = LinearModel(now)
-    steps = [model.step(now.damping)]
-    promised = model.gain(steps[0])
-    if now.fresh and np.linalg.norm(s := steps[0]) > SHORTEST:
-        # the same step corrected for the curvature along it, where that can be measured
-        origin, probe = model.reach(np.zeros_like(s)), model.reach(PROBE * s)
-        slope = (residuals(probe[None])[0] - now.residual) / PROBE
-        curvature = 2 / PROBE * (slope - now.jacobian @ ((probe - origin) / PROBE))
-        if np.isfinite(curvature).all():
-            corrected = model.step(now.damping, now.residual + 0.5 * curvature)
-            change, length = (np.linalg.norm(model.scale * each) for each in (corrected - s, s))
-            steps += [corrected] if change < CURVED * length else []
+    first = model.step(now.damping)
+    steps = [first]
+    if now.fresh and np.linalg.norm(first) > SHORTEST:
+        corrected = _corrected(now, model, first, residuals)
+        if corrected is not None:
+            steps.append(corrected)
     points = np.array([model.reach(s) for s in steps])
     if np.linalg.norm(points[0] - now.point) <= SHORTEST * np.linalg.norm(now.point):
         return _no_step(now)
     rows = residuals(points)
     cost = costs(rows)
     best = np.argmin(cost)
-    if not cost[best] < now.cost:  # a new Jacobian, or a shorter step
-        if not now.fresh:
-            return replace(now, jacobian=no_jacobian(now.point))
-        after = replace(now, damping=now.damping * 2 * now.growth, growth=2 * now.growth)
-        promises = model.gain(model.step(after.damping)) >= settings.gain_tolerance * now.cost
-        return after if promises else _no_step(now)
+    if not cost[best] < now.cost:
+        return _without_gain(now, model, settings)
+    promised = model.gain(first)
     ratio = (now.cost - cost[best]) / promised if promised > 0 else 0.0
     after = _moved(now, points[best], rows[best], ratio, settings)
-    if after.ended:
+    if after.ended or not _keeps_jacobian(now, after, ratio):
         return after
-    # the logarithm of the cost must fall by as much in this one simulation as it has on average
+    return replace(after, jacobian=_updated(now, after))
+
+
+def _corrected(now: Descent, model: LinearModel, first: Array, residuals: Function) -> Array | None:
+    """Return a step corrected for the curvature of the residual along it.
+
+    None: that cannot be measured, or the correction is too large to be believed.
+    """
+    origin = model.reach(np.zeros_like(first))
+    probe = model.reach(PROBE * first)
+    slope = (residuals(probe[None])[0] - now.residual) / PROBE
+    curvature = 2 / PROBE * (slope - now.jacobian @ ((probe - origin) / PROBE))
+    if not np.isfinite(curvature).all():
+        return None
+    corrected = model.step(now.damping, now.residual + 0.5 * curvature)
+    change = np.linalg.norm(model.scale * (corrected - first))
+    length = np.linalg.norm(model.scale * first)
+    return corrected if change < CURVED * length else None
+
+
+def _without_gain(now: State, model: LinearModel, settings: RefinementSettings) -> State:
+    """Take a new Jacobian, or a shorter step, after a step that does not help."""
+    if not now.fresh:
+        return replace(now, jacobian=no_jacobian(now.point))
+    after = replace(now, damping=now.damping * 2 * now.growth, growth=2 * now.growth)
+    promised = model.gain(model.step(after.damping))
+    if promised >= settings.gain_tolerance * now.cost:
+        return after
+    return _no_step(now)
+
+
+def _keeps_jacobian(now: Descent, after: Descent, ratio: float) -> bool:
+    """Return whether the next step may begin with an updated Jacobian.
+
+    A new one must have promised well. Of an updated one the logarithm of the cost must fall by as
+    much in this one simulation as it has on average since the last new one.
+    """
+    if now.fresh:
+        return bool(ratio > TRUSTED)
     cost, evaluations = now.cycle
     mean = np.log(cost / after.cost) / (now.evaluations + 1 - evaluations)
-    if not (ratio > TRUSTED if now.fresh else np.log(now.cost / after.cost) >= mean):
-        return after
-    # Broyden's update: the Jacobian nearest to the present one, by its own scale, that explains the step
+    return bool(np.log(now.cost / after.cost) >= mean)
+
+
+def _updated(now: Descent, after: Descent) -> Array:
+    """Return Broyden's update: the Jacobian nearest to the present one, by its own scale, that
+    explains the step."""
     move = after.point - now.point
     scaled = np.sum(now.jacobian**2, axis=0) * move
     unexplained = after.residual - now.residual - now.jacobian @ move
-    return replace(after, jacobian=now.jacobian + np.outer(unexplained / (scaled @ move), scaled))
+    return now.jacobian + np.outer(unexplained / (scaled @ move), scaled)
 
 
 def _moved(now: State, point: Array, row: Array, ratio: float, settings: RefinementSettings) -> State:
-    """Move to a better point, whose gain is `ratio` times the promised one; the Jacobian is to be taken."""
+    """Move to a better point, whose gain is `ratio` times the promised one;
+    the Jacobian is to be taken."""
     cost = costs(row[None])[0]
-    slow = now.slow + 1 if now.cost - cost < settings.gain_tolerance * now.cost else 0
+    gained_little = now.cost - cost < settings.gain_tolerance * now.cost
+    slow = now.slow + 1 if gained_little else 0
     ending = Ending.UNDER_WAY
     if cost <= EXACT * now.cost_before:
         ending = Ending.EXACT
@@ -145,6 +185,8 @@ def _moved(now: State, point: Array, row: Array, ratio: float, settings: Refinem
         ending = Ending.SLOW
     elif now.iterations + 1 >= settings.iterations:
         ending = Ending.ITERATIONS
+    # Nielsen's rule
+    shrinking = max(1 / 3, 1 - (2 * ratio - 1) ** 3)
     return replace(
         now,
         point=point,
@@ -152,7 +194,7 @@ def _moved(now: State, point: Array, row: Array, ratio: float, settings: Refinem
         cost=cost,
         jacobian=no_jacobian(point),
         fresh=False,
-        damping=max(now.damping * max(1 / 3, 1 - (2 * ratio - 1) ** 3), UNDAMPED),
+        damping=max(now.damping * shrinking, UNDAMPED),
         growth=2.0,
         slow=slow,
         iterations=now.iterations + 1,
@@ -161,7 +203,7 @@ def _moved(now: State, point: Array, row: Array, ratio: float, settings: Refinem
 
 
 def _no_step(now: State) -> State:
-    """Where no step is left: end, or take a Jacobian that was updated anew."""
+    """End where no step is left, or first take anew a Jacobian that was updated."""
     if now.fresh:
         return replace(now, ending=Ending.NO_IMPROVEMENT)
     return replace(now, jacobian=no_jacobian(now.point), damping=DAMPING, growth=2.0)

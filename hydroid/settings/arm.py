@@ -1,7 +1,7 @@
 """A hydraulic arm: an MJCF, and one YAML file with what MJCF cannot say.
 
-The MJCF has links, joints, ranges, masses and meshes; its keyframes are the named poses. The YAML has the
-actuators, in units of a drawing (mm, mm², cm³/rad).
+The MJCF has links, joints, ranges, masses and meshes; its keyframes are the named poses. The YAML
+has the actuators, in units of a drawing (mm, mm², cm³/rad).
 """
 
 import math
@@ -24,8 +24,8 @@ from hydroid.settings.load import Settings, load
 Actuator: TypeAlias = LinearActuator | RotaryActuator
 
 FARTHEST_BY_CYLINDER = 200.0
-"""how far a cylinder turns a joint at most, with a linkage such as a bucket's [deg]; slewing gears and
-rotators turn farther"""
+"""how far a cylinder turns a joint at most, with a linkage such as a bucket's [deg]; slewing gears
+and rotators turn farther"""
 SLIDE = 2  # MuJoCo's number of a joint that slides
 
 
@@ -40,10 +40,11 @@ Beside = Annotated[Path, Strict(False), AfterValidator(_from_folder)]
 
 @record
 class Joint:
-    """A joint that turns [deg], or `slides` [m]; what is said of angles then holds for its position.
+    """A joint that turns [deg], or `slides` [m];
+    what is said of angles then holds for its position.
 
-    A continuous one turns without stops: its range limits what is shown and tested. No actuator: nothing that
-    stage 2 knows moves it.
+    A continuous one turns without stops: its range limits what is shown and tested. No actuator:
+    nothing that stage 2 knows moves it.
     """
 
     name: str
@@ -55,27 +56,33 @@ class Joint:
     @property
     def limits(self) -> tuple[float, float]:
         """The range in the units of a simulation [rad], or [m]."""
+        if self.slides:
+            return self.range
         low, high = self.range
-        return self.range if self.slides else (math.radians(low), math.radians(high))
+        return math.radians(low), math.radians(high)
 
     @property
     def may_stand_in(self) -> bool:
         """Whether its rotary actuator may stand in for a cylinder of unknown size and linkage."""
-        free = self.continuous or self.slides
-        within = self.range[1] - self.range[0] <= FARTHEST_BY_CYLINDER
-        return isinstance(self.actuator, RotaryActuator) and within and not free
+        if self.continuous or self.slides:
+            return False
+        low, high = self.range
+        return isinstance(self.actuator, RotaryActuator) and high - low <= FARTHEST_BY_CYLINDER
 
     def has(self, quantity: str) -> bool:
         """Whether a quantity of a joint's actuator means anything of what moves this one."""
-        of = CHOICES[quantity].of
-        kinds = {"cylinder": isinstance(self.actuator, LinearActuator), "stand-in": self.may_stand_in}
-        return kinds.get(of, True)
+        kind = CHOICES[quantity].of
+        if kind == "cylinder":
+            return isinstance(self.actuator, LinearActuator)
+        if kind == "stand-in":
+            return self.may_stand_in
+        return True
 
 
 class Arm(Settings):
-    """An arm as its YAML file and its MJCF describe it; the MJCF is read when something of it is asked for.
-    Raises SettingsError: where the MJCF is read, a setting that does not fit it; ModelError: then, no MJCF,
-    or one that hydroid cannot simulate.
+    """An arm as its YAML file and its MJCF describe it; the MJCF is read when something of it is
+    asked for. Raises SettingsError: where the MJCF is read, a setting that does not fit it;
+    ModelError: then, no MJCF, or one that hydroid cannot simulate.
     """
 
     model: Beside
@@ -83,17 +90,20 @@ class Arm(Settings):
     actuators: dict[str, Annotated[Cylinder | RotaryActuator, Field(discriminator="kind")]] = {}
     """what moves the joints, by name; a joint that stage 2 does not drive needs none"""
     payload: str | None = None
-    """site of the model where the gripper holds a payload's centre of mass; null: logs have no payloads"""
+    """site of the model where the gripper holds a payload's centre of mass; null:
+    logs have no payloads"""
     pair: Beside | None = None
-    """MJCF of a machine with two of these arms, whose joints are named right_JOINT and left_JOINT; null: the
-    arm stands alone"""
+    """MJCF of a machine with two of these arms, whose joints are named right_JOINT and left_JOINT;
+    null: the arm stands alone"""
 
     def model_post_init(self, context: Any) -> None:
-        """Keep where the settings came from beside what is read of the model: it decides nothing."""
+        """Keep where the settings came from beside what is read of the model:
+        it decides nothing."""
         vars(self)["where"] = (context or {}).get("source", self.where)
 
     def __copy__(self) -> "Arm":
-        """Copy the settings alone: a copy with another model must not keep what was read of this one."""
+        """Copy the settings alone: a copy with another model must not keep what was read
+        of this one."""
         copy = super().__copy__()
         for name in vars(copy).keys() - Arm.model_fields.keys():
             del vars(copy)[name]
@@ -101,39 +111,43 @@ class Arm(Settings):
 
     @cached_property
     def where(self) -> str:
-        """Begins messages about the settings."""
+        """The file that settings came from, with which messages about them begin."""
         return "the arm's file"
 
     @cached_property
     def joints(self) -> tuple["Joint", ...]:
-        """In the order of the model, (J,)."""
+        """Joints in the order of the model, (J,)."""
         model = self._model
         names = [model.joint(j).name for j in range(model.njnt)]
         for name in self.actuators:
             if name not in names:
                 hint = f"the model's joints: {', '.join(names)}"
                 raise SettingsError(f"actuators.{name}: no such joint", self.where, hint)
-        if self.payload is not None and self.payload not in [model.site(s).name for s in range(model.nsite)]:
+        sites = [model.site(s).name for s in range(model.nsite)]
+        if self.payload is not None and self.payload not in sites:
             raise SettingsError(f"payload: the model has no site {self.payload!r}", self.where)
-        joints = list[Joint]()
-        for name in names:
-            joint, actuator = model.joint(name), self.actuators.get(name)
-            limited, slides = bool(joint.limited[0]), int(joint.type[0]) == SLIDE
-            # sliders and tests take a joint without limits once round
-            low, high = (-1.0, 1.0) if slides else (-180.0, 180.0)
-            if limited:
-                low, high = (joint.range if slides else np.degrees(joint.range)).round(DIGITS).tolist()
-            bare = Joint(name, (low, high), not limited, None, slides)
-            if isinstance(actuator, Cylinder):
-                try:
-                    if not limited:
-                        raise ValueError("a joint without limits needs a rotary actuator")
-                    data = _at_zero(self.model)
-                    actuator = make_cylinder(actuator, bare.limits, data, name, slides=slides)
-                except ValueError as error:
-                    raise SettingsError(f"actuators.{name}: {error}", self.where) from None
-            joints.append(replace(bare, actuator=actuator))
-        return tuple(joints)
+        return tuple(map(self._joint, names))
+
+    def _joint(self, name: str) -> Joint:
+        """Return a joint of the model with what moves it.
+
+        Raises SettingsError: a cylinder that does not fit the model.
+        """
+        joint = self._model.joint(name)
+        continuous = not joint.limited[0]
+        slides = int(joint.type[0]) == SLIDE
+        bare = Joint(name, _range(joint, continuous, slides), continuous, None, slides)
+        actuator = self.actuators.get(name)
+        if not isinstance(actuator, Cylinder):
+            return replace(bare, actuator=actuator)
+        try:
+            if continuous:
+                raise ValueError("a joint without limits needs a rotary actuator")
+            data = _at_zero(self.model)
+            made = make_cylinder(actuator, bare.limits, data, name, slides=slides)
+        except ValueError as error:
+            raise SettingsError(f"actuators.{name}: {error}", self.where) from None
+        return replace(bare, actuator=made)
 
     @cached_property
     def mass_of(self) -> dict[str, float]:
@@ -142,20 +156,24 @@ class Arm(Settings):
         Those of the joints come in their order, then parts that are fixed to them, L in all.
         """
         model = self._model
-        moving = [model.body(b) for b in range(1, model.nbody) if model.body_weldid[b] and model.body_mass[b]]
-        links = sorted((body for body in moving if body.name), key=lambda body: not body.jntnum[0])
+        bodies = [model.body(b) for b in range(1, model.nbody) if model.body_weldid[b]]
+        links = [body for body in bodies if body.name and body.mass[0]]
+        # the sort is stable: those of the joints come first, in their order
+        links.sort(key=lambda body: not body.jntnum[0])
         return {body.name: float(body.mass[0]) for body in links}
 
     @cached_property
     def poses(self) -> dict[str, tuple[float, ...]]:
         """Angle of each joint by the pose's name [rad]: the model's keyframes, and `home`."""
         model = self._model
-        keys = {model.key(k).name: tuple(model.key_qpos[k].tolist()) for k in range(model.nkey)}
-        return {"home": tuple(model.qpos0.tolist())} | keys
+        poses = {"home": tuple(model.qpos0.tolist())}
+        for k in range(model.nkey):
+            poses[model.key(k).name] = tuple(model.key_qpos[k].tolist())
+        return poses
 
     @cached_property
     def name(self) -> str:
-        """Of the model."""
+        """Name of the model."""
         return self._model.names.split(b"\0")[0].decode()
 
     @property
@@ -179,7 +197,8 @@ class Arm(Settings):
 
     @property
     def ranges(self) -> dict[str, tuple[float, float]]:
-        """Lower and upper stop of each joint by its name [rad], or [m] of a slide; infinite where none is."""
+        """Lower and upper stop of each joint by its name [rad], or [m] of a slide;
+        infinite where none is."""
         free = (-math.inf, math.inf)
         return {joint.name: free if joint.continuous else joint.limits for joint in self.joints}
 
@@ -213,13 +232,24 @@ class Arm(Settings):
     def pose(self, name: str) -> Array:
         """Return a named pose [rad], shape (J,)."""
         if name not in self.poses:
-            raise SettingsError(f"{self.name} has no pose {name!r}", hint=f"one of: {', '.join(self.poses)}")
+            hint = f"one of: {', '.join(self.poses)}"
+            raise SettingsError(f"{self.name} has no pose {name!r}", hint=hint)
         return np.array(self.poses[name])
 
 
 def load_arm(name: str | Path, beside: Path | None = None) -> Arm:
     """Read an arm's YAML, found as `find_config` does."""
     return load(find_config(name, beside, kind="arm"), Arm)
+
+
+def _range(joint: Any, continuous: bool, slides: bool) -> tuple[float, float]:
+    """Return the range of a model's joint [deg], or [m]; without limits once round,
+    for sliders and tests."""
+    if continuous:
+        return (-1.0, 1.0) if slides else (-180.0, 180.0)
+    limits = joint.range if slides else np.degrees(joint.range)
+    low, high = limits.round(DIGITS).tolist()
+    return low, high
 
 
 def _at_zero(path: Path) -> Any:
@@ -232,7 +262,10 @@ def _at_zero(path: Path) -> Any:
 
 @lru_cache(maxsize=8)
 def _compiled(path: Path, _changed: int, _size: int) -> Any:
-    """The same of a file that did not change, without meshes that decide no inertia: these take long."""
+    """Return the data of a file that did not change, without meshes that decide no inertia.
+
+    Meshes take long to compile.
+    """
     import mujoco
 
     from hydroid.mjcf import mujoco_errors, read_mjcf
@@ -240,12 +273,13 @@ def _compiled(path: Path, _changed: int, _size: int) -> Any:
     spec = read_mjcf(path)
     if spec.compiler.inertiafromgeom != mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE:
         for geom in list(spec.geoms):
-            mesh = geom.type == mujoco.mjtGeom.mjGEOM_MESH
-            if mesh and not geom.name and geom.parent.explicitinertial:
+            is_mesh = geom.type == mujoco.mjtGeom.mjGEOM_MESH
+            if is_mesh and not geom.name and geom.parent.explicitinertial:
                 spec.delete(geom)
     used = {geom.meshname for geom in spec.geoms}
-    for one in [mesh for mesh in spec.meshes if mesh.name not in used]:
-        spec.delete(one)
+    for mesh in list(spec.meshes):
+        if mesh.name not in used:
+            spec.delete(mesh)
     with mujoco_errors(path):
         data = mujoco.MjData(spec.compile())
     data.qpos[:] = 0.0

@@ -1,7 +1,8 @@
-"""YAML text -> plain values: mappings, lists, text, numbers, true, false and null, and nothing else.
+"""YAML text -> plain values: mappings, lists, text, numbers, true, false and null,
+and nothing else.
 
-Scalars are read as YAML 1.2 defines them. PyYAML's own rules, those of YAML 1.1, read 010 as 8, 1:30 as 90
-and 1e3 as text; here they are 10, text and 1000.
+Scalars are read as YAML 1.2 defines them. PyYAML's own rules, those of YAML 1.1, read 010 as 8,
+1:30 as 90 and 1e3 as text; here they are 10, text and 1000.
 """
 
 import re
@@ -15,10 +16,16 @@ from hydroid.files import read_file
 
 Lines = dict[tuple[str, ...], int]  # line [1-based] of each key or item, by its path
 
-MOST_VALUES, MOST_CHARACTERS = 20_000, 2**20
+MOST_VALUES = 20_000
 """in one document"""
+MOST_CHARACTERS = 2**20
+"""of all texts in one document"""
+DEEPEST = 40
+"""lists and mappings inside each other"""
 _PLAIN = {
-    "mapping values are not allowed": "there is a second ': ' in this line, or the line is indented too far",
+    "mapping values are not allowed": (
+        "there is a second ': ' in this line, or the line is indented too far"
+    ),
     "\\t": "a line is indented by a tab; use spaces",
     "expected ',' or ']'": "a list [a, b] is not closed with ']'",
     "expected ',' or '}'": "a mapping {a: 1} is not closed with '}'",
@@ -50,16 +57,23 @@ def read_document(text: str, source: object) -> tuple[Any, Lines]:
     """Read one YAML document."""
     reader = _Reader(source)
     try:
-        node = yaml.compose(text, Loader=yaml.BaseLoader)  # every scalar is text
-        return None if node is None else reader.value(node, ()), reader.lines
+        # every scalar is text
+        node = yaml.compose(text, Loader=yaml.BaseLoader)
+        value = None if node is None else reader.value(node, ())
     except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        where = f"{source}, line {mark.line + 1}, column {mark.column + 1}" if mark else source
-        problem = str(getattr(error, "problem", None) or getattr(error, "reason", None))
-        plain = next((words for part, words in _PLAIN.items() if part in problem), problem)
-        raise SettingsError(f"is not YAML: {plain}", where) from None
+        raise _not_yaml(error, source) from None
     except RecursionError:
         raise SettingsError("is not YAML: it is nested too deeply", source) from None
+    return value, reader.lines
+
+
+def _not_yaml(error: yaml.YAMLError, source: object) -> SettingsError:
+    """Return what the YAML reader stumbled over, in plain words, and where."""
+    mark = getattr(error, "problem_mark", None)
+    where = f"{source}, line {mark.line + 1}, column {mark.column + 1}" if mark else source
+    problem = getattr(error, "problem", None) or getattr(error, "reason", None)
+    plain = next((words for part, words in _PLAIN.items() if part in str(problem)), problem)
+    return SettingsError(f"is not YAML: {plain}", where)
 
 
 class _Reader:
@@ -70,15 +84,16 @@ class _Reader:
 
     def __init__(self, source: object) -> None:
         self.lines: Lines = {}
-        self._source, self._characters = source, 0
+        self._source = source
+        self._characters = 0
 
     def value(self, node: yaml.Node, path: tuple[str, ...]) -> Any:
         """Return the value of a node at a path of keys."""
         if len(self.lines) >= MOST_VALUES:
             raise SettingsError(f"holds more than {MOST_VALUES} values", self._source)
         where = self._place(node)
-        if len(path) > 40:
-            raise SettingsError("is nested more than 40 deep", where)
+        if len(path) > DEEPEST:
+            raise SettingsError(f"is nested more than {DEEPEST} deep", where)
         kind = node.tag.removeprefix("tag:yaml.org,2002:")
         if kind not in ("str", "seq", "map"):
             raise SettingsError(f"a value of type {kind!r} is not allowed", where)
@@ -87,16 +102,20 @@ class _Reader:
             return self._scalar(node)
         if isinstance(node, yaml.SequenceNode):
             return [self.value(item, (*path, str(index))) for index, item in enumerate(node.value)]
+        return self._mapping(node, path)
+
+    def _mapping(self, node: yaml.Node, path: tuple[str, ...]) -> dict[Any, Any]:
         values: dict[Any, Any] = {}
         for key, item in node.value:
             if not isinstance(key, yaml.ScalarNode):
                 raise SettingsError("a key must be plain text or a number", self._place(key))
             name = self._scalar(key)
-            place = (*path, str(name))  # 02 and 2 are the same joint
-            if place in self.lines:
-                raise SettingsError(f"{'.'.join(place)} occurs twice", self._place(key))
-            self.lines[place] = key.start_mark.line + 1
-            values[name] = self.value(item, place)
+            # paths hold text: 02 and 2 are the same joint
+            item_path = (*path, str(name))
+            if item_path in self.lines:
+                raise SettingsError(f"{'.'.join(item_path)} occurs twice", self._place(key))
+            self.lines[item_path] = key.start_mark.line + 1
+            values[name] = self.value(item, item_path)
         return values
 
     def _place(self, node: yaml.Node) -> str:
@@ -107,12 +126,21 @@ class _Reader:
         self._characters += len(text)
         if self._characters > MOST_CHARACTERS:
             raise SettingsError(f"holds more than {MOST_CHARACTERS} characters of text", self._source)
-        if not all(c.isprintable() or c in "\t\n" for c in text):
+        if not all(letter.isprintable() or letter in "\t\n" for letter in text):
             raise SettingsError("a text contains characters that cannot be printed", self._place(node))
-        if node.style is not None:  # quoted, or a block of text
-            return text
-        if text.lower() in _WORDS:
-            return _WORDS[text.lower()]
-        if _INTEGER.fullmatch(text):
-            return int(text)
-        return float(re.sub(r"\.(?=[in])", "", text.lower())) if _NUMBER.fullmatch(text) else text
+        # a plain scalar is neither quoted nor a block of text
+        is_plain = node.style is None
+        return _plain_value(text) if is_plain else text
+
+
+def _plain_value(text: str) -> Any:
+    """Return what a plain scalar stands for by the rules of YAML 1.2."""
+    word = text.lower()
+    if word in _WORDS:
+        return _WORDS[word]
+    if _INTEGER.fullmatch(text):
+        return int(text)
+    if _NUMBER.fullmatch(text):
+        # Python spells .inf and .nan without the point
+        return float(re.sub(r"\.(?=[in])", "", word))
+    return text

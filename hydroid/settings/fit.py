@@ -1,9 +1,10 @@
-"""Settings of a fit, one YAML file per job, from the log to the search; and of a study, which vary them."""
+"""Settings of a fit, one YAML file per job, from the log to the search; and of a study,
+which vary them."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
-from itertools import product
+from itertools import product, starmap
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -28,22 +29,24 @@ class FitSettings(Settings):
     stage: Literal["mech", "hyd"] = "mech"
     """mech: the hydraulics are a gain; hyd: the whole chain from command to torque is simulated"""
     arm: Arm = "hydrolek"  # pyright: ignore[reportAssignmentType]
-    """name of a shipped arm, or path of an arm's YAML file, relative to this file or to the working folder"""
+    """name of a shipped arm, or path of an arm's YAML file,
+    relative to this file or to the working folder"""
     outputs: Annotated[Joints, Field(min_length=1)] = (2,)
     """joints whose measured angle is compared"""
     tolerance_deg: Positive | ByJoint[Positive] | None = None
-    """rms error on unseen logs up to which joints are predicted [deg], of all or by joint; null: 2 % of their
-    travel there"""
+    """rms error on unseen logs up to which joints are predicted [deg], of all or by joint; null: 2
+    % of their travel there"""
     start_pose: str = "home"
     """name of the arm's pose that joints without a measured angle hold"""
     free_start: bool = True
-    """whether simulated angles may begin beside the truth, as far as the sensor's noise in the rest before
-    the first command allows: the drift of the errors begins as uncertain as that. false: it is exact"""
+    """whether simulated angles may begin beside the truth, as far as the sensor's noise in the rest
+    before the first command allows: the drift of the errors begins as uncertain as that. false:
+    it is exact"""
     parameters: dict[str, ParameterSettings]
     """the parameters of the model by name, those to be estimated and those that are fixed"""
     scale: Literal["log", "linear"] = "log"
-    """log: parameters with a lower bound above 0 are searched, refined and reported by their logarithm;
-    linear: by their value, as in equations (15) and (16)"""
+    """log: parameters with a lower bound above 0 are searched, refined and reported by their
+    logarithm; linear: by their value, as in equations (15) and (16)"""
     hydraulics: HydraulicSettings = HydraulicSettings()
     priors: dict[str, PriorSettings] = {}
     """what is known besides the logs, each under a name of your choice"""
@@ -56,15 +59,18 @@ class FitSettings(Settings):
     refinement: RefinementSettings | None = RefinementSettings()
     """the refinement's settings; null: no refinement, as in the article"""
     joint_refinement: bool = False
-    """at the end, refine the parameters of both stages together: all that have bounds, fixed ones included"""
+    """at the end, refine the parameters of both stages together: all that have bounds,
+    fixed ones included"""
     design: DesignSettings = DesignSettings()
 
     @classmethod
     def names_of_joints(cls, values: Plain, folder: Path) -> tuple[str, ...]:
         """Return the names of the arm's joints; empty where no arm can be read."""
         arm = values.get("arm", cls.model_fields["arm"].default)
+        if not isinstance(arm, str):
+            return ()
         try:
-            return load_arm(arm, folder).joint_names if isinstance(arm, str) else ()
+            return load_arm(arm, folder).joint_names
         except HydroidError:
             return ()
 
@@ -74,30 +80,38 @@ class FitSettings(Settings):
         """Find the arm first: joints and links may be given by its names."""
         if not isinstance(values, dict):
             return values
-        names = values.get("parameters")
-        if isinstance(names, dict) and not all(isinstance(n, str) and n.isidentifier() for n in names):
-            raise ValueError("parameter names must be plain words such as K or M1")
-        context, arm = info.context or {}, values.get("arm", cls.model_fields["arm"].default)
-        if isinstance(arm, str):
-            arm = load_arm(arm, context.get("folder"))
-        elif isinstance(arm, dict):
-            arm = validate(arm, Arm, "arm", folder=context.get("folder"))
-        known = context["arm"] = arm if isinstance(arm, Arm) else None
-        if isinstance(names, dict):
+        parameters = values.get("parameters")
+        if isinstance(parameters, dict):
+            _check_names(parameters)
+        context = info.context or {}
+        arm = cls._arm_of(values, context.get("folder"))
+        # the context carries the arm to the validators of joints, which turn names into numbers
+        context["arm"] = arm if isinstance(arm, Arm) else None
+        if isinstance(parameters, dict):
             compared = values.get("outputs", cls.model_fields["outputs"].default)
-            log = values.get("log")
-            groups = log.get("groups") if isinstance(log, dict) else getattr(log, "groups", None)
-            entries = by_group(expanded(names, compared, known), groups if isinstance(groups, dict) else ())
+            entries = expanded(parameters, compared, context["arm"])
+            entries = by_group(entries, _groups(values.get("log")))
             entries, priors = with_curves(entries, values.get("priors"))
             values = {**values, "parameters": entries}
             if priors is not None:
                 values["priors"] = priors
         return {**values, "arm": arm}
 
+    @classmethod
+    def _arm_of(cls, values: Plain, folder: Path | None) -> Any:
+        """Return the arm that values of settings name or hold; anything else as it stands."""
+        arm = values.get("arm", cls.model_fields["arm"].default)
+        if isinstance(arm, str):
+            return load_arm(arm, folder)
+        if isinstance(arm, dict):
+            return validate(arm, Arm, "arm", folder=folder)
+        return arm
+
     @model_validator(mode="before")
     @classmethod
     def _one_model_without_hydraulics(cls, values: Any) -> Any:
-        """Take stage 1 for dynamic, whatever `simulation.model` says of stage 2: its steps follow from it."""
+        """Take stage 1 for dynamic, whatever `simulation.model` says of stage 2:
+        its steps follow from it."""
         if not isinstance(values, dict) or values.get("stage", "mech") != "mech":
             return values
         simulation = values.get("simulation")
@@ -111,11 +125,13 @@ class FitSettings(Settings):
     def _of_the_stage(self) -> "FitSettings":
         if self.joint_refinement and self.simulation.model == "ladder":
             raise ValueError("joint_refinement: refines one model; set simulation.model to it")
-        for name, own in self.parameters.items():
-            if self.stage == "mech" and own.quantity not in MECHANICAL:
-                raise ValueError(f"parameters.{name}: stage mech has no {own.quantity}; set stage: hyd")
-            if self.stage == "hyd" and own.quantity == "gain":
+        for name, parameter in self.parameters.items():
+            quantity = parameter.quantity
+            if self.stage == "mech" and quantity not in MECHANICAL:
+                raise ValueError(f"parameters.{name}: stage mech has no {quantity}; set stage: hyd")
+            if self.stage == "hyd" and quantity == "gain":
                 raise ValueError(f"parameters.{name}: stage hyd has no gain; the hydraulics take its place")
+        # this raises where a parameter cannot be made
         self.parameter_set()
         return self
 
@@ -126,10 +142,16 @@ class FitSettings(Settings):
 
     @property
     def seeded(self) -> bool:
-        """Whether another seed may lead a search elsewhere: not one that begins at stated starts alone."""
-        stated = any(p.states_start for p in self.parameters.values() if p.fixed is None)
-        drawn = self.search.algorithm != "multistart" or self.search.multistart.starts > 1
-        return drawn or not stated
+        """Whether another seed may lead a search elsewhere:
+        not one that begins at stated starts alone."""
+        if not self._states_start:
+            return True
+        return self.search.algorithm != "multistart" or self.search.multistart.starts > 1
+
+    @property
+    def _states_start(self) -> bool:
+        """Whether any parameter that is estimated says where a search starts."""
+        return any(p.states_start for p in self.parameters.values() if p.fixed is None)
 
     @property
     def substeps(self) -> int:
@@ -142,34 +164,56 @@ class FitSettings(Settings):
 
         The oil of a quasi-static model is none of the dynamic one, which has its own.
         """
-        own = [p for p in self.parameters.values() if model != "dynamic" or not p.quantity.startswith("oil_")]
-        return tuple(dict.fromkeys(p.term for p in own if p.term is not None))
+        parameters = self.parameters.values()
+        if model == "dynamic":
+            parameters = [p for p in parameters if not p.quantity.startswith("oil_")]
+        names = (parameter.term for parameter in parameters if parameter.term is not None)
+        return tuple(dict.fromkeys(names))
 
     def of_estimate(self, name: str | None) -> "FitSettings":
         """Return the settings that an estimate of a fit was refined with, and predicts with.
 
-        `name` is that of the estimate, then those of the terms that it has: refined+pump; None: no fit's.
+        `name` is that of the estimate, then those of the terms that it has: refined+pump;
+        None: no fit's.
         """
         if name is None:
             return self
         model, *terms = name.split("+")
-        settings = self
-        if model == "joint":  # every parameter is free that can be
-            free = {n: p.changed({"fixed": None}) for n, p in self.parameters.items() if p.can_be_free}
-            settings = self.with_parameters(free)
+        settings = self._all_free() if model == "joint" else self
         if self.terms() != tuple(terms):
-            own = {n: p for n, p in settings.parameters.items() if p.term is None or p.term in terms}
-            settings = settings.changed({"parameters": own})
-        return settings.changed({"simulation.model": model}) if model == "dynamic" else settings
+            settings = settings._with_terms(terms)
+        if model == "dynamic":
+            settings = settings.changed({"simulation.model": model})
+        return settings
+
+    def _all_free(self) -> "FitSettings":
+        """Return the settings with every parameter free that can be."""
+        changed = {
+            name: parameter.changed({"fixed": None})
+            for name, parameter in self.parameters.items()
+            if parameter.can_be_free
+        }
+        return self.with_parameters(changed)
+
+    def _with_terms(self, terms: Collection[str]) -> "FitSettings":
+        """Return the settings without the parameters of all other terms."""
+        kept = {
+            name: parameter
+            for name, parameter in self.parameters.items()
+            if parameter.term is None or parameter.term in terms
+        }
+        return self.changed({"parameters": kept})
 
     def parameter_set(self) -> ParameterSet:
-        """Return the parameters with units, bounds, priors and fixed values, in the order of theta."""
+        """Return the parameters with units, bounds, priors and fixed values,
+        in the order of theta."""
         parameters = [
-            make_parameter(name, own, self.arm, self.hydraulics, log=self.scale == "log")
-            for name, own in self.parameters.items()
+            make_parameter(name, settings, self.arm, self.hydraulics, log=self.scale == "log")
+            for name, settings in self.parameters.items()
         ]
-        if not any(own.states_start for own in self.parameters.values() if own.fixed is None):
-            parameters = [replace(one, start=None) for one in parameters]
+        if not self._states_start:
+            # nominal values alone are no start: the search draws its own
+            parameters = [replace(parameter, start=None) for parameter in parameters]
         return ParameterSet(tuple(parameters))
 
     def with_parameters(self, changed: Mapping[str, ParameterSettings]) -> "FitSettings":
@@ -178,17 +222,39 @@ class FitSettings(Settings):
 
     def acting_on(self, joint: int) -> set[str]:
         """Return the names of the free parameters that act on this joint only."""
-        return {n for n, p in self.parameters.items() if p.fixed is None and p.joints == (joint,)}
+        return {
+            name
+            for name, parameter in self.parameters.items()
+            if parameter.fixed is None and parameter.joints == (joint,)
+        }
 
     def alone(self, joint: int, values: Mapping[str, float]) -> "FitSettings":
         """Return the settings of one joint's own parameters, the others held at values by name.
 
         Joints that are not compared then follow their logged motion.
         """
-        own = self.acting_on(joint)
-        held = {n: p.changed({"fixed": values[n]}) for n, p in self.parameters.items() if n not in own}
+        free = self.acting_on(joint)
+        held = {
+            name: parameter.changed({"fixed": values[name]})
+            for name, parameter in self.parameters.items()
+            if name not in free
+        }
         changes = {"outputs": (joint,), "simulation.other_joints": "measured"}
         return self.with_parameters(held).changed(changes)
+
+
+def _check_names(parameters: Mapping[Any, Any]) -> None:
+    """Raise ValueError where a parameter's name cannot be used in tables and by `--set`."""
+    for name in parameters:
+        if not isinstance(name, str) or not name.isidentifier():
+            raise ValueError("parameter names must be plain words such as K or M1")
+
+
+def _groups(log: Any) -> Collection[str]:
+    """Return the names of the groups of logs,
+    of the settings of logs as YAML or Python gives them."""
+    groups = log.get("groups") if isinstance(log, dict) else getattr(log, "groups", None)
+    return groups if isinstance(groups, dict) else ()
 
 
 MOST_CELLS = 100_000  # of a study
@@ -207,7 +273,8 @@ class StudySettings(Settings):
     logs: Annotated[tuple[str, ...], Field(min_length=1)]
     """fitted logs, relative to the study's file"""
     axes: dict[str, Annotated[dict[str, Changes] | tuple[Any, ...], Field(min_length=1)]] = {}
-    """what varies: a dotted key with a list of values, or a name with cells: {label: {key: value, ...}}"""
+    """what varies: a dotted key with a list of values, or a name with cells: {label: {key: value,
+    ...}}"""
     seeds: Annotated[int, Field(ge=0, le=10_000)] = 10
     """number of seeds, from 1"""
 
@@ -215,20 +282,26 @@ class StudySettings(Settings):
         """Return the settings that each cell replaces, by the cell's name."""
         if math.prod(map(len, self.axes.values())) > MOST_CELLS:
             raise SettingsError(f"make more than {MOST_CELLS} cells", "axes", "leave some out")
-        options = [
-            axis.items() if isinstance(axis, dict) else [(f"{key} {value}", {key: value}) for value in axis]
-            for key, axis in self.axes.items()
-        ]
-        return {
-            ", ".join(label for label, _ in choice) or "all": {
-                key: value for _, change in choice for key, value in change.items()
-            }
-            for choice in product(*options)
-        }
+        cells = dict[str, Changes]()
+        for choice in product(*starmap(_options, self.axes.items())):
+            name = ", ".join(label for label, _ in choice) or "all"
+            cells[name] = {}
+            for _, change in choice:
+                cells[name] |= change
+        return cells
+
+
+def _options(key: str, axis: Mapping[str, Changes] | tuple[Any, ...]) -> list[tuple[str, Changes]]:
+    """Return the cells along an axis of a study: their labels,
+    and the settings that they replace."""
+    if isinstance(axis, Mapping):
+        return [*axis.items()]
+    return [(f"{key} {value}", {key: value}) for value in axis]
 
 
 def cell_settings(study: StudySettings, path: Path, extra: Changes | None = None) -> dict[str, FitSettings]:
-    """Return the settings of a fit of every cell, with `extra` ones replaced, by the cell's name."""
+    """Return the settings of a fit of every cell, with `extra` ones replaced,
+    by the cell's name."""
     config = find_config(study.base, path.parent)
     try:
         return {

@@ -1,4 +1,5 @@
-"""YAML -> checked settings; every error names the file, the line, the setting and what is allowed."""
+"""YAML -> checked settings; every error names the file, the line,
+the setting and what is allowed."""
 
 import difflib
 from collections.abc import Mapping, Sequence
@@ -18,18 +19,26 @@ _PLAIN = {
     "model": "must be a mapping of settings",
     "tuple": "must be a list in brackets, [a, b]",
 }
-"""what a fault means in YAML, by the start of pydantic's name for it; its own words say the others"""
+"""what a fault means in YAML, by the start of pydantic's name for it;
+its own words say the others"""
+
+
+_YAML_WORDS = {"None": "null", "True": "true", "False": "false"}
+"""how YAML spells what Python spells otherwise"""
 
 
 def _with_tuples(values: Any) -> Any:
     """Take YAML's lists for tuples, which frozen settings hold."""
     if isinstance(values, dict):
         return {key: _with_tuples(value) for key, value in values.items()}
-    return tuple(_with_tuples(value) for value in values) if isinstance(values, list) else values
+    if isinstance(values, list):
+        return tuple(map(_with_tuples, values))
+    return values
 
 
 class Settings(BaseModel):
-    """Base of all settings: frozen; an unknown key is an error, and so is true for a number or "3" for 3."""
+    """Base of all settings: frozen; an unknown key is an error,
+    and so is true for a number or "3" for 3."""
 
     model_config = {"frozen": True, "extra": "forbid", "allow_inf_nan": False, "strict": True}
 
@@ -41,26 +50,43 @@ class Settings(BaseModel):
         return ()
 
     def changed(self, changes: Mapping[str, Any]) -> Self:
-        """Return the settings with values replaced by dotted key, such as `search.seed`; none is checked."""
+        """Return the settings with values replaced by dotted key, such as `search.seed`.
+
+        The new values are not checked.
+        """
         settings = self
         for key, value in changes.items():
             name, _, inner = key.partition(".")
-            within = getattr(settings, name).changed({inner: value}) if inner else value
-            settings = settings.model_copy(update={name: within})
+            if inner:
+                value = getattr(settings, name).changed({inner: value})
+            settings = settings.model_copy(update={name: value})
         return settings
 
 
 def _number_of(key: Any, info: ValidationInfo) -> Any:
-    """Take a joint's name, or its number as text, as JSON and `--set` spell it, for its number from 1."""
+    """Take a joint's name, or its number as text, as JSON and `--set` spell it,
+    for its number from 1."""
     if not isinstance(key, str):
         return key
-    if key.isascii() and key.isdecimal():
+    if _is_number(key):
         return int(key)
-    arm = (info.context or {}).get("arm")
-    names = arm.joint_names if arm else ()
+    names = _joint_names(info)
     if key in names:
         return names.index(key) + 1
-    raise ValueError(f"no joint {key!r}" + (f"; the arm's joints: {', '.join(names)}" if names else ""))
+    hint = f"; the arm's joints: {', '.join(names)}" if names else ""
+    raise ValueError(f"no joint {key!r}{hint}")
+
+
+def _is_number(key: str) -> bool:
+    """Return whether a text is a whole number; `isdecimal` alone takes the digits of any script."""
+    return key.isascii() and key.isdecimal()
+
+
+def _joint_names(info: ValidationInfo) -> tuple[str, ...]:
+    """Return the names of the joints of the arm that settings are about;
+    none before the arm is read."""
+    arm = (info.context or {}).get("arm")
+    return arm.joint_names if arm else ()
 
 
 JointNumber = Annotated[int, BeforeValidator(_number_of), Field(ge=1)]
@@ -68,25 +94,30 @@ JointNumber = Annotated[int, BeforeValidator(_number_of), Field(ge=1)]
 
 
 def meant(key: Any, names: Sequence[str]) -> Any:
-    """Return the number of the joint that a key means, by its number or its name; any other key itself."""
-    if isinstance(key, str) and key.isascii() and key.isdecimal():
+    """Return the number of the joint that a key means, by its number or its name;
+    any other key itself."""
+    if isinstance(key, str) and _is_number(key):
         return int(key)
-    return names.index(key) + 1 if key in names else key
+    if key in names:
+        return names.index(key) + 1
+    return key
 
 
 def each_once(joints: Any, names: Sequence[str]) -> None:
-    """Raise ValueError where a joint occurs twice among joints, such as by its number and its name."""
+    """Raise ValueError where a joint occurs twice among joints,
+    such as by its number and its name."""
     taken = set[Any]()
     for key in joints:
-        if (joint := meant(key, names)) in taken:
+        joint = meant(key, names)
+        if joint in taken:
             raise ValueError(f"joint {key} occurs twice")
         taken.add(joint)
 
 
 def _each_once(joints: Any, info: ValidationInfo) -> Any:
-    arm = (info.context or {}).get("arm")
+    # keys of another type are no joints: pydantic refuses them in its own words
     if isinstance(joints, dict | tuple) and all(isinstance(key, str | int) for key in joints):
-        each_once(joints, arm.joint_names if arm else ())
+        each_once(joints, _joint_names(info))
     return joints
 
 
@@ -107,26 +138,41 @@ def load(path: Path, kind: type[S], overrides: Mapping[str, Any] | None = None) 
     An override of a joint's settings finds them under its number and under its name.
     """
     values, lines = read_yaml(path)
-    given = dict[str, str]()
-    names = kind.names_of_joints(values | dict(overrides or {}), path.parent) if overrides else ()
-    for key, value in (overrides or {}).items():
-        (*folders, last), place, parts = key.split("."), values, list[str]()
-        for folder in folders:
-            parts.append(part := _same_key(place, folder, names))
-            place = place.setdefault(part, {})
-            if not isinstance(place, dict):
-                raise SettingsError(f"{folder} has no settings below it", f"--set {key}")
-        parts.append(part := _same_key(place, last, names))
-        place[part] = value
-        given[".".join(map(str, parts))] = key
-    return validate(values, kind, str(path), lines, given, path.parent)
+    changes = dict(overrides or {})
+    overridden = dict[str, str]()
+    if changes:
+        names = kind.names_of_joints(values | changes, path.parent)
+        for key, value in changes.items():
+            overridden[_replace(values, key, value, names)] = key
+    return validate(values, kind, str(path), lines, overridden, path.parent)
 
 
-def _same_key(place: Plain, key: str, names: Sequence[str]) -> Any:
-    """Return the key by which a mapping has a setting, such as a joint's name for its number; or the key."""
-    if key in place:
+def _replace(values: Plain, key: str, value: Any, names: Sequence[str]) -> str:
+    """Replace a value in nested mappings by its dotted key,
+    and return the key by which they have it."""
+    *folders, last = key.split(".")
+    mapping = values
+    parts = list[str]()
+    for folder in folders:
+        part = _same_key(mapping, folder, names)
+        parts.append(part)
+        mapping = mapping.setdefault(part, {})
+        if not isinstance(mapping, dict):
+            raise SettingsError(f"{folder} has no settings below it", f"--set {key}")
+    part = _same_key(mapping, last, names)
+    parts.append(part)
+    mapping[part] = value
+    return ".".join(map(str, parts))
+
+
+def _same_key(mapping: Plain, key: str, names: Sequence[str]) -> Any:
+    """Return the key by which a mapping has a setting, such as a joint's name for its number;
+    or the key."""
+    if key in mapping:
         return key
-    return next((one for one in place if meant(one, names) == meant(key, names)), key)
+    joint = meant(key, names)
+    same = (other for other in mapping if meant(other, names) == joint)
+    return next(same, key)
 
 
 def validate(
@@ -137,7 +183,8 @@ def validate(
     overridden: Mapping[str, str] | None = None,
     folder: Path | None = None,
 ) -> S:
-    """Check a mapping against `kind` and report its faults with their places, of many the first four.
+    """Check a mapping against `kind` and report its faults with their places,
+    of many the first four.
 
     Files that the settings name are first looked up in `folder`. `overridden` are the keys that
     `--set` gave, by those that they replace.
@@ -146,24 +193,42 @@ def validate(
         return kind.model_validate(values, context={"folder": folder, "source": source})
     except ValidationError as error:
         faults = sorted(error.errors(), key=_rank)
-    found = dict[str, str]()  # a value that is none of several types is one fault
+    problems = dict[str, str]()
     for fault in faults:
         key, problem = _explained(fault, kind)
-        # the fault may lie in an override, below it, or in what it is a part of
-        replaced = sorted(overridden or {})
-        near = (o for o in replaced if f"{key}.".startswith(f"{o}.") or o.startswith(f"{key}."))
-        if overridden and (at := next(near, None)):
-            name, where = key[len(at) + 1 :], f"--set {overridden[at]}"
+        override = _override_of(key, overridden or {})
+        if override is not None and overridden:
+            name = key[len(override) + 1 :]
+            where = f"--set {overridden[override]}"
         else:
-            named = fault["type"] in ("extra_forbidden", "missing")  # the problem names the setting
-            parts = tuple(key.split("."))
-            begins = (parts[:end] for end in range(len(parts), 0, -1))
-            line = next((f", line {lines[part]}" for part in begins if lines and part in lines), "")
-            name, where = "" if named else _shown(key)[1:-1], f"{source}{line}"
-        found.setdefault(where, f"{name}: {problem}" if name else problem)
-    (where, what), *others = found.items()
-    also = listed([f"{place.removeprefix(f'{source}, ')}: {other}" for place, other in others], 3)
-    raise SettingsError(what, where, also and f"also {also}")
+            names_itself = fault["type"] in ("extra_forbidden", "missing")
+            name = "" if names_itself else _shown(key)[1:-1]
+            where = source + _line_of(key, lines or {})
+        # a value that is none of several types has a fault for each; they are one problem
+        problems.setdefault(where, f"{name}: {problem}" if name else problem)
+    (where, what), *others = problems.items()
+    further = [f"{place.removeprefix(f'{source}, ')}: {problem}" for place, problem in others]
+    hint = f"also {listed(further, 3)}" if further else ""
+    raise SettingsError(what, where, hint)
+
+
+def _override_of(key: str, overridden: Mapping[str, str]) -> str | None:
+    """Return the overridden key in which a fault may lie: its own, one above it,
+    or one below it."""
+    for override in sorted(overridden):
+        if f"{key}.".startswith(f"{override}.") or override.startswith(f"{key}."):
+            return override
+    return None
+
+
+def _line_of(key: str, lines: Lines) -> str:
+    """Return the line of a setting in words; where it has none,
+    that of the mapping that lacks it."""
+    parts = tuple(key.split("."))
+    for end in range(len(parts), 0, -1):
+        if parts[:end] in lines:
+            return f", line {lines[parts[:end]]}"
+    return ""
 
 
 def parse_override(text: str) -> tuple[str, Any]:
@@ -181,7 +246,8 @@ def _rank(fault: Any) -> int:
     """
     if fault["type"] == "extra_forbidden":
         return 0
-    return 2 if fault["type"].endswith("_type") and any(map(_is_type, fault["loc"])) else 1
+    one_of_several = any(map(_is_type, fault["loc"]))
+    return 2 if one_of_several and fault["type"].endswith("_type") else 1
 
 
 def _is_type(part: Any) -> bool:
@@ -190,32 +256,53 @@ def _is_type(part: Any) -> bool:
 
 
 def _explained(fault: Any, kind: type[Settings]) -> tuple[str, str]:
-    """The dotted key of a setting, and what is wrong with it, from one of pydantic's faults."""
+    """Return the dotted key of a setting, and what is wrong with it,
+    from one of pydantic's faults."""
     key = ".".join(str(part) for part in fault["loc"] if not _is_type(part))
     if fault["type"] == "missing":
         return key, f"setting {key!r} is missing"
     if fault["type"] == "extra_forbidden":
-        inner: Any = kind
-        for part in fault["loc"][:-1]:
-            field = getattr(inner, "model_fields", {}).get(str(part))
-            inner = field and field.annotation
-        allowed = [*getattr(inner, "model_fields", ())]
-        near = difflib.get_close_matches(str(fault["loc"][-1]), allowed, n=1)
-        choice = f"; did you mean {near[0]!r}?" if near else f"; allowed here: {', '.join(allowed)}"
-        return key, f"unknown setting {_shown(key)}{choice if allowed else ''}"
-    words = str(fault["msg"]).removeprefix("Value error, ").replace("Input should", "must")
-    problem = _PLAIN.get(fault["type"].partition("_")[0], words[:1].lower() + words[1:])
-    if isinstance(fault["input"], dict):  # a check of several settings names the one that is wrong
-        name, colon, rest = problem.partition(": ")
-        inner = name if colon and name.replace(".", "").isidentifier() else ""
-        return (f"{key}.{inner}".strip("."), rest) if inner else (key, problem)
-    return key, f"{problem} (given: {_shown(fault['input'])})"
+        return key, f"unknown setting {_shown(key)}{_choice(fault['loc'], kind)}"
+    problem = _problem(fault)
+    if not isinstance(fault["input"], dict):
+        return key, f"{problem} (given: {_shown(fault['input'])})"
+    # a check of several settings begins its message with the one that is wrong
+    name, colon, rest = problem.partition(": ")
+    if colon and name.replace(".", "").isidentifier():
+        return f"{key}.{name}".strip("."), rest
+    return key, problem
+
+
+def _choice(location: Sequence[Any], kind: type[Settings]) -> str:
+    """Return which settings there are where an unknown one stands, or the one that it resembles."""
+    *outer, unknown = location
+    settings: Any = kind
+    for part in outer:
+        field = getattr(settings, "model_fields", {}).get(str(part))
+        settings = field and field.annotation
+    allowed = [*getattr(settings, "model_fields", ())]
+    # a misspelt setting is more likely than one that was never there
+    near = difflib.get_close_matches(str(unknown), allowed, n=1)
+    if near:
+        return f"; did you mean {near[0]!r}?"
+    return f"; allowed here: {', '.join(allowed)}" if allowed else ""
+
+
+def _problem(fault: Any) -> str:
+    """Return what is wrong, in YAML's words where pydantic's are Python's."""
+    family = fault["type"].partition("_")[0]
+    if family in _PLAIN:
+        return _PLAIN[family]
+    message = str(fault["msg"]).removeprefix("Value error, ")
+    message = message.replace("Input should", "must")
+    return message[:1].lower() + message[1:]
 
 
 def _shown(value: object) -> str:
-    """A value as YAML writes it, shortened where it is long."""
+    """Return a value as YAML writes it, shortened where it is long."""
+    text = repr(value)
     if isinstance(value, tuple):
         text = f"[{', '.join(map(_shown, value))}]"
-    else:
-        text = {"None": "null", "True": "true", "False": "false"}.get(repr(value), repr(value))
+    elif text in _YAML_WORDS:
+        text = _YAML_WORDS[text]
     return text if len(text) <= 60 else f"{text[:56]}...{text[-1]}"

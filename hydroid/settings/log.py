@@ -1,4 +1,5 @@
-"""How the columns of a log become commands [%] and joint angles [rad]. The defaults fit the shipped logs.
+"""How the columns of a log become commands [%] and joint angles [rad].
+The defaults fit the shipped logs.
 
 log:
   time: {column: t, unit: ms}
@@ -8,6 +9,7 @@ log:
     7: null                     # not in the log
 """
 
+import re
 from fnmatch import fnmatch
 from pathlib import Path
 from typing import Annotated, Literal, NamedTuple
@@ -18,6 +20,14 @@ from hydroid.errors import SettingsError
 from hydroid.files import Plain
 from hydroid.settings.load import ByJoint, Settings
 from hydroid.words import listed
+
+_PART = re.compile(r"\[\d+\]$")
+
+
+def log_file(source: str | Path) -> Path:
+    """Return the file of a log by its source: FILE[2] is the part of FILE after its first gap."""
+    return Path(_PART.sub("", str(source)))
+
 
 JOINT = "{joint}"
 OTHER = "other"
@@ -49,15 +59,17 @@ class TimeColumn(Settings):
 
 
 class Columns(Settings):
-    """Columns of one quantity: value = scale · cell + offset. Null: as for all joints, or the default."""
+    """Columns of one quantity: value = scale · cell + offset. Null: as for all joints,
+    or the default."""
 
     column: Annotated[tuple[Name, ...] | None, BeforeValidator(_one_or_more)] = None
-    """name in the header, with {joint} for the joint's number; or two names: the positive and the negative
-    direction of a command, whose values lie in [0, 100] % and are subtracted; chamber A, which pushes to
-    positive angles, and chamber B of a pressure. Default: u{joint}_pct, q{joint}_deg, [pA{joint}_bar,
-    pB{joint}_bar]"""
+    """name in the header, with {joint} for the joint's number; or two names: the positive and the
+    negative direction of a command, whose values lie in [0, 100] % and are subtracted; chamber A,
+    which pushes to positive angles, and chamber B of a pressure. Default: u{joint}_pct,
+    q{joint}_deg, [pA{joint}_bar, pB{joint}_bar]"""
     unit: Literal["%", "deg", "rad", "m", "cm", "mm", "bar", "Pa", "MPa"] | None = None
-    """unit of the scaled cells, of the angle of a joint that slides m, cm or mm; default: %, deg, bar"""
+    """unit of the scaled cells: of the angle of a joint that slides m, cm or mm, which of a joint
+    that turns are the length of its cylinder from pin to pin; default: %, deg, bar"""
     scale: Annotated[Number | None, AfterValidator(_nonzero)] = None
     """factor on the cells; default: 1"""
     offset: Number | None = None
@@ -82,11 +94,13 @@ KINDS = {
 
 
 def _checked(columns: Columns | None, info: ValidationInfo) -> Columns | None:
+    if columns is None:
+        return None
     kind = str(info.field_name)
     _, counts, units = KINDS[kind]
-    if columns and columns.unit not in (None, *units):
+    if columns.unit not in (None, *units):
         raise ValueError(f"{columns.unit} is no unit of a log's {kind}s")
-    if columns and columns.column and len(columns.column) not in counts:
+    if columns.column and len(columns.column) not in counts:
         raise ValueError(f"{kind} needs {' or '.join(map(str, counts))} column names")
     return columns
 
@@ -106,7 +120,9 @@ class JointColumns(Settings):
 
 
 def _common(columns: Columns | None) -> Columns | None:
-    for name in (columns and columns.column) or ():
+    if columns is None:
+        return None
+    for name in columns.column or ():
         if JOINT not in name:
             raise ValueError(f"column {name!r} is meant for all joints, so its name must contain {JOINT}")
     return columns
@@ -135,44 +151,57 @@ class LogSettings(Settings):
     groups: dict[
         Annotated[str, Field(pattern=r"^\w+$")], Annotated[tuple[Name, ...], BeforeValidator(_one_or_more)]
     ] = {}
-    """logs that share a day, an oil temperature or an operator, by a name of your choice: a pattern of file
-    names, or several, as in {monday: mon_*.csv}. Parameters may have an effect in each (`per: group`)"""
+    """logs that share a day, an oil temperature or an operator, by a name of your choice: a pattern
+    of file names, or several, as in {monday: mon_*.csv}.
+    Parameters may have an effect in each (`per: group`)"""
     repair_s: Annotated[float, Field(ge=0, le=10)] = 0.1
     """longest gap that --repair fills [s]"""
 
     _prefix: str = PrivateAttr("")
 
     def columns(self, kind: Kind, joint: int) -> ColumnMap | None:
-        """Return the columns of a joint (number, from 1), its number in their names; None: not in the log."""
+        """Return the columns of a joint (number, from 1), its number in their names; None: not in
+        the log."""
         common: Columns | None = getattr(self, kind)
-        own: Columns | None = getattr(self.joints.get(joint, JointColumns()), kind, None)
-        if own is None or (common is None and own == Columns()):
+        of_joint = self.joints.get(joint, JointColumns())
+        own: Columns | None = getattr(of_joint, kind, None)
+        if own is None:
             return None
-        default, _, (unit, *_) = KINDS[kind]
-        given: Plain = {"column": default, "unit": unit}
-        for columns in filter(None, (common, own)):
-            given |= columns.model_dump(exclude_none=True)
-        names = tuple(self._prefix + name.replace(JOINT, str(joint)) for name in given.pop("column"))
+        if common is None and own == Columns():
+            return None
+        names, _, (unit, *_) = KINDS[kind]
+        given: Plain = {"column": names, "unit": unit}
+        if common is not None:
+            given |= common.model_dump(exclude_none=True)
+        given |= own.model_dump(exclude_none=True)
+        templates = given.pop("column")
+        names = tuple(self._prefix + name.replace(JOINT, str(joint)) for name in templates)
         return ColumnMap(names, **given)
 
     def group_of(self, log: str) -> str:
         """Return the group of a log by its file's name.
+
         Raises SettingsError: it is in several.
         """
-        name = Path(log).name
-        of = [group for group, patterns in self.groups.items() for p in patterns if fnmatch(name, p)]
-        if len({*of}) > 1:
-            raise SettingsError(f"{name} is in the groups {listed(of)}", "log.groups")
-        return of[0] if of else OTHER
+        name = log_file(log).name
+        found = list[str]()
+        for group, patterns in self.groups.items():
+            if any(fnmatch(name, pattern) for pattern in patterns):
+                found.append(group)
+        if len(found) > 1:
+            raise SettingsError(f"{name} is in the groups {listed(found)}", "log.groups")
+        return found[0] if found else OTHER
 
     def of_arm(self, side: str) -> "LogSettings":
-        """Return the columns of one of two arms: their names begin with its own; the time's is common."""
+        """Return the columns of one of two arms: their names begin with its own;
+        the time's is common."""
         copy = self.model_copy()
         copy._prefix = f"{side}_"
         return copy
 
     def angles_only(self) -> "LogSettings":
-        """Return the columns of a trajectory: whatever commands and pressures it holds are not read."""
+        """Return the columns of a trajectory: whatever commands and pressures it holds
+        are not read."""
         nothing = {"command": None, "pressure": None}
         joints = {joint: own and own.changed(nothing) for joint, own in self.joints.items()}
         return self.changed(nothing | {"joints": joints})

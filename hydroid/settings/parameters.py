@@ -1,4 +1,5 @@
-"""From the settings of parameters to parameters: one per joint, nominal values, priors, bounds and starts."""
+"""From the settings of parameters to parameters: one per joint, nominal values, priors,
+bounds and starts."""
 
 import math
 import re
@@ -23,49 +24,99 @@ CURVE_BOUNDS = (0.003, 300.0)
 """of a factor: the first part of a valve that jumps open is some hundred times as steep as the last"""
 CURVE_SD = 0.3
 """scatter of the logarithm of neighbouring factors that one expects (ours)"""
+BY_TURN = ("area", "area_a", "area_b", "dry_friction")
+"""quantities that a rotary actuator has by its angle, where a cylinder has them by its stroke"""
 GROUP = "group"
 """what `per` says of a parameter that has an effect in each group"""
 
 
 def expanded(parameters: Mapping[str, Any], compared: Any, arm: Arm | None) -> Plain:
-    """Return the settings of parameters, as YAML gives them, with one entry for each joint or link of `each`.
+    """Return the settings of parameters, as YAML gives them,
+    one entry for each joint or link of `each`.
 
-    `compared` are the joints that `each: true` means; of masses it means all links. With one joint a
-    mechanical parameter serves all joints, because those that are driven but not compared need it too.
+    `compared` are the joints that `each: true` means; of masses it means all links. With one joint
+    a mechanical parameter serves all joints, because those that are driven but not compared need it
+    too.
+
     Raises ValueError: a parameter with `joints` or `link` and `each`.
     """
     result: Plain = {}
     for name, entry in parameters.items():
         each = entry.get("each") if isinstance(entry, dict) else None
         if not each:
-            result[name] = result.get(name, {}) | entry if isinstance(entry, dict) else entry
-            continue
-        quantity = entry.get("quantity")
-        key, kind = ("link", str) if quantity == "mass" else ("joints", int | str)
-        if entry.get(key) is not None:
-            what = "link or each: links" if key == "link" else "joints that share it or each: joints"
-            raise ValueError(f"parameters.{name}: give {what} that have their own, not both")
-        every = arm.link_names if key == "link" and arm else compared
-        places = every if each is True else each
-        if not isinstance(places, list | tuple) or not all(isinstance(place, kind) for place in places):
-            result[name] = entry  # refused as any other wrong value
-            continue
-        shared = {setting: value for setting, value in entry.items() if setting != "each"}
-        names = dict(enumerate(arm.joint_names, 1)) if arm and key == "joints" else {}
-        if key == "joints":
-            _refuse(places, "outputs" if each is True else f"parameters.{name}.each", [*names.values()])
-        numbers: Plain = {label: number for number, label in names.items()}
-        places = [numbers.get(place, place) for place in places]
-        if key == "joints" and len(places) == 1:
-            everywhere = each is True and quantity in MECHANICAL
-            result[name] = shared | ({} if everywhere else {"joints": places})
-            continue
-        taken = set[str]()
-        for place in places:
-            label = names.get(place, place)
-            own = distinct(re.sub(r"\W", "_", f"{name}_{label}"), taken)  # --set splits names at dots
-            result[own] = shared | {key: place if key == "link" else [place]} | result.get(own, {})
+            _add(result, name, entry)
+        elif entry.get("quantity") == "mass":
+            _add_links(result, name, entry, arm)
+        else:
+            _add_joints(result, name, entry, compared, arm)
     return result
+
+
+def _add(result: Plain, name: str, entry: Any) -> None:
+    """Add an entry that needs no expansion; it changes one that `each` has made under its name."""
+    if isinstance(entry, dict):
+        entry = result.get(name, {}) | entry
+    result[name] = entry
+
+
+def _add_links(result: Plain, name: str, entry: Plain, arm: Arm | None) -> None:
+    """Add a mass for each link of `each`."""
+    if entry.get("link") is not None:
+        raise ValueError(f"parameters.{name}: give link or each: links that have their own, not both")
+    links: Any = entry["each"]
+    if links is True:
+        links = arm.link_names if arm else None
+    if not _are_all(links, str):
+        # refused as any other wrong value
+        result[name] = entry
+        return
+    shared = _without_each(entry)
+    taken = set[str]()
+    for link in links:
+        own_name = _name_at(name, link, taken)
+        result[own_name] = shared | {"link": link} | result.get(own_name, {})
+
+
+def _add_joints(result: Plain, name: str, entry: Plain, compared: Any, arm: Arm | None) -> None:
+    """Add a parameter for each joint of `each`."""
+    if entry.get("joints") is not None:
+        what = "joints that share it or each: joints that have their own, not both"
+        raise ValueError(f"parameters.{name}: give {what}")
+    all_compared = entry["each"] is True
+    joints: Any = compared if all_compared else entry["each"]
+    if not _are_all(joints, int | str):
+        # refused as any other wrong value
+        result[name] = entry
+        return
+    names = arm.joint_names if arm else ()
+    _refuse(joints, "outputs" if all_compared else f"parameters.{name}.each", names)
+    numbers = {label: number for number, label in enumerate(names, 1)}
+    joints = [numbers.get(joint, joint) for joint in joints]
+    shared = _without_each(entry)
+    if len(joints) == 1:
+        # joints that are driven but not compared need a mechanical parameter, too
+        everywhere = all_compared and entry.get("quantity") in MECHANICAL
+        result[name] = shared if everywhere else shared | {"joints": joints}
+        return
+    labels = dict(enumerate(names, 1))
+    taken = set[str]()
+    for joint in joints:
+        own_name = _name_at(name, labels.get(joint, joint), taken)
+        result[own_name] = shared | {"joints": [joint]} | result.get(own_name, {})
+
+
+def _are_all(values: Any, kind: Any) -> bool:
+    return isinstance(values, list | tuple) and all(isinstance(value, kind) for value in values)
+
+
+def _without_each(entry: Plain) -> Plain:
+    return {setting: value for setting, value in entry.items() if setting != "each"}
+
+
+def _name_at(name: str, label: Any, taken: set[str]) -> str:
+    """Return the name of a parameter at a joint or link; --set splits names at dots,
+    so it has none."""
+    return distinct(re.sub(r"\W", "_", f"{name}_{label}"), taken)
 
 
 def _refuse(joints: Any, where: str, names: Sequence[str]) -> None:
@@ -79,14 +130,15 @@ def _refuse(joints: Any, where: str, names: Sequence[str]) -> None:
 
 
 def by_group(parameters: Mapping[str, Any], groups: Collection[str]) -> Plain:
-    """Return the settings of parameters with one entry for each group of `per: group`, and for other logs.
+    """Return the settings of parameters, one entry for each group of `per:
+    group` and for other logs.
 
     Raises ValueError: there are no groups.
     """
     result: Plain = {}
     for name, entry in parameters.items():
         if not isinstance(entry, dict) or entry.get("per") != GROUP:
-            result[name] = result.get(name, {}) | entry if isinstance(entry, dict) else entry
+            _add(result, name, entry)
             continue
         if not groups or GROUP in groups:
             what = "per: group needs log.groups: {name: pattern}, none of them named group"
@@ -94,8 +146,8 @@ def by_group(parameters: Mapping[str, Any], groups: Collection[str]) -> Plain:
         for group in (*groups, OTHER):
             if len(result) >= MOST:
                 raise ValueError(f"parameters.{name}: more than {MOST} parameters")
-            own = f"{name}_{group}"
-            result[own] = entry | {"per": group} | result.get(own, {})
+            effect = f"{name}_{group}"
+            result[effect] = entry | {"per": group} | result.get(effect, {})
     return result
 
 
@@ -132,78 +184,123 @@ def with_curves(parameters: Mapping[str, Any], priors: Any) -> tuple[Plain, Any]
     return result, smooth | (priors or {})
 
 
-def nominal_value(arm: Arm, hydraulics: HydraulicSettings, own: ParameterSettings) -> float | None:
-    """Return what its settings, `hydraulics` or the arm's file say of a parameter; None: no one value."""
-    if own.nominal is not None or own.per is not None:
-        return own.nominal or 0.0
-    if own.link is not None:
-        return arm.mass_of.get(own.link)
-    if own.quantity in MECHANICAL:
+def nominal_value(arm: Arm, hydraulics: HydraulicSettings, settings: ParameterSettings) -> float | None:
+    """Return what its settings, `hydraulics` or the arm's file say of a parameter; None:
+    no one value."""
+    if settings.nominal is not None:
+        return settings.nominal
+    if settings.per is not None:
+        # an effect of a group is added to the quantity
+        return 0.0
+    if settings.link is not None:
+        return arm.mass_of.get(settings.link)
+    if settings.quantity in MECHANICAL:
         return None
-    tables = [actuator_values(one, hydraulics) for one in _actuators(arm, own) if one is not None]
-    values = {table[side] for table in tables for side in TARGETS[own.quantity]}
+    values = set[float | None]()
+    for actuator in _actuators(arm, settings):
+        if actuator is not None:
+            table = actuator_values(actuator, hydraulics)
+            values |= {table[name] for name in TARGETS[settings.quantity]}
     return values.pop() if len(values) == 1 else None
 
 
 def make_parameter(
-    name: str, own: ParameterSettings, arm: Arm, hydraulics: HydraulicSettings, *, log: bool
+    name: str, settings: ParameterSettings, arm: Arm, hydraulics: HydraulicSettings, *, log: bool
 ) -> Parameter:
     """Return one parameter with its bounds, prior and start.
 
     `log`: on a log scale where it is positive, as one with a log-normal prior always is.
-    Raises ValueError: a prior without a nominal value, or one that does not fit, with the parameter's name.
+
+    Raises ValueError: a prior without a nominal value, or one that does not fit, with the
+    parameter's name.
     """
-    nominal = nominal_value(arm, hydraulics, own)
-    prior = _prior(name, own, nominal)
-    lower, upper = own.bounds or _default_bounds(own, prior)
-    start = own.start if own.start is not None else nominal
-    start = None if start is None else min(max(start, lower), upper)
-    on_log = lower > 0 and (log or (prior is not None and prior.log))
-    least = (own.per and own.sd) or 0.0
-    return Parameter(name, _unit(arm, own), lower, upper, own.fixed, on_log, start, prior, least)
+    nominal = nominal_value(arm, hydraulics, settings)
+    prior = _prior(name, settings, nominal)
+    lower, upper = settings.bounds or _default_bounds(settings, prior)
+    start = nominal
+    if settings.start is not None:
+        start = settings.start
+    if start is not None:
+        start = min(max(start, lower), upper)
+    has_log_prior = prior is not None and prior.log
+    least = 0.0
+    if settings.per is not None and settings.sd is not None:
+        # an effect is near 0, where no relative change means anything
+        least = settings.sd
+    return Parameter(
+        name=name,
+        unit=_unit(arm, settings),
+        lower=lower,
+        upper=upper,
+        fixed=settings.fixed,
+        log=lower > 0 and (log or has_log_prior),
+        start=start,
+        prior=prior,
+        least=least,
+    )
 
 
-def _prior(name: str, own: ParameterSettings, nominal: float | None) -> Prior | None:
-    if not own.has_prior:
+def _prior(name: str, settings: ParameterSettings, nominal: float | None) -> Prior | None:
+    if not settings.has_prior:
         return None
     if nominal is None:
-        word = "within" if own.sd is None else "sd"
+        word = "within" if settings.sd is None else "sd"
         raise ValueError(
-            f"parameters.{name}: {word}: needs a nominal value; the settings and the arm's file have none "
-            f"for this {own.quantity}, so add nominal: VALUE, or give bounds: in place of {word}:"
+            f"parameters.{name}: {word}: needs a nominal value; the settings and the arm's file "
+            f"have none for this {settings.quantity}, so add nominal: VALUE, or give bounds: in "
+            f"place of {word}:"
         )
-    if own.bounds is not None and not own.bounds[0] <= nominal <= own.bounds[1]:
-        raise ValueError(
-            f"parameters.{name}: the nominal value {nominal:g} {own.unit} lies outside the bounds"
-        )
-    if own.sd is not None:
-        return Prior(nominal, own.sd)
+    if settings.bounds is not None:
+        lower, upper = settings.bounds
+        if not lower <= nominal <= upper:
+            value = f"{nominal:g} {settings.unit}"
+            raise ValueError(f"parameters.{name}: the nominal value {value} lies outside the bounds")
+    if settings.sd is not None:
+        return Prior(nominal, settings.sd)
     if nominal <= 0:
         raise ValueError(f"parameters.{name}: within: factor needs a nominal value above 0; give sd: instead")
-    return Prior(nominal, math.log(own.within or 1.0) / 1.96, log=True)  # 95 % lie within
+    # 95 % of a normal variable, here of the logarithm, lie within 1.96 standard deviations
+    return Prior(nominal, math.log(settings.within or 1.0) / 1.96, log=True)
 
 
-def _default_bounds(own: ParameterSettings, prior: Prior | None) -> tuple[float, float]:
+def _default_bounds(settings: ParameterSettings, prior: Prior | None) -> tuple[float, float]:
+    """Return the bounds of a parameter that states none: four standard deviations of its prior."""
     if prior is None:
-        return own.fixed or 0.0, own.fixed or 0.0
-    lower, upper = prior.value(-4.0), prior.value(4.0)
-    if own.per is None:  # what must be above 0 is not searched below 1 % of its value
-        quantity = CHOICES[own.quantity]
-        lower = max(lower, 0.01 * prior.nominal if quantity.positive else quantity.lowest)
-    return lower, upper
+        held = settings.fixed or 0.0
+        return held, held
+    lower = prior.value(-4.0)
+    upper = prior.value(4.0)
+    if settings.per is not None:
+        return lower, upper
+    quantity = CHOICES[settings.quantity]
+    least = quantity.lowest
+    if quantity.positive:
+        # what must be above 0 is not searched below 1 % of its value
+        least = 0.01 * prior.nominal
+    return max(lower, least), upper
 
 
-def _unit(arm: Arm, own: ParameterSettings) -> str:
-    """The unit of a parameter; joints that slide, and rotary actuators that turn, have their own."""
-    sliding = bool(own.joints) and {*own.joints} <= {*arm.slides}
-    if own.quantity in MECHANICAL and sliding:
-        return own.unit.replace("N·m", "N").replace("rad", "m")
-    actuators = _actuators(arm, own) if own.joints else []
-    rotary = bool(actuators) and all(isinstance(one, RotaryActuator) for one in actuators) and not sliding
-    sized = own.quantity in ("area", "area_a", "area_b", "dry_friction")
-    return {"mm²": "cm³/rad", "N": "N·m"}[own.unit] if rotary and sized else own.unit
+def _unit(arm: Arm, settings: ParameterSettings) -> str:
+    """Return the unit of a parameter.
+
+    Of joints that slide, and of rotary actuators that turn, it is another than the quantity's.
+    """
+    if not settings.joints:
+        return settings.unit
+    all_slide = {*settings.joints} <= {*arm.slides}
+    if all_slide and settings.quantity in MECHANICAL:
+        return settings.unit.replace("N·m", "N").replace("rad", "m")
+    actuators = _actuators(arm, settings)
+    all_rotary = bool(actuators) and all(isinstance(a, RotaryActuator) for a in actuators)
+    if all_rotary and not all_slide and settings.quantity in BY_TURN:
+        return {"mm²": "cm³/rad", "N": "N·m"}[settings.unit]
+    return settings.unit
 
 
-def _actuators(arm: Arm, own: ParameterSettings) -> list[Actuator | None]:
-    """What moves the joints that a parameter acts on; joints that the arm lacks are refused elsewhere."""
-    return [joint.actuator for j, joint in enumerate(arm.joints, 1) if own.joints is None or j in own.joints]
+def _actuators(arm: Arm, settings: ParameterSettings) -> list[Actuator | None]:
+    """Return what moves the joints that a parameter acts on; joints that the arm lacks are refused
+    elsewhere."""
+    joints = settings.joints
+    return [
+        joint.actuator for number, joint in enumerate(arm.joints, 1) if joints is None or number in joints
+    ]

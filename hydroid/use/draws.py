@@ -30,7 +30,7 @@ from hydroid.plant import Plant
 from hydroid.posterior.error_model import likelihood_at
 from hydroid.posterior.posterior import NORMAL, Posterior, stored_posterior
 from hydroid.problem.problem import Problem
-from hydroid.run.record import fitted_by
+from hydroid.run.record import record_of
 
 FORGOTTEN, BETWEEN = 20, 4
 """motions before the first draw, and between two: with bounds, one alone does not forget where it began"""
@@ -107,8 +107,9 @@ def draw(model: IdentifiedModel, n: int, seed: int = 0, problem: Problem | None 
     if n < 1:
         raise SettingsError("needs one draw at least", "draws")
     changes = within(known, n, np.random.default_rng(seed))
-    if problem is None and (fitted := fitted_by(model)[0]):
-        problem = Problem(model.settings, [one.log for one in fitted])
+    record = None if problem is not None else record_of(model)
+    if record is not None:
+        problem = Problem(model.settings, [p.log for p in record.fitted])
     if problem is not None:
         changes = on_their_level(known, changes, problem)
     return Draws(model, known.box.points(changes), known)

@@ -13,7 +13,10 @@ _TRIAL = "import mujoco; mujoco.Renderer(mujoco.MjModel.from_xml_string('<mujoco
 
 
 def choose_platform() -> None:
-    """Choose a way to render that needs no window and works on this machine; MUJOCO_GL has precedence."""
+    """Choose a way to render that needs no window and works on this machine.
+
+    MUJOCO_GL has precedence.
+    """
     if sys.platform == "linux" and not os.environ.get("MUJOCO_GL"):
         working = next(filter(renders, PLATFORMS), None)
         os.environ |= {"MUJOCO_GL": working} if working else {}

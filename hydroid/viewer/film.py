@@ -1,4 +1,6 @@
-"""A motion on the screen, as a film or a picture: the simulated machine over the measured one, its ghost."""
+"""A motion on the screen, as a film or a picture: the simulated machine over the measured one, its
+ghost.
+"""
 
 import io
 import os
@@ -17,7 +19,7 @@ from PIL import Image, ImageDraw, ImageFont
 from hydroid.errors import RunError, SettingsError
 from hydroid.progress import Progress, no_progress
 from hydroid.reporting.outlines import sight
-from hydroid.viewer.motion import Motion, Playback, Replay
+from hydroid.viewer.motion import Motion, Playback, Region, Replay
 
 Picture = NDArray[np.uint8]
 
@@ -26,7 +28,9 @@ KINDS = {".mp4": ((1920, 1080), 20.0), ".gif": ((960, 540), 10.0), ".png": ((192
 
 
 def rendered(motion: Motion, size: tuple[int, int], frames: Iterable[tuple[float, str]]) -> Iterator[Picture]:
-    """Yield a machine at times [s], a text above each, in a size [px]: RGB, shape (height, width, 3)."""
+    """Yield a machine at times [s], a text above each, in a size [px]: RGB, shape
+    (height, width, 3).
+    """
     replay, (width, height), camera = Replay(motion), size, mujoco.MjvCamera()
     look = replay.model.vis
     look.global_.offwidth, look.global_.offheight = width, height
@@ -40,7 +44,7 @@ def rendered(motion: Motion, size: tuple[int, int], frames: Iterable[tuple[float
         how = f"MUJOCO_GL={os.environ.get('MUJOCO_GL')}: {' '.join(str(error).split())}"
         hint = "install libegl1 or libosmesa6, and set MUJOCO_GL=egl or osmesa before Python starts"
         raise RunError(f"no picture can be rendered ({how})", hint=hint) from None
-    look_at(camera, replay.model)
+    look_at(camera, replay.model, replay.region)
     letters = height // 30
     with renderer:
         for time, text in frames:
@@ -55,7 +59,9 @@ def rendered(motion: Motion, size: tuple[int, int], frames: Iterable[tuple[float
 def render_motion(
     motion: Motion, kind: str, span: tuple[float, float], progress: Progress = no_progress
 ) -> bytes:
-    """Return the content of a film of a motion in a span [s], or of a picture of its beginning (.png)."""
+    """Return the content of a film of a motion in a span [s], or of a picture of its beginning
+    (.png).
+    """
     begin, end = max(span[0], 0.0), min(span[1], motion.time[-1])
     if not begin < end:
         what = f"{span[0]:g}:{span[1]:g} s holds nothing of a motion of {motion.time[-1]:g} s"
@@ -73,17 +79,18 @@ def render_motion(
     return (_mp4 if kind == ".mp4" else _still)(rendered(motion, size, frames()), kind)
 
 
-def look_at(camera: mujoco.MjvCamera, model: mujoco.MjModel) -> None:
-    """Point a camera at a whole machine, as it is seen at first."""
-    camera.lookat[:], camera.distance = model.stat.center, 2.3 * model.stat.extent
+def look_at(camera: mujoco.MjvCamera, model: mujoco.MjModel, region: Region) -> None:
+    """Point a camera at a whole machine, so far away that its region is inside the picture."""
+    camera.lookat[:] = region.centre
+    camera.distance = region.radius / np.sin(np.radians(model.vis.global_.fovy) / 2)
     camera.azimuth, camera.elevation = 125.0, -18.0  # [deg]
 
 
 def add_ghost(playback: Playback, scene: mujoco.MjvScene, camera: mujoco.MjvCamera) -> None:
     """Add what moves of a playback's ghost, if it has one, to a scene, blue and translucent.
 
-    It stands 4 mm farther away from the camera: where both machines agree only the simulated one is seen,
-    and their surfaces do not flicker.
+    It stands 4 mm farther away from the camera: where both machines agree only the simulated one is
+    seen, and their surfaces do not flicker.
     """
     if playback.ghost is None:
         return
@@ -166,7 +173,7 @@ def show(playback: Playback) -> None:
     drawing = set(threading.enumerate()) - others
     try:
         with viewer.lock():
-            look_at(viewer.cam, playback.model)
+            look_at(viewer.cam, playback.model, playback.region)
         play(playback, viewer)
     finally:
         viewer.close()

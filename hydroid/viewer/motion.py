@@ -13,13 +13,17 @@ from hydroid.log import Log
 from hydroid.plant import Plant
 from hydroid.prediction import predict_log
 
+MOMENTS = 60
+"""of a motion, at which it is looked where the machine is"""
+
 
 @record
 class Motion:
-    """A machine under the commands of logs: times [s], (T,), and angles of all joints [rad], (T, nq).
+    """A machine under the commands of logs: times [s], (T,), and angles of all joints [rad],
+    (T, nq).
 
-    `measured` is None where the logs hold no motion; `error` is the rms difference of the driven joints that
-    were measured [deg], NaN where there are none.
+    `measured` is None where the logs hold no motion; `error` is the rms difference of the driven
+    joints that were measured [deg], NaN where there are none.
     """
 
     machine: Machine
@@ -59,10 +63,43 @@ def place(model: mujoco.MjModel, data: mujoco.MjData, angle: Array) -> None:
         update(model, data)
 
 
+@record
+class Region:
+    """A sphere around all that is drawn of a machine: its centre [m], shape (3,), and radius [m]."""
+
+    centre: Array
+    radius: float
+
+
+def region_of(model: mujoco.MjModel, angles: Array) -> Region:
+    """Return the region of a machine at angles of all joints [rad], (F, nq), without the floor."""
+    data = mujoco.MjData(model)
+    solid = model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE
+    if not solid.any():
+        return Region(model.stat.center.copy(), float(model.stat.extent))
+    around = model.geom_rbound[solid]
+    places = np.empty((len(angles), len(around), 3))
+    for row, angle in zip(places, angles, strict=True):
+        place(model, data, angle)
+        row[:] = data.geom_xpos[solid]
+    low = (places - around[:, None]).min(axis=(0, 1))
+    high = (places + around[:, None]).max(axis=(0, 1))
+    centre = (low + high) / 2
+    away = np.linalg.norm(places - centre, axis=2) + around
+    return Region(centre, float(away.max()))
+
+
 class Sliders:
-    """A plant with all joints on the viewer's sliders, from a named pose or the settings' start pose."""
+    """A plant with all joints on the viewer's sliders, from a named pose or the settings' start
+    pose.
+    """
 
     duration, ghost = np.inf, None
+
+    @property
+    def region(self) -> Region:
+        """Where the machine stands."""
+        return region_of(self.model, self.data.qpos[None])
 
     def __init__(self, plant: Plant, pose: str | None = None) -> None:
         self.plant, self._start = plant, pose
@@ -86,6 +123,14 @@ class Sliders:
 class Replay:
     """A simulated motion from its start to its end."""
 
+    @property
+    def region(self) -> Region:
+        """Where the machine and its ghost are in the course of the motion."""
+        motion = self._motion
+        angles = [motion.simulated] if motion.measured is None else [motion.simulated, motion.measured]
+        moments = np.unique(np.linspace(0, len(motion.time) - 1, MOMENTS).round().astype(int))
+        return region_of(self.model, np.concatenate([one[moments] for one in angles]))
+
     def __init__(self, motion: Motion) -> None:
         self.model, self._motion = motion.machine.model, motion
         self.data, self.duration = mujoco.MjData(self.model), float(motion.time[-1])
@@ -107,5 +152,5 @@ class Replay:
 
 
 Playback = Sliders | Replay
-"""what is drawn (`model`, `data` and, where something was measured, `ghost`), the `time` that is shown and
-the `duration` after which all stands still [s]"""
+"""what is drawn (`model`, `data` and, where something was measured, `ghost`), the `time` that is
+shown and the `duration` after which all stands still [s]"""

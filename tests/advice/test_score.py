@@ -12,7 +12,8 @@ SAMPLES = 1000
 def fitted(noise: np.ndarray, slopes: np.ndarray) -> Explained:
     """What a linear least-squares fit of `slopes`, (p, R), leaves of innovations."""
     effects = np.linalg.qr(slopes.T)[0].T
-    return Explained(effects, noise - effects.T @ (effects @ noise))
+    left = noise - effects.T @ (effects @ noise)
+    return Explained(effects, left, variance=lambda row: float(row @ row))
 
 
 def test_the_statistic_of_a_linear_problem_is_that_of_regression():

@@ -90,10 +90,6 @@ def test_an_unchanged_term_changes_nothing_and_a_changed_one_what_it_sets(late: 
     np.testing.assert_allclose(delay.innovations(likelihood, known.theta, [0.03]), right, atol=1e-9)
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="a lag of 30 ms is named before the delay: by one-step innovations the two are nearly alike",
-)
 def test_a_missing_delay_is_found_and_lowers_the_error_on_parts_left_out(late: tuple[Problem, Uncertainty]):
     problem, known = late
     content, _ = advice(problem, known, "runs/late", no_progress)

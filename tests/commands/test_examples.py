@@ -18,9 +18,9 @@ NAMES = [
     for name in hydroid.__all__
     if re.search(r"^ {4}\S*.*hydroid\.", inspect.getdoc(getattr(hydroid, name)) or "", re.MULTILINE)
 ]
-ELSEWHERE = {"view", "report", "convert", "init", "study"}
-"""a window or a film needs OpenGL, report pages, which are not written here, the others files of one's own;
-they have tests of their own"""
+ELSEWHERE = {"view", "report", "convert", "init", "study", "follow", "export", "draw", "Env"}
+"""a window or a film needs OpenGL, report pages, which are not written here, files of one's own, and what
+uses a machine a finished fit of stage 2; they have tests of their own"""
 WRITES = {"fit": "a", "fit_mech": "mech", "fit_hyd": "hyd"}
 """the run folder that an example makes"""
 QUICK = SMALL | {"refinement": None, "joint_refinement": False, "design": {"effort": 3, "poses": "any"}}

@@ -1,18 +1,22 @@
-"""What commands read: angles that are not measured stay unmeasured, though the simulation has a
-start pose."""
+"""What commands read: angles that are not measured stay so, and parts of a log between its gaps."""
 
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
-from log_files import RIG
+from log_files import RIG, assert_same
 
-from hydroid import load_settings, read_logs, simulate
+from hydroid import check, convert, load_settings, read_logs, simulate
 from hydroid.advice.assumptions import exchanged
+from hydroid.commands.logs import run_logs
+from hydroid.errors import LogError
 from hydroid.fitting.multistart import lone_joints
-from hydroid.log import Log
+from hydroid.log import Log, check_parts
+from hydroid.posterior.error_model import likelihood_at
 from hydroid.problem.problem import Problem
 from hydroid.settings.fit import FitSettings
+from hydroid.settings.log import LogSettings
 
 LOG = RIG / "rig_all_joints_1.csv"
 UNMEASURED = {"log.joints.3.angle": None}
@@ -50,8 +54,7 @@ def test_a_log_that_was_read_elsewhere_has_a_start_pose_too() -> None:
 
 
 def test_what_needs_the_motion_of_driven_joints_leaves_out_logs_that_lack_it() -> None:
-    """The start of a joint is open, joints are fitted alone and columns compared only where it is
-    measured."""
+    """A start is open, joints are fitted alone and columns compared only where joints are measured."""
     log, fit = read(**UNMEASURED)
     problem, whole = Problem(fit, [log]), Problem(settings(), [read()[0]])
     assert 3 in whole.started(whole.logs[0])
@@ -75,3 +78,69 @@ def test_a_simulation_from_a_named_pose_starts_there_and_writes_all_angles(tmp_p
     log = simulate(RIG / "rig_shoulder_1.csv", fit=truth, pose="study", out=tmp_path / "log.csv").log
     assert log.measured.all()
     np.testing.assert_allclose(log.start, load_settings("fit-hyd").arm.pose("study"), atol=1e-3)
+
+
+def gapped(folder: Path) -> Path:
+    """The log of the rig without 0.4 s."""
+    rows = LOG.read_text().splitlines()
+    path = folder / "log.csv"
+    path.write_text("\n".join([*rows[:1001], *rows[1041:2001]]))
+    return path
+
+
+def test_a_gap_gives_two_logs_that_share_the_files_payload_and_group(tmp_path: Path) -> None:
+    path = gapped(tmp_path)
+    fit = settings(**{"payloads": {"log.csv": 50.0}, "log.groups": {"monday": "log.csv"}})
+    one, two = read_logs(path, fit)
+    assert (one.source, two.source) == (f"{path}[1]", f"{path}[2]")
+    assert fit.log.group_of(two.source) == "monday"
+    loaded, plain = (Problem(s, [two]) for s in (fit, fit.changed({"payloads": {}})))
+    theta = fit.parameter_set().start[None]
+    assert not np.array_equal(loaded.output_errors(theta), plain.output_errors(theta))
+
+
+def test_a_log_with_a_hole_gives_the_likelihoods_rows_of_its_two_parts(tmp_path: Path) -> None:
+    path = gapped(tmp_path)
+    name, *rows = path.read_text().splitlines()
+    halves = [tmp_path / "before.csv", tmp_path / "after.csv"]
+    for half, own in zip(halves, (rows[:1000], rows[1000:]), strict=True):
+        half.write_text("\n".join([name, *own]))
+    fit = settings()
+    holed, apart = (Problem(fit, read_logs(logs, fit)) for logs in (path, halves))
+    assert apart.logs[1].first_command == 0  # of a later one the start is a mean, with the gap or without
+    theta = fit.parameter_set().start
+    rows_of = [likelihood_at(problem, theta).rows(theta[None]) for problem in (holed, apart)]
+    np.testing.assert_array_equal(*rows_of)
+    np.testing.assert_array_equal(holed.evaluate(theta[None]), apart.evaluate(theta[None]))
+
+
+def test_what_needs_one_log_refuses_parts(tmp_path: Path) -> None:
+    truth = RIG.parent / "article" / "truth.yaml"
+    with pytest.raises(LogError, match="gaps split it into 2 parts, and one log is needed"):
+        simulate(gapped(tmp_path), fit=truth, out=tmp_path / "out.csv")
+    assert not (tmp_path / "out.csv").exists()
+
+
+def test_check_speaks_of_each_part(tmp_path: Path) -> None:
+    checked = check(gapped(tmp_path))
+    assert [len(one.log.time) for one in checked.result] == [1000, 960]
+    assert checked.exit_status == 0
+    assert [row["log"][-3:] for row in checked.content["logs"]] == ["[1]", "[2]"]
+
+
+def test_convert_keeps_gaps(tmp_path: Path) -> None:
+    path, out = gapped(tmp_path), tmp_path / "out.csv"
+    convert(path, out=out)
+    ranges = load_settings("fit-hyd").arm.ranges
+    (before, after) = (check_parts(one, LogSettings(), ranges)[0] for one in (path, out))
+    assert [part.begin for part in after] == pytest.approx([part.begin for part in before])
+    for one, other in zip(before, after, strict=True):
+        assert_same(one, other)
+
+
+def test_a_run_of_parts_finds_its_file_again(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    folder.mkdir()
+    path = gapped(tmp_path)
+    (folder / "run.json").write_text(json.dumps({"logs": {f"{path}[1]": "a", f"{path}[2]": "b"}}))
+    assert run_logs(folder) == [path]

@@ -98,6 +98,27 @@ def test_fit_validate_and_simulate_walk_through(short: Path, hydroid_cli: Run, t
     assert sorted(p.name for p in tmp_path.iterdir()) == ["run", "sim.csv", "val", "val2"]
 
 
+def test_the_logs_of_the_fits_that_a_fit_began_from_are_seen(
+    short: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """Of a chain of three, and of a fit in memory; each log is kept once."""
+    monkeypatch.chdir(tmp_path)
+    rows = (ROOT / "examples" / "logs" / "rig_shoulder_2.csv").read_text().splitlines()
+    logs = {"first": short}
+    for name, first in {"second": 1, "third": 1001, "other": 2001}.items():
+        logs[name] = tmp_path / f"{name}.csv"
+        logs[name].write_text("\n".join([rows[0], *rows[first : first + 900]]) + "\n")
+    tiny = {"search.ga.population": 4, "search.ga.generations": 1}
+    quick = {"algorithm": "ga", "refinement": False, "set": tiny}
+    hydroid.fit_mech(logs["first"], out="first", **quick)
+    hydroid.fit_mech([logs["first"], logs["second"]], start="first", out="second", **quick)
+    third = hydroid.fit_mech(logs["third"], start="second", out="third", **quick)
+    assert [log.source for log in third.earlier] == [str(logs["first"]), str(logs["second"])]
+    for fit in ("third", third):
+        validated = hydroid.validate([*logs.values()], fit=fit)
+        assert [one.unseen for one in validated.result] == [False, False, False, True]
+
+
 def test_a_log_set_apart_stays_on_the_page_and_out_of_the_verdict(array, hydroid_cli: Run):
     shutil.copytree(array[0] / "seed-1", "run")
     other = ROOT / "examples" / "logs" / "rig_shoulder_2.csv"
@@ -125,6 +146,7 @@ def test_a_log_that_diverges_is_named_and_judged_with_the_others(
         return predict(model, log, joints) * (np.nan if log.source == "lost.csv" else 1)
 
     monkeypatch.setattr(validation, "predict", lost)
+    monkeypatch.setattr(validation, "predict_with_pressures", lambda *given: (lost(*given), None))
     done = hydroid_cli("validate", "good.csv", "lost.csv", "--fit=run", "--out=val", "--json")
     assert done.err == "hydroid: warning: run predicts no joint in lost.csv: its simulation diverged\n"
     found = json.loads(done.out)
@@ -167,7 +189,10 @@ def test_a_fit_in_memory_steps_predicts_validates_reports_and_tables_itself(shor
     assert np.array_equal(predicted.response, fitted.predictions[0].response)
     assert predicted.ahead.shape[1:] == (5, 1)
     validated = fitted.validate(short)
-    assert validated.lines[1] == f"The fit was made with {short}: that tests nothing."
+    assert (
+        validated.lines[1]
+        == f"The fit, or one that it began from, was made with {short}: that tests nothing."
+    )
     (seen,) = validated.content["verdict"]
     assert (seen["unseen_deg"], seen["fitted_deg"]) == (None, pytest.approx(fitted.summary.rms_deg))
     other = ROOT / "examples" / "logs" / "rig_shoulder_2.csv"
@@ -194,7 +219,7 @@ def test_analyse_tells_what_a_log_determines(short: Path, hydroid_cli: Run, tmp_
     assert rows["M1"]["source"] == "prior only"
     assert rows["M1"]["data_share"] == 0
     assert rows["S"]["profile_interval"] is not None
-    for name in ("parameters", "directions"):
+    for name in ("parameters", "correlations"):
         assert (tmp_path / "told" / "tables" / f"{name}.csv").stat().st_size > 0
 
 

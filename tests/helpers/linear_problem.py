@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 
 from hydroid.log import Log
 from hydroid.parameters import Parameter, ParameterSet
-from hydroid.posterior.error_model import SHORTEST, likelihood_at, make_error_model
+from hydroid.posterior.error_model import SHORTEST, likelihood_at, make_error_model, make_likelihood
 from hydroid.problem.channels import Channel
 from hydroid.problem.priors import Priors
 from hydroid.settings.fit import FitSettings
@@ -96,10 +96,11 @@ def dense_covariance(problem, numbers):
 def most_likely(problem, rounds=4):
     """The estimate by generalised least squares, with the error model of its errors, again and again."""
     theta = least_squares(problem.columns, problem.measured)
-    model = make_error_model(problem)
+    likelihood = make_likelihood(problem)
     for _ in range(rounds):
-        model = likelihood_at(problem, theta).errors
+        likelihood = likelihood_at(problem, theta)
+        weighing = likelihood.errors
         theta = least_squares(
-            model.innovations(problem.columns), model.innovations(problem.measured[None])[0]
+            weighing.innovations(problem.columns), weighing.innovations(problem.measured[None])[0]
         )
-    return theta, model.numbers
+    return theta, likelihood.shown.numbers

@@ -110,16 +110,7 @@ CASES = {
 }  # fmt: skip
 
 
-CURVED = pytest.mark.xfail(
-    strict=True,
-    reason="the two trade along a curved valley: the truth is as likely as the estimate (1.5 in "
-    "log-likelihood), but linear intervals are too narrow",
-)
-
-
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=CURVED) if n == "trapped pressure" else n for n in CASES]
-)
+@pytest.mark.parametrize("name", [*CASES])
 def test_a_term_is_recovered(name):
     case = CASES[name]
     joints = tuple(case.commands[0])

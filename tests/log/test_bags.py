@@ -7,7 +7,7 @@ import pytest
 from log_files import faults, read
 from log_formats import BagWriter
 
-from hydroid.log import guess_columns, open_table
+from hydroid.log import check_parts, guess_columns, open_table
 from hydroid.settings.log import LogSettings
 
 KINDS = ("ros1", "ros2", "mcap")
@@ -78,9 +78,19 @@ def errors(path: Path, settings: LogSettings = SETTINGS) -> str:
     return said
 
 
-def test_a_gap_in_the_angles_is_a_fault(tmp_path: Path) -> None:
+def test_a_gap_in_the_angles_splits_the_log(tmp_path: Path) -> None:
+    """Both parts hold what the log without a gap holds there."""
     path, _ = write(tmp_path, "ros2", gap=(4, 4.4))
-    assert "0.42 s without a sample" in errors(path)
+    (tmp_path / "whole").mkdir()
+    whole, _ = read(write(tmp_path / "whole", "ros2")[0], SETTINGS, RANGES)
+    parts, findings = check_parts(path, SETTINGS, RANGES)
+    assert [part.source for part in parts] == [f"{path}[1]", f"{path}[2]"]
+    assert "0.42 s without a sample" in str(findings[0])
+    for part in parts:
+        first = round(part.begin / 0.01)
+        rows = slice(first, first + len(part.time))
+        np.testing.assert_allclose(part.angle, whole.angle[rows], atol=1e-9)
+        np.testing.assert_allclose(part.command, whole.command[rows], atol=1e-9)
 
 
 def test_bad_bags_are_refused_in_one_line(tmp_path: Path) -> None:
@@ -158,4 +168,4 @@ def test_one_time_with_two_values_is_refused_and_a_message_that_came_twice_is_no
 
 def test_a_wrong_stamp_does_not_fill_the_memory(tmp_path: Path) -> None:
     path = two_topics(tmp_path, "mcap", {0.0: 3.0}, lambda time: time if time else 1e8 - START)
-    assert "rows, of which 1 columns are read; at most" in errors(path)
+    assert "rows; at most 30,000,000 rows of 1 columns can be read" in errors(path)

@@ -2,7 +2,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from log_files import assert_same, cells, faults, lines, place, read, save
+from log_files import assert_same, cells, lines, place, read, save
 
 from hydroid.errors import LogError
 
@@ -132,9 +132,24 @@ def test_the_table_is_found_in_any_layout(layout: str, separator: str, tmp_path:
 def test_a_faulty_cell_below_comments_and_a_preamble_has_its_place(line, cell, text, tmp_path) -> None:
     table = rows(["# one"], [], ["Rate", "100"], below=[["s", "%", "%", "deg", "deg"]])
     table[4 + line][cell] = text
-    (fault,) = faults(save(tmp_path / "log.csv", table))
-    assert place(fault) == f"line {5 + line}, column {HEAD[cell]}"
+    _, (left_out, *_) = read(save(tmp_path / "log.csv", table))
+    assert place(left_out) == f"line {5 + line}, column {HEAD[cell]}"
 
 
-def test_a_torn_row_below_the_names_is_a_fault(tmp_path: Path) -> None:
-    assert place(faults(save(tmp_path / "log.csv", rows(below=[["broken", "off"]])))[0]) == "line 2"
+def test_a_torn_row_below_the_names_is_left_out(tmp_path: Path) -> None:
+    _, (left_out,) = read(save(tmp_path / "log.csv", rows(below=[["broken", "off"]])))
+    assert (left_out.kind, place(left_out)) == ("row left out", "line 2")
+
+
+def test_names_and_cells_of_different_number(tmp_path: Path) -> None:
+    """A last name without cells, and a first column of row numbers without a name."""
+    plain, _ = read(save(tmp_path / "plain.csv", ROWS))
+    more = [[*HEAD, "note"], *DATA]
+    numbered = [HEAD, *([str(k), *row] for k, row in enumerate(DATA, 1))]
+    for table, remark in (
+        (more, "lines hold 5 cells: note has none"),
+        (numbered, "the first column has no name"),
+    ):
+        log, (finding,) = read(save(tmp_path / "log.csv", table))
+        assert finding.what == remark
+        assert_same(log, plain)

@@ -1,6 +1,7 @@
 """Binary formats: the same bits as the CSV they were made from, and one clear line for a bad file."""
 
 import sys
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -103,8 +104,10 @@ BAD = {
         lambda p: write_parquet(p / "a.parquet", {**COLUMNS, "u1_pct": ["up"] * 80}),
         "row 1, column u1_pct: 'up' is not a number (and 79 more",
     ),
-    "no value in parquet": (
-        lambda p: write_parquet(p / "a.parquet", {**COLUMNS, "u1_pct": [None, *COLUMNS["u1_pct"][1:]]}),
+    "no values in parquet": (
+        lambda p: write_parquet(
+            p / "a.parquet", {**COLUMNS, "u1_pct": [*[None] * 9, *COLUMNS["u1_pct"][9:]]}
+        ),
         "row 1, column u1_pct: no value is there",
     ),
     "other length": (
@@ -114,6 +117,38 @@ BAD = {
     "empty": (lambda p: save(p / "a.csv", []), FORMATS),
     "workbook": (lambda p: save(p / "a.xlsx", [["PK\3\4\0\0"]]), "save the sheet as CSV"),
 }
+
+
+@pytest.mark.parametrize("version", ["v5", "v7.3"])
+def test_a_large_variable_that_is_not_used_is_not_unpacked(
+    version: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from scipy.io import savemat
+
+    monkeypatch.setattr("hydroid.log.binary.MOST_NUMBERS", 1000)
+    columns = {"film": np.zeros(100_000), **COLUMNS}
+    path = tmp_path / "log.mat"
+    if version == "v5":
+        savemat(path, columns, do_compression=True)
+    else:
+        write_mat73(path, columns)
+    log, (left_out,) = read(path)
+    assert left_out.what == "film holds more than 1,000 numbers and is left out"
+    same(log, tmp_path)
+
+
+def test_columns_of_parquet_that_are_not_used_are_not_unpacked(tmp_path: Path) -> None:
+    """Of 80 rows with a text of 100,000 letters each, which takes the file a few kB."""
+    path = write_parquet(tmp_path / "log.parquet", {**COLUMNS, "film": ["x" * 100_000] * 80})
+    read(path)
+    tracemalloc.start()
+    try:
+        log, _ = read(path)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert peak < 500_000
+    same(log, tmp_path)
 
 
 def empty_bag(path: Path) -> Path:

@@ -1,11 +1,13 @@
 import time
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
 import pytest
-from log_files import RIG, RIG_RANGES, cells, faults, lines, place, read, save
+from log_files import NAMES, RANGES, RIG, RIG_RANGES, SETTINGS, cells, faults, lines, place, read, save
 
 from hydroid.errors import LogError
+from hydroid.log import check_log
 from hydroid.settings.log import LogSettings
 
 
@@ -42,13 +44,7 @@ FAULTS = {
     "above the range": (cell(40, 3, "88.3"), "line 41, column q1_deg", "q1_deg in log.angle, or the joint's"),
     "command above": (cell(40, 1, "100.01"), "line 41, column u1_pct", "allowed are -100 to 100 %"),
     "command below": (cell(40, 1, "-100.01"), "line 41, column u1_pct", "command of joint 1 is -100.01 %"),
-    "digit groups": (cell(40, 2, "1_0"), "line 41, column u2_pct", "'1_0' is not a number"),
-    "text": (cell(40, 2, "#N/A"), "line 41, column u2_pct", "is not a number"),
-    "a cell more": (cell(40, 2, "3,4"), "line 41", "should have 5 cells"),
     "a jump": (cell(40, 4, "1000"), "line 41, column q2_deg", "jumps by"),
-    "no time of day": (
-        clock(lambda k: "noon" if k == 7 else f"12:00:00.{k:02d}"), "line 9, column time_s", "12:30:05.25",
-    ),
     "no time column": (lambda rows: [r.pop(0) for r in rows], "line 1", "lacks 'time_s'"),
     "two lacking": (
         lambda rows: [r.__delitem__(slice(2, 4)) for r in rows],
@@ -57,7 +53,6 @@ FAULTS = {
     ),
     "a name twice": (lambda rows: [r.append(r[3]) for r in rows], "line 1", "2 columns 'q1_deg'"),
     "one column": (lambda rows: [r.__setitem__(slice(None), [":".join(r)]) for r in rows], "", "one column"),
-    "names again": (lambda rows: rows.insert(40, rows[0]), "line 41", "and numbers in them"),
     "no times": (lambda rows: [r.__setitem__(0, "x") for r in rows[1:]], "line 2, column time_s", "'x'"),
     "backwards": (values(lambda t: t[::-1]), "line 3, column time_s", "does not increase"),
     "short": (values(lambda t: t[:20]), "column time_s", "at least 0.5 s is needed"),
@@ -65,6 +60,18 @@ FAULTS = {
     "ks": (values(lambda t: t * [0.001, 1, 1, 1, 1]), "column time_s", "log.time.unit"),
 }  # fmt: skip
 """change of a file, and place and words of its only fault"""
+LEFT_OUT = {
+    "digit groups": (cell(40, 2, "1_0"), "line 41, column u2_pct", "'1_0' is not a number: left out"),
+    "text": (cell(40, 2, "#N/A"), "line 41, column u2_pct", "is not a number: left out"),
+    "no text": (cell(40, 2, ""), "line 41, column u2_pct", "no value is there: left out"),
+    "a cell more": (cell(40, 2, "3,4"), "line 41", "does not hold 5 cells with numbers: left out"),
+    "no time of day": (
+        clock(lambda k: "noon" if k == 7 else f"12:00:00.{k:02d}"), "line 9, column time_s", "'noon' is not",
+    ),
+    "names again": (lambda rows: rows.insert(40, rows[0]), "line 41", "does not hold 5 cells with numbers"),
+    "a row twice": (lambda rows: rows.insert(41, rows[40]), "line 42, column time_s", "does not increase"),
+}  # fmt: skip
+"""change of one row of a file that costs this row only, and the place and words of the warning"""
 
 
 @pytest.mark.parametrize("case", FAULTS)
@@ -73,6 +80,21 @@ def test_a_fault_has_its_place_and_its_words(case: str, tmp_path: Path) -> None:
     (fault,) = faults(edited(tmp_path, change))
     assert place(fault) == where
     assert said in str(fault)
+
+
+@pytest.mark.parametrize("case", LEFT_OUT)
+def test_no_log_is_refused_for_one_row(case: str, tmp_path: Path) -> None:
+    whole, _ = read(edited(tmp_path, lambda rows: None))
+    change, where, said = LEFT_OUT[case]
+    log, (finding, *lost) = read(edited(tmp_path, change))
+    assert (finding.level, place(finding)) == ("warning", where)
+    assert said in str(finding)
+    assert {one.kind for one in lost} <= {"lost"}  # the sample that is bridged then
+    np.testing.assert_allclose(log.time, whole.time, atol=1e-12)
+    there = np.ones(len(whole.time), bool) if log.recorded is None else log.recorded
+    assert there.sum() >= len(there) - 1
+    np.testing.assert_array_equal(log.angle[there], whole.angle[there])
+    np.testing.assert_array_equal(log.command[there], whole.command[there])
 
 
 @pytest.mark.parametrize(("column", "text"), FINE)
@@ -102,10 +124,12 @@ def test_every_fault_of_a_file_is_reported_at_once(tmp_path: Path) -> None:
         rows[30][4] = "-"
 
     path = edited(tmp_path, spoil)
-    cells = {"line 11, column u1_pct", "line 13, column u2_pct", "line 15, column q1_deg"}
-    cells |= {"line 17, column q1_deg", "line 21", "line 31, column q2_deg"}
-    assert {place(fault) for fault in faults(path)} == cells
-    with pytest.raises(LogError, match=r"log\.csv, line 21: .*5 cells"):
+    assert {place(fault) for fault in faults(path)} == {"line 11, column u1_pct", "line 15, column q1_deg"}
+    left_out = next(one for one in check_log(path, SETTINGS, RANGES)[1] if one.kind == "row left out")
+    assert str(left_out).endswith(
+        "line 13, column u2_pct: no value is there (and 3 more, to line 31): left out"
+    )
+    with pytest.raises(LogError, match=r"log\.csv, line 11, column u1_pct: "):
         read(path)
 
 
@@ -147,6 +171,24 @@ def test_a_joint_is_undriven_or_unmeasured_only_if_the_config_says_so(tmp_path: 
     assert not log.measured.any()
 
 
+@pytest.mark.parametrize("unused", [0, 5])
+def test_reading_takes_no_more_memory_than_four_times_the_file(unused: int, tmp_path: Path) -> None:
+    values = cells(20_000)
+    values = np.column_stack([values, np.repeat(values[:, 3:4], unused, axis=1)])
+    header = ",".join([*NAMES, *(f"spare{k}" for k in range(unused))])
+    path = tmp_path / "log.csv"
+    np.savetxt(path, values, "%.6f", ",", header=header, comments="")
+    check_log(path, SETTINGS, RANGES)  # whatever is loaded once
+    tracemalloc.start()
+    try:
+        log, _ = check_log(path, SETTINGS, RANGES)
+        assert log is not None
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert peak < 4 * path.stat().st_size
+
+
 def test_a_joint_that_the_arm_lacks_is_refused(tmp_path: Path) -> None:
     settings = LogSettings.model_validate({"joints": {5: None}})
     with pytest.raises(LogError, match="no joint 5; the arm has joints 1 to 2"):
@@ -178,8 +220,9 @@ def test_a_jittering_clock_needs_no_repair_and_shifts_nothing(tmp_path: Path) ->
     there = np.interp(log.time + 0.05, values[:, 0], travel)[:-2]
     np.testing.assert_allclose(0.05 * np.cumsum(log.command[:-2, 0]), there, atol=1e-9)
     gap = save(tmp_path / "gap.csv", lines(np.delete(values, np.s_[50:52], axis=0)))
-    assert "--repair" in str(faults(gap, LogSettings(period_s=0.05))[0])
-    assert len(read(gap, LogSettings(period_s=0.05, repair_s=0.2), repair=True)[0].time) == len(log.time)
+    bridged, (lost, *_) = read(gap, LogSettings(period_s=0.05))
+    assert (lost.level, lost.what) == ("warning", "samples lost: 2")
+    assert len(bridged.time) == len(log.time)
 
 
 def test_a_faster_log_gives_the_means_of_its_commands(tmp_path: Path) -> None:

@@ -1,8 +1,11 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 from hypothesis import given, settings, strategies as st
-from log_files import cells, faults, lines, place, read, save
+from log_files import RANGES, SETTINGS, assert_same, cells, faults, lines, place, read, save
+
+from hydroid.log import check_parts, write_log
 
 holes = st.lists(st.tuples(st.integers(2, 75), st.integers(1, 3)), max_size=4)
 
@@ -55,9 +58,10 @@ def test_a_hole_at_an_end_is_not_invented(tmp_path: Path) -> None:
     table = lines(cells())
     table[1][1] = table[-1][3] = ""
     path = save(tmp_path / "log.csv", table)
-    found = faults(path, repair=True)
-    assert {place(fault) for fault in found} == {"line 2, column u1_pct", "line 81, column q1_deg"}
-    assert all("between good cells" in fault.hint for fault in found)
+    log, (finding,) = read(path, repair=True)
+    assert (finding.level, place(finding)) == ("warning", "line 2, column u1_pct")
+    assert "no value is there (and 1 more, to line 81): left out" in finding.what
+    assert len(log.time) == 78
 
 
 def test_torn_rows_and_rows_without_a_time_are_put_back(tmp_path: Path) -> None:
@@ -66,7 +70,104 @@ def test_torn_rows_and_rows_without_a_time_are_put_back(tmp_path: Path) -> None:
     table[40][0] = ""
     table[-1] = table[-1][:3]
     path = save(tmp_path / "log.csv", table)
-    assert len(faults(path)) == 2
     log, findings = read(path, repair=True)
     assert len(log.time) == 79
     assert "rows left out: 3" in findings[0].what
+
+
+def dropped(folder: Path, *gaps: tuple[int, int], rows: int = 400) -> tuple[Path, np.ndarray]:
+    """A log without the samples from the first to before the last of each gap; and the whole log."""
+    values = cells(rows)
+    gone = [row for first, end in gaps for row in range(first, end)]
+    return save(folder / "log.csv", lines(np.delete(values, gone, axis=0))), values
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_up_to_two_lost_samples_are_bridged_with_a_warning(count: int, tmp_path: Path) -> None:
+    path, values = dropped(tmp_path, (100, 100 + count), (300, 301))
+    whole, _ = read(save(tmp_path / "whole.csv", lines(values)))
+    log, (lost,) = read(path)
+    assert (lost.level, lost.kind) == ("warning", "lost")
+    assert lost.what == f"samples lost: {count + 1} (and 1 more, to line {302 - count})"
+    assert place(lost) == "line 102, column time_s"
+    there = np.delete(np.arange(400), [*range(100, 100 + count), 300])
+    np.testing.assert_array_equal(log.angle[there], whole.angle[there])
+    np.testing.assert_array_equal(log.command[there], whole.command[there])
+    np.testing.assert_array_equal(log.command[100], whole.command[99])  # it was held
+    np.testing.assert_allclose(log.angle, whole.angle, atol=1e-3 * 100)
+
+
+def test_a_gap_splits_a_log_and_only_what_is_lost_is_left_out(tmp_path: Path) -> None:
+    path, values = dropped(tmp_path, (100, 103), (250, 300))
+    whole, _ = read(save(tmp_path / "whole.csv", lines(values)))
+    parts, (gap, *_) = check_parts(path, SETTINGS, RANGES)
+    assert (gap.level, gap.kind, place(gap)) == ("warning", "gap", "line 102, column time_s")
+    assert "0.04 s without a sample" in gap.what
+    assert "parts read: 3" in gap.what
+    assert [part.source for part in parts] == [f"{path}[{k}]" for k in (1, 2, 3)]
+    for part, (first, end) in zip(parts, [(0, 100), (103, 250), (300, 400)], strict=True):
+        assert part.begin == pytest.approx(0.01 * first)
+        np.testing.assert_allclose(part.time, 0.01 * np.arange(end - first), atol=1e-12)
+        np.testing.assert_array_equal(part.command, whole.command[first:end])
+        np.testing.assert_array_equal(part.angle, whole.angle[first:end])
+    np.testing.assert_array_equal(parts[1].start, whole.angle[103])  # the arm may be moving there
+
+
+def test_parts_shorter_than_half_a_second_are_left_out_and_counted(tmp_path: Path) -> None:
+    path, _ = dropped(tmp_path, (100, 110), (130, 140))
+    parts, (gap,) = check_parts(path, SETTINGS, RANGES)
+    assert [len(part.time) for part in parts] == [100, 260]
+    assert "parts read: 2, 1 shorter than 0.5 s left out" in gap.what
+    short, _ = dropped(tmp_path, *[(k, k + 5) for k in range(30, 400, 30)])
+    (fault,) = faults(short)
+    assert "no part of 0.5 s without a gap" in fault.what
+
+
+def test_a_gap_that_is_short_against_the_new_period_does_not_split(tmp_path: Path) -> None:
+    path, _ = dropped(tmp_path, (100, 110))
+    coarse = SETTINGS.changed({"period_s": 0.05})
+    assert len(check_parts(path, coarse, RANGES)[0]) == 1
+    assert len(check_parts(path, SETTINGS, RANGES, repair=True)[0]) == 1
+
+
+CUTS = {
+    "fewer cells": lambda line: line.rsplit(",", 2)[0],
+    "no last cell": lambda line: line.rpartition(",")[0] + ",",
+    "a sign": lambda line: line.rpartition(",")[0] + ",-",
+    "an exponent": lambda line: line.rpartition(",")[0] + ",1e",
+    "one letter": lambda line: line[:1],
+}
+
+
+@pytest.mark.parametrize("cut", CUTS)
+def test_a_last_line_that_is_cut_off_is_left_out(cut: str, tmp_path: Path) -> None:
+    path = save(tmp_path / "log.csv", lines(cells()))
+    *rows, last = path.read_text().splitlines()
+    path.write_text("\n".join([*rows, CUTS[cut](last)]))
+    log, (finding,) = read(path)
+    assert (finding.level, finding.what) == ("warning", "the last line is cut off and left out")
+    assert place(finding) == "line 81"
+    assert_same(log, read(save(tmp_path / "short.csv", lines(cells(79))))[0])
+
+
+def test_a_line_that_is_cut_off_elsewhere_is_left_out(tmp_path: Path) -> None:
+    table = lines(cells())
+    table[40] = table[40][:2]
+    _, (finding, _) = read(save(tmp_path / "log.csv", table))
+    assert (finding.level, finding.kind, place(finding)) == ("warning", "row left out", "line 41")
+
+
+def test_where_many_rows_hold_no_numbers_none_is_left_out(tmp_path: Path) -> None:
+    """Then the column is another one than the settings say."""
+    table = lines(cells())
+    for row in table[10:15]:
+        row[3] = "off"
+    (fault,) = faults(save(tmp_path / "log.csv", table))
+    assert "'off' is not a number (and 4 more, to line 15)" in fault.what
+
+
+def test_a_part_is_written_and_read_back_to_the_same_bits(tmp_path: Path) -> None:
+    parts, _ = check_parts(dropped(tmp_path, (150, 200))[0], SETTINGS, RANGES)
+    for part in parts:
+        write_log(tmp_path / "part.csv", part, SETTINGS, exact=True)
+        assert_same(read(tmp_path / "part.csv")[0], part)

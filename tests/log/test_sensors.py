@@ -1,5 +1,4 @@
-"""Faults of a sensor are told from motion: no joint leaps within a sample, and a good log is
-free of findings."""
+"""Faults of a sensor are told from motion, and good logs are free of them."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -101,6 +101,12 @@ def early(seconds: float) -> list[Table]:
     return of("q", lambda q: np.r_[q[samples:], np.full(samples, q[-1])], boom([60, -60]))
 
 
+def targets() -> list[Table]:
+    """What the angle reaches 0.2 s later, as a controller holds it."""
+    table = boom([60, -60, 80])
+    return [table | {"u2_pct": np.r_[table["q2_deg"][20:], np.full(20, table["q2_deg"][-1])]}]
+
+
 def holed(angle: np.ndarray) -> np.ndarray:
     return np.where(np.arange(len(angle)) == 700, np.nan, angle)
 
@@ -168,11 +174,17 @@ WRONG = (
     ),
     Wrong("clocks that differ by 0.3 s", "warning: as no machine does", lambda: early(0.3)),
     Wrong("commands that are all 0", "warning: no joint is driven", lambda: of("u", np.zeros_like)),
+    Wrong(
+        "a joystick whose lowering half is missing",
+        "warning: lacks half of the command",
+        lambda: of("u2", lambda u: u.clip(0), boom([60, -60])),
+    ),
+    Wrong("position targets in place of commands", "warning: as a target", targets),
     Wrong("a clock that jitters", "note: is resampled", lambda: of("time", lambda t: t + JITTER)),
-    Wrong("0.4 s without a sample", "error: cut the log into two", lambda: without(*range(900, 940))),
-    Wrong("a dropped sample", "error: --repair fills gaps up to 0.1 s", lambda: without(900)),
-    Wrong("a sample that stands twice", "error: does not increase", lambda: of("", lambda v: v[ROWS])),
-    Wrong("a cell that holds no number", "error: 'nan'", lambda: of("q2", holed)),
+    Wrong("0.4 s without a sample", "warning: parts read: 2", lambda: without(*range(900, 940))),
+    Wrong("a dropped sample", "warning: samples lost: 1", lambda: without(900)),
+    Wrong("a sample that stands twice", "warning: does not increase", lambda: of("", lambda v: v[ROWS])),
+    Wrong("a cell that holds no number", "warning: left out", lambda: of("q2", holed)),
     Wrong("a dead sensor", "warning: never changes", lambda: of("q2", lambda q: np.full_like(q, q[0]))),
     Wrong("a sensor that freezes", "warning: last digit", lambda: of("q1", frozen, dig()), config=EXCAVATED),
     Wrong("a spike of 25 deg", "warning: jumps by 25", lambda: of("q2", spiked)),

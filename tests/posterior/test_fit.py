@@ -14,6 +14,7 @@ from hydroid.commands.fit import FitResult
 from hydroid.errors import RunError
 from hydroid.estimate import FitSummary
 from hydroid.posterior.posterior import stored_posterior
+from hydroid.run.record import load_record
 from hydroid.settings.load import load
 
 HELD = ("I_max", "I_min", "A", "C")
@@ -42,7 +43,23 @@ def test_the_summary_holds_quantities_curves_and_covariance_as_the_file_does(fit
     speed = summary.curves["shoulder_speed"]
     assert len(speed.at) == len(speed.value) == len(speed.interval)
     at_50 = dict(zip(speed.at, speed.value, strict=True))[50.0]
-    assert summary.quantities["shoulder_speed_50_positive"].value == pytest.approx(at_50)
+    assert summary.quantities["shoulder_speed_50_positive"].value == pytest.approx(at_50, rel=1e-5)
+
+
+def test_the_record_in_memory_is_that_of_the_run_folder(fitted):
+    ours = fitted.record
+    stored = load_record(fitted.folder).result
+    for predicted, read in zip(ours.fitted, stored.fitted, strict=True):
+        np.testing.assert_array_equal(predicted.response, read.response)
+        np.testing.assert_array_equal(predicted.log.angle, read.log.angle)
+    np.testing.assert_array_equal(ours.history, stored.history)
+    for array, read in zip(ours.front, stored.front, strict=True):
+        np.testing.assert_array_equal(array, read)
+    assert [vars(effort) for effort in ours.refinements] == [vars(e) for e in stored.refinements]
+    assert ours.segments.keys() == stored.segments.keys()
+    assert {j: [*models] for j, models in ours.baselines.items()} == {
+        j: [*models] for j, models in stored.baselines.items()
+    }
 
 
 def test_the_kept_precision_gives_the_intervals_of_the_fit(fitted):

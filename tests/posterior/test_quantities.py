@@ -35,7 +35,7 @@ def measured(bench: Bench, estimate: Candidates) -> dict[str, list[float]]:
     """All quantities of one candidate by name; curves in the order of their points."""
     found: dict[str, list[float]] = {}
     values = joint_measure(bench, estimate)(estimate)
-    for column, value in sorted(values, key=lambda pair: pair[0].command or 0.0):
+    for column, value in sorted(values, key=lambda pair: pair[0].at or 0.0):
         found.setdefault(f"joint{bench.joint}_{column.name}", []).append(float(value[0]))
     return found
 

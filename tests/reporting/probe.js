@@ -27,6 +27,14 @@ async function hover() {
     }
   }
 }
+// what is shown after the last cell of a matrix is chosen: its row, and the rows of charts and arms there
+function chosen() {
+  const cell = [...document.querySelectorAll("[role=tab][data-row]")].at(-1);
+  if (!cell) return null;
+  cell.click();
+  const rows = (what) => [...document.querySelectorAll(what)].filter((e) => !e.hidden && e.offsetParent !== null).map((e) => e.dataset.row);
+  return { row: cell.dataset.row, charts: rows(".tab[data-row]"), arms: rows(".beside[data-row]") };
+}
 const waiting = setInterval(() => {
   if (document.documentElement.dataset.ready !== "yes") return;
   clearInterval(waiting);
@@ -44,7 +52,7 @@ const waiting = setInterval(() => {
       unnamed: [...document.querySelectorAll("button, img, [role=group]")]
         .filter((e) => !(e.textContent.trim() || e.alt || e.ariaLabel)).length,
       tooltips: [...tooltips], images: everything(document).filter((one) => one.tagName === "IMG").length,
-      ran: globalThis.ran ?? "nothing",
+      ran: globalThis.ran ?? "nothing", chosen: chosen(),
     };
     document.head.replaceChildren();
     document.body.textContent = `FOUND${JSON.stringify(found)}END`;

@@ -72,6 +72,14 @@ def test_a_page_is_whole_in_a_browser(pages: dict[str, Path], name: str, how: tu
     assert np.max(np.diff(levels)) <= 1
 
 
+def test_choosing_a_cell_moves_chart_and_arm_together(pages: dict[str, Path]):
+    """One log is shown at a time."""
+    chosen = seen(pages["report"], 1400)["chosen"]
+    assert chosen["row"] == "other.csv fitted"
+    assert chosen["charts"] == [chosen["row"]]
+    assert chosen["arms"] == [chosen["row"]]
+
+
 INJECTED = "<img src=x onerror=\"ran='a name'\">"  # short: pages shorten long names
 SCRIPT = "<script>ran='a script'</script>"
 

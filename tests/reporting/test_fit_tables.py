@@ -9,8 +9,10 @@ from report_fits import MODEL, make_fit, make_problem, make_record, make_uncerta
 
 from hydroid.findings import Finding
 from hydroid.fitting.summary import summarise
+from hydroid.reporting.knowledge_report import error_section
+from hydroid.reporting.merged_report import merged_tables
 from hydroid.reporting.page import Table, log_names
-from hydroid.reporting.parameters_report import error_section, merged_tables, parameter_table
+from hydroid.reporting.parameters_report import parameter_table
 
 FEWER = {name: bounds for name, bounds in MODEL.items() if name != "M2"}
 
@@ -31,7 +33,7 @@ def test_every_parameter_is_in_the_table():
     problem = make_problem()
     fit = make_fit(problem)
     table = parameter_table(problem.settings, summarise(problem, fit))
-    assert column(table, "name") == list(MODEL)
+    assert column(table, "symbol") == list(MODEL)
     assert column(table, "value") == list(fit.best.theta)
     assert column(table, "from") == pytest.approx(fit.uncertainty.interval[:, 0])
     assert column(table, "to") == pytest.approx(fit.uncertainty.interval[:, 1])
@@ -43,12 +45,29 @@ def test_flags_and_findings_name_what_the_data_cannot_tell():
     effects = (1e-3, 0.0, 0.0, 1e-3)
     fit = make_fit(problem, effects=effects)
     summary = summarise(problem, fit)
-    assert column(parameter_table(problem.settings, summary), "flag") == ["", "fixed", "no effect", ""]
+    assert column(parameter_table(problem.settings, summary), "source") == [
+        "data",
+        "fixed",
+        "no effect",
+        "data",
+    ]
     assert Finding("no effect", "note", ("M1",)) in summary.findings
     at = with_theta(fit, problem, effects, K=MODEL["K"][0], M2=MODEL["M2"][1])
     expected = ["at lower bound", "fixed", "no effect", "at upper bound"]
-    assert column(parameter_table(problem.settings, summarise(problem, at)), "flag") == expected
+    assert column(parameter_table(problem.settings, summarise(problem, at)), "source") == expected
     assert Finding("at bound", "warning", ("M2",), {"side": "upper"}) in summarise(problem, at).findings
+
+
+def test_nobody_is_asked_to_widen_what_has_no_larger_value():
+    """A share of 1 is the largest there is; a share of 0.5 is a bound that somebody has set."""
+    problem = make_problem()
+    share = {"quantity": "compensation", "joints": (2,), "link": None}
+    for upper, kind in ((1.0, "at limit"), (0.5, "at bound")):
+        changed = problem.settings.parameters["M1"].changed(share | {"bounds": (0.0, upper)})
+        other = problem.varied(problem.settings.with_parameters({"M1": changed}))
+        fit = with_theta(make_fit(other, effects=(1e-3,) * 4), other, (1e-3,) * 4, M1=upper)
+        kinds = {one.kind for one in summarise(other, fit).findings if "M1" in one.subjects}
+        assert kinds & {"at limit", "at bound"} == {kind}
 
 
 def test_what_the_logs_move_far_from_its_prior_is_one_finding():
@@ -67,7 +86,7 @@ def test_how_sure_a_prediction_can_be_is_said_of_each_joint():
     two = one.changed({"after_10_s_deg": 0.5, "lasts_s": 1.4})
     section = error_section(problem.settings, summary.changed({"errors": {"q2": one, "q3": two}}))
     assert section is not None
-    assert "uncertain by 1.2 deg (shoulder) and 0.5 deg (elbow), whatever the parameters" in section.text
+    assert "uncertain by 1.2 deg (shoulder) and 0.5 deg (elbow) after 10 s" in section.text
     table = section.tables["prediction_errors"]
     assert table.rows == (("shoulder", "deg", 0.05, 1.234, None), ("elbow", "deg", 0.05, 0.5, 1.4))
     assert error_section(problem.settings, summary.changed({"errors": {}})) is None
@@ -79,8 +98,8 @@ def test_what_is_left_of_an_error_and_lasts_is_a_finding():
     fit = make_fit(problem)
     assert "error lasts" not in {one.kind for one in summarise(problem, fit).findings}
     row = ar1(np.random.default_rng(1), len(problem.measured), np.exp(-0.01), 1.0)
-    linear = replace(fit.uncertainty.linear, innovations=row)
-    summary = summarise(problem, replace(fit, uncertainty=replace(fit.uncertainty, linear=linear)))
+    known = replace(fit.uncertainty, innovations=row)
+    summary = summarise(problem, replace(fit, uncertainty=known))
     (finding,) = [one for one in summary.findings if one.kind == "error lasts"]
     assert finding.level == "note"
     time = summary.errors["q2"].lasts_s

@@ -11,7 +11,7 @@ from hydroid.fitting.validation import fitted
 from hydroid.reporting.chart import Chart, Mark, Panel
 from hydroid.reporting.figure import figure, saved, style
 from hydroid.reporting.page_file import plain
-from hydroid.reporting.predictions import draw_response
+from hydroid.reporting.response_report import draw_joints, draw_response
 from hydroid.reporting.search_report import learning, pareto
 
 pytestmark = pytest.mark.filterwarnings("error")  # a warning of matplotlib's is a figure gone wrong
@@ -99,8 +99,12 @@ def test_a_response_shows_measured_and_simulated_angle_residual_pressures_and_co
     log = one.log
     pressed = replace(log, pressure=np.tile([5e6, 2e6], (*log.angle.shape, 1)))
     upper, middle, pressure, lower = draw_response("one", 2, [replace(one, log=pressed)], 1000).panels
-    assert labelled(pressure)["chamber A"].y == pytest.approx(np.full(len(log.time), 50.0))
-    assert len(draw_response("one", 2, [one], 1000).panels) == 3  # pressures are drawn where they are logged
+    assert labelled(pressure)["chamber A, measured"].y == pytest.approx(np.full(len(log.time), 50.0))
+    assert len(draw_response("one", 2, [one], 1000).panels) == 3  # there are none
+    simulated = replace(one, pressure=np.full((len(one.log.time), 1, 2), 50e5))
+    *_, drawn, _ = draw_response("one", 2, [simulated], 1000).panels
+    assert [mark.label for mark in drawn.marks] == ["chamber A, simulated", "chamber B, simulated"]
+    assert drawn.marks[0].y == pytest.approx(50.0)
     measured = np.degrees(log.angle[:, 1])
     assert labelled(upper)["measured"].y == pytest.approx(measured)
     simulated = np.degrees(fit.best.responses[0][:, 0])
@@ -140,3 +144,16 @@ def test_a_thinned_curve_keeps_its_ends_extremes_and_gaps(samples: int):
     gap = np.where(np.arange(samples) > samples // 2, np.nan, curve)
     if samples > 1:
         assert np.isnan(Mark("line", time, gap).thinned(1000).y).any()
+
+
+def test_all_joints_of_a_log_share_one_axis_of_time():
+    problem = make_problem(outputs=(2, 3))
+    (one,) = fitted(make_fit(problem))
+    chart = draw_joints("all", problem.settings.arm, [one], 300)
+    assert chart.linked
+    assert [panel.y for panel in chart.panels] == ["shoulder [deg]", "elbow [deg]", "command [%]"]
+    labels = {mark.label for mark in chart.panels[-1].marks}
+    assert labels == {"command of shoulder", "command of elbow"}
+    measured, simulated = chart.panels[0].marks
+    assert measured.y - simulated.y == pytest.approx(np.degrees(one.error(2)))
+    check(chart)

@@ -7,11 +7,13 @@ from hydroid import load_settings
 from hydroid.advice.growth import Candidate
 from hydroid.advice.suggestions import action_findings, freeing_command, proposed
 from hydroid.advice.terms import Term
+from hydroid.findings import Finding
+from hydroid.reporting.parameters_report import in_words
 from hydroid.settings.load import parse_override
 
 
 @pytest.mark.parametrize(
-    ("after", "expected"), [(11.0, "C would be known to 11 % instead of 15 %."), (15.0, "")]
+    ("after", "expected"), [(11.0, "Then C is known to 11 % instead of 15 %."), (15.0, "")]
 )
 def test_an_action_that_changes_nothing_is_not_shown(after: float, expected: str):
     action = {"action": "state", "of": "D", "parameter": "C", "before_percent": 15.0, "after_percent": after}
@@ -31,3 +33,19 @@ def test_the_command_that_frees_a_held_mass_gives_settings_that_need_no_stage_1(
     key, value = parse_override(command.split("--set '")[1].split("'")[0])
     assert (key, value) == ("parameters.M3", entries["M3"])
     assert load_settings("fit-hyd", {key: value}).parameters["M3"].states_start
+
+
+def test_what_to_state_is_named_in_words_with_its_symbol_behind():
+    problem = make_problem()
+    action = {"action": "state", "of": "D", "parameter": "M1", "before_percent": 15.0, "after_percent": 3.0}
+    (found,) = action_findings({"actions": [action]}, problem.settings)
+    assert found.what.startswith("State damping of the joint (D) to ±")
+    assert found.hint == "Then mass (link1: M1) is known to 3 % instead of 15 %."
+
+
+def test_parameters_of_the_same_words_are_named_together():
+    settings = make_problem().settings
+    some = Finding("strained prior", "warning", ("M1", "K", "M2"), details={"K": "2.9 above"})
+    assert in_words(some, settings).subjects == ("mass (M1 and M2)", "torque per command (K; 2.9 above)")
+    other = Finding("log stands out", "warning", ("a.csv",), {"run": "R"})
+    assert in_words(other, settings).subjects == ("a.csv",)

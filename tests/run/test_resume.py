@@ -49,10 +49,13 @@ def content(folder: Path) -> dict[str, object]:
     }
 
 
+PYMOO = ["-q", "--algorithm=pymoo", "--no-refinement"]
 SEARCHES = {
     "ga": [*SHORT, "--set", "search.ga.generations=20", "--set", "refinement.iterations=20"],
     "nsga2": ["-q", "--set", "search.nsga2={population: 10, generations: 20}", "--no-refinement"],
     "multistart": ["-q", "--algorithm=multistart", "--set=search.multistart={starts: 3, iterations: 5}"],
+    "moead": [*PYMOO, "--set", "search.pymoo={population: 10, generations: 20}"],
+    "mopso-cd": [*PYMOO, "--set=search.pymoo={algorithm: mopso-cd, population: 10, generations: 20}"],
 }
 
 

@@ -16,6 +16,7 @@ from hydroid.errors import RunError, SettingsError
 from hydroid.identified_model import IdentifiedModel, load_identified
 from hydroid.log import Log
 from hydroid.plant import Plant
+from hydroid.reporting.outlines import sight
 from hydroid.viewer import film
 from hydroid.viewer.film import LATE, play, rendered
 from hydroid.viewer.motion import Motion, Replay, Sliders, simulated_motion
@@ -148,3 +149,23 @@ def test_what_cannot_be_shown_is_refused(nominal: IdentifiedModel, study_log: Lo
         film.render_motion(motion, ".png", (9.0, 12.0))
     with pytest.raises(SettingsError, match="commands nothing"):
         simulated_motion(nominal, {"alone": step_log(study_log.start, [0.0])})
+
+
+def test_the_machine_stays_in_the_frame_wherever_it_slews(nominal: IdentifiedModel, study_log: Log):
+    """By the camera's law: what is seen lies within half its angle of its axis, from where it stands."""
+    turned = study_log.angle.copy()
+    turned[:, 0] += np.radians(160) * study_log.time / study_log.time[-1]
+    motion = simulated_motion(nominal, {"alone": replace(study_log, angle=turned)})
+    replay = Replay(motion)
+    camera = mujoco.MjvCamera()
+    film.look_at(camera, replay.model, replay.region)
+    ahead = sight(camera.azimuth, camera.elevation)[2]
+    eye = camera.lookat - camera.distance * ahead
+    half = np.radians(replay.model.vis.global_.fovy) / 2
+    for moment in np.linspace(0.0, replay.duration, 7):
+        replay.advance(moment)
+        assert replay.ghost is not None
+        for data in (replay.data, replay.ghost):
+            to = data.xpos[1:] - eye
+            away = np.arccos(to @ ahead / np.linalg.norm(to, axis=1))
+            assert away.max() < half

@@ -1,0 +1,107 @@
+"""Lengths of cylinders -> angles of the joints that they turn, by the triangle of their pins."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from hydroid.arrays import Array, record
+from hydroid.log.log import LogFinding
+from hydroid.log.table import Recording
+from hydroid.settings.arm import Arm
+from hydroid.settings.cylinder import LinearActuator
+from hydroid.units import UNITS
+
+POINTS = 2001
+"""of a table of lengths over a joint's range"""
+STEPS = 3
+"""of Newton's method from there"""
+MARGIN = 0.02
+"""part of the stroke by which lengths may lie outside: drawings and sensors err"""
+
+
+@record
+class Rod:
+    """A cylinder that turns a joint from a lower to an upper angle [rad], `limits`."""
+
+    cylinder: LinearActuator
+    limits: tuple[float, float]
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Its length from pin to pin with the rod in and out [m]."""
+        lengths = self.cylinder.length(np.array(self.limits))
+        return float(lengths.min()), float(lengths.max())
+
+    @property
+    def margin(self) -> float:
+        """How far a length may lie outside [m]."""
+        shortest, longest = self.ends
+        return MARGIN * (longest - shortest)
+
+    def reading(self, cells: Array, unit: str) -> tuple[str, float] | None:
+        """Return the unit of cells, (R,), which are its lengths or its rod's travel, and the offset in it.
+
+        `unit`: the one that the file states; empty: none. None: they are neither.
+        """
+        shortest, longest = self.ends
+        known = cells[np.isfinite(cells)]
+        fitting = list[tuple[float, str, float]]()
+        for name in [unit] if unit else ["mm", "cm", "m"]:
+            factor = UNITS[name].factor
+            low, high = factor * known.min(), factor * known.max()
+            for offset in (0.0, shortest):
+                inside = low + offset >= shortest - self.margin and high + offset <= longest + self.margin
+                if inside:
+                    fitting.append((high - low, name, offset / factor))
+        if not fitting:
+            return None
+        _, name, offset = max(fitting, key=lambda one: one[0])  # in which the rod moves farthest
+        return name, float(f"{offset:.9g}")
+
+    def angle(self, length: Array) -> Array:
+        """Return the joint's angle [rad] at lengths [m], (R,); those outside count as the nearest end.
+
+        The length rises or falls throughout the range, or the arm would be refused.
+        """
+        grid = np.linspace(*self.limits, POINTS)
+        table = self.cylinder.length(grid)
+        if table[0] > table[-1]:
+            grid, table = grid[::-1], table[::-1]
+        within = np.clip(length, table[0], table[-1])
+        angle = np.interp(within, table, grid)
+        for _ in range(STEPS):
+            angle = angle - (self.cylinder.length(angle) - within) / self.cylinder.moment_arm(angle)
+        return angle
+
+
+def rods_of(arm: Arm) -> Mapping[int, Rod]:
+    """Return the cylinders of an arm that turn joints, by the joints' numbers (from 1)."""
+    rods = dict[int, Rod]()
+    for number, joint in enumerate(arm.joints, 1):
+        if isinstance(joint.actuator, LinearActuator) and not joint.slides:
+            rods[number] = Rod(joint.actuator, joint.limits)
+    return rods
+
+
+def as_angles(recording: Recording, findings: list[LogFinding]) -> Recording:
+    """Return a recording with the angles of joints in place of the lengths of their cylinders.
+
+    Lengths that the cylinder cannot have are an error.
+    """
+    if all(signal.rod is None for signal in recording.signals):
+        return recording
+    values = recording.values.copy()
+    for signal, column in zip(recording.signals, values.T, strict=True):
+        if (rod := signal.rod) is None:
+            continue
+        shortest, longest = rod.ends
+        with np.errstate(invalid="ignore"):
+            out = np.flatnonzero((column < shortest - rod.margin) | (column > longest + rod.margin))
+        if len(out):
+            numbers = {"length": 1e3 * column[out[0]], "low": 1e3 * shortest, "high": 1e3 * longest}
+            findings.append(
+                recording.finding("error", "length outside", out, signal, signal.owner, **numbers)
+            )
+        column[:] = rod.angle(column)
+    return replace(recording, values=values)

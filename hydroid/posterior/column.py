@@ -1,0 +1,29 @@
+"""A quantity of a joint before its interval is known: its name, its words, and its value for
+candidates.
+"""
+
+from collections.abc import Iterator
+from typing import NamedTuple, TypeAlias
+
+from hydroid.arrays import Array
+
+
+class Column(NamedTuple):
+    """One quantity of a joint, or one point of one of its curves.
+
+    name: plain ASCII. label: the same in words. positive: it cannot be negative, and its interval
+    is multiplicative. at: where the point of a curve is, `along` what; the points of a curve share
+    their name.
+    """
+
+    name: str
+    label: str
+    unit: str
+    positive: bool = True
+    at: float | None = None
+    along: str = "command [%]"
+
+
+Measured: TypeAlias = Iterator[tuple[Column, Array]]
+"""quantities of n candidates, each of shape (n,), the same for every population;
+NaN where one is undefined"""

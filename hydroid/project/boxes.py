@@ -1,0 +1,74 @@
+"""An arm of boxes from the names of its joints and the lengths of its links, for a machine without CAD."""
+
+from collections.abc import Sequence
+
+from hydroid.errors import SettingsError
+from hydroid.log.clues import words
+
+UPRIGHT = 0.0
+"""length that says that a joint turns about the vertical, as a slewing gear does [m]"""
+RANGES = {"swing": (-180, 180), "boom": (-30, 60), "stick": (-130, -20), "bucket": (-150, 30)}
+"""of joints that are called so [deg]; ours, as excavators have them"""
+CALLED = {"slew": "swing", "azimuth": "swing", "arm": "stick", "dipper": "stick", "tool": "bucket"}
+OTHERS = (-90, 90)
+MASS = 45.0
+"""of a link over the square of its length [kg/m²]; ours, as of excavators of 1 to 20 t"""
+SLENDER = 7.0
+"""length of a link over its width and height"""
+LONGEST = 100.0
+"""of a link [m]"""
+
+
+def boxes_urdf(joints: Sequence[str], lengths: Sequence[float]) -> str:
+    """Return a URDF of an arm whose links are boxes; a joint of length 0 turns its link about the vertical.
+
+    Raises SettingsError: not a length for each joint, or one that no link has.
+    """
+    if not joints or len(joints) != len(lengths):
+        what = f"{len(lengths)} lengths for {len(joints)} joints"
+        raise SettingsError(what, "--lengths", "as in --joints swing,boom,arm,bucket --lengths 0,3.7,1.6,0.9")
+    if odd := [joint for joint in joints if not joint.isidentifier()]:
+        raise SettingsError(f"{odd[0]!r} is no name of a joint", "--joints", "letters, digits and _")
+    if len({*joints}) < len(joints):
+        raise SettingsError("holds a name twice", "--joints")
+    wrong = [length for length in lengths if not 0 <= length <= LONGEST]
+    if wrong or not any(lengths):
+        what = f"{wrong[0]:g} is no length of a link" if wrong else "no link has a length"
+        raise SettingsError(what, "--lengths", f"0 to {LONGEST:g} m; 0 for a joint that slews")
+    reach, parent, at = sum(lengths), "base", "0 0 1"
+    parts = ['<link name="base"/>']
+    for joint, length in zip(joints, lengths, strict=True):
+        upright = length == UPRIGHT
+        size = reach / SLENDER if upright else length
+        parts += [_link(f"{joint}_link", size, reach if upright else length, cube=upright)]
+        parts += [_joint(joint, parent, at, upright=upright)]
+        parent, at = f"{joint}_link", f"{length:g} 0 0"
+    return f'<robot name="boxes">{"".join(parts)}</robot>'
+
+
+def _link(name: str, size: float, length: float, *, cube: bool) -> str:
+    """Return a box along x, or one around the axis of a link that slews, which weighs as the arm does."""
+    wide = size if cube else size / SLENDER
+    mass = MASS * length**2
+    middle = 0.0 if cube else size / 2
+    along, across = mass * wide**2 / 6, mass * (wide**2 + size**2) / 12
+    origin = f'<origin xyz="{middle:g} 0 0"/>'
+    return (
+        f'<link name="{name}"><inertial>{origin}<mass value="{mass:g}"/>'
+        f'<inertia ixx="{along:g}" iyy="{across:g}" izz="{across:g}" ixy="0" ixz="0" iyz="0"/></inertial>'
+        f'<visual>{origin}<geometry><box size="{size:g} {wide:g} {wide:g}"/></geometry></visual></link>'
+    )
+
+
+def _joint(name: str, parent: str, at: str, *, upright: bool) -> str:
+    called = [CALLED.get(word, word) for word in words(name)]
+    low, high = next((RANGES[word] for word in called if word in RANGES), OTHERS)
+    if upright:
+        low, high = RANGES["swing"]
+    axis = "0 0 1" if upright else "0 -1 0"  # positive angles lift
+    radians = [f"{end * 0.017453292519943295:.6g}" for end in (low, high)]
+    return (
+        f'<joint name="{name}" type="revolute"><parent link="{parent}"/><child link="{name}_link"/>'
+        f'<origin xyz="{at}"/><axis xyz="{axis}"/>'
+        f'<limit lower="{radians[0]}" upper="{radians[1]}" effort="0" velocity="0"/></joint>'
+    )

@@ -1,0 +1,202 @@
+"""What each joint's valve and actuator do, beside what was measured: speeds, openings, answers to a
+step.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from hydroid.arrays import Array
+from hydroid.estimate import CurveEstimate, FitSummary, QuantityEstimate
+from hydroid.log import Log
+from hydroid.reporting.chart import Chart, Color, Mark, Panel
+from hydroid.reporting.page import Plot, Section
+from hydroid.settings.fit import FitSettings
+from hydroid.words import listed, two_digits
+
+OVER = 0.25
+"""time over which a speed is measured [s]; for as long before it the command must have stood
+still"""
+STILL = 20.0
+"""by how much a command that stands still may change [%]: a joystick never rests"""
+AT_END = 0.02
+"""part of a joint's travel in the logs within which it may stand at a stop"""
+TOWARDS: dict[str, Color] = {"positive": "blue", "negative": "orange"}
+"""endings of curves, as `posterior.quantities` names directions, and their colours"""
+
+_SPEED = (
+    "Speeds of a settled motion through mid travel, and how far the valve opens then, with 95 % intervals. "
+    "Points: measured speeds in all poses and under all loads, against the command one dead time before. "
+    "Grey: commands beyond those of the logs."
+)
+_SPEED_ALONE = (
+    "Speeds of a settled motion through mid travel, with 95 % intervals. Points: measured speeds in all "
+    "poses and under all loads. Grey: commands beyond those of the logs."
+)
+_STEP = (
+    "A step of the command from rest at mid travel, and the frequency response of its start, with 95 % "
+    "intervals: how fast the joint follows, and how late."
+)
+
+
+def speed_section(settings: FitSettings, summary: FitSummary, logs: Sequence[Log]) -> Section | None:
+    """Return the section of speed and valve opening against command, a tab per joint.
+
+    None: no curves.
+    """
+    tabs = list[Plot]()
+    fastest = list[str]()
+    opens = False
+    for joint in settings.outputs:
+        name = settings.arm.joint_names[joint - 1]
+        speed = summary.curves.get(f"{name}_speed")
+        if speed is None:
+            continue
+        opening = summary.curves.get(f"{name}_opening")
+        opens = opens or opening is not None
+        late = [one.value for one in _dead_times(name, summary)]
+        pairs = [
+            measured_speeds(log, joint, float(np.mean(late)) if late else 0.0)
+            for log in logs
+            if log.measured[joint - 1]
+        ]
+        cloud = np.hstack(pairs) if pairs else np.empty((2, 0))
+        commands = np.concatenate([log.command[:, joint - 1] for log in logs])
+        drawing = partial(_speed_chart, name, (speed, opening), commands, cloud)
+        tabs.append(Plot(f"speed_{len(tabs) + 1}", f"{name}: {speed.label}", drawing, button=name))
+        fastest.append(f"{name} {two_digits(max(map(abs, speed.value)))} {speed.unit}")
+    if not tabs:
+        return None
+    title = "Speed and valve against command" if opens else "Speed against command"
+    answer = f"fastest: {listed(fastest)}"
+    return Section(title, _SPEED if opens else _SPEED_ALONE, tabs=tuple(tabs), folded=True, answer=answer)
+
+
+def step_section(settings: FitSettings, summary: FitSummary) -> Section | None:
+    """Return the section of step and frequency responses, a tab per joint.
+
+    None: the fit states none.
+    """
+    tabs = list[Plot]()
+    slowest = list[str]()
+    for joint in settings.outputs:
+        name = settings.arm.joint_names[joint - 1]
+        if not any(f"{name}_step_{towards}" in summary.curves for towards in TOWARDS):
+            continue
+        drawing = partial(_response_chart, name, summary.curves)
+        caption = f"{name}: step and frequency response"
+        tabs.append(Plot(f"step_{len(tabs) + 1}", caption, drawing, button=name))
+        if late := _dead_times(name, summary):
+            slowest.append(f"{name} {two_digits(max(one.value for one in late))} s")
+    if not tabs:
+        return None
+    answer = f"dead time: {listed(slowest)}" if slowest else ""
+    title = "Step and frequency response"
+    return Section(title, _STEP, tabs=tuple(tabs), folded=True, answer=answer)
+
+
+def measured_speeds(log: Log, joint: int, late: float) -> tuple[Array, Array]:
+    """Return commands [%] and speeds [rad/s] of a joint, from 1, where its command stood still,
+    (n,) each.
+
+    The command is that of `late` [s] before. Stretches of OVER do not overlap; those without a
+    command, and those near an end of the travel, are left out.
+    """
+    command = log.command[:, joint - 1]
+    angle = log.angle[:, joint - 1]
+    half = max(round(0.5 * OVER / log.period), 1)
+    delay = round(late / log.period)
+    low, high = np.min(angle), np.max(angle)
+    margin = AT_END * (high - low)
+    commands = list[float]()
+    speeds = list[float]()
+    for middle in range(delay + 3 * half, len(angle) - half, 2 * half):
+        held = command[middle - delay - 3 * half : middle - delay + half]
+        free = low + margin < angle[middle] < high - margin
+        if not free or np.ptp(held) > STILL or not np.any(held):
+            continue
+        commands.append(float(held[2 * half :].mean()))
+        way = angle[middle + half] - angle[middle - half]
+        speeds.append(float(way / (2 * half * log.period)))
+    return np.array(commands), np.array(speeds)
+
+
+def _dead_times(name: str, summary: FitSummary) -> list[QuantityEstimate]:
+    """Return the dead times of a joint in both directions, as far as the fit states them."""
+    times = [summary.quantities.get(f"{name}_dead_time_{towards}") for towards in TOWARDS]
+    return [one for one in times if one is not None]
+
+
+def _speed_chart(
+    name: str, curves: tuple[CurveEstimate, CurveEstimate | None], commands: Array, measured: Array
+) -> Chart:
+    """Draw speed and opening of a joint over its logged commands, and measured pairs, shape (2, n)."""
+    speed, opening = curves
+    left = np.array([-105.0, commands.max(initial=0.0)])
+    right = np.array([commands.min(initial=0.0), 105.0])
+    beyond = Mark("spans", left, end=right, color="pale", alpha=0.4)
+    factor = 1e3 if speed.unit.startswith("mm") else np.degrees(1.0)
+    command, turning = measured
+    cloud = Mark("points", command, factor * turning, color="ink", label="measured", width=5, alpha=0.35)
+    marks = (beyond, *_both_sides(speed), cloud)
+    panels = [Panel("", f"speed [{speed.unit}]", marks, f"{name}: {speed.label}", 300)]
+    if opening is not None:
+        label = f"opening [{opening.unit}]"
+        panels.append(Panel("", label, (beyond, *_both_sides(opening)), opening.label, 200))
+    panels[-1] = replace(panels[-1], x="command [%]")
+    return Chart(tuple(panels), linked=True)
+
+
+def _both_sides(curve: CurveEstimate) -> list[Mark]:
+    """Draw a curve against the command, with the dead band between its two sides."""
+    marks = list[Mark]()
+    for sign, color in (1.0, "blue"), (-1.0, "orange"):
+        x, y, low, high = _rows(curve)
+        side = sign * x > 0
+        word = "positive" if sign > 0 else "negative"
+        label = f"model, {word} command"
+        marks.append(Mark("band", x[side], low[side], high[side], color=color, label=label, alpha=0.25))
+        marks.append(Mark("line", x[side], y[side], color=color, label=label))
+    return marks
+
+
+def _response_chart(name: str, curves: Mapping[str, CurveEstimate]) -> Chart:
+    """Draw what the curves say of one joint in both directions."""
+    panels = (
+        _response_panel("speed", f"{name}: step of the command", 250, _towards(name, "step", curves)),
+        _response_panel("amplitude", "frequency response", 200, _towards(name, "amplitude", curves)),
+        _response_panel("phase", "", 200, _towards(name, "phase", curves)),
+    )
+    return Chart(panels)
+
+
+def _towards(name: str, kind: str, curves: Mapping[str, CurveEstimate]) -> dict[str, CurveEstimate]:
+    """Return the curves of a kind by the direction of the command."""
+    keys = {towards: f"{name}_{kind}_{towards}" for towards in TOWARDS}
+    return {towards: curves[key] for towards, key in keys.items() if key in curves}
+
+
+def _response_panel(y: str, title: str, height: int, curves: Mapping[str, CurveEstimate]) -> Panel:
+    marks = list[Mark]()
+    along, unit = "", ""
+    for towards, curve in curves.items():
+        x, value, low, high = _rows(curve)
+        label = curve.label.partition(" to ")[2]  # the command and the direction
+        color = TOWARDS[towards]
+        marks.append(Mark("band", x, low, high, color=color, label=label, alpha=0.25))
+        marks.append(Mark("line", x, value, color=color, label=label))
+        along, unit = curve.along, curve.unit
+    over_frequency = along.startswith("frequency")
+    decades = y == "amplitude"
+    panel = Panel(along, f"{y} [{unit}]", tuple(marks), title, height)
+    return replace(panel, log_x=over_frequency, log_y=decades)
+
+
+def _rows(curve: CurveEstimate) -> Array:
+    """Return places, values, and both ends of the intervals, NaN where there is no limit, shape
+    (4, n).
+    """
+    ends = np.array(curve.interval, dtype=float)
+    return np.array([curve.at, curve.value, ends[:, 0], ends[:, 1]], dtype=float)

@@ -1,0 +1,114 @@
+"""What a fit knows of the machine, what it does not know, and how sure a prediction can be."""
+
+from typing import Any
+
+import numpy as np
+
+from hydroid.estimate import FitSummary, QuantityEstimate
+from hydroid.findings import Finding
+from hydroid.reporting.page import Section, Table
+from hydroid.reporting.parameters_report import in_words
+from hydroid.settings.fit import FitSettings
+from hydroid.words import interval_words, listed, two_digits
+
+BEST_WITHIN = 0.3
+"""half of a 95 % interval, relative to the value, up to which a property counts as known"""
+MOST_KNOWN = 5
+"""quantities of a joint that a page shows"""
+MOST_UNKNOWN = 6
+MOST_WARNINGS = 3
+
+
+def warnings(summary: FitSummary) -> tuple[Finding, ...]:
+    """Return what must be read before any use of the estimate, at most three things."""
+    return tuple(one for one in summary.findings if one.level != "note")[:MOST_WARNINGS]
+
+
+def unknown_section(settings: FitSettings, summary: FitSummary) -> Section:
+    """Return the section of the other findings.
+
+    Those after the first six stand with the parameters.
+
+    Which parameters cannot be told apart, their correlations show.
+    """
+    points = tuple(str(in_words(one, settings)) for one in _others(summary)[:MOST_UNKNOWN])
+    none = "" if points else "The logs determine every free parameter."
+    return Section("What is not known", none, points)
+
+
+def further_findings(summary: FitSummary) -> tuple[str, ...]:
+    """Return the findings that `unknown_section` has no room for."""
+    return tuple(str(one) for one in _others(summary)[MOST_UNKNOWN:])
+
+
+def _others(summary: FitSummary) -> list[Finding]:
+    first = warnings(summary)
+    return [one for one in summary.findings if one not in first and one.kind != "combination"]
+
+
+def quantity_section(settings: FitSettings, summary: FitSummary) -> Section | None:
+    """Return the section with a card of the best known quantities of each joint.
+
+    None without any.
+    """
+    cards = dict[str, Table]()
+    for joint in settings.outputs:
+        known = [q for q in summary.quantities.values() if q.joint == joint and q.within <= BEST_WITHIN]
+        known.sort(key=lambda one: one.within)
+        rows = [(q.label, f"{q.value:.3g}", q.unit, _within(q)) for q in known[:MOST_KNOWN]]
+        name = settings.arm.joint_names[joint - 1]
+        if rows:
+            cards[f"known_{name}"] = Table(name, ("quantity", "value", "unit", "interval"), tuple(rows))
+    text = (
+        "With 95 % intervals, which are right only if the model is right. estimate.yaml has all quantities."
+    )
+    return Section("What is known", text, cards=cards) if cards else None
+
+
+def _within(one: QuantityEstimate) -> str:
+    """Write an interval: of a percentage its ends, since ± 3 % of 40 % could mean either."""
+    low, high = one.interval
+    if one.unit == "%" and low is not None and high is not None:
+        return f"{interval_words(low, high)} %"
+    return f"± {100 * one.within:.2g} %"
+
+
+def error_section(settings: FitSettings, summary: FitSummary) -> Section | None:
+    """Return the section with the error model of each compared joint.
+
+    None where the run has none.
+    """
+    rows = list[dict[str, Any]]()
+    after = list[str]()
+    for joint in settings.outputs:
+        error = summary.errors.get(f"q{joint}")
+        if error is None:
+            continue
+        name = settings.arm.joint_names[joint - 1]
+        unit, factor = "deg", 1.0
+        if settings.arm.joints[joint - 1].slides:
+            unit, factor = "mm", 1e3 * float(np.radians(1.0))
+        ahead = factor * error.after_10_s_deg
+        which = f" ({name})" if len(settings.outputs) > 1 else ""
+        after.append(f"{two_digits(ahead)} {unit}{which}")
+        rows.append(
+            {
+                "joint": name,
+                "unit": unit,
+                "sensor's noise": factor * error.sensor_deg,
+                "uncertain after 10 s": ahead,
+                "what is left lasts [s]": error.lasts_s or None,
+            }
+        )
+    if not rows:
+        return None
+    text = (
+        f"Even with exact parameters a prediction is uncertain by {listed(after)} after 10 s of motion: what "
+        "moves a joint beside its commands adds up."
+    )
+    note = (
+        "Standard deviations; after 10 s at the mean speed of the logs. What is left and lasts is the error "
+        "of the model, not the sensor's; empty: nothing lasts."
+    )
+    table = Table.of("", {name: name for name in rows[0]}, rows, note)
+    return Section("How sure a prediction can be", text, tables={"prediction_errors": table})

@@ -1,0 +1,225 @@
+"""Logs as machines record them, of which the truth is known: are they read rightly, or is it said?
+
+All are of the template's arm, a boom and a stick, so that `hydroid init DIR --log LOG` takes them alone.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+import hydroid
+from hydroid.errors import HydroidError
+from hydroid.log import Log
+from hydroid.settings.arm import Arm
+from hydroid.settings.cylinder import LinearActuator
+
+JOINTS = ("boom", "stick")
+PERIOD = 0.02
+RANGES = {"boom": (-30.0, 60.0), "stick": (-130.0, -20.0)}
+SPEEDS = {"boom": 0.2, "stick": -0.3}
+"""[deg/s] of each % above the dead band; the stick's rod pushes it down"""
+DEAD = 15.0  # [%]
+CLOSE_COMMAND, CLOSE_ANGLE = 2.0, 0.5
+"""differences from the truth [%, deg] below which a log is read rightly"""
+Columns = dict[str, np.ndarray]
+
+
+@dataclass(frozen=True)
+class Truth:
+    """Time [s], commands [%] and angles [deg] by joint."""
+
+    time: np.ndarray
+    command: Columns
+    angle: Columns
+
+
+@dataclass(frozen=True)
+class FieldLog:
+    """A log of one kind: what writes it of the truth; `said`: words of the line that must be printed.
+
+    Without these it must be read rightly, though `lost` [s] of it may be missing.
+    """
+
+    name: str
+    write: Callable[[Truth, Arm], str]
+    said: str = ""
+    lost: float = 0.1
+    steps: tuple[float, ...] = (70, -60, 100, -100, 45, -80)
+
+
+def make_truth(steps: tuple[float, ...]) -> Truth:
+    """Rest, then steps of both joints in turn, of 2 s with 1 s of rest between."""
+    commands = {name: [np.zeros(100)] for name in JOINTS}
+    for k, step in enumerate(steps * 2):
+        driven = JOINTS[k // len(steps)]
+        for name in JOINTS:
+            commands[name] += [np.full(100, step if name == driven else 0.0), np.zeros(50)]
+    command = {name: np.concatenate(parts) for name, parts in commands.items()}
+    angle = {name: _moved(command[name], name) for name in JOINTS}
+    return Truth(PERIOD * np.arange(len(command["boom"])), command, angle)
+
+
+def _moved(command: np.ndarray, name: str) -> np.ndarray:
+    low, high = RANGES[name]
+    angle, speed, angles = (low + high) / 2, 0.0, list[float]()
+    for u in command:
+        wanted = SPEEDS[name] * np.sign(u) * max(abs(u) - DEAD, 0.0)
+        speed += (wanted - speed) * PERIOD / 0.1
+        angle = float(np.clip(angle + speed * PERIOD, low + 1, high - 1))
+        angles.append(angle)
+    return np.array(angles)
+
+
+def text(columns: Mapping[str, np.ndarray]) -> str:
+    """Return a CSV of columns; of numbers with nine digits."""
+    cells = [
+        values.tolist() if values.dtype.kind in "UO" else [f"{value:.9g}" for value in values]
+        for values in columns.values()
+    ]
+    return "\n".join([",".join(columns), *(",".join(row) for row in zip(*cells, strict=True))]) + "\n"
+
+
+def table(truth: Truth) -> Columns:
+    """Return the columns of a well-kept log."""
+    columns = {"time_s": truth.time}
+    columns |= {f"{name}_cmd_pct": truth.command[name] for name in JOINTS}
+    return columns | {f"{name}_angle_deg": truth.angle[name] for name in JOINTS}
+
+
+def commands(label: str, change: Callable[[np.ndarray], np.ndarray]) -> Callable[[Truth, Arm], str]:
+    """Return what writes commands as they are sent, under the joint's name and a label."""
+
+    def write(truth: Truth, arm: Arm) -> str:
+        columns = {"time_s": truth.time} | {f"{n}_{label}": change(truth.command[n]) for n in JOINTS}
+        return text(columns | {f"{name}_angle_deg": truth.angle[name] for name in JOINTS})
+
+    return write
+
+
+def lengths(label: str, factor: float, *, travel: bool = False) -> Callable[[Truth, Arm], str]:
+    """Return what writes the lengths of cylinders in place of angles, or the travel of their rods."""
+
+    def write(truth: Truth, arm: Arm) -> str:
+        columns = {"time_s": truth.time} | {f"{n}_cmd_pct": truth.command[n] for n in JOINTS}
+        for joint in arm.joints:
+            assert isinstance(joint.actuator, LinearActuator)
+            length = joint.actuator.length(np.radians(truth.angle[joint.name]))
+            shortest = joint.actuator.length(np.array(joint.limits)).min()
+            columns[f"{joint.name}_{label}"] = factor * (length - travel * shortest)
+        return text(columns)
+
+    return write
+
+
+def changed(change: Callable[[Columns], Columns]) -> Callable[[Truth, Arm], str]:
+    """Return what writes a well-kept log whose columns are changed."""
+    return lambda truth, arm: text(change(table(truth)))
+
+
+def lines(change: Callable[[list[str]], list[str]]) -> Callable[[Truth, Arm], str]:
+    """Return what writes a well-kept log whose lines are changed."""
+    return lambda truth, arm: "\n".join(change(text(table(truth)).splitlines()))
+
+
+def _stamps(columns: Columns) -> Columns:
+    start = np.datetime64("2026-03-01T23:59:50.000")
+    stamps = start + np.round(1e3 * columns["time_s"]).astype("m8[ms]")
+    return {"stamp": stamps.astype(str)} | {name: own for name, own in columns.items() if name != "time_s"}
+
+
+def _renamed(columns: Columns, factor: float, name: str) -> Columns:
+    others = {key: values for key, values in columns.items() if key != "time_s"}
+    whole = np.array([f"{round(factor * one)}" for one in columns["time_s"]])
+    return {name: whole} | others
+
+
+def _dirty(rows: list[str]) -> list[str]:
+    cells = rows[300].split(",")
+    rows[300] = ",".join([*cells[:3], "nan", *cells[4:]])
+    return [*rows[:500], rows[499], *rows[500:700], rows[0], *rows[700:]]
+
+
+def _half(columns: Columns) -> Columns:
+    return {n: v.clip(0) if "cmd" in n else v for n, v in columns.items()}
+
+
+def _targets(columns: Columns) -> Columns:
+    ahead = {n: np.r_[v[10:], np.full(10, v[-1])] for n, v in columns.items() if "angle" in n}
+    kept = {name: own for name, own in columns.items() if "cmd" not in name}
+    return kept | {name.replace("angle", "target"): own for name, own in ahead.items()}
+
+
+def _counts(columns: Columns) -> Columns:
+    turned = {n.replace("deg", "counts"): np.round(2048 + v * 4096 / 360) for n, v in columns.items()}
+    return {n: v for n, v in columns.items() if "angle" not in n} | {
+        n: v for n, v in turned.items() if "angle" in n
+    }
+
+
+FIELD_LOGS = (
+    FieldLog("pulses of 1000 to 2000 µs", commands("us", lambda u: 1500 + 5 * u)),
+    FieldLog("duty of 0 to 100 % around 50", commands("duty", lambda u: 50 + 0.5 * u)),
+    FieldLog("4 to 20 mA", commands("valve_mA", lambda u: 12 + 0.08 * u)),
+    FieldLog("3 to 9 V of a supply of 12 V", commands("joystick_V", lambda u: 6 + 0.03 * u)),
+    FieldLog("0.25 to 0.75 of a supply", commands("joystick", lambda u: 0.5 + 0.0025 * u)),
+    FieldLog("-1, 0 and 1 of switched valves", commands("cmd", lambda u: u / 100), steps=(100, -100, 100)),
+    FieldLog("bytes around 127", commands("joy", lambda u: np.round(127 + 1.27 * u))),
+    FieldLog("permille on a bus", commands("cmd", lambda u: 10 * u)),
+    FieldLog("cylinder lengths in mm", lengths("cyl_mm", 1e3)),
+    FieldLog("travel of the rods in cm", lengths("stroke_cm", 1e2, travel=True)),
+    FieldLog("cylinder lengths without a unit", lengths("cylinder_length", 1.0)),
+    FieldLog("a hole of 2 s", lines(lambda rows: rows[:600] + rows[700:]), lost=2.1),
+    FieldLog("a last line cut off", lines(lambda rows: [*rows[:-1], rows[-1][:7]])),
+    FieldLog("a cell without a number, a row twice, names again", lines(_dirty)),
+    FieldLog("more names than cells", lines(lambda rows: [rows[0] + ",note,operator", *rows[1:]])),
+    FieldLog("dates and times past midnight", changed(_stamps)),
+    FieldLog("time in ns", changed(lambda columns: _renamed(columns, 1e9, "time_ns"))),
+    FieldLog("a joystick without its lowering half", changed(_half), "lacks half of the command"),
+    FieldLog("targets in place of commands", changed(_targets), "targets of positions"),
+    FieldLog("encoder counts", changed(_counts), "taken for the whole range"),
+)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What `init` made of a log: "right", "said" in one line, "refused" otherwise, or "wrong" in silence."""
+
+    verdict: str
+    line: str = ""
+
+
+def outcome(log: FieldLog, folder: Path, arm: Arm) -> Outcome:
+    """Write a log, give it to `init`, and compare what is read then with the truth."""
+    truth, path = make_truth(log.steps), folder / "log.csv"
+    path.write_text(log.write(truth, arm))
+    try:
+        result = hydroid.init(folder / "mine", log=path)
+        printed = [str(line) for line in result.lines]
+        told = next((line.strip() for line in printed if log.said and log.said in line), "")
+        if told:
+            return Outcome("said", told)
+        if missing := result.result.missing:
+            return Outcome("refused", missing)
+        settings = hydroid.load_settings(folder / "mine" / "fit.yaml")
+        parts = hydroid.read_logs(path, settings)
+    except HydroidError as error:
+        return Outcome("said" if log.said and log.said in str(error) else "refused", str(error))
+    return Outcome("right" if is_right(parts, truth, log.lost) else "wrong")
+
+
+def is_right(parts: list[Log], truth: Truth, lost: float) -> bool:
+    """Return whether logs hold commands and angles of the truth, but for a part of its time [s]."""
+    read = 0.0
+    for part in parts:
+        begin = getattr(part, "begin", 0.0)
+        rows = np.minimum(np.rint((begin + part.time) / PERIOD).astype(int), len(truth.time) - 1)
+        read += part.duration
+        for number, name in enumerate(JOINTS):
+            size = np.abs(np.abs(part.command[:, number]) - np.abs(truth.command[name][rows]))
+            off = np.abs(np.degrees(part.angle[:, number]) - truth.angle[name][rows])
+            # a command averaged over a lost or doubled row may differ for a sample
+            if np.quantile(size, 0.99) > CLOSE_COMMAND or not off.max() <= CLOSE_ANGLE:
+                return False
+    return read >= truth.time[-1] - lost

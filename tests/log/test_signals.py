@@ -1,0 +1,67 @@
+"""What a command is in: one table for `init`, `check` and the page on logs."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hydroid.log import guess_columns, open_table
+from hydroid.log.signals import SIGNALS, CommandRange, Signal, likely_range
+from hydroid.settings.log import LogSettings
+
+PAGE = Path(__file__).parents[2] / "docs" / "logs.md"
+T = np.arange(2000) * 0.02
+STEPS = np.repeat([0.0, 100, 0, -100, 40, 0, -70, 0, 100, 0], 200)
+"""a command [%] that begins with rest and is given whole both ways"""
+
+
+def cells(signal: Signal) -> np.ndarray:
+    return signal.middle + signal.half * STEPS / 100
+
+
+@pytest.mark.parametrize("signal", SIGNALS, ids=lambda signal: signal.name)
+def test_each_signal_is_recognised_and_brought_to_percent(signal: Signal, tmp_path: Path) -> None:
+    likely = likely_range(cells(signal), unit=signal.unit)
+    assert isinstance(likely, CommandRange)
+    assert likely.name == signal.name
+    np.testing.assert_allclose(likely.scale * cells(signal) + likely.offset, STEPS, atol=1e-9)
+
+
+UNITS = {"pulses of 1 to 2 ms": "ms", "1000 to 2000 µs": "us", "6 to 18 V": "V", "4 to 20 mA": "mA"}
+
+
+@pytest.mark.parametrize("signal", SIGNALS, ids=lambda signal: signal.name)
+def test_init_writes_its_scale_and_offset(signal: Signal, tmp_path: Path) -> None:
+    unit = UNITS.get(signal.name, "")
+    name = f"cmd_boom_{unit}" if unit else "cmd_boom"
+    path = tmp_path / "log.csv"
+    table = np.stack([T, cells(signal), 20 * np.sin(0.4 * T)], axis=1)
+    np.savetxt(path, table, delimiter=",", header=f"time_s,{name},angle_boom", comments="")
+    command = LogSettings.model_validate(guess_columns(open_table(path), ["boom"]).log).columns("command", 1)
+    assert command is not None
+    np.testing.assert_allclose(command.scale * cells(signal) + command.offset, STEPS, atol=1e-9)
+
+
+def test_the_page_has_each_signal() -> None:
+    page = PAGE.read_text()
+    for signal in SIGNALS:
+        assert row(signal) in page
+
+
+def row(signal: Signal) -> str:
+    _, scale, offset = signal.range
+    rest = f", {signal.middle:g} at rest" if signal.low >= 0 else ""
+    return f"| {signal.name}{rest} | {scale:.6g} | {f'{offset:.6g}'.replace('-', '−') if offset else ''} |\n"
+
+
+@pytest.mark.parametrize("steps", [STEPS.clip(0), STEPS / 2, np.zeros(2000)], ids=["one way", "half", "none"])
+def test_a_command_in_percent_stays_one(steps: np.ndarray) -> None:
+    likely = likely_range(steps)
+    assert likely is None or likely.name == "%"
+
+
+def test_a_joystick_of_bytes_that_is_often_at_its_end_is_none_from_0_to_100() -> None:
+    """Its 0 is a whole command: it rests at 127, first and mostly."""
+    likely = likely_range(np.round(127 + 1.27 * STEPS))
+    assert likely is not None
+    assert likely.name == "bytes around 127"

@@ -195,9 +195,7 @@ def by_speeds(problem: Problem, joint: int, theta: Array) -> Array:
 
     It is theta itself where its valve has no curve, or the logs show none.
     """
-    own = problem.settings.acting_on(joint)
-    curved = {problem.settings.parameters[name].quantity[:-2] for name in own} & {*CURVE}
-    found = fitted_valve(problem.logs, joint) if curved else None
+    found = fitted_valve(problem.logs, joint) if has_curve(problem, joint) else None
     if found is None:
         return theta
     a, b = found.sides
@@ -207,6 +205,13 @@ def by_speeds(problem: Problem, joint: int, theta: Array) -> Array:
     for part, name in enumerate(CURVE):
         values |= _sided(name, a.factors[part], b.factors[part])
     return _with_valve(problem, joint, theta, values, np.array([a.speed, b.speed]))
+
+
+def has_curve(problem: Problem, joint: int) -> bool:
+    """Whether a joint's valve has a curve that is estimated, besides its power law."""
+    parameters = problem.settings.parameters
+    own = (parameters[name].quantity for name in problem.settings.acting_on(joint))
+    return any(quantity.startswith(CURVE) for quantity in own)
 
 
 def _sided(name: str, a: float, b: float) -> dict[str, float]:

@@ -188,7 +188,7 @@ class Priors:
 def _further(name: str, prior: PriorSettings, parameters: ParameterSet) -> _Combination | _Heavy | None:
     """Return a prior on several parameters; None where all of them are fixed."""
     names = parameters.names
-    for parameter in prior.smooth or prior.factors:
+    for parameter in prior.names:
         if parameter not in names:
             hint = f"parameters: {', '.join(names)}"
             raise SettingsError(f"no parameter {parameter!r}", f"priors.{name}", hint)

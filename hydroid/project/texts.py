@@ -138,14 +138,14 @@ def _opening(joint: Joint, speed: float, usual: float) -> str:
 class ValveSide(NamedTuple):
     """What the settings say of one direction of a joint's valve: numbers as YAML.
 
-    `curve`: its factors at the start; empty: a valve that is open or shut, which tells no curve.
+    `one_size`: of a valve that is open or shut, whose logs tell no curve.
     """
 
     name: str
     opening: str
     dead: str
     exponent: str
-    curve: str
+    one_size: bool
 
 
 def _sides(
@@ -158,14 +158,13 @@ def _sides(
     if valve is None:
         dead = DEAD * min(max(motion.dead_band, 5.0), 40.0) if motion else UNKNOWN_DEAD
         opening = _opening(joint, usual, usual) if motion else ""
-        numbers = opening, short(dead), short(EXPONENT), "[1, 1, 1, 1]"
-        return [ValveSide("A", *numbers), ValveSide("B", *numbers)]
+        numbers = opening, short(dead), short(EXPONENT)
+        return [ValveSide("A", *numbers, one_size=False), ValveSide("B", *numbers, one_size=False)]
     sides = list[ValveSide]()
     for name, start in zip("AB", valve.sides, strict=True):
-        factors = "" if start.one_size else flow([rounded(one) for one in start.factors])
         opening = _opening(joint, start.speed, usual)
         band = short(min(start.dead_band, MOST_DEAD))
-        sides.append(ValveSide(name, opening, band, short(start.exponent), factors))
+        sides.append(ValveSide(name, opening, band, short(start.exponent), start.one_size))
     return sides
 
 

@@ -56,10 +56,10 @@ class ParameterSettings(Settings):
     quantity in its logs, around 0 with standard deviation `sd`, and one of all other logs,
     NAME_other: an unseen day is predicted with the mean, and a wider band. The name of a group,
     or other: an effect of that one"""
-    term: Annotated[str, Field(pattern="^[A-Za-z_]+$")] | None = None
+    term: Annotated[str, Field(pattern=r"^[^\W\d]\w*$")] | None = None
     """name of a term of the model, of one parameter or several: a fit begins without it, adds it
-    after the refinement, and keeps it where it lowers the error on parts of the logs left out by 5
-    %; null: always there"""
+    after the refinement, and keeps it where it foretells parts of the logs left out clearly better.
+    One whose parameters all act on one joint is tried on that joint alone. null: always there"""
 
     @model_validator(mode="after")
     def _consistent(self) -> "ParameterSettings":
@@ -188,6 +188,11 @@ class PriorSettings(Settings):
         if not self.smooth and not any(self.factors.values()):
             raise ValueError("names no parameter")
         return self
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The parameters that it is about."""
+        return self.smooth or tuple(self.factors)
 
     @property
     def factors(self) -> dict[str, float]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from hydroid.arrays import Array, record
 from hydroid.fitting.checkpoints import Checkpoints
-from hydroid.fitting.left_out import LeftOut, gain, is_better, parts, predict_parts
+from hydroid.fitting.left_out import LeftOut, gain, is_better, predict_blocks
 from hydroid.fitting.multistart import alone, by_speeds, has_curve, lone_joints
 from hydroid.fitting.refinement import Refinement, refine, refine_from_afar
 from hydroid.fitting.step import Step, step_of
@@ -28,9 +28,6 @@ from hydroid.settings.search import RefinementSettings
 
 FIRST = 10
 """iterations after which another model must be more likely than the last one: each is slow to simulate"""
-WORTH = 1.0
-"""gain of the fitted logs' log-likelihood that pays for a parameter more (H. Akaike, 1974): a rung below that
-cannot foretell parts left out clearly better"""
 FIRM = 1e-3  # gain below which least squares ends where another rung may follow
 
 
@@ -97,8 +94,6 @@ class Ladder:
         self.kept = min(estimates.values(), key=lambda e: e.rms if e.usable else np.inf)
         self._watch, self._checkpoints, self._late = watch, checkpoints, False
         self._step = step_of(self.kept.name)
-        self._left_out = dict[str, LeftOut]()
-        self._searched = problem.parameters.mapping(self.kept.theta)
 
     def climb(self, whole: Problem) -> None:
         """Refine the estimate with each model and term that the settings of a fit's problem name."""
@@ -170,14 +165,10 @@ class Ladder:
         if not if_better:
             self._keep(own, new, step)
             return
-        if self._explained(own, new.theta) < _price(last, own):
-            return
-        without = self._parts_left_out(settings)
-        starts = np.array([_begun(own, last, one) for one in without.thetas])
-        with_it = self._predicted(own, starts, step, settings)
+        without = self._left_out_of(last, self.refinements[start.name])
+        with_it = self._left_out_of(own, result)
         self.estimates[step.estimate] = new = replace(new, gained=gain(with_it, without))
         if not self._late and is_better(with_it, without):
-            self._left_out[step.estimate] = with_it
             self._keep(own, new, step)
 
     def _try_alone(self, whole: Problem, settings: RefinementSettings) -> set[str]:
@@ -204,7 +195,8 @@ class Ladder:
         without = self._refined(make_likelihood(before), theta, settings, step.changed(phase="without it"))
         with_it = self._refined(make_likelihood(after), begun, settings, step, refine_from_afar)
         reached = after.parameters.from_unit(with_it.point)
-        if not self._late and _explained_more(before, without, after, reached) >= _price(before, after):
+        foretold = self._left_out_of(after, with_it)
+        if not self._late and is_better(foretold, self._left_out_of(before, without)):
             self._keep(own, self._listed(own, reached, step), step.changed(joint=0))
 
     def _try_without(self, whole: Problem, term: str, settings: RefinementSettings) -> None:
@@ -219,11 +211,9 @@ class Ladder:
         parameters, before = own.parameters, self.problem.parameters
         theta = parameters.started(before.mapping(self.kept.theta))
         result = self._refined(make_likelihood(own), theta, settings, step.changed(phase="on the way"))
-        with_it = self._parts_left_out(settings)
-        starts = np.array([parameters.started(before.mapping(one)) for one in with_it.thetas])
-        without = self._predicted(own, starts, step, settings)
+        with_it = self._left_out_of(self.problem, self.refinements[self.kept.name])
+        without = self._left_out_of(own, result)
         if not self._late and not is_better(with_it, without):
-            self._left_out[step.estimate] = without
             self._keep(own, self._measured(own, result, step), step)
 
     def _explained(self, problem: Problem, theta: Array) -> float:
@@ -231,7 +221,11 @@ class Ladder:
 
         Both are weighed by the errors of the kept one.
         """
-        return _explained_more(self.problem, self.refinements[self.kept.name], problem, theta)
+        kept = likelihood_at(self.problem, self.kept.theta, self.refinements[self.kept.name].numbers)
+        other = replace(kept, problem=problem)
+        before = kept.rows(self.kept.theta[None])[0]
+        after = other.rows(theta[None])[0]
+        return 0.5 * float(before @ before - after @ after)
 
     def _is_white(self) -> bool:
         """Whether the errors of the estimate that is kept leave innovations that are white."""
@@ -243,22 +237,8 @@ class Ladder:
     def _keep(self, problem: Problem, estimate: Estimate, step: Step) -> None:
         self.problem, self.kept, self._step = problem, estimate, step
 
-    def _parts_left_out(self, settings: RefinementSettings) -> LeftOut:
-        """Return the parts of the logs as the kept model foretells them, from where the search began."""
-        name, problem = self.kept.name, self.problem
-        if name not in self._left_out:
-            start = problem.parameters.started(self._searched)
-            starts = np.tile(start, (len(np.unique(parts(problem))), 1))
-            self._left_out[name] = self._predicted(problem, starts, self._step, settings)
-        return self._left_out[name]
-
-    def _predicted(
-        self, problem: Problem, starts: Array, step: Step, settings: RefinementSettings
-    ) -> LeftOut:
-        def refit(likelihood: Likelihood, theta: Array, part: int) -> Refinement:
-            return self._refined(likelihood, theta, settings, step.changed(without=part))
-
-        return predict_parts(problem, starts, refit)
+    def _left_out_of(self, problem: Problem, end: Refinement) -> LeftOut:
+        return predict_blocks(make_likelihood(problem), end)
 
     def _refined(
         self,
@@ -281,24 +261,6 @@ class Ladder:
         """Measure theta, (P,), and list it as the estimate of a step."""
         self.estimates |= measured(problem, {step.estimate: theta})
         return self.estimates[step.estimate]
-
-
-def _explained_more(before: Problem, end: Refinement, after: Problem, theta: Array) -> float:
-    """Rise of the log-likelihood from an end of least squares to another problem's theta, (P,).
-
-    Both are of the same logs, and weighed by the errors of the end.
-    """
-    kept = likelihood_at(before, before.parameters.from_unit(end.point), end.numbers)
-    other = replace(kept, problem=after)
-    old = kept.rows(before.parameters.from_unit(end.point)[None])[0]
-    new = other.rows(theta[None])[0]
-    return 0.5 * float(old @ old - new @ new)
-
-
-def _price(last: Problem, problem: Problem) -> float:
-    """The log-likelihood that a model must gain for the parameters that the last one has not."""
-    more = int(problem.parameters.free.sum() - last.parameters.free.sum())
-    return WORTH * max(more, 1)
 
 
 def _begun(problem: Problem, last: Problem, theta: Array) -> Array:

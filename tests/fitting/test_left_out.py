@@ -7,7 +7,17 @@ import pytest
 from made_logs import FAST, fast_arm, noisy, stepped
 
 from hydroid.advice.suggestions import refitted
-from hydroid.fitting.left_out import BLOCK, LeftOut, blocks, gain, is_better, parts, predict_parts
+from hydroid.fitting.left_out import (
+    BLOCK,
+    LEAST_BLOCKS,
+    LeftOut,
+    blocks,
+    gain,
+    is_better,
+    parts,
+    predict_blocks,
+    predict_parts,
+)
 from hydroid.log import Log
 from hydroid.posterior.error_model import make_likelihood
 from hydroid.problem.problem import Problem
@@ -69,7 +79,32 @@ def test_blocks_are_spans_of_time_and_no_two_logs_share_one():
     each = [number[: len(logs[0].time)], number[len(logs[0].time) :]]
     assert not {*each[0].tolist()} & {*each[1].tolist()}
     for log, own in zip(logs, each, strict=True):
-        assert [np.ptp(log.time[own == one]) <= BLOCK for one in np.unique(own)]
+        assert all(np.ptp(log.time[own == one]) <= BLOCK for one in np.unique(own))
+
+
+def test_short_logs_have_as_many_blocks_as_a_standard_error_needs():
+    number = blocks(Problem(ONE, [log_of(0).first(1.0)]))
+    assert np.ptp(np.bincount(number)) <= 1
+    assert number.max() + 1 == LEAST_BLOCKS
+
+
+def test_a_block_is_predicted_as_by_a_fit_without_it():
+    """To first order: what is left of each change is small beside it."""
+    problem = Problem(MORE, [log_of(0)])
+    truth = problem.parameters.vector(FAST, "truth")
+    likelihood = make_likelihood(problem)
+    end = refitted(likelihood, truth, 1)
+    all_of_it = problem.parameters.from_unit(end.point)
+    found = predict_blocks(likelihood, end)
+    number = blocks(problem)
+    for block in range(number.max() + 1):
+        out = number == block
+        rest = replace(likelihood, shown=likelihood.shown.without(out))
+        alone = problem.parameters.from_unit(refitted(rest, truth, 1).point)
+        change = np.log(alone / all_of_it)
+        assert np.linalg.norm(np.log(found.thetas[block] / alone)) < 0.2 * np.linalg.norm(change) + 1e-5
+        errors = problem.output_errors(found.thetas[block][None])[0]
+        np.testing.assert_allclose(found.errors[out], errors[out], atol=1e-4)
 
 
 @pytest.mark.parametrize("stiffness", [1.3, 0.7])
@@ -108,17 +143,12 @@ def test_the_gain_is_that_of_the_weighed_squares_and_its_error_that_of_the_block
     assert error == pytest.approx(np.sqrt(len(levels)) * np.std(levels, ddof=1))
 
 
-def test_one_block_tells_nothing_and_what_diverges_is_worse():
+def test_what_diverges_is_worse_and_one_that_does_not_is_better():
     log = log_of(0).first(1.0)
     problem = Problem(ONE, [log])
     theta = problem.parameters.start[None]
     noise = np.random.default_rng(1).normal(0.0, 0.01, len(log.time))
-    high, low, lost = (LeftOut(problem, theta, factor * noise) for factor in (0.5, 1.0, np.inf))
-    assert blocks(problem).max() == 0
-    rise, error = gain(high, low)
-    assert rise > 0
-    assert error == np.inf
-    assert not is_better(high, low)
+    low, lost = (LeftOut(problem, theta, factor * noise) for factor in (1.0, np.inf))
     assert is_better(low, lost)
     assert not is_better(lost, low)
     assert not is_better(lost, lost)

@@ -24,6 +24,7 @@ from hydroid.posterior.uncertainty import Uncertainty, uncertainty
 from hydroid.posterior.whiteness import lasting
 from hydroid.problem.problem import Problem
 from hydroid.search.descent import Ending
+from hydroid.settings.fit import FitSettings
 from hydroid.settings.search import RefinementSettings
 
 FIRST = 10
@@ -103,15 +104,17 @@ class Ladder:
         climbs = two or bool(settings.terms())
         tolerance = max(FIRM, refinement.gain_tolerance) if climbs else refinement.gain_tolerance
         on_the_way = refinement.changed({"gain_tolerance": tolerance})
-        tried = self._try_alone(whole, on_the_way)
+        lone = self._lone_terms(settings)
         for model in ("refined", "dynamic")[: 1 + two]:
-            possible = [term for term in settings.terms(model) if term not in tried]
-            terms = tuple(term for term in settings.terms(model) if term in self._step.terms)
+            possible = settings.terms(model)
+            terms = tuple(term for term in possible if term in self._step.terms)
             self._rung(whole, Step(model, terms), on_the_way, if_better=model == "dynamic")
             for term in possible if self._step.model == model else ():
-                if term not in terms:
+                if term not in (*terms, *lone):
                     with_term = self._step.changed(terms=(*self._step.terms, term))
                     self._rung(whole, with_term, on_the_way, if_better=True)
+            if model == "refined":
+                self._add_lone_terms(whole, lone, on_the_way)
         if self._step.model == "dynamic":
             for term in self._step.terms:
                 self._try_without(whole, term, on_the_way)
@@ -136,16 +139,24 @@ class Ladder:
         slopes = descent.jacobian[: problem.measured.size].T * change[:, None]
         return uncertainty(problem, theta, slopes, descent.numbers)
 
-    def _rung(self, whole: Problem, step: Step, settings: RefinementSettings, *, if_better: bool) -> None:
+    def _rung(
+        self,
+        whole: Problem,
+        step: Step,
+        settings: RefinementSettings,
+        *,
+        if_better: bool,
+        begun: Array | None = None,
+    ) -> None:
         """Refine with the settings of an estimate, from the one kept; keep the result where it is better.
 
-        if_better: else it is kept in any case.
+        if_better: else it is kept in any case. begun: where it begins, shape (P,), if not at the kept one.
         """
         last, start = self.problem, self.kept
         if if_better and (self._late or last.leaves_noise(start.theta)):
             return
         own = whole.varied(whole.settings.of_estimate(step.estimate))
-        theta = _begun(own, last, start.theta)
+        theta = _begun(own, last, start.theta) if begun is None else begun
         likelihood = make_likelihood(own)
         if own.settings.quasi_static != last.settings.quasi_static:
             if self._is_white():  # there is nothing for a model that is slow to simulate
@@ -171,33 +182,39 @@ class Ladder:
         if not self._late and is_better(with_it, without):
             self._keep(own, new, step)
 
-    def _try_alone(self, whole: Problem, settings: RefinementSettings) -> set[str]:
-        """Add terms of one joint, each tried on that joint alone, which takes seconds; return those tried.
+    def _lone_terms(self, settings: FitSettings) -> dict[str, int]:
+        """Return the terms of one joint that can be fitted alone, and that joint, numbered from 1."""
+        return {term: joint for joint in lone_joints(self.problem) for term in settings.terms_of(joint)}
 
-        The other joints follow their logs. A term is kept where it explains enough of the joint's motion.
+    def _add_lone_terms(self, whole: Problem, lone: Mapping[str, int], settings: RefinementSettings) -> None:
+        """Try each term of one joint on that joint alone, which takes seconds; then the better ones together.
+
+        The other joints follow their logs meanwhile.
         """
-        tried = set[str]()
-        for joint in lone_joints(self.problem):
-            for term in whole.settings.terms_of(joint):
-                tried.add(term)
-                self._try_on_joint(whole, joint, term, settings)
-        return tried
+        problem, theta, step = self.problem, self.kept.theta, self._step
+        for term, joint in lone.items():
+            tried = step.changed(terms=(*step.terms, term), joint=joint)
+            own = whole.varied(whole.settings.of_estimate(tried.estimate))
+            reached = self._better_alone(problem, own, theta, tried, settings)
+            if reached is not None:
+                problem, theta, step = own, reached, tried.changed(joint=0)
+        if step != self._step:
+            self._rung(whole, step, settings, if_better=True, begun=theta)
 
-    def _try_on_joint(self, whole: Problem, joint: int, term: str, settings: RefinementSettings) -> None:
-        last, theta = self.problem, self.kept.theta
-        before = alone(last, joint, theta)
+    def _better_alone(
+        self, last: Problem, problem: Problem, theta: Array, step: Step, settings: RefinementSettings
+    ) -> Array | None:
+        """Return where a joint alone leads, (P,), from the theta of the last problem; None: not better."""
+        before = alone(last, step.joint, theta)
         if self._late or before.leaves_noise(theta):
-            return
-        step = self._step.changed(terms=(*self._step.terms, term), joint=joint)
-        own = whole.varied(whole.settings.of_estimate(step.estimate))
-        begun = _begun(own, last, theta)
-        after = alone(own, joint, begun)
+            return None
+        begun = _begun(problem, last, theta)
+        after = alone(problem, step.joint, begun)
         without = self._refined(make_likelihood(before), theta, settings, step.changed(phase="without it"))
         with_it = self._refined(make_likelihood(after), begun, settings, step, refine_from_afar)
-        reached = after.parameters.from_unit(with_it.point)
-        foretold = self._left_out_of(after, with_it)
-        if not self._late and is_better(foretold, self._left_out_of(before, without)):
-            self._keep(own, self._listed(own, reached, step), step.changed(joint=0))
+        if self._late or not is_better(self._left_out_of(after, with_it), self._left_out_of(before, without)):
+            return None
+        return after.parameters.from_unit(with_it.point)
 
     def _try_without(self, whole: Problem, term: str, settings: RefinementSettings) -> None:
         """Drop a term that was kept below, unless this model foretells clearly better with it.
@@ -254,13 +271,10 @@ class Ladder:
 
     def _measured(self, problem: Problem, end: Refinement, step: Step) -> Estimate:
         """Measure an end of least squares, and list it."""
-        self.refinements[step.estimate] = end
-        return self._listed(problem, problem.parameters.from_unit(end.point), step)
-
-    def _listed(self, problem: Problem, theta: Array, step: Step) -> Estimate:
-        """Measure theta, (P,), and list it as the estimate of a step."""
-        self.estimates |= measured(problem, {step.estimate: theta})
-        return self.estimates[step.estimate]
+        name = step.estimate
+        self.estimates |= measured(problem, {name: problem.parameters.from_unit(end.point)})
+        self.refinements[name] = end
+        return self.estimates[name]
 
 
 def _begun(problem: Problem, last: Problem, theta: Array) -> Array:

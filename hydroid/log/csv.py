@@ -153,9 +153,14 @@ def _encoding(path: Path) -> str:
         if file.read(2) in (b"\xff\xfe", b"\xfe\xff"):
             return "utf-16"
         file.seek(0)
-        decoder, encoding = getincrementaldecoder("utf-8-sig")(), "utf-8-sig"
+        decoder, encoding, line = getincrementaldecoder("utf-8-sig")(), "utf-8-sig", 1
         while piece := file.read(1 << 16):
-            if b"\0" in piece:
+            text, nul, _ = piece.partition(b"\0")
+            line += text.count(b"\n")
+            if nul and line > 1 and encoding == "utf-8-sig":
+                hint = "a logger keeps room by them, or lost power: cut the file there"
+                raise LogError("holds NUL bytes from here on", f"{path}, line {line}", hint)
+            if nul:
                 raise _no_text(path)
             if encoding == "utf-8-sig":
                 try:

@@ -208,6 +208,8 @@ def _as_numbers(cells: NDArray[Any]) -> tuple[Array, bool]:
     """Return cells as numbers, NaN where there is none, and whether they are times [s] from the first."""
     if cells.dtype.kind in "fiub":
         return cells.astype(np.float64), False
+    if cells.dtype.kind == "m":
+        return cells / np.timedelta64(1, "s"), True
     if cells.dtype.kind == "M":
         there = ~np.isnat(cells)
         ticks = (cells[there] - cells[there][:1]).astype("m8[ns]").astype(np.int64)
@@ -232,6 +234,10 @@ def refuse_large(source: str, rows: int, columns: int) -> None:
         raise LogError(what, source, "cut it, or record at a lower rate")
 
 
+BLIND = (ArithmeticError, AssertionError, AttributeError, LookupError, MemoryError, TypeError)
+"""errors of a library that met bytes which its authors did not expect: their text says nothing of the file"""
+
+
 @contextmanager
 def format_library(package: str, extra: str, path: Path, kind: str) -> Generator[Any]:
     """Yield a library that reads a format; whatever it raises on damaged bytes becomes a `LogError`."""
@@ -242,6 +248,8 @@ def format_library(package: str, extra: str, path: Path, kind: str) -> Generator
         raise LogError(what, path, f"pip install 'hydroid[{extra}]'") from None
     try:
         yield library
+    except LogError:
+        raise
     except Exception as error:
-        reason = " ".join(str(error).split())[:200] or type(error).__name__
-        raise LogError(f"cannot be read as {kind} ({reason})", path, "save it again") from None
+        reason = "damaged" if isinstance(error, BLIND) else " ".join(str(error).split())[:200]
+        raise LogError(f"cannot be read as {kind} ({reason or 'damaged'})", path, "save it again") from None

@@ -22,7 +22,7 @@ import numpy as np
 from hydroid.arrays import Array, Ints, Mask, record
 from hydroid.errors import LogError
 from hydroid.log.repair import hold
-from hydroid.log.table import Recording, Signal, Table, format_library, refuse_large
+from hydroid.log.table import Recording, Signal, Table, format_library, refuse_large, time_of_day
 from hydroid.settings.log import LogSettings
 from hydroid.words import listed
 
@@ -114,7 +114,8 @@ class BagTable(Table):
         topics = ", ".join(sorted({topic_of(name) for name in held}))
         remarks = (*self.remarks, f"{topics}: resampled to {self.period:g} s")
         table = Table(source=self.source, names=self.names, columns=columns, remarks=remarks)
-        return Recording(table, tuple(signals), values[~lost], np.flatnonzero(~lost))
+        day = time_of_day(np.array([start], "M8[ns]"))
+        return Recording(table, tuple(signals), values[~lost], np.flatnonzero(~lost), day)
 
     def _grid(self, held: Mapping[str, bool], at: Mapping[str, Ints]) -> tuple[int, Array]:
         """Return the first time that all interpolated channels have [ns], and the rows' times from it [s]."""

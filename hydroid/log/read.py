@@ -129,7 +129,8 @@ def _parts(
     for piece in between_gaps(recording, settings, findings, repair=repair):
         begin = float(piece.time[0] - recording.time[0])
         rest = 0 if begin else None  # after a gap the arm may be moving
-        parts.append(replace(resample(piece, settings, joints), begin=begin, rest=rest))
+        log = resample(piece, settings, joints)
+        parts.append(replace(log, begin=begin, rest=rest, clock=recording.clock))
     if len(parts) == 1:
         return parts
     return [replace(one, source=f"{one.source}[{k}]") for k, one in enumerate(parts, 1)]

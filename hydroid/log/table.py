@@ -97,7 +97,8 @@ class Table:
             with np.errstate(all="ignore"):
                 column[:] = numbers * (1.0 if timed else signal.gain) + signal.offset
         values[~(np.abs(values) < 1e100)] = np.nan
-        return Recording(self, tuple(signals), values, np.arange(len(values)))
+        clock = time_of_day(self.columns[first])
+        return Recording(self, tuple(signals), values, np.arange(len(values)), clock)
 
 
 @record
@@ -107,12 +108,14 @@ class Recording:
     Attributes:
         values: in the signals' units, shape (R, C), NaN where the file holds no number.
         rows: of the table [0-based], shape (R,).
+        clock: time of day of the table's first row, HH:MM:SS; empty where the file has none.
     """
 
     table: Table
     signals: tuple[Signal, ...]
     values: Array
     rows: Ints
+    clock: str = ""
 
     @property
     def time(self) -> Array:
@@ -158,6 +161,13 @@ def clock(cell: str) -> int | None:
     hour, minute, second, fraction, half = match.groups()
     hours = int(hour) % 12 + 12 * (half in "Pp") if half else int(hour)
     return ((hours * 60 + int(minute)) * 60 + int(second)) * 10**9 + int((fraction or "0").ljust(9, "0"))
+
+
+def time_of_day(cells: NDArray[Any]) -> str:
+    """Return the time of day of the first cell, HH:MM:SS; empty where it is none."""
+    if cells.dtype.kind != "M" or not len(cells) or np.isnat(cells[0]):
+        return ""
+    return str(cells[0].astype("M8[s]")).partition("T")[2]
 
 
 class TextColumn:

@@ -92,7 +92,8 @@ def check(
         paths = [Path(log) for log in as_list(logs)]
         for number, path in enumerate(paths, 1):
             progress("reading log", number, len(paths), path.name)
-            files.append(_File(path, *check_file(path, settings, repair=repair)))
+            found = check_file(path, settings, repair=repair, progress=progress)
+            files.append(_File(path, *found))
         there = [log for file in files for log in file.parts]
         progress("looking at the motion", len(paths), None)
         motion = [*undriven_findings(there, settings), *motion_findings(there, settings.arm)]

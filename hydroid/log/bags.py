@@ -23,6 +23,7 @@ from hydroid.arrays import Array, Ints, Mask, record
 from hydroid.errors import LogError
 from hydroid.log.repair import hold
 from hydroid.log.table import Recording, Signal, Table, format_library, refuse_large, time_of_day
+from hydroid.progress import Progress, no_progress
 from hydroid.settings.log import LogSettings
 from hydroid.words import listed
 
@@ -30,6 +31,7 @@ LATE = 0.1
 """how late a message may be recorded [s]: networks reorder messages; a longer step back is the clock's"""
 HOLE = 0.1
 """shortest silence of a topic that counts as a hole [s]"""
+WATCHED = 5_000  # messages between two reports of progress
 LARGEST_MESSAGE = 20_000
 """[bytes]; larger ones are images and point clouds"""
 
@@ -150,7 +152,7 @@ def _in_holes(seconds: Array, grid: Array) -> Mask:
     return far & (grid > seconds[after - 1] + 1e-9) & (grid < seconds[after] - 1e-9)
 
 
-def open_bag(path: Path, settings: LogSettings) -> BagTable:
+def open_bag(path: Path, settings: LogSettings, progress: Progress = no_progress) -> BagTable:
     """Read the channels of a bag. Raises LogError: it cannot be read, or holds none."""
     channels, counts = dict[str, Channel](), dict[str, int]()
     unread = Counter[str]()
@@ -159,7 +161,9 @@ def open_bag(path: Path, settings: LogSettings) -> BagTable:
 
         latest = get_typestore(Stores.LATEST)  # for bags that do not hold their definitions
         with rosbags.AnyReader([path], default_typestore=latest) as reader:
-            for connection, recorded, data in reader.messages():
+            for number, (connection, recorded, data) in enumerate(reader.messages()):
+                if number % WATCHED == 0:
+                    progress(f"reading {path.name}, message", number, reader.message_count)
                 topic = connection.topic
                 counts[topic] = counts.get(topic, 0) + 1
                 if len(data) > LARGEST_MESSAGE:

@@ -17,6 +17,7 @@ from hydroid.errors import LogError
 from hydroid.log.bags import open_bag
 from hydroid.log.mat5 import large_variables
 from hydroid.log.table import MOST_NUMBERS, Table, TextColumn, format_library, refuse_large
+from hydroid.progress import Progress
 from hydroid.settings.log import LogSettings
 from hydroid.words import listed
 
@@ -25,7 +26,7 @@ TEXTS = ("string", "large_string", "binary", "large_binary")
 TEXTS_AT_ONCE = 1024
 
 
-def open_mat(path: Path, _settings: LogSettings) -> Table:
+def open_mat(path: Path, _settings: LogSettings, _progress: Progress) -> Table:
     """Read all variables of a file, which is HDF5 from version 7.3 on."""
     hdf5 = HDF5 in first_bytes(path)
     package = "h5py" if hdf5 else "scipy.io"
@@ -117,7 +118,7 @@ class ParquetColumns(Mapping[str, NDArray[Any]]):
         return None
 
 
-def open_parquet(path: Path, _settings: LogSettings) -> Table:
+def open_parquet(path: Path, _settings: LogSettings, _progress: Progress) -> Table:
     """Open a file, whose columns are read where they are used."""
     columns = ParquetColumns(path)
     return ParquetTable(source=str(path), names=tuple(columns), columns=columns)

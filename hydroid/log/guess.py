@@ -15,7 +15,7 @@ import numpy as np
 from hydroid.arrays import Array
 from hydroid.errors import LogError
 from hydroid.files import Plain
-from hydroid.log.clues import CLUES, column_unit, direction, joint_of, kind_of, number_in, words
+from hydroid.log.clues import CLUES, RAW, column_unit, direction, joint_of, kind_of, number_in, words
 from hydroid.log.rods import Rod
 from hydroid.log.signals import likely_range
 from hydroid.log.table import Signal, Table
@@ -81,7 +81,10 @@ def guess_columns(
         _by_joint(_angles_first(columns, kind), (joints, links), (slides, rods), reasons)
         for kind in ("command", "angle")
     )
-    unitless = [c.values for joint, ((c,), _) in angles.items() if joint not in slides and not c.unit]
+    unitless = list[Array]()
+    for joint, ((column,), _) in angles.items():
+        if joint not in slides and not column.unit and not _is_raw(column):
+            unitless.append(column.values)
     default = "rad" if max((np.nanmax(np.abs(x)) for x in unitless), default=np.inf) <= 6.3 else "deg"
     entries = dict[int, Plain]()
     for joint in sorted({*angles, *commands}):
@@ -125,12 +128,14 @@ def _angle(
     limits: tuple[float, float] | None,
 ) -> tuple[Plain, str]:
     """Return the settings of the column of a joint's angle, and what it is taken for."""
-    known = column.values[np.isfinite(column.values)]
-    low, high = float(known.min()), float(known.max())
-    largest = max(abs(low), abs(high))
-    if slides:  # no telescope is 50 m long
+    largest = float(np.nanmax(np.abs(column.values)))
+    raw = _is_raw(column)
+    if slides and not raw:  # no telescope is 50 m long
         unit = column.unit or ("mm" if largest > 50 else "m")
         return {"column": column.name, "unit": unit}, f"{column.name}: position in {unit}"
+    if rod is not None and raw and _is_length(column):
+        ends = 1e3 * rod.ends[0], 1e3 * rod.ends[1]
+        return _over_the_range(column, ends, "mm", "stroke of its cylinder")
     if length := _length(column, rod, usual):
         unit, offset = length
         entry: Plain = {"column": column.name, "unit": unit}
@@ -139,19 +144,37 @@ def _angle(
         with_it_in = f"whose cylinder is {offset:.6g} {unit} long with it in,"
         said = f"{column.name}: travel of the rod in {unit}, {with_it_in}"
         return entry | {"offset": offset}, said
-    unit = column.unit or usual
-    if column.unit or largest * UNITS[unit].factor <= LARGEST_ANGLE or not limits or high == low:
-        return {"column": column.name, "unit": unit}, f"{column.name}: angle in {unit}"
-    least, most = np.degrees(limits)
-    scale = float(f"{(most - least) / (high - low):.6g}")
-    entry = {
-        "column": column.name,
-        "unit": "deg",
-        "scale": scale,
-        "offset": float(f"{least - scale * low:.6g}"),
-    }
-    what = f"counts from {low:g} to {high:g}, taken for the whole range of {least:.4g} to {most:.4g} deg"
-    return entry, f"{column.name}: {what}: correct scale and offset where the log does not reach both ends,"
+    too_large = not column.unit and largest * UNITS[usual].factor > LARGEST_ANGLE
+    if limits and (raw or too_large):
+        ends = limits if slides else (float(np.degrees(limits[0])), float(np.degrees(limits[1])))
+        return _over_the_range(column, ends, "m" if slides else "deg", "range")
+    unit = usual if raw else column.unit or usual
+    return {"column": column.name, "unit": unit}, f"{column.name}: angle in {unit}"
+
+
+def _is_raw(column: _Column) -> bool:
+    """Return whether a position is as a sensor gives it: in V, mA or counts."""
+    if column.unit:
+        return UNITS[column.unit.lower()].quantity in RAW
+    return not {*words(column.name)}.isdisjoint(CLUES["counts"])
+
+
+def _over_the_range(column: _Column, ends: tuple[float, float], unit: str, whole: str) -> tuple[Plain, str]:
+    """Return the settings of a position in V, mA or counts, which is taken for all that a joint can do.
+
+    `ends` of that are in the unit.
+    """
+    known = column.values[np.isfinite(column.values)]
+    low, high = float(known.min()), float(known.max())
+    least, most = ends
+    span = high - low or 1.0
+    scale = float(f"{(most - least) / span:.6g}")
+    offset = float(f"{least - scale * low:.6g}")
+    signal = column.unit or "counts"
+    what = f"{low:g} to {high:g} {signal}, taken for the whole {whole}, {least:.4g} to {most:.4g} {unit}"
+    hint = "correct scale and offset where the log does not reach both ends,"
+    entry: Plain = {"column": column.name, "unit": unit, "scale": scale, "offset": offset}
+    return entry, f"{column.name}: {what}: {hint}"
 
 
 def _angles_first(columns: Sequence[_Column], kind: str) -> list[_Column]:
@@ -236,7 +259,7 @@ def _by_joint(
         unit = pair[0].unit
         length = unit in LENGTHS
         takes = (length and joint in rods) or length == (joint in slides)
-        fits = kind == "command" or not unit or takes
+        fits = kind == "command" or not unit or takes or _is_raw(pair[0])
         free = fits and 0 < joint <= len(names) and joint not in given
         if free:
             given[joint] = pair, why

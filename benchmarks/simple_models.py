@@ -1,9 +1,10 @@
-"""Nine numbers fitted to angles, and to the innovations of an error model: which predicts unseen logs better?
+"""Simple models of a joint: which predicts unseen logs better?
 
 A joint's nine numbers (dead band, exponent, speed and lag of each direction, and a delay) are fitted to the
 squares of output errors, as the verdict has them, and then in three rounds to innovations: the noise and the
-drift are estimated from what they leave, and the numbers anew. Rms errors [deg] of the logs that are not
-fitted.
+drift are estimated from what they leave, and the numbers anew. The table of mean speeds with a delay stands
+beside them, and the curves at which a fit begins, fitted with delay and lag to what errors of the angle
+gain within 1.5 s (`hydroid.fitting.valve_start`). Rms errors [deg] of the logs that are not fitted.
 """
 
 from collections.abc import Sequence
@@ -18,6 +19,7 @@ import hydroid
 from hydroid.arrays import Array
 from hydroid.fitting.baselines import LOWER, NAMES, SCALE, UPPER, Baseline, fit_baselines
 from hydroid.fitting.validation import HORIZONS, errors_ahead
+from hydroid.fitting.valve_start import fitted_valve
 from hydroid.log import Log
 from hydroid.posterior.error_model import (
     LEAST_NOISE,
@@ -87,9 +89,14 @@ def compare(settings: FitSettings, fitted: Sequence[Log], unseen: Sequence[Log])
         tests = [log for log in unseen if log.driven[joint - 1]]
         clock = Clock()
         models = fit_baselines(fitted, joint, limits)
-        show(name, "angles", models[NAMES[-1]], tests, clock)
+        show(name, "speeds: a table", models[NAMES[1]], tests, clock)
+        show("", "angles: nine numbers", models[NAMES[-1]], tests, clock)
         again = by_innovations(models[NAMES[-1]], fitted, limits)
-        show("", "innovations", again, tests, clock)
+        show("", "innovations: nine numbers", again, tests, clock)
+        clock = Clock()
+        valve = fitted_valve(fitted, joint)
+        if valve is not None:
+            show("", "changes of angles: curves", valve.baseline(joint, limits), tests, clock)
 
 
 if __name__ == "__main__":

@@ -17,6 +17,8 @@ from hydroid.settings.load import JointNumber, NotNegative, Positive, Settings, 
 
 Interval = tuple[float | None, float | None]  # its ends; null: it has no limit there
 NAME = "estimate.yaml"  # name of the file in a run folder and beside a saved plant
+LARGER = 32
+"""times that an estimate may be as large as settings: it has a covariance of all parameters"""
 DESCRIPTION = "run.json"
 """name of the file that describes a run: versions, seed, hashes of its logs and files, status,
 seconds"""
@@ -235,7 +237,7 @@ def read_estimate(source: Path) -> tuple[Path, Plain, FitSummary | None]:
         RunError: a folder that holds no estimate. SettingsError: a file that is none.
     """
     file = _estimate_in(source) if os.path.isdir(source) else source
-    content, lines = read_yaml(file)
+    content, lines = read_yaml(file, LARGER)
     if "estimate" in content:
         summary = validate(content, FitSummary, str(file), lines)
         return file, summary.values, summary

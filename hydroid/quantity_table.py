@@ -117,3 +117,6 @@ TARGETS = {name: tuple(_by_side([row])) for name, row in CHOICES.items()}
 
 # the quantities that both stages have
 MECHANICAL = tuple(row.name for row in _GROUPS["mechanical"])
+
+# the factors of a valve's curve, part by part
+CURVE = tuple(row.name for row in _GROUPS["hydraulic"] if row.name.startswith("curve_"))

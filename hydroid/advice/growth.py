@@ -84,9 +84,9 @@ class Explained:
 def explained(problem: Problem, known: Uncertainty) -> Explained:
     """Return what a fit has explained at an estimate. Parameters at bounds are held."""
     linear = known.linear
-    of_priors = problem.priors.scores(known.theta[None])[0]
     # the estimate does not depend on the weak priors
     weak = np.zeros(len(linear.slopes))
+    of_priors = problem.priors.weighed_at(known.theta)(known.theta[None])[0]
     left = np.concatenate([linear.innovations, of_priors, weak])
 
     def variance(row: Array) -> float:

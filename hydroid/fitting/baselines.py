@@ -67,7 +67,7 @@ class Baseline:
             beyond = (np.abs(command) - dead) / (100.0 - dead)
             share = np.power(beyond, exponent, out=np.zeros_like(beyond), where=beyond > 0)
             target = speed * share
-        return _follow(
+        return follow(
             target * log.period,
             side,
             self.delay / log.period,
@@ -82,7 +82,7 @@ class Baseline:
 
 
 @njit(cache=True)
-def _follow(
+def follow(
     target: Array,
     side: NDArray[np.int64],
     delay: float,

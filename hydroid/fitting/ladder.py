@@ -15,6 +15,7 @@ import numpy as np
 from hydroid.arrays import Array, record
 from hydroid.fitting.checkpoints import Checkpoints
 from hydroid.fitting.left_out import LeftOut, gain, is_better, parts, predict_parts
+from hydroid.fitting.multistart import alone, by_speeds, has_curve, lone_joints
 from hydroid.fitting.refinement import Refinement, refine, refine_from_afar
 from hydroid.fitting.step import Step, step_of
 from hydroid.posterior.error_model import Likelihood, likelihood_at, make_likelihood
@@ -27,9 +28,9 @@ from hydroid.settings.search import RefinementSettings
 
 FIRST = 10
 """iterations after which another model must be more likely than the last one: each is slow to simulate"""
-WORTH = 2.0
-"""gain of the fitted logs' log-likelihood, for each parameter more, below which no part is left out: such a
-rung cannot foretell them clearly better"""
+WORTH = 1.0
+"""gain of the fitted logs' log-likelihood that pays for a parameter more (H. Akaike, 1974): a rung below that
+cannot foretell parts left out clearly better"""
 FIRM = 1e-3  # gain below which least squares ends where another rung may follow
 
 
@@ -107,9 +108,10 @@ class Ladder:
         climbs = two or bool(settings.terms())
         tolerance = max(FIRM, refinement.gain_tolerance) if climbs else refinement.gain_tolerance
         on_the_way = refinement.changed({"gain_tolerance": tolerance})
+        tried = self._try_alone(whole, on_the_way)
         for model in ("refined", "dynamic")[: 1 + two]:
-            possible = settings.terms(model)
-            terms = tuple(term for term in possible if term in self._step.terms)
+            possible = [term for term in settings.terms(model) if term not in tried]
+            terms = tuple(term for term in settings.terms(model) if term in self._step.terms)
             self._rung(whole, Step(model, terms), on_the_way, if_better=model == "dynamic")
             for term in possible if self._step.model == model else ():
                 if term not in terms:
@@ -148,7 +150,7 @@ class Ladder:
         if if_better and (self._late or last.leaves_noise(start.theta)):
             return
         own = whole.varied(whole.settings.of_estimate(step.estimate))
-        theta = own.parameters.started(last.parameters.mapping(start.theta))
+        theta = _begun(own, last, start.theta)
         likelihood = make_likelihood(own)
         if own.settings.quasi_static != last.settings.quasi_static:
             if self._is_white():  # there is nothing for a model that is slow to simulate
@@ -159,7 +161,8 @@ class Ladder:
             if self._explained(own, theta) < 0.0:
                 return
         # what a search ended at may be far from an optimum
-        how = refine if if_better else refine_from_afar
+        far = not if_better or _new_curves(own, last)
+        how = refine_from_afar if far else refine
         result = self._refined(likelihood, theta, settings, step.changed(phase="on the way"), how)
         if self._late and if_better:
             return
@@ -167,17 +170,42 @@ class Ladder:
         if not if_better:
             self._keep(own, new, step)
             return
-        more = max(int(own.parameters.free.sum() - last.parameters.free.sum()), 1)
-        if self._explained(own, new.theta) < WORTH * more:
+        if self._explained(own, new.theta) < _price(last, own):
             return
         without = self._parts_left_out(settings)
-        mapped = [last.parameters.mapping(one) for one in without.thetas]
-        starts = np.array([own.parameters.started(one) for one in mapped])
+        starts = np.array([_begun(own, last, one) for one in without.thetas])
         with_it = self._predicted(own, starts, step, settings)
         self.estimates[step.estimate] = new = replace(new, gained=gain(with_it, without))
         if not self._late and is_better(with_it, without):
             self._left_out[step.estimate] = with_it
             self._keep(own, new, step)
+
+    def _try_alone(self, whole: Problem, settings: RefinementSettings) -> set[str]:
+        """Add terms of one joint, each tried on that joint alone, which takes seconds; return those tried.
+
+        The other joints follow their logs. A term is kept where it explains enough of the joint's motion.
+        """
+        tried = set[str]()
+        for joint in lone_joints(self.problem):
+            for term in whole.settings.terms_of(joint):
+                tried.add(term)
+                self._try_on_joint(whole, joint, term, settings)
+        return tried
+
+    def _try_on_joint(self, whole: Problem, joint: int, term: str, settings: RefinementSettings) -> None:
+        last, theta = self.problem, self.kept.theta
+        before = alone(last, joint, theta)
+        if self._late or before.leaves_noise(theta):
+            return
+        step = self._step.changed(terms=(*self._step.terms, term), joint=joint)
+        own = whole.varied(whole.settings.of_estimate(step.estimate))
+        begun = _begun(own, last, theta)
+        after = alone(own, joint, begun)
+        without = self._refined(make_likelihood(before), theta, settings, step.changed(phase="without it"))
+        with_it = self._refined(make_likelihood(after), begun, settings, step, refine_from_afar)
+        reached = after.parameters.from_unit(with_it.point)
+        if not self._late and _explained_more(before, without, after, reached) >= _price(before, after):
+            self._keep(own, self._listed(own, reached, step), step.changed(joint=0))
 
     def _try_without(self, whole: Problem, term: str, settings: RefinementSettings) -> None:
         """Drop a term that was kept below, unless this model foretells clearly better with it.
@@ -203,11 +231,7 @@ class Ladder:
 
         Both are weighed by the errors of the kept one.
         """
-        kept = likelihood_at(self.problem, self.kept.theta, self.refinements[self.kept.name].numbers)
-        other = replace(kept, problem=problem)
-        before = kept.rows(self.kept.theta[None])[0]
-        after = other.rows(theta[None])[0]
-        return 0.5 * float(before @ before - after @ after)
+        return _explained_more(self.problem, self.refinements[self.kept.name], problem, theta)
 
     def _is_white(self) -> bool:
         """Whether the errors of the estimate that is kept leave innovations that are white."""
@@ -250,7 +274,50 @@ class Ladder:
 
     def _measured(self, problem: Problem, end: Refinement, step: Step) -> Estimate:
         """Measure an end of least squares, and list it."""
-        name = step.estimate
-        self.estimates |= measured(problem, {name: problem.parameters.from_unit(end.point)})
-        self.refinements[name] = end
-        return self.estimates[name]
+        self.refinements[step.estimate] = end
+        return self._listed(problem, problem.parameters.from_unit(end.point), step)
+
+    def _listed(self, problem: Problem, theta: Array, step: Step) -> Estimate:
+        """Measure theta, (P,), and list it as the estimate of a step."""
+        self.estimates |= measured(problem, {step.estimate: theta})
+        return self.estimates[step.estimate]
+
+
+def _explained_more(before: Problem, end: Refinement, after: Problem, theta: Array) -> float:
+    """Rise of the log-likelihood from an end of least squares to another problem's theta, (P,).
+
+    Both are of the same logs, and weighed by the errors of the end.
+    """
+    kept = likelihood_at(before, before.parameters.from_unit(end.point), end.numbers)
+    other = replace(kept, problem=after)
+    old = kept.rows(before.parameters.from_unit(end.point)[None])[0]
+    new = other.rows(theta[None])[0]
+    return 0.5 * float(old @ old - new @ new)
+
+
+def _price(last: Problem, problem: Problem) -> float:
+    """The log-likelihood that a model must gain for the parameters that the last one has not."""
+    more = int(problem.parameters.free.sum() - last.parameters.free.sum())
+    return WORTH * max(more, 1)
+
+
+def _begun(problem: Problem, last: Problem, theta: Array) -> Array:
+    """Return where another model begins, from theta, (P,), of the last one.
+
+    A valve that has a curve now begins at the speeds that the logs show: from a power law, least squares
+    seldom finds a valve that opens all at once.
+    """
+    begun = problem.parameters.started(last.parameters.mapping(theta))
+    for joint in _new_curves(problem, last):
+        begun = by_speeds(problem, joint, begun)
+    return begun
+
+
+def _new_curves(problem: Problem, last: Problem) -> list[int]:
+    """The joints, from 1, whose valves have a curve here and had none in the last model.
+
+    None of a dynamic model: without the oil and the inertia, the speeds are no better start.
+    """
+    if not problem.settings.quasi_static:
+        return []
+    return [j for j in problem.settings.outputs if has_curve(problem, j) and not has_curve(last, j)]

@@ -14,6 +14,7 @@ together is left to the refinement that follows the search.
 """
 
 from collections import defaultdict
+from collections.abc import Mapping
 from operator import itemgetter
 
 import numpy as np
@@ -23,10 +24,12 @@ from hydroid.fitting.baselines import NAMES, fit_baselines
 from hydroid.fitting.checkpoints import Checkpoints, Memo
 from hydroid.fitting.refinement import Refining, refine_from_afar
 from hydroid.fitting.step import Step
+from hydroid.fitting.valve_start import fitted_valve
 from hydroid.parameters import Array
 from hydroid.posterior.bench import make_bench
 from hydroid.posterior.error_model import likelihood_at, make_likelihood
 from hydroid.problem.problem import Problem
+from hydroid.quantity_table import CURVE
 from hydroid.search.chromosomes import Genes
 from hydroid.search.genetic import Population
 
@@ -110,7 +113,7 @@ class Multistart:
             start = by_numbers(problem, joint, theta)
             tried = [self._grown(problem, start, step.changed(numbers=True))]
             if not problem.leaves_noise(tried[0][1]):
-                tried.append(self._grown(problem, theta, step))
+                tried.append(self._grown(problem, by_speeds(problem, joint, theta), step))
             result = min(tried, key=COST)
             self.ends[joint] += map(COST, tried)
             best = self._best[joint] = min(self._best.get(joint, result), result, key=COST)
@@ -175,28 +178,66 @@ def alone(problem: Problem, joint: int, theta: Array) -> Problem:
 
 
 def by_numbers(problem: Problem, joint: int, theta: Array) -> Array:
-    """Return theta, (P,), with the valve of a joint whose speed follows the command alone: nine numbers.
+    """Return theta, (P,), with the valve of a joint whose speed follows the command alone: nine numbers."""
+    ends = [*problem.settings.arm.ranges.values()][joint - 1]
+    found = fit_baselines(problem.logs, joint, ends)[NAMES[-1]]
+    values = {"delay": found.delay, "pilot_lag": 0.0}
+    rows = {"dead_band": 0, "opening_exponent": 1, "opening_lag": 3}
+    for name, row in rows.items():
+        values |= _sided(name, *found.numbers[row].tolist())
+    for name in CURVE:
+        values |= _sided(name, 1.0, 1.0)
+    return _with_valve(problem, joint, theta, values, np.abs(found.numbers[2]))
+
+
+def by_speeds(problem: Problem, joint: int, theta: Array) -> Array:
+    """Return theta, (P,), with the valve of a joint at the speeds that its logs show (`speed_curve`).
+
+    It is theta itself where its valve has no curve, or the logs show none.
+    """
+    found = fitted_valve(problem.logs, joint) if has_curve(problem, joint) else None
+    if found is None:
+        return theta
+    a, b = found.sides
+    values = {"delay": found.delay, "pilot_lag": 0.0, "opening_lag": found.lag}
+    values |= _sided("dead_band", a.dead_band, b.dead_band)
+    values |= _sided("opening_exponent", a.exponent, b.exponent)
+    for part, name in enumerate(CURVE):
+        values |= _sided(name, a.factors[part], b.factors[part])
+    return _with_valve(problem, joint, theta, values, np.array([a.speed, b.speed]))
+
+
+def has_curve(problem: Problem, joint: int) -> bool:
+    """Whether a joint's valve has a curve that is estimated, besides its power law."""
+    parameters = problem.settings.parameters
+    own = (parameters[name].quantity for name in problem.settings.acting_on(joint))
+    return any(quantity.startswith(CURVE) for quantity in own)
+
+
+def _sided(name: str, a: float, b: float) -> dict[str, float]:
+    """Return values of a quantity by name: of both sides, and their mean for both."""
+    return {name: (a + b) / 2, f"{name}_a": a, f"{name}_b": b}
+
+
+def _with_valve(
+    problem: Problem, joint: int, theta: Array, values: Mapping[str, float], speeds: Array
+) -> Array:
+    """Return theta, (P,), with quantities of a joint by name, and openings for its full speeds [rad/s], (2,).
 
     No load slows it, its actuator is strong enough for any, and its lever is the same everywhere.
     """
     settings = problem.settings
-    ends = [*settings.arm.ranges.values()][joint - 1]
-    found = fit_baselines(problem.logs, joint, ends)[NAMES[-1]]
-    values = dict.fromkeys(("pilot_lag", "lever_slope", "lever_bend"), 0.0)
-    values |= {"delay": found.delay, "compensation": 1.0}
-    for row, name in (0, "dead_band"), (1, "opening_exponent"), (3, "opening_lag"):
-        a, b = found.numbers[row].tolist()
-        values |= {name: (a + b) / 2, f"{name}_a": a, f"{name}_b": b}
+    straight = {"lever_slope": 0.0, "lever_bend": 0.0, "compensation": 1.0}
     start, places = theta.copy(), dict[str, int]()
     for i, one in enumerate(settings.parameters.values()):
         if one.fixed is None and one.joints == (joint,):
             prior, places[one.quantity] = problem.parameters.parameters[i].prior, i
-            start[i] = values.get(one.quantity, start[i])
+            start[i] = {**straight, **values}.get(one.quantity, start[i])
             if one.quantity.startswith("area") and prior is not None:
                 start[i] = prior.value(1.0)  # a weaker one may stall, where nothing has an effect
     bench = make_bench(settings, problem.logs, joint)
     for side, (name, full) in enumerate((("opening_a", 100.0), ("opening_b", -100.0))):
         speed = bench.movement(full).speeds(problem.bindings.candidates(start[None])).max() / bench.unit[0]
         if name in places and speed > 0:  # in proportion, where no load slows it
-            start[places[name]] *= abs(found.numbers[2, side]) / speed
+            start[places[name]] *= speeds[side] / speed
     return np.clip(start, problem.parameters.lower, problem.parameters.upper)

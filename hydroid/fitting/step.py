@@ -3,9 +3,9 @@
 from dataclasses import dataclass, replace
 from typing import Literal
 
-Phase = Literal["", "from afar", "at first", "on the way"]
+Phase = Literal["", "from afar", "at first", "on the way", "without it"]
 """of a rung: by output errors, to see whether it is likely at all, to see whether it is better,
-or to the end (no words)"""
+without its last term, or to the end (no words)"""
 
 
 @dataclass(frozen=True)

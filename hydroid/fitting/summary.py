@@ -145,7 +145,8 @@ def fit_findings(fit: Fit) -> list[Finding]:
     if apart:
         names = [fit.problem.settings.arm.joint_names[joint - 1] for joint in apart if joint]
         findings.append(Finding("several optima", "note", tuple(names or ["all joints"])))
-    scores = zip(priors.names, priors.scores(fit.best.theta[None])[0].tolist(), strict=True)
+    distances = priors.scores(fit.best.theta[None])[0] * priors.firm  # heavy tails foresee any distance
+    scores = zip(priors.names, distances.tolist(), strict=True)
     each = zip(fit.problem.parameters.names, fit.uncertainty.status, strict=True)
     vague = {name for name, s in each if s.source is Source.PRIOR or s.flag is Flag.UNIDENTIFIABLE}
     far = {

@@ -12,8 +12,9 @@ gives
 
     Q_P = φ Q_max min(1, (p_S − P)/droop),
 
-and comes up after a demand: φ is `pump_idle` at rest, and from `pump_delay` after the first command on it
-rises to 1 with the time constant `pump_rise`. Every section of the valve has a load check valve: oil never
+so that the pressure falls in proportion to the flow, by no more than `pump_limit`: there it gives whatever is
+taken. It comes up after a demand: φ is `pump_idle` at rest, and from `pump_delay` after the first command on
+it rises to 1 with the time constant `pump_rise`. Every section of the valve has a load check valve: oil never
 runs back to the pump. A joint whose own supply pressure is lower than the line's has a reducing valve.
 Joints without an actuator take nothing. One that follows a log takes what its actuator's chamber swallows at
 the logged speed, however low P falls.
@@ -27,7 +28,8 @@ v̄ the joints' mean velocities, k = dQ/dP of a metering edge and r a chamber's 
 pushes joint i with the torque f_i δ, and g_i is f_i times the draw. To the symmetric system of the velocities
 that adds the matrix √(f g) √(f g)ᵀ h / D, which is positive: the sub-step stays as stable as it is without a
 pump. (Between joints whose draws differ this is not f gᵀ: the predicted velocities err in the second order of
-the sub-step, no oil is lost.) Where P would pass the relief pressure, δ is what is missing to it.
+the sub-step, no oil is lost.) Where P would pass the relief pressure, or the limit of its fall, δ is what is
+missing to it.
 """
 
 # pyright: reportMissingParameterType=false
@@ -48,6 +50,12 @@ def delivery(pressure: float, share: float, c) -> Any:
     if left < c.pump_droop:
         return full * max(left, 0.0) / c.pump_droop, full / c.pump_droop
     return full, 0.0
+
+
+@compilable
+def lowest(c) -> float:
+    """Pressure of the line [Pa] below which nothing that joints take brings it."""
+    return max(c.relief - c.pump_limit, 0.0)
 
 
 @compilable
@@ -95,8 +103,11 @@ def open_line(line, c, step: float) -> None:
     line.softness = 1.0 / (c.line_volume / (c.bulk_modulus * step) + fall + line.softness)
     line.change = line.softness * (flow - line.drawn - line.swept)
     missing = c.relief - line.pressure
+    least = lowest(c) - line.pressure
     if line.change >= missing:
         line.change, line.softness = missing, 0.0
+    elif line.change <= least and c.pump_limit < np.inf:
+        line.change, line.softness = least, 0.0
 
 
 @compilable
@@ -111,5 +122,5 @@ def fill(line, w, step: float) -> None:
 @compilable
 def close_line(line, c) -> None:
     """Take over the line's change, and be ready for the next sub-step."""
-    line.pressure = min(max(line.pressure + line.change, 0.0), c.relief)
+    line.pressure = min(max(line.pressure + line.change, lowest(c)), c.relief)
     line.drawn, line.softness, line.swept = line.taken, 0.0, 0.0

@@ -10,9 +10,12 @@ The article leaves A(x) open. Ours: A_max min((|x| − overlap)/w, 1)^n, each di
 overlap, w and n, plus a leakage area on all four edges. With a flow limit, the pump gives no more than that
 to this actuator; with a check valve (`hydroid.hydraulics.pump`) no oil runs back to it.
 
-A spool is cut with notches, so its opening is no one power of the travel. Four factors, `notch_1` to
-`notch_4`, change the slope of the power law where it is below 4, 10, 25 and 50 % of full: a monotone curve of
-five parts, which still ends at A_max.
+A spool is cut with notches, and a servo may drive it through a small part of its travel, so its opening is
+no one power of the travel. Four factors, `curve_1` to `curve_4`, multiply the increments of the power law
+over the first 4, to 15, to 40 and to 70 % of the travel (`KNOTS`). That of the last part is 1. So the curve
+is monotone, and it still ends at A_max: what counts is how steep a part is beside the last one. The first
+part is so short that it stands for a jump. `notch_1` to `notch_4` do the same where the power law, not the
+travel, is below 4, 10, 25 and 50 % of full.
 
 The article's edges open alike. A real spool's do not: `return_a` and `return_b` are the openings of A→T and
 B→T as multiples of those of P→B and P→A. So a load that is lowered can be held by the oil that leaves, while
@@ -39,6 +42,7 @@ DENSITY = 860.0  # ρ of the oil [kg/m³]; ours
 
 MARGIN = 0.25  # part of the supply pressure that a compensator leaves the pump edge; ours
 NOTCHES = (0.04, 0.1, 0.25, 0.5)  # parts of the full opening where the notches of a valve's curve end; ours
+KNOTS = (0.04, 0.15, 0.4, 0.7)  # parts of the spool's travel where the parts of a valve's curve end; ours
 
 
 @compilable
@@ -48,17 +52,30 @@ def slot_share(travel, side) -> Any:
 
 
 @compilable
-def notched(share, side) -> Any:
+def bent_opening(share, factors, ends) -> Any:
     """Part of the full opening, from the part that the power law gives: 0 to 1, as the result.
 
-    Where all four factors are 1, the result is the power law's, to the bit.
+    Its slope has a factor of each part, up to each of `ends`, and 1 beyond the last one. Where all factors
+    are 1, the result is the power law's, to the bit.
     """
     more, whole, low = 0.0, 0.0, 0.0
-    factors = side.notch_1, side.notch_2, side.notch_3, side.notch_4
-    for factor, high in zip(factors, NOTCHES):  # noqa: B905  # compiled code knows no strict=
+    for factor, high in zip(factors, ends):  # noqa: B905  # compiled code knows no strict=
         more = more + (factor - 1.0) * np.minimum(np.maximum(share - low, 0.0), high - low)
         whole, low = whole + (factor - 1.0) * (high - low), high
     return (share + more) / (1.0 + whole)
+
+
+@compilable
+def notched(share, side) -> Any:
+    """Part of the full opening with the side's notches, from the part that the power law gives."""
+    return bent_opening(share, (side.notch_1, side.notch_2, side.notch_3, side.notch_4), NOTCHES)
+
+
+@compilable
+def curved(share, side) -> Any:
+    """Part of the full opening on the side's curve, from the part that the power law gives."""
+    factors = side.curve_1, side.curve_2, side.curve_3, side.curve_4
+    return bent_opening(share, factors, (side.knot_1, side.knot_2, side.knot_3, side.knot_4))
 
 
 def conductance(flow_coefficient) -> Any:

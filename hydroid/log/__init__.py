@@ -2,6 +2,7 @@
 
 from hydroid.log.binary import FORMATS as FORMATS
 from hydroid.log.checks import motion_findings as motion_findings
+from hydroid.log.command_sizes import one_size as one_size, only_command as only_command
 from hydroid.log.guess import ColumnGuess as ColumnGuess, guess_columns as guess_columns
 from hydroid.log.log import (
     Log as Log,

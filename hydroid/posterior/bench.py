@@ -12,7 +12,8 @@ from hydroid.arm.model import load_model
 from hydroid.arrays import Array, record
 from hydroid.hydraulics.cylinder import rod_motion
 from hydroid.hydraulics.records import Records, coefficients
-from hydroid.log import Log
+from hydroid.log import Log, only_command
+from hydroid.log.command_sizes import ONE_SIZE
 from hydroid.mjcf import quiet_mujoco
 from hydroid.settings.cylinder import LinearActuator
 from hydroid.settings.fit import FitSettings
@@ -30,7 +31,8 @@ reach the second"""
 class Bench:
     """A joint, numbered from 1, whose quantities are wanted.
 
-    `angle`: at which it is tested [rad]; `period` between samples [s]; `scenario`: the joint alone.
+    `angle`: at which it is tested [rad]; `period` between samples [s]; `scenario`: the joint alone; `only`:
+    size of the commands in positive and in negative direction [%], None where they have several.
     """
 
     settings: FitSettings
@@ -38,6 +40,12 @@ class Bench:
     angle: float
     period: float
     scenario: Scenario
+    only: tuple[float | None, float | None] = (None, None)
+
+    def tells(self, command: float) -> bool:
+        """Return whether the logs tell what a command [%] does: all but between on and off."""
+        only = self.only[0 if command > 0 else 1]
+        return only is None or abs(abs(command) - only) <= ONE_SIZE
 
     @property
     def unit(self) -> tuple[float, str]:
@@ -155,7 +163,8 @@ def make_bench(settings: FitSettings, logs: Sequence[Log], joint: int) -> Bench:
     rest = Log("a test movement", np.array([0.0, period]), command, still, period)
     alone = settings.simulation.changed({"other_joints": "locked"})
     scenario = Scenario(load_model(arm), arm, rest, [joint - 1], alone)
-    return Bench(settings, joint, float(middle), period, scenario)
+    only = only_command(logs, joint, 1.0), only_command(logs, joint, -1.0)
+    return Bench(settings, joint, float(middle), period, scenario, only)
 
 
 def actuator(bench: Bench, candidates: Candidates) -> tuple[Records, Array, Array]:

@@ -40,11 +40,16 @@ StepCurves = Callable[[Array], Measured]
 
 
 def opening_curve(bench: Bench, candidates: Candidates, sign: float) -> Measured:
-    """The opening of the pump edge against commands of a sign that are held [mm²], without leakage."""
+    """The opening of the pump edge against commands of a sign that are held [mm²], without leakage.
+
+    Commands that are on or off in the logs tell of no others.
+    """
     c, *_ = actuator(bench, candidates)
     side = c.a if sign > 0 else c.b
     idle = resting_stroke(drive(0.0, c), c.gap, c.plunger_stiffness)
     for command in OPENING_COMMANDS:
+        if not bench.tells(sign * command):
+            continue
         beyond = np.maximum(command - side.dead_band, 0.0)
         passed = np.where(beyond > 0.0, 1.0, 0.0)
         voltage = side_voltage(beyond, passed, side.onset, side.dead_band)

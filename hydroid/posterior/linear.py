@@ -132,7 +132,7 @@ def estimate_box(parameters: ParameterSet, theta: Array) -> Box:
 
 def prior_slopes(priors: Priors, box: Box) -> Array:
     """Derivatives of the M priors' scores, shape (p, M), per relative change of each free parameter."""
-    return differentiate(priors.scores, box, single_axes(box, 1e-4))  # they are smooth
+    return differentiate(priors.weighed_at(box.at), box, single_axes(box, 1e-4))  # they are smooth
 
 
 def white_posterior(box: Box, *parts: Array) -> Posterior:

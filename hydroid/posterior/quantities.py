@@ -179,9 +179,10 @@ def direction_test(bench: Bench, estimate: Candidates, sign: float, ending: str,
     planned = dict(
         zip(COMMANDS, towards * bench.steady(estimate, commands, bench.loads(estimate))[0], strict=True)
     )
+    told = [u for u in COMMANDS if bench.tells(sign * u)]
     # the smallest command from 50 % that clearly moves the joint, or the largest
-    clear = (u for u, speed in planned.items() if u >= 50.0 and speed > ONSET * planned[100.0])
-    rise = next(clear, 100.0)
+    clear = (u for u in told if u >= 50.0 and planned[u] > ONSET * planned[100.0])
+    rise = next(clear, told[-1] if told else 100.0)
     step = bench.movement(sign * rise, LASTS)
     after_step = step_curves(step, estimate, ending, word)
     opens_later = valve_opens(bench, estimate, sign)[1][0] > 0.0
@@ -189,7 +190,8 @@ def direction_test(bench: Bench, estimate: Candidates, sign: float, ending: str,
     def measure(candidates: Candidates, loads: Array) -> Measured:
         steady = bench.steady(candidates, commands, loads)
         for u, velocity in zip(commands.tolist(), steady.T, strict=True):
-            yield Column("speed", f"speed at {bench.pose}", f"{unit}/s", False, u), velocity
+            if abs(u) in told:
+                yield Column("speed", f"speed at {bench.pose}", f"{unit}/s", False, u), velocity
         speed = dict(zip(COMMANDS, towards * steady.T, strict=True))
         gain = (speed[60.0] - speed[40.0]) / (60.0 - 40.0)
         run = step.speeds(candidates)
@@ -206,7 +208,8 @@ def direction_test(bench: Bench, estimate: Candidates, sign: float, ending: str,
             (100.0, "full_flow", f"flow at 100 % command and {pose}", "L/min", flow),
         ]
         for u, name, label, own_unit, value in rows:
-            if planned[u] != 0.0:
+            of_several = name == "gain" and len(told) < len(COMMANDS)
+            if planned[u] != 0.0 and u in told and not of_several:
                 yield Column(f"{name}_{ending}", f"{label}, {word}", own_unit), value
         if opens_later:
             band = np.add(*valve_opens(bench, candidates, sign))

@@ -3,14 +3,23 @@
 Each has a value and a standard deviation; a combination without one is a constraint. A search stays where
 every prior holds within REACH standard deviations. The refinement and the uncertainty take each as one more
 measurement.
+
+One with heavy tails knows its scatter only roughly: it is Student's t with FREEDOM degrees of freedom, a
+normal distribution whose variance is drawn, and the draw is integrated out. The variance of the m bends of
+one curve is drawn once: a curve with one bend may have others, and one without is held straight by all of
+them. Of m distances r in units of the scale the negative logarithm is
+
+    ½ (ν + m) log(1 + r'r/ν),
+
+which is half the square of its scores, so that least squares minimises it. Such a prior confines no search.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
 
-from hydroid.arrays import Array, record
+from hydroid.arrays import Array, Mask, record
 from hydroid.errors import SettingsError
 from hydroid.parameters import ParameterSet, Prior
 from hydroid.settings.problem import PriorSettings
@@ -18,6 +27,8 @@ from hydroid.settings.problem import PriorSettings
 REACH = 2.0  # standard deviations that a candidate of a search may be away from a prior
 CONSTRAINT_SD = 1e-5
 """standard deviation of a constraint, as a part of the range that its parameters' bounds allow"""
+FREEDOM = 2.0
+"""degrees of freedom ν of a prior with heavy tails: 10 % of its values are beyond 3 scales, 1 % beyond 10"""
 MAX_SWEEPS = 200  # projections on all priors in turn; two that are nearly parallel need the most
 
 
@@ -29,7 +40,6 @@ class _Combination:
     step: the shortest change in the box of the free parameters that raises factors·theta by 1, shape (P,).
     """
 
-    name: str
     factors: Array
     value: float
     sd: float
@@ -45,11 +55,50 @@ class _Combination:
         """Excess of one standard deviation, shape (n,)."""
         return self.sd * (np.ones(len(theta)) if self.divisor is None else theta[:, self.divisor])
 
+    def distances(self, theta: Array) -> Array:
+        """Distance from the value in standard deviations, shape (n, 1)."""
+        return (self.excess(theta) / self.tolerance(theta))[:, None]
+
+
+@record
+class _Bends:
+    """What a curve bends from one of its parts to the next: the columns of their factors, in order."""
+
+    columns: list[int]
+    sd: float
+
+    def distances(self, theta: Array) -> Array:
+        """Logarithms of the ratios of neighbours, the last one to 1, over the scale: (n, P) -> (n, m)."""
+        logs = np.log(theta[:, self.columns])
+        ahead = np.hstack([logs[:, 1:], np.zeros((len(theta), 1))])
+        return (logs - ahead) / self.sd
+
+
+@record
+class _Heavy:
+    """A prior with heavy tails on m distances."""
+
+    of: _Combination | _Bends
+
+    def distances(self, theta: Array) -> Array:
+        """Scores, (n, m)."""
+        distances = self.of.distances(theta)
+        square = (distances * distances).sum(axis=1, keepdims=True)
+        far = np.maximum(square / FREEDOM, 1e-12)  # log(1 + x)/x is 1 there to the last digit
+        many = distances.shape[1]
+        return distances * np.sqrt((FREEDOM + many) / FREEDOM * np.log1p(far) / far)
+
+    def weight(self, theta: Array) -> float:
+        """Factor on distances at one theta, (1, P), by which a normal prior has the same slope there."""
+        distances = self.of.distances(theta)[0]
+        return float(np.sqrt((FREEDOM + len(distances)) / (FREEDOM + distances @ distances)))
+
 
 class Priors:
-    """M priors about P parameters, named `names`; those about fixed parameters only are left out.
+    """Priors about P parameters, with M scores in all; those about fixed parameters only are left out.
 
-    Those of single parameters come first. `searched` are the parameters with bounds within REACH of these.
+    Those of single parameters come first. `searched` are the parameters with bounds within REACH of these,
+    `names` those of the priors by score, and `firm` says which scores are those of normal distributions.
     """
 
     def __init__(self, settings: Mapping[str, PriorSettings], parameters: ParameterSet) -> None:
@@ -60,17 +109,23 @@ class Priors:
                 low, high = max(p.lower, p.prior.value(-REACH)), min(p.upper, p.prior.value(REACH))
                 narrowed[column] = replace(p, lower=low, upper=high)
         self.searched = ParameterSet(tuple(narrowed))
-        self._combinations = [
-            combination
-            for name, prior in settings.items()
-            if (combination := _combination(name, prior, self.searched)) is not None
-        ]
-        self.names = (
-            *(parameters.names[column] for column in self._own),
-            *(combination.name for combination in self._combinations),
-        )
+        self._combinations = list[_Combination]()
+        self._further = list[_Combination | _Heavy]()
+        names, firm = [parameters.names[column] for column in self._own], [True] * len(self._own)
+        for name, prior in settings.items():
+            further = _further(name, prior, self.searched)
+            if further is None:
+                continue
+            self._further.append(further)
+            if isinstance(further, _Combination):
+                self._combinations.append(further)
+            many = further.distances(self.searched.start[None]).shape[1]
+            names += [name] * many
+            firm += [isinstance(further, _Combination)] * many
+        self.names = tuple(names)
+        self.firm: Mask = np.array(firm, dtype=bool)
         if self._combinations:
-            off = np.abs(self.scores(self.project(self.searched.start[None]))[0])
+            off = np.abs(self.scores(self.project(self.searched.start[None]))[0]) * self.firm
             worst = np.argmax(off)
             if off[worst] > 1.5 * REACH:
                 raise SettingsError(
@@ -83,11 +138,30 @@ class Priors:
         return len(self.names)
 
     def scores(self, theta: Array) -> Array:
-        """Return the distance from each prior's value in standard deviations; (n, P) -> (n, M)."""
-        own = [prior.score(theta[:, column]) for column, prior in self._own.items()]
-        return np.array(
-            [*own, *(c.excess(theta) / c.tolerance(theta) for c in self._combinations)]
-        ).T.reshape(len(theta), len(self))
+        """Return the distance from each prior's value in standard deviations; (n, P) -> (n, M).
+
+        Those of a prior with heavy tails have half of their squares for its negative logarithm.
+        """
+        own = [prior.score(theta[:, [column]]) for column, prior in self._own.items()]
+        further = [prior.distances(theta) for prior in self._further]
+        return np.hstack([np.empty((len(theta), 0)), *own, *further])
+
+    def weighed_at(self, theta: Array) -> Callable[[Array], Array]:
+        """Return scores, (n, P) -> (n, M), with priors of heavy tails as they act at theta, shape (P,).
+
+        They are normal there, with the scatter that theta shows: their slopes are those of the negative
+        logarithm, and their information is what theta's neighbours are known by.
+        """
+        weights = [1.0 if isinstance(p, _Combination) else p.weight(theta[None]) for p in self._further]
+
+        def scores(near: Array) -> Array:
+            rows = [prior.score(near[:, [column]]) for column, prior in self._own.items()]
+            for prior, weight in zip(self._further, weights, strict=True):
+                distances = prior.distances if isinstance(prior, _Combination) else prior.of.distances
+                rows.append(weight * distances(near))
+            return np.hstack([np.empty((len(near), 0)), *rows])
+
+        return scores
 
     def project(self, theta: Array) -> Array:
         """Return theta, (n, P), moved by the shortest steps to within REACH sd of every combination.
@@ -111,13 +185,27 @@ class Priors:
         return theta
 
 
-def _combination(name: str, prior: PriorSettings, parameters: ParameterSet) -> _Combination | None:
-    """Return a combination; None where all of its parameters are fixed."""
-    names, free = parameters.names, parameters.free
-    for parameter in prior.factors:
+def _further(name: str, prior: PriorSettings, parameters: ParameterSet) -> _Combination | _Heavy | None:
+    """Return a prior on several parameters; None where all of them are fixed."""
+    names = parameters.names
+    for parameter in prior.names:
         if parameter not in names:
             hint = f"parameters: {', '.join(names)}"
             raise SettingsError(f"no parameter {parameter!r}", f"priors.{name}", hint)
+    if prior.smooth is None:
+        combination = _combination(prior, parameters)
+        return combination if combination is None or prior.tails == "normal" else _Heavy(combination)
+    columns = [names.index(parameter) for parameter in prior.smooth]
+    for column in columns:
+        p = parameters.parameters[column]
+        if (p.lower if p.fixed is None else p.fixed) <= 0:
+            raise SettingsError(f"{p.name} may be 0", f"priors.{name}.smooth", "give it bounds above 0")
+    return _Heavy(_Bends(columns, prior.sd or 0.0)) if parameters.free[columns].any() else None
+
+
+def _combination(prior: PriorSettings, parameters: ParameterSet) -> _Combination | None:
+    """Return a combination; None where all of its parameters are fixed."""
+    names, free = parameters.names, parameters.free
     factors = np.array([prior.factors.get(n, 0.0) for n in names])
     if not factors[free].any():
         return None
@@ -125,9 +213,9 @@ def _combination(name: str, prior: PriorSettings, parameters: ParameterSet) -> _
     step = factors * width**2 / np.sum((factors * width) ** 2)
     sd = prior.sd or CONSTRAINT_SD * float(np.abs(factors) @ width)
     if prior.ratio is None:
-        return _Combination(name, factors, prior.value, sd, None, step)
+        return _Combination(factors, prior.value or 0.0, sd, None, step)
     divisor = names.index(prior.ratio[1])
     p = parameters.parameters[divisor]
     if (p.lower if p.fixed is None else p.fixed) <= 0:
         raise SettingsError(f"a ratio divides by {p.name}, which may be 0", "priors")
-    return _Combination(name, factors, 0.0, sd, divisor, step)
+    return _Combination(factors, 0.0, sd, divisor, step)

@@ -1,6 +1,7 @@
 """What a log holds: its columns, and how the joints move in it."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import field
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,7 @@ import numpy as np
 from hydroid.arrays import Array, record
 from hydroid.errors import LogError
 from hydroid.files import Plain
+from hydroid.fitting.valve_start import JointStart, fitted_valve
 from hydroid.log import ColumnGuess, JointMotion, Log, Table, check_log, motion_of
 from hydroid.log.clues import column_unit, kind_of
 from hydroid.log.read import angle_margin
@@ -37,9 +39,10 @@ class Layout:
     """The columns of a log, as the `log` section of a fit's settings, and what its numbers say.
 
     `outputs` are joints that a log drives and measures, `motions` how the measured ones move, by
-    number from 1; `reasons` have a line for each column that is not `unused`; `followed`: a joint
-    that no command drives moves. `missing` says which columns a person must name, in a section that
-    is then no more than a start; `candidates` are lines about what each could be.
+    number from 1, and `valves` those by which the outputs follow commands of the sign that these
+    have in the section; `reasons` have a line for each column that is not `unused`; `followed`: a
+    joint that no command drives moves. `missing` says which columns a person must name, in a section
+    that is then no more than a start; `candidates` are lines about what each could be.
     """
 
     section: Plain
@@ -48,6 +51,7 @@ class Layout:
     unused: tuple[str, ...]
     motions: Mapping[int, JointMotion]
     followed: bool
+    valves: Mapping[int, JointStart] = field(default_factory=dict[int, JointStart])
     origin: str = GUESSED
     missing: str = ""
     candidates: tuple[str, ...] = ()
@@ -101,7 +105,7 @@ def _seen(table: Table, arm: Arm, guess: ColumnGuess, others: Sequence[Path], or
         motions = {joint: motion_of(logs[0], joint) for joint in measured}
         _refuse_rest(table, driven, logs, arm.joint_names)
         driven = _driven(driven, logs, arm.joint_names, reasons)
-    _turn_commands(entries, motions, arm, reasons)
+    wrong = _turn_commands(entries, motions, arm, reasons)
     reasons += _lacking(entries, arm.joint_names)
     undriven = [motion for joint, motion in motions.items() if joint not in driven]
     return Layout(
@@ -111,6 +115,7 @@ def _seen(table: Table, arm: Arm, guess: ColumnGuess, others: Sequence[Path], or
         guess.unused,
         motions,
         followed=any(motion.travel > FOLLOWED for motion in undriven),
+        valves=_valves(logs, driven, wrong),
         origin=origin,
     )
 
@@ -138,17 +143,34 @@ def _driven(
 
 def _turn_commands(
     entries: dict[int, Plain], motions: Mapping[int, JointMotion], arm: Arm, reasons: list[str]
-) -> None:
-    """Turn commands that act against the angle, and say what else is odd in how joints move."""
-    any_turned = False
+) -> list[int]:
+    """Turn commands that act against the angle, and say what else is odd in how joints move.
+
+    Returns the joints whose commands were turned.
+    """
+    wrong = list[int]()
     for joint, motion in motions.items():
         is_wrong = motion.contradicts(backward=joint in arm.backward)
         reasons += _remarks(motion, arm.joints[joint - 1], is_wrong)
         if is_wrong:
             entries[joint]["command"] = turned(entries[joint]["command"])
-            any_turned = True
-    if any_turned:
+            wrong.append(joint)
+    if wrong:
         reasons.append(REVERSED)
+    return wrong
+
+
+def _valves(logs: Sequence[Log], joints: Sequence[int], wrong: Sequence[int]) -> dict[int, JointStart]:
+    """Return the valves of joints that follow their logged commands.
+
+    `logs` have the commands as they were recorded, of which those of `wrong` joints are then turned.
+    """
+    valves = dict[int, JointStart]()
+    for joint in joints:
+        valve = fitted_valve(logs, joint)
+        if valve is not None:
+            valves[joint] = valve.turned if joint in wrong else valve
+    return valves
 
 
 def _lacking(entries: Mapping[int, Plain], names: Sequence[str]) -> Iterator[str]:

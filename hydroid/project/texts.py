@@ -15,6 +15,7 @@ from hydroid.arm.model import load_model
 from hydroid.arrays import Array
 from hydroid.cad.importer import ImportedArm
 from hydroid.files import Plain, fill_template, yaml_text
+from hydroid.fitting.valve_start import EXPONENT, USUAL_LAG, JointStart
 from hydroid.hydraulics.valve import DENSITY
 from hydroid.log import JointMotion
 from hydroid.project.layout import Layout
@@ -25,8 +26,12 @@ from hydroid.settings.hydraulics import HydraulicSettings
 LONGEST_STEP = 0.025  # of MuJoCo [s], in a log of fewer samples
 VALVE_STEP = 0.002  # of valves and oil [s]
 DEAD = 0.8  # part of the command below which a joint seems to stand that its dead band is
+UNKNOWN_DEAD = 10.0  # dead band of a joint that no log moves [%]
+MOST_DEAD = 85.0  # the largest dead band to start at [%]
+UNKNOWN_LAG = 0.05  # of the opening of a joint that no log moves [s]
+LONGEST_DELAY = 0.9  # to start at [s]
+LONGEST_LAG = 0.5  # to start at [s]
 DRAG = 0.02  # part of the torque at the pump's pressure that damping takes at full speed
-RESPONSE = 0.1  # of a valve and its oil without any delay [s]
 USUAL_SPEED = 0.5  # of a joint of which no log tells its own [rad/s, m/s]
 LIFT = 2.0  # torque of a joint at the pump's pressure, over the largest that gravity asks of it
 
@@ -110,11 +115,10 @@ def _lever(joint: Joint) -> float:
     return np.abs(joint.actuator.moment_arm(np.linspace(*joint.limits, 50))).mean()
 
 
-def _opening(joint: Joint, speed: float) -> str:
-    """Return the nominal opening of a stand-in that was sized before a log told its joint's speed,
-    as YAML.
+def _opening(joint: Joint, speed: float, usual: float) -> str:
+    """Return the nominal opening of a direction of a stand-in, from its speed at full command, as YAML.
 
-    Empty where the arm's file has another one: it holds.
+    Empty where the arm's file has an opening that no `usual` speed of the joint gives: it holds.
     """
     actuator = joint.actuator
     if actuator is None:
@@ -125,9 +129,43 @@ def _opening(joint: Joint, speed: float) -> str:
     else:
         displacement = actuator.displacement
         opening = actuator.max_opening
-    if not math.isclose(opening, opening_at(displacement, USUAL_SPEED), rel_tol=0.01):
+    sized = [opening_at(displacement, one) for one in (USUAL_SPEED, usual)]
+    if not any(math.isclose(opening, one, rel_tol=0.01) for one in sized):
         return ""
     return f"nominal: {short(opening_at(displacement, speed))}, "
+
+
+class ValveSide(NamedTuple):
+    """What the settings say of one direction of a joint's valve: numbers as YAML.
+
+    `one_size`: of a valve that is open or shut, whose logs tell no curve.
+    """
+
+    name: str
+    opening: str
+    dead: str
+    exponent: str
+    one_size: bool
+
+
+def _sides(
+    joint: Joint, valve: JointStart | None, motion: JointMotion | None, usual: float
+) -> list[ValveSide]:
+    """Return both directions of a joint's valve, A first, at the speeds that the logs show.
+
+    `usual` is the speed of the joint at full command, by which its actuator was sized [rad/s].
+    """
+    if valve is None:
+        dead = DEAD * min(max(motion.dead_band, 5.0), 40.0) if motion else UNKNOWN_DEAD
+        opening = _opening(joint, usual, usual) if motion else ""
+        numbers = opening, short(dead), short(EXPONENT)
+        return [ValveSide("A", *numbers, one_size=False), ValveSide("B", *numbers, one_size=False)]
+    sides = list[ValveSide]()
+    for name, start in zip("AB", valve.sides, strict=True):
+        opening = _opening(joint, start.speed, usual)
+        band = short(min(start.dead_band, MOST_DEAD))
+        sides.append(ValveSide(name, opening, band, short(start.exponent), start.one_size))
+    return sides
 
 
 def arm_text(imported: ImportedArm, arm: Arm | None, sizes: Sequence[JointSize]) -> str:
@@ -203,7 +241,8 @@ def fit_text(
             low, high = joint.range
             volumes.append(size.displacement * math.radians(high - low) / 2)
         draw = usual_flow / flows[number]
-        joints.append(_joint_text(joint, size, layout.motions.get(number), draw))
+        valve = layout.valves.get(number)
+        joints.append(_joint_text(joint, size, layout.motions.get(number), valve, draw))
     period = layout.section.get("period_s", 0.01)
     # a whole number of steps, but for the rounding of the division
     steps = math.ceil(period / LONGEST_STEP - 1e-9)
@@ -224,31 +263,34 @@ def fit_text(
     )
 
 
-def _joint_text(joint: Joint, size: JointSize, motion: JointMotion | None, draw: float) -> Plain:
-    """Return what the settings of a fit say of a joint, and of its motion where a log shows any.
+def _joint_text(
+    joint: Joint, size: JointSize, motion: JointMotion | None, valve: JointStart | None, draw: float
+) -> Plain:
+    """Return what the settings of a fit say of a joint, and of its motion and valve where a log
+    shows them.
 
     `draw` is the usual flow of the machine's joints over that of this one.
     """
     linear = isinstance(joint.actuator, LinearActuator)
-    opening = ""
     delay = 0.0
-    dead_band = 10.0
-    if motion:
-        opening = _opening(joint, size.speed)
-        delay = min(max(motion.likely_lag - RESPONSE, 0.0), 0.9)
-        dead_band = DEAD * min(max(motion.dead_band, 5.0), 40.0)
+    lag = UNKNOWN_LAG
+    if valve:
+        delay = valve.delay
+        lag = valve.lag
+    elif motion:
+        delay = max(motion.likely_lag - USUAL_LAG, 0.0)
     return {
         "own": joint.name.removesuffix("_joint"),
         "name": joint.name,
         "linear": linear,
         "lever": joint.has("lever_slope"),
-        "opening": opening,
+        "sides": _sides(joint, valve, motion, size.speed),
         "damping": short(DRAG * size.damping),
-        "delay": delay,
+        "delay": min(delay, LONGEST_DELAY),
+        "lag": min(lag, LONGEST_LAG),
         "unit": "N·s/m" if joint.slides else "N·m·s/rad",
         # a stand-in's size is a guess, but the valves of one machine let like flows through
         "draw": 1 if linear else short(draw),
-        "dead": short(dead_band),
     }
 
 

@@ -16,8 +16,9 @@ from hydroid.files import read_file
 
 Lines = dict[tuple[str, ...], int]  # line [1-based] of each key or item, by its path
 
+MOST_BYTES = 2**18
 MOST_VALUES = 20_000
-"""in one document"""
+"""in one document of settings"""
 MOST_CHARACTERS = 2**20
 """of all texts in one document"""
 DEEPEST = 40
@@ -36,9 +37,9 @@ _INTEGER = re.compile(r"[-+]?[0-9]{1,300}")  # longer ones are beyond any float
 _NUMBER = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)(e[-+]?[0-9]+)?|[-+]?\.inf|\.nan", re.IGNORECASE)
 
 
-def read_yaml(path: Path) -> tuple[dict[str, Any], Lines]:
-    """Read a file that holds one mapping."""
-    most = 2**18
+def read_yaml(path: Path, times: int = 1) -> tuple[dict[str, Any], Lines]:
+    """Read a file that holds one mapping. It may be `times` as large as settings are."""
+    most = times * MOST_BYTES
     try:
         data = read_file(path, most + 1)
         text = data.decode("utf-8-sig")
@@ -47,15 +48,15 @@ def read_yaml(path: Path) -> tuple[dict[str, Any], Lines]:
         raise SettingsError(f"cannot be read ({reason})", path) from None
     if len(data) > most:
         raise SettingsError(f"is larger than {most >> 10} KiB, too large for settings", path)
-    values, lines = read_document(text, path)
+    values, lines = read_document(text, path, times)
     if not isinstance(values, dict):
         raise SettingsError("must be a mapping of settings", path, "write `key: value` lines")
     return values, lines
 
 
-def read_document(text: str, source: object) -> tuple[Any, Lines]:
-    """Read one YAML document."""
-    reader = _Reader(source)
+def read_document(text: str, source: object, times: int = 1) -> tuple[Any, Lines]:
+    """Read one YAML document. It may hold `times` as many values as settings do."""
+    reader = _Reader(source, times * MOST_VALUES)
     try:
         # every scalar is text
         node = yaml.compose(text, Loader=yaml.BaseLoader)
@@ -82,15 +83,16 @@ class _Reader:
     What stands behind an alias counts whenever it is used: a few lines cannot expand to billions.
     """
 
-    def __init__(self, source: object) -> None:
+    def __init__(self, source: object, most: int) -> None:
         self.lines: Lines = {}
         self._source = source
+        self._most = most  # values
         self._characters = 0
 
     def value(self, node: yaml.Node, path: tuple[str, ...]) -> Any:
         """Return the value of a node at a path of keys."""
-        if len(self.lines) >= MOST_VALUES:
-            raise SettingsError(f"holds more than {MOST_VALUES} values", self._source)
+        if len(self.lines) >= self._most:
+            raise SettingsError(f"holds more than {self._most} values", self._source)
         where = self._place(node)
         if len(path) > DEEPEST:
             raise SettingsError(f"is nested more than {DEEPEST} deep", where)

@@ -18,7 +18,7 @@ from hydroid.settings.arm import Arm, load_arm
 from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.load import ByJoint, Joints, Positive, Settings, load, validate
 from hydroid.settings.log import LogSettings
-from hydroid.settings.parameters import by_group, expanded, make_parameter
+from hydroid.settings.parameters import by_group, expanded, make_parameter, with_curves
 from hydroid.settings.problem import ObjectiveSettings, ParameterSettings, PriorSettings, SimulationSettings
 from hydroid.settings.search import DesignSettings, RefinementSettings, SearchSettings
 
@@ -90,7 +90,11 @@ class FitSettings(Settings):
         if isinstance(parameters, dict):
             compared = values.get("outputs", cls.model_fields["outputs"].default)
             entries = expanded(parameters, compared, context["arm"])
-            values = {**values, "parameters": by_group(entries, _groups(values.get("log")))}
+            entries = by_group(entries, _groups(values.get("log")))
+            entries, priors = with_curves(entries, values.get("priors"))
+            values = {**values, "parameters": entries}
+            if priors is not None:
+                values["priors"] = priors
         return {**values, "arm": arm}
 
     @classmethod
@@ -166,6 +170,14 @@ class FitSettings(Settings):
         names = (parameter.term for parameter in parameters if parameter.term is not None)
         return tuple(dict.fromkeys(names))
 
+    def terms_of(self, joint: int) -> tuple[str, ...]:
+        """Names of the terms whose parameters all act on one joint, numbered from 1."""
+        owners = dict[str, set[tuple[int, ...] | None]]()
+        for parameter in self.parameters.values():
+            if parameter.term is not None:
+                owners.setdefault(parameter.term, set()).add(parameter.joints)
+        return tuple(term for term, joints in owners.items() if joints == {(joint,)})
+
     def of_estimate(self, name: str | None) -> "FitSettings":
         """Return the settings that an estimate of a fit was refined with, and predicts with.
 
@@ -192,13 +204,15 @@ class FitSettings(Settings):
         return self.with_parameters(changed)
 
     def _with_terms(self, terms: Collection[str]) -> "FitSettings":
-        """Return the settings without the parameters of all other terms."""
+        """Return the settings without the parameters of all other terms, and the priors on these."""
         kept = {
             name: parameter
             for name, parameter in self.parameters.items()
             if parameter.term is None or parameter.term in terms
         }
-        return self.changed({"parameters": kept})
+        left_out = self.parameters.keys() - kept.keys()
+        priors = {name: prior for name, prior in self.priors.items() if left_out.isdisjoint(prior.names)}
+        return self.changed({"parameters": kept, "priors": priors})
 
     def parameter_set(self) -> ParameterSet:
         """Return the parameters with units, bounds, priors and fixed values,

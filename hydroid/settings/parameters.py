@@ -8,7 +8,7 @@ from typing import Any
 
 from hydroid.files import Plain
 from hydroid.parameters import Parameter, Prior
-from hydroid.quantity_table import CHOICES, MECHANICAL, TARGETS
+from hydroid.quantity_table import CHOICES, CURVE, MECHANICAL, TARGETS
 from hydroid.settings.arm import Actuator, Arm
 from hydroid.settings.hydraulics import HydraulicSettings, actuator_values
 from hydroid.settings.linkage import RotaryActuator
@@ -18,6 +18,12 @@ from hydroid.settings.problem import ParameterSettings
 from hydroid.words import distinct
 
 MOST = 10_000  # parameters of all groups
+CURVES = {"curve": "", "curve_a": "_a", "curve_b": "_b"}
+"""quantities that stand for the factors of a valve's curve, and what the names of these end with"""
+CURVE_BOUNDS = (0.003, 300.0)
+"""of a factor: the first part of a valve that jumps open is some hundred times as steep as the last"""
+CURVE_SD = 0.3
+"""scatter of the logarithm of neighbouring factors that one expects (ours)"""
 BY_TURN = ("area", "area_a", "area_b", "dry_friction")
 """quantities that a rotary actuator has by its angle, where a cylinder has them by its stroke"""
 GROUP = "group"
@@ -143,6 +149,39 @@ def by_group(parameters: Mapping[str, Any], groups: Collection[str]) -> Plain:
             effect = f"{name}_{group}"
             result[effect] = entry | {"per": group} | result.get(effect, {})
     return result
+
+
+def with_curves(parameters: Mapping[str, Any], priors: Any) -> tuple[Plain, Any]:
+    """Return the settings of parameters and priors with the factors, and the smoothness, of valves' curves.
+
+    A parameter `curve_a`, `curve_b` or `curve` stands for the factors NAME_1, NAME_2, ... of the valve's
+    curve of one direction or both, and for a prior NAME by which they are alike (`PriorSettings.smooth`).
+    Raises ValueError: a start that is no list of as many numbers.
+    """
+    result: Plain = {}
+    smooth: Plain = {}
+    for name, entry in parameters.items():
+        side = CURVES.get(str(entry.get("quantity"))) if isinstance(entry, dict) else None
+        if side is None:
+            result[name] = result.get(name, {}) | entry if isinstance(entry, dict) else entry
+            continue
+        if entry.get("per") is not None:
+            raise ValueError(f"parameters.{name}: a curve has no effect per group")
+        starts = entry.get("start", [1.0] * len(CURVE))
+        if not isinstance(starts, list | tuple) or len(starts) != len(CURVE):
+            what = f"start: a curve has a list of {len(CURVE)} factors"
+            raise ValueError(f"parameters.{name}: {what}, of which 1 is the power law")
+        shared = {"bounds": CURVE_BOUNDS} | entry
+        sd = shared.pop("sd", CURVE_SD)
+        factors = [f"{name}_{part}" for part in range(1, len(CURVE) + 1)]
+        for factor, quantity, start in zip(factors, CURVE, starts, strict=True):
+            own = shared | {"quantity": f"{quantity}{side}", "start": start}
+            result[factor] = own | result.get(factor, {})
+        if entry.get("fixed") is None:
+            smooth[name] = {"smooth": factors, "sd": sd}
+    if not smooth or not isinstance(priors, dict | None):
+        return result, priors
+    return result, smooth | (priors or {})
 
 
 def nominal_value(arm: Arm, hydraulics: HydraulicSettings, settings: ParameterSettings) -> float | None:

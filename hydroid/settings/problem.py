@@ -20,11 +20,14 @@ class ParameterSettings(Settings):
       M3:  {quantity: mass, link: link3, nominal: 20, sd: 1}    # weighed
       D:   {quantity: damping, each: true, bounds: [20, 5000]}  # D_boom, ... of compared joints
       M:   {quantity: mass, each: true, within: 2}              # M_link1, M_link2, ... of all links
+      C:   {quantity: curve_a, joints: [2]}                     # C_1 to C_4, and a prior C
     """
 
     quantity: str
     """gain, damping, stiffness, friction or mass; in stage 2 also any quantity of `hydraulics` and
-    area_a, area_b, opening_a, opening_b, pivot_distance_1, pivot_distance_2, pivot_angle"""
+    area_a, area_b, opening_a, opening_b, pivot_distance_1, pivot_distance_2, pivot_angle. curve_a,
+    curve_b, or curve for both: the factors NAME_1 to NAME_4 of the valve's curve, curve_1 to
+    curve_4, whose `start` is a list; they get bounds, and a prior NAME: smooth, of this `sd` (0.3)"""
     joints: Joints | None = None
     """joints that share the parameter; null: all"""
     each: bool | Joints = False
@@ -53,10 +56,10 @@ class ParameterSettings(Settings):
     quantity in its logs, around 0 with standard deviation `sd`, and one of all other logs,
     NAME_other: an unseen day is predicted with the mean, and a wider band. The name of a group,
     or other: an effect of that one"""
-    term: Annotated[str, Field(pattern="^[A-Za-z_]+$")] | None = None
+    term: Annotated[str, Field(pattern=r"^[^\W\d]\w*$")] | None = None
     """name of a term of the model, of one parameter or several: a fit begins without it, adds it
-    after the refinement, and keeps it where it lowers the error on parts of the logs left out by 5
-    %; null: always there"""
+    after the refinement, and keeps it where it foretells parts of the logs left out clearly better.
+    One whose parameters all act on one joint is tried on that joint alone. null: always there"""
 
     @model_validator(mode="after")
     def _consistent(self) -> "ParameterSettings":
@@ -149,6 +152,8 @@ class PriorSettings(Settings):
       forearm:    {of: M5, value: 4.0, sd: 0.4}                          # a Gaussian prior
       balance:    {of: {M3: 1, M4: -2}, value: 0, sd: 0.5}               # M3 - 2 M4
       areas:      {ratio: [A_A, A_B], value: 1.333}                      # A_A / A_B
+      spool:      {of: {dead_A: 1, dead_B: -1}, value: 0, sd: 5, tails: heavy}    # alike, or not at all
+      curve:      {smooth: [curve_1, curve_2, curve_3, curve_4], sd: 0.3}         # no bend without a reason
     """
 
     of: str | tuple[str, ...] | dict[str, float] | None = None
@@ -156,28 +161,46 @@ class PriorSettings(Settings):
     or a mapping of parameters to their factors"""
     ratio: tuple[str, str] | None = None
     """two parameters: the ratio of the first to the second is meant"""
-    value: float
-    """value of the combination, in the unit of the parameters"""
+    smooth: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
+    """positive parameters, such as the factors of a valve's curve: the ratios of neighbours, and the last
+    one, are 1 but for a scatter of their logarithms of about `sd`, which the logs may show to be much less
+    or much more"""
+    value: float | None = None
+    """value of the combination, in the unit of the parameters; of `smooth` there is none"""
     sd: Positive | None = None
     """standard deviation of the value; null: the constraint is exact"""
+    tails: Literal["normal", "heavy"] = "normal"
+    """heavy: the value may also be many standard deviations off, if the logs say so: Student's t with 2
+    degrees of freedom, of scale sd, in place of a normal distribution"""
 
     @model_validator(mode="after")
     def _names_parameters(self) -> "PriorSettings":
-        if (self.of is None) == (self.ratio is None):
+        given = [one for one in (self.of, self.ratio, self.smooth) if one is not None]
+        if len(given) != 1:
             raise ValueError(
-                "give either of: parameter, [parameters] or {parameter: factor}, or ratio: [a, b]"
+                "give either of: parameter, [parameters] or {parameter: factor}, or ratio: [a, b], "
+                "or smooth: [parameters]"
             )
-        if not any(self.factors.values()):
+        if (self.smooth is None) == (self.value is None):
+            raise ValueError("has no value" if self.smooth else "needs a value")
+        if self.sd is None and (self.smooth or self.tails == "heavy"):
+            raise ValueError("needs sd: without one it is exact")
+        if not self.smooth and not any(self.factors.values()):
             raise ValueError("names no parameter")
         return self
 
     @property
+    def names(self) -> tuple[str, ...]:
+        """The parameters that it is about."""
+        return self.smooth or tuple(self.factors)
+
+    @property
     def factors(self) -> dict[str, float]:
         """Parameters with their factors; of a ratio those of a - value b,
-        which is 0 where it holds."""
+        which is 0 where it holds. Of `smooth` there are none."""
         if self.ratio is not None:
             first, second = self.ratio
-            return {first: 1.0, second: -self.value}
+            return {first: 1.0, second: -(self.value or 0.0)}
         if isinstance(self.of, dict):
             return self.of
         names = (self.of,) if isinstance(self.of, str) else self.of

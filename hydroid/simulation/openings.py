@@ -22,7 +22,7 @@ from hydroid.hydraulics.records import SCRATCH
 BEHIND_VALVE = [
     *("damping", "stiffness", "friction", "dry_friction", "lever_slope", "lever_bend", "compensation"),
     *("oil_frequency", "oil_damping", "ring_cosine", "ring_sine"),
-    *("pump_flow", "pump_droop", "supply_pressure", "relief"),
+    *("pump_flow", "pump_droop", "pump_limit", "supply_pressure", "relief"),
 ]
 BEHIND_PORT = ["area", "draw", "return_"]
 """what a valve's opening does not depend on, of a joint and of its sides; the others are taken to matter"""

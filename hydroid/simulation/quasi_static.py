@@ -30,7 +30,7 @@ from hydroid.hydraulics.cylinder import bent, filling, rod
 from hydroid.hydraulics.elementwise import compilable
 from hydroid.hydraulics.joint import mean_opening
 from hydroid.hydraulics.kernel import Plugin, make_pad, source_key
-from hydroid.hydraulics.pump import begin_line, come_up, delivery
+from hydroid.hydraulics.pump import begin_line, come_up, delivery, lowest
 from hydroid.hydraulics.records import LINEAR
 from hydroid.hydraulics.valve import MARGIN
 from hydroid.simulation import rollout
@@ -93,18 +93,12 @@ def line_pressure(plugin: Plugin, work, line, share: float, some) -> float:
     Newton's method from the last step's, within a bracket: what is taken rises with the pressure, and what is
     given falls.
     """
-    low, high = 0.0, some.relief
-    pressure = min(max(line.pressure, 1e-3 * high), high)
+    low, high = lowest(some), some.relief
+    if some.pump_limit < np.inf and _taken_beyond(plugin, work, line, share, some, low)[0] >= 0.0:
+        return low  # where the pump gives whatever is taken
+    pressure = min(max(line.pressure, low, 1e-3 * high), high)
     for _ in range(ITERATIONS):
-        given, slope = delivery(pressure, share, some)
-        excess = line.taken - given
-        for a in range(plugin.idle, plugin.order.size):
-            j = plugin.order[a]
-            c = plugin.coefficients[j]
-            _, flow, rise = rod_speed(c, work[j], min(pressure, c.supply_pressure))
-            excess += flow
-            if pressure <= c.supply_pressure:
-                slope += rise
+        excess, slope = _taken_beyond(plugin, work, line, share, some, pressure)
         if excess > 0.0:
             high = pressure
         else:
@@ -116,6 +110,21 @@ def line_pressure(plugin: Plugin, work, line, share: float, some) -> float:
             after = high if after > high == some.relief else 0.5 * (low + high)
         pressure = after
     return pressure
+
+
+@compilable
+def _taken_beyond(plugin: Plugin, work, line, share: float, some, pressure: float) -> Any:
+    """Flow that the actuators take beyond what the pump gives at a line pressure [Pa], and its slope."""
+    given, slope = delivery(pressure, share, some)
+    excess = line.taken - given
+    for a in range(plugin.idle, plugin.order.size):
+        j = plugin.order[a]
+        c = plugin.coefficients[j]
+        _, flow, rise = rod_speed(c, work[j], min(pressure, c.supply_pressure))
+        excess += flow
+        if pressure <= c.supply_pressure:
+            slope += rise
+    return excess, slope
 
 
 @compilable

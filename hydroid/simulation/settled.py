@@ -20,7 +20,7 @@ from numba import njit
 from hydroid.arrays import Array
 from hydroid.hydraulics.elementwise import compilable
 from hydroid.hydraulics.kernel import Plugin, make_pad, source_key
-from hydroid.hydraulics.pump import delivery
+from hydroid.hydraulics.pump import delivery, lowest
 from hydroid.simulation import quasi_static as quasi_static_laws, rollout, steady
 from hydroid.simulation.quasi_static import LEAST_LEVER, rod_speed, weigh
 from hydroid.simulation.steady import balanced_speed, steady_opening, surplus
@@ -139,12 +139,12 @@ def shared_pressure(plugin: Plugin, rods: Rods, law: Law) -> float:
     some = plugin.coefficients[plugin.order[plugin.order.size - 1]]
     if some.pump_flow == np.inf:
         return np.inf
-    low, high, last = 0.0, some.relief, 0
+    low, high, last = lowest(some), some.relief, 0
     over = drawn_at(plugin, rods, law, high)
     if over <= 0.0:
         return high
     if over < some.pump_flow:  # where the pump gives this flow; at less pressure no more is drawn
-        low = high - some.pump_droop * over / some.pump_flow
+        low = max(low, high - some.pump_droop * over / some.pump_flow)
     under = drawn_at(plugin, rods, law, low) - delivery(low, 1.0, some)[0]
     if abs(under) <= SETTLED * some.pump_flow or under >= 0.0:
         return low

@@ -30,7 +30,7 @@ from hydroid.hydraulics.cylinder import friction_damping, volume
 from hydroid.hydraulics.elementwise import compilable
 from hydroid.hydraulics.joint import opened
 from hydroid.hydraulics.kernel import Plugin, make_pad, source_key
-from hydroid.hydraulics.pump import delivery
+from hydroid.hydraulics.pump import delivery, lowest
 from hydroid.hydraulics.records import LINEAR, Records, coefficients, has_force_curve
 from hydroid.hydraulics.solenoid import beyond_dead_band, drive, resting_stroke, side_voltage
 from hydroid.hydraulics.valve import port_flow
@@ -154,7 +154,7 @@ def fed_speed(c, w, takes) -> Any:
     """Speed [m/s] of the rod at which forces and the pump's flow balance, and the supply [Pa] there."""
     if c.pump_flow == np.inf:
         return balanced_speed(c.supply_pressure, c, w, takes)[0], c.supply_pressure
-    low, high, pressure = 0.0, c.relief, c.relief
+    low, high, pressure = lowest(c), c.relief, c.relief
     for _ in range(HALVINGS):  # what is drawn rises with the line's pressure, and what is given falls
         _, drawn = balanced_speed(min(pressure, c.supply_pressure), c, w, takes)
         if drawn > delivery(pressure, 1.0, c)[0]:

@@ -140,6 +140,17 @@ def watched(p: Records, command: np.ndarray, settings: HydraulicSettings, **how)
     return angle, Observation(**fields), np.array([v[0, 0] for _, v in seen])
 
 
+def valve_curve(share: float, exponent: float, factors: list[float]) -> float:
+    """Part of the full opening at a part of the travel: increments of a power law, each times its factor."""
+    ends = [0.0, 0.04, 0.15, 0.4, 0.7, 1.0]
+
+    def height(end: float) -> float:
+        steps = [min(high, end) ** exponent - min(low, end) ** exponent for low, high in pairwise(ends)]
+        return sum(factor * step for factor, step in zip(factors, steps, strict=True))
+
+    return height(share) / height(1.0)
+
+
 def cylinder(angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The rod's way [m] and its moment arm [m]."""
     return triangle(angle, A, B, THETA0, SHORTEST)[:2]
@@ -185,7 +196,9 @@ def reference(p: Records, command: np.ndarray, rtol: float = 1e-7) -> tuple[np.n
             spool = xa - xb
             side = "a" if spool > 0 else "b"
             share = min(max(abs(spool) - v[f"overlap_{side}"], 0) / v[f"slot_width_{side}"], 1)
-            area = v[f"opening_{side}"] * share ** v[f"opening_exponent_{side}"]
+            exponent = v[f"opening_exponent_{side}"]
+            factors = [v[f"curve_{k}_{side}"] for k in (1, 2, 3, 4)]
+            area = v[f"opening_{side}"] * valve_curve(share, exponent, [*factors, 1.0])
             ahead, back = (area, 0.0) if spool > 0 else (0.0, area)
             in_a, in_b = (max(flow(v["leakage"] + a, ps - p), backflow) for a, p in ((ahead, pa), (back, pb)))
             fill_a, fill_b = (v["anticavitation"] if p < pt else 0.0 for p in (pa, pb))
@@ -196,6 +209,8 @@ def reference(p: Records, command: np.ndarray, rtol: float = 1e-7) -> tuple[np.n
                 left = v["supply_pressure"] - ps
                 given = pump * min(1.0, max(left, 0.0) / v["pump_droop"]) if v["pump_droop"] > 0 else pump
                 relieved = pump * max(-left, 0.0) / 1e3  # all of it at 0.01 bar above
+                if left > v["pump_limit"]:
+                    given += 10 * pump * (left - v["pump_limit"]) / 1e3  # whatever is taken at 0.01 bar below
                 rise = (given - relieved - in_a - in_b) / v["line_volume"]
             speed = r * w
             force = v["area_a"] * pa - v["area_b"] * pb

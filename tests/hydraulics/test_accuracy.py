@@ -39,12 +39,14 @@ def test_pressures_follow_the_reference_and_refinement_is_first_order_or_better(
     "optional",
     [
         {"overlap_a": 0.2, "overlap_b": 0.3, "opening_exponent": 1.6, "opening_b": 0.3},
+        {"opening_exponent": 1.3, "curve_1_a": 8.0, "curve_2_a": 0.4, "curve_3_b": 2.5, "curve_4_b": 0.5},
         {"dry_friction": 500.0, "leakage": 0.002, "supply_pressure": 180.0},
         {"return_a": 2.5, "return_b": 0.6, "anticavitation": 2.0},
         {"plunger_mass": 0.1, "plunger_damping": 15.0, "bulk_modulus": 3000.0},
         {"pump_flow": 1.0},
         {"pump_flow": 1.0, "line_volume": 50.0},
         {"pump_flow": 2.0, "pump_droop": 60.0},
+        {"pump_flow": 1.0, "pump_droop": 60.0, "pump_limit": 25.0},
     ],
 )
 def test_optional_physics_agrees_too(optional: dict[str, float]):

@@ -18,7 +18,7 @@ from hydroid.hydraulics.solenoid import (
     resting_stroke,
     side_voltage,
 )
-from hydroid.hydraulics.valve import notched, port_flow
+from hydroid.hydraulics.valve import KNOTS, curved, notched, port_flow
 from hydroid.settings.arm import Arm
 from hydroid.settings.hydraulics import HydraulicSettings
 
@@ -103,6 +103,23 @@ def test_notches_bend_the_opening_between_its_ends():
     assert (slope > 0).all()
     middles = np.searchsorted(share, [0.02, 0.07, 0.2, 0.4])  # one in each part
     np.testing.assert_allclose(slope[middles] / slope[-1], [0.2, 3.0, 0.5, 2.0])
+
+
+def test_a_curve_changes_the_power_laws_increments_between_its_knots():
+    def side(*factors: float) -> SimpleNamespace:
+        named = {f"curve_{k}": factor for k, factor in enumerate(factors, start=1)}
+        return SimpleNamespace(**named, **{f"knot_{k}": knot**1.6 for k, knot in enumerate(KNOTS, start=1)})
+
+    travel = np.linspace(0.0, 1.0, 1001)
+    power = travel**1.6
+    assert np.array_equal(curved(power, side(1.0, 1.0, 1.0, 1.0)), power)
+    factors = 50.0, 0.3, 2.0, 0.5
+    opening = curved(power, side(*factors))
+    assert opening[[0, -1]] == pytest.approx([0.0, 1.0])
+    assert (np.diff(opening) > 0).all()
+    ends = np.array([0.0, *KNOTS, 1.0])
+    steps = np.diff(np.interp(ends, travel, opening)) / np.diff(ends**1.6)
+    np.testing.assert_allclose(steps[:-1] / steps[-1], factors)
 
 
 @pytest.mark.parametrize("compensation", [0.0, 0.4, 1.0])

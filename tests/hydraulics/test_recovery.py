@@ -25,8 +25,8 @@ class Case(NamedTuple):
     model: str = "dynamic"
 
 
-# The flow limit starts where it is felt: above the largest flow of the log it has no effect. The
-# effect of the start pressure fades with the first movement, and a log of several has a second optimum.
+# A limit of the flow, or of the droop, starts where it is felt: above what the log reaches it has no effect.
+# The effect of the start pressure fades with the first movement, and a log of several has a second optimum.
 CASES = {
     "lag of a pilot stage": Case(
         {"pilot_lag": (0.005, 1, 0.15, 0.05), "delay": (0, 0.5, 0.05, 0.1)}, {"dead_band": 20.0}
@@ -40,6 +40,10 @@ CASES = {
         {"oil_frequency": (0.5, 20, 1.4, 3), "oil_damping": (0, 0.9, 0.2, 0.5)}, model="quasi-static"
     ),
     "droop": Case({"pump_droop": (1, 150, 60, 20)}, {"pump_flow": 3.0}),
+    "droop that ends at a limit": Case(
+        {"pump_droop": (1, 300, 120, 60), "pump_limit": (1, 140, 40, 20)}, {"pump_flow": 3.0},
+        model="quasi-static",
+    ),
     "width of the slots": Case({"slot_width_a": (0.5, 5, 2.4, 1.5), "slot_width_b": (0.5, 5, 1.6, 2.2)}),
     "volume of the line": Case(
         {"line_volume": (20, 3000, 600, 200)}, {"pump_flow": 1.5}, ({2: [80, 0, -80, 0] * 5},), 0.25
@@ -88,6 +92,12 @@ CASES = {
         {f"notch_{k}_a": (0.2, 5, true, 1) for k, true in enumerate((0.5, 2.0, 0.6, 1.5), start=1)}
         | {"plunger_damping_a": (5, 500, 100, 60)},
         NOTHING, ({2: [15, -60, 25, 0, 40, -70, 60, 0, 20, -50, 90, -90, 30, 10]},), 0.8,
+    ),
+    "the curve of a valve": Case(
+        {f"curve_{k}_a": (0.05, 100, true, 1) for k, true in enumerate((20.0, 0.5, 2.0, 0.4), start=1)}
+        | {"dead_band_a": (0, 40, 10, 14)},
+        {"opening_exponent": 1.4},
+        ({2: [13, 15, -50, 25, 20, -40, 40, 60, -70, 0, 75, 85, -80, 20, 100, -90, 30, 50, 14]},), 0.6,
     ),
     "trapped pressure": Case(
         {"trapped_pressure": (0, 100, 25, 10), "dead_volume": (5, 300, 60, 40)},

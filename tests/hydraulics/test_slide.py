@@ -96,7 +96,7 @@ def test_a_rotary_actuator_on_a_slide_has_the_units_of_a_slide(
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_its_flow_is_area_times_speed_and_its_pose_is_said_in_mm(settings: FitSettings, sign: float) -> None:
-    log = step_log(settings.arm.pose("up"), {2: [50.0]})
+    log = step_log(settings.arm.pose("up"), {2: [50.0, 100.0]})
     log.angle[-1, 1] += 0.5
     bench = make_bench(settings, [log], 2)
     assert bench.angle == pytest.approx(1e-3 * float(bench.pose.removesuffix(" mm")), abs=1e-12)

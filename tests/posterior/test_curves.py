@@ -18,7 +18,8 @@ def shoulder(**changes: object):
     values = {name: value for name, value in HYDRAULIC.items() if name not in ("F1", "x1")}
     settings = load_settings("article-hyd", {"parameters.S.fixed": 0.0} | changes)
     model = identified(settings, values, "test")
-    log = step_log(settings.arm.pose("study"), {2: [50.0]})
+    # two sizes a direction: commands that are on or off would tell of no others
+    log = step_log(settings.arm.pose("study"), {2: [50.0, 100.0, -50.0, -100.0]})
     log.angle[-1, 1] += 0.6  # the travel
     return make_bench(settings, [log], 2), Bindings(settings).candidates(model.theta[None])
 

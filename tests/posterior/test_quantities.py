@@ -26,7 +26,7 @@ def model(stage: str = "hyd", **changes: object) -> IdentifiedModel:
 
 
 def shoulder_bench(one: IdentifiedModel, joint: int = 2) -> tuple[Bench, Candidates]:
-    log = step_log(one.settings.arm.pose("study"), {joint: [50.0]})
+    log = step_log(one.settings.arm.pose("study"), {joint: [30.0, 50.0]})
     log.angle[-1, joint - 1] += 0.6  # the travel
     return make_bench(one.settings, [log], joint), Bindings(one.settings).candidates(one.theta[None])
 
@@ -133,6 +133,21 @@ def test_a_dead_band_and_an_overlap_add_up_to_one():
     travels = [spool(c, u, c.a.onset[0]) for u in commands]
     beyond = np.interp(c.a.overlap[0], travels, commands)  # of a pilot stage without dead band
     assert found["joint2_dead_band_positive"] == [pytest.approx(20.0 + beyond * (100 - 20) / 100, abs=0.01)]
+
+
+def test_commands_that_are_on_or_off_tell_nothing_of_what_lies_between():
+    one = model()
+    log = step_log(one.settings.arm.pose("study"), {2: [100.0, 0.0, -30.0, 0.0, -60.0]})
+    log.angle[-1, 1] += 0.6
+    bench = make_bench(one.settings, [log], 2)
+    estimate = Bindings(one.settings).candidates(one.theta[None])
+    found = measured(bench, estimate)
+    columns = [column for column, _ in joint_measure(bench, estimate)(estimate)]
+    points = [column.at for column in columns if column.name == "speed"]
+    assert [point for point in points if point > 0] == [100.0]
+    assert len([point for point in points if point < 0]) == 11
+    assert {"joint2_speed_50_negative", "joint2_gain_negative", "joint2_speed_100_positive"} <= set(found)
+    assert not {"joint2_speed_50_positive", "joint2_gain_positive"} & set(found)
 
 
 @pytest.mark.parametrize("model_name", ["dynamic", "quasi-static"])

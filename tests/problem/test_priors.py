@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from made_logs import TRUTH, noisy, stepped
 from recovery import refined
+from scipy.stats import multivariate_t, t
 
 from hydroid import load_settings
 from hydroid.errors import SettingsError
@@ -42,6 +43,50 @@ def test_scores_are_distances_in_standard_deviations():
     assert scores == pytest.approx(np.array([[0.0, 10.0, 4.0, 2.0]]))
 
 
+def test_heavy_tails_are_students_distribution():
+    known = priors(tie={"of": {"a": 1.0, "b": -1.0}, "value": 0.0, "sd": 0.5, "tails": "heavy"})
+    apart = np.array([0.0, 0.1, 0.5, 4.0])
+    theta = np.array([[5.0 + one, 5.0, 2.0, 500.0] for one in apart])
+    logs = t.logpdf(apart / 0.5, df=2)
+    assert 0.5 * known.scores(theta)[:, 0] ** 2 == pytest.approx(logs[0] - logs, abs=1e-9)
+
+
+def test_the_bends_of_a_curve_share_one_scatter():
+    known = priors(curve={"smooth": ["a", "b", "d"], "sd": 0.3})
+    theta = np.array([[2.0, 4.0, 2.0, 100.0], [1.0, 1.0, 2.0, 1.0]])
+    bends = np.log([2.0 / 4.0, 4.0 / 100.0, 100.0]) / 0.3
+    density = multivariate_t(shape=np.eye(3), df=2)
+    expected = density.logpdf(np.zeros(3)) - density.logpdf(bends)
+    squares = (known.scores(theta) ** 2).sum(axis=1)
+    assert 0.5 * squares == pytest.approx([expected, 0.0])
+
+
+def test_weighed_scores_have_the_slopes_of_the_density():
+    tie = {"of": {"a": 1.0, "b": -1.0}, "value": 0.0, "sd": 0.5, "tails": "heavy"}
+    known = priors(
+        tie=tie, curve={"smooth": ["a", "b", "d"], "sd": 0.3}, d={"of": "d", "value": 400, "sd": 50}
+    )
+    theta, step = np.array([4.0, 2.0, 2.0, 300.0]), 1e-5
+    weighed = known.weighed_at(theta)
+    for column in (0, 1, 3):
+        near = np.tile(theta, (2, 1))
+        near[:, column] += (-step, step)
+        slope = np.diff(0.5 * (known.scores(near) ** 2).sum(axis=1))
+        assert weighed(theta[None])[0] @ np.diff(weighed(near), axis=0)[0] == pytest.approx(
+            slope[0], rel=1e-4
+        )
+
+
+def test_heavy_tails_confine_no_search():
+    known = priors(
+        tie={"of": {"a": 1.0, "b": -1.0}, "value": 0.0, "sd": 0.1, "tails": "heavy"},
+        curve={"smooth": ["a", "b"], "sd": 0.1},
+    )
+    candidates = random_candidates(20)
+    assert np.array_equal(known.project(candidates), candidates)
+    assert not known.firm.any()
+
+
 def test_a_search_stays_where_every_prior_nearly_holds():
     known = priors(
         sum={"of": ["a", "b", "c"], "value": 10.0, "sd": 0.5},
@@ -70,6 +115,8 @@ def test_priors_that_cannot_hold_are_refused():
         priors(wrong={"of": ["a", "x"], "value": 1.0})
     with pytest.raises(SettingsError, match="cannot hold within the bounds"):
         priors(wrong={"of": ["a", "b"], "value": 50.0, "sd": 0.5})
+    with pytest.raises(SettingsError, match="no parameter 'x'"):
+        priors(wrong={"smooth": ["a", "x"], "sd": 1.0})
     assert len(priors(c={"of": "c", "value": 1.0, "sd": 0.1})) == 0  # about a fixed parameter only
     assert len(priors(ratio={"ratio": ["a", "c"], "value": 1.0, "sd": 0.1})) == 1
 
@@ -82,6 +129,12 @@ def test_priors_that_cannot_hold_are_refused():
         {"of": [], "value": 1.0},
         {"of": {"a": 0.0}, "value": 1.0},
         {"of": "a", "value": 1.0, "sd": 0.0},
+        {"of": "a", "value": 1.0, "tails": "heavy"},
+        {"of": "a", "sd": 1.0},
+        {"smooth": ["a", "b"]},
+        {"smooth": ["a", "b"], "value": 1.0, "sd": 0.3},
+        {"smooth": [], "sd": 0.3},
+        {"smooth": ["a", "b"], "of": "a", "sd": 0.3},
     ],
 )
 def test_an_incomplete_prior_is_refused(prior):

@@ -66,6 +66,33 @@ def test_a_fit_starts_near_the_log(place: Path):
     assert np.all(np.abs(np.log(np.array(openings) / true)) < np.log(2.5))
 
 
+def test_each_side_of_a_valve_starts_where_the_logs_show_it(place: Path):
+    """The machine's valves have dead bands of 20 and 30 %; the boom's is wired the other way round."""
+    settings = hydroid.load_settings(place / "mine" / "fit.yaml")
+    for joint in ("swing", "boom", "stick"):
+        a, b = (settings.parameters[f"dead_{side}_{joint}"].nominal for side in "AB")
+        assert (a, b) == pytest.approx((20, 30), abs=5), joint
+        assert settings.priors[f"dead_{joint}"].tails == "heavy"
+        assert settings.priors[f"curve_A_{joint}"].smooth is not None
+        assert settings.terms_of(settings.outputs[0]) == ("curve_swing",)
+
+
+def test_a_valve_that_is_open_or_shut_gets_no_curve(place: Path, tmp_path: Path):
+    table = np.genfromtxt(place / "move_0.csv", delimiter=",", names=True, deletechars="")
+    names = (place / "move_0.csv").read_text().splitlines()[0]
+    rows = np.array([list(row) for row in table])
+    for column, name in enumerate(names.split(",")):
+        if "valve" in name or "command" in name:
+            rows[:, column] = np.sign(rows[:, column]) * (np.abs(rows[:, column]) > 0) * 10
+    np.savetxt(tmp_path / "switched.csv", rows, "%.8g", ",", header=names, comments="")
+    init(tmp_path / "mine", write_robot(tmp_path), [tmp_path / "switched.csv"])
+    settings = hydroid.load_settings(tmp_path / "mine" / "fit.yaml")
+    named = set(settings.parameters)
+    assert {"open_A_boom", "open_B_boom", "dead_A_boom"} <= named
+    assert not {name for name in named if name.startswith(("curve_A_boom", "exponent_A_boom"))}
+    assert "exponent_boom" not in settings.priors
+
+
 @pytest.mark.slow
 def test_from_cad_and_log_to_a_validated_fit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """Every command of the next steps, as they stand; the last log was not fitted."""

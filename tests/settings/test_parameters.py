@@ -64,6 +64,9 @@ def test_bounds_follow_from_the_prior():
         ({"nominal": -1.0, "sd": 2}, "cannot be negative"),
         ({"each": True, "within": 2}, "not both"),
         ({"quantity": "pump_flow", "bounds": [1, 2]}, "all joints share the pump"),
+        ({"quantity": "curve_a", "start": 2.0}, "a list of 4 factors"),
+        ({"quantity": "curve_a", "start": [1, 1, 1]}, "a list of 4 factors"),
+        ({"quantity": "curve_a", "start": [1, 1, 1, 0]}, "start 0 lies outside the bounds"),
     ],
 )
 def test_settings_that_make_no_sense_are_refused(entry, words):
@@ -84,6 +87,27 @@ def test_each_writes_one_parameter_per_joint_with_its_own_nominal_value():
     assert parameters["A_A_shoulder"].prior.sd == pytest.approx(math.log(1.5) / 1.96)
     assert settings.parameters["A_A_azimuth"].joints == (1,)
     assert settings.parameters["C"].joints == (2,)
+
+
+def test_a_curve_stands_for_its_factors_and_their_smoothness():
+    changes = {
+        "outputs": [1, 2],
+        "parameters.C": {"quantity": "curve_a", "each": True, "start": [5, 2, 1, 1]},
+        "parameters.C_shoulder_3.start": 1.5,
+        "parameters.F": {"quantity": "curve_b", "joints": [2], "fixed": 1},
+    }
+    settings = load_settings("fit-hyd", changes)
+    parameters = {p.name: p for p in settings.parameter_set().parameters}
+    own = [parameters[f"C_shoulder_{part}"] for part in (1, 2, 3, 4)]
+    assert [p.start for p in own] == [5, 2, 1.5, 1]
+    assert all(p.log and p.lower < 0.01 and p.upper > 100 for p in own)
+    assert settings.parameters["C_azimuth_2"].quantity == "curve_2_a"
+    assert settings.priors["C_shoulder"].smooth == tuple(p.name for p in own)
+    assert parameters["F_4"].fixed == 1
+    assert "F" not in settings.priors
+    again = load_settings("fit-hyd", settings.model_dump(mode="json", include={"parameters", "priors"}))
+    assert again.parameters == settings.parameters
+    assert again.priors == settings.priors
 
 
 def test_a_log_scale_maps_the_unit_box_by_ratios_and_back():

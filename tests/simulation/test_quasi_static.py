@@ -58,7 +58,14 @@ def test_without_load_the_speed_is_opening_times_root_of_the_pressure(simulated)
 @pytest.mark.parametrize("commands", [{SHOULDER: 50}, {SHOULDER: -50}, {SHOULDER: 60, 2: -40}])
 @pytest.mark.parametrize(
     "pump",
-    [{}, PUMP, PUMP | {"draw_a": 0.3, "draw_b": 0.8}, {"compensation": 1.0}, PUMP | {"compensation": 0.5}],
+    [
+        {},
+        PUMP,
+        PUMP | {"pump_limit": 8e5},
+        PUMP | {"draw_a": 0.3, "draw_b": 0.8},
+        {"compensation": 1.0},
+        PUMP | {"compensation": 0.5},
+    ],
 )
 def test_the_dynamic_model_converges_to_it_as_oil_stiffens_and_motion_slows(simulated, commands, pump):
     def apart(slower, stiffer):
@@ -182,6 +189,22 @@ def test_what_the_actuators_take_is_what_the_pump_gives(simulated, draw):
     moving = trace.line[:, 0] < joints.supply_pressure[SHOULDER]
     assert moving.sum() > 100
     np.testing.assert_allclose(taken[moving], given[moving], rtol=1e-6)
+
+
+@pytest.mark.parametrize("model", ["quasi-static", "dynamic"])
+def test_the_pressure_falls_by_no_more_than_its_limit(simulated, model):
+    """Up to there it is that without a limit, and below a pump that gives whatever is taken."""
+    pump = PUMP | {"line_volume": 1e-6, "pump_limit": 8e5}
+    _, limited, joints = simulated({SHOULDER: 70, 2: -60}, 1.0, model, **pump)
+    _, without, _ = simulated({SHOULDER: 70, 2: -60}, 1.0, model, **pump | {"pump_limit": np.inf})
+    low = joints.supply_pressure[SHOULDER] - pump["pump_limit"]
+    assert without.line[:, 0].min() < low - 5e5
+    assert limited.line[:, 0].min() == pytest.approx(low)
+    beyond = np.flatnonzero(without.line[:, 0] < low)[0]
+    np.testing.assert_allclose(limited.line[:beyond], without.line[:beyond])
+    taken = np.where(limited.flow[..., 0] > 0, limited.flow[..., 0], -limited.flow[..., 1]).sum(axis=1)
+    given = PUMP["pump_flow"] * pump["pump_limit"] / PUMP["pump_droop"]
+    assert taken.max() > 1.2 * given
 
 
 @pytest.mark.parametrize("model", ["quasi-static", "dynamic"])

@@ -54,7 +54,14 @@ def both(spec, arm):
         {"flow_limit": 8e-6, "return_a": 2.5},
         PUMP,
         PUMP | {"draw_a": 0.5, "return_b": 0.6},
-        {"overlap_a": 0.3e-3, "overlap_b": 0.2e-3, "opening_exponent_a": 1.6, "notch_2_b": 0.5},
+        PUMP | {"pump_limit": 15e5},
+        {
+            "overlap_a": 0.3e-3,
+            "overlap_b": 0.2e-3,
+            "opening_exponent_a": 1.6,
+            "notch_2_b": 0.5,
+            "curve_2_a": 3.0,
+        },
         {"mass": 0.1, "dead_band_a": 20.0, "dead_band_b": 25.0, "pilot_lag_a": 0.05},
     ],
 )

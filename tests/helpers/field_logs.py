@@ -235,7 +235,10 @@ FIELD_LOGS = (
 
 @dataclass(frozen=True)
 class Outcome:
-    """What `init` made of a log: "right", "said" in one line, "refused" otherwise, or "wrong" in silence."""
+    """What became of a log: "right", "said" in one line, "refused", or "wrong" in silence.
+
+    Where commands were followed also "named": the verdict says that the fit predicts badly.
+    """
 
     verdict: str
     line: str = ""
@@ -269,16 +272,12 @@ def followed(log: FieldLog, folder: Path, arm: Arm, budget: str) -> Outcome:
     Right: it is read rightly, and the fit predicts the second.
     """
     read = outcome(log, folder, arm)
+    if read.verdict != "right":
+        return read
     other = replace(log, steps=tuple(-step for step in log.steps[::-1]))
     (folder / "other.csv").write_text(other.write(make_truth(other.steps), arm))
     found = follow(folder, ["followed", "--log", "log.csv"], "other.csv", budget)
-    told = next((line.strip() for line in found.lines if log.said and log.said in line), "")
-    if told or read.verdict != "right":
-        return read
-    if found.refused:
-        return Outcome("refused", found.refused)
-    pairs = [f"{name} {unseen:.2g} ({still:.2g})" for name, (unseen, still) in found.errors.items()]
-    return Outcome("right" if found.predicted else "wrong", ", ".join(pairs))
+    return Outcome(found.verdict, found.line)
 
 
 def is_right(parts: list[Log], truth: Truth, lost: float) -> bool:

@@ -5,14 +5,16 @@ import io
 import json
 import math
 import shlex
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import typer
 
 from hydroid.commands.app import app
 from hydroid.errors import HydroidError
+from hydroid.joint_verdict import Verdict
 
 STEPS = ("check", "fit-hyd", "validate")
 """that are followed; `suggest` comes after them"""
@@ -30,18 +32,29 @@ class Followed:
         refused: a line that ended them; empty if all ran.
         lines: all that was printed.
         errors: unseen error and that of standing still [deg], by joint.
+        blamed: joints whose verdict is that the fit fails.
     """
 
     refused: str
     lines: list[str]
     errors: dict[str, tuple[float, float]]
+    blamed: tuple[str, ...] = ()
 
     @property
-    def predicted(self) -> bool:
-        """Whether the fit predicts every joint, and not only its rest."""
-        return bool(self.errors) and all(
-            unseen <= PREDICTED * still for unseen, still in self.errors.values()
-        )
+    def verdict(self) -> str:
+        """Right, refused, named (the verdict says what is predicted badly), or wrong."""
+        if self.refused:
+            return "refused"
+        missed = {name for name, (unseen, still) in self.errors.items() if not unseen <= PREDICTED * still}
+        if not missed and self.errors:
+            return "right"
+        return "named" if missed and missed <= {*self.blamed} else "wrong"
+
+    @property
+    def line(self) -> str:
+        """Why it was refused, or the errors, and those of standing still in brackets."""
+        pairs = [f"{name} {unseen:.2g} ({still:.2g})" for name, (unseen, still) in self.errors.items()]
+        return self.refused or ", ".join(pairs)
 
 
 def follow(folder: Path, init: Sequence[str], unseen: str, budget: str) -> Followed:
@@ -49,7 +62,7 @@ def follow(folder: Path, init: Sequence[str], unseen: str, budget: str) -> Follo
 
     The fit has a budget, as `init` proposes: it ends at its best model so far.
     """
-    lines, errors = list[str](), dict[str, tuple[float, float]]()
+    lines, errors, blamed = list[str](), dict[str, tuple[float, float]](), list[str]()
     with contextlib.chdir(folder):
         try:
             lines += _run(["init", *init])
@@ -61,12 +74,14 @@ def follow(folder: Path, init: Sequence[str], unseen: str, budget: str) -> Follo
                     command.append("--json")
                 printed = _run(command)
                 if command[0] == "validate":
-                    errors = _errors(json.loads(printed[-1]))
+                    verdict = json.loads(printed[-1])["verdict"]
+                    errors = _errors(verdict)
+                    blamed = [one["name"] for one in verdict if Verdict(one["verdict"]).fails]
                 else:
                     lines += printed
         except HydroidError as error:
             return Followed(str(error), lines, errors)
-    return Followed("", lines, errors)
+    return Followed("", lines, errors, tuple(blamed))
 
 
 def _printed(lines: Sequence[str]) -> Iterator[list[str]]:
@@ -91,9 +106,9 @@ def _run(arguments: Sequence[str]) -> list[str]:
     return lines
 
 
-def _errors(content: dict) -> dict[str, tuple[float, float]]:
+def _errors(verdict: Sequence[Mapping[str, Any]]) -> dict[str, tuple[float, float]]:
     found = dict[str, tuple[float, float]]()
-    for joint in content["verdict"]:
+    for joint in verdict:
         unseen = joint["unseen_deg"]
         still = joint["baselines_deg"]["standing still"]
         found[joint["name"]] = math.inf if unseen is None else unseen, still

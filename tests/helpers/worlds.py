@@ -190,13 +190,10 @@ def write_log(world: World, path: Path, seconds: float = 30.0, number: int = 0) 
 def followed(world: World, folder: Path, budget: str) -> tuple[str, str]:
     """Write an arm and two logs, and follow the commands that `init` prints, validated on the second log.
 
-    Returns "right" or "wrong" with unseen errors (and those of standing still) [deg], or "refused" and why.
+    Returns the outcome, and unseen errors (and those of standing still) [deg], or why it was refused.
     """
     robot = world.write(world, folder)
     write_log(world, folder / "log.csv", 60.0, 1)
     write_log(world, folder / "other.csv", 60.0, 2)
     found = follow(folder, ["mine", "--arm", robot.name, "--log", "log.csv"], "other.csv", budget)
-    if found.refused:
-        return "refused", found.refused
-    pairs = [f"{name} {unseen:.2g} ({still:.2g})" for name, (unseen, still) in found.errors.items()]
-    return "right" if found.predicted else "wrong", ", ".join(pairs)
+    return found.verdict, found.line

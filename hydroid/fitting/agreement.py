@@ -29,6 +29,7 @@ PERIOD = 0.02
 """of the samples that are compared, at the shortest [s]"""
 STRIDE = 0.2
 """over which moves are compared with those of the model [s]"""
+TINY = 1e-12
 LEAST_EASE = 0.2
 """part of its mean speed that a joint has at any angle, at least"""
 LEAST_LOGS = 3
@@ -203,10 +204,12 @@ def _stretched(courses: Sequence[_Course], model: Baseline) -> list[_Course]:
     at = (np.concatenate(places) - least) / (most - least)
     # the moves asked for, times 1, the place and its square; 1 as if by a few seconds more of data
     rows = ask[:, None] * at[:, None] ** np.arange(3)
-    weak = 1e-3 * np.sum(ask**2)
+    weak = 1e-3 * np.sum(ask**2) + TINY
     shape = np.linalg.solve(rows.T @ rows + weak * np.eye(3), rows.T @ move + weak * np.array([1, 0, 0]))
     grid = np.linspace(0.0, 1.0, 201)
     ease = np.polyval(shape[::-1], grid)
+    if ease.mean() <= 0:  # it moves against its commands, or without them
+        return list(courses)
     ease = ease.clip(LEAST_EASE * ease.mean())
     steps = 0.5 * (1 / ease[1:] + 1 / ease[:-1]) * np.diff(grid) * (most - least)
     measure = np.concatenate([[0.0], np.cumsum(steps)])
@@ -292,7 +295,7 @@ def _spread(values: Array, variances: Array) -> Array:
     mean = (weight * values).sum(axis=0) / weight.sum(axis=0)
     scatter = (weight * (values - mean) ** 2).sum(axis=0)
     scale = weight.sum(axis=0) - (weight**2).sum(axis=0) / weight.sum(axis=0)
-    return ((scatter - (len(values) - 1)) / scale).clip(0.0)
+    return ((scatter - (len(values) - 1)) / scale.clip(TINY)).clip(0.0)
 
 
 def _odd(numbers: _Numbers, k: int, windows: int) -> int | None:

@@ -50,3 +50,25 @@ def test_the_log_that_differs_is_named_with_its_difference(kind: str, seed: int)
 
 def test_two_logs_are_too_few_to_name_one() -> None:
     assert compare_logs([log_of(0), log_of(1, speed=0.5)], RANGES) == []
+
+
+@pytest.mark.parametrize("kind", ["at random", "against the command", "hardly driven", "one level"])
+def test_logs_that_no_simple_model_explains_are_compared_all_the_same(kind: str) -> None:
+    logs = [log_of(k) for k in range(3)]
+    rng = np.random.default_rng(0)
+    changed = list[Log]()
+    for log in logs:
+        steps = np.diff(log.angle, axis=0, prepend=log.angle[:1])
+        angle, command = log.angle, log.command
+        if kind == "at random":
+            angle = np.cumsum(rng.normal(0, 0.01, angle.shape), axis=0)
+        elif kind == "against the command":
+            angle = np.cumsum(np.where(steps > 0, -2, 1) * steps, axis=0)
+        elif kind == "hardly driven":
+            command = command * (np.arange(len(command)) > len(command) - 5)[:, None]
+        else:
+            command = np.sign(command).clip(0)
+        changed.append(replace(log, angle=angle, command=command))
+    for found in compare_logs(changed, RANGES):
+        assert np.isfinite(found.numbers).all()
+        assert np.isfinite(found.sd).all()

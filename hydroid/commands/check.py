@@ -1,13 +1,14 @@
 """`hydroid check` and `hydroid convert`: what is wrong or unusual about logs, and logs as plain CSV."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from hydroid.arrays import Array
+from hydroid.arrays import Array, record
+from hydroid.commands.agreement import odd_logs, plain, tables
 from hydroid.commands.console import Result
 from hydroid.commands.inputs import (
     ConfigSource,
@@ -20,6 +21,7 @@ from hydroid.commands.inputs import (
     refuse_overwriting,
 )
 from hydroid.commands.logs import check_file, plain_findings, undriven_findings
+from hydroid.commands.progress import Progress
 from hydroid.files import Plain
 from hydroid.log import (
     ColumnGuess,
@@ -34,8 +36,13 @@ from hydroid.log import (
     open_table,
     write_log,
 )
+from hydroid.settings.fit import FitSettings
 from hydroid.settings.log import LogSettings
 from hydroid.units import way
+from hydroid.words import listed
+
+if TYPE_CHECKING:
+    from hydroid.fitting.agreement import Agreement
 
 
 class LogCheck(NamedTuple):
@@ -70,50 +77,105 @@ def check(
 ) -> "Result[list[LogCheck]]":
     """List the faults of logs, and anything unusual in them.
 
-    A finding shared by several logs is listed once. The exit status is 2 if a log is unusable, or if these
-    logs together leave a fit of the settings nothing to fit.
+    A finding shared by several logs is listed once. Of three logs or more it says whether they agree, and
+    which one stands out in a joint's speed, dead bands or delay. The exit status is 2 if a log is unusable,
+    or if these logs together leave a fit of the settings nothing to fit.
 
     Example: hydroid check LOG.csv
 
         print(*hydroid.check(["a.csv", "b.csv"]).result[0].findings, sep="\\n")
     """
     settings = load_settings(config, set)
-    names, slides = settings.arm.joint_names, settings.arm.slides
-    checks, rows, sizes = list[LogCheck](), list[Plain](), list[str]()
-    read = list[tuple[Path, Log | None, list[LogFinding]]]()
-    for path in map(Path, as_list(logs)):
-        parts, findings = check_file(path, settings, repair=repair)
-        read.append((path, parts[0] if parts else None, findings))
-        read += [(path, part, []) for part in parts[1:]]
-    there, refused = [log for _, log, _ in read if log is not None], False
-    motion = [*undriven_findings(there, settings), *motion_findings(there, settings.arm)]
-    for path, log, findings in read:
-        source = str(path) if log is None else log.source
-        motions = {} if log is None else driven_joints(log)
-        moved = {names[j - 1]: one.travel for j, one in motions.items()}
-        if log is not None:
-            findings = by_level([*findings, *(one for one in motion if one.source == log.source)])
-            ways = (f"{names[j - 1]} by {way(m.travel, slides=j in slides)}" for j, m in motions.items())
-            moves = ", ".join(ways) or "nothing"
-            size = f"{len(log.time)} samples, {log.duration:.2f} s"
-            sizes.append(f"{source}: {size}; driven and moved: {moves}")
-        usable = all(finding.level != "error" for finding in findings)
-        refused |= not usable
-        rows.append(
-            {
-                "log": source,
-                "usable": usable,
-                "samples": log and len(log.time),
-                "duration_s": log and log.duration,
-                "driven_joints": [] if log is None else np.array(names)[log.driven].tolist(),
-                "moved_deg": moved,
-                "findings": plain_findings(findings),
-            }
-        )
-        checks.append(LogCheck(path, log, findings, moved))
-    every = (finding for one in checks for finding in one.findings)
-    lines = [f"{level}: {line}" for level, line in grouped(every)]
-    return Result([*lines, *sizes], {"logs": rows}, checks, exit_status=2 if refused else 0)
+    names = settings.arm.joint_names
+    with Progress() as progress:
+        files = list[_File]()
+        paths = [Path(log) for log in as_list(logs)]
+        for number, path in enumerate(paths, 1):
+            progress("reading log", number, len(paths), path.name)
+            found = check_file(path, settings, repair=repair, progress=progress)
+            files.append(_File(path, *found))
+        there = [log for file in files for log in file.parts]
+        progress("looking at the motion", len(paths), None)
+        motion = [*undriven_findings(there, settings), *motion_findings(there, settings.arm)]
+        agreements = _compared(there, settings, progress)
+    motion += odd_logs(agreements, there, settings)
+    checks = [one for file in files for one in _checks(file, motion, names)]
+    sizes = [_size(one, settings) for one in checks if one.log is not None]
+    lines = [f"{level}: {line}" for level, line in grouped(f for one in checks for f in one.findings)]
+    summary = list[str]()
+    if agreements and not any(one.odd for one in agreements):
+        joints = listed([names[one.joint - 1] for one in agreements])
+        summary.append(f"No log stands out in speed, dead bands or delay of {joints}; -v shows all logs.")
+    content = {
+        "logs": [_plain(one, names) for one in checks],
+        "agreement": plain(agreements, names),
+    }
+    refused = not all(_is_usable(one) for one in checks)
+    shown = tables(agreements, names, every=False)
+    details = tables(agreements, names, every=True)
+    return Result(
+        [*lines, *sizes, *shown, *summary],
+        content,
+        checks,
+        exit_status=2 if refused else 0,
+        details=[] if shown == details else details,
+    )
+
+
+def _compared(logs: Sequence[Log], settings: FitSettings, progress: Progress) -> "list[Agreement]":
+    """Compare logs, if there are enough; what compares them takes most of a second to be loaded."""
+    if len(logs) < 3:
+        return []
+    from hydroid.fitting.agreement import compare_logs
+
+    return compare_logs(logs, [*settings.arm.ranges.values()], progress)
+
+
+@record
+class _File:
+    """The parts of a file between its gaps, none if it cannot be used, and what was found in it."""
+
+    path: Path
+    parts: Sequence[Log]
+    findings: Sequence[LogFinding]
+
+
+def _checks(file: _File, motion: Sequence[LogFinding], names: Sequence[str]) -> Iterator[LogCheck]:
+    """Yield what was found in each part of a file, and in its motion."""
+    if not file.parts:
+        yield LogCheck(file.path, None, file.findings, {})
+    for part in file.parts:
+        own = file.findings if part is file.parts[0] else ()
+        findings = by_level([*own, *(one for one in motion if one.source == part.source)])
+        moved = {names[joint - 1]: one.travel for joint, one in driven_joints(part).items()}
+        yield LogCheck(file.path, part, findings, moved)
+
+
+def _is_usable(one: LogCheck) -> bool:
+    return all(finding.level != "error" for finding in one.findings)
+
+
+def _size(one: LogCheck, settings: FitSettings) -> str:
+    """Return a line on a log: how long it is, and what moves in it."""
+    assert one.log is not None
+    slides = {settings.arm.joint_names[joint - 1] for joint in settings.arm.slides}
+    ways = [f"{name} by {way(travel, slides=name in slides)}" for name, travel in one.moved_deg.items()]
+    size = f"{len(one.log.time)} samples, {one.log.duration:.2f} s"
+    return f"{one.log.source}: {size}; driven and moved: {', '.join(ways) or 'nothing'}"
+
+
+def _plain(one: LogCheck, names: Sequence[str]) -> Plain:
+    """Return a log as JSON holds it."""
+    log = one.log
+    return {
+        "log": str(one.path) if log is None else log.source,
+        "usable": _is_usable(one),
+        "samples": log and len(log.time),
+        "duration_s": log and log.duration,
+        "driven_joints": [] if log is None else np.array(names)[log.driven].tolist(),
+        "moved_deg": one.moved_deg,
+        "findings": plain_findings(one.findings),
+    }
 
 
 @command

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hydroid.commands.inputs import LogSource, LogSources, ModelSource, as_list
+from hydroid.commands.progress import Progress
 from hydroid.errors import LogError, RunError, SettingsError
 from hydroid.estimate import read_estimate
 from hydroid.files import is_file
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log, LogFinding, check_parts, grouped, log_finding, open_table
-from hydroid.progress import LOGGER, NOTE
+from hydroid.progress import LOGGER, NOTE, Progress as WorkProgress, no_progress
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.log import LogSettings, log_file
 
@@ -43,17 +44,17 @@ def read_logs(
     read: list[Log] = []
     findings: list[LogFinding] = []
     pose = settings.arm.pose(settings.start_pose)
-    for source in as_list(logs):
-        if isinstance(source, Log):
-            read.append(
-                source if source.measured.all() or source.pose is not None else replace(source, pose=pose)
-            )
-            continue
-        parts, more = check_file(Path(source), settings, repair=repair, angles=angles)
-        if not parts:
-            raise more[0].error()
-        findings += more
-        read += [replace(part, pose=pose) for part in parts]
+    with Progress() as progress:
+        for source in as_list(logs):
+            if isinstance(source, Log):
+                known = source.measured.all() or source.pose is not None
+                read.append(source if known else replace(source, pose=pose))
+                continue
+            parts, more = check_file(Path(source), settings, repair=repair, angles=angles, progress=progress)
+            if not parts:
+                raise more[0].error()
+            findings += more
+            read += [replace(part, pose=pose) for part in parts]
     for level, line in grouped(findings):
         LOGGER.log(logging.WARNING if level == "warning" else NOTE, "%s: %s", level, line)
     return read
@@ -73,7 +74,12 @@ def read_log(log: LogSource, settings: FitSettings, *, repair: bool = False, ang
 
 
 def check_file(
-    path: Path, settings: FitSettings, *, repair: bool, angles: bool = True
+    path: Path,
+    settings: FitSettings,
+    *,
+    repair: bool,
+    angles: bool = True,
+    progress: WorkProgress = no_progress,
 ) -> tuple[list[Log], list[LogFinding]]:
     """Read a file as the settings map it: its parts between gaps, none if it cannot be used.
 
@@ -81,7 +87,9 @@ def check_file(
     """
     path = path.resolve() if path.name in ("", "..") else path
     arm, outputs = settings.arm, settings.outputs if angles else None
-    return check_parts(path, settings.log, arm.ranges, outputs=outputs, arm=arm, repair=repair)
+    return check_parts(
+        path, settings.log, arm.ranges, outputs=outputs, arm=arm, repair=repair, progress=progress
+    )
 
 
 def undriven_findings(logs: Sequence[Log], settings: FitSettings) -> list[LogFinding]:

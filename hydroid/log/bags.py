@@ -9,6 +9,7 @@ first message a command is 0 %. The time column has the name that the settings g
 
 import sqlite3
 from array import array
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import field, fields, is_dataclass
@@ -21,13 +22,16 @@ import numpy as np
 from hydroid.arrays import Array, Ints, Mask, record
 from hydroid.errors import LogError
 from hydroid.log.repair import hold
-from hydroid.log.table import Recording, Signal, Table, format_library, refuse_large
+from hydroid.log.table import Recording, Signal, Table, format_library, refuse_large, time_of_day
+from hydroid.progress import Progress, no_progress
 from hydroid.settings.log import LogSettings
+from hydroid.words import listed
 
 LATE = 0.1
 """how late a message may be recorded [s]: networks reorder messages; a longer step back is the clock's"""
 HOLE = 0.1
 """shortest silence of a topic that counts as a hole [s]"""
+WATCHED = 5_000  # messages between two reports of progress
 LARGEST_MESSAGE = 20_000
 """[bytes]; larger ones are images and point clouds"""
 
@@ -110,9 +114,10 @@ class BagTable(Table):
         values = np.stack([columns[signal.name] for signal in signals], axis=1)
         values[~(np.abs(values) < 1e100)] = np.nan
         topics = ", ".join(sorted({topic_of(name) for name in held}))
-        remarks = (f"{topics}: resampled to {self.period:g} s",)
+        remarks = (*self.remarks, f"{topics}: resampled to {self.period:g} s")
         table = Table(source=self.source, names=self.names, columns=columns, remarks=remarks)
-        return Recording(table, tuple(signals), values[~lost], np.flatnonzero(~lost))
+        day = time_of_day(np.array([start], "M8[ns]"))
+        return Recording(table, tuple(signals), values[~lost], np.flatnonzero(~lost), day)
 
     def _grid(self, held: Mapping[str, bool], at: Mapping[str, Ints]) -> tuple[int, Array]:
         """Return the first time that all interpolated channels have [ns], and the rows' times from it [s]."""
@@ -147,20 +152,27 @@ def _in_holes(seconds: Array, grid: Array) -> Mask:
     return far & (grid > seconds[after - 1] + 1e-9) & (grid < seconds[after] - 1e-9)
 
 
-def open_bag(path: Path, settings: LogSettings) -> BagTable:
+def open_bag(path: Path, settings: LogSettings, progress: Progress = no_progress) -> BagTable:
     """Read the channels of a bag. Raises LogError: it cannot be read, or holds none."""
     channels, counts = dict[str, Channel](), dict[str, int]()
+    unread = Counter[str]()
     with format_library("rosbags.highlevel", "ros", path, "a bag") as rosbags:
         from rosbags.typesys import Stores, get_typestore
 
         latest = get_typestore(Stores.LATEST)  # for bags that do not hold their definitions
         with rosbags.AnyReader([path], default_typestore=latest) as reader:
-            for connection, recorded, data in reader.messages():
+            for number, (connection, recorded, data) in enumerate(reader.messages()):
+                if number % WATCHED == 0:
+                    progress(f"reading {path.name}, message", number, reader.message_count)
                 topic = connection.topic
                 counts[topic] = counts.get(topic, 0) + 1
                 if len(data) > LARGEST_MESSAGE:
                     continue
-                message = reader.deserialize(data, connection.msgtype)
+                try:
+                    message = reader.deserialize(data, connection.msgtype)
+                except Exception:  # rosbags raises any on damaged bytes
+                    unread[topic] += 1
+                    continue
                 stamp = getattr(getattr(message, "header", None), "stamp", None)
                 at = 0 if stamp is None else int(stamp.sec) * 10**9 + int(stamp.nanosec)
                 for name, number in _numbers(message, f"{topic}."):
@@ -169,14 +181,17 @@ def open_bag(path: Path, settings: LogSettings) -> BagTable:
                     channel.values.append(number)
                     channel.messages.append(counts[topic])
         set_back = _set_back(path)
+    left_out = unread.items()
+    remarks = [f"{topic}: {lost} of {counts[topic]} messages cannot be read" for topic, lost in left_out]
     if not channels:
-        raise LogError("holds no channel of numbers", path)
+        raise LogError(listed(remarks) if remarks else "holds no channel of numbers", path)
     return BagTable(
         source=str(path),
         names=(settings.time.column, *channels),
         channels=channels,
         period=settings.period_s,
         set_back=set_back,
+        remarks=tuple(remarks),
     )
 
 

@@ -4,12 +4,10 @@ Of a .mat a vector is a column of the variable's name; column k of a matrix is `
 longer axis is the time; fields of structs follow after a dot; element k of a cell array is `name[k]`.
 """
 
-import struct
-import zlib
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,18 +15,18 @@ from numpy.typing import NDArray
 from hydroid.arrays import record
 from hydroid.errors import LogError
 from hydroid.log.bags import open_bag
+from hydroid.log.mat5 import large_variables
 from hydroid.log.table import MOST_NUMBERS, Table, TextColumn, format_library, refuse_large
+from hydroid.progress import Progress
 from hydroid.settings.log import LogSettings
 from hydroid.words import listed
 
-COMPRESSED = 15
-"""type of a compressed element of a MATLAB file"""
 TEXTS = ("string", "large_string", "binary", "large_binary")
 """types of columns of text in a Parquet file; others hold numbers or times"""
 TEXTS_AT_ONCE = 1024
 
 
-def open_mat(path: Path, _settings: LogSettings) -> Table:
+def open_mat(path: Path, _settings: LogSettings, _progress: Progress) -> Table:
     """Read all variables of a file, which is HDF5 from version 7.3 on."""
     hdf5 = HDF5 in first_bytes(path)
     package = "h5py" if hdf5 else "scipy.io"
@@ -39,7 +37,7 @@ def open_mat(path: Path, _settings: LogSettings) -> Table:
                 variables = _without_hdf5(file, large)
         else:
             names = [name for name, *_ in library.whosmat(str(path))]
-            large += _large_variables(path, names)
+            large += large_variables(path, names, 8 * MOST_NUMBERS)
             wanted = [name for name in names if name not in large]
             variables = library.loadmat(str(path), simplify_cells=True, variable_names=wanted)
         columns = dict(_columns("", variables))
@@ -53,37 +51,6 @@ def open_mat(path: Path, _settings: LogSettings) -> Table:
         )
         raise LogError("holds no array of numbers", path, hint)
     return Table(source=str(path), names=tuple(columns), columns=columns, remarks=remarks)
-
-
-def _large_variables(path: Path, names: Sequence[str]) -> list[str]:
-    """Return the compressed variables of a file that unpack to more than can be read.
-
-    They are unpacked piece by piece, and not kept. Version 4 has none, and the file's size is that of others.
-    """
-    with path.open("rb") as file:
-        head = file.read(128)
-        if head[126:] not in (b"IM", b"MI"):
-            return []
-        order, sizes = "<" if head[126:] == b"IM" else ">", list[int]()
-        while len(tag := file.read(8)) == 8:
-            kind, size = struct.unpack(f"{order}2I", tag)
-            end = file.tell() + size
-            sizes.append(_unpacked_size(file, size) if kind == COMPRESSED else size)
-            file.seek(end)
-    return [name for name, size in zip(names, sizes, strict=False) if size > 8 * MOST_NUMBERS]
-
-
-def _unpacked_size(file: BinaryIO, size: int) -> int:
-    """Return what the next bytes of a file, compressed, unpack to; not much more than the limit."""
-    unpacker, total = zlib.decompressobj(), 0
-    data = b""
-    while total <= 8 * MOST_NUMBERS:
-        data = unpacker.unconsumed_tail or file.read(min(size, 1 << 16))
-        size -= 0 if unpacker.unconsumed_tail else len(data)
-        if not data:
-            break
-        total += len(unpacker.decompress(data, 1 << 20))
-    return total
 
 
 @record
@@ -151,7 +118,7 @@ class ParquetColumns(Mapping[str, NDArray[Any]]):
         return None
 
 
-def open_parquet(path: Path, _settings: LogSettings) -> Table:
+def open_parquet(path: Path, _settings: LogSettings, _progress: Progress) -> Table:
     """Open a file, whose columns are read where they are used."""
     columns = ParquetColumns(path)
     return ParquetTable(source=str(path), names=tuple(columns), columns=columns)
@@ -181,7 +148,9 @@ def _without_hdf5(item: Any, large: list[str]) -> Any:
     """
     if hasattr(item, "items"):
         return {name: _without_hdf5(inner, large) for name, inner in item.items()}
-    if item.size is not None and item.size > MOST_NUMBERS:
+    if item is None or item.size is None:  # a link to an object that is not there, an array without a shape
+        return None
+    if item.size > MOST_NUMBERS:
         large.append(item.name.lstrip("/"))
         return None
     text = item.attrs.get("MATLAB_class") == b"char" or "MATLAB_empty" in item.attrs

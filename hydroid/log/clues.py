@@ -7,6 +7,8 @@ from hydroid.files import read_table
 from hydroid.units import Unit, unit_of
 
 CLUES = read_table("log/clues.yaml")
+RAW = ("voltage", "current")
+"""quantities in which sensors and amplifiers speak"""
 
 
 def words(name: str) -> list[str]:
@@ -28,6 +30,8 @@ def kind_of(name: str, unit: Unit | None) -> str:
         return "other"
     if {*there} & {*CLUES["targets"]} and unit and unit.quantity in ("angle", "length"):
         return "target"
+    if unit and unit.quantity in RAW and {*there} & {*CLUES["sensors"]}:
+        return "angle"
     if unit:
         return CLUES["units"].get(unit.quantity, "other")
     if {*there} & {"cmd", "command", "commands", "joystick", "joy"}:

@@ -12,10 +12,11 @@ import csv
 from array import array
 from codecs import getincrementaldecoder
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain, islice, pairwise
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from hydroid.arrays import record
 from hydroid.errors import LogError
 from hydroid.log.binary import FORMATS
 from hydroid.log.table import Recording, Signal, Table, TextColumn, clock, number
+from hydroid.progress import Progress, no_progress
 from hydroid.units import bare, unit_of
 from hydroid.words import listed
 
@@ -32,6 +34,7 @@ IS_CSV = f"formats of logs are {FORMATS}; a CSV file has a header and one row pe
 
 
 SAMPLE = 400  # lines by which separator, names and width are recognised
+WATCHED = 20_000  # lines between two reports of progress
 PIECE = 256  # lines whose cells are held as text at a time
 
 
@@ -56,14 +59,23 @@ class CsvTable(Table):
         return cells[self.names.index(name)]
 
 
-def open_csv(path: Path) -> Table:
+def open_csv(path: Path, progress: Progress = no_progress) -> Table:
     """Find the table in a file, whose lines are read one after the other."""
     encoding = _encoding(path)
     try:
         with path.open(encoding=encoding) as file:
-            return _read_table(path, encoding, file)
+            return _read_table(path, encoding, _watched(file, path, progress))
     except UnicodeDecodeError:
         raise _no_text(path) from None
+
+
+def _watched(file: TextIO, path: Path, progress: Progress) -> Iterator[str]:
+    """Yield lines, and report how much of the file is read [MB]."""
+    size = path.stat().st_size // 1_000_000
+    for row, line in enumerate(file):
+        if row % WATCHED == 0:
+            progress(f"reading {path.name}, MB", file.buffer.tell() // 1_000_000, size)
+        yield line
 
 
 def _read_table(path: Path, encoding: str, file: Iterable[str]) -> Table:
@@ -153,9 +165,14 @@ def _encoding(path: Path) -> str:
         if file.read(2) in (b"\xff\xfe", b"\xfe\xff"):
             return "utf-16"
         file.seek(0)
-        decoder, encoding = getincrementaldecoder("utf-8-sig")(), "utf-8-sig"
+        decoder, encoding, line = getincrementaldecoder("utf-8-sig")(), "utf-8-sig", 1
         while piece := file.read(1 << 16):
-            if b"\0" in piece:
+            text, nul, _ = piece.partition(b"\0")
+            line += text.count(b"\n")
+            if nul and line > 1 and encoding == "utf-8-sig":
+                hint = "a logger keeps room by them, or lost power: cut the file there"
+                raise LogError("holds NUL bytes from here on", f"{path}, line {line}", hint)
+            if nul:
                 raise _no_text(path)
             if encoding == "utf-8-sig":
                 try:

@@ -15,11 +15,11 @@ import numpy as np
 from hydroid.arrays import Array
 from hydroid.errors import LogError
 from hydroid.files import Plain
-from hydroid.log.clues import CLUES, column_unit, direction, joint_of, kind_of, number_in, words
+from hydroid.log.clues import CLUES, RAW, column_unit, direction, joint_of, kind_of, number_in, words
 from hydroid.log.rods import Rod
-from hydroid.log.signals import likely_range
+from hydroid.log.signals import CommandRange, likely_range, resting_range
 from hydroid.log.table import Signal, Table
-from hydroid.units import UNITS, likely_time_unit
+from hydroid.units import UNITS, likely_time_unit, unit_of
 from hydroid.words import listed
 
 PERIODS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2)  # [s], of which a guess takes the nearest
@@ -81,15 +81,20 @@ def guess_columns(
         _by_joint(_angles_first(columns, kind), (joints, links), (slides, rods), reasons)
         for kind in ("command", "angle")
     )
-    unitless = [c.values for joint, ((c,), _) in angles.items() if joint not in slides and not c.unit]
+    unitless = list[Array]()
+    for joint, ((column,), _) in angles.items():
+        if joint not in slides and not column.unit and not _is_raw(column):
+            unitless.append(column.values)
     default = "rad" if max((np.nanmax(np.abs(x)) for x in unitless), default=np.inf) <= 6.3 else "deg"
+    given = {joint: _cells(table, pair) for joint, (pair, _) in commands.items()}
+    usual = _usual_range([*given.values()])
     entries = dict[int, Plain]()
     for joint in sorted({*angles, *commands}):
         entry: Plain = {"command": None, "angle": None}
         entries[joint], of = entry, joints[joint - 1]
         if joint in commands:
             pair, why = commands[joint]
-            entry["command"], said = _command(table, pair)
+            entry["command"], said = _command(pair, given[joint], usual)
             reasons.append(f"{said} of {of}, {why}")
         if joint in angles:
             (column,), why = angles[joint]
@@ -125,12 +130,14 @@ def _angle(
     limits: tuple[float, float] | None,
 ) -> tuple[Plain, str]:
     """Return the settings of the column of a joint's angle, and what it is taken for."""
-    known = column.values[np.isfinite(column.values)]
-    low, high = float(known.min()), float(known.max())
-    largest = max(abs(low), abs(high))
-    if slides:  # no telescope is 50 m long
+    largest = float(np.nanmax(np.abs(column.values)))
+    raw = _is_raw(column)
+    if slides and not raw:  # no telescope is 50 m long
         unit = column.unit or ("mm" if largest > 50 else "m")
         return {"column": column.name, "unit": unit}, f"{column.name}: position in {unit}"
+    if rod is not None and raw and _is_length(column):
+        ends = 1e3 * rod.ends[0], 1e3 * rod.ends[1]
+        return _over_the_range(column, ends, "mm", "stroke of its cylinder")
     if length := _length(column, rod, usual):
         unit, offset = length
         entry: Plain = {"column": column.name, "unit": unit}
@@ -139,19 +146,37 @@ def _angle(
         with_it_in = f"whose cylinder is {offset:.6g} {unit} long with it in,"
         said = f"{column.name}: travel of the rod in {unit}, {with_it_in}"
         return entry | {"offset": offset}, said
-    unit = column.unit or usual
-    if column.unit or largest * UNITS[unit].factor <= LARGEST_ANGLE or not limits or high == low:
-        return {"column": column.name, "unit": unit}, f"{column.name}: angle in {unit}"
-    least, most = np.degrees(limits)
-    scale = float(f"{(most - least) / (high - low):.6g}")
-    entry = {
-        "column": column.name,
-        "unit": "deg",
-        "scale": scale,
-        "offset": float(f"{least - scale * low:.6g}"),
-    }
-    what = f"counts from {low:g} to {high:g}, taken for the whole range of {least:.4g} to {most:.4g} deg"
-    return entry, f"{column.name}: {what}: correct scale and offset where the log does not reach both ends,"
+    too_large = not column.unit and largest * UNITS[usual].factor > LARGEST_ANGLE
+    if limits and (raw or too_large):
+        ends = limits if slides else (float(np.degrees(limits[0])), float(np.degrees(limits[1])))
+        return _over_the_range(column, ends, "m" if slides else "deg", "range")
+    unit = usual if raw else column.unit or usual
+    return {"column": column.name, "unit": unit}, f"{column.name}: angle in {unit}"
+
+
+def _is_raw(column: _Column) -> bool:
+    """Return whether a position is as a sensor gives it: in V, mA or counts."""
+    if column.unit:
+        return UNITS[column.unit.lower()].quantity in RAW
+    return not {*words(column.name)}.isdisjoint(CLUES["counts"])
+
+
+def _over_the_range(column: _Column, ends: tuple[float, float], unit: str, whole: str) -> tuple[Plain, str]:
+    """Return the settings of a position in V, mA or counts, which is taken for all that a joint can do.
+
+    `ends` of that are in the unit.
+    """
+    known = column.values[np.isfinite(column.values)]
+    low, high = float(known.min()), float(known.max())
+    least, most = ends
+    span = high - low or 1.0
+    scale = float(f"{(most - least) / span:.6g}")
+    offset = float(f"{least - scale * low:.6g}")
+    signal = column.unit or "counts"
+    what = f"{low:g} to {high:g} {signal}, taken for the whole {whole}, {least:.4g} to {most:.4g} {unit}"
+    hint = "correct scale and offset where the log does not reach both ends,"
+    entry: Plain = {"column": column.name, "unit": unit, "scale": scale, "offset": offset}
+    return entry, f"{column.name}: {what}: {hint}"
 
 
 def _angles_first(columns: Sequence[_Column], kind: str) -> list[_Column]:
@@ -184,6 +209,7 @@ def nearest_period(step: float) -> float:
 def _columns(table: Table, names: Sequence[str]) -> Iterator[_Column]:
     """Yield the columns that seem to be times, commands or angles; arrays of a rare length are no signals."""
     units = {name: column_unit(name, table.units.get(name, "")) for name in table.names if name}
+    of_joints = {word for name in names for word in words(name)} - {"joint", "link"}
     every = {name: kind_of(name, unit) for name, unit in units.items()}
     bare = [{*words(name)} - {"joint"} for name in names]
     bare += [
@@ -199,10 +225,19 @@ def _columns(table: Table, names: Sequence[str]) -> Iterator[_Column]:
                 values = recording.time
                 unit = units[name]
                 stated = unit.name if unit else ""
-                if kind == "time" and not _rises(values) and likely_range(values, unit=stated):
-                    kind = "command"  # pulses
+                if kind == "time" and not _rises(values):
+                    pulses = likely_range(values, unit=stated)
+                    measured = not {*words(name)}.isdisjoint(of_joints)
+                    # "Boom Ms" may be its measured position
+                    kind = "command" if pulses and _are_pulses(pulses) else "angle" if measured else kind
+                    stated = "" if kind == "angle" else stated
                 if np.isfinite(values).any():
                     yield _Column(name, kind, stated, values)
+
+
+def _are_pulses(likely: CommandRange) -> bool:
+    unit = unit_of(likely.name.split()[-1])
+    return unit is not None and unit.quantity == "time"
 
 
 def _rises(values: Array) -> bool:
@@ -236,7 +271,7 @@ def _by_joint(
         unit = pair[0].unit
         length = unit in LENGTHS
         takes = (length and joint in rods) or length == (joint in slides)
-        fits = kind == "command" or not unit or takes
+        fits = kind == "command" or not unit or takes or _is_raw(pair[0])
         free = fits and 0 < joint <= len(names) and joint not in given
         if free:
             given[joint] = pair, why
@@ -262,13 +297,44 @@ def _by_joint(
     return given
 
 
-def _command(table: Table, columns: Sequence[_Column]) -> tuple[Plain, str]:
+class _Cells(NamedTuple):
+    """The cells of a command, or of its two directions, and what they are likely in."""
+
+    values: Array
+    likely: CommandRange | None
+
+
+def _cells(table: Table, columns: Sequence[_Column]) -> _Cells:
+    signals = [Signal(column.name, "command", rest=np.nan) for column in columns]
+    values = table.read(signals).values.T
+    negative = values[1] if len(values) > 1 else None
+    return _Cells(values, likely_range(values[0], negative, columns[0].unit))
+
+
+def _usual_range(commands: Sequence[_Cells]) -> CommandRange | None:
+    """Return the range that more than half of a log's commands are in, if it has a positive middle."""
+    names = [one.likely.name for one in commands if one.likely and one.likely.offset]
+    most = max(names, key=names.count, default="")
+    if names.count(most) <= len(commands) / 2:
+        return None
+    return next(one.likely for one in commands if one.likely and one.likely.name == most)
+
+
+def _command(columns: Sequence[_Column], cells: _Cells, usual: CommandRange | None) -> tuple[Plain, str]:
+    """Return the settings of the columns of a command, and what they are taken for.
+
+    What rests beside the middle is no command: its own rest is 0 %.
+    """
     names = [column.name for column in columns]
-    signals = [Signal(name, "command", rest=np.nan) for name in names]
-    cells = table.read(signals).values.T
-    likely = likely_range(cells[0], cells[1] if len(cells) > 1 else None, columns[0].unit)
+    likely = cells.likely
+    if len(columns) == 1 and (at_rest := resting_range(cells.values[0], likely, usual)):
+        rest, likely = at_rest
+        likely = likely.with_overshoot(cells.values)
+        entry: Plain = {"column": names[0], "scale": likely.scale, "offset": likely.offset}
+        return entry, f"{names[0]}: command in {likely.name}, at rest at {rest:.6g}"
     entry: Plain = {"column": names[0] if len(names) == 1 else names}
     if likely is None or "%" in (columns[0].unit, likely.name):
         return entry, f"{' and '.join(names)}: command in %"
+    likely = likely.with_overshoot(cells.values)
     entry |= {"scale": likely.scale} | ({"offset": likely.offset} if likely.offset else {})
     return entry, f"{' and '.join(names)}: command in {likely.name}"

@@ -28,6 +28,7 @@ class Log:
             two rows, and say nothing new. None: all do.
         pose: in which joints stand that are not measured [rad], shape (J,); None: it is not known.
         begin: time of its first sample in the recording, of which it may be a part [s].
+        clock: time of day at which the recording begins, HH:MM:SS; empty where the file has none.
     """
 
     source: str
@@ -40,6 +41,7 @@ class Log:
     recorded: Mask | None = None
     pose: Array | None = None
     begin: float = 0.0
+    clock: str = ""
 
     @property
     def joints(self) -> int:

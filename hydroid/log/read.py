@@ -17,6 +17,7 @@ from hydroid.log.log import Log, LogFinding, by_level, log_finding
 from hydroid.log.repair import between_gaps, hold, resample, without_bad_rows
 from hydroid.log.rods import as_angles, rods_of
 from hydroid.log.table import Recording, Signal, Table
+from hydroid.progress import Progress, no_progress
 from hydroid.settings.arm import Arm
 from hydroid.settings.log import Kind, LogSettings
 from hydroid.units import UNITS
@@ -33,7 +34,7 @@ Ranges = Mapping[str, tuple[float, float]]
 """of all joints [rad, m], by their names"""
 
 
-def open_table(path: Path, settings: LogSettings = DEFAULT) -> Table:
+def open_table(path: Path, settings: LogSettings = DEFAULT, progress: Progress = no_progress) -> Table:
     """Open a log of any format, recognised by its first bytes.
 
     The settings name the time column, and the period to which the channels of a bag are resampled.
@@ -46,8 +47,8 @@ def open_table(path: Path, settings: LogSettings = DEFAULT) -> Table:
         raise LogError(f"cannot be read ({reason})", path) from None
     for name, (reader, starts) in BINARY.items():
         if data.startswith(starts) or path.suffix.lower() == name:
-            return reader(path, settings)
-    return open_csv(path)
+            return reader(path, settings, progress)
+    return open_csv(path, progress)
 
 
 def _first_bytes(path: Path) -> bytes:
@@ -76,6 +77,7 @@ def check_parts(
     outputs: Sequence[int] | None = (),
     arm: Arm | None = None,
     repair: bool = False,
+    progress: Progress = no_progress,
 ) -> tuple[list[Log], list[LogFinding]]:
     """Find everything that is wrong with a log: return its parts between gaps, and all findings.
 
@@ -88,6 +90,7 @@ def check_parts(
         arm: whose cylinders have lengths that stand for angles; a positive command turns its joints
             `backward` to negative angles.
         repair: fill holes up to `settings.repair_s`.
+        progress: how much of the file is read [MB].
     """
     source, parts, findings, compared = str(path), list[Log](), list[LogFinding](), outputs or ()
     try:
@@ -98,7 +101,7 @@ def check_parts(
         if unmapped := [joint for joint in compared if settings.columns("angle", joint) is None]:
             what = f"output joint {[*ranges][unmapped[0] - 1]} has no angle column"
             raise LogError(what, source, "map it in log.joints, or take another")
-        table = open_table(path, settings)
+        table = open_table(path, settings, progress)
         if outputs is None:
             signals = [s for s in signals if s.kind in ("time", "command") or s.name in table.names]
         signals = _match(table, signals, needed, findings)
@@ -129,7 +132,8 @@ def _parts(
     for piece in between_gaps(recording, settings, findings, repair=repair):
         begin = float(piece.time[0] - recording.time[0])
         rest = 0 if begin else None  # after a gap the arm may be moving
-        parts.append(replace(resample(piece, settings, joints), begin=begin, rest=rest))
+        log = resample(piece, settings, joints)
+        parts.append(replace(log, begin=begin, rest=rest, clock=recording.clock))
     if len(parts) == 1:
         return parts
     return [replace(one, source=f"{one.source}[{k}]") for k, one in enumerate(parts, 1)]

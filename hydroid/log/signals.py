@@ -12,6 +12,8 @@ SLACK = 0.06
 """part of half a range by which converters overshoot, and by which joysticks rest beside the middle"""
 USED = 0.1
 """part of half a range beyond which both sides of the middle are used"""
+FARTHEST_REST = 0.3
+"""part of half a range by which a command may rest beside the middle"""
 COMMON = 0.05
 """part of the samples that makes 0 a command that is really given"""
 
@@ -28,6 +30,14 @@ class CommandRange(NamedTuple):
         offset = self.offset + self.scale * offset
         more = f" and log.command.offset: {offset:g}" if offset else ""
         return {"range": self.name, "scale": f"{self.scale * gain:g}{more}"}
+
+    def with_overshoot(self, values: Array) -> "CommandRange":
+        """Return a range in which no cell is beyond 100 %, for converters that overshoot."""
+        most = float(np.nanmax(np.abs(self.scale * values + self.offset))) / 100
+        if most <= 1 + 1e-8:
+            return self
+        scale, offset = (float(f"{one / (most + 1e-5):.6g}") for one in (self.scale, self.offset))
+        return self._replace(scale=scale, offset=offset)
 
 
 class Signal(NamedTuple):
@@ -94,6 +104,31 @@ def likely_range(values: Array, negative: Array | None = None, unit: str = "") -
             signal.low < 0 or _rests_in_the_middle(signal, values, rests, zero_is_given)
         ):
             return signal.range
+    return None
+
+
+def resting_range(
+    values: Array, likely: CommandRange | None, usual: CommandRange | None
+) -> tuple[float, CommandRange] | None:
+    """Return where a command rests that rests beside the middle of its range, and the range from there.
+
+    Cells are in the `likely` range, or in the `usual` one of the log's other commands, whose whole it does
+    not leave. None: it rests in the middle, or the log does not tell: it begins at rest and rests most of
+    the time.
+    """
+    values = values[~np.isnan(values)]
+    kinds, counts = np.unique(values, return_counts=True)
+    if not len(kinds) or values[0] != kinds[counts.argmax()]:
+        return None
+    rest = float(values[0])
+    for own in (likely if likely and likely.offset else None, usual):
+        if own is None:
+            continue
+        percent = own.scale * values + own.offset
+        off = own.scale * rest + own.offset
+        within = np.abs(percent).max() <= 100 * (1 + SLACK)
+        if 0 < abs(off) <= 100 * FARTHEST_REST and within:
+            return rest, own._replace(offset=float(f"{-own.scale * rest:.6g}"))
     return None
 
 

@@ -97,7 +97,8 @@ class Table:
             with np.errstate(all="ignore"):
                 column[:] = numbers * (1.0 if timed else signal.gain) + signal.offset
         values[~(np.abs(values) < 1e100)] = np.nan
-        return Recording(self, tuple(signals), values, np.arange(len(values)))
+        clock = time_of_day(self.columns[first])
+        return Recording(self, tuple(signals), values, np.arange(len(values)), clock)
 
 
 @record
@@ -107,12 +108,14 @@ class Recording:
     Attributes:
         values: in the signals' units, shape (R, C), NaN where the file holds no number.
         rows: of the table [0-based], shape (R,).
+        clock: time of day of the table's first row, HH:MM:SS; empty where the file has none.
     """
 
     table: Table
     signals: tuple[Signal, ...]
     values: Array
     rows: Ints
+    clock: str = ""
 
     @property
     def time(self) -> Array:
@@ -158,6 +161,13 @@ def clock(cell: str) -> int | None:
     hour, minute, second, fraction, half = match.groups()
     hours = int(hour) % 12 + 12 * (half in "Pp") if half else int(hour)
     return ((hours * 60 + int(minute)) * 60 + int(second)) * 10**9 + int((fraction or "0").ljust(9, "0"))
+
+
+def time_of_day(cells: NDArray[Any]) -> str:
+    """Return the time of day of the first cell, HH:MM:SS; empty where it is none."""
+    if cells.dtype.kind != "M" or not len(cells) or np.isnat(cells[0]):
+        return ""
+    return str(cells[0].astype("M8[s]")).partition("T")[2]
 
 
 class TextColumn:
@@ -208,6 +218,8 @@ def _as_numbers(cells: NDArray[Any]) -> tuple[Array, bool]:
     """Return cells as numbers, NaN where there is none, and whether they are times [s] from the first."""
     if cells.dtype.kind in "fiub":
         return cells.astype(np.float64), False
+    if cells.dtype.kind == "m":
+        return cells / np.timedelta64(1, "s"), True
     if cells.dtype.kind == "M":
         there = ~np.isnat(cells)
         ticks = (cells[there] - cells[there][:1]).astype("m8[ns]").astype(np.int64)
@@ -232,6 +244,10 @@ def refuse_large(source: str, rows: int, columns: int) -> None:
         raise LogError(what, source, "cut it, or record at a lower rate")
 
 
+BLIND = (ArithmeticError, AssertionError, AttributeError, LookupError, MemoryError, TypeError)
+"""errors of a library that met bytes which its authors did not expect: their text says nothing of the file"""
+
+
 @contextmanager
 def format_library(package: str, extra: str, path: Path, kind: str) -> Generator[Any]:
     """Yield a library that reads a format; whatever it raises on damaged bytes becomes a `LogError`."""
@@ -242,6 +258,8 @@ def format_library(package: str, extra: str, path: Path, kind: str) -> Generator
         raise LogError(what, path, f"pip install 'hydroid[{extra}]'") from None
     try:
         yield library
+    except LogError:
+        raise
     except Exception as error:
-        reason = " ".join(str(error).split())[:200] or type(error).__name__
-        raise LogError(f"cannot be read as {kind} ({reason})", path, "save it again") from None
+        reason = "damaged" if isinstance(error, BLIND) else " ".join(str(error).split())[:200]
+        raise LogError(f"cannot be read as {kind} ({reason or 'damaged'})", path, "save it again") from None

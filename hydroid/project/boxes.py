@@ -13,6 +13,8 @@ CALLED = {"slew": "swing", "azimuth": "swing", "arm": "stick", "dipper": "stick"
 OTHERS = (-90, 90)
 MASS = 45.0
 """of a link over the square of its length [kg/m²]; ours, as of excavators of 1 to 20 t"""
+DENSEST = 3000.0
+"""of a link's box [kg/m³], where small links would weigh more than steel"""
 SLENDER = 7.0
 """length of a link over its width and height"""
 LONGEST = 100.0
@@ -49,7 +51,7 @@ def boxes_urdf(joints: Sequence[str], lengths: Sequence[float]) -> str:
 def _link(name: str, size: float, length: float, *, cube: bool) -> str:
     """Return a box along x, or one around the axis of a link that slews, which weighs as the arm does."""
     wide = size if cube else size / SLENDER
-    mass = MASS * length**2
+    mass = min(MASS * length**2, DENSEST * size * wide**2)
     middle = 0.0 if cube else size / 2
     along, across = mass * wide**2 / 6, mass * (wide**2 + size**2) / 12
     origin = f'<origin xyz="{middle:g} 0 0"/>'

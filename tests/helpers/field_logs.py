@@ -4,10 +4,11 @@ All are of the template's arm, a boom and a stick, so that `hydroid init DIR --l
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from printed import follow
 
 import hydroid
 from hydroid.errors import HydroidError
@@ -113,6 +114,25 @@ def lengths(label: str, factor: float, *, travel: bool = False) -> Callable[[Tru
     return write
 
 
+def wires(label: str, low: float, high: float, *, clip: float = 1.0) -> Callable[[Truth, Arm], str]:
+    """Return what writes draw wires along the cylinders, whose signal goes from low to high over the stroke.
+
+    A wire that is too short stays at a part of it, `clip`.
+    """
+
+    def write(truth: Truth, arm: Arm) -> str:
+        columns = {"time_s": truth.time} | {f"{n}_cmd_pct": truth.command[n] for n in JOINTS}
+        for joint in arm.joints:
+            assert isinstance(joint.actuator, LinearActuator)
+            length = joint.actuator.length(np.radians(truth.angle[joint.name]))
+            shortest, longest = np.sort(joint.actuator.length(np.array(joint.limits)))
+            part = ((length - shortest) / (longest - shortest)).clip(0, clip)
+            columns[f"{joint.name}_{label}"] = low + (high - low) * part
+        return text(columns)
+
+    return write
+
+
 def changed(change: Callable[[Columns], Columns]) -> Callable[[Truth, Arm], str]:
     """Return what writes a well-kept log whose columns are changed."""
     return lambda truth, arm: text(change(table(truth)))
@@ -158,6 +178,20 @@ def _counts(columns: Columns) -> Columns:
     }
 
 
+def _pots(columns: Columns) -> Columns:
+    others = {name: own for name, own in columns.items() if "angle" not in name}
+    return others | {f"{name}_pot_V": 2.5 + columns[f"{name}_angle_deg"] / 60 for name in JOINTS}
+
+
+def _jump(columns: Columns) -> Columns:
+    moved = columns["boom_angle_deg"] + 12.0 * (columns["time_s"] > 20)
+    return columns | {"boom_angle_deg": moved}
+
+
+def _still(columns: Columns) -> Columns:
+    return {name: 0 * own if "cmd" in name else own for name, own in columns.items()}
+
+
 FIELD_LOGS = (
     FieldLog("pulses of 1000 to 2000 µs", commands("us", lambda u: 1500 + 5 * u)),
     FieldLog("duty of 0 to 100 % around 50", commands("duty", lambda u: 50 + 0.5 * u)),
@@ -179,12 +213,32 @@ FIELD_LOGS = (
     FieldLog("a joystick without its lowering half", changed(_half), "lacks half of the command"),
     FieldLog("targets in place of commands", changed(_targets), "targets of positions"),
     FieldLog("encoder counts", changed(_counts), "taken for the whole range"),
+    FieldLog("draw wires in mA", wires("wire_mA", 4, 20), "taken for the whole stroke"),
+    FieldLog("draw wires in V", wires("wire_V", 0, 10), "taken for the whole stroke"),
+    FieldLog("draw wires in counts", wires("wire_counts", 0, 4095), "taken for the whole stroke"),
+    FieldLog("potentiometers in V", changed(_pots), "taken for the whole range"),
+    FieldLog("a draw wire that is too short", wires("wire_mm", 0, 400, clip=0.6), "stands to the last digit"),
+    FieldLog("an encoder that slips", changed(_jump), "jumps by"),
+    FieldLog(
+        "a counter of samples for the time",
+        changed(lambda c: _renamed(c, 50.0, "sample")),
+        "looks like a time",
+    ),
+    FieldLog("commands that are all 0", changed(_still), "no command is ever given"),
+    FieldLog(
+        "no command at all",
+        changed(lambda c: {n: v for n, v in c.items() if "cmd" not in n}),
+        "looks like a command",
+    ),
 )
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What `init` made of a log: "right", "said" in one line, "refused" otherwise, or "wrong" in silence."""
+    """What became of a log: "right", "said" in one line, "refused", or "wrong" in silence.
+
+    Where commands were followed also "named": the verdict says that the fit predicts badly.
+    """
 
     verdict: str
     line: str = ""
@@ -198,6 +252,9 @@ def outcome(log: FieldLog, folder: Path, arm: Arm) -> Outcome:
         result = hydroid.init(folder / "mine", log=path)
         printed = [str(line) for line in result.lines]
         told = next((line.strip() for line in printed if log.said and log.said in line), "")
+        if log.said and not told and not result.result.missing:
+            printed = [*map(str, hydroid.check(path, config=folder / "mine" / "fit.yaml").lines)]
+            told = next((line for line in printed if log.said in line), "")
         if told:
             return Outcome("said", told)
         if missing := result.result.missing:
@@ -207,6 +264,20 @@ def outcome(log: FieldLog, folder: Path, arm: Arm) -> Outcome:
     except HydroidError as error:
         return Outcome("said" if log.said and log.said in str(error) else "refused", str(error))
     return Outcome("right" if is_right(parts, truth, log.lost) else "wrong")
+
+
+def followed(log: FieldLog, folder: Path, arm: Arm, budget: str) -> Outcome:
+    """Write two logs, and follow the commands that `init` prints for the first, validated on the second.
+
+    Right: it is read rightly, and the fit predicts the second.
+    """
+    read = outcome(log, folder, arm)
+    if read.verdict != "right":
+        return read
+    other = replace(log, steps=tuple(-step for step in log.steps[::-1]))
+    (folder / "other.csv").write_text(other.write(make_truth(other.steps), arm))
+    found = follow(folder, ["followed", "--log", "log.csv"], "other.csv", budget)
+    return Outcome(found.verdict, found.line)
 
 
 def is_right(parts: list[Log], truth: Truth, lost: float) -> bool:

@@ -84,7 +84,7 @@ class Kind:
     """One kind of file.
 
     seeds: intact files. place: path of the file below a room's folder. command: what reads it. check: looks
-    at an accepted one.
+    at an accepted one. damaged: makes a damaged one of an intact one.
     """
 
     name: str
@@ -92,12 +92,13 @@ class Kind:
     place: str
     command: Callable[[Path, bytes], Sequence[str]]
     check: Callable[[Path, bytes], None] | None = None
+    damaged: Callable[[Random, bytes], bytes] = damage
 
     def read_damaged(self, room: Path, seed: int) -> bool:
         """Damage a file as the seed says, and read it; what is raised names kind and seed."""
         rng = Random(f"{self.name} {seed}")
         try:
-            return self.read(room, damage(rng, rng.choice(self.seeds())))
+            return self.read(room, self.damaged(rng, rng.choice(self.seeds())))
         except Exception as error:
             error.add_note(f"the damaged {self.name} of seed {seed}")
             raise

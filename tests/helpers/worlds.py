@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 from arms import MODELS
+from printed import follow
 from robots import LIMIT, body, joint
 
 Joint = tuple[str, str, str, str, tuple[float, float, float], str]
@@ -184,3 +185,15 @@ def write_log(world: World, path: Path, seconds: float = 30.0, number: int = 0) 
     text = ",".join(columns)
     np.savetxt(path, np.stack([*columns.values()], axis=1), "%.6g", ",", header=text, comments="")
     return path
+
+
+def followed(world: World, folder: Path, budget: str) -> tuple[str, str]:
+    """Write an arm and two logs, and follow the commands that `init` prints, validated on the second log.
+
+    Returns the outcome, and unseen errors (and those of standing still) [deg], or why it was refused.
+    """
+    robot = world.write(world, folder)
+    write_log(world, folder / "log.csv", 60.0, 1)
+    write_log(world, folder / "other.csv", 60.0, 2)
+    found = follow(folder, ["mine", "--arm", robot.name, "--log", "log.csv"], "other.csv", budget)
+    return found.verdict, found.line

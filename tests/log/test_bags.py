@@ -169,3 +169,16 @@ def test_one_time_with_two_values_is_refused_and_a_message_that_came_twice_is_no
 def test_a_wrong_stamp_does_not_fill_the_memory(tmp_path: Path) -> None:
     path = two_topics(tmp_path, "mcap", {0.0: 3.0}, lambda time: time if time else 1e8 - START)
     assert "rows; at most 30,000,000 rows of 1 columns can be read" in errors(path)
+
+
+@pytest.mark.parametrize("kind", ["ros1", "ros2"])
+def test_a_message_that_is_damaged_is_left_out(kind: str, tmp_path: Path) -> None:
+    path, _ = write(tmp_path, kind)
+    file = path if path.is_file() else next(path.glob("*.db3"))
+    data = file.read_bytes()
+    third = command(2.0).tobytes()
+    place = data.index(third)
+    file.write_bytes(data[: place - 8] + b"\xff" * 8 + data[place:])  # the length stands before the numbers
+    log, findings = read(path, SETTINGS, RANGES)
+    assert "/valves/command: 1 of 15 messages cannot be read" in [finding.what for finding in findings]
+    assert log.driven.all()

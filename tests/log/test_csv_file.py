@@ -64,6 +64,7 @@ def test_the_same_log_in_any_dialect(dialect: str, tmp_path: Path) -> None:
         (b"\xff\xfe\x00", "not a text file"),
         (b"0.0,1,2,3,4\n", "line 1: has no header"),
         (b"# 5,6\n0.0,1\n", "line 2: has no header"),
+        (b"time_s,u1_pct\n0,1\n\0\0\0", "line 3: holds NUL bytes from here on"),
     ],
 )
 def test_a_file_that_is_no_log(data: bytes, said: str, tmp_path: Path) -> None:

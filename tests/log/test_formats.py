@@ -88,13 +88,47 @@ def test_timestamps_in_parquet(tmp_path: Path) -> None:
     same(log, tmp_path)
 
 
+def test_lengths_of_time_in_parquet_are_seconds(tmp_path: Path) -> None:
+    lengths = (1e6 * T).round().astype("m8[us]")
+    log, _ = read(write_parquet(tmp_path / "log.parquet", {**COLUMNS, "time_s": lengths}))
+    same(log, tmp_path)
+
+
+def test_links_to_nothing_and_arrays_without_a_shape_are_left_alone(tmp_path: Path) -> None:
+    from h5py import Empty, ExternalLink, File, SoftLink
+
+    path = write_mat73(tmp_path / "log.mat", COLUMNS)
+    with File(path, "r+") as file:
+        file["film"] = SoftLink("/nowhere")
+        file["page"] = ExternalLink("nowhere.h5", "/film")
+        file["none"] = Empty("f8")
+    same(read(path)[0], tmp_path)
+
+
 def truncated(path: Path) -> Path:
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
     return path
 
 
+def with_kind(path: Path, kind: int) -> Path:
+    """A file whose first element of doubles is marked as one of another kind, at which scipy crashes."""
+    data = write_mat(path, COLUMNS).read_bytes()
+    doubles = b"\x09\0\0\0" + np.uint32(8 * len(T)).tobytes()
+    assert doubles in data
+    path.write_bytes(data.replace(doubles, bytes([kind]) + doubles[1:], 1))
+    return path
+
+
 MATLAB = "cannot be read as a MATLAB file"
 BAD = {
+    "numbers of no kind": (
+        lambda p: with_kind(p / "log.mat", 186),
+        f"{MATLAB} (damaged: an element is of kind 186)",
+    ),
+    "a matrix in numbers": (
+        lambda p: with_kind(p / "log.mat", 14),
+        f"{MATLAB} (damaged: an element is of kind 14",
+    ),
     "truncated mat": (lambda p: truncated(write_mat(p / "log.mat", COLUMNS)), MATLAB),
     "truncated v7.3": (lambda p: truncated(write_mat73(p / "log.mat", COLUMNS)), MATLAB),
     "truncated parquet": (lambda p: truncated(write_parquet(p / "a", COLUMNS)), "cannot be read as Parquet"),

@@ -98,3 +98,56 @@ def test_digits_in_a_topics_name_number_no_joint():
     assert number_in("/CalibratedJointVals3.position[2]") == 2
     assert number_in("/valve3/command.data") == 3
     assert number_in("/valve3/angle [deg]") == 3
+
+
+DUTY = 2.5 * np.repeat([0, 0.8, 0, -0.8, 0, 0.5, -1, 0], 100)
+"""around a rest, of pulses of 5 to 10 %"""
+
+
+def test_a_command_that_rests_beside_the_middle_rests_at_zero_and_is_in_the_range_of_the_others(
+    tmp_path: Path,
+) -> None:
+    """As servo amplifiers are trimmed, whose converters overshoot."""
+    rests = {"swing": 7.4695, "boom": 7.614, "stick": 6.9645}
+    names, columns = ["t"], [0.02 * np.arange(len(DUTY))]
+    for joint, rest in rests.items():
+        names += [f"{joint}_cmd", f"{joint}_deg"]
+        columns += [rest + (0.75 if joint == "stick" else 1.03) * DUTY, 3 * np.sin(columns[0])]
+    np.savetxt(tmp_path / "log.csv", np.stack(columns, 1), "%.6g", ",", header=",".join(names), comments="")
+    found = guess_columns(open_table(tmp_path / "log.csv"), list(rests))
+    settings = LogSettings.model_validate(found.log)
+    for number, (joint, rest) in enumerate(rests.items(), 1):
+        command = settings.columns("command", number)
+        assert command is not None
+        assert command.scale * rest + command.offset == pytest.approx(0, abs=1e-3)
+        share = 75 if joint == "stick" else 100
+        assert np.abs(command.scale * columns[2 * number - 1] + command.offset).max() == pytest.approx(
+            share, abs=0.1
+        )
+        assert f"{joint}_cmd: command in pulses of 5 to 10 % duty, at rest at {rest:.6g}" in str(
+            found.reasons
+        )
+
+
+def test_what_is_called_ms_and_is_no_time_is_measured(tmp_path: Path) -> None:
+    time = 0.02 * np.arange(800)
+    columns = np.stack([time, 60 * np.sign(np.sin(time)), 9 + 2 * np.sin(time)], axis=1)
+    header = "Time,Boom Cmd,Boom Ms"
+    np.savetxt(tmp_path / "log.csv", columns, "%.6g", ",", header=header, comments="")
+    found = guess_columns(open_table(tmp_path / "log.csv"), ["boom"])
+    assert found.log["joints"][1]["angle"]["column"] == "Boom Ms"
+    assert found.log["joints"][1]["command"]["column"] == "Boom Cmd"
+
+
+@pytest.mark.parametrize(("name", "ends"), [("boom_pot_V", (0.6, 4.1)), ("boom_encoder_counts", (150, 3900))])
+def test_a_sensors_signal_is_taken_for_the_whole_range(name: str, ends: tuple, tmp_path: Path) -> None:
+    time = 0.02 * np.arange(800)
+    cells = np.interp(np.sin(time), [-1, 1], ends)
+    columns = np.stack([time, 60 * np.cos(time), cells], axis=1)
+    np.savetxt(tmp_path / "log.csv", columns, "%.9g", ",", header=f"time_s,boom_cmd,{name}", comments="")
+    found = guess_columns(open_table(tmp_path / "log.csv"), ["boom"], ranges={1: (-0.5, 1.0)})
+    angle = LogSettings.model_validate(found.log).columns("angle", 1)
+    assert angle is not None
+    reached = angle.scale * np.array([cells.min(), cells.max()]) + angle.offset
+    np.testing.assert_allclose(reached, np.degrees([-0.5, 1.0]), atol=1e-2)
+    assert "taken for the whole range" in str(found.reasons)

@@ -8,13 +8,23 @@ import time
 from pathlib import Path
 
 import pytest
-from fuzz import KINDS, logs, run_kinds
+from fuzz import KINDS as FILES, logs, run_kinds
+from fuzz_formats import FORMATS, bounded
 
 from hydroid.errors import SettingsError
 from hydroid.settings.document import read_document
 
 TIMES = int(os.environ.get("FUZZ", "1"))
-COUNTS = {"log": 40, "config": 40, "set": 40, "arm": 25, "mesh": 25, "values": 10, "model": 8}
+KINDS = FILES | FORMATS
+COUNTS = dict.fromkeys(FORMATS, 15) | {
+    "log": 40,
+    "config": 40,
+    "set": 40,
+    "arm": 25,
+    "mesh": 25,
+    "values": 10,
+    "model": 8,
+}
 HEADER = logs()[0].split(b"\n", 1)[0]
 
 
@@ -24,7 +34,10 @@ def test_damaged_files_are_read_rightly_or_refused_in_one_line(name: str, tmp_pa
     files.mkdir()
     work.mkdir()
     monkeypatch.chdir(work)
-    accepted = [KINDS[name].read_damaged(files, seed) for seed in range(COUNTS[name] * TIMES)]
+    kind, accepted = KINDS[name], list[bool]()
+    for seed in range(COUNTS[name] * TIMES):
+        with bounded(max(map(len, kind.seeds()))):
+            accepted.append(kind.read_damaged(files, seed))
     assert os.listdir(work) == []  # nothing is written where nobody asked for it
     assert not all(accepted)
 
@@ -33,6 +46,14 @@ def test_damaged_files_are_read_rightly_or_refused_in_one_line(name: str, tmp_pa
 def test_intact_files_are_accepted(name: str, tmp_path: Path) -> None:
     for data in KINDS[name].seeds():
         assert KINDS[name].read(tmp_path, data)
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_a_format_is_read_or_refused_in_one_line_whatever_its_columns(name: str, tmp_path: Path) -> None:
+    plain, *odd = FORMATS[name].seeds()
+    assert FORMATS[name].read(tmp_path, plain)
+    for data in {*odd}:
+        FORMATS[name].read(tmp_path, data)
 
 
 @pytest.mark.slow

@@ -1,0 +1,115 @@
+"""Follows what `hydroid init` prints: check, fit and validate, as a user pastes them, in a folder."""
+
+import contextlib
+import io
+import json
+import math
+import shlex
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import typer
+
+from hydroid.commands.app import app
+from hydroid.errors import HydroidError
+from hydroid.joint_verdict import Verdict
+
+STEPS = ("check", "fit-hyd", "validate")
+"""that are followed; `suggest` comes after them"""
+OTHER = "OTHER.csv"
+"""stands in what is printed for a log that the fit has not seen"""
+PREDICTED = 1 / 3
+"""of what standing still errs by: an unseen error up to this shows that the log was understood"""
+
+
+@dataclass(frozen=True)
+class Followed:
+    """What became of printed commands.
+
+    Attributes:
+        refused: a line that ended them; empty if all ran.
+        lines: all that was printed.
+        errors: unseen error and that of standing still [deg], by joint.
+        blamed: joints whose verdict is that the fit fails.
+    """
+
+    refused: str
+    lines: list[str]
+    errors: dict[str, tuple[float, float]]
+    blamed: tuple[str, ...] = ()
+
+    @property
+    def verdict(self) -> str:
+        """Right, refused, named (the verdict says what is predicted badly), or wrong."""
+        if self.refused:
+            return "refused"
+        missed = {name for name, (unseen, still) in self.errors.items() if not unseen <= PREDICTED * still}
+        if not missed and self.errors:
+            return "right"
+        return "named" if missed and missed <= {*self.blamed} else "wrong"
+
+    @property
+    def line(self) -> str:
+        """Why it was refused, or the errors, and those of standing still in brackets."""
+        pairs = [f"{name} {unseen:.2g} ({still:.2g})" for name, (unseen, still) in self.errors.items()]
+        return self.refused or ", ".join(pairs)
+
+
+def follow(folder: Path, init: Sequence[str], unseen: str, budget: str) -> Followed:
+    """Run `hydroid init` in a folder, and then the commands that it prints, validated on an unseen log.
+
+    The fit has a budget, as `init` proposes: it ends at its best model so far.
+    """
+    lines, errors, blamed = list[str](), dict[str, tuple[float, float]](), list[str]()
+    with contextlib.chdir(folder):
+        try:
+            lines += _run(["init", *init])
+            for arguments in [*_printed(lines)]:
+                command = [unseen if word == OTHER else word for word in arguments]
+                if command[0] == "fit-hyd":
+                    command += ["--budget", budget, "--quiet"]
+                if command[0] == "validate":
+                    command.append("--json")
+                printed = _run(command)
+                if command[0] == "validate":
+                    verdict = json.loads(printed[-1])["verdict"]
+                    errors = _errors(verdict)
+                    blamed = [one["name"] for one in verdict if Verdict(one["verdict"]).fails]
+                else:
+                    lines += printed
+        except HydroidError as error:
+            return Followed(str(error), lines, errors)
+    return Followed("", lines, errors, tuple(blamed))
+
+
+def _printed(lines: Sequence[str]) -> Iterator[list[str]]:
+    for line in lines:
+        words = shlex.split(line) if line.startswith("  hydroid ") else []
+        if words[1:2] and words[1] in STEPS:
+            yield words[1:]
+
+
+def _run(arguments: Sequence[str]) -> list[str]:
+    """Return what a command prints. Raises HydroidError: it was refused."""
+    out, err = io.StringIO(), io.StringIO()
+    status = 0
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        try:
+            status = app(list(arguments), standalone_mode=False)
+        except typer.Exit as end:
+            status = end.exit_code
+    lines = [*err.getvalue().splitlines(), *out.getvalue().splitlines()]
+    if status:
+        raise HydroidError(lines[0] if lines else f"{arguments[0]} ends with status {status}")
+    return lines
+
+
+def _errors(verdict: Sequence[Mapping[str, Any]]) -> dict[str, tuple[float, float]]:
+    found = dict[str, tuple[float, float]]()
+    for joint in verdict:
+        unseen = joint["unseen_deg"]
+        still = joint["baselines_deg"]["standing still"]
+        found[joint["name"]] = math.inf if unseen is None else unseen, still
+    return found

@@ -132,17 +132,21 @@ def parts(problem: Problem) -> Ints:
 def gain(after: LeftOut, before: LeftOut) -> tuple[float, float]:
     """Return by how much one model foretells the parts better than another, and the standard error of that.
 
-    It is a difference of log-likelihoods, by the weights of errors that the one before shows on the parts. By
-    the weights of its fit a part that it errs on by degrees would be impossible, and one such part would
-    decide. The error is infinite where there is one block only, or where either model cannot be simulated.
+    It is a difference of log-likelihoods by blocks, half by the weights that the errors of the one show
+    on the parts, half by those of the other. By the weights of one alone, the other's errors would seem
+    impossible wherever it errs a little more. The standard error is infinite where there is one block
+    only, or where either model cannot be simulated.
     """
     problem = before.problem
     able = [bool(np.isfinite(one.errors).all()) for one in (after, before)]
     if not all(able):
         return float(np.inf if able[0] else -np.inf), np.inf
-    weighing = make_likelihood(problem).estimated(before.errors).errors
-    squares = weighing.innovations(np.stack([after.errors, before.errors])) ** 2
-    change = 0.5 * (squares[1] - squares[0])
+    errors = np.stack([before.errors, after.errors])
+    change = np.zeros(problem.measured.size)
+    for of_one in errors:
+        weighing = make_likelihood(problem).estimated(of_one).errors
+        squares = weighing.innovations(errors) ** 2
+        change += 0.25 * (squares[0] - squares[1])
     sums = np.bincount(blocks(problem), change)
     if len(sums) < 2:
         return float(np.sum(sums)), np.inf

@@ -134,10 +134,13 @@ def test_the_gain_is_that_of_the_weighed_squares_and_its_error_that_of_the_block
     theta = problem.parameters.start[None]
     before = LeftOut(problem, theta, rng.normal(0.0, 0.01, problem.measured.size))
     after = LeftOut(problem, theta, rng.normal(0.0, 0.007, problem.measured.size))
-    weighing = make_likelihood(problem).estimated(before.errors).errors
-    squares = weighing.innovations(np.stack([before.errors, after.errors])) ** 2
-    levels = np.bincount(blocks(problem), 0.5 * (squares[0] - squares[1]))
+    levels = np.zeros(blocks(problem).max() + 1)
+    for one in (before, after):
+        weighing = make_likelihood(problem).estimated(one.errors).errors
+        squares = weighing.innovations(np.stack([before.errors, after.errors])) ** 2
+        levels += 0.5 * np.bincount(blocks(problem), 0.5 * (squares[0] - squares[1]))
     rise, error = gain(after, before)
+    assert gain(before, after) == pytest.approx((-rise, error))
     assert rise == pytest.approx(levels.sum())
     assert rise > 0
     assert error == pytest.approx(np.sqrt(len(levels)) * np.std(levels, ddof=1))

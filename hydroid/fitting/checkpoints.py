@@ -17,7 +17,9 @@ from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
 
 SAVE_EVERY = 5.0
-"""seconds between checkpoints: a lost one costs no more, and writing it is noise beside the work"""
+"""seconds between checkpoints: a lost one costs no more"""
+SHARE = 0.05
+"""of the time that writing them takes at most: the Jacobians of a large fit are hundreds of MB"""
 
 Arrays = dict[str, NDArray[Any]]
 Checkpoints = MutableMapping[str, Arrays]
@@ -27,16 +29,21 @@ Checkpoints = MutableMapping[str, Arrays]
 def saving(checkpoints: Checkpoints, name: str) -> Generator[Callable[[Callable[[], Arrays]], None]]:
     """Yield a function that takes how the newest state is stored.
 
-    A state is stored every SAVE_EVERY seconds, and the last one where the block ends, also by an interrupt.
+    A state is stored every SAVE_EVERY seconds, or more seldom where that takes long, and the last one
+    where the block ends, also by an interrupt.
     """
-    saved, pending = time.monotonic(), None
+    pending = None
+    saved = time.monotonic()
+    wait = SAVE_EVERY
 
     def keep(state: Callable[[], Arrays]) -> None:
-        nonlocal saved, pending
+        nonlocal saved, pending, wait
         pending = state
-        if time.monotonic() - saved > SAVE_EVERY:
+        begun = time.monotonic()
+        if begun - saved > wait:
             checkpoints[name] = state()
             saved, pending = time.monotonic(), None
+            wait = max(SAVE_EVERY, (saved - begun) / SHARE)
 
     try:
         yield keep

@@ -10,7 +10,7 @@ from hydroid.fitting.step import Step
 from hydroid.parameters import Array
 from hydroid.posterior.error_model import Likelihood
 from hydroid.progress import LOGGER
-from hydroid.search.descent import Descent, Ending, start
+from hydroid.search.descent import Descent, Ending, no_jacobian, start
 from hydroid.search.least_squares import step
 from hydroid.settings.search import RefinementSettings
 
@@ -36,6 +36,11 @@ class Refinement(Descent):
 
     numbers: Array
     negative_log: float = np.inf
+
+    @property
+    def without_jacobian(self) -> "Refinement":
+        """The refinement without its Jacobian, which is large."""
+        return replace(self, jacobian=no_jacobian(self.point))
 
 
 def refine(
@@ -80,6 +85,8 @@ def refine(
                 now = _with_new_numbers(likelihood, now)
                 rows = _rows(likelihood, now)
         now = replace(now, negative_log=_at(likelihood, now).negative_log(now.residual))
+        if now.ended and what.on_its_way:
+            now = now.without_jacobian
         if moved or now.ended:  # else a start that itself may have been reached too late
             keep(now.arrays)
     if not now.ended:  # the checkpoint is where it goes on

@@ -48,6 +48,11 @@ class Step:
         words += [self.phase] if self.phase else []
         return " ".join(words)
 
+    @property
+    def on_its_way(self) -> bool:
+        """Whether another least squares goes on from where it ends, and only that end counts."""
+        return self.model == "start" or self.phase in ("from afar", "at first")
+
     def changed(self, **changes: object) -> "Step":
         """Return the step with other attributes."""
         return replace(self, **changes)  # pyright: ignore[reportArgumentType]

@@ -23,7 +23,7 @@ from hydroid.hydraulics.cylinder import (
 from hydroid.hydraulics.elementwise import compilable, implicit_weight, kept
 from hydroid.hydraulics.records import LINEAR, NONE, ROTARY
 from hydroid.hydraulics.solenoid import beyond_dead_band, drive, plunger_step, plunger_weight, side_voltage
-from hydroid.hydraulics.valve import curved, notched, slot_share
+from hydroid.hydraulics.valve import curved, slot_share
 
 STILL = 1e-15
 """speed of a plunger before and after a sub-step, below which rounding alone moves it [m/s]"""
@@ -103,7 +103,7 @@ def opened(side, travel: float) -> float:
         share = share**side.opening_exponent
     if side.has_curve:
         share = curved(share, side)
-    return side.opening * (notched(share, side) if side.has_notches else share)
+    return side.opening * share
 
 
 @compilable

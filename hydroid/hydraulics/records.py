@@ -59,7 +59,6 @@ SIDE = np.dtype(
         ("pilot_keep", np.float64),  # part of the pilot stage's error that a sub-step leaves,
         ("pilot_steps", np.float64),  # and its lag in sub-steps
         ("plunger_weight", np.float64),  # of its new state in a sub-step
-        ("has_notches", np.bool_),
         ("has_curve", np.bool_),
         # parts of the opening that the power law gives where the parts of the valve's curve end
         *((f"knot_{k}", np.float64) for k in range(1, len(KNOTS) + 1)),
@@ -199,7 +198,6 @@ def coefficients(joints: Records, period: float = 0.01, substeps: int = 1) -> Re
         side["pilot_steps"] = side.pilot_lag * substeps / period
         side["pilot_keep"] = kept(side["pilot_steps"])
         side["plunger_weight"] = plunger_weight(side.plunger_damping, period / substeps, table)
-        side["has_notches"] = np.any([side[f"notch_{k}"] != 1.0 for k in (1, 2, 3, 4)], axis=0)
         side["has_curve"] = np.any([side[name] != 1.0 for name in CURVE], axis=0)
         for k, knot in enumerate(KNOTS, 1):
             side[f"knot_{k}"] = knot**side.opening_exponent

@@ -14,8 +14,7 @@ A spool is cut with notches, and a servo may drive it through a small part of it
 no one power of the travel. Four factors, `curve_1` to `curve_4`, multiply the increments of the power law
 over the first 4, to 15, to 40 and to 70 % of the travel (`KNOTS`). That of the last part is 1. So the curve
 is monotone, and it still ends at A_max: what counts is how steep a part is beside the last one. The first
-part is so short that it stands for a jump. `notch_1` to `notch_4` do the same where the power law, not the
-travel, is below 4, 10, 25 and 50 % of full.
+part is so short that it stands for a jump.
 
 The article's edges open alike. A real spool's do not: `return_a` and `return_b` are the openings of A→T and
 B→T as multiples of those of P→B and P→A. So a load that is lowered can be held by the oil that leaves, while
@@ -41,7 +40,6 @@ from hydroid.hydraulics.elementwise import compilable
 DENSITY = 860.0  # ρ of the oil [kg/m³]; ours
 
 MARGIN = 0.25  # part of the supply pressure that a compensator leaves the pump edge; ours
-NOTCHES = (0.04, 0.1, 0.25, 0.5)  # parts of the full opening where the notches of a valve's curve end; ours
 KNOTS = (0.04, 0.15, 0.4, 0.7)  # parts of the spool's travel where the parts of a valve's curve end; ours
 
 
@@ -63,12 +61,6 @@ def bent_opening(share, factors, ends) -> Any:
         more = more + (factor - 1.0) * np.minimum(np.maximum(share - low, 0.0), high - low)
         whole, low = whole + (factor - 1.0) * (high - low), high
     return (share + more) / (1.0 + whole)
-
-
-@compilable
-def notched(share, side) -> Any:
-    """Part of the full opening with the side's notches, from the part that the power law gives."""
-    return bent_opening(share, (side.notch_1, side.notch_2, side.notch_3, side.notch_4), NOTCHES)
 
 
 @compilable

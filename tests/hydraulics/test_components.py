@@ -18,7 +18,7 @@ from hydroid.hydraulics.solenoid import (
     resting_stroke,
     side_voltage,
 )
-from hydroid.hydraulics.valve import KNOTS, curved, notched, port_flow
+from hydroid.hydraulics.valve import KNOTS, curved, port_flow
 from hydroid.settings.arm import Arm
 from hydroid.settings.hydraulics import HydraulicSettings
 
@@ -89,20 +89,6 @@ def test_plunger_converges_at_second_order():
 
     exact = end(4000)
     assert abs(end(10) - exact) / abs(end(20) - exact) == pytest.approx(4.0, rel=0.2)
-
-
-def test_notches_bend_the_opening_between_its_ends():
-    def curve(*factors: float) -> np.ndarray:
-        return notched(share, SimpleNamespace(**{f"notch_{k}": f for k, f in enumerate(factors, start=1)}))
-
-    share = np.linspace(0.0, 1.0, 1001)
-    assert np.array_equal(curve(1.0, 1.0, 1.0, 1.0), share)
-    bent = curve(0.2, 3.0, 0.5, 2.0)
-    assert bent[[0, -1]] == pytest.approx([0.0, 1.0])
-    slope = np.diff(bent) / np.diff(share)
-    assert (slope > 0).all()
-    middles = np.searchsorted(share, [0.02, 0.07, 0.2, 0.4])  # one in each part
-    np.testing.assert_allclose(slope[middles] / slope[-1], [0.2, 3.0, 0.5, 2.0])
 
 
 def test_a_curve_changes_the_power_laws_increments_between_its_knots():

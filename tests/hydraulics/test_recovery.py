@@ -88,11 +88,6 @@ CASES = {
         },
         NOTHING, ({2: [50, -40, 80, -90, 60, 0, -60, 40, -30, 90, -70, 30]},), 0.8,
     ),
-    "notches": Case(
-        {f"notch_{k}_a": (0.2, 5, true, 1) for k, true in enumerate((0.5, 2.0, 0.6, 1.5), start=1)}
-        | {"plunger_damping_a": (5, 500, 100, 60)},
-        NOTHING, ({2: [15, -60, 25, 0, 40, -70, 60, 0, 20, -50, 90, -90, 30, 10]},), 0.8,
-    ),
     "the curve of a valve": Case(
         {f"curve_{k}_a": (0.05, 100, true, 1) for k, true in enumerate((20.0, 0.5, 2.0, 0.4), start=1)}
         | {"dead_band_a": (0, 40, 10, 14)},

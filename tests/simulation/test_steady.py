@@ -59,7 +59,7 @@ def both(spec, arm):
             "overlap_a": 0.3e-3,
             "overlap_b": 0.2e-3,
             "opening_exponent_a": 1.6,
-            "notch_2_b": 0.5,
+            "curve_3_b": 0.5,
             "curve_2_a": 3.0,
         },
         {"mass": 0.1, "dead_band_a": 20.0, "dead_band_b": 25.0, "pilot_lag_a": 0.05},

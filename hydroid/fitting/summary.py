@@ -1,15 +1,16 @@
 """A fit's result as `estimate.yaml` and `--json` hold it, with what a reader must know before using it."""
 
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
 from hydroid.estimate import AngleError, FitSummary, NamedEstimate, ParameterEstimate, finite, finite_ends
 from hydroid.findings import Finding
 from hydroid.fitting.fit import Fit
+from hydroid.fitting.ladder import Estimate
 from hydroid.parameters import Parameter
-from hydroid.posterior.by_log import by_log
+from hydroid.posterior.by_log import ByLog, by_log
 from hydroid.posterior.error_model import ErrorModel
 from hydroid.posterior.identifiability import identifiability
 from hydroid.posterior.uncertainty import Flag, Source, Uncertainty
@@ -22,6 +23,8 @@ STRAINED_ABOVE = 2.0
 """standard deviations from its prior beyond which an estimate strains it, if the logs determine it"""
 SAME_OPTIMUM = 10.0
 """log-likelihood below the best up to which a start has found the same optimum"""
+MOST_COMBINATIONS = 6
+"""of parameters that stand in for each other, as findings"""
 _WARNINGS = "at bound", "effect unknown"
 _KINDS = (
     *_WARNINGS,
@@ -37,69 +40,88 @@ _KINDS = (
 
 def summarise(problem: Problem, fit: Fit) -> FitSummary:
     """Return the final estimate with its uncertainty, and the estimates it was chosen from."""
-    settings, refinement = problem.settings, fit.refinement
-    objective = 1.0 if settings.objective.relative else 180 / np.pi
     known = account(fit.problem, fit.uncertainty)
-    estimates = {
-        e.name: NamedEstimate(
-            values=settings.of_estimate(e.name).parameter_set().mapping(e.theta),
-            rms_deg=finite(np.degrees(e.rms)),
-            objective=finite(objective * e.overall),
-            gained=e.gained and finite_ends(np.array(e.gained)),
-        )
-        for e in fit.estimates.values()
-    }
+    scalars, curves = fit.quantities
+    simulations, diverged = fit.history[-1, 2:4]
+    converged = None
+    ending = None
+    if fit.refinement is not None:
+        converged = fit.refinement.ending.converged
+        ending = fit.refinement.ending.value
     return known.changed(
         {
             "joints": problem.active_joints,
             "final": fit.final,
-            "converged": refinement and refinement.ending.converged,
-            "ending": refinement and refinement.ending.value,
+            "converged": converged,
+            "ending": ending,
             "rms_deg": finite(np.degrees(fit.best.rms)),
-            "seed": settings.search.seed,
-            "simulations": int(fit.history[-1, 2]),
-            "diverged": int(fit.history[-1, 3]),
+            "seed": problem.settings.search.seed,
+            "simulations": int(simulations),
+            "diverged": int(diverged),
             "findings": (*fit_findings(fit), *known.findings),
-            "estimates": estimates,
-            "quantities": fit.quantities[0],
-            "curves": fit.quantities[1],
+            "estimates": {one.name: _named_estimate(problem, one) for one in fit.estimates.values()},
+            "quantities": scalars,
+            "curves": curves,
         }
+    )
+
+
+def _named_estimate(problem: Problem, estimate: Estimate) -> NamedEstimate:
+    """Return an estimate as it is stored: by names, and in degrees."""
+    settings = problem.settings
+    objective = estimate.overall if settings.objective.relative else np.degrees(estimate.overall)
+    gained = None
+    if estimate.gained is not None:
+        gained = finite_ends(np.array(estimate.gained))
+    return NamedEstimate(
+        values=settings.of_estimate(estimate.name).parameter_set().mapping(estimate.theta),
+        rms_deg=finite(np.degrees(estimate.rms)),
+        objective=finite(objective),
+        gained=gained,
     )
 
 
 def account(problem: Problem, known: Uncertainty) -> FitSummary:
     """Return an estimate with what its logs say about it, whatever led to it."""
-    logs, scale, parameters = by_log(problem, known), known.linear.box.scale, problem.parameters
-    estimate = {
-        parameter.name: ParameterEstimate(
-            value=float(known.theta[i]),
-            unit=parameter.unit,
-            sd=finite(known.standard_deviation[i]),
-            sd_by_log=finite(logs.relative[i] * scale[i]),
-            interval=finite_ends(known.interval[i]),
-            interval_by_log=finite_ends(logs.interval[i]),
-            flag=status.flag.value,
-            source=status.source and status.source.value,
-            data_share=None if status.flag is Flag.FIXED else status.share,
-            at_bound=status.at_bound,
-            effect_deg=finite(np.degrees(known.sensitivity[i])),
-        )
-        for i, (parameter, status) in enumerate(zip(parameters.parameters, known.status, strict=True))
-    }
-    findings = _parameter_findings(problem, estimate)
-    findings += [Finding("logs disagree", "warning", logs.differing)] if logs.differing else []
+    logs = by_log(problem, known)
+    parameters = problem.parameters
+    estimate = dict[str, ParameterEstimate]()
+    for i, parameter in enumerate(parameters.parameters):
+        estimate[parameter.name] = _parameter_estimate(parameter.unit, i, known, logs)
     errors = angle_errors(known)
+
+    findings = _parameter_findings(problem, estimate)
+    if logs.differing:
+        findings.append(Finding("logs disagree", "warning", logs.differing))
     findings += _lasting_findings(problem, errors)
-    combinations = identifiability(problem, known).combinations
-    # six of them: the table of directions has all
-    findings += [Finding("combination", "note", tuple(one)) for one in combinations if len(one) > 1][:6]
+    several = [one for one in identifiability(problem, known).combinations if len(one) > 1]
+    # the table of directions has all
+    findings += [Finding("combination", "note", tuple(one)) for one in several[:MOST_COMBINATIONS]]
     return FitSummary(
         stage=problem.settings.stage,
         estimate=estimate,
         findings=tuple(sorted(findings, key=lambda finding: finding.level == "note")),
         covariance=known.posterior.stored(parameters),
         errors=errors,
-        left_out_deg={angle: tuple(errors) for angle, errors in logs.left_out.items()},
+        left_out_deg={angle: tuple(left_out) for angle, left_out in logs.left_out.items()},
+    )
+
+
+def _parameter_estimate(unit: str, i: int, known: Uncertainty, logs: ByLog) -> ParameterEstimate:
+    """Return parameter number i of an estimate, with what is known of it."""
+    status = known.status[i]
+    return ParameterEstimate(
+        value=float(known.theta[i]),
+        unit=unit,
+        sd=finite(known.standard_deviation[i]),
+        sd_by_log=finite(logs.relative[i] * known.linear.box.scale[i]),
+        interval=finite_ends(known.interval[i]),
+        interval_by_log=finite_ends(logs.interval[i]),
+        flag=status.flag.value,
+        source=status.source and status.source.value,
+        data_share=None if status.flag is Flag.FIXED else status.share,
+        at_bound=status.at_bound,
+        effect_deg=finite(np.degrees(known.sensitivity[i])),
     )
 
 
@@ -133,35 +155,54 @@ def _deviation_ahead(errors: ErrorModel, i: int, seconds: float) -> float:
 
 def fit_findings(fit: Fit) -> list[Finding]:
     """Return what is to be said about a fit's way to its estimate."""
-    findings, priors = list[Finding](), fit.problem.priors
-    if fit.refinement is None:
-        findings.append(Finding("not refined", "warning"))
-    elif not (ending := fit.refinement.ending).converged:
-        seeded = fit.problem.settings.seeded
-        stopped = "not converged" if seeded else "not converged from its start"
-        kind = "time up" if ending is Ending.TIME else stopped
-        findings.append(Finding(kind, "warning", (fit.final,), {"ending": ending.value}))
-    apart = [joint for joint, ends in fit.ends.items() if max(ends) > SAME_OPTIMUM + min(ends)]
-    if apart:
-        names = [fit.problem.settings.arm.joint_names[joint - 1] for joint in apart if joint]
-        findings.append(Finding("several optima", "note", tuple(names or ["all joints"])))
-    distances = priors.scores(fit.best.theta[None])[0] * priors.firm  # heavy tails foresee any distance
-    scores = zip(priors.names, distances.tolist(), strict=True)
-    each = zip(fit.problem.parameters.names, fit.uncertainty.status, strict=True)
-    vague = {name for name, s in each if s.source is Source.PRIOR or s.flag is Flag.UNIDENTIFIABLE}
-    far = {
-        prior: f"{abs(score):.1f} {'above' if score > 0 else 'below'}"
-        for prior, score in sorted(scores, key=lambda pair: -abs(pair[1]))
-        if abs(score) > STRAINED_ABOVE and prior not in vague
-    }
-    if far:
-        findings.append(Finding("strained prior", "warning", tuple(far), details=far))
+    findings = [*_ending_findings(fit), *_optima_findings(fit), *_prior_findings(fit)]
     findings += [Finding("diverged", "warning", (e.name,)) for e in fit.estimates.values() if not e.usable]
     # half of a 95 % interval as large as the value, or without end
     lost = dict.fromkeys(q.label for q in fit.quantities[0].values() if not q.within <= 1.0)
     if lost:
         findings.append(Finding("quantities open", "note", tuple(lost)))
     return findings
+
+
+def _ending_findings(fit: Fit) -> Iterator[Finding]:
+    """Yield why the refinement ended, if not at an optimum."""
+    if fit.refinement is None:
+        yield Finding("not refined", "warning")
+        return
+    ending = fit.refinement.ending
+    if ending.converged:
+        return
+    kind = "not converged" if fit.problem.settings.seeded else "not converged from its start"
+    if ending is Ending.TIME:
+        kind = "time up"
+    yield Finding(kind, "warning", (fit.final,), {"ending": ending.value})
+
+
+def _optima_findings(fit: Fit) -> Iterator[Finding]:
+    """Yield the joints whose starts ended at different optima."""
+    apart = [joint for joint, ends in fit.ends.items() if max(ends) > SAME_OPTIMUM + min(ends)]
+    if apart:
+        names = [fit.problem.settings.arm.joint_names[joint - 1] for joint in apart if joint]
+        yield Finding("several optima", "note", tuple(names or ["all joints"]))
+
+
+def _prior_findings(fit: Fit) -> Iterator[Finding]:
+    """Yield the priors from which the logs have led the estimate far away, the farthest first."""
+    priors = fit.problem.priors
+    vague = set[str]()
+    for name, status in zip(fit.problem.parameters.names, fit.uncertainty.status, strict=True):
+        if status.source is Source.PRIOR or status.flag is Flag.UNIDENTIFIABLE:
+            vague.add(name)
+    # heavy tails foresee any distance
+    distances = priors.scores(fit.best.theta[None])[0] * priors.firm
+    scores = dict(zip(priors.names, distances.tolist(), strict=True))
+    far = dict[str, str]()
+    for prior in sorted(scores, key=lambda name: -abs(scores[name])):
+        score = scores[prior]
+        if abs(score) > STRAINED_ABOVE and prior not in vague:
+            far[prior] = f"{abs(score):.1f} {'above' if score > 0 else 'below'}"
+    if far:
+        yield Finding("strained prior", "warning", tuple(far), details=far)
 
 
 def _lasting_findings(problem: Problem, errors: Mapping[str, AngleError]) -> list[Finding]:
@@ -192,14 +233,13 @@ def _parameter_findings(problem: Problem, estimate: Mapping[str, ParameterEstima
         kinds[str(kind), ""].append(parameter.name)
         if one.effect_deg is None and one.flag != Flag.FIXED:  # simulations diverge where it is changed
             kinds["effect unknown", ""].append(parameter.name)
-    return [
-        Finding(
-            kind, "warning" if kind in _WARNINGS else "note", tuple(names), {"side": side} if side else {}
-        )
-        for kind in _KINDS
-        for (own, side), names in kinds.items()
-        if own == kind
-    ]
+    findings = list[Finding]()
+    for kind in _KINDS:
+        level = "warning" if kind in _WARNINGS else "note"
+        for (own, side), names in kinds.items():
+            if own == kind:
+                findings.append(Finding(kind, level, tuple(names), {"side": side} if side else {}))
+    return findings
 
 
 def _at_bound(problem: Problem, parameter: Parameter, side: str) -> str:

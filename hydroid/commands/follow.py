@@ -34,10 +34,11 @@ def follow(
     set: "SettingChanges" = None,
     repair: bool = False,
 ) -> "Result[Followed]":
-    """Find commands that lead the arm along joint angles, or the tip along a path: to be played open loop.
+    """Find commands that lead the arm along joint angles over time, or its tip along a path.
 
-    Dead band, valve curve, load, pump, delay and lags are in it. Says where a joint cannot move as wished,
-    and then takes the nearest; predicts the tracking error with its band. A page shows the arm in motion.
+    The commands are a feed-forward: play them without feedback. They allow for dead band, valve curve, load,
+    pump, delay and lags. Where a joint cannot move as wished, the command says so and takes the nearest
+    speed. It predicts the tracking error with its band. A page shows the arm in motion.
 
     Example: hydroid follow TRAJECTORY.csv --fit runs/hyd --out commands.csv
 

@@ -53,10 +53,10 @@ def two_digits(value: float) -> str:
 
 
 def three_digits(value: float) -> str:
-    """Write three significant digits, or all before the point; a dash if not finite."""
+    """Write three significant digits, or all before the point up to ten million; a dash if not finite."""
     if not math.isfinite(value):
         return "–"
-    return f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}"
+    return f"{value:.0f}" if 100 <= abs(value) < 1e7 else f"{value:.3g}"
 
 
 def interval_words(low: float | None, high: float | None) -> str:

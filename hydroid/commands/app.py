@@ -46,7 +46,7 @@ GROUPS = {
     "Use the model": {
         "simulate": "simulate commands, write a log",
         "follow": "find commands that lead the arm along a path",
-        "export": "write it for other programs: URDF, MJCF, FMU, tables, draws",
+        "export": "write the fitted machine for other programs",
     },
     "Compare settings": {"study": "fit with several settings, each over many seeds"},
 }

@@ -77,9 +77,9 @@ def check(
 ) -> "Result[list[LogCheck]]":
     """List the faults of logs, and anything unusual in them.
 
-    A finding shared by several logs is listed once. Of three logs or more it says whether they agree, and
-    which one stands out in a joint's speed, dead bands or delay. The exit status is 2 if a log is unusable,
-    or if these logs together leave a fit of the settings nothing to fit.
+    A finding shared by several logs is listed once. With three logs or more it also compares them, and names
+    the one whose speed, dead band or delay differs from the others. The exit status is 2 if a log is
+    unusable, or if no joint in these logs can be fitted with the settings.
 
     Example: hydroid check LOG.csv
 

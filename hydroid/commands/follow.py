@@ -19,6 +19,7 @@ from hydroid.log import Log, open_table, write_log
 from hydroid.words import plain
 
 if TYPE_CHECKING:
+    from hydroid.identified_model import IdentifiedModel
     from hydroid.settings.fit import FitSettings
     from hydroid.use.follow import Followed
 
@@ -33,10 +34,11 @@ def follow(
     set: "SettingChanges" = None,
     repair: bool = False,
 ) -> "Result[Followed]":
-    """Find commands that lead the arm along joint angles over time: a feed-forward, to be played open loop.
+    """Find commands that lead the arm along joint angles over time, or its tip along a path.
 
-    Dead band, valve curve, load, pump, delay and lags are in it. Says where a joint cannot move as wished,
-    and then takes the nearest; predicts the tracking error with its band. A page shows the arm in motion.
+    The commands are a feed-forward: play them without feedback. They allow for dead band, valve curve, load,
+    pump, delay and lags. Where a joint cannot move as wished, the command says so and takes the nearest
+    speed. It predicts the tracking error with its band. A page shows the arm in motion.
 
     Example: hydroid follow TRAJECTORY.csv --fit runs/hyd --out commands.csv
 
@@ -45,7 +47,8 @@ def follow(
 
     Args:
         trajectory (TRAJECTORY.csv): Joint angles over time, in the columns and units of the fit's logs;
-            joints without a column rest in the start pose of the settings.
+            or the tip's position over time, in columns x_m, y_m and z_m. Joints without a column, or
+            without commands, rest in the start pose of the settings.
         out (LOG.csv): The commands, in the columns and units of the fit's logs, beside the wished angles;
             the page has the same name [default of the command line: runs/follow/commands.csv].
         payload (0 or more): Mass in the gripper [kg].
@@ -59,8 +62,10 @@ def follow(
     model = open_model(fit, overrides=set)
     if model.settings.stage != "hyd":
         raise SettingsError("a fit of stage 1 has no valves", model.source, "name a fit of stage 2")
-    settings = _of_its_joints(trajectory, model.settings)
-    (path,) = read_arms(trajectory, settings, None, angles=True, repair=repair).values()
+    path = _tip_path(trajectory, model)
+    if path is None:
+        settings = _of_its_joints(trajectory, model.settings)
+        (path,) = read_arms(trajectory, settings, None, angles=True, repair=repair).values()
     from hydroid.reporting.follow_page import follow_page, missed_lines, tracking_table
     from hydroid.use.follow import follow as find_commands
 
@@ -71,7 +76,7 @@ def follow(
     lines = [tracking_table(found, arm), *missed_lines(found, arm)]
     if found.lead_s:
         lines.append(
-            f"The path begins {plain(found.lead_s)} s after the commands: delay and lags take so long."
+            f"The path begins {plain(found.lead_s)} s into the file: delay and lags need commands that early."
         )
     if out is not None:
         write_log(Path(out), found.log, model.settings.log, arm=model.settings.arm)
@@ -80,6 +85,22 @@ def follow(
     missed = [{**vars(one), "joint": arm.joint_names[one.joint]} for one in found.missed]
     content = {"out": out and str(out), "lead_s": found.lead_s, "joints": rows, "missed": missed}
     return Result(lines, content, found, page)
+
+
+def _tip_path(trajectory: "Source | Log", model: "IdentifiedModel") -> "Log | None":
+    """Return the joint angles along a file's path of the tip; None: it holds no such path."""
+    if isinstance(trajectory, Log) or not is_file(trajectory):
+        return None
+    from hydroid.plant import Plant
+    from hydroid.use.tip_path import Tip, holds_tip, tip_path
+
+    settings = model.settings
+    table = open_table(Path(trajectory), settings.log)
+    if not holds_tip(table):
+        return None
+    tip = Tip(settings.arm, Plant(model).joints)
+    start = settings.arm.pose(settings.start_pose)
+    return tip_path(table, settings.log.time.column, settings.log.period_s, tip, start)
 
 
 def _of_its_joints(trajectory: "Source | Log", settings: "FitSettings") -> "FitSettings":

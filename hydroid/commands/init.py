@@ -28,11 +28,11 @@ def init(
 ) -> "Result[Project]":
     """Write a project that runs, from your arm's CAD and your log.
 
-    It has the arm's file and model, settings of a fit with starts and priors from the arm's size, a
-    picture to check the arm by, and the commands to run next.
+    The project holds the arm's file and model, the settings of a fit, a picture to check the arm by, and
+    the commands to run next. Start values and priors come from the arm's size.
 
-    A log whose columns it does not know ends with status 2, and a project whose fit.yaml lists
-    them. Name them there, and go on with --config.
+    If it does not recognise a log's columns, the exit status is 2, and the project's fit.yaml lists
+    them. Say there what they are, then run init again with --config.
 
     Example: hydroid init mine --arm robot.urdf --log a.csv
 

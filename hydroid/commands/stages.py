@@ -315,11 +315,11 @@ def adapt(
     set: "SettingChanges" = None,
     repair: bool = False,
 ) -> FitResult:
-    """Adapt a fit to new logs: a few parameters are freed, all others are held at its estimate.
+    """Adapt a fit to new logs: estimate a few parameters anew, and keep the others.
 
-    For a slower engine, a colder day, another tool. A load of known mass is no parameter but a
-    payload of the logs: --set 'payloads={LOADED.csv: 250}'. Writes a run that every command takes.
-    Judges each freed parameter by parts of the logs left out.
+    Use it after a change of the machine: a slower engine, a colder day, another tool. For a load of known
+    mass, set the payload of the logs instead: --set 'payloads={LOADED.csv: 250}'. Each freed parameter is
+    tested on parts of the logs that are left out. The result is a run that every command takes.
 
     Example: hydroid adapt LOADED.csv --fit runs/hyd --free P_flow,P_droop
 

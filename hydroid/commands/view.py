@@ -60,7 +60,7 @@ def simulate(
     """Simulate commands with an estimate and write the log: a prediction,
     or synthetic data to test a fit.
 
-    Of two arms neither feels the other: the carrier stands still, and they share no pump.
+    A pair of arms is simulated as two separate arms: they share no pump, and their carrier stands still.
 
     Example: hydroid simulate COMMANDS.csv --fit runs/hyd --out sim.csv
 

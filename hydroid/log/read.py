@@ -209,7 +209,7 @@ def _match(
             what = listed([f"{one.name!r} ({one}{guess.get(one.name, '')})" for one in lacking], 2)
             what = f"lacks {what}; unused: {listed([*filter(None, free.values())] or ['none'], 3)}"
             places = listed([*dict.fromkeys(f"log.{one.kind}" for one in lacking)])
-            hint = f"give {places} in the config the right column, or null if the log has none"
+            hint = f"in the config, set {places} to the right column, or to null if the log has none"
         line = f", line {table.header}" if table.header else ""
         raise LogError(what, f"{table.source}{line}", hint)
     return wanted

@@ -18,8 +18,8 @@ _MOTION = (
     "The picture begins where they differ most."
 )
 _NOTE = (
-    "error: rms, as the model predicts it. with its band: rms of the error that 95 % of such machines stay "
-    "within, without any feedback."
+    "error: rms between wished and predicted angle. with its band: 95 % of the machines that the logs allow "
+    "stay within this rms error, without any feedback."
 )
 
 
@@ -71,8 +71,8 @@ def _missed(group: Sequence[Missed], lead: float, arm: Arm) -> str:
     factor, unit = _unit(arm, worst.joint + 1)
     spans = [f"{one.from_s - lead:.2f} to {one.to_s - lead:.2f}" for one in group]
     had, wished = two_digits(factor * worst.had), two_digits(factor * worst.wished)
-    what = f"{arm.joint_names[worst.joint]}: {worst.limit}, at worst {had} of {wished} {unit}/s"
-    return f"{what}; from {listed(spans, 3)} s of the path"
+    what = f"{arm.joint_names[worst.joint]}: {worst.limit}, at worst {had} {unit}/s where {wished} are wished"
+    return f"{what}; {listed(spans, 3)} s into the path"
 
 
 def _lead(followed: Followed, arm: Arm) -> str:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from hydroid.arrays import record
 from hydroid.files import csv_text
 from hydroid.findings import Finding
-from hydroid.words import number, numbered, plain
+from hydroid.words import numbered, plain, three_digits
 
 if TYPE_CHECKING:
     import rich.table
@@ -28,7 +28,7 @@ Cell = str | int | float | None  # text, a count, a measured number, or nothing
 
 
 class Given(float):
-    """A number from the user, such as a bound: it is shown as given, not rounded to four digits."""
+    """A number from the user, such as a bound: it is shown as given, not rounded to three digits."""
 
 
 @record
@@ -167,7 +167,7 @@ def _aligned(cells: list[str], digit: str, point: str, *, right: bool) -> list[s
 def shown(cell: Cell) -> str:
     """Return the text of a cell for a reader."""
     if isinstance(cell, float):
-        return plain(cell) if isinstance(cell, Given) else number(cell)
+        return plain(cell) if isinstance(cell, Given) else three_digits(cell)
     return "" if cell is None else str(cell)
 
 

@@ -25,13 +25,12 @@ _RIVALS = (
     "joint, which are dead band, exponent, top speed and lag of each direction, and one delay."
 )
 _FITTED = (
-    "Rms errors{unit} on the fitted logs: no unseen log, one that was not fitted, tests the fit yet. Last "
-    "three columns: simple models."
+    "Rms errors{unit} on the fitted logs. No other log tests the fit yet. Last three columns: simple models."
 )
 _TESTED = (
     "Rms errors{unit} on {count} unseen log{s} (not fitted): of the change over 1, 5 and 10 s, and over "
-    "whole logs. In brackets: the best simple model, than which the fit is better, worse, or from which it "
-    "cannot be told."
+    "whole logs. In brackets: the best simple model. The word after it: whether the fit is better or "
+    "worse than that model, or cannot be told from it."
 )
 WHOLE = "whole logs"
 """name of a column"""

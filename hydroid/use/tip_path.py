@@ -1,0 +1,187 @@
+"""Joint angles along a path of the tip: MuJoCo's kinematics inverted, sample by sample.
+
+Each sample starts from the pose before it and takes damped least-squares steps (C. W. Wampler, *Manipulator
+inverse kinematic solutions based on vector formulations and damped least-squares methods*, 1986). Of several
+poses that reach a point it so finds one near the pose before: the joints move no more than the path asks for.
+"""
+
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+
+from hydroid.arm.model import load_model
+from hydroid.arrays import Array
+from hydroid.errors import LogError, SettingsError
+from hydroid.log import Log
+from hydroid.log.table import Signal, Table
+from hydroid.settings.arm import Arm
+
+COLUMNS = ("x_m", "y_m", "z_m")
+"""columns of a file that hold the tip's position [m], in the axes of the arm's model"""
+REACHED = 1e-6
+"""distance from a point at which the tip counts as there [m]"""
+UNREACHED = 1e-3
+"""distance from a point from which a path is refused [m]: a valve leads no tip that closely"""
+MOST_STEPS = 300
+"""steps for a sample; a path's first point, far from the start pose, takes the most"""
+DAMPING = 1e-3
+"""of a step, beside the lengths of the arm [m]; it shrinks as the tip comes close"""
+LARGEST_TURN = 0.2
+"""of a joint in one step [rad], of one that slides [m]"""
+
+
+class Tip:
+    """The tip of an arm: the site of its payload.
+
+    Args:
+        arm: whose MJCF is read.
+        joints: that may move, numbered from 1; the others keep their angle.
+
+    Raises:
+        SettingsError: the arm's file names no site.
+    """
+
+    def __init__(self, arm: Arm, joints: Sequence[int]) -> None:
+        if arm.payload is None:
+            hint = "add a site to the model, and name it: payload: SITE"
+            raise SettingsError("the arm's file does not say where its tip is", arm.where, hint)
+        self._model = load_model(arm).compile()
+        self._data = mujoco.MjData(self._model)
+        self._site = self._model.site(arm.payload).id
+        self._moving = np.array(joints) - 1
+        self._low, self._high = arm.lower, arm.upper
+
+    def place(self, angle: Array) -> Array:
+        """Return where the tip is [m], shape (3,), at angles of all joints [rad], shape (J,)."""
+        self._data.qpos[:] = angle
+        mujoco.mj_kinematics(self._model, self._data)
+        mujoco.mj_comPos(self._model, self._data)
+        return self._data.site_xpos[self._site].copy()
+
+    def angles(self, points: Array, start: Array) -> tuple[Array, Array]:
+        """Return angles [rad], shape (T, J), and how far the tip stays off [m], shape (T,).
+
+        Args:
+            points: of the tip [m], shape (T, 3).
+            start: pose before the first point [rad], shape (J,).
+        """
+        angle = np.empty((len(points), len(start)))
+        off = np.empty(len(points))
+        pose = start
+        for k, point in enumerate(points):
+            pose, off[k] = self._reach(point, pose)
+            angle[k] = pose
+        return angle, off
+
+    def _reach(self, point: Array, pose: Array) -> tuple[Array, float]:
+        """Return the pose near another that brings the tip closest to a point, and the distance [m]."""
+        missing = point - self.place(pose)
+        off = float(np.linalg.norm(missing))
+        damping = DAMPING
+        for _ in range(MOST_STEPS):
+            if off < REACHED or damping > 1e3:
+                break
+            tried = self._step(missing, pose, damping)
+            left = point - self.place(tried)
+            if float(np.linalg.norm(left)) < off:
+                pose, missing, off = tried, left, float(np.linalg.norm(left))
+                damping = max(0.3 * damping, 1e-9)
+            else:
+                damping *= 4.0
+                self.place(pose)  # the next step's slopes are those of this pose
+        return pose, off
+
+    def _step(self, missing: Array, pose: Array, damping: float) -> Array:
+        """Return the pose after a step towards a point; joints at an end of their range stay within."""
+        slopes = np.empty((3, self._model.nv))
+        mujoco.mj_jacSite(self._model, self._data, slopes, None, self._site)
+        free = self._moving
+        next_pose = pose.copy()
+        for _ in range(len(self._moving)):
+            near = slopes[:, free]
+            step = near.T @ np.linalg.solve(near @ near.T + damping * np.eye(3), missing)
+            step *= min(1.0, LARGEST_TURN / max(float(np.abs(step).max()), LARGEST_TURN))
+            beyond = (pose[free] + step > self._high[free]) | (pose[free] + step < self._low[free])
+            beyond &= (pose[free] >= self._high[free]) | (pose[free] <= self._low[free])
+            next_pose[:] = pose
+            next_pose[free] = pose[free] + step
+            if not beyond.any() or beyond.all():
+                break
+            free = free[~beyond]  # a joint at its end cannot help: the others take its part
+        return next_pose.clip(self._low, self._high)
+
+
+def holds_tip(table: Table) -> bool:
+    """Whether a file holds the tip's position.
+
+    Raises LogError: it holds some of its columns only.
+    """
+    missing = [name for name in COLUMNS if name not in table.names]
+    if not missing:
+        return True
+    if len(missing) < len(COLUMNS):
+        hint = f"a path of the tip takes {', '.join(COLUMNS)}"
+        raise LogError(f"column {missing[0]} is missing", table.source, hint)
+    return False
+
+
+def tip_path(table: Table, time: str, period: float, tip: Tip, start: Array) -> Log:
+    """Return the joint angles along a path of the tip, without commands.
+
+    Args:
+        table: with a column of times [s] and `COLUMNS`.
+        time: name of the column of times.
+        period: of the samples [s]; the tip moves on a line between two rows.
+        tip: of the arm.
+        start: pose from which the first point is sought [rad], shape (J,).
+
+    Raises:
+        LogError: a column of times is missing, a cell holds no number, times do not increase, or a point
+            cannot be reached.
+    """
+    if time not in table.names:
+        raise LogError(f"column {time} is missing", table.source, "a path of the tip takes times [s]")
+    signals = [Signal(time, "time"), *(Signal(name, "position") for name in COLUMNS)]
+    recording = table.read(signals)
+    values = recording.values
+    lines = np.arange(len(values)) + 1 if table.lines is None else table.lines
+    lines = np.asarray(lines)[recording.rows]
+    word = "line" if table.header else "row"
+    if not np.isfinite(values).all():
+        row, column = np.argwhere(~np.isfinite(values))[0].tolist()
+        where = f"{table.source}, {word} {lines[row]}, column {signals[column].name}"
+        raise LogError("holds no number", where, "give times in s and positions in m")
+    back = np.flatnonzero(np.diff(recording.time) <= 0)
+    if len(back):
+        where = f"{table.source}, {word} {lines[back[0] + 1]}, column {time}"
+        raise LogError("times do not increase", where, "each row must be later than the row before")
+    if len(values) < 2:
+        raise LogError("holds no path", table.source, "give two rows at least")
+    since = recording.time - recording.time[0]
+    samples = int(np.floor(since[-1] / period + 1e-6)) + 1
+    at = np.arange(samples, dtype=float) * period
+    points = np.empty((samples, 3))
+    for axis in range(3):
+        points[:, axis] = np.interp(at, since, values[:, 1 + axis])
+    angle, off = tip.angles(points, start)
+    if off.max() > UNREACHED:
+        raise _unreached(table.source, at + recording.time[0], points, off, tip.place(start))
+    return Log(str(table.source), at, np.zeros_like(angle), angle, period)
+
+
+def _unreached(source: str, time: Array, points: Array, off: Array, first: Array) -> LogError:
+    """Return the error of a path that the tip cannot follow: its worst point, and where the tip starts."""
+    worst = int(np.argmax(off))
+    missed = int(np.sum(off > UNREACHED))
+    what = (
+        f"the tip cannot reach {_spelt(points[worst])} at {time[worst]:.4g} s: "
+        f"it stays {off[worst]:.3g} m off, the most of {missed} such samples"
+    )
+    hint = f"only joints with commands move; in the start pose the tip is at {_spelt(first)}"
+    return LogError(what, source, hint)
+
+
+def _spelt(point: Array) -> str:
+    x, y, z = point.tolist()
+    return f"x {x:.3f}, y {y:.3f}, z {z:.3f} m"

@@ -1,0 +1,115 @@
+"""A path of the tip becomes joint angles whose forward kinematics are the path."""
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from made_logs import HYDRAULIC, TRUTH
+
+import hydroid
+from hydroid import load_settings
+from hydroid.errors import LogError
+from hydroid.identified_model import IdentifiedModel, identified
+from hydroid.use.tip_path import Tip
+
+
+def model() -> IdentifiedModel:
+    """Shoulder and elbow with hydraulics, and little friction."""
+    values = TRUTH | HYDRAULIC
+    values |= {"open_A": 0.3, "open_B": 0.3, "delay": 0.05, "friction": 20.0, "S": 0.0, "A": 0.05, "C": 0.05}
+    changes = {"start_pose": "study", "outputs": [2, 3]}
+    changes |= {f"hydraulics.{name}": 0.05 for name in ("onset_a", "onset_b")}
+    settings = load_settings("fit-hyd", changes | {"hydraulics.leakage": 0.0})
+    return identified(settings, {n: v for n, v in values.items() if n in settings.parameters}, "test")
+
+
+def forward(arm, angle):
+    """Where the payload's site is [m], by MuJoCo alone."""
+    mjcf = mujoco.MjModel.from_xml_path(str(arm.model))
+    data = mujoco.MjData(mjcf)
+    data.qpos[:] = angle
+    mujoco.mj_kinematics(mjcf, data)
+    return data.site(arm.payload).xpos.copy()
+
+
+def line(start, by, seconds=4.0, rows=101):
+    """A straight line [s, m, m, m], at rest at both ends."""
+    time = np.linspace(0.0, seconds, rows)
+    part = 0.5 - 0.5 * np.cos(np.pi * time / seconds)
+    return np.column_stack([time, start + part[:, None] * np.array(by)])
+
+
+def write(path: Path, rows, header="time_s,x_m,y_m,z_m") -> Path:
+    np.savetxt(path, rows, delimiter=",", header=header, comments="")
+    return path
+
+
+@pytest.mark.parametrize("by", [[0.05, 0.0, 0.05], [-0.1, 0.0, 0.1], [0.0, 0.0, -0.1]])
+def test_the_tip_is_where_the_path_is(by):
+    one = model()
+    arm, start = one.settings.arm, one.settings.arm.pose("study")
+    points = line(forward(arm, start), by)[:, 1:]
+    angle, off = Tip(arm, [2, 3]).angles(points, start)
+    np.testing.assert_allclose([forward(arm, pose) for pose in angle], points, atol=1e-5)
+    assert off.max() < 1e-5
+    assert np.all((angle >= arm.lower) & (angle <= arm.upper))
+    np.testing.assert_array_equal(
+        np.delete(angle, [1, 2], axis=1), np.delete(np.tile(start, (101, 1)), [1, 2], 1)
+    )
+    assert np.abs(np.diff(angle, axis=0)).max() < np.radians(5.0)  # no jump between two samples
+
+
+def test_with_more_joints_than_needed_angles_return_to_where_they_began():
+    """A still path keeps the pose: of many poses that reach a point, the one before is taken."""
+    one = model()
+    arm, start = one.settings.arm, one.settings.arm.pose("study")
+    points = np.tile(forward(arm, start), (5, 1))
+    angle, _ = Tip(arm, range(1, 8)).angles(points, start)
+    np.testing.assert_allclose(angle, np.tile(start, (5, 1)), atol=1e-6)
+
+
+def test_commands_lead_the_tip_along_a_line(tmp_path: Path):
+    one = model()
+    arm, start = one.settings.arm, one.settings.arm.pose("study")
+    wished = line(forward(arm, start), [0.03, 0.0, 0.05], seconds=6.0)
+    file = write(tmp_path / "tip.csv", wished)
+    hydroid.follow(file, fit=one, out=tmp_path / "commands.csv")
+    played = hydroid.simulate(tmp_path / "commands.csv", fit=one).log
+    end = forward(arm, played.angle[-1])
+    np.testing.assert_allclose(end, wished[-1, 1:], atol=2e-3)
+
+
+def beyond(place):
+    return line(place, [5.0, 0.0, 0.0])
+
+
+def backwards(place):
+    rows = line(place, [0.03, 0.0, 0.0])
+    rows[3, 0] = 0.0
+    return rows
+
+
+def without_number(place):
+    rows = line(place, [0.03, 0.0, 0.0])
+    rows[4, 2] = np.nan
+    return rows
+
+
+@pytest.mark.parametrize(
+    ("rows", "header", "says"),
+    [
+        (beyond, "time_s,x_m,y_m,z_m", r"cannot reach x .* at 4 s: it stays 4\.\d+ m off"),
+        (backwards, "time_s,x_m,y_m,z_m", "line 5, column time_s: times do not increase"),
+        (without_number, "time_s,x_m,y_m,z_m", "line 6, column y_m: holds no number"),
+        (beyond, "time_s,x_m,y_m,height", "column z_m is missing"),
+        (beyond, "seconds,x_m,y_m,z_m", "column time_s is missing"),
+    ],
+)
+def test_a_path_that_cannot_be_followed_is_refused_in_one_line(tmp_path: Path, rows, header, says):
+    one = model()
+    place = forward(one.settings.arm, one.settings.arm.pose("study"))
+    file = write(tmp_path / "tip.csv", rows(place), header)
+    with pytest.raises(LogError, match=says):
+        hydroid.follow(file, fit=one, out=tmp_path / "commands.csv")
+    assert not (tmp_path / "commands.csv").exists()

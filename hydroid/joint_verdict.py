@@ -6,6 +6,7 @@ from enum import StrEnum
 from pydantic import Field
 
 from hydroid.settings.load import Settings
+from hydroid.units import Display, display
 
 
 class Verdict(StrEnum):
@@ -101,6 +102,11 @@ class JointVerdict(Settings):
     """the fit with each simple model over these times"""
     compared_whole: dict[str, Comparison] = Field(default_factory=dict[str, Comparison])
     """the fit with each simple model over whole unseen logs; empty where there are none"""
+
+    @property
+    def shown(self) -> Display:
+        """How a reader is shown the joint's errors."""
+        return display(slides=self.slides)
 
     @property
     def text(self) -> str:

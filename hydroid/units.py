@@ -27,6 +27,29 @@ def _units() -> dict[str, Unit]:
     return units
 
 
+class Display(NamedTuple):
+    """How a reader is shown where a joint is: what that is called, and in which unit."""
+
+    word: str
+    unit: str
+    factor: float
+    """what 1 rad, or 1 m of a joint that slides, is in the unit"""
+
+    def of_degrees(self, value: float) -> float:
+        """Return, in the unit, what files keep in degrees; of a joint that slides they keep 1 m
+        as if it were 1 rad."""
+        return value if self is TURNING else self.factor * math.radians(value)
+
+
+TURNING = Display("angle", "deg", math.degrees(1.0))
+SLIDING = Display("position", "mm", 1e3)
+
+
+def display(*, slides: bool) -> Display:
+    """Return how a joint that turns, or one that `slides`, is shown."""
+    return SLIDING if slides else TURNING
+
+
 UNITS = _units()
 """by their spelling in lower case"""
 

@@ -50,7 +50,8 @@ class Bench:
     @property
     def unit(self) -> tuple[float, str]:
         """What 1 rad, or 1 m of a joint that slides, is in the unit of quantities."""
-        return (1e3, "mm") if self.settings.arm.joints[self.joint - 1].slides else (np.degrees(1.0), "deg")
+        shown = self.settings.arm.joints[self.joint - 1].shown
+        return shown.factor, shown.unit
 
     @property
     def pose(self) -> str:

@@ -49,7 +49,7 @@ def tracking_table(followed: Followed, arm: Arm) -> Table:
     """Return the predicted errors of the joints."""
     rows: list[tuple[str | float | None, ...]] = []
     for joint in followed.joints:
-        factor, unit = _unit(arm, joint)
+        _, unit, factor = arm.joints[joint - 1].shown
         error, wide = (factor * size for size in followed.rms(joint))
         command = followed.log.command[:, joint - 1]
         full = 100.0 * float(np.mean(np.abs(command) >= 100.0))
@@ -68,7 +68,7 @@ def missed_lines(followed: Followed, arm: Arm) -> list[str]:
 
 def _missed(group: Sequence[Missed], lead: float, arm: Arm) -> str:
     worst = max(group, key=lambda one: abs(one.wished - one.had))
-    factor, unit = _unit(arm, worst.joint + 1)
+    _, unit, factor = arm.joints[worst.joint].shown
     spans = [f"{one.from_s - lead:.2f} to {one.to_s - lead:.2f}" for one in group]
     had, wished = two_digits(factor * worst.had), two_digits(factor * worst.wished)
     what = f"{arm.joint_names[worst.joint]}: {worst.limit}, at worst {had} {unit}/s where {wished} are wished"
@@ -80,7 +80,7 @@ def _lead(followed: Followed, arm: Arm) -> str:
         return followed.rms(joint)[0]
 
     worst = max(followed.joints, key=relative)
-    factor, unit = _unit(arm, worst)
+    _, unit, factor = arm.joints[worst - 1].shown
     error = number(factor * followed.rms(worst)[0])
     text = f"The model follows the path to {error} {unit} rms at most ({arm.joint_names[worst - 1]})."
     if followed.missed:
@@ -89,15 +89,12 @@ def _lead(followed: Followed, arm: Arm) -> str:
     return text
 
 
-def _unit(arm: Arm, joint: int) -> tuple[float, str]:
-    """What 1 rad or 1 m of a joint (number, from 1) is in the unit that is shown."""
-    return (1e3, "mm") if arm.joints[joint - 1].slides else (float(np.degrees(1.0)), "deg")
-
-
 def _chart(followed: Followed, joint: int, arm: Arm) -> Chart:
-    factor, unit = _unit(arm, joint)
-    time, column = followed.log.time - followed.lead_s, joint - 1
-    wished, predicted = factor * followed.log.angle[:, column], factor * followed.angle[:, column]
+    column = joint - 1
+    word, unit, factor = arm.joints[column].shown
+    time = followed.log.time - followed.lead_s
+    wished = factor * followed.log.angle[:, column]
+    predicted = factor * followed.angle[:, column]
     error = wished - predicted
     upper = (
         Mark("line", time, wished, color="ink", label="wished", width=5, alpha=0.35),
@@ -113,7 +110,7 @@ def _chart(followed: Followed, joint: int, arm: Arm) -> Chart:
     command = Mark("step", time, followed.log.command[:, column], color="grey")
     spans = [one for one in followed.missed if one.joint == column]
     panels = (
-        Panel("", f"{_place(arm, joint)} [{unit}]", upper, arm.joint_names[column], 280),
+        Panel("", f"{word} [{unit}]", upper, arm.joint_names[column], 280),
         Panel("", f"error [{unit}]", tuple(middle), height=190),
         Panel(
             "time [s]",
@@ -132,7 +129,3 @@ def _shaded(spans: Sequence[Missed], lead: float) -> list[Mark]:
     begin = np.array([one.from_s for one in spans]) - lead
     end = np.array([one.to_s for one in spans]) - lead
     return [Mark("spans", x=begin, end=end, color="pink", label="cannot be had", alpha=0.3)]
-
-
-def _place(arm: Arm, joint: int) -> str:
-    return "position" if arm.joints[joint - 1].slides else "angle"

@@ -2,8 +2,6 @@
 
 from typing import Any
 
-import numpy as np
-
 from hydroid.estimate import FitSummary, QuantityEstimate
 from hydroid.findings import Finding
 from hydroid.reporting.page import Section, Table
@@ -85,9 +83,9 @@ def error_section(settings: FitSettings, summary: FitSummary) -> Section | None:
         if error is None:
             continue
         name = settings.arm.joint_names[joint - 1]
-        unit, factor = "deg", 1.0
-        if settings.arm.joints[joint - 1].slides:
-            unit, factor = "mm", 1e3 * float(np.radians(1.0))
+        shown = settings.arm.joints[joint - 1].shown
+        unit = shown.unit
+        factor = shown.of_degrees(1.0)
         ahead = factor * error.after_10_s_deg
         which = f" ({name})" if len(settings.outputs) > 1 else ""
         after.append(f"{two_digits(ahead)} {unit}{which}")

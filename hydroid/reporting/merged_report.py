@@ -22,7 +22,7 @@ def merged_tables(runs: Sequence[Record]) -> dict[str, Table]:
     units = dict[str, str]()
     flags = dict[str, str]()
     for run in runs:
-        units |= {f"error of {one.name}": "mm" if one.slides else "deg" for one in run.summary.verdict}
+        units |= {f"error of {one.name}": one.shown.unit for one in run.summary.verdict}
     for run in runs:
         units |= {name: one.unit for name, one in run.summary.estimate.items()}
         flags = {name: status(one) for name, one in run.summary.estimate.items()} | flags
@@ -47,6 +47,6 @@ def _errors(run: Record) -> dict[str, float | None]:
     """
     errors = dict[str, float | None]()
     for one in run.summary.verdict:
-        factor = 1e3 * float(np.radians(1.0)) if one.slides else 1.0
+        factor = one.shown.of_degrees(1.0)
         errors[f"error of {one.name}"] = None if one.fitted_deg is None else factor * one.fitted_deg
     return errors

@@ -16,6 +16,7 @@ from hydroid.reporting.chart import SERIES, Chart, Mark, Panel, finite
 from hydroid.reporting.moving_arm import MOST, moving_arm
 from hydroid.reporting.page import Plot, Section, Table, log_names, short_name
 from hydroid.settings.arm import Arm
+from hydroid.units import display
 from hydroid.words import number, two_digits
 
 MOTIONS = 8
@@ -91,10 +92,11 @@ def error_table(predictions: Sequence[Prediction], arm: Arm, *, one_fit: bool) -
     for one in predictions:
         for row in one.plain(arm.joint_names):
             row |= {"fit": short_name(one.fit), "log": names[one.log.source], "kind": _kind(one)}
-            row["unit"] = "deg"
-            if row["joint"] in arm.slides:
-                row["unit"] = "mm"
-                row |= {key: error and 1e3 * np.radians(error) for key, error in row.items() if "_deg" in key}
+            shown = arm.joints[row["joint"] - 1].shown
+            row["unit"] = shown.unit
+            for key, error in row.items():
+                if "_deg" in key and error is not None:
+                    row[key] = shown.of_degrees(error)
             rows.append(row)
     columns = dict(_COLUMNS)
     if one_fit:
@@ -179,11 +181,6 @@ def _all_tab(arm: Arm, group: Sequence[Prediction], log: str, bins: int, tabs: S
     return Plot("", title, drawing, button="all", column=ALL, state=worst)
 
 
-def _scale(slides: bool) -> tuple[str, str, float]:
-    """Return what a joint's angle is called, its unit, and 1 rad in it."""
-    return ("position", "mm", 1e3) if slides else ("angle", "deg", float(np.degrees(1.0)))
-
-
 def draw_response(
     title: str, joint: int, several: Sequence[Prediction], bins: int, *, slides: bool = False
 ) -> Chart:
@@ -192,7 +189,7 @@ def draw_response(
     """
     log = several[0].log
     column = joint - 1
-    place, unit, factor = _scale(slides)
+    place, unit, factor = display(slides=slides)
     measured = factor * log.angle[:, column]
     upper = [Mark("line", log.time, measured, color="ink", label="measured", width=5, alpha=0.35)]
     middle = [Mark("rule", y=np.zeros(1), color="grey", width=1)]
@@ -249,7 +246,7 @@ def draw_joints(title: str, arm: Arm, group: Sequence[Prediction], bins: int) ->
     for number_of, joint in enumerate(_compared(group)):
         one = next(prediction for prediction in group if joint in prediction.joints)
         name = arm.joint_names[joint - 1]
-        _, unit, factor = _scale(arm.joints[joint - 1].slides)
+        _, unit, factor = arm.joints[joint - 1].shown
         measured = factor * one.log.angle[:, joint - 1]
         simulated = measured - factor * finite(one.error(joint))
         simulated[np.abs(simulated - measured) > FAR * max(np.ptp(measured), 1.0)] = np.nan

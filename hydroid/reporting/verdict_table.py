@@ -18,6 +18,7 @@ from hydroid.reporting.page import Cell, Given, Section, Table, short_name
 from hydroid.search.descent import Ending
 from hydroid.settings.arm import Arm
 from hydroid.settings.log import log_file
+from hydroid.units import Display, display
 from hydroid.words import listed, told_apart, two_digits
 
 _RIVALS = (
@@ -79,27 +80,27 @@ def _row(one: JointVerdict, *, tested: bool) -> dict[str, Cell]:
     row: dict[str, Cell] = {
         "joint": one.name,
         "verdict": f"{one.verdict.sign} {one.text}",
-        "unit": "mm" if one.slides else "deg",
-        "fitted": _shown(one.fitted_deg, one.slides),
+        "unit": one.shown.unit,
+        "fitted": _shown(one.fitted_deg, one.shown),
     }
     if not tested:
-        return row | {name: _shown(error, one.slides) for name, error in one.baselines_deg.items()}
+        return row | {name: _shown(error, one.shown) for name, error in one.baselines_deg.items()}
     if not one.unseen_logs:
         return row
     whole = {THE_FIT: one.unseen_deg} | one.baselines_deg
     # one log, or a few, cannot tell: the numbers stand there alone
-    row[WHOLE] = _beside_best(whole, one.compared_whole, one.slides, least=LEAST_BLOCKS)
+    row[WHOLE] = _beside_best(whole, one.compared_whole, one.shown, least=LEAST_BLOCKS)
     for i, seconds in enumerate(HORIZONS):
         errors = {name: errors[i] for name, errors in one.horizons_deg.items()}
         compared = {name: comparisons[i] for name, comparisons in one.compared.items()}
-        row[column_of(seconds)] = _beside_best(errors, compared, one.slides) if errors else None
+        row[column_of(seconds)] = _beside_best(errors, compared, one.shown) if errors else None
     return row
 
 
 def _beside_best(
     errors: Mapping[str, float | None],
     compared: Mapping[str, Comparison],
-    slides: bool,
+    shown: Display,
     least: int = 0,
 ) -> str | None:
     """Return the fit's error beside that of the best simple model, as "2.1 (2.3) cannot be told".
@@ -112,7 +113,7 @@ def _beside_best(
         return None
     best = min(simple, key=simple.__getitem__)
     fit = errors[THE_FIT]
-    scale = 1e3 * np.radians(1.0) if slides else 1.0
+    scale = shown.of_degrees(1.0)
     if fit is None:
         return f"diverged ({two_digits(scale * simple[best])})"
     ours, theirs = told_apart(scale * fit, scale * simple[best])
@@ -120,11 +121,11 @@ def _beside_best(
     return f"{ours} ({theirs}){word}"
 
 
-def _shown(error: float | None, slides: bool) -> Cell:
-    """Return an error [deg] as a table shows it, of a joint that slides in mm."""
+def _shown(error: float | None, shown: Display) -> Cell:
+    """Return an error [deg] as a table shows it, in the unit in which its joint is shown."""
     if error is None:
         return None
-    return Given(two_digits(1e3 * np.radians(error) if slides else error))
+    return Given(two_digits(shown.of_degrees(error)))
 
 
 def left_out_table(
@@ -132,15 +133,18 @@ def left_out_table(
 ) -> Table:
     """Return a table of rows by key, with a further column for each joint of their `left_out_deg`."""
     keys = dict[str, str]()  # of the joints' columns: a joint may be called as one of `columns`
-    slides = {arm.joint_names[joint - 1] for joint in arm.slides}
+    sliding = {joint.name for joint in arm.joints if joint.slides}
     cells = list[dict[str, Cell]]()
     for row in rows:
         cells.append(dict(row))
         for name, error in row.get("left_out_deg", {}).items():
             key = f"left_out_deg.{name}"
             keys[key] = name
-            shown = _shown(error, name in slides)
-            cells[-1][key] = shown if shown is None or name not in slides else f"{shown:g} mm"
+            shown = display(slides=name in sliding)
+            cell = _shown(error, shown)
+            if cell is not None and name in sliding:  # the note says that the others are in deg
+                cell = f"{cell:g} {shown.unit}"
+            cells[-1][key] = cell
     return Table.of(title, columns | keys, cells, note + _LEFT_OUT)
 
 
@@ -162,11 +166,10 @@ def horizon_section(fits: Verdicts) -> Section | None:
             whole = {THE_FIT: one.unseen_deg} | one.baselines_deg
             for name, errors in one.horizons_deg.items():
                 of = short_name(fit) if name == THE_FIT and len(fits) > 1 else name
-                unit = "mm" if one.slides else "deg"
-                row: dict[str, Cell] = {"joint": one.name, "of": of, "unit": unit}
+                row: dict[str, Cell] = {"joint": one.name, "of": of, "unit": one.shown.unit}
                 for seconds, error in zip(HORIZONS, errors, strict=True):
-                    row[column_of(seconds)] = _shown(error, one.slides)
-                row[WHOLE] = _shown(whole[name], one.slides)
+                    row[column_of(seconds)] = _shown(error, one.shown)
+                row[WHOLE] = _shown(whole[name], one.shown)
                 if row not in rows:  # the simple models of fits to the same logs are the same
                     rows.append(row)
     names = ("joint", "of", "unit", *map(column_of, HORIZONS), WHOLE)
@@ -262,7 +265,8 @@ def worst(verdicts: Sequence[JointVerdict]) -> str:
     one = max(verdicts, key=_size)
     if not np.isfinite(_error(one)):
         return f"Worst: {one.name}, whose simulation diverges."
-    scale, unit = (1e3 * np.radians(1.0), "mm") if one.slides else (1.0, "deg")
+    scale = one.shown.of_degrees(1.0)
+    unit = one.shown.unit
     good = f"{two_digits(scale * one.tolerance_deg)} {unit} (by default 2 % of its travel)"
     # a joint without simple models has no logs either, and nothing beside it
     error, least = told_apart(scale * _error(one), scale * min(one.baselines_deg.values(), default=0.0))

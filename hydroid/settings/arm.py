@@ -20,6 +20,7 @@ from hydroid.quantity_table import CHOICES
 from hydroid.settings.cylinder import LinearActuator, make_cylinder
 from hydroid.settings.linkage import DIGITS, Cylinder, RotaryActuator
 from hydroid.settings.load import Settings, load
+from hydroid.units import Display, display
 
 Actuator: TypeAlias = LinearActuator | RotaryActuator
 
@@ -60,6 +61,11 @@ class Joint:
             return self.range
         low, high = self.range
         return math.radians(low), math.radians(high)
+
+    @property
+    def shown(self) -> Display:
+        """How a reader is shown where it is: its angle in deg, or its position in mm."""
+        return display(slides=self.slides)
 
     @property
     def may_stand_in(self) -> bool:

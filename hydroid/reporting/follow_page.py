@@ -29,17 +29,18 @@ def follow_page(name: str, followed: Followed, arm: Arm) -> Page:
     columns = [joint - 1 for joint in followed.joints]
     moving = Prediction(name, followed.log, followed.joints, followed.angle[:, columns], {}, None)
     motion = motion_section(arm, {"the path": moving}, _MOTION)
-    tabs = tuple(
-        Plot(f"joint_{joint}", arm.joint_names[joint - 1], partial(_chart, followed, joint, arm), True)
-        for joint in followed.joints
-    )
+    tabs = list[Plot]()
+    for joint in followed.joints:
+        name_of_joint = arm.joint_names[joint - 1]
+        draw = partial(_chart, followed, joint, arm)
+        tabs.append(Plot(f"joint_{joint}", name_of_joint, draw, zoom=True, button=name_of_joint))
     sections = (
         Section(table.title, "", tuple(missed_lines(followed, arm)), {"tracking": table}),
         *([motion] if motion else []),
         Section(
             "Joint by joint",
             "Wished and predicted angle, the error with its band, and the command.",
-            tabs=tabs,
+            tabs=tuple(tabs),
         ),
     )
     return Page(name, f"Commands for {arm.name}", _lead(followed, arm), sections, ())

@@ -20,6 +20,7 @@ from hydroid.log import Log
 from hydroid.posterior.band import Band, fitted_bands, prediction_bands
 from hydroid.prediction import predict, predict_with_pressures
 from hydroid.progress import LOGGER
+from hydroid.units import display
 from hydroid.words import listed, three_digits
 
 if TYPE_CHECKING:
@@ -121,13 +122,12 @@ class Prediction:
         number = named.get(joint, joint) if isinstance(joint, str) else joint
         if number not in self.joints:
             raise KeyError(f"no joint {joint!r} is predicted; there {_are(self._named)}")
-        slides = number in self.slides
-        factor = 1e3 if slides else degrees(1.0)
+        _, unit, factor = display(slides=number in self.slides)
         column = self.joints.index(number)
         band = self.bands.get(number)
         return JointPrediction(
             name=self._named[column],
-            unit="mm" if slides else "deg",
+            unit=unit,
             time=self.log.time,
             measured=factor * self.log.angle[:, number - 1],
             response=factor * self.response[:, column],

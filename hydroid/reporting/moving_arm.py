@@ -14,6 +14,7 @@ import numpy as np
 from hydroid.arrays import Array, record
 from hydroid.fitting.validation import Prediction
 from hydroid.reporting.outlines import Shape, body_poses, shapes, sight
+from hydroid.units import display
 
 MOST = 1200
 """moments of all logs of a page together"""
@@ -185,5 +186,5 @@ def _errors(
     for joint in compared:
         slides = model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE
         units[names[joint]] = " mm" if slides else "°"
-        errors[names[joint]] = (1e3 if slides else np.degrees(1.0)) * error[:, joint]
+        errors[names[joint]] = display(slides=slides).factor * error[:, joint]
     return errors, units

@@ -284,26 +284,34 @@ def next_step(
     files = shlex.join(dict.fromkeys(str(log_file(one.log.source)) for one in fitted))
     joints = [one.name for one in verdicts if one.verdict is Verdict.UNTESTED]
     if summary.ending == Ending.TIME.value:
-        command = f"hydroid fit-{summary.stage} {files} --config {run}/config.yaml --out {run} --resume"
         kind = "go on"
+        command = f"hydroid fit-{summary.stage} {files} --config {run}/config.yaml --out {run} --resume"
     elif summary.stage == "mech":
-        kind, command = "fit the hydraulics", f"hydroid fit-hyd {files} --mech {run}"
+        kind = "fit the hydraulics"
+        command = f"hydroid fit-hyd {files} --mech {run}"
     elif joints:
-        kind, command = "predict unseen", f"hydroid validate OTHER.csv --fit {run}"
+        kind = "predict unseen"
+        command = f"hydroid validate OTHER.csv --fit {run}"
     elif all(one.verdict is Verdict.PREDICTS for one in verdicts):
-        kind, command = "use the machine", f"hydroid simulate COMMANDS.csv --fit {run}"
-    elif joints := [
-        one.name
-        for one in verdicts
-        if one.verdict is not Verdict.PREDICTS
-        and (one.unseen_deg or 0.0) > WORSE * (one.expected_deg or np.inf)
-    ]:
-        kind, command = "machine changed", f"hydroid adapt UNSEEN.csv --fit {run}"
+        kind = "use the machine"
+        command = f"hydroid simulate COMMANDS.csv --fit {run}"
+    elif joints := [one.name for one in verdicts if _worse_than_expected(one)]:
+        kind = "machine changed"
+        command = f"hydroid adapt UNSEEN.csv --fit {run}"
     elif joints := _too_short(verdicts):
-        kind, command = "test longer", f"hydroid validate OTHER.csv --fit {run}"
+        kind = "test longer"
+        command = f"hydroid validate OTHER.csv --fit {run}"
     else:
-        kind, command = "look for terms", f"hydroid suggest --fit {run}"
+        kind = "look for terms"
+        command = f"hydroid suggest --fit {run}"
     return Finding(kind, "note", tuple(joints), {"command": command})
+
+
+def _worse_than_expected(one: JointVerdict) -> bool:
+    """Return whether a fit fails unseen logs by more than its fitted logs let expect."""
+    if one.verdict is Verdict.PREDICTS or one.unseen_deg is None or not one.expected_deg:
+        return False
+    return one.unseen_deg > WORSE * one.expected_deg
 
 
 def _too_short(verdicts: Sequence[JointVerdict]) -> list[str]:

@@ -35,20 +35,31 @@ class Motion:
 
 def simulated_motion(model: IdentifiedModel, logs: Mapping[str, Log]) -> Motion:
     """Simulate the commands of logs, by the name of the arm that they move (`Machine.sides`)."""
-    arm, first = model.settings.arm, next(iter(logs.values()))
+    arm = model.settings.arm
     machine = load_machine(arm, pair=ALONE not in logs)
     for log in logs.values():
         if not log.driven.any():
             raise SettingsError("commands nothing", log.source, "name a log with commands")
     simulated = {side: predict_log(model, log).angle for side, log in logs.items()}
-    errors = [
-        (log.angle - simulated[side])[:, log.driven & _moves(log.angle)].ravel() for side, log in logs.items()
-    ]
-    rest, error = arm.pose(model.settings.start_pose), np.concatenate(errors)
+    rest = arm.pose(model.settings.start_pose)
     moved = {side: log.posed for side, log in logs.items() if _moves(log.angle).any()}
     measured = machine.joined(simulated | moved, rest) if moved else None
-    size = np.degrees(rms(error)) if error.size else np.nan
-    return Motion(machine, first.time, machine.joined(simulated, rest), measured, size)
+    time = next(iter(logs.values())).time
+    error = _rms_error(logs, simulated)
+    return Motion(machine, time, machine.joined(simulated, rest), measured, error)
+
+
+def _rms_error(logs: Mapping[str, Log], simulated: Mapping[str, Array]) -> float:
+    """Return the rms difference [deg] of simulated angles [rad], (T, J), and the measured ones."""
+    errors = list[Array]()
+    for side, log in logs.items():
+        compared = log.driven & _moves(log.angle)
+        difference = log.angle - simulated[side]
+        errors.append(difference[:, compared].ravel())
+    error = np.concatenate(errors)
+    if not error.size:
+        return np.nan
+    return float(np.degrees(rms(error)))
 
 
 def _moves(angle: Array) -> Mask:
@@ -94,7 +105,8 @@ class Sliders:
     pose.
     """
 
-    duration, ghost = np.inf, None
+    duration = np.inf
+    ghost = None
 
     @property
     def region(self) -> Region:
@@ -102,9 +114,12 @@ class Sliders:
         return region_of(self.model, self.data.qpos[None])
 
     def __init__(self, plant: Plant, pose: str | None = None) -> None:
-        self.plant, self._start = plant, pose
+        self.plant = plant
+        self._start = pose
         self.restart()
-        self.model, self.data = plant.model, plant.data  # of the plant in its pose, where it locks joints
+        # a plant that locks joints has a model of its own in each pose: take it after the reset
+        self.model = plant.model
+        self.data = plant.data
 
     def restart(self) -> None:
         """Go back to the start."""
@@ -116,7 +131,8 @@ class Sliders:
         plant = self.plant
         while plant.time + plant.period <= until + 1e-9:
             plant.step(plant.command)
-        place(plant.model, plant.data, plant.data.qpos)  # `mj_step` leaves what is drawn a step behind
+        # `mj_step` leaves what is drawn a step behind
+        place(plant.model, plant.data, plant.data.qpos)
         self.time = plant.time
 
 
@@ -127,13 +143,17 @@ class Replay:
     def region(self) -> Region:
         """Where the machine and its ghost are in the course of the motion."""
         motion = self._motion
-        angles = [motion.simulated] if motion.measured is None else [motion.simulated, motion.measured]
         moments = np.unique(np.linspace(0, len(motion.time) - 1, MOMENTS).round().astype(int))
-        return region_of(self.model, np.concatenate([one[moments] for one in angles]))
+        angles = [motion.simulated[moments]]
+        if motion.measured is not None:
+            angles.append(motion.measured[moments])
+        return region_of(self.model, np.concatenate(angles))
 
     def __init__(self, motion: Motion) -> None:
-        self.model, self._motion = motion.machine.model, motion
-        self.data, self.duration = mujoco.MjData(self.model), float(motion.time[-1])
+        self._motion = motion
+        self.model = motion.machine.model
+        self.data = mujoco.MjData(self.model)
+        self.duration = float(motion.time[-1])
         self.ghost = None if motion.measured is None else mujoco.MjData(self.model)
         self.restart()
 

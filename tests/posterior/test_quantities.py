@@ -143,7 +143,7 @@ def test_commands_that_are_on_or_off_tell_nothing_of_what_lies_between():
     estimate = Bindings(one.settings).candidates(one.theta[None])
     found = measured(bench, estimate)
     columns = [column for column, _ in joint_measure(bench, estimate)(estimate)]
-    points = [column.at for column in columns if column.name == "speed"]
+    points = [column.at or 0.0 for column in columns if column.name == "speed"]
     assert [point for point in points if point > 0] == [100.0]
     assert len([point for point in points if point < 0]) == 11
     assert {"joint2_speed_50_negative", "joint2_gain_negative", "joint2_speed_100_positive"} <= set(found)

@@ -151,7 +151,7 @@ def test_a_parameter_is_one_line_of_words_with_its_interval():
     expected = {
         "quantity": "torque per command",
         "symbol": "K",
-        "value": "0.2500",
+        "value": "0.25",
         "interval": "0.20 to 0.31",
     }
     assert row.items() >= expected.items()

@@ -6,7 +6,9 @@ import pytest
 
 import hydroid
 from hydroid.errors import SettingsError
+from hydroid.estimate import read_estimate
 from hydroid.problem.bindings import Bindings
+from hydroid.settings.document import read_yaml
 from hydroid.settings.fit import FitSettings, StudySettings
 from hydroid.settings.load import load, parse_override
 from hydroid.settings.log import ColumnMap, LogSettings
@@ -256,3 +258,14 @@ def test_a_joint_inherits_what_it_does_not_say() -> None:
     assert settings.columns("angle", 3) == ColumnMap(("elbow",), "rad")
     assert settings.columns("command", 4) is None
     assert settings.columns("angle", 4) is None
+
+
+def test_an_estimate_may_be_larger_than_settings(tmp_path: Path):
+    """It has a covariance of all parameters, which of a hundred of them is 300 KiB."""
+    file = tmp_path / "estimate.yaml"
+    file.write_text("parameters:\n" + "".join(f"  P_{number}: 0.25{' ' * 300}\n" for number in range(1000)))
+    with pytest.raises(SettingsError, match="larger than 256 KiB"):
+        read_yaml(file)
+    _, values, _ = read_estimate(file)
+    assert len(values) == 1000
+    assert set(values.values()) == {0.25}

@@ -158,7 +158,8 @@ class Ladder:
         own = whole.varied(whole.settings.of_estimate(step.estimate))
         theta = _begun(own, last, start.theta) if begun is None else begun
         likelihood = make_likelihood(own)
-        if own.settings.quasi_static != last.settings.quasi_static:
+        other_model = own.settings.quasi_static != last.settings.quasi_static
+        if other_model:
             if self._is_white():  # there is nothing for a model that is slow to simulate
                 return
             few = settings.changed({"iterations": FIRST})
@@ -166,8 +167,8 @@ class Ladder:
             theta = own.parameters.from_unit(first.point)
             if self._explained(own, theta) < 0.0:
                 return
-        # what a search ended at may be far from an optimum
-        far = not if_better or _new_curves(own, last)
+        # what a search, or another model, ended at may be far from an optimum
+        far = not if_better or other_model or _new_curves(own, last)
         how = refine_from_afar if far else refine
         result = self._refined(likelihood, theta, settings, step.changed(phase="on the way"), how)
         if self._late and if_better:

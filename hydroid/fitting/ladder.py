@@ -14,7 +14,7 @@ import numpy as np
 
 from hydroid.arrays import Array, record
 from hydroid.fitting.checkpoints import Checkpoints
-from hydroid.fitting.left_out import LeftOut, gain, is_better, predict_blocks
+from hydroid.fitting.left_out import LeftOut, gain, is_better, is_clear, predict_blocks
 from hydroid.fitting.multistart import alone, by_speeds, has_curve, lone_joints
 from hydroid.fitting.refinement import Refinement, refine, refine_from_afar
 from hydroid.fitting.step import Step, step_of
@@ -179,8 +179,9 @@ class Ladder:
             return
         without = self._left_out_of(last, self.refinements[start.name])
         with_it = self._left_out_of(own, result)
-        self.estimates[step.estimate] = new = replace(new, gained=gain(with_it, without))
-        if not self._late and is_better(with_it, without):
+        gained = gain(with_it, without)
+        self.estimates[step.estimate] = new = replace(new, gained=gained)
+        if not self._late and is_clear(*gained):
             self._keep(own, new, step)
 
     def _lone_terms(self, settings: FitSettings) -> dict[str, int]:

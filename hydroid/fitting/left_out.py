@@ -158,7 +158,11 @@ def is_better(after: LeftOut, before: LeftOut) -> bool:
 
     So does one that can be simulated where the other cannot.
     """
-    rise, error = gain(after, before)
+    return is_clear(*gain(after, before))
+
+
+def is_clear(rise: float, error: float) -> bool:
+    """Whether a gain and its standard error, as `gain` returns them, say that a model is better."""
     return rise > CERTAIN * error or rise == np.inf
 
 

@@ -1,4 +1,5 @@
-"""What the benchmarks share: options, tables, a clock, simulated logs of known truth, refits."""
+"""What the benchmarks share: options, tables, a clock, simulated logs of known truth,
+refits."""
 
 import argparse
 import sys
@@ -23,19 +24,32 @@ SPENT = "{:.0f} s, {:.0f} s of CPU"
 
 
 def options(text: str | None, **defaults: Any) -> Any:
-    """Parse the flags of a benchmark whose docstring is `text`; a list takes several, of names only these."""
-    parser = argparse.ArgumentParser(description=text, formatter_class=argparse.RawDescriptionHelpFormatter)
+    """Parse the flags of a benchmark whose docstring is `text`; a list takes several,
+    of names only these."""
+    parser = argparse.ArgumentParser(
+        description=text, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     for name, default in defaults.items():
-        first, nargs = (default[0], "*") if isinstance(default, list) else (default, None)
+        first, nargs = (
+            (default[0], "*") if isinstance(default, list) else (default, None)
+        )
         names = default if nargs and isinstance(first, str) else None
-        how: dict[str, Any] = {"type": type(first), "default": default, "nargs": nargs, "choices": names}
+        how: dict[str, Any] = {
+            "type": type(first),
+            "default": default,
+            "nargs": nargs,
+            "choices": names,
+        }
         how = {"action": "store_true"} if default is False else how
-        parser.add_argument(f"--{name.replace('_', '-')}", help=f"by default {default}", **how)
+        parser.add_argument(
+            f"--{name.replace('_', '-')}", help=f"by default {default}", **how
+        )
     return parser.parse_args()
 
 
 def table(header: str, line: str = "", *columns: Iterable[Any]) -> None:
-    """Print a table in Markdown: the header, then `line` with one value of every column in each row."""
+    """Print a table in Markdown: the header, then `line` with one value of every column
+    in each row."""
     print(f"\n| {header} |\n|{' --- |' * (1 + header.count('|'))}", flush=True)
     for cells in zip(*columns, strict=True):
         row(line.format(*cells))
@@ -53,7 +67,9 @@ class Clock:
 
     @property
     def seconds(self) -> tuple[float, float]:
-        return time.perf_counter() - self._begun[0], time.process_time() - self._begun[1]
+        return time.perf_counter() - self._begun[0], time.process_time() - self._begun[
+            1
+        ]
 
     def __str__(self) -> str:
         return SPENT.format(*self.seconds)
@@ -67,10 +83,11 @@ def pseudo_random_log(
     seed: int = 0,
     allowed: Callable[[Log], bool] = lambda log: True,
 ) -> Log:
-    """Make a log of random levels and dwells of joints (from 1), as in figure 17, every joint at rest.
+    """Make a log of random levels and dwells of joints (from 1), as in figure 17, every
+    joint at rest.
 
-    A level after which `allowed` is false of the log so far is turned round or reduced, as by an operator who
-    keeps the arm off its stops.
+    A level after which `allowed` is false of the log so far is turned round or reduced,
+    as by an operator who keeps the arm off its stops.
     """
     rng = np.random.default_rng(seed)
     samples = round(duration / period)
@@ -82,7 +99,14 @@ def pseudo_random_log(
             level = rng.uniform(-100.0, 100.0)
             for factor in (1.0, -1.0, 0.5, -0.5, 0.25, -0.25, 0.0):
                 command[start : start + dwell, joint - 1] = round(factor * level, 1)
-                if allowed(at_rest(pose, command[: min(start + dwell, samples)], period, "pseudo-random")):
+                if allowed(
+                    at_rest(
+                        pose,
+                        command[: min(start + dwell, samples)],
+                        period,
+                        "pseudo-random",
+                    )
+                ):
                     break
             start += dwell
     return at_rest(pose, command, period, "pseudo-random")
@@ -96,7 +120,8 @@ def true_log(
     pose: np.ndarray | None = None,
     limits: np.ndarray | None = None,
 ) -> Log:
-    """Return the response to pseudo-random commands of the outputs, kept within limits [rad], shape (2, J).
+    """Return the response to pseudo-random commands of the outputs, kept within limits
+    [rad], shape (2, J).
 
     By default it starts at the study pose and keeps off the stops.
     """
@@ -111,5 +136,7 @@ def true_log(
         return bool(np.all((angle > low) & (angle < high)))
 
     pose, joints = arm.pose("study") if pose is None else pose, list(settings.outputs)
-    drive = pseudo_random_log(pose, joints, seconds, settings.log.period_s, seed, inside)
+    drive = pseudo_random_log(
+        pose, joints, seconds, settings.log.period_s, seed, inside
+    )
     return simulate_log(settings, drive, truth)

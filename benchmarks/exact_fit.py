@@ -1,7 +1,8 @@
 """What is possible: a machine's own equations, fitted to its logs from the true values.
 
-Such a fit loses nothing to its model, its search or its choices, and shows what statistics alone leave. Its
-least squares are of innovations: the error of a joint is taken for a drift in noise.
+Such a fit loses nothing to its model, its search or its choices, and shows what
+statistics alone leave. Its least squares are of innovations: the error of a joint is
+taken for a drift in noise.
 """
 
 from collections.abc import Sequence
@@ -23,7 +24,8 @@ FACTORS = ("exponent", "full", "lag", "load", "stiff", "ratio", "draw", "droop")
 """numbers of a machine that a step of 1 multiplies by exp(0.1)"""
 LIMITS = {"dead": (0.0, 90.0), "friction": (0.0, 0.9), "lever": (-0.9, 0.9)}
 """A delay has none: below 0, a command acts before the sample that first shows it."""
-DIFFERENCE = 0.1  # step of a derivative: the supply is solved by halves, and has no smaller ones
+# step of a derivative: the supply is solved by halves, and has no smaller ones
+DIFFERENCE = 0.1
 SETTLED = 1e-3
 """relative fall of the sum of squares below which a fit ends"""
 MOST_STEPS = 20
@@ -39,13 +41,19 @@ def exact_fit(truth: Machine, recordings: Sequence[Recording]) -> Machine:
 
     def residual(steps: Array) -> Array:
         machine = moved(truth, places, steps)
-        rows = [w * innovations(machine, one) for w, one in zip(weights, recordings, strict=True)]
+        rows = [
+            w * innovations(machine, one)
+            for w, one in zip(weights, recordings, strict=True)
+        ]
         return np.concatenate([row.ravel() for row in rows])
 
     def jacobian(steps: Array) -> Array:
         here = residual(steps)
         changes = DIFFERENCE * np.eye(len(steps))
-        return np.column_stack([residual(steps + change) - here for change in changes]) / DIFFERENCE
+        return (
+            np.column_stack([residual(steps + change) - here for change in changes])
+            / DIFFERENCE
+        )
 
     end = least_squares(
         residual,
@@ -59,7 +67,8 @@ def exact_fit(truth: Machine, recordings: Sequence[Recording]) -> Machine:
 
 
 def respond(machine: Machine, recording: Recording) -> Array:
-    """Angles of STEP [rad], (S, J), under a log's commands, interpolated: they depend smoothly on delays."""
+    """Angles of STEP [rad], (S, J), under a log's commands, interpolated: they depend
+    smoothly on delays."""
     commands = [
         np.interp(recording.grid - delay, recording.time, command)
         for delay, command in zip(machine.delay, recording.command.T, strict=True)
@@ -70,7 +79,8 @@ def respond(machine: Machine, recording: Recording) -> Array:
 
 
 def innovations(machine: Machine, recording: Recording) -> Array:
-    """What is new in each error of a recording [rad], (T, J): r_k = (1 - K) r_{k-1} + e_k - e_{k-1}."""
+    """What is new in each error of a recording [rad], (T, J): r_k = (1 - K) r_{k-1} +
+    e_k - e_{k-1}."""
     error = errors(respond(machine, recording), recording.time, recording.angle)
     return np.asarray(lfilter([1.0, -1.0], [1.0, GAIN - 1.0], error, axis=0))
 
@@ -78,23 +88,30 @@ def innovations(machine: Machine, recording: Recording) -> Array:
 def numbers(m: Machine) -> list[Place]:
     """The numbers that a machine has."""
     every = [
-        (name, place) for name in (*SHIFTS, *FACTORS) for place in np.ndindex(np.shape(getattr(m, name)))
+        (name, place)
+        for name in (*SHIFTS, *FACTORS)
+        for place in np.ndindex(np.shape(getattr(m, name)))
     ]
     return [(name, place) for name, place in every if is_there(m, name, place)]
 
 
 def is_there(m: Machine, name: str, place: tuple[int, ...]) -> bool:
-    """Whether a number of a machine acts: no lever of a rotary actuator, no load of an upright axis."""
+    """Whether a number of a machine acts: no lever of a rotary actuator, no load of an
+    upright axis."""
     if name == "draw":
         return m.droop > 0
     if name == "load":
         return not m.vertical[place]
     of = {"ratio": "stiff"}.get(name, name)
-    return name not in ("lever", "stiff", "ratio", "droop") or np.asarray(getattr(m, of))[place] != 0
+    return (
+        name not in ("lever", "stiff", "ratio", "droop")
+        or np.asarray(getattr(m, of))[place] != 0
+    )
 
 
 def moved(truth: Machine, places: Sequence[Place], steps: Array) -> Machine:
-    """Return a machine whose numbers at P places are P steps, (P,), from the true ones."""
+    """Return a machine whose numbers at P places are P steps, (P,), from the true
+    ones."""
     machine = copy(truth)
     for name in (*SHIFTS, *FACTORS):
         setattr(machine, name, np.array(getattr(truth, name), float))

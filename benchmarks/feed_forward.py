@@ -1,13 +1,16 @@
-"""Commands computed from a fit, played on the true machine: how well do joints follow four paths?
+"""Commands computed from a fit, played on the true machine: how well do joints follow
+four paths?
 
-The machines are those of `make bench B=strangers`, which fits them first (`--machines 3`, same `--folder` and
-`--seed`): equations and integrator are not hydroid's. Each path lasts 20 s. It is followed
+The machines are those of `make bench B=strangers`, which fits them first (`--machines
+3`, same `--folder` and `--seed`): equations and integrator are not hydroid's. Each path
+lasts 20 s. It is followed
 
-- open loop: by `hydroid follow`, and by the inverses of nine numbers and of a table of speeds, which are
-  fitted to the same logs and look ahead by their own delay and lag;
-- with a proportional controller of the measured angles beside them, and by that controller alone. It asks for
-  speeds, which nine numbers turn into commands, dead band included; its gain is the best of six by the
-  fit's own plant with the noise of the logs, on the last path and alone.
+- open loop: by `hydroid follow`, and by the inverses of nine numbers and of a table of
+  speeds, which are fitted to the same logs and look ahead by their own delay and lag;
+- with a proportional controller of the measured angles beside them, and by that
+  controller alone. It asks for speeds, which nine numbers turn into commands, dead band
+  included; its gain is the best of six by the fit's own plant with the noise of the
+  logs, on the last path and alone.
 
 Errors are rms over all samples and the joints that a path moves.
 """
@@ -38,7 +41,8 @@ REACH = 0.3
 GAINS = (0.1, 0.2, 0.3, 0.45, 0.6, 0.8)
 """speed per error, times delay and lag"""
 QUIET = 0.01
-"""part of a top speed below which a controller asks for nothing: dead bands would chatter"""
+"""part of a top speed below which a controller asks for nothing: dead bands would
+chatter"""
 WAYS = ("the fit", "nine numbers", "speed tables", "no feed-forward")
 
 
@@ -59,12 +63,16 @@ class Case:
     def top(self) -> Array:
         """Speed of each joint that the logs show in both directions [rad/s], (J,)."""
         tables = [one.table for one in self.simple["speed tables"]]
-        return np.array([min(np.max(t[:, 1]), -np.min(t[:, 1])) for t in tables if t is not None])
+        return np.array(
+            [min(np.max(t[:, 1]), -np.min(t[:, 1])) for t in tables if t is not None]
+        )
 
     @property
     def late(self) -> Array:
         """Delay and lag of each joint, by nine numbers [s], (J,)."""
-        return np.array([one.delay + one.numbers[3].mean() for one in self.simple["nine numbers"]])
+        return np.array(
+            [one.delay + one.numbers[3].mean() for one in self.simple["nine numbers"]]
+        )
 
 
 def smooth(time: Array, begin: float, seconds: float) -> Array:
@@ -74,13 +82,20 @@ def smooth(time: Array, begin: float, seconds: float) -> Array:
 
 
 def there_and_back(time: Array, begin: float, seconds: float) -> Array:
-    return smooth(time, begin, 0.45 * seconds) - smooth(time, begin + 0.55 * seconds, 0.45 * seconds)
+    return smooth(time, begin, 0.45 * seconds) - smooth(
+        time, begin + 0.55 * seconds, 0.45 * seconds
+    )
 
 
 def ramps(time: Array, case: Case) -> Array:
     """Each joint in turn, out and back."""
     each = (SECONDS - REST) / case.machine.joints
-    return np.column_stack([there_and_back(time, REST + j * each, each) for j in range(case.machine.joints)])
+    return np.column_stack(
+        [
+            there_and_back(time, REST + j * each, each)
+            for j in range(case.machine.joints)
+        ]
+    )
 
 
 def digging(time: Array, case: Case) -> Array:
@@ -93,7 +108,9 @@ def together(time: Array, case: Case) -> Array:
     """Sines of different periods, all at once."""
     grown = smooth(time, REST, 3.0)
     periods = np.linspace(4.0, 9.0, case.machine.joints)
-    return np.column_stack([grown * np.sin(2 * np.pi * (time - REST) / one) for one in periods])
+    return np.column_stack(
+        [grown * np.sin(2 * np.pi * (time - REST) / one) for one in periods]
+    )
 
 
 def tip(time: Array, case: Case) -> Array:
@@ -124,12 +141,15 @@ PATHS: dict[str, Callable[[Array, Case], Array]] = {
 
 
 def path(case: Case, kind: str) -> Log:
-    """A path about the middle of the ranges, as fast as FULL says, or as far as REACH."""
+    """A path about the middle of the ranges, as fast as FULL says, or as far as
+    REACH."""
     time = np.arange(round(SECONDS / case.period), dtype=float) * case.period
     shape = PATHS[kind](time, case)
     half = REACH * np.ptp(case.machine.ends, axis=1)
     far = np.abs(shape).max(axis=0)
-    fast = np.abs(np.gradient(shape, case.period, axis=0)).max(axis=0) / (FULL * case.top)
+    fast = np.abs(np.gradient(shape, case.period, axis=0)).max(axis=0) / (
+        FULL * case.top
+    )
     with np.errstate(divide="ignore"):
         scale = np.minimum(np.where(far > 0, half / far, np.inf), 1.0 / fast)
     if kind == "tip on a line":  # both joints together, or it is no line
@@ -140,16 +160,21 @@ def path(case: Case, kind: str) -> Log:
 
 
 def inverse(one: Baseline, speed: Array) -> Array:
-    """Commands [%] at which a simple model has speeds [rad/s]; full ones where it has not."""
+    """Commands [%] at which a simple model has speeds [rad/s]; full ones where it has
+    not."""
     if one.table is not None:
         commands, speeds = one.table.T
         rising = np.sign(speeds[-1] - speeds[0])
         order = np.maximum.accumulate(rising * speeds)
-        return np.interp(rising * speed, order + 1e-12 * np.arange(len(order)), commands) * (speed != 0)
+        return np.interp(
+            rising * speed, order + 1e-12 * np.arange(len(order)), commands
+        ) * (speed != 0)
     dead, exponent, full = one.numbers[:3]
     side = np.where(speed / full[0] > 0, 0, 1)
     part = np.clip(np.abs(speed / full[side]), 0.0, 1.0) ** (1.0 / exponent[side])
-    return np.where(speed == 0, 0.0, (1.0 - 2.0 * side) * (dead[side] + (100.0 - dead[side]) * part))
+    return np.where(
+        speed == 0, 0.0, (1.0 - 2.0 * side) * (dead[side] + (100.0 - dead[side]) * part)
+    )
 
 
 def ahead(wished: Log, late: Array) -> Array:
@@ -157,45 +182,69 @@ def ahead(wished: Log, late: Array) -> Array:
     speed = np.diff(wished.angle, axis=0, append=wished.angle[-1:]) / wished.period
     columns = zip(speed.T, late, strict=True)
     return np.column_stack(
-        [np.interp(wished.time + lag, wished.time, one, right=0.0) for one, lag in columns]
+        [
+            np.interp(wished.time + lag, wished.time, one, right=0.0)
+            for one, lag in columns
+        ]
     )
 
 
 def simple_commands(case: Case, wished: Log, name: str) -> Array:
     """Commands [%], (T, J), by the inverse of simple models."""
     models = case.simple[name]
-    late = np.array([one.delay + (0.0 if one.table is not None else one.numbers[3].mean()) for one in models])
+    late = np.array(
+        [
+            one.delay + (0.0 if one.table is not None else one.numbers[3].mean())
+            for one in models
+        ]
+    )
     speeds = ahead(wished, late)
     speeds[np.abs(speeds) < 0.005 * case.top] = 0.0
-    return np.column_stack([inverse(one, speed) for one, speed in zip(models, speeds.T, strict=True)])
+    return np.column_stack(
+        [inverse(one, speed) for one, speed in zip(models, speeds.T, strict=True)]
+    )
 
 
-def play(case: Case, wished: Log, command: Array, gain: float, rng: np.random.Generator) -> Array:
-    """Angles of the true machine [rad], (T, J), under commands [%] and feedback with a gain [1/s]."""
+def play(
+    case: Case, wished: Log, command: Array, gain: float, rng: np.random.Generator
+) -> Array:
+    """Angles of the true machine [rad], (T, J), under commands [%] and feedback with a
+    gain [1/s]."""
     machine, count = case.machine, round(case.period / STEP)
-    carry, given = machine.at_rest(wished.angle[0]), np.zeros((len(command) * count, machine.joints))
+    carry, given = (
+        machine.at_rest(wished.angle[0]),
+        np.zeros((len(command) * count, machine.joints)),
+    )
     angle = np.empty_like(command)
     forward = ahead(wished, case.late) if command.any() else np.zeros_like(command)
     for k, one in enumerate(command):
         angle[k] = carry[0]
-        error = wished.angle[k] - angle[k] - rng.normal(0.0, machine.noise, machine.joints)
+        error = (
+            wished.angle[k] - angle[k] - rng.normal(0.0, machine.noise, machine.joints)
+        )
         at = slice(k * count, (k + 1) * count)
-        given[at] = np.clip(one + correction(case, forward[k], gain * error), -100.0, 100.0)
+        given[at] = np.clip(
+            one + correction(case, forward[k], gain * error), -100.0, 100.0
+        )
         machine.go_on(given[: at.stop], carry, at.start)
     return angle
 
 
 def correction(case: Case, forward: Array, more: Array) -> Array:
-    """What is added to commands [%] for more speed [rad/s] beside that which they already ask for."""
+    """What is added to commands [%] for more speed [rad/s] beside that which they
+    already ask for."""
     asked = np.where(np.abs(forward + more) < QUIET * case.top, 0.0, forward + more)
     before = np.where(np.abs(forward) < QUIET * case.top, 0.0, forward)
     models = case.simple["nine numbers"]
     pairs = zip(models, asked, before, strict=True)
-    return np.array([float(inverse(m, np.array(a)) - inverse(m, np.array(b))) for m, a, b in pairs])
+    return np.array(
+        [float(inverse(m, np.array(a)) - inverse(m, np.array(b))) for m, a, b in pairs]
+    )
 
 
 def tuned_gain(case: Case) -> float:
-    """The gain [1/s] with which the controller alone follows the last path best, on the fit's own plant."""
+    """The gain [1/s] with which the controller alone follows the last path best, on the
+    fit's own plant."""
     wished, plant = path(case, [*PATHS][-1]), Plant(case.model)
     late, found = float(case.late.max()), dict[float, float]()
     for part in GAINS:
@@ -203,7 +252,9 @@ def tuned_gain(case: Case) -> float:
         for k in range(len(wished.time) - 1):
             read = angle[-1] + rng.normal(0.0, case.machine.noise, case.machine.joints)
             error = part / late * (wished.angle[k] - read)
-            angle.append(plant.step(np.clip(correction(case, 0.0 * error, error), -100.0, 100.0)))
+            angle.append(
+                plant.step(np.clip(correction(case, 0.0 * error, error), -100.0, 100.0))
+            )
         found[part / late] = rms_of(np.array(angle), wished)
     return min(found, key=lambda gain: found[gain])
 
@@ -215,12 +266,15 @@ def rms_of(angle: Array, wished: Log) -> float:
 
 
 def run(folder: Path, seed: int, number: int) -> list[Any]:
-    """Follow every path on a machine; rows of a path with its errors, open loop and with feedback [deg]."""
+    """Follow every path on a machine; rows of a path with its errors, open loop and
+    with feedback [deg]."""
     run_folder = folder / f"{number:02d}" / "mine" / "runs" / "fit"
     machine = Machine(np.random.default_rng([seed, number]), number)
     baselines = load_record(run_folder).result.baselines
     names = WAYS[1:3]
-    simple = {name: [baselines[joint][name] for joint in sorted(baselines)] for name in names}
+    simple = {
+        name: [baselines[joint][name] for joint in sorted(baselines)] for name in names
+    }
     case = Case(machine, load_identified(run_folder), simple)
     gain, rows = tuned_gain(case), list[Any]()
     for kind in PATHS:
@@ -231,10 +285,18 @@ def run(folder: Path, seed: int, number: int) -> list[Any]:
             **{name: simple_commands(case, wished, name) for name in names},
             WAYS[3]: np.zeros_like(wished.angle),
         }
-        opened = [rms_of(play(case, wished, commands[name], 0.0, rng), wished) for name in WAYS[:3]]
-        closed = [rms_of(play(case, wished, commands[name], gain, rng), wished) for name in WAYS]
+        opened = [
+            rms_of(play(case, wished, commands[name], 0.0, rng), wished)
+            for name in WAYS[:3]
+        ]
+        closed = [
+            rms_of(play(case, wished, commands[name], gain, rng), wished)
+            for name in WAYS
+        ]
         rows.append((number, kind, opened, closed, len(found.missed)))
-        cells = [" ".join(f"{one:.2f}" for one in errors) for errors in (opened, closed)]
+        cells = [
+            " ".join(f"{one:.2f}" for one in errors) for errors in (opened, closed)
+        ]
         parts = f"{opened[0] / min(opened[1:]):.2f}", f"{closed[0] / closed[3]:.2f}"
         row(number, kind, *cells, *parts, len(found.missed), f"{gain:.1f}")
     return rows
@@ -253,7 +315,9 @@ def main() -> None:
     best = np.median(opened[:, 0] / opened[:, 1:].min(axis=1))
     alone = np.median(closed[:, 0] / closed[:, 3])
     middle = np.median(opened[:, 0]), np.median(closed[:, 0])
-    print(f"\nmedian of {len(rows)} paths: open loop {middle[0]:.2f} deg, {best:.2f} of the best other;")
+    print(
+        f"\nmedian of {len(rows)} paths: open loop {middle[0]:.2f} deg, {best:.2f} of the best other;"
+    )
     print(f"with P {middle[1]:.2f} deg, {alone:.2f} of P alone")
 
 

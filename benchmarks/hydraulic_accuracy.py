@@ -1,7 +1,8 @@
 """How exact the hydraulics are over the whole search space (takes minutes).
 
-One joint against Radau (rtol 1e-8) of the full coupled equations: feasible parameter sets drawn from 0.25 to
-2.5 times the article's values, 30 s of pseudo-random pulses, several sub-steps and MuJoCo steps.
+One joint against Radau (rtol 1e-8) of the full coupled equations: feasible parameter
+sets drawn from 0.25 to 2.5 times the article's values, 30 s of pseudo-random pulses,
+several sub-steps and MuJoCo steps.
 """
 
 import numpy as np
@@ -21,10 +22,14 @@ if __name__ == "__main__":
     pairs = [reference(candidates[i : i + 1], command, 1e-8) for i in range(sets)]  # pyright: ignore[reportArgumentType]
     exact, pressure = zip(*pairs, strict=True)
     angle, bar, errors = np.degrees(exact), 1e-5 * np.array(pressure), []
-    print(f"{sets} sets, 30 s, joint from {angle.min():.0f} to {angle.max():.0f} deg; Radau took {clock}")
+    print(
+        f"{sets} sets, 30 s, joint from {angle.min():.0f} to {angle.max():.0f} deg; Radau took {clock}"
+    )
     for steps, substeps in STEPS:
         seen: list = []
-        out = simulate(candidates, command, HydraulicSettings(substeps=substeps), steps, seen)
+        out = simulate(
+            candidates, command, HydraulicSettings(substeps=substeps), steps, seen
+        )
         error = np.degrees(out) - angle
         rms, worst = np.sqrt((error**2).mean(axis=1)), abs(error).max(axis=1)
         p = 1e-5 * np.stack([o.pressure[:, 0] for o, _ in seen], axis=1)

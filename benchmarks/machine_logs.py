@@ -1,14 +1,16 @@
-"""Logs and arms as the world has them: right, said in one line, refused, or wrong without a word.
+"""Logs and arms as the world has them: right, said in one line, refused, or wrong
+without a word.
 
     python benchmarks/machine_logs.py
     python benchmarks/machine_logs.py --follow 20
 
-The logs are written for the purpose (tests/helpers/field_logs.py). Without --follow they are read by what
-`hydroid init` writes. With it, the commands that `init` prints are followed: check, a fit of that budget, and
-validation on a second log; and then for twelve arms (tests/helpers/worlds.py), whose fits have three times
-the budget. A log is right if it is read rightly, and if the fit errs on the second log by at most a third of
-what standing still does (shown in brackets) [deg]. With another version of hydroid on PYTHONPATH the table is
-that of this version.
+The logs are written for the purpose (tests/helpers/field_logs.py). Without --follow
+they are read by what `hydroid init` writes. With it, the commands that `init` prints
+are followed: check, a fit of that budget, and validation on a second log; and then for
+twelve arms (tests/helpers/worlds.py), whose fits have three times the budget. A log is
+right if it is read rightly, and if the fit errs on the second log by at most a third of
+what standing still does (shown in brackets) [deg]. With another version of hydroid on
+PYTHONPATH the table is that of this version.
 """
 
 import argparse
@@ -32,8 +34,12 @@ from hydroid.settings.arm import load_arm
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--follow", type=int, metavar="SECONDS", help="budget of a fit of two joints")
-    parser.add_argument("--only", default="", help="a part of the names of logs and arms")
+    parser.add_argument(
+        "--follow", type=int, metavar="SECONDS", help="budget of a fit of two joints"
+    )
+    parser.add_argument(
+        "--only", default="", help="a part of the names of logs and arms"
+    )
     given = parser.parse_args()
     logging.getLogger("hydroid").setLevel(logging.CRITICAL)
     counts = Counter[str]()
@@ -45,7 +51,10 @@ def main() -> None:
 
         def show(what: str, verdict: str, line: str, folder: Path) -> None:
             counts[verdict] += 1
-            print(f"| {what} | {verdict} | {line.replace(f'{folder}/', '')[:150]} |", flush=True)
+            print(
+                f"| {what} | {verdict} | {line.replace(f'{folder}/', '')[:150]} |",
+                flush=True,
+            )
 
         for number, log in enumerate(FIELD_LOGS):
             if given.only not in log.name:
@@ -63,7 +72,10 @@ def main() -> None:
             folder = home / f"arm_{number}"
             folder.mkdir()
             show(name, *worlds.followed(world, folder, f"{3 * given.follow}s"), folder)
-    print(", ".join(f"{verdict}: {count}" for verdict, count in counts.items()), f"of {counts.total()}")
+    print(
+        ", ".join(f"{verdict}: {count}" for verdict, count in counts.items()),
+        f"of {counts.total()}",
+    )
 
 
 if __name__ == "__main__":

@@ -1,9 +1,11 @@
-"""How fast least squares may follow an error: the real excavator fitted with several memories.
+"""How fast least squares may follow an error: the real excavator fitted with several
+memories.
 
-Each begins at the estimate of `make excavator`, refined by output errors (a memory without end).
-Rms errors [deg] of the logs that are not fitted, by joint: of the change over 1, 5 and 10 s, and
-over whole logs. The shortest memory is as good as maximum likelihood here: the errors of this model
-last, so that their own model follows them from sample to sample.
+Each begins at the estimate of `make excavator`, refined by output errors (a memory
+without end). Rms errors [deg] of the logs that are not fitted, by joint: of the change
+over 1, 5 and 10 s, and over whole logs. The shortest memory is as good as maximum
+likelihood here: the errors of this model last, so that their own model follows them
+from sample to sample.
 """
 
 from collections.abc import Iterator
@@ -50,12 +52,16 @@ def unseen(problem: Problem, theta: Array) -> Iterator[list[float]]:
                 ahead = round(seconds / problem.logs[channel.log].period)
                 error = error[ahead:] - error[:-ahead]
             squares.setdefault(channel.joint, []).append(error**2)
-        yield [float(np.sqrt(np.mean(np.concatenate(each)))) for each in squares.values()]
+        yield [
+            float(np.sqrt(np.mean(np.concatenate(each)))) for each in squares.values()
+        ]
 
 
 def main() -> None:
     """Fit and show."""
-    given = options(__doc__, fit="runs/excavator/fit", memories=[0.05, 1.0, 2.5, 5.0, 10.0])
+    given = options(
+        __doc__, fit="runs/excavator/fit", memories=[0.05, 1.0, 2.5, 5.0, 10.0]
+    )
     settings = load(FOLDER / "fit.yaml", FitSettings, {})
     problem = problem_of(settings, "fit_*.csv")
     judged = problem_of(settings, "check_*.csv")
@@ -68,10 +74,18 @@ def main() -> None:
     rows = list[tuple[str, ...]]()
     for memory in (np.inf, *given.memories):
         clock = Clock()
-        theta = white if np.isinf(memory) else refined(replace(likelihood, memory=memory), white)
+        theta = (
+            white
+            if np.isinf(memory)
+            else refined(replace(likelihood, memory=memory), white)
+        )
         cpu = f"{clock.seconds[1]:.0f}"
-        for over, values in zip(("1 s", "5 s", "10 s", "whole logs"), unseen(judged, theta), strict=True):
-            rows.append((f"{memory:g}", over, *(f"{value:.2f}" for value in values), cpu))
+        for over, values in zip(
+            ("1 s", "5 s", "10 s", "whole logs"), unseen(judged, theta), strict=True
+        ):
+            rows.append(
+                (f"{memory:g}", over, *(f"{value:.2f}" for value in values), cpu)
+            )
     table(header, " | ".join(["{}"] * len(rows[0])), *zip(*rows, strict=True))
 
 

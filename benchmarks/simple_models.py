@@ -1,10 +1,12 @@
 """Simple models of a joint: which predicts unseen logs better?
 
-A joint's nine numbers (dead band, exponent, speed and lag of each direction, and a delay) are fitted to the
-squares of output errors, as the verdict has them, and then in three rounds to innovations: the noise and the
-drift are estimated from what they leave, and the numbers anew. The table of mean speeds with a delay stands
-beside them, and the curves at which a fit begins, fitted with delay and lag to what errors of the angle
-gain within 1.5 s (`hydroid.fitting.valve_start`). Rms errors [deg] of the logs that are not fitted.
+A joint's nine numbers (dead band, exponent, speed and lag of each direction, and a
+delay) are fitted to the squares of output errors, as the verdict has them, and then in
+three rounds to innovations: the noise and the drift are estimated from what they leave,
+and the numbers anew. The table of mean speeds with a delay stands beside them, and the
+curves at which a fit begins, fitted with delay and lag to what errors of the angle gain
+within 1.5 s (`hydroid.fitting.valve_start`). Rms errors [deg] of the logs that are not
+fitted.
 """
 
 from collections.abc import Sequence
@@ -17,7 +19,14 @@ from scipy.optimize import least_squares
 
 import hydroid
 from hydroid.arrays import Array
-from hydroid.fitting.baselines import LOWER, NAMES, SCALE, UPPER, Baseline, fit_baselines
+from hydroid.fitting.baselines import (
+    LOWER,
+    NAMES,
+    SCALE,
+    UPPER,
+    Baseline,
+    fit_baselines,
+)
 from hydroid.fitting.validation import HORIZONS, errors_ahead
 from hydroid.fitting.valve_start import fitted_valve
 from hydroid.log import Log
@@ -36,8 +45,11 @@ from hydroid.settings.fit import FitSettings
 SHOWN = (1.0, 5.0, 10.0)
 
 
-def error_model(logs: Sequence[Log], joint: int, limits: tuple[float, float]) -> ErrorModel:
-    """Return the error model of a joint's angle in logs, whose numbers are still to be estimated."""
+def error_model(
+    logs: Sequence[Log], joint: int, limits: tuple[float, float]
+) -> ErrorModel:
+    """Return the error model of a joint's angle in logs, whose numbers are still to be
+    estimated."""
     courses = list[Course]()
     first = 0
     for log in logs:
@@ -48,15 +60,21 @@ def error_model(logs: Sequence[Log], joint: int, limits: tuple[float, float]) ->
         way = travelled(angle, log.period)
         stops = at_stops(angle, limits, log.period)
         used = np.ones(len(angle), dtype=bool)
-        courses.append(Course(rows, 1.0, log.period, way, angle - angle[0], stops, readings, used))
+        courses.append(
+            Course(rows, 1.0, log.period, way, angle - angle[0], stops, readings, used)
+        )
     numbers = np.zeros((1, len(NUMBERS)))
     numbers[0, 0] = LEAST_NOISE["angle"] ** 2
     numbers[0, -1] = SHORTEST
     of = (0,) * len(logs)
-    return ErrorModel((Signal(joint, "angle"),), numbers, tuple(courses), of, np.array([np.nan]))
+    return ErrorModel(
+        (Signal(joint, "angle"),), numbers, tuple(courses), of, np.array([np.nan])
+    )
 
 
-def by_innovations(model: Baseline, logs: Sequence[Log], limits: tuple[float, float]) -> Baseline:
+def by_innovations(
+    model: Baseline, logs: Sequence[Log], limits: tuple[float, float]
+) -> Baseline:
     """Return nine numbers that are refitted to the innovations of what they leave."""
     errors = error_model(logs, model.joint, limits)
     x = np.array([*model.numbers.ravel(), model.delay])
@@ -74,15 +92,21 @@ def by_innovations(model: Baseline, logs: Sequence[Log], limits: tuple[float, fl
     return made(x)
 
 
-def show(name: str, how: str, model: Baseline, logs: Sequence[Log], clock: Clock) -> None:
+def show(
+    name: str, how: str, model: Baseline, logs: Sequence[Log], clock: Clock
+) -> None:
     whole = np.degrees(np.sqrt(np.mean(model.errors(logs) ** 2)))
-    ahead = np.concatenate([errors_ahead(log, lambda part: model.errors([part])) for log in logs])
+    ahead = np.concatenate(
+        [errors_ahead(log, lambda part: model.errors([part])) for log in logs]
+    )
     rms = np.degrees(np.sqrt(np.nanmean(ahead**2, axis=0)))
     cells = [f"{rms[HORIZONS.index(seconds)]:.2f}" for seconds in SHOWN]
     row(name, how, *cells, f"{whole:.2f}", clock)
 
 
-def compare(settings: FitSettings, fitted: Sequence[Log], unseen: Sequence[Log]) -> None:
+def compare(
+    settings: FitSettings, fitted: Sequence[Log], unseen: Sequence[Log]
+) -> None:
     for joint in settings.outputs:
         limits = [*settings.arm.ranges.values()][joint - 1]
         name = settings.arm.joint_names[joint - 1]
@@ -96,19 +120,31 @@ def compare(settings: FitSettings, fitted: Sequence[Log], unseen: Sequence[Log])
         clock = Clock()
         valve = fitted_valve(fitted, joint)
         if valve is not None:
-            show("", "changes of angles: curves", valve.baseline(joint, limits), tests, clock)
+            show(
+                "",
+                "changes of angles: curves",
+                valve.baseline(joint, limits),
+                tests,
+                clock,
+            )
 
 
 if __name__ == "__main__":
     options(__doc__)
-    table(f"joint | fitted to | {' | '.join(f'{s:g} s' for s in SHOWN)} | whole logs | time, from the start")
+    table(
+        f"joint | fitted to | {' | '.join(f'{s:g} s' for s in SHOWN)} | whole logs | time, from the start"
+    )
     folder = EXAMPLES / "excavator"
     excavator = hydroid.load_settings(folder / "fit.yaml")
-    logs = [hydroid.read_logs(sorted(folder.glob(f"{kind}_*.csv")), excavator) for kind in ("fit", "check")]
+    logs = [
+        hydroid.read_logs(sorted(folder.glob(f"{kind}_*.csv")), excavator)
+        for kind in ("fit", "check")
+    ]
     compare(excavator, *logs)
     rig = hydroid.load_settings("fit-hyd")
     first, second = (
-        hydroid.read_logs([EXAMPLES / "logs" / f"rig_shoulder_{number}.csv"], rig) for number in (1, 2)
+        hydroid.read_logs([EXAMPLES / "logs" / f"rig_shoulder_{number}.csv"], rig)
+        for number in (1, 2)
     )
     compare(rig, first, second)
     compare(rig, second, first)

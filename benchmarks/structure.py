@@ -1,14 +1,16 @@
-"""The shape of the code, beside what it may be at most; with `--packages`, every package by itself.
+"""The shape of the code, beside what it may be at most; with `--packages`, every
+package by itself.
 
-`--worst N` names the N functions of most complexity and the N statements of most syntax nodes;
-`--files` the figures of every file; a name of a package or file restricts both.
+`--worst N` names the N functions of most complexity and the N statements of most syntax
+nodes; `--files` the figures of every file; a name of a package or file restricts both.
 
-A line of code holds a token that is not a comment or a docstring. A comment has a line of its own.
-Tokens are names, operators, numbers and strings. The nodes of a statement are those of its syntax
-tree, without the statements inside it. The complexity of a function counts the ways through it:
-one, and one more for each branch, loop, handler, condition of a comprehension, conditional
-expression and operand of `and` and `or`. Its arguments are all but `self` and `cls`;
-those of a command are options, and are not counted.
+A line of code holds a token that is not a comment or a docstring. A comment has a line
+of its own. Tokens are names, operators, numbers and strings. The nodes of a statement
+are those of its syntax tree, without the statements inside it. The complexity of a
+function counts the ways through it: one, and one more for each branch, loop, handler,
+condition of a comprehension, conditional expression and operand of `and` and `or`. Its
+arguments are all but `self` and `cls`; those of a command are options, and are not
+counted.
 """
 
 import argparse
@@ -77,7 +79,9 @@ class Shape:
     """of each function"""
 
     def __add__(self, other: "Shape") -> "Shape":
-        return Shape(*(getattr(self, name) + getattr(other, name) for name in vars(self)))
+        return Shape(
+            *(getattr(self, name) + getattr(other, name) for name in vars(self))
+        )
 
     def per_thousand(self, count: int) -> float:
         return 1000 * count / max(self.code_lines, 1)
@@ -94,22 +98,52 @@ class Shape:
             "lines": (self.lines, ""),
             "tokens": (self.tokens, ""),
             "tokens a line of code": (self.tokens / max(self.code_lines, 1), "9"),
-            f"lines over {LONG_LINE} characters, %": (self.percent(self.long_lines), "0.5"),
+            f"lines over {LONG_LINE} characters, %": (
+                self.percent(self.long_lines),
+                "0.5",
+            ),
             "docstrings, % of lines": (self.percent(self.docstring_lines), ""),
             "comments, % of lines": (self.percent(self.comment_lines), "2 to 3"),
-            "comments beside code, % of lines": (self.percent(self.comments_beside), ""),
+            "comments beside code, % of lines": (
+                self.percent(self.comments_beside),
+                "",
+            ),
             "nodes a statement, mean": (float(np.mean(nodes)), ""),
-            "nodes a statement, 90th percentile": (float(np.percentile(nodes, 90)), "14"),
-            "nodes a statement, 99th percentile": (float(np.percentile(nodes, 99)), "25"),
+            "nodes a statement, 90th percentile": (
+                float(np.percentile(nodes, 90)),
+                "14",
+            ),
+            "nodes a statement, 99th percentile": (
+                float(np.percentile(nodes, 99)),
+                "25",
+            ),
             "complexity, mean": (float(np.mean(complexities)), "3.8"),
             "complexity, largest": (max(complexities), str(MOST_COMPLEX)),
             f"functions of complexity over {MOST_COMPLEX}": (too_complex, "0"),
-            f"functions of over {MOST_ARGUMENTS} arguments": (self.functions_of_many_arguments, "0"),
-            "comprehensions a thousand lines": (self.per_thousand(self.comprehensions), "35"),
-            "nested comprehensions a thousand lines": (self.per_thousand(self.nested_comprehensions), "1"),
-            "conditional expressions a thousand lines": (self.per_thousand(self.conditionals), "20"),
-            "nested conditionals a thousand lines": (self.per_thousand(self.nested_conditionals), "0"),
-            "a, b = x, y a thousand lines": (self.per_thousand(self.paired_assignments), "8"),
+            f"functions of over {MOST_ARGUMENTS} arguments": (
+                self.functions_of_many_arguments,
+                "0",
+            ),
+            "comprehensions a thousand lines": (
+                self.per_thousand(self.comprehensions),
+                "35",
+            ),
+            "nested comprehensions a thousand lines": (
+                self.per_thousand(self.nested_comprehensions),
+                "1",
+            ),
+            "conditional expressions a thousand lines": (
+                self.per_thousand(self.conditionals),
+                "20",
+            ),
+            "nested conditionals a thousand lines": (
+                self.per_thousand(self.nested_conditionals),
+                "0",
+            ),
+            "a, b = x, y a thousand lines": (
+                self.per_thousand(self.paired_assignments),
+                "8",
+            ),
         }
 
 
@@ -118,10 +152,16 @@ def shape(path: Path) -> Shape:
     tree = ast.parse(text)
     tokens = [*tokenize.generate_tokens(io.StringIO(text).readline)]
     documented = docstring_lines(tree)
-    comments = [t for t in tokens if t.type == tokenize.COMMENT and not DIRECTIVE.match(t.string)]
+    comments = [
+        t
+        for t in tokens
+        if t.type == tokenize.COMMENT and not DIRECTIVE.match(t.string)
+    ]
     alone = [t for t in comments if not t.line[: t.start[1]].strip()]
     code = [t for t in tokens if t.type in CODE_TOKENS]
-    code_lines = {line for t in code for line in range(t.start[0], t.end[0] + 1)} - documented
+    code_lines = {
+        line for t in code for line in range(t.start[0], t.end[0] + 1)
+    } - documented
     nodes = [*ast.walk(tree)]
     comprehensions = [node for node in nodes if isinstance(node, COMPREHENSIONS)]
     conditionals = [node for node in nodes if isinstance(node, ast.IfExp)]
@@ -166,10 +206,14 @@ def is_docstring(node: ast.AST) -> TypeGuard[ast.Expr]:
 
 def holds(node: ast.AST, kinds: type[ast.AST] | tuple[type[ast.AST], ...]) -> bool:
     """Return whether a node of these kinds stands inside another."""
-    return any(isinstance(inner, kinds) for inner in ast.walk(node) if inner is not node)
+    return any(
+        isinstance(inner, kinds) for inner in ast.walk(node) if inner is not node
+    )
 
 
-def is_nested(node: ast.ListComp | ast.SetComp | ast.DictComp | ast.GeneratorExp) -> bool:
+def is_nested(
+    node: ast.ListComp | ast.SetComp | ast.DictComp | ast.GeneratorExp,
+) -> bool:
     """Return whether a comprehension holds another, or has several `for`."""
     return len(node.generators) > 1 or holds(node, COMPREHENSIONS)
 
@@ -188,9 +232,11 @@ def statements(tree: ast.Module) -> list[ast.stmt]:
 
 
 def statement_nodes(statement: ast.stmt) -> int:
-    """Return the number of nodes of a statement, without those of the statements inside it.
+    """Return the number of nodes of a statement, without those of the statements inside
+    it.
 
-    What a node only carries along does not count: operators, and whether a name is read or written.
+    What a node only carries along does not count: operators, and whether a name is read
+    or written.
     """
     carried = (ast.expr_context, ast.operator, ast.unaryop, ast.cmpop, ast.boolop)
     count = 0
@@ -232,7 +278,10 @@ def arguments(function: Function) -> int:
 def imports(tree: ast.Module) -> Iterator[str]:
     for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom) and node.module:
-            yield from (node.module, *(f"{node.module}.{alias.name}" for alias in node.names))
+            yield from (
+                node.module,
+                *(f"{node.module}.{alias.name}" for alias in node.names),
+            )
         elif isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
 
@@ -242,7 +291,10 @@ def cycles(trees: dict[Path, ast.Module]) -> int:
     components)."""
     names = [".".join(path.relative_to(ROOT).with_suffix("").parts) for path in trees]
     names = [name.removesuffix(".__init__") for name in names]
-    taken = [set(imports(tree)) - {own} for own, tree in zip(names, trees.values(), strict=True)]
+    taken = [
+        set(imports(tree)) - {own}
+        for own, tree in zip(names, trees.values(), strict=True)
+    ]
     graph = np.array([[name in some for name in names] for some in taken])
     group_of = connected_components(graph, connection="strong")[1]
     return int(np.sum(np.bincount(group_of) > 1))
@@ -250,7 +302,9 @@ def cycles(trees: dict[Path, ast.Module]) -> int:
 
 def constants(tree: ast.Module) -> int:
     """Return the number of names in capitals at the top level of a file."""
-    assigned = (getattr(node, "targets", [getattr(node, "target", None)]) for node in tree.body)
+    assigned = (
+        getattr(node, "targets", [getattr(node, "target", None)]) for node in tree.body
+    )
     nodes = chain(*(ast.walk(target) for target in chain(*assigned) if target))
     names = [node.id for node in nodes if isinstance(node, ast.Name)]
     return sum(bool(re.fullmatch(r"_?[A-Z][A-Z0-9_]*", name)) for name in names)
@@ -265,24 +319,38 @@ def settings(kind: object, seen: set[object]) -> int:
         return sum(settings(part, seen) for part in getattr(kind, "__args__", ()))
     seen.add(kind)
     own = sum(name in kind.model_fields for name in kind.__annotations__)
-    return own + sum(settings(field.annotation, seen) for field in kind.model_fields.values())
+    return own + sum(
+        settings(field.annotation, seen) for field in kind.model_fields.values()
+    )
 
 
 def lines(folder: str) -> int:
-    return sum(len(path.read_text().splitlines()) for path in (ROOT / folder).rglob("*.py"))
+    return sum(
+        len(path.read_text().splitlines()) for path in (ROOT / folder).rglob("*.py")
+    )
 
 
 def whole_code(paths: Sequence[Path]) -> dict[str, tuple[float, str]]:
     """Return the figures of the code that no package has by itself."""
     trees = {path: ast.parse(path.read_text()) for path in paths}
-    functions = [node for tree in trees.values() for node in ast.walk(tree) if isinstance(node, Function)]
-    targets = re.findall(r"^([a-z][a-z-]*):(?!=)", (ROOT / "Makefile").read_text(), re.MULTILINE)
+    functions = [
+        node
+        for tree in trees.values()
+        for node in ast.walk(tree)
+        if isinstance(node, Function)
+    ]
+    targets = re.findall(
+        r"^([a-z][a-z-]*):(?!=)", (ROOT / "Makefile").read_text(), re.MULTILINE
+    )
     sizes = [len(path.read_text().splitlines()) for path in paths]
     return {
         "files": (len(paths), ""),
         "median file": (float(np.median(sizes)), ""),
         "largest file": (max(sizes), ""),
-        "largest function": (max((f.end_lineno or 0) - f.lineno + 1 for f in functions), ""),
+        "largest function": (
+            max((f.end_lineno or 0) - f.lineno + 1 for f in functions),
+            "",
+        ),
         "constants": (sum(map(constants, trees.values())), ""),
         "settings": (settings(FitSettings, set()), "130"),
         "commands": (len(COMMANDS), "14"),
@@ -319,7 +387,9 @@ def show_parts(parts: dict[str, Shape]) -> None:
     width = max(map(len, parts))
     print(" " * width, *(f"{name:>11}" for name in COLUMNS))
     for name, part in parts.items():
-        print(f"{name:{width}}", *(f"{value(part):11.4g}" for value in COLUMNS.values()))
+        print(
+            f"{name:{width}}", *(f"{value(part):11.4g}" for value in COLUMNS.values())
+        )
 
 
 def show_worst(paths: Sequence[Path], number: int) -> None:
@@ -344,9 +414,13 @@ def package(path: Path) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("names", nargs="*", help="packages or files [default: all]")
-    parser.add_argument("--packages", action="store_true", help="a line for every package")
+    parser.add_argument(
+        "--packages", action="store_true", help="a line for every package"
+    )
     parser.add_argument("--files", action="store_true", help="a line for every file")
-    parser.add_argument("--worst", type=int, default=0, metavar="N", help="the N worst places")
+    parser.add_argument(
+        "--worst", type=int, default=0, metavar="N", help="the N worst places"
+    )
     given = parser.parse_args()
     every = sorted(CODE.rglob("*.py"))
     chosen = {(CODE / name).resolve() for name in given.names}
@@ -354,11 +428,16 @@ def main() -> None:
     if not paths:
         parser.error("no such package or file")
     shapes = {path: shape(path) for path in paths}
-    show(sum(shapes.values(), Shape()).figures() | ({} if chosen else whole_code(every)))
+    show(
+        sum(shapes.values(), Shape()).figures() | ({} if chosen else whole_code(every))
+    )
     if given.packages:
         names = sorted({package(path) for path in paths})
         parts = {
-            name: sum((s for path, s in shapes.items() if package(path) == name), Shape()) for name in names
+            name: sum(
+                (s for path, s in shapes.items() if package(path) == name), Shape()
+            )
+            for name in names
         }
         show_parts(parts)
     if given.files:

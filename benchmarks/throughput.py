@@ -1,8 +1,9 @@
 """What a simulation costs, and what hydroid adds to it: ratios inside one run.
 
-A population (70 candidates, 7,500 steps, objectives included) against `mujoco.batch.Batch.rollout` alone
-on the same model and candidates, set up beforehand; `locked` against `passive`; both stages; how fast a plant
-steps, as a multiple of real time; and the excavator's derivatives in both models of stage 2.
+A population (70 candidates, 7,500 steps, objectives included) against
+`mujoco.batch.Batch.rollout` alone on the same model and candidates, set up beforehand;
+`locked` against `passive`; both stages; how fast a plant steps, as a multiple of real
+time; and the excavator's derivatives in both models of stage 2.
 
 --together: only how fast many plants, and environments of gymnasium, step in one call.
 """
@@ -32,24 +33,33 @@ ALL = list(range(1, 8))
 
 
 def make_problem(config: str, joints: list[int], other_joints: str) -> Problem:
-    """A problem whose data are commands of some joints, and stage 1's response to them at the truth."""
+    """A problem whose data are commands of some joints, and stage 1's response to them
+    at the truth."""
     settings = load_settings(config, {"simulation.other_joints": other_joints})
     log = pseudo_random_log(settings.arm.pose("study"), joints, duration=75.01)
-    return Problem(settings, [simulate_log(settings, log, TRUTH) if config == "article-mech" else log])
+    return Problem(
+        settings,
+        [simulate_log(settings, log, TRUTH) if config == "article-mech" else log],
+    )
 
 
 def population(problem: Problem) -> np.ndarray:
-    unit = np.random.default_rng(0).random((CANDIDATES, int(problem.parameters.free.sum())))
+    unit = np.random.default_rng(0).random(
+        (CANDIDATES, int(problem.parameters.free.sum()))
+    )
     return problem.parameters.from_unit(unit)
 
 
 def bare_rollout(problem: Problem) -> Callable[[], object]:
-    """Return MuJoCo's own rollout of the same candidates, written without hydroid's simulation."""
+    """Return MuJoCo's own rollout of the same candidates, written without hydroid's
+    simulation."""
     log, arm = problem.logs[0], problem.settings.arm
     candidates = problem.bindings.candidates(population(problem))
     passive = problem.settings.simulation.other_joints == "passive"
     moving = np.arange(log.joints) if passive else np.array([1])
-    reduced = lock(load_model(arm), arm, np.isin(range(log.joints), moving), log.angle[0])
+    reduced = lock(
+        load_model(arm), arm, np.isin(range(log.joints), moving), log.angle[0]
+    )
     reduced.model.qpos_spring[:] = log.angle[0, moving]
     batch = Batch(reduced.model, nsim=CANDIDATES)
     for name, value in reduced.inertials(candidates.mass).items():
@@ -67,7 +77,9 @@ def bare_rollout(problem: Problem) -> Callable[[], object]:
     def roll() -> None:
         batch.reset()
         batch.bind("qpos")[:] = log.angle[0, moving]
-        batch.rollout(steps, torque, mujoco.mjtState.mjSTATE_QFRC_APPLIED.value, out=out)
+        batch.rollout(
+            steps, torque, mujoco.mjtState.mjSTATE_QFRC_APPLIED.value, out=out
+        )
 
     return roll
 
@@ -84,19 +96,30 @@ def in_turn(calls: dict[str, Callable[[], object]]) -> dict[str, np.ndarray]:
 
 
 def derivatives(model: str) -> Callable[[], object]:
-    """Return the excavator's simulations of one Jacobian: candidates that differ in one parameter each."""
-    folder, steps = EXAMPLES / "excavator", {"simulation.steps_per_sample": 5} if model == "dynamic" else {}
+    """Return the excavator's simulations of one Jacobian: candidates that differ in one
+    parameter each."""
+    folder, steps = (
+        EXAMPLES / "excavator",
+        {"simulation.steps_per_sample": 5} if model == "dynamic" else {},
+    )
     settings = load_settings(folder / "fit.yaml", {"simulation.model": model} | steps)
-    problem = Problem(settings, read_logs(sorted(folder.glob("fit_0[12].csv")), settings))
+    problem = Problem(
+        settings, read_logs(sorted(folder.glob("fit_0[12].csv")), settings)
+    )
     theta = np.tile(problem.parameters.start, (int(problem.parameters.free.sum()), 1))
     theta[range(len(theta)), np.flatnonzero(problem.parameters.free)] += 1e-6
     return partial(problem.output_errors, theta)
 
 
 def plant_steps(joints: list[int], steps: int = 2000) -> tuple[float, float]:
-    """Return the seconds that a step of a plant with hydraulics on some joints takes, and its period."""
+    """Return the seconds that a step of a plant with hydraulics on some joints takes,
+    and its period."""
     plant = load_plant("article-hyd", overrides={"start_pose": "study"}, joints=joints)
-    commands = 30.0 * np.isin(ALL, joints) * np.sin(np.arange(steps)[:, None] / 50 + np.arange(7))
+    commands = (
+        30.0
+        * np.isin(ALL, joints)
+        * np.sin(np.arange(steps)[:, None] / 50 + np.arange(7))
+    )
 
     def run() -> None:
         plant.reset()
@@ -107,19 +130,26 @@ def plant_steps(joints: list[int], steps: int = 2000) -> tuple[float, float]:
 
 
 def together(model: str) -> tuple[float, float]:
-    """Return the steps per second of 64 plants in one call, and those of 64 environments (use.environment).
+    """Return the steps per second of 64 plants in one call, and those of 64
+    environments (use.environment).
 
     Two threads; an action is held for five steps, which count as one of an environment.
     """
     plant = load_plant(
-        "article-hyd", overrides={"start_pose": "study", "simulation.model": model}, joints=[2]
+        "article-hyd",
+        overrides={"start_pose": "study", "simulation.model": model},
+        joints=[2],
     )
-    batch = PlantBatch([Plant(plant.identified, joints=[2]) for _ in range(MACHINES)], threads=2)
+    batch = PlantBatch(
+        [Plant(plant.identified, joints=[2]) for _ in range(MACHINES)], threads=2
+    )
     envs = VectorEnv(plant.identified, MACHINES, draws=False, threads=2)
     envs.reset(seed=0)
     rng = np.random.default_rng(0)
     commands = 30.0 * rng.uniform(-1.0, 1.0, (50, MACHINES, 1)) * np.isin(ALL, [2])
-    actions = rng.uniform(-0.3, 0.3, (50, MACHINES, len(envs.joints))).astype(np.float32)
+    actions = rng.uniform(-0.3, 0.3, (50, MACHINES, len(envs.joints))).astype(
+        np.float32
+    )
 
     def step() -> None:
         for command in commands:
@@ -140,22 +170,40 @@ if __name__ == "__main__":
             plants, envs = together(name)
             row(f"{name} | {plants:.0f} | {envs:.0f}")
         raise SystemExit
-    problems = {name: make_problem("article-mech", [2], name) for name in ("passive", "locked")}
-    calls = {f"{name}, bare": bare_rollout(problem) for name, problem in problems.items()}
-    problems |= {f"hydraulics of {len(j)}": make_problem("article-hyd", j, "passive") for j in ([2], ALL)}
-    took = in_turn({name: partial(p.evaluate, population(p)) for name, p in problems.items()} | calls)
-    table("joints besides the shoulder | evaluation [s] | Batch.rollout alone [s] | ratio | evaluations/s")
+    problems = {
+        name: make_problem("article-mech", [2], name) for name in ("passive", "locked")
+    }
+    calls = {
+        f"{name}, bare": bare_rollout(problem) for name, problem in problems.items()
+    }
+    problems |= {
+        f"hydraulics of {len(j)}": make_problem("article-hyd", j, "passive")
+        for j in ([2], ALL)
+    }
+    took = in_turn(
+        {name: partial(p.evaluate, population(p)) for name, p in problems.items()}
+        | calls
+    )
+    table(
+        "joints besides the shoulder | evaluation [s] | Batch.rollout alone [s] | ratio | evaluations/s"
+    )
     for name in ("passive", "locked"):
         middle, alone = np.median(took[name]), took[f"{name}, bare"]
         ratio, rate = np.median(alone / took[name]), CANDIDATES / middle
-        row(f"{name} | {middle:.3f} | {np.median(alone):.3f} | {ratio:.3f} | {rate:.0f}")
+        row(
+            f"{name} | {middle:.3f} | {np.median(alone):.3f} | {ratio:.3f} | {rate:.0f}"
+        )
     table("evaluation of the seven-joint model | seconds | against Batch.rollout alone")
     for name in problems:
-        row(f"{name} | {np.median(took[name]):.3f} | {np.median(took[name] / took['passive, bare']):.2f}")
+        row(
+            f"{name} | {np.median(took[name]):.3f} | {np.median(took[name] / took['passive, bare']):.2f}"
+        )
     took = in_turn({model: derivatives(model) for model in ("dynamic", "quasi-static")})
     table("a Jacobian of the excavator | seconds | times as fast")
     for name, seconds in took.items():
-        row(f"{name} | {np.median(seconds):.3f} | {np.median(took['dynamic'] / seconds):.1f}")
+        row(
+            f"{name} | {np.median(seconds):.3f} | {np.median(took['dynamic'] / seconds):.1f}"
+        )
     table("joints with hydraulics | step [µs] | times real time")
     for some in ([2], ALL):
         step, period = plant_steps(some)

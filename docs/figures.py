@@ -1,10 +1,12 @@
-"""Figures of `make demo` and `make excavator` that the pages state: one file, and the pages' parts from it.
+"""Figures of `make demo` and `make excavator` that the pages state: one file, and the
+pages' parts from it.
 
     python docs/figures.py [runs]     # reads the runs, writes docs/figures.yaml and the marked parts of pages
     python docs/figures.py --pages    # writes the marked parts alone, from docs/figures.yaml
 
-A marked part stands between <!--=NAME--> and <!--/-->: NAME is one of PARTS, or leads to one number of the
-file by its keys, as rig.shoulder.unseen_deg does. It must not begin a line within a paragraph.
+A marked part stands between <!--=NAME--> and <!--/-->: NAME is one of PARTS, or leads
+to one number of the file by its keys, as rig.shoulder.unseen_deg does. It must not
+begin a line within a paragraph.
 """
 
 import re
@@ -30,10 +32,17 @@ from hydroid.words import listed, number
 
 ROOT = Path(__file__).parents[1]
 FILE = ROOT / "docs" / "figures.yaml"
-PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), ROOT / "examples/excavator/README.md")
+PAGES = (
+    ROOT / "README.md",
+    *sorted((ROOT / "docs").glob("*.md")),
+    ROOT / "examples/excavator/README.md",
+)
 HEAD = "# Written by `make figures` from the runs of `make demo` and `make excavator`; pages state them.\n"
 MARKED = re.compile(r"(<!--=([\w. ]+)-->)(.*?)(<!--/-->)", re.DOTALL)
-JOINTS = (("rig", "shoulder"), *(("excavator", joint) for joint in ("boom", "arm", "bucket", "swing")))
+JOINTS = (
+    ("rig", "shoulder"),
+    *(("excavator", joint) for joint in ("boom", "arm", "bucket", "swing")),
+)
 TIMES = (*map(column_of, JUDGED), WHOLE)
 """columns of the table of verdicts that the README's table has as rows"""
 
@@ -46,7 +55,10 @@ def collected(runs: Path) -> Figures:
     rig = _joints(stage_2)
     for one in stage_1.verdict:
         rig[one.name]["stage_1_deg"] = _rounded(one.fitted_deg)
-    quantities = {"stage 1": _quantities(stage_1.summary), "stage 2": _quantities(stage_2.summary)}
+    quantities = {
+        "stage 1": _quantities(stage_1.summary),
+        "stage 2": _quantities(stage_2.summary),
+    }
     parameters = {
         name: {
             "value": _rounded(one.value),
@@ -56,12 +68,22 @@ def collected(runs: Path) -> Figures:
         for name, one in stage_2.summary.estimate.items()
     }
     excavator = _joints(load_record(runs / "excavator" / "fit"))
-    return {"rig": rig, "excavator": excavator, "quantities": quantities, "parameters": parameters}
+    return {
+        "rig": rig,
+        "excavator": excavator,
+        "quantities": quantities,
+        "parameters": parameters,
+    }
 
 
 def _joints(record: Record) -> Figures:
-    """Return what the verdict says of each joint, and the mean absolute errors [deg]."""
-    joints, fitted, unseen = Figures(), record.result.fitted, [*record.validations.values()]
+    """Return what the verdict says of each joint, and the mean absolute errors
+    [deg]."""
+    joints, fitted, unseen = (
+        Figures(),
+        record.result.fitted,
+        [*record.validations.values()],
+    )
     shown = verdict_table({"": record.verdict})
     for one, cells in zip(record.verdict, shown.rows, strict=True):
         row = dict(zip(shown.header, cells, strict=True))
@@ -74,7 +96,10 @@ def _joints(record: Record) -> Figures:
             "unseen_mae_deg": _mean_absolute(unseen, one.joint),
             "inside_percent": _rounded(one.inside_percent),
             **{name: _rounded(error) for name, error in one.baselines_deg.items()},
-            "ahead": {name: [*map(_rounded, errors)] for name, errors in one.horizons_deg.items()},
+            "ahead": {
+                name: [*map(_rounded, errors)]
+                for name, errors in one.horizons_deg.items()
+            },
             "compared": {
                 name: [comparison.outcome.value for comparison in comparisons]
                 for name, comparisons in one.compared.items()
@@ -85,7 +110,11 @@ def _joints(record: Record) -> Figures:
 
 def _mean_absolute(predictions: Sequence[Prediction], joint: int) -> float | None:
     errors: list[Array] = [one.error(joint) for one in predictions]
-    return _rounded(float(np.degrees(np.abs(np.concatenate(errors)).mean()))) if errors else None
+    return (
+        _rounded(float(np.degrees(np.abs(np.concatenate(errors)).mean())))
+        if errors
+        else None
+    )
 
 
 def _quantities(summary: FitSummary) -> list[Figures]:
@@ -102,13 +131,17 @@ def _quantities(summary: FitSummary) -> list[Figures]:
 
 
 def _rounded(value: float | None) -> float | None:
-    """Return six digits: more than any page states, or a page would round what is rounded."""
+    """Return six digits: more than any page states, or a page would round what is
+    rounded."""
     return None if value is None else float(f"{value:.6g}")
 
 
 def at_a_glance(figures: Figures) -> str:
     """Return the README's table."""
-    lines = [["", "rig: shoulder", "excavator: boom", "arm", "bucket", "swing"], ["---"] * 6]
+    lines = [
+        ["", "rig: shoulder", "excavator: boom", "arm", "bucket", "swing"],
+        ["---"] * 6,
+    ]
     joints = [figures[machine][joint] for machine, joint in JOINTS]
     lines.append(["verdict", *(one["verdict"] for one in joints)])
     for name in TIMES:
@@ -143,7 +176,11 @@ def not_better(figures: Figures) -> str:
         for seconds in JUDGED:
             outcomes = {compared[name][HORIZONS.index(seconds)] for name in NAMES[1:]}
             # of several the one that says least for the fit
-            least = next(one for one in (Outcome.WORSE, Outcome.UNTOLD, Outcome.BETTER) if one in outcomes)
+            least = next(
+                one
+                for one in (Outcome.WORSE, Outcome.UNTOLD, Outcome.BETTER)
+                if one in outcomes
+            )
             at[least].append(f"{seconds:g}")
         exceptions += [
             f"the {joint} after {listed(at[outcome])} s ({outcome})"
@@ -159,9 +196,18 @@ def quantities(figures: Figures) -> str:
     lines = [["stage", "quantity", "value", "95 % interval"], ["---"] * 4]
     for stage, rows in figures["quantities"].items():
         for row in rows:
-            low, high = ("no limit" if end is None else number(end) for end in row["interval"])
+            low, high = (
+                "no limit" if end is None else number(end) for end in row["interval"]
+            )
             unit = f" [{row['unit']}]" if row["unit"] else ""
-            lines.append([stage, f"{row['label']}{unit}", number(row["value"]), f"{low} to {high}"])
+            lines.append(
+                [
+                    stage,
+                    f"{row['label']}{unit}",
+                    number(row["value"]),
+                    f"{low} to {high}",
+                ]
+            )
     return _table(lines)
 
 
@@ -204,7 +250,9 @@ def _error(value: float | None) -> str:
 
 
 def _table(lines: Sequence[Sequence[str]]) -> str:
-    rows = "\n".join(f"| {' | '.join(cells)} |".replace("|  |", "| |") for cells in lines)
+    rows = "\n".join(
+        f"| {' | '.join(cells)} |".replace("|  |", "| |") for cells in lines
+    )
     return f"\n\n{rows}\n\n"
 
 
@@ -222,7 +270,11 @@ def main(given: Sequence[str]) -> None:
             found = collected(Path(*given) if given else ROOT / "runs")
         except HydroidError as error:
             sys.exit(f"{error}; `make demo excavator` comes first")
-        write_atomic(FILE, HEAD + yaml.safe_dump(found, sort_keys=False, allow_unicode=True, width=110))
+        write_atomic(
+            FILE,
+            HEAD
+            + yaml.safe_dump(found, sort_keys=False, allow_unicode=True, width=110),
+        )
     figures = yaml.safe_load(FILE.read_text(encoding="utf-8"))
     for page, text in marked():
         write_atomic(page, filled(text, figures))

@@ -1,4 +1,5 @@
-"""The pictures of the documentation that show the demo's fits (`make demo` first; needs Chromium and OpenGL).
+"""The pictures of the documentation that show the demo's fits (`make demo` first; needs
+Chromium and OpenGL).
 
 python docs/pictures.py [runs/demo]      # docs/arm_moving.gif, docs/report.png, docs/report_*.png
 """
@@ -28,11 +29,27 @@ SHOTS = {
     "report": ("hyd/report.html", "", (1000, 1240), "light"),
     "report_phone": ("hyd/report.html", "", (400, 1000), "dark"),
     "report_motion": ("mech/report.html", ".beside", (1000, 420), "light"),
-    "report_speed": ("hyd/report.html", "Speed and valve against command", (1000, 760), "light"),
-    "report_step": ("hyd/report.html", "Step and frequency response", (1000, 860), "light"),
-    "report_residuals": ("hyd/report.html", "Are the residuals white?", (1000, 705), "dark"),
+    "report_speed": (
+        "hyd/report.html",
+        "Speed and valve against command",
+        (1000, 760),
+        "light",
+    ),
+    "report_step": (
+        "hyd/report.html",
+        "Step and frequency response",
+        (1000, 860),
+        "light",
+    ),
+    "report_residuals": (
+        "hyd/report.html",
+        "Are the residuals white?",
+        (1000, 705),
+        "dark",
+    ),
 }
-"""page, title of the section or a selector (without: the page's beginning), width and height [px], look"""
+"""page, title of the section or a selector (without: the page's beginning), width and
+height [px], look"""
 TOP = """(document.querySelector("%s".startsWith(".") ? "%s" : "none")
   ?? [...document.querySelectorAll("section, details")].find(
     (one) => one.querySelector("h2")?.textContent === "%s")
@@ -41,16 +58,20 @@ FOLD = 'document.querySelectorAll("details").forEach((one) => { one.open = false
 
 
 def moving(demo: Path) -> None:
-    """Film the arm with the fits of both stages, each over the ghost of a log that neither has seen."""
+    """Film the arm with the fits of both stages, each over the ghost of a log that
+    neither has seen."""
     log = read_logs(LOG, load_settings("fit-mech"))[0]
     motions = {
-        words: simulated_motion(load_identified(demo / name), {"alone": log}) for name, words in FITS.items()
+        words: simulated_motion(load_identified(demo / name), {"alone": log})
+        for name, words in FITS.items()
     }
     pictures: list[Image.Image] = []
     times = np.arange(*SPAN, 1 / RATE).tolist()
     for words, motion in motions.items():
         left = list(motions).index(words) * SIZE[0]
-        for k, shown in enumerate(rendered(motion, SIZE, ((time, "") for time in times))):
+        for k, shown in enumerate(
+            rendered(motion, SIZE, ((time, "") for time in times))
+        ):
             if len(pictures) <= k:
                 pictures.append(Image.new("RGB", (len(motions) * SIZE[0], SIZE[1])))
             pictures[k].paste(Image.fromarray(shown), (left, 0))
@@ -59,7 +80,12 @@ def moving(demo: Path) -> None:
             error = f"error {motion.error:.2g}° rms, {times[k]:.1f} s"
             draw.text((left + 10, 30), error, "#101010", ImageFont.load_default(14))
     frames = [one.quantize(COLORS, dither=Image.Dither.NONE) for one in pictures]
-    how = {"save_all": True, "append_images": frames[1:], "duration": 1000 // RATE, "loop": 0}
+    how = {
+        "save_all": True,
+        "append_images": frames[1:],
+        "duration": 1000 // RATE,
+        "loop": 0,
+    }
     frames[0].save(HERE / "arm_moving.gif", optimize=True, **how)
 
 
@@ -69,10 +95,14 @@ async def shots(demo: Path) -> None:
         tab = await connected(profile)
         for name, (page, title, (width, height), look) in SHOTS.items():
             await tab.load(demo / page, width, look)
-            top = await tab.value(TOP % (title, title, title) if title else f"{FOLD}, 0")
+            top = await tab.value(
+                TOP % (title, title, title) if title else f"{FOLD}, 0"
+            )
             file = HERE / f"{name}.png"
             file.write_bytes(await tab.shot(0, float(top), width, height))
-            Image.open(file).convert("RGB").quantize(128, dither=Image.Dither.NONE).save(file, optimize=True)
+            Image.open(file).convert("RGB").quantize(
+                128, dither=Image.Dither.NONE
+            ).save(file, optimize=True)
 
 
 if __name__ == "__main__":

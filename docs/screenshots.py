@@ -4,8 +4,8 @@
     python docs/screenshots.py --only fit-hyd validate
     python docs/screenshots.py --axe axe.min.js     # also asks axe-core, a checker of accessibility
 
-The reports come from small fits of the virtual rig's logs, made once in build/screenshots/runs. It needs
-Chromium. axe.min.js is in the package axe-core of npm.
+The reports come from small fits of the virtual rig's logs, made once in
+build/screenshots/runs. It needs Chromium. axe.min.js is in the package axe-core of npm.
 """
 
 import argparse
@@ -47,13 +47,19 @@ AXE = """axe.run({runOnly: ["wcag2a", "wcag2aa", "best-practice"]}).then((found)
 
 def main() -> None:
     """Make the reports that are missing, and take their pictures."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
     parser.add_argument("--out", type=Path, default=ROOT / "build/screenshots")
-    parser.add_argument("--only", nargs="+", choices=KINDS, default=list(KINDS), metavar="KIND")
+    parser.add_argument(
+        "--only", nargs="+", choices=KINDS, default=list(KINDS), metavar="KIND"
+    )
     parser.add_argument("--axe", type=Path, help="axe.min.js")
     asked = parser.parse_args()
     pages = {kind: page(kind, asked.out.resolve() / "runs") for kind in asked.only}
-    asyncio.run(shoot(pages, asked.out.resolve(), asked.axe.read_text() if asked.axe else ""))
+    asyncio.run(
+        shoot(pages, asked.out.resolve(), asked.axe.read_text() if asked.axe else "")
+    )
 
 
 def page(kind: str, runs: Path) -> Path:
@@ -65,11 +71,22 @@ def page(kind: str, runs: Path) -> Path:
         for name in used:
             page(name, runs)
         paths = [str(runs / one) if one in used else one for one in given]
-        done = [sys.executable, "-m", "hydroid", command, *paths, "--out", str(folder), "--quiet"]
+        done = [
+            sys.executable,
+            "-m",
+            "hydroid",
+            command,
+            *paths,
+            "--out",
+            str(folder),
+            "--quiet",
+        ]
         print(" ".join(done[2:]), flush=True)
         if subprocess.run(done, cwd=ROOT).returncode:
             sys.exit(f"{kind} was not made")
-    order = sorted(folder.glob("*.html"), key=lambda file: (file.name != "report.html", file.name))
+    order = sorted(
+        folder.glob("*.html"), key=lambda file: (file.name != "report.html", file.name)
+    )
     return order[0]
 
 
@@ -88,7 +105,8 @@ def browser() -> Generator[Path]:
             "--remote-debugging-port=0",
         ]
         process = subprocess.Popen(
-            [program, *how, f"--user-data-dir={profile}", "about:blank"], stderr=subprocess.DEVNULL
+            [program, *how, f"--user-data-dir={profile}", "about:blank"],
+            stderr=subprocess.DEVNULL,
         )
         try:
             yield Path(profile)
@@ -104,8 +122,13 @@ async def shoot(pages: dict[str, Path], out: Path, axe: str) -> None:
         for kind, file in pages.items():
             for width in WIDTHS:
                 for look in LOOKS:
-                    found = await tab.picture(file, (width, look), out / f"{kind}-{width}-{look}.png", axe)
-                    print(f"{kind} {width} {look}: {'; '.join(found) or 'nothing'}", flush=True)
+                    found = await tab.picture(
+                        file, (width, look), out / f"{kind}-{width}-{look}.png", axe
+                    )
+                    print(
+                        f"{kind} {width} {look}: {'; '.join(found) or 'nothing'}",
+                        flush=True,
+                    )
             await tab.paper(file, out / f"{kind}-paper.pdf")
 
 
@@ -115,7 +138,11 @@ async def connected(profile: Path) -> "Tab":
     while not (port.exists() and port.read_text().strip()):
         await asyncio.sleep(0.1)
     number, path = port.read_text().split()
-    tab = Tab(await websocket_connect(f"ws://127.0.0.1:{number}{path}", max_message_size=1 << 28))
+    tab = Tab(
+        await websocket_connect(
+            f"ws://127.0.0.1:{number}{path}", max_message_size=1 << 28
+        )
+    )
     targets = (await tab.ask("Target.getTargets"))["targetInfos"]
     target = next(t["targetId"] for t in targets if t["type"] == "page")
     attached = await tab.ask("Target.attachToTarget", targetId=target, flatten=True)
@@ -133,7 +160,8 @@ class Tab:
         self.problems: list[str] = []
 
     async def ask(self, method: str, **parameters: Any) -> dict[str, Any]:
-        """Send a command, and return its answer; what the page complains of meanwhile is kept."""
+        """Send a command, and return its answer; what the page complains of meanwhile
+        is kept."""
         self.number += 1
         sent = {"id": self.number, "method": method, "params": parameters}
         await self.socket.write_message(
@@ -151,8 +179,12 @@ class Tab:
     def _note(self, message: dict[str, Any]) -> None:
         what, how = message.get("method"), message.get("params", {})
         if what == "Runtime.exceptionThrown":
-            self.problems.append(f"error: {how['exceptionDetails'].get('exception', {}).get('description')}")
-        elif what == "Log.entryAdded" or (what == "Runtime.consoleAPICalled" and how["type"] == "error"):
+            self.problems.append(
+                f"error: {how['exceptionDetails'].get('exception', {}).get('description')}"
+            )
+        elif what == "Log.entryAdded" or (
+            what == "Runtime.consoleAPICalled" and how["type"] == "error"
+        ):
             self.problems.append(f"console: {how.get('entry', how.get('args'))}")
         elif what == "Network.requestWillBeSent":
             url = how["request"]["url"]
@@ -161,7 +193,9 @@ class Tab:
 
     async def value(self, script: str) -> Any:
         """Run a script, and return its value."""
-        answer = await self.ask("Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True)
+        answer = await self.ask(
+            "Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True
+        )
         return answer["result"].get("value")
 
     async def load(self, file: Path, width: int, look: str) -> dict[str, Any]:
@@ -170,11 +204,14 @@ class Tab:
         size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
         await self.ask("Emulation.setDeviceMetricsOverride", **size)
         await self.ask(
-            "Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": look}]
+            "Emulation.setEmulatedMedia",
+            features=[{"name": "prefers-color-scheme", "value": look}],
         )
         await self.ask("Page.navigate", url=file.as_uri())
         began = time.monotonic()
-        while (await self.value(PROBE) or {}).get("ready") != "yes" and time.monotonic() < began + 60:
+        while (await self.value(PROBE) or {}).get(
+            "ready"
+        ) != "yes" and time.monotonic() < began + 60:
             await asyncio.sleep(0.1)
         await self.value(OPEN)
         await asyncio.sleep(2)
@@ -183,10 +220,14 @@ class Tab:
     async def shot(self, left: float, top: float, width: float, height: float) -> bytes:
         """Return a part of the page [px] as PNG."""
         clip = {"x": left, "y": top, "width": width, "height": height, "scale": 1}
-        taken = await self.ask("Page.captureScreenshot", captureBeyondViewport=True, clip=clip)
+        taken = await self.ask(
+            "Page.captureScreenshot", captureBeyondViewport=True, clip=clip
+        )
         return base64.b64decode(taken["data"])
 
-    async def picture(self, file: Path, seen: tuple[int, str], out: Path, axe: str) -> Sequence[str]:
+    async def picture(
+        self, file: Path, seen: tuple[int, str], out: Path, axe: str
+    ) -> Sequence[str]:
         """Take a picture of the whole page, and return what is wrong with it."""
         found = await self.load(file, *seen)
         out.write_bytes(await self.shot(0, 0, seen[0], min(found["height"], 16000)))
@@ -203,7 +244,9 @@ class Tab:
     async def paper(self, file: Path, out: Path) -> None:
         """Print a page on A4."""
         await self.load(file, 1400, "light")
-        printed = await self.ask("Page.printToPDF", paperWidth=8.27, paperHeight=11.69, printBackground=False)
+        printed = await self.ask(
+            "Page.printToPDF", paperWidth=8.27, paperHeight=11.69, printBackground=False
+        )
         out.write_bytes(base64.b64decode(printed["data"]))
 
 

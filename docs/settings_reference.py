@@ -1,6 +1,8 @@
-"""The reference of all settings, `docs/settings.md`, written from the settings classes themselves.
+"""The reference of all settings, `docs/settings.md`, written from the settings classes
+themselves.
 
-`python docs/settings_reference.py > docs/settings.md` writes it; a test compares the two.
+`python docs/settings_reference.py > docs/settings.md` writes it; a test compares the
+two.
 """
 
 import ast
@@ -31,13 +33,23 @@ ending (`delay`), here and as a parameter.
 
 """
 _ELSEWHERE = ("arm", "command", "angle", "pressure")
-"""described where they stand first: the arm in a table of its own, a joint's columns under `log`"""
+"""described where they stand first: the arm in a table of its own, a joint's columns
+under `log`"""
 _UNIT = re.compile(r" ?\[([^\]]*[^\d\], ][^\],]*)\]")
 
 
 _TASKS = {
     "What is compared, and when it counts as predicted": (
-        *("stage", "arm", "outputs", "tolerance_deg", "start_pose", "free_start", "payloads", "objective"),
+        *(
+            "stage",
+            "arm",
+            "outputs",
+            "tolerance_deg",
+            "start_pose",
+            "free_start",
+            "payloads",
+            "objective",
+        ),
     ),
     "How a log is read": ("log",),
     "What is estimated, and what is known of it": ("parameters", "priors", "scale"),
@@ -51,28 +63,50 @@ _TASKS = {
 
 def reference() -> str:
     """Return the whole page as Markdown."""
-    rows, grouped = dict(_rows(FitSettings)), {name for names in _TASKS.values() for name in names}
-    assert {re.split(r"[.<]", key)[0] for key in rows} == grouped, "a setting belongs to no task"
+    rows, grouped = (
+        dict(_rows(FitSettings)),
+        {name for names in _TASKS.values() for name in names},
+    )
+    assert {re.split(r"[.<]", key)[0] for key in rows} == grouped, (
+        "a setting belongs to no task"
+    )
     parts = [_HEAD]
     for title, names in _TASKS.items():
         own = [row for key, row in rows.items() if re.split(r"[.<]", key)[0] in names]
         parts.append(f"## {title}\n\n{_table(own)}\n")
-    parts.append("## The arm's file\n\nWhat `arm:` names, by default `configs/hydrolek.yaml`.\n\n")
+    parts.append(
+        "## The arm's file\n\nWhat `arm:` names, by default `configs/hydrolek.yaml`.\n\n"
+    )
     parts.append(_table(row for _, row in _rows(Arm)))
-    parts.append("\n## A study's file\n\nWhat `hydroid study` reads ([studies.md](studies.md)).\n\n")
+    parts.append(
+        "\n## A study's file\n\nWhat `hydroid study` reads ([studies.md](studies.md)).\n\n"
+    )
     parts.append(_table(row for _, row in _rows(StudySettings)))
     return "".join(parts)
 
 
 def _table(rows: Iterable[str]) -> str:
-    return "\n".join(["| setting | value | default | meaning |", "| --- | --- | --- | --- |", *rows]) + "\n"
+    return (
+        "\n".join(
+            [
+                "| setting | value | default | meaning |",
+                "| --- | --- | --- | --- |",
+                *rows,
+            ]
+        )
+        + "\n"
+    )
 
 
 def _rows(kind: type[BaseModel]) -> Iterator[tuple[str, str]]:
     """Key and row of every setting of a class."""
     for key, field, meaning, default in _settings(kind, ""):
         unit = _unit(field, meaning)
-        text = _UNIT.sub("", meaning, count=1) if unit and f"[{unit}]" in meaning else meaning
+        text = (
+            _UNIT.sub("", meaning, count=1)
+            if unit and f"[{unit}]" in meaning
+            else meaning
+        )
         yield key, _line(key, _type(field.annotation), unit, default, text)
 
 
@@ -84,19 +118,34 @@ def _line(key: str, kind: str, unit: str, default: str, meaning: str) -> str:
 def _settings(
     kind: type[BaseModel], prefix: str, given: BaseModel | None = None
 ) -> Iterator[tuple[str, FieldInfo, str, str]]:
-    """Key, field, meaning and default of every setting of a class and of the classes within it.
+    """Key, field, meaning and default of every setting of a class and of the classes
+    within it.
 
     `given` holds the defaults where the class stands; None: its own.
     """
     for name, field in kind.model_fields.items():
-        key, default = prefix + name, "" if field.is_required() else _given(field, given, name)
-        inner = [] if kind in (FitSettings, JointColumns) and name in _ELSEWHERE else _inner(field.annotation)
+        key, default = (
+            prefix + name,
+            "" if field.is_required() else _given(field, given, name),
+        )
+        inner = (
+            []
+            if kind in (FitSettings, JointColumns) and name in _ELSEWHERE
+            else _inner(field.annotation)
+        )
         meaning = _docstring(kind, name)
         below = default if isinstance(default, BaseModel) else None
         if not inner or meaning:
-            yield key, field, meaning, "" if below or default == "" else f"`{_yaml(default)}`"
+            yield (
+                key,
+                field,
+                meaning,
+                "" if below or default == "" else f"`{_yaml(default)}`",
+            )
         for suffix, model in inner:
-            yield from _settings(model, f"{key}{suffix}.", below if suffix == "" else None)
+            yield from _settings(
+                model, f"{key}{suffix}.", below if suffix == "" else None
+            )
 
 
 def _given(field: FieldInfo, given: BaseModel | None, name: str) -> Any:
@@ -117,7 +166,11 @@ def _inner(annotation: Any) -> list[tuple[str, type[BaseModel]]]:
         return [(place + suffix, model) for suffix, model in _inner(arguments[1])]
     if origin in (Union, types.UnionType):
         return [pair for argument in arguments for pair in _inner(argument)]
-    return [("[]" + suffix, model) for suffix, model in _inner(arguments[0])] if origin is tuple else []
+    return (
+        [("[]" + suffix, model) for suffix, model in _inner(arguments[0])]
+        if origin is tuple
+        else []
+    )
 
 
 def _type(annotation: Any) -> str:
@@ -138,17 +191,31 @@ def _type(annotation: Any) -> str:
         )
     if origin is dict:
         inner = _type(arguments[1])
-        return f"mapping to {inner}" if inner.startswith(("list", "mapping to")) else f"mapping to {inner}s"
+        return (
+            f"mapping to {inner}"
+            if inner.startswith(("list", "mapping to"))
+            else f"mapping to {inner}s"
+        )
     if annotation is Any:
         return "value"
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return "text or mapping" if annotation is Arm else "mapping"
-    plain = {float: "number", int: "whole number", str: "text", bool: "true or false", Path: "path"}
+    plain = {
+        float: "number",
+        int: "whole number",
+        str: "text",
+        bool: "true or false",
+        Path: "path",
+    }
     return plain.get(annotation, "null")
 
 
 def _plural(kind: str) -> str:
-    return kind.replace("list of", "lists of", 1) if kind.startswith("list of") else f"{kind}s"
+    return (
+        kind.replace("list of", "lists of", 1)
+        if kind.startswith("list of")
+        else f"{kind}s"
+    )
 
 
 def _yaml(value: Any) -> str:
@@ -165,7 +232,8 @@ def _unit(field: FieldInfo, meaning: str) -> str:
 
 
 def _docstring(kind: type[BaseModel], name: str) -> str:
-    """The text of a field: its description, what stands below it, or the text of the class that it holds."""
+    """The text of a field: its description, what stands below it, or the text of the
+    class that it holds."""
     if text := kind.model_fields[name].description:
         return text
     for base in kind.__mro__:

@@ -1,7 +1,9 @@
-"""A policy in the environment of any run: `python examples/gym_env.py [RUN]`, of a fit or the shipped arm.
+"""A policy in the environment of any run: `python examples/gym_env.py [RUN]`, of a fit
+or the shipped arm.
 
-`hydroid.VectorEnv` steps several machines in one call; here a proportional policy brings their joints to
-random angles. With a fit, all but the first are machines that the logs do not rule out.
+`hydroid.VectorEnv` steps several machines in one call; here a proportional policy
+brings their joints to random angles. With a fit, all but the first are machines that
+the logs do not rule out.
 """
 
 import sys
@@ -17,7 +19,8 @@ MACHINES, SECONDS, GAIN = 4, 5.0, 10.0
 
 
 def make_env(source: str) -> VectorEnv:
-    """Return machines of a run's draws, or of its estimate where there is nothing to draw from."""
+    """Return machines of a run's draws, or of its estimate where there is nothing to
+    draw from."""
     model = load_plant(source).identified
     try:
         return hydroid.VectorEnv(model, MACHINES, seconds=SECONDS)
@@ -30,11 +33,17 @@ if __name__ == "__main__":
     plant, envs = load_plant(source), make_env(source)
     columns = [joint - 1 for joint in envs.joints]
     # a positive command lowers the angle of some joints
-    senses = np.array([np.sign(plant.speeds({plant.names[k]: 100.0})[k]) for k in columns])
+    senses = np.array(
+        [np.sign(plant.speeds({plant.names[k]: 100.0})[k]) for k in columns]
+    )
     seen, _ = envs.reset(seed=1)
     over = np.zeros(MACHINES, dtype=bool)
     while not over.any():
         distance = seen[:, len(columns) : 2 * len(columns)]
-        seen, *_, over, _ = envs.step(np.clip(GAIN * senses * distance, -1.0, 1.0).astype(np.float32))
+        seen, *_, over, _ = envs.step(
+            np.clip(GAIN * senses * distance, -1.0, 1.0).astype(np.float32)
+        )
     left = np.abs(seen[:, len(columns)]).round(4).tolist()
-    print(f"error of {plant.names[columns[0]]} after {SECONDS:.0f} s [half ranges]: {left}")
+    print(
+        f"error of {plant.names[columns[0]]} after {SECONDS:.0f} s [half ranges]: {left}"
+    )

@@ -1,8 +1,10 @@
-"""Feed-forward with a PID controller beside it: `python examples/pid.py [RUN]`, of a fit or the shipped arm.
+"""Feed-forward with a PID controller beside it: `python examples/pid.py [RUN]`, of a
+fit or the shipped arm.
 
-The first joint that takes commands goes along a smooth path. The controller asks for speeds: that of the
-path, which comes earlier by what the joint is late, and more where the angle errs. `Plant.commands` turns
-them into commands. Its gains are tuned on the plant, and tried on machines that the logs do not rule out.
+The first joint that takes commands goes along a smooth path. The controller asks for
+speeds: that of the path, which comes earlier by what the joint is late, and more where
+the angle errs. `Plant.commands` turns them into commands. Its gains are tuned on the
+plant, and tried on machines that the logs do not rule out.
 """
 
 import sys
@@ -37,7 +39,9 @@ class Path:
         return self.way / self.seconds * 30.0 * (part * (1.0 - part)) ** 2
 
 
-def follow(machine: Plant, model: Plant, path: Path, gain: float) -> tuple[float, float]:
+def follow(
+    machine: Plant, model: Plant, path: Path, gain: float
+) -> tuple[float, float]:
     """Return the rms error along a path, and the angle at its end; gain [1/s]."""
     joint = model.joints[0] - 1
     late = float(joint_lags(model)[joint])
@@ -64,7 +68,8 @@ def main(source: str) -> None:
     model, machine = load_plant(source), load_plant(source)
     arm, joint = model.identified.settings.arm, model.joints[0] - 1
     name = model.names[joint]
-    low, high = np.clip([arm.lower[joint], arm.upper[joint]], -np.pi, np.pi)  # it may turn without end
+    # it may turn without end
+    low, high = np.clip([arm.lower[joint], arm.upper[joint]], -np.pi, np.pi)
     pose = model.angle
     pose[joint] = low + START * (high - low)
     top = model.commands({name: 1e3}, at=pose).speed[joint]
@@ -72,9 +77,13 @@ def main(source: str) -> None:
     late = max(float(joint_lags(model)[joint]), model.period)
     ended = {gain / late: follow(machine, model, path, gain / late) for gain in GAINS}
     gain = min(ended, key=lambda one: ended[one][0])
-    unit, factor = ("mm", 1e3) if arm.joints[joint].slides else ("deg", float(np.degrees(1.0)))
+    unit, factor = (
+        ("mm", 1e3) if arm.joints[joint].slides else ("deg", float(np.degrees(1.0)))
+    )
     wanted = factor * path.angle(SECONDS)
-    print(f"{name} after {SECONDS:.0f} s: {factor * ended[gain][1]:.2f} {unit} of {wanted:.2f}")
+    print(
+        f"{name} after {SECONDS:.0f} s: {factor * ended[gain][1]:.2f} {unit} of {wanted:.2f}"
+    )
     print(f"gain {gain:.2g} 1/s, rms error {factor * ended[gain][0]:.3f} {unit}")
     try:
         plants = [*hydroid.draw(source, DRAWS).plants()]

@@ -1,8 +1,10 @@
-"""A fitted arm as a ROS 2 node: `python examples/ros2_node.py RUN`, in a shell where ROS 2 is sourced.
+"""A fitted arm as a ROS 2 node: `python examples/ros2_node.py RUN`, in a shell where
+ROS 2 is sourced.
 
-It takes commands [%] from the topic `command` (sensor_msgs/JointState: `name`, and in `effort` the commands),
-steps the plant in real time, and publishes the joints' angles [rad] and speeds on `joint_states`. A command
-holds until the next one; joints that a message does not name keep theirs.
+It takes commands [%] from the topic `command` (sensor_msgs/JointState: `name`, and in
+`effort` the commands), steps the plant in real time, and publishes the joints' angles
+[rad] and speeds on `joint_states`. A command holds until the next one; joints that a
+message does not name keep theirs.
 """
 
 import sys
@@ -12,10 +14,14 @@ from hydroid.plant import Plant, load_plant
 
 
 class ArmNode:
-    """The plant of a run between two topics; `node` is a node of rclpy, `message` makes a JointState."""
+    """The plant of a run between two topics; `node` is a node of rclpy, `message` makes
+    a JointState."""
 
     def __init__(self, node: Any, message: Any, plant: Plant) -> None:
-        self.plant, self.command = plant, dict.fromkeys((plant.names[j - 1] for j in plant.joints), 0.0)
+        self.plant, self.command = (
+            plant,
+            dict.fromkeys((plant.names[j - 1] for j in plant.joints), 0.0),
+        )
         self._node, self._message = node, message
         self._angle = plant.reset()
         self._publisher = node.create_publisher(message, "joint_states", 10)
@@ -28,7 +34,9 @@ class ArmNode:
             if name in self.command:
                 self.command[name] = float(value)
             else:
-                self._node.get_logger().warning(f"{name} takes no command; those that do: {[*self.command]}")
+                self._node.get_logger().warning(
+                    f"{name} takes no command; those that do: {[*self.command]}"
+                )
 
     def step(self) -> None:
         """Go on by one period and publish where the arm is."""

@@ -7,8 +7,9 @@
     plant.reset()
     angle = plant.step({"boom": 50})
 
-Each command of `hydroid --help` is one function here: its arguments come first, its options are
-keywords, and its result prints itself in a notebook. Every name is imported when it is first used.
+Each command of `hydroid --help` is one function here: its arguments come first, its
+options are keywords, and its result prints itself in a notebook. Every name is imported
+when it is first used.
 """
 
 import ast
@@ -30,7 +31,11 @@ if TYPE_CHECKING:
     from hydroid.commands.inputs import load_settings as load_settings
     from hydroid.commands.logs import read_logs as read_logs
     from hydroid.commands.plan import design as design, suggest as suggest
-    from hydroid.commands.stages import adapt as adapt, fit_hyd as fit_hyd, fit_mech as fit_mech
+    from hydroid.commands.stages import (
+        adapt as adapt,
+        fit_hyd as fit_hyd,
+        fit_mech as fit_mech,
+    )
     from hydroid.commands.study import study as study
     from hydroid.commands.validate import report as report, validate as validate
     from hydroid.commands.view import simulate as simulate, view as view
@@ -43,7 +48,11 @@ if TYPE_CHECKING:
     )
     from hydroid.log import Log as Log, write_log as write_log
     from hydroid.parallel.cluster import open_workers as open_workers
-    from hydroid.plant import Plant as Plant, PlantBatch as PlantBatch, load_plant as load_plant
+    from hydroid.plant import (
+        Plant as Plant,
+        PlantBatch as PlantBatch,
+        load_plant as load_plant,
+    )
     from hydroid.use.draws import Draws as Draws
     from hydroid.use.environment import Env as Env, VectorEnv as VectorEnv
 
@@ -53,7 +62,9 @@ __version__ = "0.1.0"
 _HOMES = {
     alias.name: node.module
     for node in ast.walk(ast.parse(Path(__file__).read_text(encoding="utf-8")))
-    if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("hydroid.")
+    if isinstance(node, ast.ImportFrom)
+    and node.module
+    and node.module.startswith("hydroid.")
     for alias in node.names
 }
 

@@ -18,7 +18,8 @@ T = TypeVar("T")
 
 @dataclass_transform(frozen_default=True, eq_default=False, field_specifiers=(field,))
 def record(kind: type[T]) -> type[T]:
-    """Make a frozen dataclass that equals itself alone: whether arrays are equal has no one answer.
+    """Make a frozen dataclass that equals itself alone: whether arrays are equal has no
+    one answer.
 
     One that prints itself in its own way keeps it.
     """
@@ -31,10 +32,11 @@ def rms(values: Array, axis: int | None = None) -> Any:
 
 
 def independent_samples(deviations: Array) -> Array:
-    """Return how many independent samples deviations from their mean, (T, m), are worth:
-    shape (m,).
+    """Return how many independent samples deviations from their mean, (T, m), are
+    worth: shape (m,).
 
-    Their correlation from one sample to the next is taken for that of a first-order process.
+    Their correlation from one sample to the next is taken for that of a first-order
+    process.
     """
     square = np.sum(deviations**2, axis=0)
     with np.errstate(invalid="ignore"):

@@ -1,8 +1,8 @@
 """Errors that a user can correct: each says what is wrong, where,
 and what is allowed or what to do.
 
-The command line shows them as one line and ends with exit status 2. Any other exception is a defect
-of hydroid and keeps its traceback.
+The command line shows them as one line and ends with exit status 2. Any other exception
+is a defect of hydroid and keeps its traceback.
 """
 
 LONGEST = 1500  # largest length of a message, in characters
@@ -34,7 +34,8 @@ class HydroidError(Exception):
 
 
 def _visible(text: str) -> str:
-    """Return a text with its control characters spelt out: they may come from a file."""
+    """Return a text with its control characters spelt out: they may come from a
+    file."""
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
 
 
@@ -51,7 +52,8 @@ class LogError(HydroidError):
 
 
 class SettingsError(HydroidError):
-    """A setting that does not exist or is not allowed, in a YAML file or an override."""
+    """A setting that does not exist or is not allowed, in a YAML file or an
+    override."""
 
 
 class ModelError(HydroidError):

@@ -1,4 +1,5 @@
-"""`estimate.yaml`: what a fit found, as plain values; `--json` of a fit prints the same."""
+"""`estimate.yaml`: what a fit found, as plain values; `--json` of a fit prints the
+same."""
 
 import math
 import os
@@ -18,10 +19,11 @@ from hydroid.settings.load import JointNumber, NotNegative, Positive, Settings, 
 Interval = tuple[float | None, float | None]  # its ends; null: it has no limit there
 NAME = "estimate.yaml"  # name of the file in a run folder and beside a saved plant
 LARGER = 32
-"""times that an estimate may be as large as settings: it has a covariance of all parameters"""
+"""times that an estimate may be as large as settings: it has a covariance of all
+parameters"""
 DESCRIPTION = "run.json"
-"""name of the file that describes a run: versions, seed, hashes of its logs and files, status,
-seconds"""
+"""name of the file that describes a run: versions, seed, hashes of its logs and files,
+status, seconds"""
 
 
 class ParameterEstimate(Settings):
@@ -44,8 +46,8 @@ class ParameterEstimate(Settings):
     flag: str | None = None
     """how well the logs determine it: a value of `posterior.uncertainty.Flag`"""
     source: str | None = None
-    """from what it is known: a value of `posterior.uncertainty.Source`; null: it is not known,
-    or fixed"""
+    """from what it is known: a value of `posterior.uncertainty.Source`; null: it is not
+    known, or fixed"""
     data_share: float | None = None
     """part of the information that the logs gave: 1 - posterior / prior variance;
     1 without a prior"""
@@ -55,7 +57,8 @@ class ParameterEstimate(Settings):
 
 
 class NamedEstimate(Settings):
-    """One of the estimates that a fit compared: null errors where its simulation diverged."""
+    """One of the estimates that a fit compared: null errors where its simulation
+    diverged."""
 
     values: dict[str, float]
     rms_deg: NotNegative | None = None
@@ -63,8 +66,8 @@ class NamedEstimate(Settings):
     objective: float | None = None
     """over the whole record: [deg], or [-] where `objective.relative` is set"""
     gained: tuple[float | None, float | None] | None = None
-    """by how much it foretells parts of the logs left out better than the estimate without its last
-    term: a difference of log-likelihoods, and its standard error"""
+    """by how much it foretells parts of the logs left out better than the estimate
+    without its last term: a difference of log-likelihoods, and its standard error"""
 
 
 class Covariance(Settings):
@@ -84,7 +87,9 @@ class Covariance(Settings):
     def _square(self) -> "Covariance":
         sizes = {len(self.scale), len(self.root), *map(len, self.root)}
         if sizes != {len(self.parameters)}:
-            raise ValueError("root must have a row and a column, and scale a value, for each of parameters")
+            raise ValueError(
+                "root must have a row and a column, and scale a value, for each of parameters"
+            )
         return self
 
 
@@ -153,7 +158,8 @@ class AngleError(Settings):
     at the logs' mean speed [deg]
     """
     lasts_s: NotNegative = 0.0
-    """time for which what is left of the error lasts [s]; 0: it is as the error model says"""
+    """time for which what is left of the error lasts [s]; 0: it is as the error model
+    says"""
 
     @property
     def numbers(self) -> tuple[float, ...]:
@@ -179,7 +185,8 @@ class FitSummary(Settings):
     """joints that take commands, numbered from 1:
     those that the fit's logs drive or that it compared"""
     final: str | None = None
-    """name of the final one among `estimates`; `joint`: a joint refinement of both stages"""
+    """name of the final one among `estimates`; `joint`: a joint refinement of both
+    stages"""
     converged: bool | None = None
     """whether every refinement converged; null: there was none"""
     ending: str | None = None
@@ -193,9 +200,11 @@ class FitSummary(Settings):
     diverged: int | None = None
     """simulations of the search that diverged"""
     findings: tuple[Annotated[Finding, BeforeValidator(_finding)], ...] = ()
-    """what to know before using the estimate, the most important first (`hydroid.findings`)"""
+    """what to know before using the estimate, the most important first
+    (`hydroid.findings`)"""
     verdict: tuple[JointVerdict, ...] = ()
-    """of each compared joint on the fitted logs; the page of a run adds the unseen logs"""
+    """of each compared joint on the fitted logs; the page of a run adds the unseen
+    logs"""
     estimates: dict[str, NamedEstimate] = {}
     """by name; the first is the search's own"""
     quantities: dict[str, QuantityEstimate] = {}
@@ -205,7 +214,8 @@ class FitSummary(Settings):
     covariance: Covariance | None = None
     """of the final estimate"""
     errors: dict[str, AngleError] = {}
-    """what the residuals of each compared angle show of its error, by angle: `q2` of joint 2"""
+    """what the residuals of each compared angle show of its error, by angle: `q2` of
+    joint 2"""
     left_out_deg: dict[str, tuple[float, ...]] = {}
     """rms error of each compared angle on each fitted log if it is left out [deg];
     none of one log"""
@@ -223,15 +233,17 @@ class FitSummary(Settings):
 def write_estimate(folder: Path, summary: FitSummary) -> None:
     """Write `estimate.yaml`."""
     # one line a list
-    write_atomic(folder / NAME, yaml_text(summary.plain(), default_flow_style=None, width=110))
+    write_atomic(
+        folder / NAME, yaml_text(summary.plain(), default_flow_style=None, width=110)
+    )
 
 
 def read_estimate(source: Path) -> tuple[Path, Plain, FitSummary | None]:
-    """Read parameter values by name: of a folder, an `estimate.yaml`, or a YAML file of `K:
-    0.2` lines.
+    """Read parameter values by name: of a folder, an `estimate.yaml`, or a YAML file of
+    `K: 0.2` lines.
 
-    Returned are the file, its values, unchecked where they are not an estimate's, and the estimate
-    where there is one.
+    Returned are the file, its values, unchecked where they are not an estimate's, and
+    the estimate where there is one.
 
     Raises:
         RunError: a folder that holds no estimate. SettingsError: a file that is none.
@@ -242,9 +254,13 @@ def read_estimate(source: Path) -> tuple[Path, Plain, FitSummary | None]:
         summary = validate(content, FitSummary, str(file), lines)
         return file, summary.values, summary
     values = content.get("parameters", content)
-    is_flat = isinstance(values, dict) and not any(isinstance(v, dict) for v in values.values())
+    is_flat = isinstance(values, dict) and not any(
+        isinstance(v, dict) for v in values.values()
+    )
     if not is_flat:
-        hint = "give the run folder, its estimate.yaml, or a YAML file of `K: 0.2` lines"
+        hint = (
+            "give the run folder, its estimate.yaml, or a YAML file of `K: 0.2` lines"
+        )
         raise SettingsError("is no estimate", file, hint)
     return file, values, None
 
@@ -266,7 +282,8 @@ def finite_ends(interval: Array) -> Interval:
 
 
 def finite(value: float | None) -> float | None:
-    """Return a number, or None where it is infinite or NaN, which JSON has no word for."""
+    """Return a number, or None where it is infinite or NaN, which JSON has no word
+    for."""
     if value is None or not math.isfinite(value):
         return None
     return float(value)

@@ -1,4 +1,5 @@
-"""Files: written so that they appear completely or not at all, and those that hydroid ships."""
+"""Files: written so that they appear completely or not at all, and those that hydroid
+ships."""
 
 import csv
 import errno
@@ -16,22 +17,34 @@ from hydroid.errors import RunError, SettingsError
 
 Plain = dict[str, Any]  # a mapping as YAML and JSON hold it
 PART = ".part"  # suffix of a file that is being written
-NOTICES = tuple(getattr(signal, n) for n in ("SIGTERM", "SIGUSR1", "SIGHUP") if hasattr(signal, n))
-"""signals by which a cluster says that time is nearly up, and a terminal that it is closed"""
+NOTICES = tuple(
+    getattr(signal, n) for n in ("SIGTERM", "SIGUSR1", "SIGHUP") if hasattr(signal, n)
+)
+"""signals by which a cluster says that time is nearly up, and a terminal that it is
+closed"""
 
 
 @contextmanager
 def undisturbed() -> Generator[None]:
     """Delay Ctrl-C and the signals of a cluster until a file is written.
 
-    A KeyboardInterrupt may come between any two bytecodes, and some libraries turn it into another error.
+    A KeyboardInterrupt may come between any two bytecodes, and some libraries turn it
+    into another error.
     """
-    if threading.current_thread() is not threading.main_thread():  # signals only interrupt the main thread
+    # signals only interrupt the main thread
+    if threading.current_thread() is not threading.main_thread():
         yield
         return
     held: list[int] = []
-    ours = [number for number in (signal.SIGINT, *NOTICES) if signal.getsignal(number) is not None]
-    before = {number: signal.signal(number, lambda number, _: held.append(number)) for number in ours}
+    ours = [
+        number
+        for number in (signal.SIGINT, *NOTICES)
+        if signal.getsignal(number) is not None
+    ]
+    before = {
+        number: signal.signal(number, lambda number, _: held.append(number))
+        for number in ours
+    }
     try:
         yield
     finally:
@@ -52,15 +65,18 @@ def writing(where: Path) -> Generator[None]:
 
 @undisturbed()
 def write_atomic(path: Path, content: str | bytes, *, keep: Path | None = None) -> None:
-    """Write a file so that readers see either the old content or the new, also after a crash.
+    """Write a file so that readers see either the old content or the new, also after a
+    crash.
 
-    The content, text as UTF-8, reaches the disk before the file gets its name, so a power cut leaves the old
-    file or the new one. A killed process may leave a hidden file with the suffix PART. `keep` is a path in
-    the same folder to which the old file, if any, is moved first: after a crash between the two renamings
-    only it exists. Raises RunError: the folder cannot be written, the disk is full, or the path is that of a
-    folder, a pipe or a device, which a file would replace.
+    The content, text as UTF-8, reaches the disk before the file gets its name, so a
+    power cut leaves the old file or the new one. A killed process may leave a hidden
+    file with the suffix PART. `keep` is a path in the same folder to which the old
+    file, if any, is moved first: after a crash between the two renamings only it
+    exists. Raises RunError: the folder cannot be written, the disk is full, or the path
+    is that of a folder, a pipe or a device, which a file would replace.
     """
-    place = Path(os.path.realpath(path))  # a link stays, and what it leads to is written
+    # a link stays, and what it leads to is written
+    place = Path(os.path.realpath(path))
     if os.path.exists(path) and not is_file(path):
         raise RunError("cannot be written (it is no file)", path, "name another file")
     temporary = place.parent / f".{place.name}.{token_hex(4)}{PART}"
@@ -101,7 +117,8 @@ def csv_text(rows: Iterable[Iterable[Any]]) -> str:
 
 
 def yaml_text(values: Any, **style: Any) -> str:
-    """Return plain values as YAML, mappings in their order; `style` is that of PyYAML's `dump`."""
+    """Return plain values as YAML, mappings in their order; `style` is that of PyYAML's
+    `dump`."""
     import yaml
 
     return yaml.safe_dump(values, sort_keys=False, allow_unicode=True, **style)
@@ -141,12 +158,16 @@ def assets() -> Path:
 
 
 def find_config(
-    name: str | Path, beside: Path | None = None, *, kind: Literal["config", "arm"] = "config"
+    name: str | Path,
+    beside: Path | None = None,
+    *,
+    kind: Literal["config", "arm"] = "config",
 ) -> Path:
-    """Find a config file by a path, or the name of a shipped config with or without `.yaml`.
+    """Find a config file by a path, or the name of a shipped config with or without
+    `.yaml`.
 
-    A relative path is looked up in `beside` first; `kind`, a fit's config or an arm's file, decides which
-    names the error lists.
+    A relative path is looked up in `beside` first; `kind`, a fit's config or an arm's
+    file, decides which names the error lists.
     """
     shipped = assets() / "configs"
     for folder in (beside or Path(), Path(), shipped):
@@ -155,5 +176,11 @@ def find_config(
                 return candidate
     if len(Path(name).parts) > 1:
         raise SettingsError("no such file or folder", name)
-    known = sorted(p.stem for p in shipped.glob("*.yaml") if (p.stem == "hydrolek") == (kind == "arm"))
-    raise SettingsError(f"no such {kind}", name, f"give a YAML file or one of: {', '.join(known)}")
+    known = sorted(
+        p.stem
+        for p in shipped.glob("*.yaml")
+        if (p.stem == "hydrolek") == (kind == "arm")
+    )
+    raise SettingsError(
+        f"no such {kind}", name, f"give a YAML file or one of: {', '.join(known)}"
+    )

@@ -9,7 +9,8 @@ from hydroid.files import read_table
 from hydroid.words import filled
 
 Level = Literal["error", "warning", "note"]
-"""error: the input or result cannot be used; warning: do not use it unread; note: good to know"""
+"""error: the input or result cannot be used; warning: do not use it unread; note: good
+to know"""
 
 
 @dataclass(frozen=True)
@@ -17,12 +18,14 @@ class Finding:
     """One thing that an analysis found; as text it is what it states, and the hint.
 
     Attributes:
-        kind: key of its words in `WORDS`. Decisions are made on it, never on a sentence.
+        kind: key of its words in `WORDS`. Decisions are made on it, never on a
+            sentence.
         level: how much it matters.
         subjects: names of what it is about: parameters, joints, logs.
-        numbers: what the sentence states, by name, in the units that the sentence prints.
-        details: by subject, what stands in brackets behind it. Apart from `numbers`: a user names
-            subjects.
+        numbers: what the sentence states, by name, in the units that the sentence
+            prints.
+        details: by subject, what stands in brackets behind it. Apart from `numbers`: a
+            user names subjects.
         where: file with line and column, or a setting; empty where there is none.
     """
 
@@ -40,12 +43,16 @@ class Finding:
 
     @property
     def hint(self) -> str:
-        """The sentence that says what to do about it; empty where nothing is to be done."""
+        """The sentence that says what to do about it; empty where nothing is to be
+        done."""
         return self._filled(WORDS[self.kind][1])
 
     def _filled(self, words: str) -> str:
         details = self.details
-        names = [f"{name} ({details[name]})" if name in details else name for name in self.subjects]
+        names = [
+            f"{name} ({details[name]})" if name in details else name
+            for name in self.subjects
+        ]
         return filled(words, names, self.numbers)
 
     def __str__(self) -> str:
@@ -54,5 +61,7 @@ class Finding:
 
 _TABLE: dict[str, list[str]] = read_table("findings.yaml")
 
-WORDS = {kind: (statement, " ".join(hint)) for kind, (statement, *hint) in _TABLE.items()}
+WORDS = {
+    kind: (statement, " ".join(hint)) for kind, (statement, *hint) in _TABLE.items()
+}
 """statement and hint by kind; a hint may be empty"""

@@ -10,8 +10,21 @@ from typing import Any
 
 from hydroid.arrays import Array, record
 from hydroid.errors import RunError
-from hydroid.estimate import DESCRIPTION, NAME, FitSummary, ParameterEstimate, read_estimate
-from hydroid.files import Plain, find_config, is_file, read_file, write_atomic, yaml_text
+from hydroid.estimate import (
+    DESCRIPTION,
+    NAME,
+    FitSummary,
+    ParameterEstimate,
+    read_estimate,
+)
+from hydroid.files import (
+    Plain,
+    find_config,
+    is_file,
+    read_file,
+    write_atomic,
+    yaml_text,
+)
 from hydroid.progress import LOGGER
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load
@@ -29,12 +42,13 @@ class IdentifiedModel:
     """A model at an estimate.
 
     Attributes:
-        settings: with the arm; after a joint refinement every parameter that has bounds is free.
+        settings: with the arm; after a joint refinement every parameter that has bounds
+            is free.
         theta: the parameters in the order and units of the settings, shape (P,).
         source: where the estimate came from, for messages.
         summary: the fit's own account of the estimate, where a fit made it.
-        nominal: parameters without a value, whose effect the settings and the arm's file give; they
-            are not among the settings' parameters.
+        nominal: parameters without a value, whose effect the settings and the arm's
+            file give; they are not among the settings' parameters.
     """
 
     settings: FitSettings
@@ -59,18 +73,26 @@ class IdentifiedModel:
         if self.summary is not None:
             return self.summary
         estimate = {
-            name: ParameterEstimate(value=value, unit=self.settings.parameters[name].unit)
+            name: ParameterEstimate(
+                value=value, unit=self.settings.parameters[name].unit
+            )
             for name, value in self.values.items()
         }
         return FitSummary(stage=self.settings.stage, estimate=estimate)
 
 
-def identified(settings: FitSettings, values: Mapping[str, Any], source: str) -> IdentifiedModel:
-    """Return the model of some settings at parameters by name; a fixed parameter may be left out.
+def identified(
+    settings: FitSettings, values: Mapping[str, Any], source: str
+) -> IdentifiedModel:
+    """Return the model of some settings at parameters by name; a fixed parameter may be
+    left out.
 
-    Raises SettingsError: a name that does not exist or is missing, or a value that is not allowed.
+    Raises SettingsError: a name that does not exist or is missing, or a value that is
+    not allowed.
     """
-    return IdentifiedModel(settings, settings.parameter_set().vector(values, source), source)
+    return IdentifiedModel(
+        settings, settings.parameter_set().vector(values, source), source
+    )
 
 
 def load_identified(
@@ -83,14 +105,16 @@ def load_identified(
     """Read an estimate and the settings it belongs to.
 
     Args:
-        source: a run folder, the folder of a saved plant, an `estimate.yaml`, or a YAML file of
-            values by name; None: no values.
-        config: settings, a path or a shipped name; left out: those beside the estimate. A file of
-            values without settings beside it has those that are shipped.
-        nominal: take parameters without a value as the settings and the arm's file have them.
+        source: a run folder, the folder of a saved plant, an `estimate.yaml`, or a YAML
+            file of values by name; None: no values.
+        config: settings, a path or a shipped name; left out: those beside the estimate.
+            A file of values without settings beside it has those that are shipped.
+        nominal: take parameters without a value as the settings and the arm's file have
+            them.
 
     Raises:
-        RunError: the folder holds no estimate, or a fit's settings are not beside its estimate.
+        RunError: the folder holds no estimate, or a fit's settings are not beside its
+            estimate.
         SettingsError: a file that cannot be read, a parameter that is unknown,
             or missing and not `nominal`.
     """
@@ -116,7 +140,8 @@ def read_identified(
     if chosen is None:
         chosen = _config_beside(file, summary, nominal=nominal)
     settings = load(find_config(chosen), FitSettings, overrides)
-    # a fit's final estimate may have terms, or be of another model than its settings began with
+    # a fit's final estimate may have terms, or be of another model than its settings
+    # began with
     if config is None and summary is not None:
         settings = settings.of_estimate(summary.final)
     missing = list[str]()
@@ -133,14 +158,19 @@ def read_identified(
     return IdentifiedModel(settings, theta, origin, summary, tuple(missing))
 
 
-def _config_beside(file: Path | None, summary: FitSummary | None, *, nominal: bool) -> str | Path:
-    """Return the settings that an estimate belongs to: those in its folder, or shipped ones."""
+def _config_beside(
+    file: Path | None, summary: FitSummary | None, *, nominal: bool
+) -> str | Path:
+    """Return the settings that an estimate belongs to: those in its folder, or shipped
+    ones."""
     if file is not None:
         beside = file.parent / CONFIG
         if is_file(beside):
             return beside
         if summary is not None:
-            what = f"is missing, and {NAME} says nothing without the settings of its fit"
+            what = (
+                f"is missing, and {NAME} says nothing without the settings of its fit"
+            )
             raise RunError(what, beside, "put it back, or name the run folder")
     return "fit-hyd" if nominal else "fit-mech"
 
@@ -178,7 +208,8 @@ def changed_files(folder: Path) -> list[str]:
 
 
 def file_hash(*files: Path) -> str:
-    """Return one hash of the content of files; those that are not there count as empty."""
+    """Return one hash of the content of files; those that are not there count as
+    empty."""
     contents = (read_file(file) for file in files if is_file(file))
     return hashlib.sha256(b"".join(contents)).hexdigest()
 
@@ -190,15 +221,22 @@ def start_values(settings: FitSettings) -> IdentifiedModel:
 
 
 def write_settings(folder: Path, settings: FitSettings) -> None:
-    """Write the settings, the arm and its models to a folder, so that it can be read anywhere."""
+    """Write the settings, the arm and its models to a folder, so that it can be read
+    anywhere."""
     # this imports MuJoCo, which takes long
     from hydroid.mjcf import copy_models
 
     arm = settings.arm
     models = {MODEL: arm.model} | ({PAIR: arm.pair} if arm.pair else {})
-    copy_models({Path(name).name: path for name, path in models.items()}, folder / Path(MODEL).parent)
+    copy_models(
+        {Path(name).name: path for name, path in models.items()},
+        folder / Path(MODEL).parent,
+    )
     paths = {"model": MODEL, "pair": PAIR if arm.pair else None}
-    for name, content in ((ARM, arm.model_dump(mode="json") | paths), (CONFIG, portable(settings))):
+    for name, content in (
+        (ARM, arm.model_dump(mode="json") | paths),
+        (CONFIG, portable(settings)),
+    ):
         write_atomic(folder / name, yaml_text(content))
 
 

@@ -10,7 +10,8 @@ from hydroid.units import Display, display
 
 
 class Verdict(StrEnum):
-    """What a fit is worth for one joint; `fitting.verdict` has the rules. Files hold the value."""
+    """What a fit is worth for one joint; `fitting.verdict` has the rules. Files hold
+    the value."""
 
     PREDICTS = "predicts"
     ROUGHLY = "predicts roughly"
@@ -23,7 +24,8 @@ class Verdict(StrEnum):
 
     @property
     def sign(self) -> str:
-        """The sign before its words: ✓ good, ! usable with care, ? the logs do not tell, ✗ bad."""
+        """The sign before its words: ✓ good, ! usable with care, ? the logs do not
+        tell, ✗ bad."""
         return _SIGNS.get(self, "✗")
 
     @property
@@ -54,7 +56,8 @@ class Outcome(StrEnum):
 
 
 class Comparison(Settings):
-    """A fit and a simple model, compared over the same starts or logs (`fitting.comparison`)."""
+    """A fit and a simple model, compared over the same starts or logs
+    (`fitting.comparison`)."""
 
     outcome: Outcome = Field(strict=False)
     """whether the fit is better or worse, or the logs do not tell"""
@@ -84,24 +87,31 @@ class JointVerdict(Settings):
     unseen_deg: float | None = None
     """on logs that it was not fitted to; null: there are none"""
     unseen_logs: int = 0
-    """how many of them drive the joint; if their error is null, its simulation diverged"""
+    """how many of them drive the joint; if their error is null, its simulation
+    diverged"""
     tolerance_deg: float
     """error up to which it predicts"""
     inside_percent: float | None = None
-    """part of the samples of the unseen logs inside the 95 % bands; null: there are none"""
+    """part of the samples of the unseen logs inside the 95 % bands; null: there are
+    none"""
     expected_deg: float | None = None
-    """what a fit of several logs expects of the unseen ones; null: of one log, or there are none"""
+    """what a fit of several logs expects of the unseen ones; null: of one log, or there
+    are none"""
     baselines_deg: dict[str, float] = Field(default_factory=dict[str, float])
-    """of the simple models on the unseen logs, or on the fitted logs where there are no others"""
+    """of the simple models on the unseen logs, or on the fitted logs where there are no
+    others"""
     horizons_deg: dict[str, tuple[float | None, ...]] = Field(
         default_factory=dict[str, tuple[float | None, ...]]
     )
-    """rms error of the angle's change over 0.5, 1, 2, 5 and 10 s from starts all along the unseen
-    logs, of the fit and of the simple models; empty where there are none"""
-    compared: dict[str, tuple[Comparison, ...]] = Field(default_factory=dict[str, tuple[Comparison, ...]])
+    """rms error of the angle's change over 0.5, 1, 2, 5 and 10 s from starts all along
+    the unseen logs, of the fit and of the simple models; empty where there are none"""
+    compared: dict[str, tuple[Comparison, ...]] = Field(
+        default_factory=dict[str, tuple[Comparison, ...]]
+    )
     """the fit with each simple model over these times"""
     compared_whole: dict[str, Comparison] = Field(default_factory=dict[str, Comparison])
-    """the fit with each simple model over whole unseen logs; empty where there are none"""
+    """the fit with each simple model over whole unseen logs; empty where there are
+    none"""
 
     @property
     def shown(self) -> Display:

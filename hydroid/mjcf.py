@@ -54,11 +54,15 @@ def _refuse_joints(spec: mujoco.MjSpec, path: Path) -> None:
 def _refuse_forces(spec: mujoco.MjSpec, path: Path) -> None:
     """Refuse forces that hydroid does not simulate."""
     if spec.equalities:
-        raise ModelError("has equality constraints, which hydroid does not simulate", path)
+        raise ModelError(
+            "has equality constraints, which hydroid does not simulate", path
+        )
     for body in spec.bodies:
         if body.gravcomp:
             why = "hydroid does not simulate what takes its weight away"
-            raise ModelError(f"body {body.name!r} has gravcomp: {why}", path, "take gravcomp out")
+            raise ModelError(
+                f"body {body.name!r} has gravcomp: {why}", path, "take gravcomp out"
+            )
     if spec.option.density or spec.option.viscosity:
         what = "has a density or viscosity of the air, which hydroid does not simulate"
         raise ModelError(what, path)
@@ -78,7 +82,10 @@ def copy_models(models: Mapping[str, Path], folder: Path) -> None:
             # a mesh without a file has its vertices in the MJCF
             if mesh.file:
                 mesh.file = _copied(home / spec.meshdir / mesh.file, folder, contents)
-        for pictures, place in ((spec.textures, spec.texturedir), (spec.hfields, spec.meshdir)):
+        for pictures, place in (
+            (spec.textures, spec.texturedir),
+            (spec.hfields, spec.meshdir),
+        ):
             for picture in pictures:
                 # these stay where they are
                 picture.file = picture.file and str(home / place / picture.file)
@@ -88,8 +95,8 @@ def copy_models(models: Mapping[str, Path], folder: Path) -> None:
 
 
 def _copied(source: Path, folder: Path, contents: dict[str, bytes]) -> str:
-    """Copy a mesh to a folder, and return its name there: meshes of different folders may have one
-    name."""
+    """Copy a mesh to a folder, and return its name there: meshes of different folders
+    may have one name."""
     try:
         content = source.read_bytes()
     except OSError as error:
@@ -116,7 +123,9 @@ def mujoco_errors(where: object) -> Generator[None]:
         with quiet_mujoco():
             yield
     except (ValueError, mujoco.FatalError) as error:
-        raise ModelError(f"MuJoCo refuses it ({' '.join(str(error).split())})", where) from None
+        raise ModelError(
+            f"MuJoCo refuses it ({' '.join(str(error).split())})", where
+        ) from None
 
 
 @contextmanager

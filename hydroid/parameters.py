@@ -1,7 +1,9 @@
-"""Parameters: names, units, bounds, scale and prior, and the way between a vector and its names.
+"""Parameters: names, units, bounds, scale and prior, and the way between a vector and
+its names.
 
-The search works in the unit box of the *free* parameters; everything else works with the full
-vector theta: one column per parameter, fixed ones included, in the units of the table.
+The search works in the unit box of the *free* parameters; everything else works with
+the full vector theta: one column per parameter, fixed ones included, in the units of
+the table.
 """
 
 import math
@@ -15,10 +17,11 @@ from hydroid.errors import SettingsError
 
 @record
 class Prior:
-    """What is known of one parameter besides the logs: Gaussian, or log-normal where `log`.
+    """What is known of one parameter besides the logs: Gaussian, or log-normal where
+    `log`.
 
-    `nominal` is the most likely value, of a log-normal prior its median; `sd` the standard
-    deviation in the unit, or that of the logarithm.
+    `nominal` is the most likely value, of a log-normal prior its median; `sd` the
+    standard deviation in the unit, or that of the logarithm.
     """
 
     nominal: float
@@ -26,14 +29,17 @@ class Prior:
     log: bool = False
 
     def score(self, value: Array) -> Array:
-        """Return the distance of values from the nominal one, in standard deviations."""
+        """Return the distance of values from the nominal one, in standard
+        deviations."""
         distance = np.log(value / self.nominal) if self.log else value - self.nominal
         return distance / self.sd
 
     def value(self, score: float) -> float:
         """Return the value at a score."""
         change = score * self.sd
-        return float(self.nominal * np.exp(change)) if self.log else self.nominal + change
+        return (
+            float(self.nominal * np.exp(change)) if self.log else self.nominal + change
+        )
 
 
 @record
@@ -44,8 +50,8 @@ class Parameter:
         name, unit: its symbol, and the unit of its values.
         lower, upper: its bounds.
         fixed: its value if it is not estimated.
-        log: whether it is searched, refined and reported by its logarithm; the lower bound is then
-            above 0.
+        log: whether it is searched, refined and reported by its logarithm; the lower
+            bound is then above 0.
         start: where a search starts; None: no parameter of the set states a start.
         prior: what is known besides the logs.
         least: what a relative change of 1 is at least, in the unit.
@@ -65,7 +71,9 @@ class Parameter:
         """Return where values lie on the parameter's scale: 0 at the lower bound,
         1 at the upper one."""
         if self.log:
-            return np.log(np.asarray(value) / self.lower) / np.log(self.upper / self.lower)
+            return np.log(np.asarray(value) / self.lower) / np.log(
+                self.upper / self.lower
+            )
         return (np.asarray(value) - self.lower) / (self.upper - self.lower)
 
     def at(self, position: Array | float) -> Array:
@@ -138,7 +146,9 @@ class ParameterSet:
         positions = iter(np.moveaxis(unit, -1, 0))
         for column, parameter in enumerate(self.parameters):
             fixed = parameter.fixed
-            theta[..., column] = parameter.at(next(positions)) if fixed is None else fixed
+            theta[..., column] = (
+                parameter.at(next(positions)) if fixed is None else fixed
+            )
         return theta
 
     def to_unit(self, theta: Array) -> Array:
@@ -146,22 +156,28 @@ class ParameterSet:
         values beyond a bound are clipped."""
         columns = [
             parameter.position(values)
-            for parameter, values in zip(self.parameters, np.moveaxis(theta, -1, 0), strict=True)
+            for parameter, values in zip(
+                self.parameters, np.moveaxis(theta, -1, 0), strict=True
+            )
             if parameter.fixed is None
         ]
         return np.clip(np.stack(columns, axis=-1), 0.0, 1.0)
 
     def width(self, theta: Array) -> Array:
-        """Return the change of each value per change of its position on its scale, at theta,
-        (P,)."""
+        """Return the change of each value per change of its position on its scale, at
+        theta, (P,)."""
         lower = np.where(self.log, self.lower, 1.0)
         upper = np.where(self.log, self.upper, 1.0)
-        return np.where(self.log, theta * np.log(upper / lower), self.upper - self.lower)
+        return np.where(
+            self.log, theta * np.log(upper / lower), self.upper - self.lower
+        )
 
     def vector(self, values: Mapping[str, object], source: str) -> Array:
-        """Return theta, shape (P,), from values by name; a fixed parameter may be left out.
+        """Return theta, shape (P,), from values by name; a fixed parameter may be left
+        out.
 
-        Raises SettingsError: a name that does not exist or is missing, or no number, or too small.
+        Raises SettingsError: a name that does not exist or is missing, or no number, or
+        too small.
         """
         unknown = [name for name in values if name not in self.names]
         if unknown:
@@ -178,7 +194,9 @@ class ParameterSet:
             # so that squares stay finite
             if not least <= number < 1e100:
                 hint = f"a number from {least:g}, in {parameter.unit}"
-                raise SettingsError(f"parameter {parameter.name!r} is {value!r}", source, hint)
+                raise SettingsError(
+                    f"parameter {parameter.name!r} is {value!r}", source, hint
+                )
             theta.append(number)
         return np.array(theta)
 
@@ -188,7 +206,8 @@ class ParameterSet:
 
 
 def _number(value: object) -> float:
-    """Return a value as a number; NaN, which no comparison accepts, of one that is none."""
+    """Return a value as a number; NaN, which no comparison accepts, of one that is
+    none."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return math.nan
     return float(value) if abs(value) < 1e100 else math.nan

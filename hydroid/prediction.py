@@ -16,17 +16,19 @@ from hydroid.simulation import Response
 
 
 def predict(model: IdentifiedModel, log: Log, joints: Sequence[int]) -> Array:
-    """Return angles [rad] of joints, numbered from 1, for a log's commands, (T, K); NaN if it diverged."""
+    """Return angles [rad] of joints, numbered from 1, for a log's commands, (T, K); NaN
+    if it diverged."""
     return _respond(model, log, [j - 1 for j in joints]).angle[0]
 
 
 def predict_with_pressures(
     model: IdentifiedModel, log: Log, joints: Sequence[int]
 ) -> tuple[Array, Array | None]:
-    """Return angles as `predict` does, and the chambers' pressures [Pa], shape (T, K, 2).
+    """Return angles as `predict` does, and the chambers' pressures [Pa], shape (T, K,
+    2).
 
-    The angles are the same to the bit. Pressures are NaN of joints that the log does not drive, and None of
-    a model without hydraulics.
+    The angles are the same to the bit. Pressures are NaN of joints that the log does
+    not drive, and None of a model without hydraulics.
     """
     if model.settings.stage != "hyd":
         return predict(model, log, joints), None
@@ -39,10 +41,12 @@ def predict_with_pressures(
 
 
 def predict_log(model: IdentifiedModel, log: Log) -> Log:
-    """Return the log with the angles that the model gives for its commands, from its first pose.
+    """Return the log with the angles that the model gives for its commands, from its
+    first pose.
 
-    Locked joints stay where they start; prescribed joints keep their logged motion. Stage 2 also gives the
-    chamber pressures of driven joints for which `log.pressure` maps columns.
+    Locked joints stay where they start; prescribed joints keep their logged motion.
+    Stage 2 also gives the chamber pressures of driven joints for which `log.pressure`
+    maps columns.
     """
     settings = model.settings
     passive = settings.simulation.other_joints == "passive"
@@ -51,20 +55,29 @@ def predict_log(model: IdentifiedModel, log: Log) -> Log:
     if settings.simulation.other_joints == "locked":
         angle[:] = log.start
     hydraulic = log.driven & (settings.stage == "hyd")
-    measured = [j for j in np.flatnonzero(hydraulic).tolist() if settings.log.columns("pressure", j + 1)]
+    measured = [
+        j
+        for j in np.flatnonzero(hydraulic).tolist()
+        if settings.log.columns("pressure", j + 1)
+    ]
     response = _respond(model, log, moving, measured)
     if not np.isfinite(response.angle).all():
         raise RunError("the simulation diverged with these parameters", model.source)
     angle[:, moving] = response.angle[0]
     pressure = None
     if measured:
-        pressure = np.zeros((*angle.shape, 2))  # the pressures of an idle cylinder are not simulated
+        # the pressures of an idle cylinder are not simulated
+        pressure = np.zeros((*angle.shape, 2))
         pressure[:, measured] = response.pressure[0]
     return replace(log, angle=angle, pressure=pressure)
 
 
-def _respond(model: IdentifiedModel, log: Log, outputs: list[int], pressures: Sequence[int] = ()) -> Response:
+def _respond(
+    model: IdentifiedModel, log: Log, outputs: list[int], pressures: Sequence[int] = ()
+) -> Response:
     """Simulate the angles of `outputs` and the pressures of some joints, 0-based."""
     settings, bindings = model.settings, Bindings(model.settings)
-    simulation = make_simulation(load_model(settings.arm), log, outputs, settings, pressures)
+    simulation = make_simulation(
+        load_model(settings.arm), log, outputs, settings, pressures
+    )
     return simulation.simulate(bindings.candidates(model.theta[None], log.source))

@@ -1,8 +1,9 @@
 """The rows of `quantities.yaml`, every quantity that can be stated or estimated,
 by name and by side.
 
-Of a quantity with two sides, such as `delay`, `delay_a` acts on motion towards A, which a positive
-command causes, and `delay_b` towards B; the name without an ending sets both.
+Of a quantity with two sides, such as `delay`, `delay_a` acts on motion towards A, which
+a positive command causes, and `delay_b` towards B; the name without an ending sets
+both.
 """
 
 from collections.abc import Iterable, Iterator
@@ -19,15 +20,18 @@ class Quantity(NamedTuple):
     Attributes:
         name: in settings and as a parameter of a fit.
         unit: of its values.
-        default: value where nothing states one; None: no limit. Of a quantity with two sides a
-            pair.
+        default: value where nothing states one; None: no limit. Of a quantity with two
+            sides a pair.
         plain: what it is, for readers who do not know its symbol.
         note: what those who set it must know besides.
-        span: values of real machines, between which `hydroid suggest` searches a quantity that is
-            not free.
-        limits: least and largest value; None: from 0 where 0 is the default, or else above 0.
-        of: the kind of actuator that alone has it, as `Joint.has` tells them apart; "": all have.
-        optional: whether null is allowed beside a number; where it is the default, it is.
+        span: values of real machines, between which `hydroid suggest` searches a
+            quantity that is not free.
+        limits: least and largest value; None: from 0 where 0 is the default, or else
+            above 0.
+        of: the kind of actuator that alone has it, as `Joint.has` tells them apart; "":
+            all have.
+        optional: whether null is allowed beside a number; where it is the default, it
+            is.
     """
 
     name: str
@@ -92,7 +96,8 @@ def quantity(name: str, row: Plain) -> Quantity:
 
 
 _GROUPS = {
-    group: tuple(map(quantity, rows, rows.values())) for group, rows in read_table("quantities.yaml").items()
+    group: tuple(map(quantity, rows, rows.values()))
+    for group, rows in read_table("quantities.yaml").items()
 }
 
 ROWS = tuple(chain(*_GROUPS.values()))  # the one table
@@ -110,7 +115,8 @@ QUANTITIES = _by_side(ROWS)
 HYDRAULIC = _by_side(_GROUPS["hydraulic"])
 """those that `hydraulics` sets for all joints"""
 
-CHOICES = {row.name: row for row in ROWS} | QUANTITIES  # what a parameter of a fit can be, by name
+# what a parameter of a fit can be, by name
+CHOICES = {row.name: row for row in ROWS} | QUANTITIES
 
 TARGETS = {name: tuple(_by_side([row])) for name, row in CHOICES.items()}
 """the quantities that a name sets: itself, or both sides"""

@@ -17,7 +17,19 @@ LARGEST = 32  # of a file [MiB]
 MOST = 200_000  # elements of a file
 DEEPEST = 200  # elements in each other, and joints behind each other
 FARTHEST = 1e9  # larger numbers are no lengths in any unit
-_PLACES = ("xyz", "rpy", "pos", "quat", "axis", "axisangle", "xyaxes", "zaxis", "euler", "fromto", "anchor")
+_PLACES = (
+    "xyz",
+    "rpy",
+    "pos",
+    "quat",
+    "axis",
+    "axisangle",
+    "xyaxes",
+    "zaxis",
+    "euler",
+    "fromto",
+    "anchor",
+)
 GEOMETRY = {*_PLACES, "radius", "length", "size", "scale", "ref"}
 """attributes that say where things are and how large"""
 OWN_NAMES = ("link", "joint", "body")  # elements whose name may stand once only
@@ -28,8 +40,9 @@ COPIES = 2000  # that an MJCF may ask for
 def read_robot(path: Path) -> ElementTree.Element:
     """Read a URDF, or an MJCF with the files that it includes in their places.
 
-    Raises ModelError: a file cannot be read, is too large or too deep, is included twice, or holds
-    the same name twice, or a length, place, angle or limit that is no finite number.
+    Raises ModelError: a file cannot be read, is too large or too deep, is included
+    twice, or holds the same name twice, or a length, place, angle or limit that is no
+    finite number.
     """
     root = _parsed(path)
     _include(root, path, path.resolve().parent, {path.resolve()})
@@ -52,7 +65,9 @@ class _Tree(ElementTree.TreeBuilder):
         self._depth += 1
         self._count += 1
         if self._depth > DEEPEST:
-            raise ModelError(f"its elements are nested more than {DEEPEST} deep", self._path)
+            raise ModelError(
+                f"its elements are nested more than {DEEPEST} deep", self._path
+            )
         if self._count > MOST:
             raise ModelError(f"holds more than {MOST} elements", self._path)
         return super().start(tag, attrs)
@@ -69,13 +84,18 @@ def _parsed(path: Path) -> ElementTree.Element:
         with path.open("rb") as file:
             data = file.read(LARGEST * 2**20 + 1)
         if len(data) > LARGEST * 2**20:
-            raise ModelError(f"is larger than {LARGEST} MiB, too large for a robot's description", path)
+            raise ModelError(
+                f"is larger than {LARGEST} MiB, too large for a robot's description",
+                path,
+            )
         return ElementTree.fromstring(data, ElementTree.XMLParser(target=_Tree(path)))
     except (ElementTree.ParseError, OSError, ValueError, LookupError) as error:
         raise ModelError(f"cannot be read as XML ({error})", path) from None
 
 
-def _include(root: ElementTree.Element, path: Path, folder: Path, there: set[Path]) -> None:
+def _include(
+    root: ElementTree.Element, path: Path, folder: Path, there: set[Path]
+) -> None:
     """Put included files in their places, each once, as MuJoCo does:
     what includes itself has no end."""
     for owner, element in _owned(root):
@@ -87,7 +107,11 @@ def _include(root: ElementTree.Element, path: Path, folder: Path, there: set[Pat
                 continue
             file = folder / str(part.get("file"))
             if file.resolve() in there:
-                raise ModelError(f"includes {part.get('file')} again", path, "MuJoCo takes a file once")
+                raise ModelError(
+                    f"includes {part.get('file')} again",
+                    path,
+                    "MuJoCo takes a file once",
+                )
             there.add(file.resolve())
             inner = _parsed(file)
             _include(inner, file, folder, there)
@@ -95,7 +119,8 @@ def _include(root: ElementTree.Element, path: Path, folder: Path, there: set[Pat
 
 
 def _owned(root: ElementTree.Element) -> Iterator[tuple[str, ElementTree.Element]]:
-    """Yield every element with the words that name it, or the nearest around it that has a name."""
+    """Yield every element with the words that name it, or the nearest around it that
+    has a name."""
     waiting = [("", root)]
     while waiting:
         owner, element = waiting.pop()
@@ -128,7 +153,8 @@ def _check_names(root: ElementTree.Element, path: Path) -> None:
 
 
 def _check_chains(root: ElementTree.Element, path: Path) -> None:
-    """Refuse links of a URDF that carry themselves, and chains that no program should go along."""
+    """Refuse links of a URDF that carry themselves, and chains that no program should
+    go along."""
     parents = dict[str, str]()
     for joint in root.iterfind("joint"):
         child = _link(joint.find("child"))
@@ -146,7 +172,9 @@ def _check_chains(root: ElementTree.Element, path: Path) -> None:
                 what = f"link {link!r} is carried by itself"
                 raise ModelError(what, path, "correct parents and children")
             if count > DEEPEST:
-                raise ModelError(f"link {link!r} is carried by more than {DEEPEST} others", path)
+                raise ModelError(
+                    f"link {link!r} is carried by more than {DEEPEST} others", path
+                )
 
 
 def _link(end: ElementTree.Element | None) -> str:
@@ -176,7 +204,9 @@ def _check_numbers(owner: str, element: ElementTree.Element, path: Path) -> None
             if number is None or abs(number) <= FARTHEST:
                 continue
             shown = f'{name}="{text[:60]}"'
-            raise ModelError(f"{_place(owner, element)}: {shown} must be finite numbers", path)
+            raise ModelError(
+                f"{_place(owner, element)}: {shown} must be finite numbers", path
+            )
 
 
 def _check_limits(owner: str, element: ElementTree.Element, path: Path) -> None:
@@ -213,7 +243,9 @@ def _limits(element: ElementTree.Element) -> tuple[float | None, float | None]:
 
 def _place(owner: str, element: ElementTree.Element) -> str:
     tag = str(element.tag)
-    return owner if owner.startswith(f"{tag} ") else f"{owner}, {tag}".removeprefix(", ")
+    return (
+        owner if owner.startswith(f"{tag} ") else f"{owner}, {tag}".removeprefix(", ")
+    )
 
 
 def _number(word: str) -> float | None:

@@ -1,10 +1,11 @@
-"""A study: every cell of some settings, fitted over every seed, and what is measured of each run.
+"""A study: every cell of some settings, fitted over every seed, and what is measured of
+each run.
 
-Each run is a fit of one cell and one seed, and leaves one small file. The file's name is a digest
-of all that decides its content: settings, arm, data and versions. So a study that was killed goes
-on where it was, and studies in one folder share the runs that they have in common. Only the process
-that was started writes. The fits run in processes of their own or on Dask's workers,
-one thread each.
+Each run is a fit of one cell and one seed, and leaves one small file. The file's name
+is a digest of all that decides its content: settings, arm, data and versions. So a
+study that was killed goes on where it was, and studies in one folder share the runs
+that they have in common. Only the process that was started writes. The fits run in
+processes of their own or on Dask's workers, one thread each.
 """
 
 import json
@@ -62,9 +63,9 @@ class Task:
 def perform(task: Task) -> Result:
     """Fit, and return what a study needs of the run, as plain values.
 
-    `measures` are those of docs/studies.md, by name. `history` has generation, simulations and best
-    objective; `segment_bests` are the parameters of the best candidate of each segment, as `theta`
-    are those of the estimate.
+    `measures` are those of docs/studies.md, by name. `history` has generation,
+    simulations and best objective; `segment_bests` are the parameters of the best
+    candidate of each segment, as `theta` are those of the estimate.
 
     Raises RunError: the estimate diverges.
     """
@@ -119,8 +120,8 @@ class Row:
 def run_study(
     path: Path, folder: Path, read: Read, executor: Executor, progress: Progress
 ) -> tuple[Row, ...]:
-    """Perform the runs of a study that `folder` does not have yet; return the measures of all,
-    by seed."""
+    """Perform the runs of a study that `folder` does not have yet; return the measures
+    of all, by seed."""
     study = load(path, StudySettings)
     cells = cell_settings(study, path)
     any_cell = next(iter(cells.values()))
@@ -129,7 +130,11 @@ def run_study(
     files = [folder / "runs" / f"{task.key()}.json" for task in tasks]
     results = {file: _read(file) for file in files if file.is_file()}
     # cells that say the same are one run
-    missing = {file: task for file, task in zip(files, tasks, strict=True) if file not in results}
+    missing = {
+        file: task
+        for file, task in zip(files, tasks, strict=True)
+        if file not in results
+    }
     if results and missing:
         total = len(results) + len(missing)
         LOGGER.log(NOTE, "%d of %d runs found, goes on", len(results), total)
@@ -143,7 +148,8 @@ def _perform_all(
     executor: Executor,
     progress: Progress,
 ) -> None:
-    """Perform the runs that are missing, and add their results to those that are there."""
+    """Perform the runs that are missing, and add their results to those that are
+    there."""
     there = len(results)
     total = there + len(missing)
     progress("runs", there, total)
@@ -169,7 +175,9 @@ def _ended(future: Future[Result], task: Task) -> tuple[Result, bool]:
     try:
         return future.result(), True
     except BrokenProcessPool:
-        hint = "the same command goes on from here; with less memory, use fewer processes"
+        hint = (
+            "the same command goes on from here; with less memory, use fewer processes"
+        )
         raise RunError("a process of the study was killed", hint=hint) from None
     except Exception as error:
         lasting = isinstance(error, HydroidError)
@@ -178,7 +186,9 @@ def _ended(future: Future[Result], task: Task) -> tuple[Result, bool]:
         return {"failed": words}, lasting
 
 
-def make_tasks(cells: Mapping[str, FitSettings], seeds: int, logs: Sequence[Log]) -> list[Task]:
+def make_tasks(
+    cells: Mapping[str, FitSettings], seeds: int, logs: Sequence[Log]
+) -> list[Task]:
     """Return all runs of a study, seed by seed, with one thread:
     the runs are what is shared out."""
     tasks = list[Task]()
@@ -192,7 +202,9 @@ def make_tasks(cells: Mapping[str, FitSettings], seeds: int, logs: Sequence[Log]
 def measured(task: Task, result: Result) -> Row:
     """Return the measures of one run (docs/studies.md)."""
     values = {name: float(value) for name, value in result.get("measures", {}).items()}
-    values |= {f"value {name}": value for name, value in result.get("theta", {}).items()}
+    values |= {
+        f"value {name}": value for name, value in result.get("theta", {}).items()
+    }
     return Row(task.cell, task.seed, values, result.get("failed", ""))
 
 
@@ -209,7 +221,8 @@ def _read(file: Path) -> Result:
 
 @contextmanager
 def processes(count: int = 0) -> Generator[Executor]:
-    """Open that many processes, one per core for 0; they end with this one, however it ends."""
+    """Open that many processes, one per core for 0; they end with this one, however it
+    ends."""
     # threads of the simulation do not survive a fork
     context = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(count or None, context, initializer=_end_with_parent)

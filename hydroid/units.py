@@ -28,7 +28,8 @@ def _units() -> dict[str, Unit]:
 
 
 class Display(NamedTuple):
-    """How a reader is shown where a joint is: what that is called, and in which unit."""
+    """How a reader is shown where a joint is: what that is called, and in which
+    unit."""
 
     word: str
     unit: str
@@ -36,8 +37,8 @@ class Display(NamedTuple):
     """what 1 rad, or 1 m of a joint that slides, is in the unit"""
 
     def of_degrees(self, value: float) -> float:
-        """Return, in the unit, what files keep in degrees; of a joint that slides they keep 1 m
-        as if it were 1 rad."""
+        """Return, in the unit, what files keep in degrees; of a joint that slides they
+        keep 1 m as if it were 1 rad."""
         return value if self is TURNING else self.factor * math.radians(value)
 
 
@@ -77,8 +78,8 @@ def bare(text: str) -> str:
 
 
 def likely_time_unit(step: float) -> str:
-    """Return the unit in which a step between samples is one of 2 to 1000 samples a second; "":
-    in none."""
+    """Return the unit in which a step between samples is one of 2 to 1000 samples a
+    second; "": in none."""
     for name in ("s", "ms", "us", "ns", "min", "day"):
         if 9e-4 < step * UNITS[name].factor < 0.6:
             return name

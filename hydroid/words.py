@@ -7,7 +7,8 @@ from unicodedata import category
 
 
 def listed(names: Sequence[str], most: int | None = None) -> str:
-    """Join names as in a sentence; of more than `most` only the first, and how many more there are."""
+    """Join names as in a sentence; of more than `most` only the first, and how many
+    more there are."""
     if most is not None and len(names) > most + 1:
         return f"{', '.join(names[:most])} and {len(names) - most} more"
     *first, last = names or ("",)
@@ -15,7 +16,8 @@ def listed(names: Sequence[str], most: int | None = None) -> str:
 
 
 def distinct(name: str, taken: set[str], ending: str = "_{}") -> str:
-    """Return a name that is not taken, whatever its case, numbered where it must be; from now on it is."""
+    """Return a name that is not taken, whatever its case, numbered where it must be;
+    from now on it is."""
     others = (name + ending.format(n) for n in count(2))
     free = next(one for one in chain([name], others) if one.lower() not in taken)
     taken.add(free.lower())
@@ -29,22 +31,31 @@ def numbered(names: Iterable[str]) -> list[str]:
 
 
 def printable(text: str) -> str:
-    """Replace what would act on a terminal instead of being shown: a file may be called by such letters."""
-    return "".join("?" if category(c) in _ACTING and c not in "\n\t" else c for c in text)
+    """Replace what would act on a terminal instead of being shown: a file may be called
+    by such letters."""
+    return "".join(
+        "?" if category(c) in _ACTING and c not in "\n\t" else c for c in text
+    )
 
 
 _ACTING = ("Cc", "Cf", "Cs")  # controls, marks of direction, and halves of letters
 
 
 def number(value: float) -> str:
-    """Write four significant digits, without exponent from 0.0001 to ten million; a dash if not finite."""
+    """Write four significant digits, without exponent from 0.0001 to ten million; a
+    dash if not finite."""
     if not math.isfinite(value):
         return "–"
     if value == 0:
         return "0"
     scientific = f"{value:.3e}"
-    exponent = int(scientific.partition("e")[2])  # of the rounded value: 0.99999 is 1.000, not 1.0000
-    return f"{float(scientific):.{max(0, 3 - exponent)}f}" if -4 <= exponent < 7 else scientific
+    # of the rounded value: 0.99999 is 1.000, not 1.0000
+    exponent = int(scientific.partition("e")[2])
+    return (
+        f"{float(scientific):.{max(0, 3 - exponent)}f}"
+        if -4 <= exponent < 7
+        else scientific
+    )
 
 
 def two_digits(value: float) -> str:
@@ -53,36 +64,52 @@ def two_digits(value: float) -> str:
 
 
 def three_digits(value: float) -> str:
-    """Write three significant digits, or all before the point up to ten million; a dash if not finite."""
+    """Write three significant digits, or all before the point up to ten million; a dash
+    if not finite."""
     if not math.isfinite(value):
         return "–"
     return f"{value:.0f}" if 100 <= abs(value) < 1e7 else f"{value:.3g}"
 
 
 def interval_words(low: float | None, high: float | None) -> str:
-    """Write an interval by two digits of its width, and of each end; nothing where it has no limit."""
+    """Write an interval by two digits of its width, and of each end; nothing where it
+    has no limit."""
     if low is None or high is None:
         if low is None and high is None:
             return ""
-        return f"up to {three_digits(high)}" if high is not None else f"from {three_digits(low or 0.0)}"
-    ends = [f"{end:.{max(_decimals(high - low), _decimals(end))}f}" for end in (low, high)]
+        return (
+            f"up to {three_digits(high)}"
+            if high is not None
+            else f"from {three_digits(low or 0.0)}"
+        )
+    ends = [
+        f"{end:.{max(_decimals(high - low), _decimals(end))}f}" for end in (low, high)
+    ]
     return " to ".join(ends)
 
 
 def _decimals(size: float) -> int:
-    """Return how many decimals show two digits of a number; 0 of one from 10 on, and of 0."""
+    """Return how many decimals show two digits of a number; 0 of one from 10 on, and of
+    0."""
     return max(0, 1 - math.floor(math.log10(abs(size)))) if size else 0
 
 
 def told_apart(first: float, second: float) -> tuple[str, str]:
-    """Write two numbers beside each other: two significant digits, three where two would tie."""
+    """Write two numbers beside each other: two significant digits, three where two
+    would tie."""
     two = _significant(first, 2), _significant(second, 2)
-    return two if two[0] != two[1] else (_significant(first, 3), _significant(second, 3))
+    return (
+        two if two[0] != two[1] else (_significant(first, 3), _significant(second, 3))
+    )
 
 
 def _significant(value: float, digits: int) -> str:
     """Write significant digits, zeros among them, or all before the point."""
-    return f"{value:.0f}" if abs(value) >= 10**digits else f"{value:#.{digits}g}".rstrip(".")
+    return (
+        f"{value:.0f}"
+        if abs(value) >= 10**digits
+        else f"{value:#.{digits}g}".rstrip(".")
+    )
 
 
 def plain(value: float) -> str:
@@ -99,12 +126,23 @@ class _Number(float):
 
 
 _ONE = {"is": "is", "has": "has", "s": "", "it": "it", "them": "it", "its": "its"}
-_MANY = {"is": "are", "has": "have", "s": "s", "it": "they", "them": "them", "its": "their"}
+_MANY = {
+    "is": "are",
+    "has": "have",
+    "s": "s",
+    "it": "they",
+    "them": "them",
+    "its": "their",
+}
 
 
 def filled(words: str, names: Sequence[str], numbers: Mapping[str, float | str]) -> str:
-    """Return a sentence of WORDS with a finding's subjects and numbers; numbers by key stand in braces."""
-    shown = {key: value if isinstance(value, str) else _Number(value) for key, value in numbers.items()}
+    """Return a sentence of WORDS with a finding's subjects and numbers; numbers by key
+    stand in braces."""
+    shown = {
+        key: value if isinstance(value, str) else _Number(value)
+        for key, value in numbers.items()
+    }
     grammar = _ONE if len(names) == 1 else _MANY
     lists = {"names": listed(names), "few": listed(names, 4)}
     return words.format(*names, **(shown | grammar | lists))

@@ -1,13 +1,15 @@
-"""Give a model the inertias of its meshes, and stand two of the shipped arm on their carrier.
+"""Give a model the inertias of its meshes, and stand two of the shipped arm on their
+carrier.
 
     python meshes/make_models.py [MODEL.xml]
 
-Without a model it is models/hydrolek.xml, and models/hydrolek_dual.xml is written from it. Of every body with
-an <inertial> and a mesh the mass stays; centre and inertia become those of the mesh at uniform density, as
-trimesh integrates them.
+Without a model it is models/hydrolek.xml, and models/hydrolek_dual.xml is written from
+it. Of every body with an <inertial> and a mesh the mass stays; centre and inertia
+become those of the mesh at uniform density, as trimesh integrates them.
 
-The left arm is the right one seen in the plane y = 0. Positions and orientations are reflected; a joint's
-axis is a pseudovector, so that the same angles, torques and commands give mirrored motions.
+The left arm is the right one seen in the plane y = 0. Positions and orientations are
+reflected; a joint's axis is a pseudovector, so that the same angles, torques and
+commands give mirrored motions.
 """
 
 import os
@@ -35,7 +37,8 @@ INERTIA = np.array([1.0, 1.0, 1.0, -1.0, 1.0, -1.0])
 
 
 def inertial(mesh: Path, mass: float) -> dict[str, str]:
-    """Centre [m] and inertia [kg·m²] of a closed mesh of some mass [kg], as attributes of an <inertial>."""
+    """Centre [m] and inertia [kg·m²] of a closed mesh of some mass [kg], as attributes
+    of an <inertial>."""
     solid = trimesh.load(mesh, force="mesh", process=False)
     assert isinstance(solid, trimesh.Trimesh)
     solid.merge_vertices()  # an STL names a corner anew in every face
@@ -43,8 +46,13 @@ def inertial(mesh: Path, mass: float) -> dict[str, str]:
         raise SystemExit(f"{mesh} is not one closed solid that looks outward")
     tensor = np.asarray(solid.moment_inertia) / solid.mass
     tensor = mass * 0.5 * (tensor + tensor.T)
-    values = {"pos": solid.center_mass, "fullinertia": tensor[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]}
-    return {name: " ".join(repr(float(x)) for x in value) for name, value in values.items()}
+    values = {
+        "pos": solid.center_mass,
+        "fullinertia": tensor[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]],
+    }
+    return {
+        name: " ".join(repr(float(x)) for x in value) for name, value in values.items()
+    }
 
 
 def write_inertias(path: Path) -> None:
@@ -53,26 +61,41 @@ def write_inertias(path: Path) -> None:
     root = ElementTree.fromstring(path.read_text(encoding="utf-8"), parser)
     compiler = root.find("compiler")
     folder = path.parent / ("" if compiler is None else compiler.get("meshdir", ""))
-    files = {mesh.get("name"): folder / str(mesh.get("file")) for mesh in root.iterfind("asset/mesh")}
+    files = {
+        mesh.get("name"): folder / str(mesh.get("file"))
+        for mesh in root.iterfind("asset/mesh")
+    }
     for body in root.iter("body"):
         stated, shape = body.find("inertial"), body.find("geom[@mesh]")
         if stated is not None and shape is not None:
-            stated.attrib.update(inertial(files[shape.get("mesh")], float(str(stated.get("mass")))))
+            stated.attrib.update(
+                inertial(files[shape.get("mesh")], float(str(stated.get("mass"))))
+            )
     text = ElementTree.tostring(root, encoding="unicode").replace(" />", "/>")
     path.write_text(text + "\n", encoding="utf-8")
 
 
 def two_arms(arm: Path) -> str:
-    """Return the MJCF of the arm and its mirror image on their carrier, with meshes relative to DUAL."""
-    machine = mujoco.MjSpec.from_string(f"<mujoco>{fill_template('cad/scene.xml')}</mujoco>")
+    """Return the MJCF of the arm and its mirror image on their carrier, with meshes
+    relative to DUAL."""
+    machine = mujoco.MjSpec.from_string(
+        f"<mujoco>{fill_template('cad/scene.xml')}</mujoco>"
+    )
     machine.modelname = "hydrolek_dual"
-    machine.comment = "the arm of hydrolek.xml and its mirror image, by `make model`: change that"
+    machine.comment = (
+        "the arm of hydrolek.xml and its mirror image, by `make model`: change that"
+    )
     machine.compiler.savecompiled = machine.compiler.savecanonical = False
     machine.add_material(name="steel", rgba=[0.25, 0.27, 0.3, 1])
     carrier = machine.worldbody.add_body(name="carrier")
     for name in CARRIER:
         machine.add_mesh(name=name, file=str(ROOT / "meshes" / f"{name}.stl"))
-        look = {"type": mujoco.mjtGeom.mjGEOM_MESH, "meshname": name, "material": "steel", "mass": 0}
+        look = {
+            "type": mujoco.mjtGeom.mjGEOM_MESH,
+            "meshname": name,
+            "material": "steel",
+            "mass": 0,
+        }
         carrier.add_geom(group=2, contype=0, conaffinity=0, **look)
         carrier.add_geom(group=3, **look)
     for side in ("right", "left"):
@@ -86,7 +109,10 @@ def two_arms(arm: Path) -> str:
     arrange(machine, middle, middle + data.xanchor[-1] - data.xanchor[0])
     text = machine.to_xml()
     for mesh in machine.meshes:
-        text = text.replace(f'"{mesh.file}"', f'"{Path(os.path.relpath(mesh.file, DUAL.parent)).as_posix()}"')
+        text = text.replace(
+            f'"{mesh.file}"',
+            f'"{Path(os.path.relpath(mesh.file, DUAL.parent)).as_posix()}"',
+        )
     return text
 
 
@@ -110,7 +136,8 @@ def attach(machine: mujoco.MjSpec, arm: mujoco.MjSpec, side: str) -> None:
 
 
 def mirror(spec: mujoco.MjSpec) -> None:
-    """Reflect all bodies of a model in the plane y = 0, so that the same angles mean mirrored poses."""
+    """Reflect all bodies of a model in the plane y = 0, so that the same angles mean
+    mirrored poses."""
     for mesh in spec.meshes:
         mesh.scale = mesh.scale * POSITION
         mesh.refpos, mesh.refquat = mesh.refpos * POSITION, mesh.refquat * QUATERNION

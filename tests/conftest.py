@@ -48,29 +48,43 @@ def spec(arm: Arm):
 
 @pytest.fixture(scope="session")
 def study_log(arm: Arm) -> Log:
-    """Five seconds of steps on the shoulder from the study pose; the angles are the start pose throughout."""
+    """Five seconds of steps on the shoulder from the study pose; the angles are the
+    start pose throughout."""
     return step_log(arm.pose("study"), [60.0, -80.0, 30.0, 0.0, -40.0])
 
 
-def candidates(arm: Arm, n: int, seed: int = 0, hydraulics: HydraulicSettings | None = None) -> Candidates:
-    """Random candidates around the article's true values; every joint shares gain, damping and stiffness."""
+def candidates(
+    arm: Arm, n: int, seed: int = 0, hydraulics: HydraulicSettings | None = None
+) -> Candidates:
+    """Random candidates around the article's true values; every joint shares gain,
+    damping and stiffness."""
     rng = np.random.default_rng(seed)
     joints = np.ones((1, len(arm.joint_names)))
-    values = np.tile(nominal_joints(arm, hydraulics or HydraulicSettings()), (n, 1)).view(np.recarray)
+    values = np.tile(
+        nominal_joints(arm, hydraulics or HydraulicSettings()), (n, 1)
+    ).view(np.recarray)
     for name, value in (("gain", 0.2), ("damping", 231.8), ("stiffness", 53.4)):
         values[name] = rng.uniform(0.5, 2.0, (n, 1)) * value * joints
     return Candidates(values, rng.uniform(0.5, 2.0, (n, len(arm.masses))) * arm.masses)
 
 
 def scattered(arm: Arm, n: int, **hydraulics: float) -> Candidates:
-    rng, everyone = np.random.default_rng(0), candidates(arm, n, hydraulics=HydraulicSettings(**hydraulics))
+    rng, everyone = (
+        np.random.default_rng(0),
+        candidates(arm, n, hydraulics=HydraulicSettings(**hydraulics)),
+    )
     for name in ("area_a", "area_b", "current_max", "onset_a", "onset_b", "force_1"):
         everyone.joints[name] *= rng.uniform(0.7, 1.4, (n, 1))
     return everyone
 
 
 def simulation(
-    spec, arm: Arm, log: Log, outputs: Sequence[int] = (1,), kind: str = "mech", **settings
+    spec,
+    arm: Arm,
+    log: Log,
+    outputs: Sequence[int] = (1,),
+    kind: str = "mech",
+    **settings,
 ) -> Simulation:
     """Of some joints, from 0, in the stage `kind`."""
     scenario = Scenario(spec, arm, log, list(outputs), SimulationSettings(**settings))

@@ -1,4 +1,5 @@
-"""An estimate with its settings is resolved in one way, and `estimate.yaml` comes back as it was written."""
+"""An estimate with its settings is resolved in one way, and `estimate.yaml` comes back
+as it was written."""
 
 import pkgutil
 from pathlib import Path
@@ -21,10 +22,16 @@ def nominal(source: Path | None = None, **overrides: object):
 
 
 def run_folder(folder: Path, final: str) -> Path:
-    fixed = {f"parameters.{name}.fixed": value for name, value in TRUTH.items() if name != "K"}
+    fixed = {
+        f"parameters.{name}.fixed": value
+        for name, value in TRUTH.items()
+        if name != "K"
+    }
     settings = load_identified(None, "fit-hyd", fixed, nominal=True).settings
     write_settings(folder, settings)
-    estimate = {n: ParameterEstimate(value=v, unit="?") for n, v in TRUTH.items() if n != "K"}
+    estimate = {
+        n: ParameterEstimate(value=v, unit="?") for n, v in TRUTH.items() if n != "K"
+    }
     write_estimate(folder, FitSummary(stage="hyd", estimate=estimate, final=final))
     return folder
 
@@ -34,7 +41,9 @@ def test_values_are_taken_and_what_is_not_named_is_nominal(tmp_path: Path, arm: 
     file.write_text("A_A: 900\nM3: 20\n")
     model, found = nominal(file)
     _, plain = nominal()
-    assert found.joints.area_a[0] == pytest.approx([8e-4, 9e-4, 1e-3, 1e-5, 5e-4, 8e-6, 3e-4])
+    assert found.joints.area_a[0] == pytest.approx(
+        [8e-4, 9e-4, 1e-3, 1e-5, 5e-4, 8e-6, 3e-4]
+    )
     assert (found.joints.area_b == plain.joints.area_b).all()
     assert found.mass[0] == pytest.approx(np.where(np.arange(8) == 2, 20.0, arm.masses))
     assert (plain.mass[0] == arm.masses).all()
@@ -69,7 +78,9 @@ def test_a_folder_without_an_estimate_is_refused(tmp_path: Path):
 
 
 @pytest.mark.parametrize(("final", "free"), [("refined", False), ("joint", True)])
-def test_a_joint_refinement_frees_what_was_fixed(tmp_path: Path, final: str, free: bool):
+def test_a_joint_refinement_frees_what_was_fixed(
+    tmp_path: Path, final: str, free: bool
+):
     folder = run_folder(tmp_path / "run", final)
     for source in (folder, folder / "estimate.yaml"):
         model = load_identified(source)

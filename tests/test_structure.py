@@ -12,7 +12,15 @@ imports = runpy.run_path(str(ROOT.parent / "benchmarks" / "structure.py"))["impo
 # a package may import packages of a lower layer, and itself
 LAYERS = [
     {"arrays", "errors"},
-    {"files", "findings", "mjcf", "parameters", "progress", "quantity_table", "robot_xml"}
+    {
+        "files",
+        "findings",
+        "mjcf",
+        "parameters",
+        "progress",
+        "quantity_table",
+        "robot_xml",
+    }
     | {"joint_verdict", "settings", "units", "words"},
     {"estimate"},
     {"identified_model"},
@@ -32,7 +40,9 @@ LAYERS = [
     {"commands"},
     {"__init__", "__main__"},
 ]
-LEVEL = {package: level for level, packages in enumerate(LAYERS) for package in packages}
+LEVEL = {
+    package: level for level, packages in enumerate(LAYERS) for package in packages
+}
 FILES = sorted(ROOT.rglob("*.py"))
 
 
@@ -42,8 +52,12 @@ def package(path: Path) -> str:
 
 def imported_packages(path: Path) -> set[str]:
     tree = ast.parse(path.read_text())
-    assert not any(getattr(node, "level", 0) for node in ast.walk(tree)), f"{path}: relative import"
-    return {name.split(".")[1] for name in imports(tree) if name.startswith("hydroid.")} & LEVEL.keys()
+    assert not any(getattr(node, "level", 0) for node in ast.walk(tree)), (
+        f"{path}: relative import"
+    )
+    return {
+        name.split(".")[1] for name in imports(tree) if name.startswith("hydroid.")
+    } & LEVEL.keys()
 
 
 def test_every_file_belongs_to_a_package():
@@ -54,9 +68,14 @@ def test_every_file_belongs_to_a_package():
 def test_no_upward_import(path: Path):
     here = package(path)
     upward = {other for other in imported_packages(path) if LEVEL[other] > LEVEL[here]}
-    beside = {other for other in imported_packages(path) if LEVEL[other] == LEVEL[here] and other != here}
+    beside = {
+        other
+        for other in imported_packages(path)
+        if LEVEL[other] == LEVEL[here] and other != here
+    }
     assert not upward, f"{here} imports {upward}"
-    # within a layer packages do not know each other, but for the small ones at the bottom
+    # within a layer packages do not know each other, but for the small ones at the
+    # bottom
     assert not beside or LEVEL[here] <= 1, f"{here} imports its neighbour {beside}"
 
 

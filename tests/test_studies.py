@@ -1,4 +1,5 @@
-"""The study's mechanism: each run is one file, what is there is not repeated, what failed is shown."""
+"""The study's mechanism: each run is one file, what is there is not repeated, what
+failed is shown."""
 
 import json
 import signal
@@ -30,7 +31,12 @@ def content(**changes: Any) -> dict[str, Any]:
         "base": "article-mech",
         "set": SMALL | {"refinement": None},
         "logs": ["short.csv"],
-        "axes": {"norm": {"largest": {"objective.norm": "inf"}, "mean": {"objective.norm": 1}}},
+        "axes": {
+            "norm": {
+                "largest": {"objective.norm": "inf"},
+                "mean": {"objective.norm": 1},
+            }
+        },
         "seeds": 2,
     }
     return study | changes
@@ -50,13 +56,18 @@ def run(file: Path, out: Path) -> tuple[Row, ...]:
 
 def stored(folder: Path) -> dict[str, dict[str, Any]]:
     """Results by file, without the time that they took."""
-    found = {file.name: json.loads(file.read_text()) for file in sorted((folder / "runs").glob("*.json"))}
+    found = {
+        file.name: json.loads(file.read_text())
+        for file in sorted((folder / "runs").glob("*.json"))
+    }
     for result in found.values():
         result.get("measures", {}).pop("seconds", None)
     return found
 
 
-def test_what_is_there_is_read_and_what_is_missing_is_performed(tmp_path: Path, monkeypatch, caplog):
+def test_what_is_there_is_read_and_what_is_missing_is_performed(
+    tmp_path: Path, monkeypatch, caplog
+):
     caplog.set_level("INFO", "hydroid")
     file = written(tmp_path)
     first, before = run(file, tmp_path), stored(tmp_path)
@@ -76,8 +87,11 @@ def test_what_is_there_is_read_and_what_is_missing_is_performed(tmp_path: Path, 
     assert "3 of 4 runs found, goes on" in caplog.text
     assert stored(tmp_path) == before
     both = zip(first, again, strict=True)
-    assert all(a.values[n] == b.values[n] for a, b in both for n in a.values if n != "seconds")
-    # another study shares the runs that both have; the unused search's settings decide nothing
+    assert all(
+        a.values[n] == b.values[n] for a, b in both for n in a.values if n != "seconds"
+    )
+    # another study shares the runs that both have; the unused search's settings decide
+    # nothing
     other = {"alone": {"one": {"objective.norm": "inf", "search.nsga2.population": 10}}}
     run(written(tmp_path, axes=other), tmp_path)
     assert set(stored(tmp_path)) == set(before)
@@ -89,7 +103,9 @@ def test_a_run_is_the_same_wherever_the_arm_s_files_lie(tmp_path: Path):
     """A checkout that is moved keeps its runs: paths decide nothing."""
     file = written(tmp_path)
     cells = cell_settings(load(file, StudySettings), file)
-    (task, *_) = make_tasks(cells, 1, read_logs([tmp_path / "short.csv"], cells["mean"]))
+    (task, *_) = make_tasks(
+        cells, 1, read_logs([tmp_path / "short.csv"], cells["mean"])
+    )
     arm = task.settings.arm
     moved = arm.changed({"pair": tmp_path / "other.xml"})
     other = replace(task, settings=task.settings.model_copy(update={"arm": moved}))
@@ -121,16 +137,30 @@ def test_a_run_that_fails_is_shown_and_the_others_count(tmp_path: Path, monkeypa
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"axes": {"norm": {"a": {"objective.nrm": 1}}}}, r"small.yaml: .*objective.nrm.*'norm'"),
-        ({"set": {"search.ga.population": 1}}, r"small.yaml: search.ga.population: .*than or equal to 4"),
-        ({"axes": {"objective.norm": []}}, r"small.yaml, line \d+: axes.objective.norm"),
+        (
+            {"axes": {"norm": {"a": {"objective.nrm": 1}}}},
+            r"small.yaml: .*objective.nrm.*'norm'",
+        ),
+        (
+            {"set": {"search.ga.population": 1}},
+            r"small.yaml: search.ga.population: .*than or equal to 4",
+        ),
+        (
+            {"axes": {"objective.norm": []}},
+            r"small.yaml, line \d+: axes.objective.norm",
+        ),
         ({"sedes": 3}, r"unknown setting 'sedes'; did you mean 'seeds'"),
-        ({"base": "nowhere"}, r"nowhere: no such config; give a YAML file or one of: .*article-mech"),
+        (
+            {"base": "nowhere"},
+            r"nowhere: no such config; give a YAML file or one of: .*article-mech",
+        ),
         ({"logs": []}, r"small.yaml, line \d+: logs"),
         ({"logs": ["gone.csv"]}, r"gone.csv"),
     ],
 )
-def test_a_bad_file_is_refused_in_one_line(tmp_path: Path, change: dict[str, Any], message: str):
+def test_a_bad_file_is_refused_in_one_line(
+    tmp_path: Path, change: dict[str, Any], message: str
+):
     with pytest.raises(HydroidError, match=message) as error:
         run(written(tmp_path, **change), tmp_path)
     assert "\n" not in str(error.value)
@@ -150,18 +180,39 @@ def test_axes_multiply_and_lists_name_their_cells(tmp_path: Path):
     axes = {"search.ga.crossover_rate": [0.4, 0.8], "norm": content()["axes"]["norm"]}
     file = written(tmp_path, axes=axes)
     cells = cell_settings(load(file, StudySettings), file)
-    names = [f"search.ga.crossover_rate {r}, {n}" for r in (0.4, 0.8) for n in ("largest", "mean")]
+    names = [
+        f"search.ga.crossover_rate {r}, {n}"
+        for r in (0.4, 0.8)
+        for n in ("largest", "mean")
+    ]
     assert list(cells) == names
     assert [s.search.ga.crossover_rate for s in cells.values()] == [0.4, 0.4, 0.8, 0.8]
 
 
 @pytest.mark.slow
-def test_a_killed_study_goes_on_ends_with_the_same_bits_and_leaves_no_process(tmp_path: Path):
-    file, (whole, killed) = written(tmp_path, seeds=6), (tmp_path / "whole", tmp_path / "killed")
+def test_a_killed_study_goes_on_ends_with_the_same_bits_and_leaves_no_process(
+    tmp_path: Path,
+):
+    file, (whole, killed) = (
+        written(tmp_path, seeds=6),
+        (tmp_path / "whole", tmp_path / "killed"),
+    )
 
     def start(out: Path) -> "subprocess.Popen[str]":
-        command = [sys.executable, "-m", "hydroid", "study", file, "--out", out, "--processes", "2"]
-        return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        command = [
+            sys.executable,
+            "-m",
+            "hydroid",
+            "study",
+            file,
+            "--out",
+            out,
+            "--processes",
+            "2",
+        ]
+        return subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
 
     first, second = start(whole), start(killed)
     while not list(killed.glob("runs/*.json")) and second.poll() is None:
@@ -176,7 +227,8 @@ def test_a_killed_study_goes_on_ends_with_the_same_bits_and_leaves_no_process(tm
     _, said = again.communicate(timeout=300)
     assert again.returncode == 0, said
     assert f"{len(before)} of 12 runs found, goes on" in said
-    assert all(file.stat().st_mtime_ns == then for file, then in before.items())  # nothing is done twice
+    # nothing is done twice
+    assert all(file.stat().st_mtime_ns == then for file, then in before.items())
     assert stored(killed) == stored(whole)
     cells = "tables/cells.csv"  # runs.csv has the seconds too
     assert (killed / cells).read_bytes() == (whole / cells).read_bytes()

@@ -38,5 +38,7 @@ def test_every_quantity_has_a_unit_of_the_table():
 
 def test_a_quantity_in_an_unknown_unit_is_refused():
     row = {"unit": "furlong", "default": 1.0, "plain": "length"}
-    with pytest.raises(ValueError, match=r"quantities\.yaml: reach: units\.yaml has no unit furlong"):
+    with pytest.raises(
+        ValueError, match=r"quantities\.yaml: reach: units\.yaml has no unit furlong"
+    ):
         quantity("reach", row)

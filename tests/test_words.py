@@ -1,4 +1,5 @@
-"""Every finding has words, every row of words a finding, and a sentence agrees with its subjects."""
+"""Every finding has words, every row of words a finding, and a sentence agrees with its
+subjects."""
 
 from pathlib import Path
 
@@ -11,13 +12,17 @@ ROOT = Path(__file__).parents[1] / "hydroid"
 
 
 def test_every_row_of_words_is_used():
-    text = "\n".join(file.read_text() for file in ROOT.rglob("*.py") if file != ROOT / "findings.py")
+    text = "\n".join(
+        file.read_text() for file in ROOT.rglob("*.py") if file != ROOT / "findings.py"
+    )
     assert not [kind for kind in WORDS if f'"{kind}"' not in text]
 
 
 @pytest.mark.parametrize("names", ["A_A is", "A_A and A_B are"])
 def test_a_sentence_agrees_with_its_subjects(names: str):
-    finding = Finding("at bound", "warning", tuple(names.split()[:-1:2]), {"side": "upper"})
+    finding = Finding(
+        "at bound", "warning", tuple(names.split()[:-1:2]), {"side": "upper"}
+    )
     assert finding.what.startswith(f"{names} at the upper bound: ")
     assert str(finding).endswith("Otherwise the model lacks something.")
 
@@ -29,11 +34,18 @@ TAKEN = ("names", "few", "is", "s", "side", "kind", "0")
 def test_a_subject_may_be_called_as_a_word_of_the_sentence(name: str):
     at = Finding("at bound", "warning", (name,), {"side": "upper"})
     assert at.what == f"{name} is at the upper bound: the error would fall beyond it."
-    strained = Finding("strained prior", "warning", (name, "K"), details={name: "2.9 above"})
-    assert strained.what == f"Far from expected, in standard deviations: {name} (2.9 above) and K."
+    strained = Finding(
+        "strained prior", "warning", (name, "K"), details={name: "2.9 above"}
+    )
+    assert (
+        strained.what
+        == f"Far from expected, in standard deviations: {name} (2.9 above) and K."
+    )
 
 
-@pytest.mark.parametrize("name", ["\x1b]0;title\x07", "\x9b31m", "\u202egpj.exe", "\udcff"])
+@pytest.mark.parametrize(
+    "name", ["\x1b]0;title\x07", "\x9b31m", "\u202egpj.exe", "\udcff"]
+)
 def test_a_name_does_nothing_to_a_terminal(name: str):
     shown = printable(f"a\t{name}\u00a0ä√\n")
     assert shown.startswith("a\t?")
@@ -58,7 +70,9 @@ def test_a_long_list_ends_with_how_many_more():
         ((123.4, 123.1), ("123", "123")),
     ],
 )
-def test_numbers_side_by_side_have_two_digits_and_three_where_two_would_tie(pair, shown):
+def test_numbers_side_by_side_have_two_digits_and_three_where_two_would_tie(
+    pair, shown
+):
     assert told_apart(*pair) == shown
 
 
@@ -76,5 +90,7 @@ def test_numbers_side_by_side_have_two_digits_and_three_where_two_would_tie(pair
         (2.0, 2.0, "2.0 to 2.0"),
     ],
 )
-def test_an_interval_shows_two_digits_of_its_width_and_of_its_ends(low, high, expected: str):
+def test_an_interval_shows_two_digits_of_its_width_and_of_its_ends(
+    low, high, expected: str
+):
     assert interval_words(low, high) == expected

@@ -1,8 +1,10 @@
-"""`docs/reproduction.md`: the article's tables and figures made anew, from results that are committed.
+"""`docs/reproduction.md`: the article's tables and figures made anew, from results that
+are committed.
 
     python benchmarks/article/page.py
 
-docs/reproduction/ has one CSV of all runs for each study, and the figures; page.md here has the words.
+docs/reproduction/ has one CSV of all runs for each study, and the figures; page.md here
+has the words.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -13,7 +15,17 @@ from typing import Any
 import numpy as np
 from claims import MOST, POWER, Outcome, Verdict, log_ratios, verdict, verdicts
 from common import ROOT
-from studies import BLIND, CENTRE, RECORDS, Claim, Runs, Table, load_studies, of_cell, read_runs
+from studies import (
+    BLIND,
+    CENTRE,
+    RECORDS,
+    Claim,
+    Runs,
+    Table,
+    load_studies,
+    of_cell,
+    read_runs,
+)
 
 from hydroid.words import two_digits
 
@@ -22,33 +34,67 @@ QUICK = "> **The short form: one seed, short data, few generations. It shows tha
 FEW = 5
 """runs below which a median of some of a cell's runs says little"""
 KINDS: dict[str, str] = {"parameter": "parameters", "mass": "parameters"}
-KINDS |= {"slope": "sensitivity", "D": "sensitivity", "": "fit, convergence, validation"}
+KINDS |= {
+    "slope": "sensitivity",
+    "D": "sensitivity",
+    "": "fit, convergence, validation",
+}
 """what a claim is about, by the first word of its measure"""
 NO_HALVING = "no halving"
-SHOWN: tuple[str, ...] = (Outcome.HOLDS, Outcome.OPPOSITE, Outcome.EXCLUDED, NO_HALVING, Outcome.UNDECIDED)
-KNOWN = Claim(says="", item="", lower="multi-objective", than="simple GA", column="identifiable error")
+SHOWN: tuple[str, ...] = (
+    Outcome.HOLDS,
+    Outcome.OPPOSITE,
+    Outcome.EXCLUDED,
+    NO_HALVING,
+    Outcome.UNDECIDED,
+)
+KNOWN = Claim(
+    says="",
+    item="",
+    lower="multi-objective",
+    than="simple GA",
+    column="identifiable error",
+)
 """what the head says of the wide box besides the article's claim"""
 
 
 def page(results: Path, *, quick: bool = False) -> str:
-    studies, text = load_studies(), Path(__file__).with_name("page.md").read_text(encoding="utf-8")
+    studies, text = (
+        load_studies(),
+        Path(__file__).with_name("page.md").read_text(encoding="utf-8"),
+    )
     runs = {name: read_runs(results / f"{name}_runs.csv") for name in studies}
-    made = {name: verdicts(study.claims, runs[name], study.tables) for name, study in studies.items()}
-    numbers = head(runs, made, {name: study.same_record for name, study in studies.items()})
+    made = {
+        name: verdicts(study.claims, runs[name], study.tables)
+        for name, study in studies.items()
+    }
+    numbers = head(
+        runs, made, {name: study.same_record for name, study in studies.items()}
+    )
     numbers["studies"] = ""
     for name, study in studies.items():
-        link, cells = f"[Settings](../benchmarks/article/{name}.yaml)", [*study.changes()]
+        link, cells = (
+            f"[Settings](../benchmarks/article/{name}.yaml)",
+            [*study.changes()],
+        )
         numbers["studies"] += f"\n## {study.title}\n\n{study.about.strip()} {link}.\n"
-        numbers["studies"] += "".join(study_table(each, runs[name], cells) for each in study.tables)
+        numbers["studies"] += "".join(
+            study_table(each, runs[name], cells) for each in study.tables
+        )
         for figure in study.figures:
-            numbers["studies"] += f"\n![{figure.title.partition(':')[0]}](reproduction/{figure.file})\n"
+            numbers["studies"] += (
+                f"\n![{figure.title.partition(':')[0]}](reproduction/{figure.file})\n"
+            )
     for word, ours in (("theirs", False), ("ours", True)):
-        numbers[word] = claims_table(v for each in made.values() for v in each if v.claim.ours is ours)
+        numbers[word] = claims_table(
+            v for each in made.values() for v in each if v.claim.ours is ours
+        )
     return QUICK * quick + text.format(enough=percent(POWER), **numbers)
 
 
 class Medians:
-    """What page.md says of a study: the median of a measure over a cell's runs, by `cell / measure`."""
+    """What page.md says of a study: the median of a measure over a cell's runs, by
+    `cell / measure`."""
 
     def __init__(self, runs: Runs) -> None:
         self.runs = runs
@@ -58,19 +104,39 @@ class Medians:
         values = of_cell(self.runs, cell, column).values()
         if not values:
             return "(no runs)"
-        return f"{median(values):,.0f}" if column == "simulations" else two_digits(median(values))
+        return (
+            f"{median(values):,.0f}"
+            if column == "simulations"
+            else two_digits(median(values))
+        )
 
 
 def head(
-    runs: Mapping[str, Runs], made: Mapping[str, Sequence[Verdict]], shared: Mapping[str, int]
+    runs: Mapping[str, Runs],
+    made: Mapping[str, Sequence[Verdict]],
+    shared: Mapping[str, int],
 ) -> dict[str, Any]:
-    """Return what page.md needs besides; `shared`: seeds up to this one share a record, by study."""
+    """Return what page.md needs besides; `shared`: seeds up to this one share a record,
+    by study."""
     says = "ulti-objective GA: lower parameter error than simple GA"
-    narrow, wide = (next(v for v in made[n] if says in v.claim.says) for n in ("mechanical", "wide"))
-    known = {n: verdict(KNOWN, log_ratios(KNOWN, runs[n]), 0.05, None) for n in ("mechanical", "wide")}
-    cells = (of_cell(runs["hydraulic"], cell, "simulations") for cell in ("multi-start", "multi-objective"))
+    narrow, wide = (
+        next(v for v in made[n] if says in v.claim.says) for n in ("mechanical", "wide")
+    )
+    known = {
+        n: verdict(KNOWN, log_ratios(KNOWN, runs[n]), 0.05, None)
+        for n in ("mechanical", "wide")
+    }
+    cells = (
+        of_cell(runs["hydraulic"], cell, "simulations")
+        for cell in ("multi-start", "multi-objective")
+    )
     least, multi = (median(each.values() or [np.nan]) for each in cells)
-    searches = [(n, r) for n in ("mechanical", "hydraulic") for r in runs[n] if "generations" in r]
+    searches = [
+        (n, r)
+        for n in ("mechanical", "hydraulic")
+        for r in runs[n]
+        if "generations" in r
+    ]
     return {
         **{f"{name}_median": Medians(made) for name, made in runs.items()},
         "narrow": interval(narrow),
@@ -79,7 +145,8 @@ def head(
         "wide_gain": gain(wide),
         "narrow_known": interval(known["mechanical"]),
         "wide_known": interval(known["wide"]),
-        "own": sum(run["seed"] > shared[name] for name, run in searches),  # with a record of their own
+        # with a record of their own
+        "own": sum(run["seed"] > shared[name] for name, run in searches),
         "searches": len(searches),
         "count": sum(not v.claim.ours for each in made.values() for v in each),
         "tally": tally(made),
@@ -89,7 +156,9 @@ def head(
 
 def tally(made: Mapping[str, Sequence[Verdict]]) -> str:
     """Return how many of the article's claims of each kind have each verdict."""
-    counts = {kind: dict[str, int].fromkeys(("claims", *SHOWN), 0) for kind in KINDS.values()}
+    counts = {
+        kind: dict[str, int].fromkeys(("claims", *SHOWN), 0) for kind in KINDS.values()
+    }
     for one in (v for each in made.values() for v in each if not v.claim.ours):
         kind = KINDS.get(one.claim.column.split()[0], KINDS[""])
         counts[kind]["claims"] += 1
@@ -99,14 +168,20 @@ def tally(made: Mapping[str, Sequence[Verdict]]) -> str:
 
 
 def called(made: Verdict) -> str:
-    """Return a verdict as a page has it: where the article prints no such effect, a halving is excluded."""
+    """Return a verdict as a page has it: where the article prints no such effect, a
+    halving is excluded."""
     stated = made.printed is not None and made.printed < made.claim.below
-    return made.outcome if stated or made.outcome is not Outcome.EXCLUDED else NO_HALVING
+    return (
+        made.outcome if stated or made.outcome is not Outcome.EXCLUDED else NO_HALVING
+    )
 
 
 def gain(made: Verdict) -> str:
-    """Return by how much the first measure can be lower than the second at best, within the interval."""
-    return percent(max(0.0, 1 - made.interval[0]) if np.isfinite(made.interval[1]) else np.nan)
+    """Return by how much the first measure can be lower than the second at best, within
+    the interval."""
+    return percent(
+        max(0.0, 1 - made.interval[0]) if np.isfinite(made.interval[1]) else np.nan
+    )
 
 
 def percent(part: float) -> str:
@@ -126,15 +201,27 @@ def claims_table(made: Iterable[Verdict]) -> str:
         printed = "" if v.printed is None else f"{v.printed:.2g}"
         open_still = v.outcome is Outcome.UNDECIDED and 2 < v.seeds < v.enough
         more = f"/{v.enough if v.enough <= MOST else f'{MOST}+'}" if open_still else ""
-        numbers = (interval(v), printed, f"{v.power:.2f}", called(v), f"{v.seeds}{more}")
-        lines.append(("" if v.claim.item == item else v.claim.item, v.claim.says, *numbers))
+        numbers = (
+            interval(v),
+            printed,
+            f"{v.power:.2f}",
+            called(v),
+            f"{v.seeds}{more}",
+        )
+        lines.append(
+            ("" if v.claim.item == item else v.claim.item, v.claim.says, *numbers)
+        )
         item = v.claim.item
-    return table("", ("item", "claim", "ratio", "article's", "power", "verdict", "seeds"), lines)
+    return table(
+        "", ("item", "claim", "ratio", "article's", "power", "verdict", "seeds"), lines
+    )
 
 
 def table(title: str, header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     above = f"\n**{title}**\n\n" if title else "\n"
-    text = "".join(f"| {' | '.join(row)} |\n" for row in (header, ["---"] * len(header), *rows))
+    text = "".join(
+        f"| {' | '.join(row)} |\n" for row in (header, ["---"] * len(header), *rows)
+    )
     return above + text
 
 
@@ -145,12 +232,20 @@ def study_table(shown: Table, runs: Runs, cells: Sequence[str]) -> str:
     """
     lines: list[list[str]] = []
     without_search = () if shown.cells == (RECORDS,) else (BLIND, CENTRE)
-    for cell in dict.fromkeys((*(shown.cells or cells), *shown.article, *without_search)):
+    for cell in dict.fromkeys(
+        (*(shown.cells or cells), *shown.article, *without_search)
+    ):
         columns = [of_cell(runs, cell, column).values() for column in shown.columns]
         most = max(map(len, columns))
-        texts = [two_digits(median(v)) if v and len(v) >= min(FEW, most) else "" for v in columns]
+        texts = [
+            two_digits(median(v)) if v and len(v) >= min(FEW, most) else ""
+            for v in columns
+        ]
         printed = shown.article.get(cell, [None] * len(columns))
-        texts = [t if v is None else f"{t} ({v:g})".strip() for t, v in zip(texts, printed, strict=True)]
+        texts = [
+            t if v is None else f"{t} ({v:g})".strip()
+            for t, v in zip(texts, printed, strict=True)
+        ]
         if any(texts):
             lines.append([cell, str(most or ""), *texts])
     return table(shown.title, ("", "runs", *shown.columns), lines)

@@ -1,4 +1,5 @@
-"""The article's studies: what runs on which record, the truth, what is shown, and what is claimed."""
+"""The article's studies: what runs on which record, the truth, what is shown, and what
+is claimed."""
 
 import csv
 import sys
@@ -26,16 +27,20 @@ FOLDER = Path(__file__).parent
 SECONDS, QUICK_SECONDS = 75.0, 15.0
 """length of the data; in the short form, which has one seed"""
 TRUTHS_FROM = 0.7
-"""a seed with a record of its own has true values of 0.7 to 1 / 0.7 times the article's"""
+"""a seed with a record of its own has true values of 0.7 to 1 / 0.7 times the
+article's"""
 Runs = list[dict[str, Any]]
-"""runs as a CSV has them: TEXTS (why it failed, best parameters of each segment), seed and measures"""
+"""runs as a CSV has them: TEXTS (why it failed, best parameters of each segment), seed
+and measures"""
 TEXTS = ("cell", "failed", "history", "segment bests")
 BLIND, CENTRE, RECORDS = "blind draw", "centre of the box", "records"
-"""cells without a search: estimates that no data went into, and what records say at the truth"""
+"""cells without a search: estimates that no data went into, and what records say at the
+truth"""
 
 
 class Table(Settings):
-    """A row for each cell, a column for each measure, and the values that the article prints, by cell."""
+    """A row for each cell, a column for each measure, and the values that the article
+    prints, by cell."""
 
     title: str
     columns: tuple[str, ...]
@@ -57,10 +62,12 @@ class Figure(Settings):
 
 
 class Claim(Settings):
-    """A statement that is tested over the seeds: a ratio of two measures is below a limit, or near 1.
+    """A statement that is tested over the seeds: a ratio of two measures is below a
+    limit, or near 1.
 
-    lower, column: the cell and the measure above the line. than, to: those below it; without `to` the same
-    measure, without `than` 1. equal: the claim is that the ratio is near 1. ours: it is not the article's.
+    lower, column: the cell and the measure above the line. than, to: those below it;
+    without `to` the same measure, without `than` 1. equal: the claim is that the ratio
+    is near 1. ours: it is not the article's.
     """
 
     says: str
@@ -77,11 +84,12 @@ class Claim(Settings):
 class ArticleStudy(StudySettings):
     """A study with what the article prints and says of it.
 
-    seeds: of the simple GA's cells; others have half as many. same_record: seeds up to this one share the
-    article's truth and one record; every later one has its own. records: number of records on which the
-    model itself is looked at. truth: the article's; none: `logs` are fitted. range_deg: where
-    simulated data keep the compared joint. checks: settings by further log. quick: settings that the short
-    form replaces in every cell.
+    seeds: of the simple GA's cells; others have half as many. same_record: seeds up to
+    this one share the article's truth and one record; every later one has its own.
+    records: number of records on which the model itself is looked at. truth: the
+    article's; none: `logs` are fitted. range_deg: where simulated data keep the
+    compared joint. checks: settings by further log. quick: settings that the short form
+    replaces in every cell.
     """
 
     logs: tuple[str, ...] = ()
@@ -109,7 +117,9 @@ class Plan:
         self.name, self.study, self.quick = name, study, quick
         self.longest = QUICK_SECONDS if quick else SECONDS
         self._record = cache(self._make_record)
-        self._directions = cache(lambda seed: Directions(self.problem(seed), self.truth(seed)))
+        self._directions = cache(
+            lambda seed: Directions(self.problem(seed), self.truth(seed))
+        )
 
     def settings(self, changes: Changes) -> dict[str, FitSettings]:
         quick = self.study.quick if self.quick else {}
@@ -120,28 +130,46 @@ class Plan:
         return self.settings({})
 
     def seeds(self, cell: str) -> range:
-        """Return the seeds that a cell should have; half as many where the search is not the simple GA."""
+        """Return the seeds that a cell should have; half as many where the search is
+        not the simple GA."""
         half = cell in self.cells and self.cells[cell].search.algorithm != "ga"
-        return range(1, 1 + min(self.study.seeds // (1 + half), 1 if self.quick else self.study.seeds))
+        return range(
+            1,
+            1
+            + min(
+                self.study.seeds // (1 + half), 1 if self.quick else self.study.seeds
+            ),
+        )
 
     def truth(self, seed: int) -> dict[str, float]:
         own = seed > self.study.same_record
-        exponents = np.random.default_rng(seed).uniform(-1, 1, len(self.study.truth)) * own
-        return {n: v * TRUTHS_FROM**e for (n, v), e in zip(self.study.truth.items(), exponents, strict=True)}
+        exponents = (
+            np.random.default_rng(seed).uniform(-1, 1, len(self.study.truth)) * own
+        )
+        return {
+            n: v * TRUTHS_FROM**e
+            for (n, v), e in zip(self.study.truth.items(), exponents, strict=True)
+        }
 
     def log(self, seed: int) -> Log:
-        return self._record(seed if self.study.truth and seed > self.study.same_record else 0)
+        return self._record(
+            seed if self.study.truth and seed > self.study.same_record else 0
+        )
 
     def directions(self, seed: int) -> Directions:
         """Return what a seed's record determines at its truth."""
         return self._directions(seed if seed > self.study.same_record else 0)
 
     def problem(self, seed: int, cell: str = "") -> Problem:
-        """Return the problem of a seed's record, for the first cell where there is no such cell."""
-        return Problem(self.cells.get(cell, next(iter(self.cells.values()))), [self.log(seed)])
+        """Return the problem of a seed's record, for the first cell where there is no
+        such cell."""
+        return Problem(
+            self.cells.get(cell, next(iter(self.cells.values()))), [self.log(seed)]
+        )
 
     def task(self, cell: str, seed: int) -> Task:
-        changes = {"search.seed": seed, "simulation.threads": 1}  # the runs are what is shared out
+        # the runs are what is shared out
+        changes = {"search.seed": seed, "simulation.threads": 1}
         return Task(cell, seed, self.cells[cell].changed(changes), (self.log(seed),))
 
     def row(self, cell: str, seed: int, result: Result) -> dict[str, Any]:
@@ -150,13 +178,20 @@ class Plan:
         row: dict[str, Any] = {"cell": cell, "seed": seed} | dict(made.values)
         if made.failed:
             return row | {"failed": made.failed}
-        bests = (" ".join(f"{value:.6g}" for value in best.values()) for best in result["segment_bests"])
-        return self.judged(row | course(result["history"]) | {"segment bests": ";".join(bests)})
+        bests = (
+            " ".join(f"{value:.6g}" for value in best.values())
+            for best in result["segment_bests"]
+        )
+        return self.judged(
+            row | course(result["history"]) | {"segment bests": ";".join(bests)}
+        )
 
     def judged(self, row: dict[str, Any]) -> dict[str, Any]:
         """Return a run with the measures of its estimate that it lacks."""
         problem = self.problem(row["seed"], row["cell"])
-        values = {name: float(row[f"value {name}"]) for name in problem.parameters.names}
+        values = {
+            name: float(row[f"value {name}"]) for name in problem.parameters.names
+        }
         theta = np.array([*values.values()])
         found = output_errors(problem, theta)
         if self.study.truth:
@@ -166,17 +201,26 @@ class Plan:
                 cells = self.settings(changes)
                 settings = cells.get(row["cell"], next(iter(cells.values())))
                 log = read_logs([FOLDER / file], settings)[0].first(self.longest)
-                found[name] = output_errors(Problem(settings, [log]), theta)["mean absolute error"]
+                found[name] = output_errors(Problem(settings, [log]), theta)[
+                    "mean absolute error"
+                ]
         return found | row
 
     def _make_record(self, seed: int) -> Log:
-        """Read the log, or simulate the truth under pseudo-random commands, as in the article's figure 17."""
+        """Read the log, or simulate the truth under pseudo-random commands, as in the
+        article's figure 17."""
         settings, truth = next(iter(self.cells.values())), self.truth(seed)
         if not truth:
-            return read_logs([FOLDER / name for name in self.study.logs], settings)[0].first(self.longest)
+            return read_logs([FOLDER / name for name in self.study.logs], settings)[
+                0
+            ].first(self.longest)
         pose, joints = settings.arm.pose("study"), [*settings.outputs]
         if self.study.range_deg is None:
-            return simulate_log(settings, pseudo_random_log(pose, joints, self.longest, seed=seed), truth)
+            return simulate_log(
+                settings,
+                pseudo_random_log(pose, joints, self.longest, seed=seed),
+                truth,
+            )
         limits = np.tile([[-np.inf], [np.inf]], len(pose))
         limits[:, joints[0] - 1] = np.radians(self.study.range_deg)
         return true_log(settings, truth, self.longest, seed, limits=limits)
@@ -184,19 +228,30 @@ class Plan:
 
 def read_runs(file: Path) -> Runs:
     """Read the runs of a study; none where there is no file."""
-    lines = csv.DictReader(file.read_text(encoding="utf-8").splitlines() if file.is_file() else [])
+    lines = csv.DictReader(
+        file.read_text(encoding="utf-8").splitlines() if file.is_file() else []
+    )
     return [
-        {name: text if name in TEXTS else float(text) for name, text in line.items() if text}
+        {
+            name: text if name in TEXTS else float(text)
+            for name, text in line.items()
+            if text
+        }
         | {"seed": int(line["seed"])}
         for line in lines
     ]
 
 
 def of_cell(runs: Runs, cell: str, column: str) -> dict[int, float]:
-    """Return a measure, or the ratio `A / B` of two, of the runs of a cell that have it, by seed."""
+    """Return a measure, or the ratio `A / B` of two, of the runs of a cell that have
+    it, by seed."""
     above, _, below = column.partition(" / ")
     if below:
         upper, lower = of_cell(runs, cell, above), of_cell(runs, cell, below)
-        return {seed: value / lower[seed] for seed, value in upper.items() if seed in lower}
-    found = {run["seed"]: run.get(column, np.nan) for run in runs if run["cell"] == cell}
+        return {
+            seed: value / lower[seed] for seed, value in upper.items() if seed in lower
+        }
+    found = {
+        run["seed"]: run.get(column, np.nan) for run in runs if run["cell"] == cell
+    }
     return {seed: value for seed, value in found.items() if np.isfinite(value)}

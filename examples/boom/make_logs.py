@@ -1,11 +1,13 @@
-"""Make the logs of the example's boom: one joint, constant duties, up from its stop and down from above.
+"""Make the logs of the example's boom: one joint, constant duties, up from its stop and
+down from above.
 
     python examples/boom/make_logs.py
 
-NO MACHINE: a virtual boom, and no hydroid model. It is a separate simulation in plain equations (Radau, rtol
-1e-7), and it differs where a machine would: pilot pressure with a lag instead of solenoids, a polynomial
-valve curve, another one for each edge, an engine whose speed lifts flow and pressure together, oil with air,
-Stribeck friction, a spring for a stop, and a pendulum for the arm. Its sizes are near those of our shoulder,
+NO MACHINE: a virtual boom, and no hydroid model. It is a separate simulation in plain
+equations (Radau, rtol 1e-7), and it differs where a machine would: pilot pressure with
+a lag instead of solenoids, a polynomial valve curve, another one for each edge, an
+engine whose speed lifts flow and pressure together, oil with air, Stribeck friction, a
+spring for a stop, and a pendulum for the arm. Its sizes are near those of our shoulder,
 all ours. What it shares with the model is the kind of physics.
 """
 
@@ -54,7 +56,8 @@ def bulk(pressure: float) -> float:
 def slope(raising: float, lowering: float, asked: float, stop: float):
     """Right-hand side for (pilots, engine, pressures of line, A and B, angle, speed).
 
-    Of pilot commands from 0 to 1, the engine's speed that is asked for, and the angle of the stop.
+    Of pilot commands from 0 to 1, the engine's speed that is asked for, and the angle
+    of the stop.
     """
 
     def f(_: float, z: np.ndarray) -> list[float]:
@@ -104,10 +107,16 @@ def boom(duty: float, way: str) -> np.ndarray:
     else:
         pb, stop = 8e5, -inf
         pa = (load / arm + AREA_B * pb) / AREA_A
-    z = np.array([0.0, 0.0, IDLE, SUPPLY * (0.5 + 0.5 * IDLE) - 1.0, pa, pb, start, 0.0])
+    z = np.array(
+        [0.0, 0.0, IDLE, SUPPLY * (0.5 + 0.5 * IDLE) - 1.0, pa, pb, start, 0.0]
+    )
     scale = np.array([1e-7, 1e-7, 1e-7, 10.0, 10.0, 10.0, 1e-9, 1e-8])
     begun, risen = REST + PILOT_DELAY[0 if sign > 0 else 1], REST + ENGINE_DELAY
-    phases = (0.0, begun, (0.0, 0.0), IDLE), (begun, risen, pilots, IDLE), (risen, LENGTH, pilots, 1.0)
+    phases = (
+        (0.0, begun, (0.0, 0.0), IDLE),
+        (begun, risen, pilots, IDLE),
+        (risen, LENGTH, pilots, 1.0),
+    )
     grid, out = np.arange(0.0, LENGTH + PERIOD / 2, PERIOD), []
     for first, last, pilot, asked in phases:
         times = grid[len(out) : np.searchsorted(grid, last + 1e-12)]
@@ -127,13 +136,20 @@ def main(folder: Path) -> None:
     rng = np.random.default_rng(0)
     for way, (_, sign) in STAGES.items():
         for duty in (*FITTED, *UNSEEN):
-            angle = np.degrees(boom(duty, way)) + rng.normal(0, NOISE_DEG, round(5.0 / PERIOD) + 1)
+            angle = np.degrees(boom(duty, way)) + rng.normal(
+                0, NOISE_DEG, round(5.0 / PERIOD) + 1
+            )
             time = PERIOD * np.arange(len(angle))
             command = np.where(time >= REST - 1e-9, sign * duty, 0.0)
             kind = "fit" if duty in FITTED else "check"
-            rows, header = np.column_stack([time, command, angle]), "time [s],duty [%],angle [deg]"
+            rows, header = (
+                np.column_stack([time, command, angle]),
+                "time [s],duty [%],angle [deg]",
+            )
             path = folder / f"{kind}_{way}_{duty}.csv"
-            np.savetxt(path, rows, fmt="%.5g", delimiter=",", header=header, comments="")
+            np.savetxt(
+                path, rows, fmt="%.5g", delimiter=",", header=header, comments=""
+            )
 
 
 if __name__ == "__main__":

@@ -1,9 +1,11 @@
-"""Make what one gets from CAD and from a logger, for an arm of ours: robot.urdf, its meshes, and three logs.
+"""Make what one gets from CAD and from a logger, for an arm of ours: robot.urdf, its
+meshes, and three logs.
 
     python examples/urdf/make_example.py
 
-NO MACHINE: the arm is made of blocks, and the logs are simulated by hydroid itself at values that the fit is
-not told. They show the way from CAD to a validated fit, not how well hydroid describes a real arm.
+NO MACHINE: the arm is made of blocks, and the logs are simulated by hydroid itself at
+values that the fit is not told. They show the way from CAD to a validated fit, not how
+well hydroid describes a real arm.
 """
 
 import sys
@@ -17,7 +19,11 @@ import hydroid
 from hydroid.identified_model import IdentifiedModel, identified
 from hydroid.log import Log
 
-SIZES = {"swing": (0.6, 0.5, 0.4), "boom": (1.8, 0.15, 0.25), "stick": (1.4, 0.12, 0.18)}
+SIZES = {
+    "swing": (0.6, 0.5, 0.4),
+    "boom": (1.8, 0.15, 0.25),
+    "stick": (1.4, 0.12, 0.18),
+}
 """length, width and height of the blocks [m]; each begins at its joint"""
 MASSES = {"swing": 300.0, "boom": 120.0, "stick": 60.0}
 JOINTS = {  # parent, place [m], turn [rad], axis, range [rad]
@@ -25,18 +31,32 @@ JOINTS = {  # parent, place [m], turn [rad], axis, range [rad]
     "boom": ("swing", "0.3 0 0.2", "1.5708 0 0", "0 0 -1", (-0.6, 1.2)),
     "stick": ("boom", "1.8 0 0", "0 0 0", "0 0 -1", (-2.8, 0.4)),
 }
-TRUTH = {"open_A": 1.3, "open_B": 0.8, "dead_A": 2.0, "dead_B": 3.0, "lag": 2.0, "size": 1.2, "D": 0.7}
-"""factors between the machine's values and those of a project, by the beginning of their names"""
+TRUTH = {
+    "open_A": 1.3,
+    "open_B": 0.8,
+    "dead_A": 2.0,
+    "dead_B": 3.0,
+    "lag": 2.0,
+    "size": 1.2,
+    "D": 0.7,
+}
+"""factors between the machine's values and those of a project, by the beginning of
+their names"""
 PERIOD, SECONDS, NOISE_DEG = 0.02, 16.0, 0.05
 
 
 def urdf() -> str:
-    """The robot, as an exporter would write it; the frames of boom and stick are turned."""
+    """The robot, as an exporter would write it; the frames of boom and stick are
+    turned."""
     parts = ['<robot name="demo_arm">', '  <link name="base"/>']
     for name, (length, width, height) in SIZES.items():
         m, turned = MASSES[name], name != "swing"
         y, z = (height, width) if turned else (width, height)
-        i = [m * (y * y + z * z) / 12, m * (length**2 + z * z) / 12, m * (length**2 + y * y) / 12]
+        i = [
+            m * (y * y + z * z) / 12,
+            m * (length**2 + z * z) / 12,
+            m * (length**2 + y * y) / 12,
+        ]
         parts += [
             f'  <link name="{name}">',
             f'    <inertial><origin xyz="{length / 2} 0 0"/><mass value="{m}"/>',
@@ -59,7 +79,9 @@ def urdf() -> str:
 def mesh(name: str) -> bytes:
     """One block as binary STL, in its link's frame."""
     length, width, height = SIZES[name]
-    solid = trimesh.creation.box(extents=(length, height, width) if name != "swing" else SIZES[name])
+    solid = trimesh.creation.box(
+        extents=(length, height, width) if name != "swing" else SIZES[name]
+    )
     solid.apply_translation((length / 2, 0, 0))
     content = solid.export(file_type="stl")
     assert isinstance(content, bytes)
@@ -84,8 +106,15 @@ def machine(project: Path, **changes: object) -> IdentifiedModel:
     model = hydroid.start_values(
         hydroid.load_settings(project / "fit.yaml", {"log.period_s": PERIOD} | changes)
     )
-    factor = {n: next((f for s, f in TRUTH.items() if n.startswith(s)), 1.0) for n in model.values}
-    return identified(model.settings, {n: v * factor[n] for n, v in model.values.items()}, "the machine")
+    factor = {
+        n: next((f for s, f in TRUTH.items() if n.startswith(s)), 1.0)
+        for n in model.values
+    }
+    return identified(
+        model.settings,
+        {n: v * factor[n] for n, v in model.values.items()},
+        "the machine",
+    )
 
 
 def recorded(truth: IdentifiedModel, seed: int) -> Log:
@@ -93,20 +122,31 @@ def recorded(truth: IdentifiedModel, seed: int) -> Log:
     arm = truth.settings.arm
     command = commands(len(arm.joints), seed)
     angle = np.tile(0.5 * (arm.lower + arm.upper), (len(command), 1))
-    log = Log("commands", np.arange(len(command), dtype=np.float64) * PERIOD, command, angle, PERIOD)
-    return hydroid.simulate(log, fit=truth, out=None, noise_deg=NOISE_DEG, seed=seed).log
+    log = Log(
+        "commands",
+        np.arange(len(command), dtype=np.float64) * PERIOD,
+        command,
+        angle,
+        PERIOD,
+    )
+    return hydroid.simulate(
+        log, fit=truth, out=None, noise_deg=NOISE_DEG, seed=seed
+    ).log
 
 
 def write_log(project: Path, path: Path, seed: int) -> None:
     """Write what a logger of the machine would: volts and radians."""
-    truth = machine(project, **{"simulation.model": "dynamic"})  # a machine has oil and inertia
+    # a machine has oil and inertia
+    truth = machine(project, **{"simulation.model": "dynamic"})
     log = recorded(truth, seed)
     names = [name.removesuffix("_joint") for name in truth.settings.arm.joint_names]
     what = ("valve [V]", "angle [rad]")
     header = ["Time [ms]", *(f"{name} {column}" for column in what for name in names)]
     # the boom's valve is wired the other way round
     rows = np.column_stack([1e3 * log.time, log.command / 10 * [1, -1, 1], log.angle])
-    np.savetxt(path, rows, fmt="%.6g", delimiter=",", header=",".join(header), comments="")
+    np.savetxt(
+        path, rows, fmt="%.6g", delimiter=",", header=",".join(header), comments=""
+    )
 
 
 def main(folder: Path) -> None:

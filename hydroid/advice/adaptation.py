@@ -1,11 +1,11 @@
 """Adaptation: a fit moved to a changed machine by a few of its parameters,
 all others held at its estimate.
 
-Which few is found by trying: the one whose fit foretells parts of the logs left out best is freed,
-then the next, until none foretells them clearly better (`fitting.left_out`).
-Candidates are what all joints share, such as the pump and the masses, and the effects of the logs'
-groups:
-what a load, a slower engine or another day changes.
+Which few is found by trying: the one whose fit foretells parts of the logs left out
+best is freed, then the next, until none foretells them clearly better
+(`fitting.left_out`). Candidates are what all joints share, such as the pump and the
+masses, and the effects of the logs' groups: what a load, a slower engine or another day
+changes.
 """
 
 from collections.abc import Sequence
@@ -27,12 +27,14 @@ from hydroid.settings.problem import ParameterSettings
 from hydroid.settings.search import MultistartSettings, RefinementSettings
 
 
-def adapted(model: IdentifiedModel, free: Sequence[str], logs: Sequence[Log] = ()) -> FitSettings:
+def adapted(
+    model: IdentifiedModel, free: Sequence[str], logs: Sequence[Log] = ()
+) -> FitSettings:
     """Return the settings in which only some parameters of a model are free, by name,
     from its estimate.
 
-    Their priors stay as wide as they were, around the estimate. Of the payloads those of these logs
-    stay.
+    Their priors stay as wide as they were, around the estimate. Of the payloads those
+    of these logs stay.
 
     Raises SettingsError: a name that is none of a parameter with bounds or a prior.
     """
@@ -54,11 +56,14 @@ def adapted(model: IdentifiedModel, free: Sequence[str], logs: Sequence[Log] = (
         {
             "parameters": parameters,
             "payloads": kept,
-            # a ladder that kept the quasi-static model: the dynamic one is not tried again
+            # a ladder that kept the quasi-static model: the dynamic one is not tried
+            # again
             "simulation.model": "quasi-static" if kind == "ladder" else kind,
             "search.algorithm": "multistart",
             # a search in name only: the refinement goes on from the fit's own estimate
-            "search.multistart": MultistartSettings(starts=1, horizons=(), iterations=20),
+            "search.multistart": MultistartSettings(
+                starts=1, horizons=(), iterations=20
+            ),
             "refinement": settings.refinement or RefinementSettings(),
         }
     )
@@ -76,8 +81,8 @@ def _refuse_unknown(names: Sequence[str], settings: FitSettings) -> None:
 def steps(
     model: IdentifiedModel, logs: Sequence[Log], free: Sequence[str], progress: Progress
 ) -> list[Plain]:
-    """Return what freeing parameters one after another does, after the model as it is (""),
-    as JSON has it.
+    """Return what freeing parameters one after another does, after the model as it is
+    (""), as JSON has it.
 
     `free` are those to be freed; without any, those that pay.
     Errors are those of parts of the logs left out.
@@ -109,8 +114,8 @@ def steps(
 
 
 def _candidates(settings: FitSettings, logs: Sequence[Log]) -> list[str]:
-    """Return the parameters that another day may change: those that all joints share, and the
-    effects of the logs' groups."""
+    """Return the parameters that another day may change: those that all joints share,
+    and the effects of the logs' groups."""
     groups = {settings.log.group_of(log.source) for log in logs}
     names = list[str]()
     for name, parameter in settings.parameters.items():
@@ -133,7 +138,9 @@ def load_findings(settings: FitSettings) -> tuple[Finding, ...]:
     """Return which masses an adaptation has freed,
     although a load at the tip has no payload to be in."""
     parameters = settings.parameters.items()
-    freed = tuple(name for name, p in parameters if p.quantity == "mass" and p.fixed is None)
+    freed = tuple(
+        name for name, p in parameters if p.quantity == "mass" and p.fixed is None
+    )
     if not freed or settings.payloads:
         return ()
     return (Finding("load as mass", "warning", freed),)

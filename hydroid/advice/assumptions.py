@@ -1,11 +1,13 @@
-"""Tests of what a fit takes for granted: which way an angle counts, and which columns are whose.
+"""Tests of what a fit takes for granted: which way an angle counts, and which columns
+are whose.
 
-Gravity slows what lifts and speeds up what lowers. So a joint's speed follows its command, late and
-unevenly, times what its lever arm and the pump do, less a part in proportion to the load: the
-torque that holds the arm in its pose. This law is linear in its unknowns, and needs no simulation.
-Where the angle of a joint counts the wrong way, the loads are those of other poses. With n
-independent samples, and sums of squares S and S' of what the laws of all joints leave,
-the logs make a joint turned round more likely by (S / S')^(n/2).
+Gravity slows what lifts and speeds up what lowers. So a joint's speed follows its
+command, late and unevenly, times what its lever arm and the pump do, less a part in
+proportion to the load: the torque that holds the arm in its pose. This law is linear in
+its unknowns, and needs no simulation. Where the angle of a joint counts the wrong way,
+the loads are those of other poses. With n independent samples, and sums of squares S
+and S' of what the laws of all joints leave, the logs make a joint turned round more
+likely by (S / S')^(n/2).
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -31,7 +33,8 @@ PERIOD = 0.05  # between samples [s]
 WINDOW = 0.2  # over which speeds and commands are averaged [s]
 LATEST = 0.8  # from a command to its effect at most [s]
 TAPS = (0.0, 0.1, 0.2, 0.3, 0.4)  # between the commands that a speed follows [s]
-KNOTS = np.linspace(-100.0, 100.0, 11)  # of the piecewise linear effect of each of them [%]
+# of the piecewise linear effect of each of them [%]
+KNOTS = np.linspace(-100.0, 100.0, 11)
 FROM_STOPS = 0.02  # angle from a stop above which a sample counts [rad]
 FROM_ZERO = 3.0  # largest command above which a sample counts [%]
 TINY = np.finfo(float).tiny
@@ -39,10 +42,11 @@ TINY = np.finfo(float).tiny
 
 @record
 class _Motion:
-    """What logs show in short windows: speeds [rad/s] and angles [rad] of all joints, shape (n, J).
+    """What logs show in short windows: speeds [rad/s] and angles [rad] of all joints,
+    shape (n, J).
 
-    joints: those that a log drives and all measure, 0-based. commands: means of each log's, shape
-    (m, J) [%], over windows that begin `period` [s] after each other.
+    joints: those that a log drives and all measure, 0-based. commands: means of each
+    log's, shape (m, J) [%], over windows that begin `period` [s] after each other.
     """
 
     joints: list[int]
@@ -60,8 +64,8 @@ class _Motion:
         return np.concatenate(late)
 
     def follows(self, joint: int, other: int) -> tuple[float, int]:
-        """Return how a joint's speed correlates with a joint's command, and after how many windows
-        it does most."""
+        """Return how a joint's speed correlates with a joint's command, and after how
+        many windows it does most."""
         speed = self.speed[:, joint] - self.speed[:, joint].mean()
         correlations = list[tuple[float, int]]()
         for late in range(round(LATEST / self.period) + 1):
@@ -90,7 +94,8 @@ def doubts(settings: FitSettings, logs: Sequence[Log]) -> dict[int, float]:
     loads_of = _Loads(settings, motion.angle)
 
     def left(turned: int | None = None) -> list[Array]:
-        """Return what each law leaves of its joint's speeds, with one joint turned round."""
+        """Return what each law leaves of its joint's speeds, with one joint turned
+        round."""
         loads = loads_of(turned)
         return [law(loads[:, joint]) for joint, law in laws.items()]
 
@@ -121,7 +126,8 @@ class _Loads:
         self._angle = angle
 
     def __call__(self, turned: int | None) -> Array:
-        """Return the torques where the angle of one joint (0-based) counts the wrong way."""
+        """Return the torques where the angle of one joint (0-based) counts the wrong
+        way."""
         signs = np.where(self._numbers == turned, -1.0, 1.0)
         poses = signs * self._angle
         loads = np.empty_like(self._angle)
@@ -134,9 +140,11 @@ class _Loads:
         return loads
 
 
-def exchanged(settings: FitSettings, logs: Sequence[Log]) -> tuple[tuple[int, int], ...]:
-    """Return pairs of joints (numbers, from 1) each of which follows the other's command,
-    not its own."""
+def exchanged(
+    settings: FitSettings, logs: Sequence[Log]
+) -> tuple[tuple[int, int], ...]:
+    """Return pairs of joints (numbers, from 1) each of which follows the other's
+    command, not its own."""
     motion = _motion(settings, logs)
 
     def prefers(joint: int, other: int) -> bool:
@@ -154,12 +162,15 @@ def exchanged(settings: FitSettings, logs: Sequence[Log]) -> tuple[tuple[int, in
 def assumption_findings(
     settings: FitSettings, logs: Sequence[Log], doubted: Mapping[int, float]
 ) -> Iterator[Finding]:
-    """Yield what the logs contradict, by the joints' names; `doubted`: what `doubts` returns."""
+    """Yield what the logs contradict, by the joints' names; `doubted`: what `doubts`
+    returns."""
     names = settings.arm.joint_names
     for j, k in exchanged(settings, logs):
         yield Finding("columns exchanged", "warning", (names[j - 1], names[k - 1]))
     for joint, evidence in doubted.items():
-        yield Finding("sign doubted", "warning", (names[joint - 1],), {"evidence": evidence})
+        yield Finding(
+            "sign doubted", "warning", (names[joint - 1],), {"evidence": evidence}
+        )
 
 
 def _motion(settings: FitSettings, logs: Sequence[Log]) -> _Motion:
@@ -171,7 +182,9 @@ def _motion(settings: FitSettings, logs: Sequence[Log]) -> _Motion:
     width = step * max(round(WINDOW / period), 1)
     pose = settings.arm.pose(settings.start_pose)
     longest = 2 * LATEST + WINDOW
-    usable = [log for log in logs if log.duration > longest and log.measured[log.driven].all()]
+    usable = [
+        log for log in logs if log.duration > longest and log.measured[log.driven].all()
+    ]
     if not usable:
         return _Motion([], period, pose[None], pose[None], ())
     speeds = list[Array]()
@@ -189,7 +202,9 @@ def _motion(settings: FitSettings, logs: Sequence[Log]) -> _Motion:
     driven = np.any([log.driven for log in usable], axis=0)
     measured = np.all([log.measured for log in usable], axis=0)
     joints = np.flatnonzero(driven & measured).tolist()
-    return _Motion(joints, period, np.concatenate(speeds), np.concatenate(angles), tuple(commands))
+    return _Motion(
+        joints, period, np.concatenate(speeds), np.concatenate(angles), tuple(commands)
+    )
 
 
 Law = Callable[[Array], Array]
@@ -212,7 +227,9 @@ def _law(settings: FitSettings, motion: _Motion, joint: int) -> Law | None:
     speed = rows @ np.linalg.lstsq(rows, speeds[:, joint])[0]
     off_centre = angle - angle.mean()
     others = speeds[:, [k for k in motion.joints if k != joint]]
-    factors = np.column_stack([off_centre, off_centre**2, np.maximum(others, 0), np.minimum(others, 0)])
+    factors = np.column_stack(
+        [off_centre, off_centre**2, np.maximum(others, 0), np.minimum(others, 0)]
+    )
     unknowns = np.hstack([rows, speed[:, None] * factors])
     basis, sizes, _ = np.linalg.svd(unknowns, full_matrices=False)
     basis = basis[:, sizes > 1e-9 * sizes[0]]
@@ -229,8 +246,8 @@ def _law(settings: FitSettings, motion: _Motion, joint: int) -> Law | None:
 
 
 def _late_commands(motion: _Motion, joint: int) -> Array:
-    """Return a joint's commands TAPS before each window, about the delay that fits best, (n,
-    TAPS)."""
+    """Return a joint's commands TAPS before each window, about the delay that fits
+    best, (n, TAPS)."""
     taps = [round(tap / motion.period) for tap in TAPS]
     _, delay = motion.follows(joint, joint)
     first = max(delay - taps[-1] // 2, 0)
@@ -238,8 +255,8 @@ def _late_commands(motion: _Motion, joint: int) -> Array:
 
 
 def _by_command(commands: Array) -> Array:
-    """Return what each of KNOTS contributes to a speed that is piecewise linear in commands, (n,
-    k).
+    """Return what each of KNOTS contributes to a speed that is piecewise linear in
+    commands, (n, k).
 
     Knots that few windows are near to are left out.
     """

@@ -1,11 +1,11 @@
 """The search for the next experiment: start pose,
 joints and commands with the most useful information.
 
-Optimal experiment design (V. V. Fedorov, 1972; E. Walter and L. Pronzato, 1997) by random draws and
-random changes of the best. The design is local: motions and sensitivities are simulated at the
-present estimate. Where that is far from the truth, design again after the next fit.
-Only the simulated motion is kept within the limits;
-an arm that differs from the model moves differently.
+Optimal experiment design (V. V. Fedorov, 1972; E. Walter and L. Pronzato, 1997) by
+random draws and random changes of the best. The design is local: motions and
+sensitivities are simulated at the present estimate. Where that is far from the truth,
+design again after the next fit. Only the simulated motion is kept within the limits; an
+arm that differs from the model moves differently.
 """
 
 from collections import Counter
@@ -41,9 +41,9 @@ from hydroid.settings.search import DesignSettings
 from hydroid.words import listed
 
 PRIOR_SD = 1.0
-"""relative standard deviation that a forecast assumes of every parameter at most (ours): a fit's
-own prior is so weak that a direction which stays unknown would outweigh all that an
-experiment can do"""
+"""relative standard deviation that a forecast assumes of every parameter at most
+(ours): a fit's own prior is so weak that a direction which stays unknown would outweigh
+all that an experiment can do"""
 
 
 def forecast(known: Posterior) -> Posterior:
@@ -51,11 +51,14 @@ def forecast(known: Posterior) -> Posterior:
     return known.add(np.eye(len(known.root)) / PRIOR_SD)
 
 
-def measured(settings: DesignSettings, signals: Sequence[Array], period: float) -> Array:
-    """Return rows N of the information N' N that signals of the joints' angles give, shape (p, p).
+def measured(
+    settings: DesignSettings, signals: Sequence[Array], period: float
+) -> Array:
+    """Return rows N of the information N' N that signals of the joints' angles give,
+    shape (p, p).
 
-    `signals` are derivatives by p parameters [rad], (p, T). The errors of a future log are those of
-    an error model: the sensor's noise, and a drift.
+    `signals` are derivatives by p parameters [rad], (p, T). The errors of a future log
+    are those of an error model: the sensor's noise, and a drift.
     """
     noise, drift = np.radians([settings.noise_deg, settings.drift_deg])
     # the drift is stated after 10 s, and its variance grows with time
@@ -72,14 +75,15 @@ ATTEMPTS = 60  # to make an experiment keep the limits
 ELITE = 4  # experiments that are changed at random, the best so far
 DIVERGES = "a simulation diverges"
 MOVED = 0.9
-"""part of its deviation before up to which an experiment must bring a parameter that counts"""
+"""part of its deviation before up to which an experiment must bring a parameter that
+counts"""
 
 
 class Trial(NamedTuple):
     """A simulated experiment that keeps the limits.
 
-    experiment: its commands. gained: rows of its information (`measured`), shape (p, p). log: its
-    commands with the simulated angles.
+    experiment: its commands. gained: rows of its information (`measured`), shape (p,
+    p). log: its commands with the simulated angles.
     """
 
     experiment: Experiment
@@ -123,7 +127,9 @@ class ExperimentSimulator:
             # no command can keep bodies apart whose distance no joint changes
             low, high = np.array([joint.limits for joint in arm.joints]).T
             poses = np.random.default_rng(0).uniform(low, high, (POSES, len(low)))
-            motion = self._machine.joined(dict.fromkeys(self._machine.sides, poses), self._pose)
+            motion = self._machine.joined(
+                dict.fromkeys(self._machine.sides, poses), self._pose
+            )
             self._counted = self._machine.checker.changing(motion)
 
     def trial(self, experiment: Experiment) -> Trial | Broken:
@@ -155,13 +161,14 @@ class ExperimentSimulator:
         near = machine.checker.first_below(motion, self._margin or 0.0, self._counted)
         if near is None:
             return None
-        # the joint that turned most lately is the cause; those far out count as the others do
+        # the joint that turned most lately is the cause; those far out count as the
+        # others do
         turned = np.ptp(angle[max(0, near - 20) : near + 1], axis=0)
         return Violation(near, int(np.argmax(turned)), False)
 
     def _broken(self, angle: Array, first: Violation | None) -> Broken:
-        """Return what a motion of all joints, (T, J), breaks: at first a joint's limits, or None:
-        bodies meet."""
+        """Return what a motion of all joints, (T, J), breaks: at first a joint's
+        limits, or None: bodies meet."""
         if first is None:
             return self._too_near(angle)
         limits = self._settings.design
@@ -185,13 +192,17 @@ class ExperimentSimulator:
         return Broken(what, "design.clearance_m", share)
 
     def _kept(self, experiment: Experiment, angle: Array) -> Trial | Broken:
-        """Return the trial of an experiment whose angles are known, (T, J); it may diverge beside
-        them."""
+        """Return the trial of an experiment whose angles are known, (T, J); it may
+        diverge beside them."""
 
         def outputs(theta: Array) -> Array:
-            return self._simulate(experiment, theta)[:, :, self._outputs].reshape(len(theta), -1)
+            return self._simulate(experiment, theta)[:, :, self._outputs].reshape(
+                len(theta), -1
+            )
 
-        slopes = differentiate(outputs, self._box, self._axes, angle[:, self._outputs].ravel())
+        slopes = differentiate(
+            outputs, self._box, self._axes, angle[:, self._outputs].ravel()
+        )
         if not np.isfinite(slopes).all():
             return DIVERGED
         of_angles = slopes.reshape(len(slopes), -1, len(self._outputs))
@@ -209,7 +220,9 @@ class ExperimentSimulator:
         moving = np.flatnonzero(log.driven | passive | is_output)
         simulation = make_simulation(self._spec, log, moving.tolist(), self._settings)
         angle = np.tile(log.angle, (len(theta), 1, 1))
-        angle[:, :, moving] = simulation.simulate(self._bindings.candidates(theta)).angle
+        angle[:, :, moving] = simulation.simulate(
+            self._bindings.candidates(theta)
+        ).angle
         return angle
 
 
@@ -217,9 +230,10 @@ class ExperimentSimulator:
 class Design:
     """A designed experiment beside the random ones it was chosen from.
 
-    random: those drawn at random that keep the limits. known: what is known without it. moved:
-    which of the p parameters any of these improves (`MOVED`), but for effects of a group of logs,
-    which belong to another day, (p,); the others must not hide them. names: of the parameters.
+    random: those drawn at random that keep the limits. known: what is known without it.
+    moved: which of the p parameters any of these improves (`MOVED`), but for effects of
+    a group of logs, which belong to another day, (p,); the others must not hide them.
+    names: of the parameters.
     """
 
     best: Trial
@@ -241,9 +255,11 @@ class Design:
 
     @property
     def random_deviations(self) -> Array:
-        """Relative standard deviation of each parameter after a random experiment, the median;
-        (p,)."""
-        return np.median([self.known.add(t.gained).deviations for t in self.random], axis=0)
+        """Relative standard deviation of each parameter after a random experiment, the
+        median; (p,)."""
+        return np.median(
+            [self.known.add(t.gained).deviations for t in self.random], axis=0
+        )
 
 
 def typical(known: Posterior, moved: Mask) -> float:
@@ -266,12 +282,18 @@ def broken_limits(broken: Sequence[Broken]) -> SettingsError:
     )
 
 
-def design(settings: FitSettings, theta: Array, logs: Sequence[Log], seed: int, progress: Progress) -> Design:
-    """Choose start pose, joints and commands of an experiment at an estimate, shape (P,),
-    beside its logs.
+def design(
+    settings: FitSettings,
+    theta: Array,
+    logs: Sequence[Log],
+    seed: int,
+    progress: Progress,
+) -> Design:
+    """Choose start pose, joints and commands of an experiment at an estimate, shape
+    (P,), beside its logs.
 
-    Random experiments are drawn and kept within the limits. The best few are then changed at
-    random, and a changed one replaces the worst of them where it is better.
+    Random experiments are drawn and kept within the limits. The best few are then
+    changed at random, and a changed one replaces the worst of them where it is better.
     The same seed gives the same experiment.
 
     Raises SettingsError: no random experiment keeps the limits.
@@ -316,7 +338,8 @@ def _known(settings: FitSettings, theta: Array, logs: Sequence[Log]) -> Posterio
 
 
 def _random_effort(effort: int) -> int:
-    """Return how many experiments are drawn at random, of all that are tried: one in six."""
+    """Return how many experiments are drawn at random, of all that are tried: one in
+    six."""
     return max(min(8, effort), effort // 6)
 
 

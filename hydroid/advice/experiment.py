@@ -1,7 +1,8 @@
 """Experiments: a start pose and pseudo-random commands, drawn and changed at random,
 kept within the limits.
 
-A command is a sequence of levels, each held for a random time, as in the article's figure 17.
+A command is a sequence of levels, each held for a random time, as in the article's
+figure 17.
 """
 
 from collections.abc import Mapping
@@ -28,7 +29,8 @@ class Input(NamedTuple):
 
 @record
 class Experiment:
-    """Start pose [rad], shape (J,), and the inputs of the driven joints, by joint (0-based)."""
+    """Start pose [rad], shape (J,), and the inputs of the driven joints, by joint
+    (0-based)."""
 
     pose: Array
     inputs: Mapping[int, Input]
@@ -45,9 +47,13 @@ class Experiment:
             command[signal.start[0] :, joint] = np.repeat(signal.level, held)
             command[:, joint] = _slewed(command[:, joint], largest_step)
         angle = np.tile(self.pose, (samples, 1))
-        return Log("design", period * np.arange(samples, dtype=float), command, angle, period)
+        return Log(
+            "design", period * np.arange(samples, dtype=float), command, angle, period
+        )
 
-    def with_level(self, joint: int, place: slice | int, level: Array | float) -> "Experiment":
+    def with_level(
+        self, joint: int, place: slice | int, level: Array | float
+    ) -> "Experiment":
         """Return the experiment with other levels of one joint, rounded to 0.1 %."""
         signal = self.inputs[joint]
         levels = signal.level.copy()
@@ -56,7 +62,8 @@ class Experiment:
 
 
 def _slewed(command: Array, largest_step: float) -> Array:
-    """Return a command, (T,), that follows another by steps of a largest size, from 0."""
+    """Return a command, (T,), that follows another by steps of a largest size, from
+    0."""
 
     def followed(now: float, wanted: float) -> float:
         return min(max(wanted, now - largest_step), now + largest_step)
@@ -94,7 +101,9 @@ class RandomExperiments:
         self._upper = upper - inward
         self._samples = experiment_samples(settings)
         self._rest = round(limits.rest_s / period)
-        self._shortest, self._longest = (max(1, round(t / period)) for t in limits.dwell_s)
+        self._shortest, self._longest = (
+            max(1, round(t / period)) for t in limits.dwell_s
+        )
 
     def draw(self) -> Experiment:
         """Draw an experiment: half of them drive all allowed joints,
@@ -118,7 +127,9 @@ class RandomExperiments:
         if kind < 0.1:
             return replace(experiment, pose=self._moved(experiment.pose))
         if kind < 0.25 or joint not in experiment.inputs:
-            return replace(experiment, inputs={**experiment.inputs, joint: self._input()})
+            return replace(
+                experiment, inputs={**experiment.inputs, joint: self._input()}
+            )
         level = experiment.inputs[joint].level
         first = self._rng.integers(len(level))
         place = slice(first, first + 1 + self._rng.integers(4))
@@ -131,7 +142,9 @@ class RandomExperiments:
     def _input(self) -> Input:
         starts = [self._rest]
         while True:
-            start = starts[-1] + int(self._rng.integers(self._shortest, self._longest + 1))
+            start = starts[-1] + int(
+                self._rng.integers(self._shortest, self._longest + 1)
+            )
             if start >= self._samples - self._shortest:
                 return Input(np.array(starts), self._levels(len(starts)))
             starts.append(start)
@@ -152,7 +165,8 @@ class RandomExperiments:
 
 
 def _possible_poses(settings: FitSettings) -> Array:
-    """Return the named poses in which the joints that move are within their limits [rad], (n, J).
+    """Return the named poses in which the joints that move are within their limits
+    [rad], (n, J).
 
     Raises SettingsError: there are none, and others are not allowed.
     """
@@ -177,8 +191,8 @@ def _possible_poses(settings: FitSettings) -> Array:
 
 
 class Violation(NamedTuple):
-    """A limit that a motion breaks: the first sample at which a joint (0-based) leaves its range,
-    is too fast, or makes bodies meet."""
+    """A limit that a motion breaks: the first sample at which a joint (0-based) leaves
+    its range, is too fast, or makes bodies meet."""
 
     sample: int
     joint: int
@@ -186,8 +200,8 @@ class Violation(NamedTuple):
 
 
 def violation(angle: Array, settings: FitSettings) -> Violation | None:
-    """Return where a motion [rad], shape (T, J), first leaves the joints' ranges or is too fast;
-    or None."""
+    """Return where a motion [rad], shape (T, J), first leaves the joints' ranges or is
+    too fast; or None."""
     outside, fast = beyond(angle, settings)
     broken = np.argwhere(outside | fast)
     if not len(broken):
@@ -197,8 +211,8 @@ def violation(angle: Array, settings: FitSettings) -> Violation | None:
 
 
 def beyond(angle: Array, settings: FitSettings) -> tuple[Mask, Mask]:
-    """Return where joints of a motion [rad], (T, J), are outside their ranges, and too fast:
-    both (T, J)."""
+    """Return where joints of a motion [rad], (T, J), are outside their ranges, and too
+    fast: both (T, J)."""
     limits = settings.design
     arm = settings.arm
     margin, largest_speed = np.radians([limits.margin_deg, limits.speed_deg_s])
@@ -210,7 +224,8 @@ def beyond(angle: Array, settings: FitSettings) -> tuple[Mask, Mask]:
 
 
 def repaired(experiment: Experiment, first: Violation) -> Experiment:
-    """Reduce the last level before a violation; turn it round where it leads out of a range."""
+    """Reduce the last level before a violation; turn it round where it leads out of a
+    range."""
     signal = experiment.inputs.get(first.joint)
     if signal is not None:
         earlier = np.flatnonzero((signal.start < first.sample) & (signal.level != 0.0))
@@ -218,7 +233,9 @@ def repaired(experiment: Experiment, first: Violation) -> Experiment:
             last = earlier[-1]
             level = (0.7 if first.fast else -0.7) * signal.level[last]
             # below 10 % an earlier level is to blame
-            return experiment.with_level(first.joint, last, level if abs(level) > 10.0 else 0.0)
+            return experiment.with_level(
+                first.joint, last, level if abs(level) > 10.0 else 0.0
+            )
     for joint, signal in experiment.inputs.items():
         experiment = experiment.with_level(joint, slice(None), 0.7 * signal.level)
     return experiment

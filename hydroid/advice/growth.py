@@ -1,17 +1,18 @@
 """Growth: the terms that a model lacks, and whether they lower the error on parts of
 the logs left out.
 
-A small change of each term changes the residual. What the free parameters cannot do as well tells
-how clearly the term is missing, and how much freeing it would gain (`score`). That is cheap: some
-simulations a term. The best few are then really freed: least squares goes on from the estimate,
-once with all samples and once without each part of them, on which the result is judged.
-A term that only follows the noise loses there.
+A small change of each term changes the residual. What the free parameters cannot do as
+well tells how clearly the term is missing, and how much freeing it would gain
+(`score`). That is cheap: some simulations a term. The best few are then really freed:
+least squares goes on from the estimate, once with all samples and once without each
+part of them, on which the result is judged. A term that only follows the noise loses
+there.
 
-The score test: let r be the innovations at a maximum of the likelihood and d the change of them
-with a quantity that the fit holds. What the free parameters can do as well as d, the fit has done
-already. So d is projected off their effects, with the priors' scores as further rows: d' = d - U' U
-d with orthonormal rows U. The statistic is the score of C. R. Rao (1948),
-a standard normal variable where the model lacks nothing:
+The score test: let r be the innovations at a maximum of the likelihood and d the change
+of them with a quantity that the fit holds. What the free parameters can do as well as
+d, the fit has done already. So d is projected off their effects, with the priors'
+scores as further rows: d' = d - U' U d with orthonormal rows U. The statistic is the
+score of C. R. Rao (1948), a standard normal variable where the model lacks nothing:
 
     z = -d' r / √(Var d' r),
 
@@ -36,11 +37,12 @@ from hydroid.progress import Progress
 
 @record
 class Score:
-    """Statistic z of one change of the model, positive where the change lowers the error.
+    """Statistic z of one change of the model, positive where the change lowers the
+    error.
 
     By the linear approximation the `amount` of it that lowers the error most raises the
-    log-likelihood that least squares takes by `gain`. `strength` is the statistic that the whole
-    change would have without noise: what can be seen at all.
+    log-likelihood that least squares takes by `gain`. `strength` is the statistic that
+    the whole change would have without noise: what can be seen at all.
     """
 
     statistic: float
@@ -59,7 +61,8 @@ class Explained:
     """What a fit has explained, and what it has left.
 
     Attributes:
-        effects: of the free parameters, orthonormal rows with all priors behind, (k, R + M + p).
+        effects: of the free parameters, orthonormal rows with all priors behind, (k, R
+            + M + p).
         left: innovations with the priors' scores behind, shape (R + M + p,).
         variance: of what is left, summed along a row of that shape.
     """
@@ -97,8 +100,8 @@ def explained(problem: Problem, known: Uncertainty) -> Explained:
 
 
 def holm(chances: Sequence[float], level: float) -> Mask:
-    """Return which findings hold, any false one with at most a probability `level` (S. Holm,
-    1979)."""
+    """Return which findings hold, any false one with at most a probability `level` (S.
+    Holm, 1979)."""
     p = np.array(chances, dtype=float)
     order = np.argsort(p)
     holds = p[order] <= level / np.arange(len(p), 0, -1)
@@ -121,8 +124,8 @@ that act beyond a threshold, small enough for a derivative"""
 
 @record
 class Candidate:
-    """A change of the settings that frees one more parameter, to be refined from `start`,
-    in its unit.
+    """A change of the settings that frees one more parameter, to be refined from
+    `start`, in its unit.
 
     Attributes:
         score: how clearly the residual shows its effect, in standard deviations.
@@ -137,8 +140,11 @@ class Candidate:
     gain: float
 
 
-def score_terms(problem: Problem, known: Uncertainty, progress: Progress) -> list[Candidate]:
-    """Test every term of a problem at an estimate; those that the logs cannot show are left out."""
+def score_terms(
+    problem: Problem, known: Uncertainty, progress: Progress
+) -> list[Candidate]:
+    """Test every term of a problem at an estimate; those that the logs cannot show are
+    left out."""
     every = terms(problem, known.theta)
     fit = explained(problem, known)
     candidates = list[Candidate]()
@@ -169,7 +175,8 @@ def promising(tests: Sequence[Candidate]) -> list[Candidate]:
 
 
 def _tested(term: Term, known: Uncertainty, fit: Explained) -> Candidate | None:
-    """Test one term by the largest change whose effect is small, a limit by each that acts.
+    """Test one term by the largest change whose effect is small, a limit by each that
+    acts.
 
     None: the logs cannot show it.
     """
@@ -206,7 +213,8 @@ def _tested(term: Term, known: Uncertainty, fit: Explained) -> Candidate | None:
     if not tried:
         return None
     gain, score, start = max(tried, key=lambda trial: trial[0])
-    # as many limits as were tried may each look significant by chance (C. E. Bonferroni)
+    # as many limits as were tried may each look significant by chance (C. E.
+    # Bonferroni)
     chance = min(len(tried) * score.chance(one_sided=one_sided), 1.0)
     statistic = score.statistic if one_sided else abs(score.statistic)
     return Candidate(term, start, statistic, chance, gain)

@@ -1,4 +1,5 @@
-"""What `hydroid suggest` says: as JSON has it, as findings, and the command that frees a term."""
+"""What `hydroid suggest` says: as JSON has it, as findings, and the command that frees
+a term."""
 
 import math
 import shlex
@@ -53,10 +54,11 @@ Content = Mapping[str, Any]
 def advice(
     problem: Problem, known: Uncertainty, run: str, progress: Progress
 ) -> tuple[Content, tuple[Finding, ...]]:
-    """Return the suggestions about an estimate with its uncertainty, and what is to be said,
-    the first first.
+    """Return the suggestions about an estimate with its uncertainty, and what is to be
+    said, the first first.
 
-    The suggestions are as JSON has them (docs/json.md); `run` is the estimate's folder in commands.
+    The suggestions are as JSON has them (docs/json.md); `run` is the estimate's folder
+    in commands.
     """
     tests = score_terms(problem, known, progress)
     candidates = promising(tests)
@@ -89,7 +91,8 @@ def advice(
         "terms": [row for _, _, row in ranked],
         "actions": next_actions(problem, known),
         "assumptions": [
-            {"kind": "sign", "joint": joint, "evidence": evidence} for joint, evidence in doubted.items()
+            {"kind": "sign", "joint": joint, "evidence": evidence}
+            for joint, evidence in doubted.items()
         ],
     }
     findings = (
@@ -103,8 +106,8 @@ def advice(
 def _tried(candidate: Candidate, without: LeftOut, run: str) -> tuple[Plain, float]:
     """Free a term and return what that does on parts left out, and its gain there.
 
-    `without` is what the model without it does; where the term is better, the command that frees
-    it belongs to the result.
+    `without` is what the model without it does; where the term is better, the command
+    that frees it belongs to the result.
     """
     problem = without.problem
     term = candidate.term
@@ -129,9 +132,15 @@ def _tried(candidate: Candidate, without: LeftOut, run: str) -> tuple[Plain, flo
 
 
 def refitted(likelihood: Likelihood, theta: Array, without: int) -> Refinement:
-    """Refine an estimate for a comparison on parts left out; nothing is shown or stored of it."""
+    """Refine an estimate for a comparison on parts left out; nothing is shown or stored
+    of it."""
     return refine_from_afar(
-        likelihood, theta, COMPARED, lambda *_: False, {}, Step("compared", without=without)
+        likelihood,
+        theta,
+        COMPARED,
+        lambda *_: False,
+        {},
+        Step("compared", without=without),
     )
 
 
@@ -139,13 +148,15 @@ def improvement(after: LeftOut, before: LeftOut) -> dict[str, tuple[float, float
     """Return by how much the rms error on a part left out falls, with a standard error,
     by joint [deg].
 
-    The error is that of the change of an angle over AHEAD. The standard error is by leaving out one
-    block of time after the other (a jackknife).
+    The error is that of the change of an angle over AHEAD. The standard error is by
+    leaving out one block of time after the other (a jackknife).
     """
     settings = after.problem.settings
     improvements = dict[str, tuple[float, float]]()
     for joint in settings.outputs:
-        squares = np.array([squares_ahead(left_out, joint) for left_out in (before, after)])
+        squares = np.array(
+            [squares_ahead(left_out, joint) for left_out in (before, after)]
+        )
         spans = squares.shape[1]
         sums = squares.sum(axis=1)
         rms_before, rms_after = np.sqrt(sums / spans)
@@ -153,7 +164,10 @@ def improvement(after: LeftOut, before: LeftOut) -> dict[str, tuple[float, float
         falls = without_one[0] - without_one[1]
         sd = np.sqrt((len(falls) - 1) * np.var(falls))
         name = settings.arm.joint_names[joint - 1]
-        improvements[name] = float(np.degrees(rms_before - rms_after)), float(np.degrees(sd))
+        improvements[name] = (
+            float(np.degrees(rms_before - rms_after)),
+            float(np.degrees(sd)),
+        )
     return improvements
 
 
@@ -174,7 +188,8 @@ def squares_ahead(left_out: LeftOut, joint: int) -> Array:
 
 
 def next_actions(problem: Problem, known: Uncertainty) -> list[Plain]:
-    """Return the actions that would help most, the best first, as JSON has them (docs/json.md)."""
+    """Return the actions that would help most, the best first, as JSON has them
+    (docs/json.md)."""
     now = forecast(known.posterior)
     wide = now.deviations
     names = np.array(problem.parameters.names)[now.box.varied]
@@ -200,11 +215,14 @@ def next_actions(problem: Problem, known: Uncertainty) -> list[Plain]:
     return [action for _, action in useful[:MOST_ACTIONS]]
 
 
-def _forecasts(problem: Problem, known: Uncertainty, now: Posterior) -> Iterator[tuple[str, str, Array]]:
-    """Yield actions, their subjects, and rows of the information that each adds, shape (k, p).
+def _forecasts(
+    problem: Problem, known: Uncertainty, now: Posterior
+) -> Iterator[tuple[str, str, Array]]:
+    """Yield actions, their subjects, and rows of the information that each adds, shape
+    (k, p).
 
-    A weighed link, a value of a data sheet, and the best of six random experiments for the designed
-    one, with the noise of the fit's worst angle.
+    A weighed link, a value of a data sheet, and the best of six random experiments for
+    the designed one, with the noise of the fit's worst angle.
     """
     settings = problem.settings
     names = problem.parameters.named(now.box.varied)
@@ -230,19 +248,27 @@ def _can_be_stated(settings: FitSettings, parameter: ParameterSettings) -> bool:
     """Return whether scales, a gauge or a data sheet can tell a parameter."""
     if parameter.unit not in MEASURABLE or parameter.per is not None:
         return False
-    # what stands in for a cylinder of unknown size has no sizes that anybody can measure
+    # what stands in for a cylinder of unknown size has no sizes that anybody can
+    # measure
     joints = settings.arm.joints
-    return not any(joints[joint - 1].may_stand_in for joint in joints_of(settings, parameter))
+    return not any(
+        joints[joint - 1].may_stand_in for joint in joints_of(settings, parameter)
+    )
 
 
 def _with_noise_of(settings: FitSettings, known: Uncertainty) -> FitSettings:
-    """Return the settings of an experiment with the noise and drift of a fit's worst angle.
+    """Return the settings of an experiment with the noise and drift of a fit's worst
+    angle.
 
-    Collisions are not checked: this is what the best of a few could measure, and `hydroid design`
-    then looks for one free of collisions.
+    Collisions are not checked: this is what the best of a few could measure, and
+    `hydroid design` then looks for one free of collisions.
     """
     errors = known.errors
-    noise = [errors.numbers[i, 0] for i, signal in enumerate(errors.signals) if signal.quantity == "angle"]
+    noise = [
+        errors.numbers[i, 0]
+        for i, signal in enumerate(errors.signals)
+        if signal.quantity == "angle"
+    ]
     drift = [error.after_10_s_deg for error in angle_errors(known).values()]
     changes = {
         "noise_deg": np.degrees(np.sqrt(max(noise))),
@@ -255,8 +281,9 @@ def _with_noise_of(settings: FitSettings, known: Uncertainty) -> FitSettings:
 def proposed(candidate: Candidate, value: float) -> dict[str, Plain]:
     """Return the entries of `parameters` that free a term, by name.
 
-    Its bounds are a fifth and five times the value that was found, with the present value inside.
-    Stage 2 asks for a start of every mechanical parameter that no run of stage 1 gives.
+    Its bounds are a fifth and five times the value that was found, with the present
+    value inside. Stage 2 asks for a start of every mechanical parameter that no run of
+    stage 1 gives.
     """
     term = candidate.term
     low, high = term.span
@@ -276,14 +303,22 @@ def proposed(candidate: Candidate, value: float) -> dict[str, Plain]:
 
 
 def freeing_command(problem: Problem, entries: Mapping[str, Any], run: str) -> str:
-    """Return the command that fits the same logs again from a run's estimate, with a term freed."""
+    """Return the command that fits the same logs again from a run's estimate, with a
+    term freed."""
     words = [f"hydroid fit-{problem.settings.stage}"]
     # the parts of a log with gaps are one file
     files = dict.fromkeys(str(log_file(log.source)) for log in problem.logs)
     words += [shlex.quote(file) for file in files]
-    words += ["--config", shlex.quote(f"{run}/config.yaml"), "--start", shlex.quote(run)]
+    words += [
+        "--config",
+        shlex.quote(f"{run}/config.yaml"),
+        "--start",
+        shlex.quote(run),
+    ]
     for name, entry in entries.items():
-        line = yaml.safe_dump(entry, default_flow_style=True, sort_keys=False, width=math.inf)
+        line = yaml.safe_dump(
+            entry, default_flow_style=True, sort_keys=False, width=math.inf
+        )
         words += ["--set", shlex.quote(f"parameters.{name}={line.strip()}")]
     *_, new = entries
     words += ["--out", shlex.quote(f"{run}-{new}")]

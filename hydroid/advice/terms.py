@@ -1,7 +1,7 @@
 """Terms: changes of the settings that give a model one more parameter.
 
-A term is a quantity that the fit holds fixed, one that it leaves at its nominal value, or the share
-of one side or joint in a parameter that serves several.
+A term is a quantity that the fit holds fixed, one that it leaves at its nominal value,
+or the share of one side or joint in a parameter that serves several.
 """
 
 import math
@@ -16,7 +16,14 @@ from hydroid.files import Plain
 from hydroid.hydraulics.actuator import START_PRESSURE
 from hydroid.posterior.error_model import Likelihood
 from hydroid.problem.problem import Problem
-from hydroid.quantity_table import CHOICES, MECHANICAL, QUANTITIES, ROWS, TARGETS, Quantity
+from hydroid.quantity_table import (
+    CHOICES,
+    MECHANICAL,
+    QUANTITIES,
+    ROWS,
+    TARGETS,
+    Quantity,
+)
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.hydraulics import actuator_values
 from hydroid.settings.problem import ParameterSettings
@@ -49,19 +56,25 @@ class Term:
         """Return an estimate of a problem, (P,), for the problem `added_to`,
         with the term at a value."""
         values = problem.parameters.mapping(theta) | {self.name: value}
-        return np.array([values[name] for name in problem.settings.parameters | dict(self.entries)])
+        return np.array(
+            [values[name] for name in problem.settings.parameters | dict(self.entries)]
+        )
 
-    def innovations(self, likelihood: Likelihood, theta: Array, values: Sequence[float]) -> Array:
-        """Innovations of a likelihood at an estimate, (P,), with the term at n values, shape (n,
-        R)."""
+    def innovations(
+        self, likelihood: Likelihood, theta: Array, values: Sequence[float]
+    ) -> Array:
+        """Innovations of a likelihood at an estimate, (P,), with the term at n values,
+        shape (n, R)."""
         problem = likelihood.problem
         thetas = np.array([self.theta(problem, theta, value) for value in values])
-        return likelihood.errors.innovations(self.added_to(problem).output_errors(thetas))
+        return likelihood.errors.innovations(
+            self.added_to(problem).output_errors(thetas)
+        )
 
     @property
     def kind(self) -> tuple[object, ...]:
-        """Quantity, joints and link, with both sides of an actuator alike: `delay` and `delay_a` of
-        a joint are of one kind."""
+        """Quantity, joints and link, with both sides of an actuator alike: `delay` and
+        `delay_a` of a joint are of one kind."""
         parameter = self.entries[self.name]
         quantity = parameter.quantity.removesuffix("_a").removesuffix("_b")
         return quantity, parameter.joints, parameter.link
@@ -102,14 +115,18 @@ def _means_something(problem: Problem, parameter: ParameterSettings) -> bool:
 def _moving(problem: Problem, quantity: str, joints: Iterable[int]) -> tuple[int, ...]:
     """Return those of some joints that move, by an actuator that has the quantity."""
     every = problem.settings.arm.joints
-    return tuple(j for j in joints if j in problem.active_joints and every[j - 1].has(quantity))
+    return tuple(
+        j for j in joints if j in problem.active_joints and every[j - 1].has(quantity)
+    )
 
 
 def _split(problem: Problem, theta: Array) -> Iterator[Term]:
     """Yield the share of side B, or of one joint that moves,
     in a free parameter that serves several."""
     settings = problem.settings
-    for parameter, value in zip(problem.parameters.parameters, theta.tolist(), strict=True):
+    for parameter, value in zip(
+        problem.parameters.parameters, theta.tolist(), strict=True
+    ):
         name = parameter.name
         shared = settings.parameters[name]
         if shared.fixed is not None or shared.per is not None:
@@ -122,9 +139,11 @@ def _split(problem: Problem, theta: Array) -> Iterator[Term]:
                 yield Term(new, entries, value)
 
 
-def _shares(problem: Problem, shared: ParameterSettings) -> dict[str, tuple[Plain, Plain]]:
-    """Return how a parameter can be split: what the rest of it serves, and what the share, by the
-    share's ending."""
+def _shares(
+    problem: Problem, shared: ParameterSettings
+) -> dict[str, tuple[Plain, Plain]]:
+    """Return how a parameter can be split: what the rest of it serves, and what the
+    share, by the share's ending."""
     settings = problem.settings
     shares = dict[str, tuple[Plain, Plain]]()
     sides = TARGETS[shared.quantity]
@@ -154,7 +173,9 @@ def _nominal(problem: Problem) -> Iterator[Term]:
                     yield from _new_term(problem, row, quantity, group)
 
 
-def _new_term(problem: Problem, row: Quantity, quantity: str, group: tuple[int, ...]) -> Iterator[Term]:
+def _new_term(
+    problem: Problem, row: Quantity, quantity: str, group: tuple[int, ...]
+) -> Iterator[Term]:
     """Yield a quantity of a group of joints as a term, if it has one value there."""
     # the pump is no joint's: the first has its values as well as any
     values = {
@@ -170,7 +191,8 @@ def _new_term(problem: Problem, row: Quantity, quantity: str, group: tuple[int, 
 
 
 def _set_by_parameters(settings: FitSettings) -> set[tuple[str, int]]:
-    """Return the quantities that parameters set, with their joints; 0 for what is no joint's."""
+    """Return the quantities that parameters set, with their joints; 0 for what is no
+    joint's."""
     taken = set[tuple[str, int]]()
     for parameter in settings.parameters.values():
         if parameter.per is None:
@@ -180,7 +202,8 @@ def _set_by_parameters(settings: FitSettings) -> set[tuple[str, int]]:
 
 
 def _may_lack(problem: Problem, row: Quantity) -> bool:
-    """Return whether the model of this stage has a quantity, and the logs do not say it already."""
+    """Return whether the model of this stage has a quantity, and the logs do not say it
+    already."""
     if problem.settings.stage == "mech" and row.name not in MECHANICAL:
         return False
     if row.of_the_pump:
@@ -190,9 +213,11 @@ def _may_lack(problem: Problem, row: Quantity) -> bool:
     return not (row.name == "start_pressure" and gauged)
 
 
-def _groups(row: Quantity, quantity: str, joints: tuple[int, ...]) -> list[tuple[int, ...]]:
-    """Return the groups of joints that may share a value: each alone, and all of them where both
-    sides do, too."""
+def _groups(
+    row: Quantity, quantity: str, joints: tuple[int, ...]
+) -> list[tuple[int, ...]]:
+    """Return the groups of joints that may share a value: each alone, and all of them
+    where both sides do, too."""
     if row.of_the_pump:
         return [(0,)]
     groups: list[tuple[int, ...]] = [(joint,) for joint in joints]
@@ -201,8 +226,11 @@ def _groups(row: Quantity, quantity: str, joints: tuple[int, ...]) -> list[tuple
     return groups
 
 
-def _new_name(problem: Problem, row: Quantity, quantity: str, group: tuple[int, ...]) -> str:
-    """Return a name for a new parameter, with that of its joint where it is one of several."""
+def _new_name(
+    problem: Problem, row: Quantity, quantity: str, group: tuple[int, ...]
+) -> str:
+    """Return a name for a new parameter, with that of its joint where it is one of
+    several."""
     settings = problem.settings
     name = quantity
     is_one_of_several = len(problem.active_joints) != 1 and len(group) == 1
@@ -219,8 +247,8 @@ def _label(settings: FitSettings, joint: int) -> str:
 
 
 def joints_of(settings: FitSettings, parameter: ParameterSettings) -> tuple[int, ...]:
-    """Return the joints that a parameter acts on; a link's mass, and the pump's numbers,
-    act on none."""
+    """Return the joints that a parameter acts on; a link's mass, and the pump's
+    numbers, act on none."""
     if parameter.link is not None or CHOICES[parameter.quantity].of_the_pump:
         return ()
     return parameter.joints or tuple(range(1, len(settings.arm.joints) + 1))

@@ -1,9 +1,9 @@
 """An arm with locked joints as an MJCF with its looks: what a plant steps and shows,
 and what is exported.
 
-The bodies are those of `hydroid.arm.locked`, with the inertia of all that is fused into them.
-Shapes, sites, cameras and lights of a fused body hang on the body that carries it;
-contacts are off, as in every simulation.
+The bodies are those of `hydroid.arm.locked`, with the inertia of all that is fused into
+them. Shapes, sites, cameras and lights of a fused body hang on the body that carries
+it; contacts are off, as in every simulation.
 """
 
 import math
@@ -27,8 +27,8 @@ _FIELDS = (
 def dressed_model(spec: mujoco.MjSpec, locked: LockedArm) -> mujoco.MjModel:
     """Return the locked arm's model with shapes, cameras and one idle motor per joint.
 
-    It steps as `locked.model` does, bit for bit: motors are switched off, and their controls are
-    free to hold commands in %.
+    It steps as `locked.model` does, bit for bit: motors are switched off, and their
+    controls are free to hold commands in %.
     """
     source = locked_spec(spec, locked, locked.model, np.zeros((2, len(locked.joints))))
     with quiet_mujoco():
@@ -42,14 +42,21 @@ def dressed_model(spec: mujoco.MjSpec, locked: LockedArm) -> mujoco.MjModel:
 def locked_spec(
     spec: mujoco.MjSpec, locked: LockedArm, model: mujoco.MjModel, motors: Array
 ) -> mujoco.MjSpec:
-    """Return an arm's MJCF with joints locked; inertia, joints and time step are those of `model`.
+    """Return an arm's MJCF with joints locked; inertia, joints and time step are those
+    of `model`.
 
-    `motors` are torque per command [N·m/%] and torque without one [N·m] of the moving joints, shape
-    (2, V); shape (2, 0): no motors.
+    `motors` are torque per command [N·m/%] and torque without one [N·m] of the moving
+    joints, shape (2, V); shape (2, 0): no motors.
     """
     source = spec.copy()
     forces = [*source.actuators, *source.sensors, *source.equalities]
-    others = [*source.keys, *source.excludes, *source.pairs, *source.flexes, *source.skins]
+    others = [
+        *source.keys,
+        *source.excludes,
+        *source.pairs,
+        *source.flexes,
+        *source.skins,
+    ]
     for part in forces + others:
         source.delete(part)
     _draw_tendons(source)
@@ -101,7 +108,9 @@ def _take_inertia(body: mujoco.MjsBody, model: mujoco.MjModel, number: int) -> N
     body.fullinertia = [np.nan, 0, 0, 0, 0, 0]
 
 
-def _take_joint(joint: mujoco.MjsJoint, model: mujoco.MjModel, number: int, *, in_degrees: bool) -> None:
+def _take_joint(
+    joint: mujoco.MjsJoint, model: mujoco.MjModel, number: int, *, in_degrees: bool
+) -> None:
     """Give a joint the damper, spring and friction of one of a model."""
     joint.damping = [model.dof_damping[number], 0, 0]
     joint.stiffness = [model.jnt_stiffness[number], 0, 0]
@@ -125,17 +134,21 @@ def _draw_tendons(spec: mujoco.MjSpec) -> None:
         tendon.frictionloss = tendon.armature = 0.0
 
 
-def write_fitted(folder: Path, fitted: mujoco.MjSpec, joints: str, actuators: Plain) -> None:
+def write_fitted(
+    folder: Path, fitted: mujoco.MjSpec, joints: str, actuators: Plain
+) -> None:
     """Write the fitted arm to `model/`, beside `arm.xml`,
     and a README that says what it is good for.
 
-    `joints` names those that take commands; `actuators` are hydraulic parameters by joint; of stage
-    1 there are none: the MJCF has motors.
+    `joints` names those that take commands; `actuators` are hydraulic parameters by
+    joint; of stage 1 there are none: the MJCF has motors.
     """
     name = "fitted"
     if actuators:
         name = "mechanics"
         write_atomic(folder / "actuators.yaml", yaml_text(actuators))
     write_atomic(folder / f"{name}.xml", mjcf_text(fitted))
-    readme = fill_template(f"arm/{name}.txt.j2", timestep=fitted.option.timestep, joints=joints)
+    readme = fill_template(
+        f"arm/{name}.txt.j2", timestep=fitted.option.timestep, joints=joints
+    )
     write_atomic(folder / "README.txt", readme)

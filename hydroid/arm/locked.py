@@ -1,10 +1,10 @@
 """The smallest model that moves exactly like the arm with some of its joints locked.
 
-A locked joint makes its link one rigid body with the link before it. `lock` builds the model of
-those rigid bodies, and `LockedArm.inertials` gives their mass, centre and inertia for any masses of
-the links, by Steiner's theorem; links that cannot move at all become part of the world and drop
-out. With every joint moving nothing but the fixed parts is fused,
-and the result is the whole arm without shapes or contacts.
+A locked joint makes its link one rigid body with the link before it. `lock` builds the
+model of those rigid bodies, and `LockedArm.inertials` gives their mass, centre and
+inertia for any masses of the links, by Steiner's theorem; links that cannot move at all
+become part of the world and drop out. With every joint moving nothing but the fixed
+parts is fused, and the result is the whole arm without shapes or contacts.
 """
 
 from collections.abc import Sequence
@@ -46,36 +46,43 @@ IDLE = (
 
 
 PART = np.dtype(
-    [("body", int), ("column", int), ("mass", float), ("centre", float, 3), ("inertia", float, (3, 3))]
+    [
+        ("body", int),
+        ("column", int),
+        ("mass", float),
+        ("centre", float, 3),
+        ("inertia", float, (3, 3)),
+    ]
 )
-"""a link, or another body of the model, as a rigid part of a fused body and in its frame: that
-body; the column of its mass in `masses`, -1 where no setting names it; its mass in the model [kg];
-its centre [m]; its inertia about that for 1 kg [m²]"""
+"""a link, or another body of the model, as a rigid part of a fused body and in its
+frame: that body; the column of its mass in `masses`, -1 where no setting names it; its
+mass in the model [kg]; its centre [m]; its inertia about that for 1 kg [m²]"""
 
 
 @record
 class LockedArm:
-    """A model with only the moving joints, and the way from link masses to its bodies."""
+    """A model with only the moving joints, and the way from link masses to its
+    bodies."""
 
     model: mujoco.MjModel
-    """one body per moving joint, no actuator: torques go to qfrc_applied [N·m]; contacts,
-    auto-reset off"""
+    """one body per moving joint, no actuator: torques go to qfrc_applied [N·m];
+    contacts, auto-reset off"""
     joints: tuple[str, ...]  # the moving joints in the order of qpos and qvel, (V,)
     columns: Index  # the same among the arm's joints, 0-based, shape (V,)
     pose: Array  # where they start [rad], shape (V,)
     parts: Any  # what the bodies consist of, (P,) of PART
     held: dict[str, tuple[Array, Array]]
-    """place in its parent of a locked joint's body, by name: [m], (3,), and a quaternion (w, x, y,
-    z)"""
+    """place in its parent of a locked joint's body, by name: [m], (3,), and a
+    quaternion (w, x, y, z)"""
 
     def inertials(self, masses: Array) -> dict[str, Array]:
-        """Fuse links of some masses [kg], shape (n, L); row k depends on masses[k] alone,
-        to the last bit.
+        """Fuse links of some masses [kg], shape (n, L); row k depends on masses[k]
+        alone, to the last bit.
 
         Returns:
-            The fields of mjModel that describe the B bodies, the world first: body_mass [kg], shape
-            (n, B); body_ipos [m], shape (n, B, 3); body_iquat (w, x, y, z), shape (n, B, 4);
-            body_inertia [kg·m²], shape (n, B, 3).
+            The fields of mjModel that describe the B bodies, the world first: body_mass
+            [kg], shape (n, B); body_ipos [m], shape (n, B, 3); body_iquat (w, x, y, z),
+            shape (n, B, 4); body_inertia [kg·m²], shape (n, B, 3).
         """
         shapes = (len(masses), self.model.nbody)
         part = self.parts
@@ -136,7 +143,8 @@ def lock(spec: mujoco.MjSpec, arm: Arm, moving: Mask, pose: Array) -> LockedArm:
 
 
 def _place(data: mujoco.MjData, body: int, above: int) -> tuple[Array, Array]:
-    """Return a body's place in another's frame: [m], (3,), and a quaternion (w, x, y, z)."""
+    """Return a body's place in another's frame: [m], (3,), and a quaternion (w, x, y,
+    z)."""
     turn = np.empty(4)
     inverse = data.xquat[above] * [1, -1, -1, -1]
     mujoco.mju_mulQuat(turn, inverse, data.xquat[body])
@@ -149,7 +157,9 @@ def _fused(
 ) -> tuple[mujoco.MjModel, Any]:
     """Return the chain of bodies that joints move, without what they weigh,
     and every body that is part of them."""
-    column_of = {full.body(name).id: column for column, name in enumerate(arm.link_names)}
+    column_of = {
+        full.body(name).id: column for column, name in enumerate(arm.link_names)
+    }
     moved = {int(joint.bodyid[0]): joint for joint in map(full.joint, joints)}
     spec = mujoco.MjSpec()
     bodies = [spec.worldbody]
@@ -178,9 +188,11 @@ def _fused(
     return model, np.array(parts, PART).view(np.recarray)
 
 
-def _part(full: mujoco.MjModel, data: mujoco.MjData, body: int, carrier: int) -> tuple[float, Array, Array]:
-    """Return a body's mass [kg], its centre [m], (3,), and its inertia for 1 kg [m²], (3, 3), in
-    the frame of the body that it is part of."""
+def _part(
+    full: mujoco.MjModel, data: mujoco.MjData, body: int, carrier: int
+) -> tuple[float, Array, Array]:
+    """Return a body's mass [kg], its centre [m], (3,), and its inertia for 1 kg [m²],
+    (3, 3), in the frame of the body that it is part of."""
     mass = float(full.body_mass[body])
     inverse = data.xmat[carrier].reshape(3, 3).T
     axes = inverse @ data.ximat[body].reshape(3, 3)
@@ -193,7 +205,8 @@ def repeat(model: mujoco.MjModel, copies: int) -> mujoco.MjModel:
     """Return a `LockedArm`'s model as often as asked for, side by side;
     bodies weigh nothing in particular.
 
-    None changes a bit of another, and a step of many costs little more than a step of one.
+    None changes a bit of another, and a step of many costs little more than a step of
+    one.
     """
     spec = mujoco.MjSpec()
     for copy in range(copies):
@@ -211,26 +224,40 @@ def repeat(model: mujoco.MjModel, copies: int) -> mujoco.MjModel:
     many.body_quat[1:] = np.tile(model.body_quat[1:], (copies, 1))
     _take_over(many, model, [*range(model.njnt)] * copies)
     many.stat.meaninertia = model.stat.meaninertia
-    many.opt.disableflags = model.opt.disableflags & ~int(mujoco.mjtDisableBit.mjDSBL_ISLAND)
+    many.opt.disableflags = model.opt.disableflags & ~int(
+        mujoco.mjtDisableBit.mjDSBL_ISLAND
+    )
     return many
 
 
-def _add(above: Any, name: str, position: Array, turn: Array, joint: Any, copy: int | str = "") -> Any:
+def _add(
+    above: Any,
+    name: str,
+    position: Array,
+    turn: Array,
+    joint: Any,
+    copy: int | str = "",
+) -> Any:
     """Add a body to another that moves like a model's joint, without what it weighs."""
     body = above.add_body(
         name=name,
         pos=position,
         quat=turn,
-        simple=False,  # MuJoCo's short cut for aligned inertias, which other masses would break
+        # MuJoCo's short cut for aligned inertias, which other masses would break
+        simple=False,
         explicitinertial=True,
         mass=1.0,
         inertia=[1.0, 1.0, 1.0],
     )
-    body.add_joint(name=f"{joint.name}{copy}", type=joint.type[0], pos=joint.pos, axis=joint.axis)
+    body.add_joint(
+        name=f"{joint.name}{copy}", type=joint.type[0], pos=joint.pos, axis=joint.axis
+    )
     return body
 
 
-def _take_over(model: mujoco.MjModel, source: mujoco.MjModel, ids: Sequence[int]) -> None:
+def _take_over(
+    model: mujoco.MjModel, source: mujoco.MjModel, ids: Sequence[int]
+) -> None:
     for name in _JOINT_FIELDS:
         getattr(model, name)[:] = getattr(source, name)[ids]
     for name in _OPTIONS:

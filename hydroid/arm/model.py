@@ -1,10 +1,11 @@
 """An arm's compiled model: with a payload where a log has one,
 or beside its mirror image on one carrier.
 
-Which of its bodies meet along a trajectory, and how near they come otherwise: bodies collide with
-the shapes that the MJCF makes collide; a mesh counts as its convex hull. Distances are MuJoCo's
-(`mj_geomDistance`). As in MuJoCo a body is not held against the one that it hangs on, nor against
-one that the model excludes; `hydroid init` excludes bodies that touch in the pose `home`.
+Which of its bodies meet along a trajectory, and how near they come otherwise: bodies
+collide with the shapes that the MJCF makes collide; a mesh counts as its convex hull.
+Distances are MuJoCo's (`mj_geomDistance`). As in MuJoCo a body is not held against the
+one that it hangs on, nor against one that the model excludes; `hydroid init` excludes
+bodies that touch in the pose `home`.
 """
 
 from collections.abc import Mapping
@@ -34,9 +35,12 @@ def load_model(arm: Arm) -> mujoco.MjSpec:
 
 
 def add_payload(spec: mujoco.MjSpec, arm: Arm, mass: float) -> mujoco.MjSpec:
-    """Return a copy of the arm's model that carries `mass` [kg] at the site of its payload."""
+    """Return a copy of the arm's model that carries `mass` [kg] at the site of its
+    payload."""
     if arm.payload is None:
-        hint = "name the site of the model that holds it in the arm's file, payload: SITE"
+        hint = (
+            "name the site of the model that holds it in the arm's file, payload: SITE"
+        )
         raise SettingsError(f"{arm.name} has no place for a payload", "payloads", hint)
     loaded = spec.copy()
     site = loaded.site(arm.payload)
@@ -76,8 +80,9 @@ class Clearance:
     """The smallest distance of any two bodies [m], (T,), along a trajectory;
     negative inside each other.
 
-    `nearest` names the two bodies of each sample, `meetings` stand in the order of their
-    beginnings; `excluded` are pairs that the model excludes, `checked` is the number of the others.
+    `nearest` names the two bodies of each sample, `meetings` stand in the order of
+    their beginnings; `excluded` are pairs that the model excludes, `checked` is the
+    number of the others.
     """
 
     time: Array
@@ -89,7 +94,8 @@ class Clearance:
 
 
 class CollisionChecker:
-    """Distances between the bodies of a compiled model whose joints are all hinges or slides."""
+    """Distances between the bodies of a compiled model whose joints are all hinges or
+    slides."""
 
     def __init__(self, model: mujoco.MjModel, source: str = "the model") -> None:
         self._model = model
@@ -109,7 +115,9 @@ class CollisionChecker:
         body = self._model.body
         # MuJoCo keeps a pair as one number, the first body in its upper half
         signatures = self._model.exclude_signature.tolist()
-        excluded = [(body(pair >> 16).name, body(pair & 0xFFFF).name) for pair in signatures]
+        excluded = [
+            (body(pair >> 16).name, body(pair & 0xFFFF).name) for pair in signatures
+        ]
         return Clearance(
             time=time,
             distance=distance.min(axis=1),
@@ -120,8 +128,8 @@ class CollisionChecker:
         )
 
     def _meetings(self, time: Array, distance: Array) -> tuple[Meeting, ...]:
-        """Return when bodies are inside each other, by the distances of all pairs of shapes, (T,
-        P)."""
+        """Return when bodies are inside each other, by the distances of all pairs of
+        shapes, (T, P)."""
         # of a body's shapes the deepest
         depths: dict[tuple[str, str], Array] = {}
         for pair in np.flatnonzero(distance.min(axis=0) < 0):
@@ -146,7 +154,9 @@ class CollisionChecker:
         meetings.sort(key=lambda meeting: meeting.from_s)
         return tuple(meetings)
 
-    def first_below(self, angle: Array, margin: float, counted: Mask | None = None) -> int | None:
+    def first_below(
+        self, angle: Array, margin: float, counted: Mask | None = None
+    ) -> int | None:
         """Return the first sample of a motion [rad], (T, nq),
         with two bodies nearer than a margin [m].
 
@@ -158,7 +168,9 @@ class CollisionChecker:
                 return sample
         return None
 
-    def below(self, angle: Array, margin: float, counted: Mask) -> tuple[tuple[str, str], float]:
+    def below(
+        self, angle: Array, margin: float, counted: Mask
+    ) -> tuple[tuple[str, str], float]:
         """Return which two bodies are nearer than a margin [m] most often,
         and in what part of a motion."""
         near = np.stack([self._distances(pose, margin) for pose in angle]) < margin
@@ -166,8 +178,8 @@ class CollisionChecker:
         return self.names[int(np.argmax(share))], float(share.max())
 
     def changing(self, poses: Array) -> Mask:
-        """Return which pairs of shapes stand at different distances in some poses [rad], (n, nq):
-        shape (P,).
+        """Return which pairs of shapes stand at different distances in some poses
+        [rad], (n, nq): shape (P,).
 
         No joint moves the others nearer: a base and what turns on it.
         """
@@ -218,8 +230,8 @@ def _pairs(model: mujoco.MjModel) -> list[list[int]]:
 class Machine:
     """A whole machine, all joints free, to be put into poses.
 
-    Its `sides` name its arms, `ALONE` or right and left; the compiled model's joints are theirs,
-    arm by arm.
+    Its `sides` name its arms, `ALONE` or right and left; the compiled model's joints
+    are theirs, arm by arm.
     """
 
     arm: Arm
@@ -232,8 +244,8 @@ class Machine:
         return CollisionChecker(self.model, self.arm.name)
 
     def joined(self, angle: Mapping[str, Array], rest: Array) -> Array:
-        """Return all joints' angles [rad], (T, nq), of arms that move, (T, J) by name; others rest,
-        (J,)."""
+        """Return all joints' angles [rad], (T, nq), of arms that move, (T, J) by name;
+        others rest, (J,)."""
         still = np.tile(rest, (max(map(len, angle.values())), 1))
         return np.hstack([angle.get(side, still) for side in self.sides])
 

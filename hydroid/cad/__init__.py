@@ -1,1 +1,2 @@
-"""A robot's URDF or MJCF and meshes -> the model of a serial arm, through MuJoCo's importer."""
+"""A robot's URDF or MJCF and meshes -> the model of a serial arm, through MuJoCo's
+importer."""

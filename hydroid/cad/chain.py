@@ -17,15 +17,19 @@ SIDES = {"left", "right", "l", "r"}
 
 
 def choose_chain(
-    spec: mujoco.MjSpec, path: Path, notes: Notes, columns: Sequence[str], tip: str | None
+    spec: mujoco.MjSpec,
+    path: Path,
+    notes: Notes,
+    columns: Sequence[str],
+    tip: str | None,
 ) -> None:
     """Choose the joints from the base to `tip`, or else to the tip that fits best,
     and delete the others.
 
-    The best tip is the one with the most joints that the columns of a log name, then the one with
-    the most joints, then the first. Rods and tubes of cylinders are no tips, nor are fingers that
-    the log does not name. What is left out is held, and its mass belongs to the link that carries
-    it.
+    The best tip is the one with the most joints that the columns of a log name, then
+    the one with the most joints, then the first. Rods and tubes of cylinders are no
+    tips, nor are fingers that the log does not name. What is left out is held, and its
+    mass belongs to the link that carries it.
 
     Raises:
         ModelError: no joint can be moved, a body has several, or no joint moves `tip`.
@@ -39,7 +43,9 @@ def choose_chain(
         chain = () if link is None else _path(link)
         why = "as asked"
         if not chain:
-            raise ModelError(f"no joint moves a link {tip!r}", path, f"tips: {', '.join(tips)}")
+            raise ModelError(
+                f"no joint moves a link {tip!r}", path, f"tips: {', '.join(tips)}"
+            )
     left_out = [joint for joint in spec.joints if joint.name not in chain]
     if left_out:
         others = [f"--tip {link}" for link, other in tips.items() if other != chain]
@@ -52,7 +58,9 @@ def choose_chain(
         spec.delete(joint)
 
 
-def _held(spec: mujoco.MjSpec, joints: Sequence[mujoco.MjsJoint], columns: Sequence[str]) -> str:
+def _held(
+    spec: mujoco.MjSpec, joints: Sequence[mujoco.MjsJoint], columns: Sequence[str]
+) -> str:
     """Return which joints are held, and loudly those that a log names."""
     names = [joint.name for joint in joints]
     named = [name for name in names if _named(spec, [name], columns)]
@@ -61,12 +69,15 @@ def _held(spec: mujoco.MjSpec, joints: Sequence[mujoco.MjsJoint], columns: Seque
 
 
 def _tips(spec: mujoco.MjSpec, path: Path) -> dict[str, tuple[str, ...]]:
-    """Return the joints from the base to each link that carries no further joint, by the link."""
+    """Return the joints from the base to each link that carries no further joint, by
+    the link."""
     chains: dict[str, tuple[str, ...]] = {}
     for joint in spec.joints:
         if len(joint.parent.joints) > 1:
             hint = "put a small body between them: hydroid moves one joint per link"
-            raise ModelError(f"body {joint.parent.name!r} has several joints", path, hint)
+            raise ModelError(
+                f"body {joint.parent.name!r} has several joints", path, hint
+            )
         chains[joint.parent.name] = _path(joint.parent)
     inner = set[str]()
     for chain in chains.values():
@@ -88,7 +99,9 @@ def _best(
     return best, "the longest branch"
 
 
-def _without_fingers(spec: mujoco.MjSpec, chain: tuple[str, ...], columns: Sequence[str]) -> tuple[str, ...]:
+def _without_fingers(
+    spec: mujoco.MjSpec, chain: tuple[str, ...], columns: Sequence[str]
+) -> tuple[str, ...]:
     """Return a chain without the fingers at its end that no column names: they grip,
     and are no arm."""
     while len(chain) > 1 and _is_finger(spec, chain[-1]):
@@ -114,15 +127,20 @@ def _is_finger(spec: mujoco.MjSpec, name: str) -> bool:
 
 
 def _without_side(name: str) -> tuple[str, ...]:
-    return tuple(word for word in words(name) if word not in SIDES and not word.isdecimal())
+    return tuple(
+        word for word in words(name) if word not in SIDES and not word.isdecimal()
+    )
 
 
 def _hold(spec: mujoco.MjSpec, notes: Notes) -> None:
-    """Delete the joints that hydroid does not move, or that follow others, and say so."""
+    """Delete the joints that hydroid does not move, or that follow others, and say
+    so."""
     followers = {e.name1 for e in spec.equalities if e.type == mujoco.mjtEq.mjEQ_JOINT}
     for joint in list(spec.joints):
         if joint.type == mujoco.mjtJoint.mjJNT_FREE:
-            notes.add("free to float in the file: fixed to the world", joint.parent.name)
+            notes.add(
+                "free to float in the file: fixed to the world", joint.parent.name
+            )
             spec.delete(joint)
             continue
         why = _why_held(joint, followers)
@@ -158,7 +176,8 @@ def _path(body: mujoco.MjsBody | None) -> tuple[str, ...]:
 
 
 def _named(spec: mujoco.MjSpec, chain: Sequence[str], columns: Sequence[str]) -> int:
-    """Return how many of the chain's joints, or of their links, are named by columns."""
+    """Return how many of the chain's joints, or of their links, are named by
+    columns."""
     names = [joint.name for joint in spec.joints]
     links = [joint.parent.name for joint in spec.joints]
     named = set[int | None]()

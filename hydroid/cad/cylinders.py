@@ -1,10 +1,10 @@
 """Cylinders that a robot's file models as links of their own -> where they are pinned.
 
-A tube that turns on one link, a rod that slides in it and is pinned to another: in an MJCF by an
-equality constraint, which closes the loop. Between rod and moved link there may be a rocker and a
-coupler (a bucket's four-bar linkage). Where one is recognised its links are held, so that their
-mass is part of the links that carry them, and the joint that it moves gets the cylinder.
-A URDF cannot close loops: its rods end nowhere.
+A tube that turns on one link, a rod that slides in it and is pinned to another: in an
+MJCF by an equality constraint, which closes the loop. Between rod and moved link there
+may be a rocker and a coupler (a bucket's four-bar linkage). Where one is recognised its
+links are held, so that their mass is part of the links that carry them, and the joint
+that it moves gets the cylinder. A URDF cannot close loops: its rods end nowhere.
 """
 
 import math
@@ -22,15 +22,26 @@ from hydroid.cad.source import Notes, word
 from hydroid.files import Plain
 from hydroid.settings.linkage import FourBar, four_bar
 
-PARTS = {"rod", "piston", "cylinder", "cyl", "ram", "tube", "barrel", "anchor", "clevis", "trunnion"}
+PARTS = {
+    "rod",
+    "piston",
+    "cylinder",
+    "cyl",
+    "ram",
+    "tube",
+    "barrel",
+    "anchor",
+    "clevis",
+    "trunnion",
+}
 """words in the names of a cylinder's links and joints"""
 ENDS = "parent", "child"  # of the sites that show where a cylinder is pinned
 
 
 @record
 class _Pin:
-    """Where two bodies turn on each other [m], shape (3,), in the file's pose; `joint` None:
-    an equality."""
+    """Where two bodies turn on each other [m], shape (3,), in the file's pose; `joint`
+    None: an equality."""
 
     bodies: tuple[str, str]
     at: Array
@@ -44,10 +55,13 @@ def take_cylinders(spec: mujoco.MjSpec, notes: Notes) -> dict[str, Plain]:
     """Hold the links of cylinders and return what an arm's file says of them,
     by the joint that they move.
 
-    Pivots become sites of the links. A joint needs limits, or its cylinder might pass a dead
-    centre. The constraints that close the loops of what is held are deleted; others stay.
+    Pivots become sites of the links. A joint needs limits, or its cylinder might pass a
+    dead centre. The constraints that close the loops of what is held are deleted;
+    others stay.
     """
-    if not any(equality.type == mujoco.mjtEq.mjEQ_CONNECT for equality in spec.equalities):
+    if not any(
+        equality.type == mujoco.mjtEq.mjEQ_CONNECT for equality in spec.equalities
+    ):
         return {}
     _, data = bare_model(spec, notes.path)
     pins = _pins(spec, data)
@@ -58,7 +72,10 @@ def take_cylinders(spec: mujoco.MjSpec, notes: Notes) -> dict[str, Plain]:
         joint = made.joint
         low, high = joint.range
         if not low < high:
-            notes.add("without limits: the file's cylinder that moves it is not taken", joint.name)
+            notes.add(
+                "without limits: the file's cylinder that moves it is not taken",
+                joint.name,
+            )
             continue
         cylinders[joint.name] = made.settings
         if not made.bars:
@@ -74,7 +91,9 @@ def take_cylinders(spec: mujoco.MjSpec, notes: Notes) -> dict[str, Plain]:
     return cylinders
 
 
-def _linkages(spec: mujoco.MjSpec, pins: Sequence[_Pin], data: mujoco.MjData) -> Iterator["_Linkage"]:
+def _linkages(
+    spec: mujoco.MjSpec, pins: Sequence[_Pin], data: mujoco.MjData
+) -> Iterator["_Linkage"]:
     """Yield every cylinder: a rod that slides in a tube,
     both pinned to links that a joint connects."""
     for slide in spec.joints:
@@ -103,10 +122,11 @@ def _show_pivots(spec: mujoco.MjSpec, made: "_Linkage", data: mujoco.MjData) -> 
 
 
 def take_sites(spec: mujoco.MjSpec, notes: Notes) -> dict[str, Plain]:
-    """Return what an arm's file says of the cylinders that pairs of sites show, by joint.
+    """Return what an arm's file says of the cylinders that pairs of sites show, by
+    joint.
 
-    The sites are called JOINT_pivot_parent and JOINT_pivot_child; the name of the joint may lack
-    its ending `_joint`, or be that of the link, and is completed.
+    The sites are called JOINT_pivot_parent and JOINT_pivot_child; the name of the joint
+    may lack its ending `_joint`, or be that of the link, and is completed.
     """
     cylinders = dict[str, Plain]()
     sites = {word(site.name): site for site in spec.sites}
@@ -124,7 +144,8 @@ def take_sites(spec: mujoco.MjSpec, notes: Notes) -> dict[str, Plain]:
 
 
 def ends_of(spec: mujoco.MjSpec, constraint: Any) -> tuple[str, str]:
-    """Return the names of the two bodies, or joints, that a constraint ties to each other."""
+    """Return the names of the two bodies, or joints, that a constraint ties to each
+    other."""
     ends = (constraint.name1, constraint.name2)
     if constraint.objtype == mujoco.mjtObj.mjOBJ_SITE:
         ends = tuple(spec.site(name).parent.name for name in ends)
@@ -141,7 +162,8 @@ def is_part_of_cylinder(joint: mujoco.MjsJoint) -> bool:
 
 
 def _pins(spec: mujoco.MjSpec, data: mujoco.MjData) -> list[_Pin]:
-    """Return where bodies turn on each other: hinges and points that equalities connect."""
+    """Return where bodies turn on each other: hinges and points that equalities
+    connect."""
     pins = list[_Pin]()
     for joint in spec.joints:
         if joint.type == mujoco.mjtJoint.mjJNT_HINGE:
@@ -161,15 +183,18 @@ def _pins(spec: mujoco.MjSpec, data: mujoco.MjData) -> list[_Pin]:
 
 def _at(pins: Sequence[_Pin], body: str, *without: str) -> list[_Pin]:
     """Return the pins of a body, but for those to some other bodies."""
-    return [pin for pin in pins if body in pin.bodies and pin.other(body) not in without]
+    return [
+        pin for pin in pins if body in pin.bodies and pin.other(body) not in without
+    ]
 
 
 @record
 class _Linkage:
-    """A cylinder, how it is pinned, the joint that it moves, and the settings that say so.
+    """A cylinder, how it is pinned, the joint that it moves, and the settings that say
+    so.
 
-    `foot` pins the tube to a link, `eye` the rod to another; `bars` are the rocker and the coupler
-    between rod and moved link, if there are any.
+    `foot` pins the tube to a link, `eye` the rod to another; `bars` are the rocker and
+    the coupler between rod and moved link, if there are any.
     """
 
     tube: str
@@ -182,10 +207,14 @@ class _Linkage:
 
 
 def _linkage(
-    pins: Sequence[_Pin], foot: _Pin, eye: _Pin, cylinder: tuple[str, str], data: mujoco.MjData
+    pins: Sequence[_Pin],
+    foot: _Pin,
+    eye: _Pin,
+    cylinder: tuple[str, str],
+    data: mujoco.MjData,
 ) -> _Linkage | None:
-    """Return what a cylinder, (tube, rod), moves, by a rocker and a coupler or directly; None: it
-    moves no joint."""
+    """Return what a cylinder, (tube, rod), moves, by a rocker and a coupler or
+    directly; None: it moves no joint."""
     tube, rod = cylinder
     base = foot.other(tube)
     moved = eye.other(rod)
@@ -207,16 +236,19 @@ def _linkage(
 
 
 class _FourBarPins(NamedTuple):
-    """Where a rocker turns on the link that carries the cylinder, where a coupler turns on the
-    rocker, and where the moved link turns on the coupler."""
+    """Where a rocker turns on the link that carries the cylinder, where a coupler turns
+    on the rocker, and where the moved link turns on the coupler."""
 
     rocker: _Pin
     coupler: _Pin
     child: _Pin
 
 
-def _rockers(pins: Sequence[_Pin], base: str, rocker: str, rod: str) -> Iterator[_FourBarPins]:
-    """Yield the pins of four-bar linkages whose rocker a rod moves and a base carries."""
+def _rockers(
+    pins: Sequence[_Pin], base: str, rocker: str, rod: str
+) -> Iterator[_FourBarPins]:
+    """Yield the pins of four-bar linkages whose rocker a rod moves and a base
+    carries."""
     for ground in _at(pins, rocker, rod):
         if ground.other(rocker) != base:
             continue
@@ -226,7 +258,8 @@ def _rockers(pins: Sequence[_Pin], base: str, rocker: str, rod: str) -> Iterator
 
 
 def _joint(pins: Sequence[_Pin], first: str, second: str) -> Any:
-    """Return the joint between two bodies, in either order; None where there is none."""
+    """Return the joint between two bodies, in either order; None where there is
+    none."""
     for pin in pins:
         if pin.joint and {*pin.bodies} == {first, second}:
             return pin.joint
@@ -237,8 +270,8 @@ def _four_bar(joint: Any, pins: Sequence[_Pin]) -> Plain | None:
     """Return the settings of a cylinder that turns a joint by a rocker and a coupler,
     as the file stands.
 
-    The pins are those of rocker and link, rocker and coupler, coupler and child, of the tube,
-    of the rod.
+    The pins are those of rocker and link, rocker and coupler, coupler and child, of the
+    tube, of the rod.
     """
     # points in the plane across the joint's axis, as complex numbers from the joint [m]
     axis = joint.xaxis
@@ -246,7 +279,9 @@ def _four_bar(joint: Any, pins: Sequence[_Pin]) -> Plain | None:
     x /= np.linalg.norm(x)
     y = np.cross(axis, x)
     offsets = [pin.at - joint.xanchor for pin in pins]
-    ground, pin, child, foot, eye = (complex(offset @ x, offset @ y) for offset in offsets)
+    ground, pin, child, foot, eye = (
+        complex(offset @ x, offset @ y) for offset in offsets
+    )
     # the rocker's pivot lies at (ground, 0)
     turn = abs(ground) / ground
     is_left = ((pin - ground) * np.conj(child - ground)).imag > 0

@@ -1,4 +1,5 @@
-"""A URDF or MJCF -> the model of a serial arm that hydroid can simulate, and its meshes."""
+"""A URDF or MJCF -> the model of a serial arm that hydroid can simulate, and its
+meshes."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -27,10 +28,11 @@ FAR = 50.0  # range of a joint that is rather in mm [m]
 
 @record
 class ImportedArm:
-    """A serial arm out of a robot's file: its MJCF, and its meshes as STL by their path from that.
+    """A serial arm out of a robot's file: its MJCF, and its meshes as STL by their path
+    from that.
 
-    `cylinders` are settings of those that the file models, but for areas, by joint; `notes` say
-    what was assumed, left out or mended.
+    `cylinders` are settings of those that the file models, but for areas, by joint;
+    `notes` say what was assumed, left out or mended.
     """
 
     title: str
@@ -49,8 +51,8 @@ def import_arm(
     """Read a URDF or an MJCF through MuJoCo's importer and take the arm out of it
     (`hydroid.init`).
 
-    `columns` are those of a log, which name joints; `tip` is the last link; `total_mass` is that
-    of all moving links [kg].
+    `columns` are those of a log, which name joints; `tip` is the last link;
+    `total_mass` is that of all moving links [kg].
 
     Raises:
         ModelError: a file that holds no arm that hydroid can simulate.
@@ -62,7 +64,9 @@ def import_arm(
     # cylinders first: their rods and tubes are then held, and are no joints of the arm
     cylinders = take_sites(spec, notes) | take_cylinders(spec, notes)
     choose_chain(spec, path, notes, columns, tip)
-    exact = urdf or all(geom.parent.explicitinertial for geom in spec.geoms if geom.meshname)
+    exact = urdf or all(
+        geom.parent.explicitinertial for geom in spec.geoms if geom.meshname
+    )
     meshes, lost = convert_meshes(spec, files, exact, notes)
     sort_shapes(spec)
     with mujoco_errors(path):
@@ -93,8 +97,8 @@ def _free_joints(spec: mujoco.MjSpec, notes: Notes) -> None:
 def _in_scene(
     spec: mujoco.MjSpec, meshes: dict[str, bytes], path: Path
 ) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
-    """Return the arm with light, floor and cameras, and the pose nearest to 0 as `home`; and its
-    model before these are arranged."""
+    """Return the arm with light, floor and cameras, and the pose nearest to 0 as
+    `home`; and its model before these are arranged."""
     # `arrange` puts its lights and cameras around the arm
     scene = fill_template("cad/scene.xml")
     text = mjcf_text(spec).replace("<worldbody>", scene + "<worldbody>", 1)
@@ -131,7 +135,8 @@ def _clear(spec: mujoco.MjSpec, path: Path) -> None:
 
 
 def _renamed(spec: mujoco.MjSpec) -> tuple[dict[str, str], dict[str, str]]:
-    """Give bodies and joints plain names, all different; return the new names by the old ones."""
+    """Give bodies and joints plain names, all different; return the new names by the
+    old ones."""
     bodies = dict[str, str]()
     taken = {"world"}
     for number, body in enumerate(spec.bodies[1:], 1):
@@ -148,7 +153,8 @@ def _renamed(spec: mujoco.MjSpec) -> tuple[dict[str, str], dict[str, str]]:
 
 
 def _is_of_scene(look: Any) -> bool:
-    """Return whether a texture or material would stand beside those of hydroid's own scene."""
+    """Return whether a texture or material would stand beside those of hydroid's own
+    scene."""
     if look.name in ("floor", "sky"):
         return True
     return getattr(look, "type", None) == mujoco.mjtTexture.mjTEXTURE_SKYBOX
@@ -170,7 +176,9 @@ def _weigh_as_on_earth(spec: mujoco.MjSpec, notes: Notes) -> None:
         notes.add("the file switches gravity off: it acts downwards along z")
     if option.density or option.viscosity:
         option.density = option.viscosity = 0.0
-        notes.add("density and viscosity of the air are left out: hydroid does not simulate them")
+        notes.add(
+            "density and viscosity of the air are left out: hydroid does not simulate them"
+        )
     option.disableflags = option.enableflags = 0
 
 
@@ -184,7 +192,8 @@ def _doubt_limits(model: mujoco.MjModel, notes: Notes) -> None:
 
 
 def _doubt(joint: Any) -> str:
-    """Return why a joint's limits look like those of another unit; empty where they do not."""
+    """Return why a joint's limits look like those of another unit; empty where they do
+    not."""
     span = float(np.ptp(joint.range))
     if joint.type[0] == mujoco.mjtJoint.mjJNT_SLIDE:
         if span > FAR:
@@ -197,8 +206,11 @@ def _doubt(joint: Any) -> str:
     return ""
 
 
-def _possible(cylinders: Mapping[str, Plain], data: mujoco.MjData, notes: Notes) -> dict[str, Plain]:
-    """Return the cylinders that can move their joints through their ranges; say of others why not.
+def _possible(
+    cylinders: Mapping[str, Plain], data: mujoco.MjData, notes: Notes
+) -> dict[str, Plain]:
+    """Return the cylinders that can move their joints through their ranges; say of
+    others why not.
 
     `data` may have any pose.
     """
@@ -236,8 +248,8 @@ def arrange(spec: mujoco.MjSpec, base: Array, tip: Array) -> None:
     """Put lights and cameras around the stretched arm, as far away as it reaches;
     exclude contacts by design.
 
-    `base` and `tip` are its ends in the world [m], shape (3,). What touches in a named pose is
-    close by design, or its hull is wide.
+    `base` and `tip` are its ends in the world [m], shape (3,). What touches in a named
+    pose is close by design, or its hull is wide.
     """
     model = spec.compile()
     centre = np.round(0.5 * (base + tip), 6)
@@ -261,7 +273,8 @@ def arrange(spec: mujoco.MjSpec, base: Array, tip: Array) -> None:
 
 
 def _touching(model: mujoco.MjModel) -> set[tuple[int, int]]:
-    """Return the pairs of bodies that touch in any named pose, the lower number first."""
+    """Return the pairs of bodies that touch in any named pose, the lower number
+    first."""
     data = mujoco.MjData(model)
     pairs = set[tuple[int, int]]()
     for key in range(model.nkey):

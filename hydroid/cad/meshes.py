@@ -22,10 +22,14 @@ UNITS = {1.0: "m", 1e-2: "cm", 1e-3: "mm"}
 """of mesh files, which do not say theirs, by what one is in m"""
 MOST_FACES = 200_000  # of a mesh that MuJoCo reads
 LARGEST = 1e7  # of a vertex in any of these units: no machine is 10 km long
-TOO_LONG = 5.0  # length of a mesh over the longest distance between joints: no part of the arm
-TOO_SHORT = 1 / 30  # length of what is seen of a link over its own distance: a link is no pin
-BRACKET = 1 / 300  # the same of the fixed base, over the longest distance: it may be small
-# part of the longest distance between joints from which a link's own tells its meshes' unit
+# length of a mesh over the longest distance between joints: no part of the arm
+TOO_LONG = 5.0
+# length of what is seen of a link over its own distance: a link is no pin
+TOO_SHORT = 1 / 30
+# the same of the fixed base, over the longest distance: it may be small
+BRACKET = 1 / 300
+# part of the longest distance between joints from which a link's own tells its meshes'
+# unit
 SPEAKS = 0.3
 LONGEST = 50.0  # mesh of an arm whose joints tell no distance [m]
 
@@ -50,10 +54,15 @@ class _Reach:
         """Return the distances, by link, that are long enough to tell the unit of a
         link's meshes."""
         least = SPEAKS * self.longest
-        return {link: distance for link, distance in self.own.items() if distance >= least and link in links}
+        return {
+            link: distance
+            for link, distance in self.own.items()
+            if distance >= least and link in links
+        }
 
     def nearest(self, length: float, of: float) -> float:
-        """Return the unit [m] in which a mesh of a length is most like a distance [m]."""
+        """Return the unit [m] in which a mesh of a length is most like a distance
+        [m]."""
         return min(UNITS, key=lambda unit: abs(np.log(length * unit / of)))
 
 
@@ -62,8 +71,9 @@ def convert_meshes(
 ) -> tuple[dict[str, bytes], set[str]]:
     """Turn the meshes into STL files in m and delete those that cannot be shown.
 
-    `exact`: no link has its inertia by what the file says of its meshes, so that the best way may
-    be taken. Returned are the files by their path from the model, and the bodies that lost a mesh.
+    `exact`: no link has its inertia by what the file says of its meshes, so that the
+    best way may be taken. Returned are the files by their path from the model, and the
+    bodies that lost a mesh.
     """
     read = _read_meshes(files, notes)
     units = _units(spec, files, read, notes)
@@ -100,11 +110,15 @@ def _delete(spec: mujoco.MjSpec, parts: Sequence[Any]) -> None:
 def _stl_names(files: Mapping[str, Path]) -> dict[str, str]:
     """Return the path from the model of each mesh's STL file, all different."""
     taken = set[str]()
-    return {name: f"{MESHES}/{distinct(word(path.stem), taken)}.stl" for name, path in files.items()}
+    return {
+        name: f"{MESHES}/{distinct(word(path.stem), taken)}.stl"
+        for name, path in files.items()
+    }
 
 
 def _read_meshes(files: Mapping[str, Path], notes: Notes) -> dict[str, trimesh.Trimesh]:
-    """Return the meshes that can be read, by the names that the spec has for their files."""
+    """Return the meshes that can be read, by the names that the spec has for their
+    files."""
     read = dict[str, trimesh.Trimesh]()
     for name, path in files.items():
         mesh = _read_mesh(path, notes)
@@ -121,8 +135,9 @@ def _units(
 ) -> dict[str, float]:
     """Return the unit of each mesh that is used [m], by its name.
 
-    Most meshes of a file have one unit: the one in which most links are as long as their joints are
-    apart. A mesh that this makes far too long or too short has its own.
+    Most meshes of a file have one unit: the one in which most links are as long as
+    their joints are apart. A mesh that this makes far too long or too short has its
+    own.
     """
     lengths = _lengths(spec, read)
     body_of = {g.meshname: g.parent.name for g in spec.geoms if lengths.get(g.meshname)}
@@ -141,13 +156,19 @@ def _units(
         link = reach.link[body]
         distance = telling.get(link, reach.longest)
         least = distance * _least_part(link, telling)
-        units[mesh] = _own_unit(reach, common, lengths[mesh], longest[link], (least, distance))
-    file_of = {mesh.name: files[mesh.file].name for mesh in spec.meshes if mesh.name in units}
+        units[mesh] = _own_unit(
+            reach, common, lengths[mesh], longest[link], (least, distance)
+        )
+    file_of = {
+        mesh.name: files[mesh.file].name for mesh in spec.meshes if mesh.name in units
+    }
     _tell_units(units, common, lengths, file_of, notes)
     return units
 
 
-def _lengths(spec: mujoco.MjSpec, read: Mapping[str, trimesh.Trimesh]) -> dict[str, float]:
+def _lengths(
+    spec: mujoco.MjSpec, read: Mapping[str, trimesh.Trimesh]
+) -> dict[str, float]:
     """Return the lengths of meshes in their own units, by name."""
     lengths = dict[str, float]()
     for mesh in spec.meshes:
@@ -158,12 +179,16 @@ def _lengths(spec: mujoco.MjSpec, read: Mapping[str, trimesh.Trimesh]) -> dict[s
 
 
 def _own_unit(
-    reach: _Reach, common: float, length: float, longest: float, wanted: tuple[float, float]
+    reach: _Reach,
+    common: float,
+    length: float,
+    longest: float,
+    wanted: tuple[float, float],
 ) -> float:
     """Return the unit of a mesh of a length [m]: the common one, unless that cannot be.
 
-    `longest` is the length of the longest mesh of its link, which is at least as long as the first
-    of `wanted` and most likely as long as the second [m].
+    `longest` is the length of the longest mesh of its link, which is at least as long
+    as the first of `wanted` and most likely as long as the second [m].
     """
     if not reach.longest:
         return common
@@ -175,10 +200,15 @@ def _own_unit(
     return common
 
 
-def _common_unit(reach: "_Reach", telling: Mapping[str, float], longest: Mapping[str, float]) -> float:
-    """Return the unit in which most links are as long as the distances between joints tell [m]."""
+def _common_unit(
+    reach: "_Reach", telling: Mapping[str, float], longest: Mapping[str, float]
+) -> float:
+    """Return the unit in which most links are as long as the distances between joints
+    tell [m]."""
     if telling:
-        votes = [reach.nearest(longest[link], distance) for link, distance in telling.items()]
+        votes = [
+            reach.nearest(longest[link], distance) for link, distance in telling.items()
+        ]
         return max(UNITS, key=votes.count)
     return 1e-3 if max(longest.values()) > LONGEST else 1.0
 
@@ -202,7 +232,9 @@ def _tell_units(
     if common != 1.0:
         usual = max((lengths[mesh] for mesh in units if mesh not in odd), default=0.0)
         which = "all but the following" if odd else "all"
-        notes.add(f"meshes up to {usual:.4g} m long: {which} are taken to be in {UNITS[common]}")
+        notes.add(
+            f"meshes up to {usual:.4g} m long: {which} are taken to be in {UNITS[common]}"
+        )
     for mesh, unit in odd.items():
         what = f"taken to be in {UNITS[unit]}, by the distances of the joints"
         notes.add(what, f"mesh {file_of[mesh]} ({lengths[mesh]:.4g} m long)")
@@ -226,16 +258,20 @@ def _reach(spec: mujoco.MjSpec, notes: Notes) -> _Reach:
 
 
 def _read_mesh(path: Path, notes: Notes) -> trimesh.Trimesh | None:
-    """Read a mesh file of any format that trimesh knows; None, with a note: it cannot be read."""
+    """Read a mesh file of any format that trimesh knows; None, with a note: it cannot
+    be read."""
     fault = f"mesh {path.name}"
     try:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             # trimesh warns of numbers that are refused below
             warnings.simplefilter("ignore")
             mesh = trimesh.load(path, force="mesh")
-    except Exception as error:  # trimesh's readers raise whatever their format's parser does
+    # trimesh's readers raise whatever their format's parser does
+    except Exception as error:
         hint = "export them as STL"
-        if path.suffix.lower() == ".dae" and isinstance(error, ImportError | ValueError):
+        if path.suffix.lower() == ".dae" and isinstance(
+            error, ImportError | ValueError
+        ):
             hint = f"pip install pycollada, or {hint}"
         notes.add(f"cannot be read; {hint}", fault)
         return None
@@ -252,10 +288,11 @@ def _read_mesh(path: Path, notes: Notes) -> trimesh.Trimesh | None:
 def _shown_stl(
     mesh: trimesh.Trimesh, scale: Array, name: str, notes: Notes
 ) -> tuple[bytes, mujoco.mjtMeshInertia] | None:
-    """Return a mesh as a binary STL, and how MuJoCo takes its inertia; None, with a note:
-    it refuses both.
+    """Return a mesh as a binary STL, and how MuJoCo takes its inertia; None, with a
+    note: it refuses both.
 
-    That is exact where the mesh is closed, else that of its hull, and of no use where it is flat.
+    That is exact where the mesh is closed, else that of its hull, and of no use where
+    it is flat.
     """
     if len(mesh.faces) > MOST_FACES:
         notes.add("more triangles than MuJoCo reads: its hull is shown", f"mesh {name}")

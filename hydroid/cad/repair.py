@@ -15,27 +15,30 @@ from hydroid.mjcf import mujoco_errors
 
 MASSLESS = 1e-6  # mass up to which a body counts as a frame without mass [kg]
 USUAL = 1200.0
-"""mass of a link over the volume of its hull [kg/m³]: compact parts of machines have 500 to 3,000.
-A welded boom has less: 10 mm of steel around 0.4 m square make 770 of the box,
-and a bend half empties its hull"""
+"""mass of a link over the volume of its hull [kg/m³]: compact parts of machines have
+500 to 3,000. A welded boom has less: 10 mm of steel around 0.4 m square make 770 of the
+box, and a bend half empties its hull"""
 LEAST = 100.0
-"""no link has less: a box around a boom of 400 kg/m³ that points up at 45 deg is four times as
-large as the boom"""
+"""no link has less: a box around a boom of 400 kg/m³ that points up at 45 deg is four
+times as large as the boom"""
 MOST = 8000.0
 """no link has more: solid steel"""
 BOXED = 500.0
-"""the same of a link that is drawn as boxes, cylinders and balls around it: a bucket of 15 mm
-plates fills 500 of its box, a bent boom 400"""
-SLENDER = 0.015  # volume of a link without a shape, over the cube of its length: a box of 1 to 8
+"""the same of a link that is drawn as boxes, cylinders and balls around it: a bucket of
+15 mm plates fills 500 of its box, a bent boom 400"""
+# volume of a link without a shape, over the cube of its length: a box of 1 to 8
+SLENDER = 0.015
 SLIGHT = 67.0
 """the least density of this box: that of a boom of 1 to 20 with 400 kg/m³,
 1 kg for a length of 1 m"""
 WATER = 1000.0  # MuJoCo's density of shapes without mass and density [kg/m³]
-NO_TENSOR = [np.nan, 0, 0, 0, 0, 0]  # MuJoCo's word for a full inertia that is not given
+# MuJoCo's word for a full inertia that is not given
+NO_TENSOR = [np.nan, 0, 0, 0, 0, 0]
 
 
 class Inertial(NamedTuple):
-    """Mass [kg], centre [m], (3,), and inertia about it [kg·m²], (3, 3), in the body's frame."""
+    """Mass [kg], centre [m], (3,), and inertia about it [kg·m²], (3, 3), in the body's
+    frame."""
 
     mass: float
     centre: Array
@@ -67,22 +70,30 @@ def repair_inertias(spec: mujoco.MjSpec, urdf: bool, notes: Notes) -> None:
             fault = "an inertia of a far larger body"
         inertial = stated
         if fault and shaped:
-            inertial = Inertial(stated.mass, hull.centre, stated.mass / hull.mass * hull.tensor)
+            inertial = Inertial(
+                stated.mass, hull.centre, stated.mass / hull.mass * hull.tensor
+            )
             notes.add(f"{fault}: that of its hull is taken", f"link {body.name}")
         elif fault:
             inertial = Inertial(stated.mass, stated.centre, _steel_ball(stated.mass))
-            notes.add(f"{fault}: a steel ball of its mass is taken", f"link {body.name}")
+            notes.add(
+                f"{fault}: a steel ball of its mass is taken", f"link {body.name}"
+            )
         set_inertia(body, *inertial)
 
 
 def _steel_ball(mass: float) -> Array:
-    """Return the inertia of a ball of 7,850 kg/m³ about its centre [kg·m²], shape (3, 3)."""
+    """Return the inertia of a ball of 7,850 kg/m³ about its centre [kg·m²], shape (3,
+    3)."""
     radius = (mass / 7850.0 / (4 / 3 * np.pi)) ** (1 / 3)
     return 0.4 * mass * radius**2 * np.eye(3)
 
 
-def weigh(spec: mujoco.MjSpec, notes: Notes, total: float | None, lost: Collection[str]) -> None:
-    """Replace masses that no machine's link has, and scale all to a total [kg] that is known.
+def weigh(
+    spec: mujoco.MjSpec, notes: Notes, total: float | None, lost: Collection[str]
+) -> None:
+    """Replace masses that no machine's link has, and scale all to a total [kg] that is
+    known.
 
     The spec has moving bodies alone, with masses and inertias.
     Those that `lost` a mesh count as shapeless.
@@ -114,8 +125,8 @@ def weigh(spec: mujoco.MjSpec, notes: Notes, total: float | None, lost: Collecti
 
 
 class _Likely(NamedTuple):
-    """What a link may weigh: its inertia at the USUAL density, and the least, largest and likeliest
-    density [kg/m³]."""
+    """What a link may weigh: its inertia at the USUAL density, and the least, largest
+    and likeliest density [kg/m³]."""
 
     usual: Inertial
     least: float
@@ -132,7 +143,9 @@ def _likely(
     """Return what links may weigh, by the hulls of those that have a shape."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    hull_of = {body.name: inertial_of(hulls, model.body(body.name).id) for body in links}
+    hull_of = {
+        body.name: inertial_of(hulls, model.body(body.name).id) for body in links
+    }
     filled = _filled([body for body in links if body.name not in lost], hull_of)
     places = _joints_and_end(links, data)
     longest = np.linalg.norm(np.diff(places, axis=0), axis=1).max()
@@ -146,8 +159,11 @@ def _likely(
     return likely
 
 
-def _joints_and_end(links: Sequence[mujoco.MjsBody], data: mujoco.MjData) -> list[Array]:
-    """Return the places of the links' joints in the world [m], and of the end of the last link.
+def _joints_and_end(
+    links: Sequence[mujoco.MjsBody], data: mujoco.MjData
+) -> list[Array]:
+    """Return the places of the links' joints in the world [m], and of the end of the
+    last link.
 
     The last link goes on as the one before it, half as long.
     """
@@ -157,8 +173,8 @@ def _joints_and_end(links: Sequence[mujoco.MjsBody], data: mujoco.MjData) -> lis
 
 
 def _slender(body: Any, to_next: Array, shortest: float) -> _Likely:
-    """Return what a link without a shape may weigh: a slender one to the next joint, `to_next` in
-    the world [m]."""
+    """Return what a link without a shape may weigh: a slender one to the next joint,
+    `to_next` in the world [m]."""
     along = body.xmat.reshape(3, 3).T @ to_next
     length = max(float(np.linalg.norm(along)), shortest, 0.1)
     mass = USUAL * SLENDER * length**3
@@ -171,10 +187,14 @@ def _scale_masses(links: Sequence[mujoco.MjsBody], total: float, notes: Notes) -
     for body in links:
         body.mass *= factor
         body.fullinertia = np.array(body.fullinertia) * factor
-    notes.add(f"all masses times {factor:.3g}: what moves weighs {total:g} kg, as asked")
+    notes.add(
+        f"all masses times {factor:.3g}: what moves weighs {total:g} kg, as asked"
+    )
 
 
-def _filled(links: Sequence[mujoco.MjsBody], hull: Mapping[str, Inertial]) -> dict[str, float]:
+def _filled(
+    links: Sequence[mujoco.MjsBody], hull: Mapping[str, Inertial]
+) -> dict[str, float]:
     """Return the likely mass of links over the volume of their hulls [kg/m³], by name;
     some have none.
 
@@ -252,7 +272,9 @@ def inertial_of(model: mujoco.MjModel, body: int) -> Inertial:
     return Inertial(model.body_mass[body], model.body_ipos[body].copy(), tensor)
 
 
-def set_inertia(body: mujoco.MjsBody, mass: float, centre: Array, tensor: Array) -> None:
+def set_inertia(
+    body: mujoco.MjsBody, mass: float, centre: Array, tensor: Array
+) -> None:
     """Give a body a mass [kg], centre [m], (3,), and inertia about it [kg·m²], (3, 3),
     in its frame."""
     body.explicitinertial = True
@@ -269,11 +291,13 @@ def set_inertia(body: mujoco.MjsBody, mass: float, centre: Array, tensor: Array)
 
 
 def _stated_fault(body: mujoco.MjsBody, urdf: bool) -> str:
-    """Say why no rigid body has the mass or inertia that a file states, and take it out; empty:
-    one has."""
+    """Say why no rigid body has the mass or inertia that a file states, and take it
+    out; empty: one has."""
     if not body.explicitinertial:
         # MuJoCo fills every shape with water of which the file says nothing
-        unsaid = all(np.isnan(geom.mass) and geom.density == WATER for geom in body.geoms)
+        unsaid = all(
+            np.isnan(geom.mass) and geom.density == WATER for geom in body.geoms
+        )
         return "no mass" if urdf or unsaid else ""
     has_mass = body.mass > MASSLESS and np.isfinite(body.mass)
     fault = _tensor_fault(_stated_tensor(body)) if has_mass else "no mass"

@@ -29,19 +29,28 @@ MOST_FILES = 20_000
 USD = (".usd", ".usda", ".usdc", ".usdz")
 """endings of USD stages"""
 URDF_OPTIONS = {"discardvisual": "false", "fusestatic": "false", "strippath": "true"}
-"""keep what MuJoCo drops from a URDF by default: visuals, and links that no joint moves"""
+"""keep what MuJoCo drops from a URDF by default: visuals, and links that no joint
+moves"""
 REFUSED = {
-    "sdf": ("is an SDF", "convert it: sdformat2mjcf {name} arm.xml (pip install sdformat-mjcf)"),
-    "usd": ("is a USD stage", "export the arm as URDF or MJCF (Isaac Sim: the URDF exporter)"),
+    "sdf": (
+        "is an SDF",
+        "convert it: sdformat2mjcf {name} arm.xml (pip install sdformat-mjcf)",
+    ),
+    "usd": (
+        "is a USD stage",
+        "export the arm as URDF or MJCF (Isaac Sim: the URDF exporter)",
+    ),
     "xacro": ("is a xacro, not a URDF", "expand it first: xacro {name} > robot.urdf"),
 }
 """files that hold robots and are not read, and what to do"""
 IGNORED = "extension plugin sensor texture hfield skin flex flexcomp composite size"
-"""elements of an MJCF that the arm does not need, whose files or libraries are often missing"""
+"""elements of an MJCF that the arm does not need, whose files or libraries are often
+missing"""
 
 
 class Notes:
-    """What an import assumed, left out or mended: sentences with the names of what they are about.
+    """What an import assumed, left out or mended: sentences with the names of what they
+    are about.
 
     `path` is the robot's file, which errors name.
     """
@@ -64,7 +73,9 @@ class Notes:
         return lines
 
 
-def read_source(path: Path, notes: Notes) -> tuple[mujoco.MjSpec, dict[str, Path], bool]:
+def read_source(
+    path: Path, notes: Notes
+) -> tuple[mujoco.MjSpec, dict[str, Path], bool]:
     """Read a URDF or an MJCF: its spec, where each mesh file that it names lies,
     and whether it is a URDF.
 
@@ -101,12 +112,15 @@ def _spec(root: ElementTree.Element, path: Path) -> mujoco.MjSpec:
 def _found(files: dict[str, str], folder: Path, notes: Notes) -> dict[str, Path]:
     """Return where mesh files lie, by the names that the spec has for them.
 
-    A file is where it is said to be, or else there from the folder or one of its parents, by as
-    many of its last folders as are there; or it has its name below the folder.
+    A file is where it is said to be, or else there from the folder or one of its
+    parents, by as many of its last folders as are there; or it has its name below the
+    folder.
     """
     by_name: dict[str, Path] = {}
     if files:
-        by_name = {path.name.lower(): path for path in islice(folder.rglob("*"), MOST_FILES)}
+        by_name = {
+            path.name.lower(): path for path in islice(folder.rglob("*"), MOST_FILES)
+        }
     found = dict[str, Path]()
     for name, given in files.items():
         path = _plain_path(given)
@@ -119,7 +133,9 @@ def _found(files: dict[str, str], folder: Path, notes: Notes) -> dict[str, Path]
             found[name] = place
         else:
             what = "nor by name below it: these shapes are not shown"
-            notes.add(f"not found from {folder} and its parents, {what}", f"mesh {given}")
+            notes.add(
+                f"not found from {folder} and its parents, {what}", f"mesh {given}"
+            )
     return found
 
 
@@ -143,7 +159,8 @@ def _places(path: Path, folder: Path) -> list[Path]:
 
 
 def _prepare_urdf(root: ElementTree.Element, notes: Notes) -> dict[str, str]:
-    """Let MuJoCo keep all of a URDF, and return what it says of each mesh by a plain file name."""
+    """Let MuJoCo keep all of a URDF, and return what it says of each mesh by a plain
+    file name."""
     children = {child.get("link") for child in root.iterfind("joint/child")}
     for link in root.iterfind("link"):
         if link.get("name") not in children:

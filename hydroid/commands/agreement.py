@@ -1,4 +1,5 @@
-"""Whether logs agree, as `check` shows it: a table of the joints in which one stands out, and which one."""
+"""Whether logs agree, as `check` shows it: a table of the joints in which one stands
+out, and which one."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -34,7 +35,11 @@ def odd_logs(
         name = settings.arm.joint_names[one.joint - 1]
         value, by = one.numbers[row, number], 2 * one.sd[row, number]
         about = _conditions(of[source], settings)
-        found.append(log_finding("warning", KINDS[number], source, name, value=value, by=by, about=about))
+        found.append(
+            log_finding(
+                "warning", KINDS[number], source, name, value=value, by=by, about=about
+            )
+        )
     return found
 
 
@@ -49,8 +54,11 @@ def _conditions(log: Log, settings: FitSettings) -> str:
     return f" ({', '.join(known)})" if known else ""
 
 
-def tables(agreements: "Sequence[Agreement]", names: Sequence[str], *, every: bool) -> "list[Table]":
-    """Return a table of the joints in which a log stands out, or of `every` joint; none if there is none."""
+def tables(
+    agreements: "Sequence[Agreement]", names: Sequence[str], *, every: bool
+) -> "list[Table]":
+    """Return a table of the joints in which a log stands out, or of `every` joint; none
+    if there is none."""
     from hydroid.reporting.page import Table
 
     rows = list[tuple[str, ...]]()
@@ -66,12 +74,15 @@ def tables(agreements: "Sequence[Agreement]", names: Sequence[str], *, every: bo
         return []
     header = ("joint", "log", "speed", "dead bands wider by [%]", "later by [s]", "")
     note = (
-        "Each log against the others, and each number alone, as if the others were the same; 95 % intervals."
+        "Each log against the others, and each number alone, as if the others were the "
+        "same; 95 % intervals."
     )
     return [Table("Do the logs agree?", header, tuple(rows), note)]
 
 
-def plain(agreements: "Sequence[Agreement]", names: Sequence[str]) -> list[Mapping[str, object]]:
+def plain(
+    agreements: "Sequence[Agreement]", names: Sequence[str]
+) -> list[Mapping[str, object]]:
     """Return agreements as JSON holds them."""
     rows = list[Mapping[str, object]]()
     for one in agreements:
@@ -80,6 +91,8 @@ def plain(agreements: "Sequence[Agreement]", names: Sequence[str]) -> list[Mappi
             for name, value, sd in zip(KEYS, one.numbers[k], one.sd[k], strict=True):
                 row[name] = float(value)
                 row[f"{name}_sd"] = float(sd)
-            row["stands_out"] = KEYS[one.odd[1]] if one.odd and one.odd[0] == k else None
+            row["stands_out"] = (
+                KEYS[one.odd[1]] if one.odd and one.odd[0] == k else None
+            )
             rows.append(row)
     return rows

@@ -75,9 +75,9 @@ def analyse(
 ) -> Result[Analysis]:
     """Find which parameters, and which combinations of parameters, the logs determine.
 
-    Prints the standard deviation and the 95 % interval of each parameter, and the combinations that
-    the logs do not determine. The page shows priors beside posteriors, correlations, and profiles as
-    curves.
+    Prints the standard deviation and the 95 % interval of each parameter, and the
+    combinations that the logs do not determine. The page shows priors beside
+    posteriors, correlations, and profiles as curves.
 
     Example: hydroid analyse LOG.csv --fit runs/hyd --profile A_A
 
@@ -86,9 +86,10 @@ def analyse(
 
     Args:
         logs (LOG): Logs of commands and joint angles [default: those of the run].
-        fit (RUN|YAML): An estimate, as a run folder or a YAML file [default: the start values of
-            the parameters].
-        profile (K,D): Parameters to profile. Each point of a profile takes a refinement.
+        fit (RUN|YAML): An estimate, as a run folder or a YAML file [default: the start
+            values of the parameters].
+        profile (K,D): Parameters to profile. Each point of a profile takes a
+            refinement.
 
     Raises:
         SettingsError: a name that is no free parameter.
@@ -125,7 +126,9 @@ def analyse(
     content |= stated.model_dump(mode="json", include={"findings", "estimate"})
     for name, parameter in content["estimate"].items():
         interval = intervals.get(name)
-        parameter["profile_interval"] = None if interval is None else [*map(finite, interval)]
+        parameter["profile_interval"] = (
+            None if interval is None else [*map(finite, interval)]
+        )
     page = analysis_page(problem.settings, stated, profiles)
     page = replace(page, files={**page.files, "parameters": table})
     said = [f"- {in_words(finding, problem.settings)}" for finding in findings]
@@ -134,7 +137,11 @@ def analyse(
 
 
 def quantity(
-    model: ModelSource, function: "Callable[[Plant], ArrayLike]", *, unit: str = "", positive: bool = False
+    model: ModelSource,
+    function: "Callable[[Plant], ArrayLike]",
+    *,
+    unit: str = "",
+    positive: bool = False,
 ) -> QuantityResult:
     """Compute a quantity of one's own from a fit, with its 95 % interval.
 
@@ -148,14 +155,15 @@ def quantity(
 
     Args:
         model: the run folder of a fit, or a plant saved from one.
-        function: takes a `Plant` and returns a number or an array. It is called with 2 p + 1
-            plants, p free parameters, and should be smooth in them: interpolate an event between
-            two samples.
+        function: takes a `Plant` and returns a number or an array. It is called with 2
+            p + 1 plants, p free parameters, and should be smooth in them: interpolate
+            an event between two samples.
         unit: of the value, for the reader.
         positive: the quantity cannot be negative; its interval is then multiplicative.
 
     Raises:
-        RunError: the folder has no covariance of these parameters, or a simulation diverged.
+        RunError: the folder has no covariance of these parameters, or a simulation
+            diverged.
     """
     from hydroid.plant import Plant
     from hydroid.posterior.posterior import stored_posterior
@@ -169,8 +177,12 @@ def quantity(
 
     def values(theta: Array) -> Array:
         plants = (Plant(replace(opened, theta=row)) for row in theta)
-        return np.stack([np.ravel(np.asarray(function(plant), float)) for plant in plants])
+        return np.stack(
+            [np.ravel(np.asarray(function(plant), float)) for plant in plants]
+        )
 
     found = known.propagate(values, positive)
     ends = found.interval.reshape(*shape, 2)
-    return QuantityResult(found.value.reshape(shape), found.sd.reshape(shape), ends, unit)
+    return QuantityResult(
+        found.value.reshape(shape), found.sd.reshape(shape), ends, unit
+    )

@@ -1,6 +1,7 @@
 """`hydroid`: the commands in their groups, and how they end.
 
-A command's module is imported when the command is called, so that `--help` answers at once.
+A command's module is imported when the command is called, so that `--help` answers at
+once.
 """
 
 import errno
@@ -23,7 +24,9 @@ if TYPE_CHECKING:
     from typer.core import TyperCommand
 
 GROUPS = {
-    "Start with your own arm and log": {"init": "write a project from an arm's CAD and a log"},
+    "Start with your own arm and log": {
+        "init": "write a project from an arm's CAD and a log"
+    },
     "Look at logs and at the arm": {
         "check": "find faults in logs",
         "convert": "write a log of any format as plain CSV",
@@ -52,13 +55,25 @@ GROUPS = {
 }
 """every command with a summary, by the heading of its group"""
 COMMANDS = [*chain.from_iterable(GROUPS.values())]
-PLAIN: Any = {"add_completion": False, "rich_markup_mode": None, "pretty_exceptions_enable": False}
+PLAIN: Any = {
+    "add_completion": False,
+    "rich_markup_mode": None,
+    "pretty_exceptions_enable": False,
+}
 """of typer's apps; plain help: importing rich would triple the time it takes"""
 
 
 OUT = {"simulate": "runs/simulated.csv", "follow": "runs/follow/commands.csv"}
 """what commands write without --out, where it is no folder of their name"""
-SYSTEM = (errno.ENAMETOOLONG, errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EIO, errno.EMFILE)
+SYSTEM = (
+    errno.ENAMETOOLONG,
+    errno.ENOSPC,
+    errno.EDQUOT,
+    errno.EROFS,
+    errno.EACCES,
+    errno.EIO,
+    errno.EMFILE,
+)
 """what a system refuses that no program can help"""
 ONE_THREAD = ("OPENBLAS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 """what keeps linear algebra from sums over several threads,
@@ -100,9 +115,12 @@ def click_command(command: str) -> "TyperCommand":
     def run(
         *,
         json: Annotated[
-            bool, typer.Option("--json", help="Print the result as JSON (docs/json.md).")
+            bool,
+            typer.Option("--json", help="Print the result as JSON (docs/json.md)."),
         ] = False,
-        quiet: Annotated[bool, typer.Option("-q", "--quiet", help="Print errors only.")] = False,
+        quiet: Annotated[
+            bool, typer.Option("-q", "--quiet", help="Print errors only.")
+        ] = False,
         verbose: Annotated[bool, typer.Option("-v", "--verbose", help=VERBOSE)] = False,
         **given: Any,
     ) -> None:
@@ -118,7 +136,9 @@ def click_command(command: str) -> "TyperCommand":
 
     *printing, _ = inspect.signature(run).parameters.values()
     run.__signature__ = inspect.Signature([*parameters, *printing])  # pyright: ignore[reportFunctionMemberAccess]
-    run.__annotations__ |= {parameter.name: parameter.annotation for parameter in parameters}
+    run.__annotations__ |= {
+        parameter.name: parameter.annotation for parameter in parameters
+    }
     alone = typer.Typer(**PLAIN)
     alone.command(command, help=text, epilog=example)(run)
     return typer.main.get_command(alone)  # pyright: ignore[reportReturnType]  # a group only of several commands
@@ -130,7 +150,9 @@ WHERE_TO_START = (
     "hydroid init. 'The article' is Montazeri et al. 2017, whose method hydroid follows."
 )
 
-app = typer.Typer(name="hydroid", cls=LazyGroup, help=ABOUT, epilog=WHERE_TO_START, **PLAIN)
+app = typer.Typer(
+    name="hydroid", cls=LazyGroup, help=ABOUT, epilog=WHERE_TO_START, **PLAIN
+)
 
 
 def _version(wanted: bool) -> None:
@@ -185,7 +207,8 @@ def _run() -> int:
 
 
 def _ending(error: Exception) -> int:
-    """Say what is wrong, and return the exit status; raise a defect of hydroid again."""
+    """Say what is wrong, and return the exit status; raise a defect of hydroid
+    again."""
     is_users = isinstance(error, HydroidError) or hasattr(error, "format_message")
     if is_users:
         show_error(error)

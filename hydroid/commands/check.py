@@ -1,4 +1,5 @@
-"""`hydroid check` and `hydroid convert`: what is wrong or unusual about logs, and logs as plain CSV."""
+"""`hydroid check` and `hydroid convert`: what is wrong or unusual about logs, and logs
+as plain CSV."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -48,7 +49,8 @@ if TYPE_CHECKING:
 class LogCheck(NamedTuple):
     """One log, or one part of a file with gaps; travel is by the joints' names.
 
-    The log is None if the file cannot be used. Findings are errors first, those of a file at its first part.
+    The log is None if the file cannot be used. Findings are errors first, those of a
+    file at its first part.
     """
 
     path: Path
@@ -58,7 +60,8 @@ class LogCheck(NamedTuple):
 
 
 class Converted(NamedTuple):
-    """What was written, or its longest part between gaps, and what each column was taken for.
+    """What was written, or its longest part between gaps, and what each column was
+    taken for.
 
     The guess is None where settings say it.
     """
@@ -77,9 +80,10 @@ def check(
 ) -> "Result[list[LogCheck]]":
     """List the faults of logs, and anything unusual in them.
 
-    A finding shared by several logs is listed once. With three logs or more it also compares them, and names
-    the one whose speed, dead band or delay differs from the others. The exit status is 2 if a log is
-    unusable, or if no joint in these logs can be fitted with the settings.
+    A finding shared by several logs is listed once. With three logs or more it also
+    compares them, and names the one whose speed, dead band or delay differs from the
+    others. The exit status is 2 if a log is unusable, or if no joint in these logs can
+    be fitted with the settings.
 
     Example: hydroid check LOG.csv
 
@@ -96,16 +100,24 @@ def check(
             files.append(_File(path, *found))
         there = [log for file in files for log in file.parts]
         progress("looking at the motion", len(paths), None)
-        motion = [*undriven_findings(there, settings), *motion_findings(there, settings.arm)]
+        motion = [
+            *undriven_findings(there, settings),
+            *motion_findings(there, settings.arm),
+        ]
         agreements = _compared(there, settings, progress)
     motion += odd_logs(agreements, there, settings)
     checks = [one for file in files for one in _checks(file, motion, names)]
     sizes = [_size(one, settings) for one in checks if one.log is not None]
-    lines = [f"{level}: {line}" for level, line in grouped(f for one in checks for f in one.findings)]
+    lines = [
+        f"{level}: {line}"
+        for level, line in grouped(f for one in checks for f in one.findings)
+    ]
     summary = list[str]()
     if agreements and not any(one.odd for one in agreements):
         joints = listed([names[one.joint - 1] for one in agreements])
-        summary.append(f"No log stands out in speed, dead bands or delay of {joints}; -v shows all logs.")
+        summary.append(
+            f"No log stands out in speed, dead bands or delay of {joints}; -v shows all logs."
+        )
     content = {
         "logs": [_plain(one, names) for one in checks],
         "agreement": plain(agreements, names),
@@ -122,8 +134,11 @@ def check(
     )
 
 
-def _compared(logs: Sequence[Log], settings: FitSettings, progress: Progress) -> "list[Agreement]":
-    """Compare logs, if there are enough; what compares them takes most of a second to be loaded."""
+def _compared(
+    logs: Sequence[Log], settings: FitSettings, progress: Progress
+) -> "list[Agreement]":
+    """Compare logs, if there are enough; what compares them takes most of a second to
+    be loaded."""
     if len(logs) < 3:
         return []
     from hydroid.fitting.agreement import compare_logs
@@ -133,21 +148,28 @@ def _compared(logs: Sequence[Log], settings: FitSettings, progress: Progress) ->
 
 @record
 class _File:
-    """The parts of a file between its gaps, none if it cannot be used, and what was found in it."""
+    """The parts of a file between its gaps, none if it cannot be used, and what was
+    found in it."""
 
     path: Path
     parts: Sequence[Log]
     findings: Sequence[LogFinding]
 
 
-def _checks(file: _File, motion: Sequence[LogFinding], names: Sequence[str]) -> Iterator[LogCheck]:
+def _checks(
+    file: _File, motion: Sequence[LogFinding], names: Sequence[str]
+) -> Iterator[LogCheck]:
     """Yield what was found in each part of a file, and in its motion."""
     if not file.parts:
         yield LogCheck(file.path, None, file.findings, {})
     for part in file.parts:
         own = file.findings if part is file.parts[0] else ()
-        findings = by_level([*own, *(one for one in motion if one.source == part.source)])
-        moved = {names[joint - 1]: one.travel for joint, one in driven_joints(part).items()}
+        findings = by_level(
+            [*own, *(one for one in motion if one.source == part.source)]
+        )
+        moved = {
+            names[joint - 1]: one.travel for joint, one in driven_joints(part).items()
+        }
         yield LogCheck(file.path, part, findings, moved)
 
 
@@ -159,7 +181,10 @@ def _size(one: LogCheck, settings: FitSettings) -> str:
     """Return a line on a log: how long it is, and what moves in it."""
     assert one.log is not None
     slides = {settings.arm.joint_names[joint - 1] for joint in settings.arm.slides}
-    ways = [f"{name} by {way(travel, slides=name in slides)}" for name, travel in one.moved_deg.items()]
+    ways = [
+        f"{name} by {way(travel, slides=name in slides)}"
+        for name, travel in one.moved_deg.items()
+    ]
     size = f"{len(one.log.time)} samples, {one.log.duration:.2f} s"
     return f"{one.log.source}: {size}; driven and moved: {', '.join(ways) or 'nothing'}"
 
@@ -187,10 +212,12 @@ def convert(
     set: "SettingChanges" = None,
     repair: bool = False,
 ) -> Result[Converted]:
-    """Write a log of any format as the CSV that every command reads: time [s], commands [%], angles [deg].
+    """Write a log of any format as the CSV that every command reads: time [s], commands
+    [%], angles [deg].
 
-    With --config the CSV holds the data as a fit uses them: resampled to log.period_s, commands delayed by
-    log.delay_s, signs and units applied. Joints that are measured but not commanded have commands of 0 %.
+    With --config the CSV holds the data as a fit uses them: resampled to log.period_s,
+    commands delayed by log.delay_s, signs and units applied. Joints that are measured
+    but not commanded have commands of 0 %.
 
     Example: hydroid convert LOG.mat --out LOG.csv
 
@@ -198,8 +225,9 @@ def convert(
 
     Args:
         out (OUT.csv): The CSV to write.
-        config (YAML): Settings that map the columns (`log`): a file, or the name of a shipped config
-            [default: the columns are guessed, and each guess is printed].
+        config (YAML): Settings that map the columns (`log`): a file, or the name of a
+            shipped config [default: the columns are guessed, and each guess is
+            printed].
         set (KEY=VALUE): Replace a setting of --config.
 
     Raises:
@@ -214,10 +242,14 @@ def convert(
         layout, ranges, arm = settings.log, settings.arm.ranges, settings.arm
     else:
         arm = None
-        most = [f"joint {number}" for number in range(1, 13)]  # more joints than an arm has
+        # more joints than an arm has
+        most = [f"joint {number}" for number in range(1, 13)]
         guess = guess_columns(open_table(path), most)
         layout = LogSettings.model_validate(guess.log)
-        ranges = {str(number): (-np.inf, np.inf) for number in range(1, 1 + max(layout.joints, default=1))}
+        ranges = {
+            str(number): (-np.inf, np.inf)
+            for number in range(1, 1 + max(layout.joints, default=1))
+        }
         reasons = [*guess.reasons]
     parts, findings = check_parts(path, layout, ranges, arm=arm, repair=repair)
     if not parts:
@@ -236,11 +268,16 @@ def convert(
         "log": guess and guess.log,
         "reasons": reasons,
     }
-    return Result([*reasons, *said, size], content, Converted(replace(longest, source=str(out)), guess))
+    return Result(
+        [*reasons, *said, size],
+        content,
+        Converted(replace(longest, source=str(out)), guess),
+    )
 
 
 def _with_gaps(parts: Sequence[Log]) -> Log:
-    """Return the parts of a log as one, to be written; its gaps are longer by less than a sample."""
+    """Return the parts of a log as one, to be written; its gaps are longer by less than
+    a sample."""
     first = parts[0]
     if len(parts) == 1:
         return first
@@ -259,7 +296,8 @@ def _with_gaps(parts: Sequence[Log]) -> Log:
 
 
 def _plain_layout(log: Log) -> LogSettings:
-    """Return the default columns of what a log holds: commands, angles, pressures of both chambers."""
+    """Return the default columns of what a log holds: commands, angles, pressures of
+    both chambers."""
     columns: dict[int, dict[str, None] | None] = {}
     for joint, measured in enumerate(log.measured):
         absent: dict[str, None] = {} if measured else {"angle": None}

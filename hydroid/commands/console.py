@@ -1,4 +1,5 @@
-"""What a command returns, and how a terminal, JSON and a notebook show it; log lines and errors."""
+"""What a command returns, and how a terminal, JSON and a notebook show it; log lines
+and errors."""
 
 import json
 import logging
@@ -41,7 +42,8 @@ class Printed:
 
     Attributes:
         lines: what a terminal and a notebook show: tables and sentences.
-        content: what JSON holds (docs/json.md): mappings, lists, text and finite numbers.
+        content: what JSON holds (docs/json.md): mappings, lists, text and finite
+            numbers.
         details: further lines that -v adds.
     """
 
@@ -59,7 +61,9 @@ class Printed:
         return f"<{type(self).__name__}: {text}>"
 
     def _repr_html_(self) -> str:
-        return fill_template("commands/notebook.html.j2", lines=(*self.lines, *self.details))
+        return fill_template(
+            "commands/notebook.html.j2", lines=(*self.lines, *self.details)
+        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -68,7 +72,8 @@ class Result(Printed, Generic[T_co]):
 
     Attributes:
         result: the numbers.
-        page: the report, with its tables by name in `page.tables`, of a command that has one.
+        page: the report, with its tables by name in `page.tables`, of a command that
+            has one.
         exit_status: of the command; 0 for success.
     """
 
@@ -78,7 +83,8 @@ class Result(Printed, Generic[T_co]):
 
 
 def written(report: "Page | Mapping[str, Table]", out: str | Path | None) -> list[str]:
-    """Write a report, or tables by name, to a folder, if there is one; return the last file."""
+    """Write a report, or tables by name, to a folder, if there is one; return the last
+    file."""
     if out is None:
         return []
     from hydroid.reporting.page_file import write_page, write_tables
@@ -88,7 +94,8 @@ def written(report: "Page | Mapping[str, Table]", out: str | Path | None) -> lis
 
 
 def show(result: Printed, *, as_json: bool, verbose: bool = False) -> None:
-    """Print a result: as JSON, or as tables and lines, with its details if `verbose`."""
+    """Print a result: as JSON, or as tables and lines, with its details if
+    `verbose`."""
     if as_json:
         _print_json(result.plain())
         return
@@ -104,9 +111,12 @@ def show(result: Printed, *, as_json: bool, verbose: bool = False) -> None:
 
 
 def program() -> str:
-    """Return hydroid as the user typed it, where a shell does not find it by its name."""
+    """Return hydroid as the user typed it, where a shell does not find it by its
+    name."""
     typed = sys.argv[0]
-    is_other = Path(typed).stem == "hydroid" and which("hydroid") != os.path.abspath(typed)
+    is_other = Path(typed).stem == "hydroid" and which("hydroid") != os.path.abspath(
+        typed
+    )
     return shlex.quote(typed) if is_other else "hydroid"
 
 
@@ -125,7 +135,9 @@ def show_error(error: Any) -> None:
         where = OPTIONS[key]
         what = what.removeprefix(f"{key}: ")
     if "--json" in sys.argv[1:]:
-        kind = "usage" if is_usage else type(error).__name__.removesuffix("Error").lower()
+        kind = (
+            "usage" if is_usage else type(error).__name__.removesuffix("Error").lower()
+        )
         parts = {"kind": kind, "what": what, "where": where, "hint": error.hint}
         _print_json({"error": parts})
         return
@@ -157,7 +169,8 @@ def log_lines(*, verbose: bool, quiet: bool) -> AbstractContextManager[None]:
 
 
 class _Terminal(logging.Handler):
-    """Writes to what is stderr at that moment: a progress bar takes its place while it is drawn."""
+    """Writes to what is stderr at that moment: a progress bar takes its place while it
+    is drawn."""
 
     def emit(self, record: logging.LogRecord) -> None:
         typer.echo(printable(self.format(record)), err=True)

@@ -1,11 +1,19 @@
-"""`hydroid export`: a fitted machine for other programs; and draws of what the logs leave open."""
+"""`hydroid export`: a fitted machine for other programs; and draws of what the logs
+leave open."""
 
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hydroid.commands.console import Result
-from hydroid.commands.inputs import ModelSource, SettingChanges, Source, command, names, open_model
+from hydroid.commands.inputs import (
+    ModelSource,
+    SettingChanges,
+    Source,
+    command,
+    names,
+    open_model,
+)
 from hydroid.errors import SettingsError
 from hydroid.files import write_atomic
 
@@ -32,10 +40,11 @@ def export(
 ) -> Result[list[str]]:
     """Write a fitted machine for other programs.
 
-    parameters: draws of all parameters together within what the logs leave open, ranges, and the errors of
-    the model. table: settled speed against command of each joint, as CSV for a PLC. urdf: your own file with
-    the masses of the fit. mjcf: a model that plain MuJoCo steps. linear: A, B, C, D and delays near a pose
-    and opening, as JSON. fmu: FMI 2 for co-simulation.
+    parameters: draws of all parameters together within what the logs leave open,
+    ranges, and the errors of the model. table: settled speed against command of each
+    joint, as CSV for a PLC. urdf: your own file with the masses of the fit. mjcf: a
+    model that plain MuJoCo steps. linear: A, B, C, D and delays near a pose and
+    opening, as JSON. fmu: FMI 2 for co-simulation.
 
     Example: hydroid export runs/hyd --to parameters --draws 100
 
@@ -47,19 +56,26 @@ def export(
         out (DIR): Folder of the files [default of the command line: runs/export].
         draws (1 to 100000): Number of draws of the parameters.
         robot (URDF): The URDF whose masses are replaced; of urdf.
-        pose (NAME): The pose where the plant starts, by its name in the arm's file [default: the start pose
-            of the settings].
-        at (JOINT=PCT,...): Commands about which the model is linear, such as boom=30,arm=-40; of linear.
+        pose (NAME): The pose where the plant starts, by its name in the arm's file
+            [default: the start pose of the settings].
+        at (JOINT=PCT,...): Commands about which the model is linear, such as
+            boom=30,arm=-40; of linear.
 
     Raises:
-        SettingsError: another kind, an option that is missing, or a fit of stage 1, which has no valves.
+        SettingsError: another kind, an option that is missing, or a fit of stage 1,
+            which has no valves.
         ModelError: the URDF cannot be used.
-        RunError: a file cannot be written, pythonfmu is missing, or there is no covariance to draw from.
+        RunError: a file cannot be written, pythonfmu is missing, or there is no
+            covariance to draw from.
     """
     if to not in KINDS:
-        raise SettingsError(f"{to!r} is no kind of export", "--to", f"choose {', '.join(KINDS)}")
+        raise SettingsError(
+            f"{to!r} is no kind of export", "--to", f"choose {', '.join(KINDS)}"
+        )
     if to == "urdf" and robot is None:
-        raise SettingsError("needs your robot's file", "--to urdf", "name it: --robot robot.urdf")
+        raise SettingsError(
+            "needs your robot's file", "--to urdf", "name it: --robot robot.urdf"
+        )
     folder = Path("export" if out is None else out)
     model = open_model(fit, overrides=set)
     if to == "parameters":
@@ -76,12 +92,16 @@ def export(
     if to == "mjcf":
         from hydroid.use.robot_files import write_moving
 
-        files = [] if out is None else [str(file) for file in write_moving(plant, folder)]
+        files = (
+            [] if out is None else [str(file) for file in write_moving(plant, folder)]
+        )
         return Result(files, {"files": files}, files)
     return _written(_files(plant, to, robot, at), folder, write=out is not None)
 
 
-def _files(plant: "Plant", to: str, robot: "Source | None", at: str) -> "dict[str, str | bytes]":
+def _files(
+    plant: "Plant", to: str, robot: "Source | None", at: str
+) -> "dict[str, str | bytes]":
     """Return the files of an export by name."""
     if to == "table":
         from hydroid.use.tables import speed_tables
@@ -109,11 +129,15 @@ def _commands(plant: "Plant", at: str) -> "Array":
     for part in names(at):
         joint, _, value = part.partition("=")
         if joint not in plant.names:
-            raise SettingsError(f"no joint {joint!r}", "--at", f"the arm has {', '.join(plant.names)}")
+            raise SettingsError(
+                f"no joint {joint!r}", "--at", f"the arm has {', '.join(plant.names)}"
+            )
         try:
             given[plant.names.index(joint)] = float(value)
         except ValueError:
-            raise SettingsError(f"{part!r} is no command", "--at", "write boom=30,arm=-40 in %") from None
+            raise SettingsError(
+                f"{part!r} is no command", "--at", "write boom=30,arm=-40 in %"
+            ) from None
     return given
 
 

@@ -44,7 +44,8 @@ class FitResult(Printed):
         folder: the run folder; None where nothing was written.
         summary: the final estimate with its uncertainty, as in `estimate.yaml`.
         model: at the final estimate.
-        record: the same that the run folder stores, as `load_record(folder).result` reads it.
+        record: the same that the run folder stores, as `load_record(folder).result`
+            reads it.
         earlier: logs of the fits that it began from, which are no test of it either.
     """
 
@@ -82,7 +83,8 @@ class FitResult(Printed):
         return f"<FitResult: {lead({'': self.summary.verdict})}>"
 
     def plant(self, **how: Any) -> "Plant":
-        """Return the identified arm to be stepped; the keywords are those of `Plant`."""
+        """Return the identified arm to be stepped; the keywords are those of
+        `Plant`."""
         from hydroid.plant import Plant
 
         return Plant(self.model, **how)
@@ -94,7 +96,8 @@ class FitResult(Printed):
         return draw(self.model, n, seed, self.problem)
 
     def predict(self, log: "LogSource") -> "Prediction":
-        """Predict a log from its commands and its first angles; NaN if the simulation diverges.
+        """Predict a log from its commands and its first angles; NaN if the simulation
+        diverges.
 
             predicted = fitted.predict("b.csv")
             print(predicted["boom"].error, predicted.to_frame())
@@ -106,7 +109,9 @@ class FitResult(Printed):
 
         return predicted(self.model, read_log(log, self.model.settings), None)
 
-    def validate(self, logs: "LogSources", out: Source | None = None) -> "Result[list[Prediction]]":
+    def validate(
+        self, logs: "LogSources", out: Source | None = None
+    ) -> "Result[list[Prediction]]":
         """Return the verdict on each joint by logs that were not fitted;
         a page of it is written to `out`.
 
@@ -126,7 +131,8 @@ class FitResult(Printed):
         return pandas.DataFrame.from_dict(rows, orient="index")
 
     def report(self, out: Source) -> Path:
-        """Write the run of a fit in memory to a folder, as `out` of the fit does; return its page.
+        """Write the run of a fit in memory to a folder, as `out` of the fit does;
+        return its page.
 
         Raises:
             RunError: the folder holds another run or cannot be written.
@@ -165,7 +171,8 @@ def fit(
     Raises:
         LogError: a log cannot be used, or none drives a joint that stage 2 compares.
         SettingsError: settings that do not fit the logs or the arm.
-        RunError: `out` holds another run or cannot be written, or every simulation diverged.
+        RunError: `out` holds another run or cannot be written, or every simulation
+            diverged.
     """
     read = read_logs(logs, settings)
     names = [log_file(log.source).name for log in read]
@@ -180,7 +187,9 @@ def fit(
     # a folder of another run is refused before the fit, which takes long
     folder = None if out is None else RunFolder(Path(out))
     if folder is not None and folder.exists and not resume:
-        raise RunError("holds a run already", out, "resume it, or choose another folder")
+        raise RunError(
+            "holds a run already", out, "resume it, or choose another folder"
+        )
     problem = Problem(settings, read, workers)
     if folder is None:
         return _result(problem, run_fit(problem, progress), None)
@@ -206,7 +215,9 @@ def _refuse_empty_groups(settings: FitSettings, names: Sequence[str]) -> None:
     for parameter in settings.parameters.values():
         if parameter.fixed is None and parameter.per not in groups:
             hint = f"logs: {', '.join(names)}"
-            raise SettingsError("none of the logs is in it", f"log.groups.{parameter.per}", hint)
+            raise SettingsError(
+                "none of the logs is in it", f"log.groups.{parameter.per}", hint
+            )
 
 
 def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
@@ -225,7 +236,10 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
     verdict = judge(settings, predictions, baselines)
     summary = summarise(problem, fit)
     doubted = doubts(settings, problem.logs)
-    findings = [*summary.findings, *assumption_findings(settings, problem.logs, doubted)]
+    findings = [
+        *summary.findings,
+        *assumption_findings(settings, problem.logs, doubted),
+    ]
     # after the first, which may be that time was up
     findings[1:1] = behind(settings, verdict)
     summary = summary.changed({"verdict": verdict, "findings": tuple(findings)})
@@ -260,5 +274,7 @@ def _store(folder: "RunFolder", result: FitResult) -> Path:
     keep_earlier(folder.path, result.earlier)
     folder.status("running", finished=date.today().isoformat())
     page = draw(folder.path)
-    folder.status("done", seconds={**result.fit.seconds, "report": time.monotonic() - began})
+    folder.status(
+        "done", seconds={**result.fit.seconds, "report": time.monotonic() - began}
+    )
     return page

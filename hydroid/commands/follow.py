@@ -34,11 +34,13 @@ def follow(
     set: "SettingChanges" = None,
     repair: bool = False,
 ) -> "Result[Followed]":
-    """Find commands that lead the arm along joint angles over time, or its tip along a path.
+    """Find commands that lead the arm along joint angles over time, or its tip along a
+    path.
 
-    The commands are a feed-forward: play them without feedback. They allow for dead band, valve curve, load,
-    pump, delay and lags. Where a joint cannot move as wished, the command says so and takes the nearest
-    speed. It predicts the tracking error with its band. A page shows the arm in motion.
+    The commands are a feed-forward: play them without feedback. They allow for dead
+    band, valve curve, load, pump, delay and lags. Where a joint cannot move as wished,
+    the command says so and takes the nearest speed. It predicts the tracking error with
+    its band. A page shows the arm in motion.
 
     Example: hydroid follow TRAJECTORY.csv --fit runs/hyd --out commands.csv
 
@@ -46,26 +48,34 @@ def follow(
         print(followed.rms(2), followed.missed)
 
     Args:
-        trajectory (TRAJECTORY.csv): Joint angles over time, in the columns and units of the fit's logs;
-            or the tip's position over time, in columns x_m, y_m and z_m. Joints without a column, or
-            without commands, rest in the start pose of the settings.
-        out (LOG.csv): The commands, in the columns and units of the fit's logs, beside the wished angles;
-            the page has the same name [default of the command line: runs/follow/commands.csv].
+        trajectory (TRAJECTORY.csv): Joint angles over time, in the columns and units of
+            the fit's logs; or the tip's position over time, in columns x_m, y_m and
+            z_m. Joints without a column, or without commands, rest in the start pose of
+            the settings.
+        out (LOG.csv): The commands, in the columns and units of the fit's logs, beside
+            the wished angles; the page has the same name [default of the command line:
+            runs/follow/commands.csv].
         payload (0 or more): Mass in the gripper [kg].
 
     Raises:
-        LogError: the trajectory cannot be used, or moves a joint that takes no commands.
-        SettingsError: a fit of stage 1, which has no valves, or `out` would overwrite the trajectory.
+        LogError: the trajectory cannot be used, or moves a joint that takes no
+            commands.
+        SettingsError: a fit of stage 1, which has no valves, or `out` would overwrite
+            the trajectory.
         RunError: the simulation diverged, or a file cannot be written.
     """
     refuse_overwriting(trajectory, out)
     model = open_model(fit, overrides=set)
     if model.settings.stage != "hyd":
-        raise SettingsError("a fit of stage 1 has no valves", model.source, "name a fit of stage 2")
+        raise SettingsError(
+            "a fit of stage 1 has no valves", model.source, "name a fit of stage 2"
+        )
     path = _tip_path(trajectory, model)
     if path is None:
         settings = _of_its_joints(trajectory, model.settings)
-        (path,) = read_arms(trajectory, settings, None, angles=True, repair=repair).values()
+        (path,) = read_arms(
+            trajectory, settings, None, angles=True, repair=repair
+        ).values()
     from hydroid.reporting.follow_page import follow_page, missed_lines, tracking_table
     from hydroid.use.follow import follow as find_commands
 
@@ -82,13 +92,21 @@ def follow(
         write_log(Path(out), found.log, model.settings.log, arm=model.settings.arm)
         lines += [str(out), *written(page, Path(out).parent)]
     rows = [_joint(found, joint, arm.joint_names[joint - 1]) for joint in found.joints]
-    missed = [{**vars(one), "joint": arm.joint_names[one.joint]} for one in found.missed]
-    content = {"out": out and str(out), "lead_s": found.lead_s, "joints": rows, "missed": missed}
+    missed = [
+        {**vars(one), "joint": arm.joint_names[one.joint]} for one in found.missed
+    ]
+    content = {
+        "out": out and str(out),
+        "lead_s": found.lead_s,
+        "joints": rows,
+        "missed": missed,
+    }
     return Result(lines, content, found, page)
 
 
 def _tip_path(trajectory: "Source | Log", model: "IdentifiedModel") -> "Log | None":
-    """Return the joint angles along a file's path of the tip; None: it holds no such path."""
+    """Return the joint angles along a file's path of the tip; None: it holds no such
+    path."""
     if isinstance(trajectory, Log) or not is_file(trajectory):
         return None
     from hydroid.plant import Plant
@@ -103,10 +121,13 @@ def _tip_path(trajectory: "Source | Log", model: "IdentifiedModel") -> "Log | No
     return tip_path(table, settings.log.time.column, settings.log.period_s, tip, start)
 
 
-def _of_its_joints(trajectory: "Source | Log", settings: "FitSettings") -> "FitSettings":
+def _of_its_joints(
+    trajectory: "Source | Log", settings: "FitSettings"
+) -> "FitSettings":
     """Return the settings without the joints that a file has no angle of.
 
-    A file with a column of another name may have misspelt one: there every joint is still asked for.
+    A file with a column of another name may have misspelt one: there every joint is
+    still asked for.
     """
     if isinstance(trajectory, Log) or not is_file(trajectory):
         return settings
@@ -114,9 +135,13 @@ def _of_its_joints(trajectory: "Source | Log", settings: "FitSettings") -> "FitS
     names = {*open_table(Path(trajectory), columns).names} - {columns.time.column}
     every = range(1, 1 + len(settings.arm.joints))
     mapped = {joint: columns.columns("angle", joint) for joint in every}
-    absent = [joint for joint, own in mapped.items() if own and not {*own.column} & names]
+    absent = [
+        joint for joint, own in mapped.items() if own and not {*own.column} & names
+    ]
     commands = [columns.columns("command", joint) for joint in every]
-    known = {name for own in (*mapped.values(), *commands) if own for name in own.column}
+    known = {
+        name for own in (*mapped.values(), *commands) if own for name in own.column
+    }
     if names - known or len(absent) == len(settings.arm.joints):
         return settings
     joints = dict(columns.joints) | dict.fromkeys(absent)
@@ -128,4 +153,9 @@ def _joint(found: "Followed", joint: int, name: str) -> dict[str, object]:
 
     error, wide = found.rms(joint)
     banded = math.degrees(wide) if math.isfinite(wide) else None
-    return {"joint": joint, "name": name, "rms_deg": math.degrees(error), "rms_with_band_deg": banded}
+    return {
+        "joint": joint,
+        "name": name,
+        "rms_deg": math.degrees(error),
+        "rms_with_band_deg": banded,
+    }

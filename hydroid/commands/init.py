@@ -28,11 +28,12 @@ def init(
 ) -> "Result[Project]":
     """Write a project that runs, from your arm's CAD and your log.
 
-    The project holds the arm's file and model, the settings of a fit, a picture to check the arm by, and
-    the commands to run next. Start values and priors come from the arm's size.
+    The project holds the arm's file and model, the settings of a fit, a picture to
+    check the arm by, and the commands to run next. Start values and priors come from
+    the arm's size.
 
-    If it does not recognise a log's columns, the exit status is 2, and the project's fit.yaml lists
-    them. Say there what they are, then run init again with --config.
+    If it does not recognise a log's columns, the exit status is 2, and the project's
+    fit.yaml lists them. Say there what they are, then run init again with --config.
 
     Example: hydroid init mine --arm robot.urdf --log a.csv
 
@@ -41,26 +42,28 @@ def init(
 
     Args:
         folder (DIR): Folder of the project, new or not [default: that of --config].
-        arm (robot.urdf): URDF or MJCF of the arm, or an arm's YAML file [default: a template of
-            boxes].
-        log (LOG): A log; its columns are guessed. Repeat it for several logs: the next steps keep
-            the last to validate on.
-        config (YAML): Settings whose `log` section you have completed, such as mine/fit.yaml: its
-            columns are taken in place of guesses, its arm stays, and the other settings are written
-            anew.
-        joints (NAME,NAME): Names of the arm's joints in the order of the log's numbers (u1, u2,
-            ...) [default: the order in the arm's file].
-        lengths (M,M): Lengths of the links that these joints move [m], in place of --arm: an arm of
-            boxes, as in --joints swing,boom,arm,bucket --lengths 0,3.7,1.6,0.9; 0 for a joint that
-            slews.
-        total_mass (KG): Mass of all links that move [kg], to which those of the arm's file are
-            scaled.
+        arm (robot.urdf): URDF or MJCF of the arm, or an arm's YAML file [default: a
+            template of boxes].
+        log (LOG): A log; its columns are guessed. Repeat it for several logs: the next
+            steps keep the last to validate on.
+        config (YAML): Settings whose `log` section you have completed, such as
+            mine/fit.yaml: its columns are taken in place of guesses, its arm stays, and
+            the other settings are written anew.
+        joints (NAME,NAME): Names of the arm's joints in the order of the log's numbers
+            (u1, u2, ...) [default: the order in the arm's file].
+        lengths (M,M): Lengths of the links that these joints move [m], in place of
+            --arm: an arm of boxes, as in --joints swing,boom,arm,bucket --lengths
+            0,3.7,1.6,0.9; 0 for a joint that slews.
+        total_mass (KG): Mass of all links that move [kg], to which those of the arm's
+            file are scaled.
         force: Replace the files of an earlier project in the folder.
-        tip (LINK): Last link of the arm, if the robot has several branches [default: the end of the
-            branch whose joints the log names, or else of the longest branch].
+        tip (LINK): Last link of the arm, if the robot has several branches [default:
+            the end of the branch whose joints the log names, or else of the longest
+            branch].
 
     Raises:
-        SettingsError: a file of the project is there already, or no joint has one of the names.
+        SettingsError: a file of the project is there already, or no joint has one of
+            the names.
         ModelError, MeshError: the arm's file cannot be used.
         LogError: the first log cannot, or no joint is driven and moves in the logs.
         RunError: the folder cannot be written.
@@ -73,12 +76,20 @@ def init(
     if kept_config is not None:
         if any((robot, joints, lengths, tip, total_mass is not None)):
             hint = "leave --arm, --joints, --lengths, --tip and --total-mass out"
-            raise SettingsError("names its arm, which stays as it is", kept_config, hint)
-        project = go_on(Path(folder) if folder else None, kept_config, logs, force=force)
+            raise SettingsError(
+                "names its arm, which stays as it is", kept_config, hint
+            )
+        project = go_on(
+            Path(folder) if folder else None, kept_config, logs, force=force
+        )
     elif robot is not None and lengths:
-        raise SettingsError("are those of the arm's file", "--lengths", "leave it out, or --arm")
+        raise SettingsError(
+            "are those of the arm's file", "--lengths", "leave it out, or --arm"
+        )
     elif folder is None:
-        raise SettingsError("which folder shall the project have?", hint="hydroid init DIR")
+        raise SettingsError(
+            "which folder shall the project have?", hint="hydroid init DIR"
+        )
     else:
         project = write_project(
             Path(folder),
@@ -120,11 +131,17 @@ def _lines(project: "Project", *, guessed: bool) -> list[str]:
     else:
         columns = "Of the log, by the columns that you gave:"
         if guessed:
-            columns = "The log's columns, guessed. Check them, and correct them in fit.yaml:"
+            columns = (
+                "The log's columns, guessed. Check them, and correct them in fit.yaml:"
+            )
         picture = project.folder / "arm.png"
         look = f"Next: look at {picture}, then (--budget 5min stops a fit at its best model):"
     lines = [f"{project.folder}: {', '.join(project.files)}"]
-    sections = {"The arm:": project.notes, columns: project.columns, look: project.commands}
+    sections = {
+        "The arm:": project.notes,
+        columns: project.columns,
+        look: project.commands,
+    }
     for heading, section in sections.items():
         if section:
             lines += ["", heading]

@@ -1,8 +1,9 @@
-"""What commands take: functions whose parameters are the options, and what is read for them.
+"""What commands take: functions whose parameters are the options, and what is read for
+them.
 
-A docstring says what each parameter is. A line of `Args:` is `name (VALUE): text`; VALUE is what
-`--help` calls it, or the range of a number. What parameters of several commands are stands in
-`SHARED`. Those before `*` need no name on the command line.
+A docstring says what each parameter is. A line of `Args:` is `name (VALUE): text`;
+VALUE is what `--help` calls it, or the range of a number. What parameters of several
+commands are stands in `SHARED`. Those before `*` need no name on the command line.
 Settings and estimates can be a file's name or what was read before.
 """
 
@@ -86,7 +87,9 @@ COMMAND_LINES: dict[Callable[..., Any], tuple[str, str, list[inspect.Parameter]]
 """text, example and parameters on the command line of every command that is imported"""
 
 
-def setting_changes(given: SettingChanges, options: Mapping[str, Any] | None = None) -> Plain:
+def setting_changes(
+    given: SettingChanges, options: Mapping[str, Any] | None = None
+) -> Plain:
     """Return settings to replace by dotted key: those of `--set`,
     and the options that are not None."""
     if given is None:
@@ -101,13 +104,16 @@ def setting_changes(given: SettingChanges, options: Mapping[str, Any] | None = N
     return changes
 
 
-def load_settings(config: ConfigSource, overrides: SettingChanges = None) -> FitSettings:
+def load_settings(
+    config: ConfigSource, overrides: SettingChanges = None
+) -> FitSettings:
     """Read the settings of a fit, and the arm they name.
 
         settings = hydroid.load_settings("fit-mech", {"search.seed": 3})
 
     Args:
-        config: a YAML file, the name of a shipped one, or settings that were read before.
+        config: a YAML file, the name of a shipped one, or settings that were read
+            before.
         overrides: settings to replace, by dotted key.
 
     Raises:
@@ -117,7 +123,9 @@ def load_settings(config: ConfigSource, overrides: SettingChanges = None) -> Fit
     if not isinstance(config, FitSettings):
         return load(find_config(config), FitSettings, changes)
     if changes:
-        raise SettingsError("cannot be replaced in settings that are read", ", ".join(changes))
+        raise SettingsError(
+            "cannot be replaced in settings that are read", ", ".join(changes)
+        )
     return config
 
 
@@ -128,26 +136,32 @@ def open_model(
     *,
     nominal: bool = False,
 ) -> IdentifiedModel:
-    """Return the model of a result, or read it from a run folder, a saved plant or a YAML file of
-    values.
+    """Return the model of a result, or read it from a run folder, a saved plant or a
+    YAML file of values.
 
-    Where `nominal`, parameters without a value have nominal ones, which only stage 2 has; a note
-    names them.
+    Where `nominal`, parameters without a value have nominal ones, which only stage 2
+    has; a note names them.
     """
     changes = setting_changes(overrides)
     if fit is not None and not isinstance(fit, str | Path):
         if changes:
             hint = "name its run folder, or make the model with `identified`"
             where = ", ".join(changes)
-            raise SettingsError("cannot be replaced in a model that is read", where, hint)
+            raise SettingsError(
+                "cannot be replaced in a model that is read", where, hint
+            )
         return getattr(fit, "model", fit)
     if isinstance(config, FitSettings):
-        raise SettingsError("settings that are read make a model with `identified`", "config")
+        raise SettingsError(
+            "settings that are read make a model with `identified`", "config"
+        )
     model = load_identified(fit, config, changes, nominal=nominal)
     if model.nominal:
         if model.settings.stage != "hyd":
             hint = "give a fit of stage 2 with --fit, or use --config fit-hyd"
-            raise SettingsError("stage 1 (mech) does not model the actuators", model.source, hint)
+            raise SettingsError(
+                "stage 1 (mech) does not model the actuators", model.source, hint
+            )
         which = ", ".join(model.nominal) if fit else "all parameters"
         LOGGER.log(NOTE, "note: nominal values for %s", which)
     return model
@@ -180,8 +194,8 @@ def as_list(sources: Any) -> list[Any]:
 
 
 def command(function: F) -> F:
-    """Make a command of a function: describe all its parameters in its docstring, and keep them for
-    typer."""
+    """Make a command of a function: describe all its parameters in its docstring, and
+    keep them for typer."""
     text, raises = _split(inspect.cleandoc(function.__doc__ or ""), "Raises:")
     text, arguments = _split(text, "Args:")
     summary, example = _split(text, "Example:")
@@ -208,7 +222,8 @@ class _Described(NamedTuple):
     """What a docstring says of a parameter."""
 
     value: str
-    """what `--help` calls its value, or the range of a number; empty where it says nothing"""
+    """what `--help` calls its value, or the range of a number; empty where it says
+    nothing"""
     text: str
 
 
@@ -217,11 +232,16 @@ def _described(section: str) -> dict[str, _Described]:
     # lines that go on are indented by 8
     entry = r"^ {4}(\w+)(?: \((.+?)\))?: (.*(?:\n {8}.*)*)"
     found = re.findall(entry, section, re.MULTILINE)
-    return {name: _Described(value, " ".join(text.split())) for name, value, text in found}
+    return {
+        name: _Described(value, " ".join(text.split())) for name, value, text in found
+    }
 
 
-def _on_command_line(parameter: inspect.Parameter, described: _Described) -> inspect.Parameter:
-    """Return a parameter of a Python function as typer takes it: an argument, or an option."""
+def _on_command_line(
+    parameter: inspect.Parameter, described: _Described
+) -> inspect.Parameter:
+    """Return a parameter of a Python function as typer takes it: an argument, or an
+    option."""
     # annotations are texts where their types are imported for the checker alone
     type_names = re.findall(r"\w+", inspect.formatannotation(parameter.annotation))
     value_type = next(TERMINAL[name] for name in type_names if name in TERMINAL)
@@ -240,7 +260,9 @@ def _on_command_line(parameter: inspect.Parameter, described: _Described) -> ins
     if default is None:
         kind = kind | None
     annotation = Annotated[kind, option]
-    return parameter.replace(kind=parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+    return parameter.replace(
+        kind=parameter.KEYWORD_ONLY, default=default, annotation=annotation
+    )
 
 
 def _flags(name: str) -> list[str]:

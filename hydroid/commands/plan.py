@@ -1,4 +1,5 @@
-"""`hydroid suggest` and `hydroid design`: what the model lacks, and the next experiment."""
+"""`hydroid suggest` and `hydroid design`: what the model lacks, and the next
+experiment."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -55,10 +56,11 @@ def suggest(
 ) -> "Result[tuple[Finding, ...]]":
     """Find what the model lacks, and what to do next.
 
-    Tests every parameter that is kept fixed, switched off or shared, such as a delay or dry
-    friction. The most promising ones are freed: does that lower the error on parts of the logs left
-    out? Tests whether the logs contradict the sign of an angle, and predicts for the best actions,
-    from weighing a link to a new experiment, how much each would reduce the uncertainty.
+    Tests every parameter that is kept fixed, switched off or shared, such as a delay or
+    dry friction. The most promising ones are freed: does that lower the error on parts
+    of the logs left out? Tests whether the logs contradict the sign of an angle, and
+    predicts for the best actions, from weighing a link to a new experiment, how much
+    each would reduce the uncertainty.
 
     Example: hydroid suggest --fit runs/hyd
 
@@ -84,7 +86,9 @@ def suggest(
     folder = Path(model.source).parent
     run = str(folder) if is_file(folder / CONFIG) else "RUN"
     with Progress() as progress:
-        content, findings = advice(problem, uncertainty(problem, model.theta), run, progress)
+        content, findings = advice(
+            problem, uncertainty(problem, model.theta), run, progress
+        )
     finished = run_of(model)
     if finished:
         verdicts = load_record(finished).verdict
@@ -97,7 +101,9 @@ def suggest(
     )
     rows = [{**content, "name": "none of them"}]
     rows += [term | {"verdict": _advised(term)} for term in content["terms"]]
-    table = left_out_table("Quantities that the fit holds", TERMS, rows, model.settings.arm, note)
+    table = left_out_table(
+        "Quantities that the fit holds", TERMS, rows, model.settings.arm, note
+    )
     lines = list[str]()
     for finding in findings:
         lines.append(f"- {finding}")
@@ -127,23 +133,26 @@ def design(
     set: "SettingChanges" = None,
     repair: bool = False,
 ) -> "Result[Design]":
-    """Design the next experiment: start pose and commands that best reduce the uncertainty
-    of the estimate.
+    """Design the next experiment: start pose and commands that best reduce the
+    uncertainty of the estimate.
 
-    SAFETY: Keep a hand on the emergency stop during the first run. The limits (design.speed_deg_s,
-    design.margin_deg, design.clearance_m) are checked only in simulation with the present estimate;
-    the real arm may exceed them. Collisions are checked with the shapes of the model, which knows
-    no hoses and nothing that stands around the machine.
+    SAFETY: Keep a hand on the emergency stop during the first run. The limits
+    (design.speed_deg_s, design.margin_deg, design.clearance_m) are checked only in
+    simulation with the present estimate; the real arm may exceed them. Collisions are
+    checked with the shapes of the model, which knows no hoses and nothing that stands
+    around the machine.
 
-    Writes commands.csv (the experiment) and predicted.csv (the simulated motion, no measurement).
-    The settings define the compared joints, the free parameters and the limits.
+    Writes commands.csv (the experiment) and predicted.csv (the simulated motion, no
+    measurement). The settings define the compared joints, the free parameters and the
+    limits.
 
     Example: hydroid design LOG.csv --fit runs/mech --duration 30
 
         commands = hydroid.design("a.csv", fit="runs/a", duration=30).result.log
 
     Args:
-        logs (LOG): Logs that there are already: what they determine need not be measured again.
+        logs (LOG): Logs that there are already: what they determine need not be
+            measured again.
         duration (S): Length of the experiment [s].
         joints (2,3): Joints to drive, by number or name [default: the compared joints].
 
@@ -188,13 +197,17 @@ def design(
         f"more. random: median of {len(result.random)} experiments of the same length and limits. "
     )
     safety = Finding("run the experiment", "note").hint
-    table = Table.of("Predicted relative standard deviations", PRECISION, rows, note + safety)
+    table = Table.of(
+        "Predicted relative standard deviations", PRECISION, rows, note + safety
+    )
     files = written({"design": table}, out)
     commands = None
     if out is not None:
         commands = str(Path(out) / "commands.csv")
         write_log(Path(commands), result.log, settings.log, arm=settings.arm)
-        write_log(Path(out) / "predicted.csv", result.best.log, settings.log, arm=settings.arm)
+        write_log(
+            Path(out) / "predicted.csv", result.best.log, settings.log, arm=settings.arm
+        )
         files.insert(0, commands)
     content = {"commands": commands, "precision": rows}
     return Result([table, *findings, *files], content, result)

@@ -1,7 +1,7 @@
 """How far a command is, and whether it is to stop.
 
-A bar shows it on a terminal, plain lines elsewhere, and nothing in Python or with -q. A cluster's
-notice that time is nearly up ends a run as Ctrl-C does: with a checkpoint.
+A bar shows it on a terminal, plain lines elsewhere, and nothing in Python or with -q. A
+cluster's notice that time is nearly up ends a run as Ctrl-C does: with a checkpoint.
 """
 
 import math
@@ -31,7 +31,8 @@ _stopped = False
 
 
 def listen() -> None:
-    """Turn the first of the notices into a KeyboardInterrupt: clusters repeat themselves.
+    """Turn the first of the notices into a KeyboardInterrupt: clusters repeat
+    themselves.
 
     One that is ignored from the start, as `nohup` has it, stays ignored.
     """
@@ -43,8 +44,8 @@ def listen() -> None:
 def stopped() -> bool:
     """Whether a notice has come.
 
-    Python drops an exception that is raised in a finalizer. Who asks here between two pieces of
-    work does not miss the notice.
+    Python drops an exception that is raised in a finalizer. Who asks here between two
+    pieces of work does not miss the notice.
     """
     return _stopped
 
@@ -58,7 +59,8 @@ def _stop(number: int, frame: FrameType | None) -> None:
 
 
 class Progress:
-    """Shows the progress of a command, as `hydroid.progress.Progress`; use it as a context."""
+    """Shows the progress of a command, as `hydroid.progress.Progress`; use it as a
+    context."""
 
     def __init__(self) -> None:
         self._bar: Any = None
@@ -71,7 +73,9 @@ class Progress:
         if self._bar is not None:
             self._bar.stop()
 
-    def __call__(self, what: str, done: float, total: float | None, text: str = "") -> None:
+    def __call__(
+        self, what: str, done: float, total: float | None, text: str = ""
+    ) -> None:
         """Show what is being done, how much of it is done, and how much there is."""
         if _stopped:
             raise KeyboardInterrupt
@@ -127,10 +131,11 @@ class FitProgress(Progress):
         return time.monotonic() > self._end
 
     def refining(self, step: "Step", simulated: int, rms: float) -> bool:
-        """Take a step of the fit, its number of simulations, and its rms error [rad] so far.
+        """Take a step of the fit, its number of simulations, and its rms error [rad] so
+        far.
 
-        A rung is the search, or a model or term of the ladder; what is kept is refined as the last
-        one. Returns whether time is up.
+        A rung is the search, or a model or term of the ladder; what is kept is refined
+        as the last one. Returns whether time is up.
         """
         from hydroid.units import way
 

@@ -1,4 +1,5 @@
-"""`hydroid fit-mech`, `hydroid fit-hyd` and `hydroid adapt`: fits, from files to run folders."""
+"""`hydroid fit-mech`, `hydroid fit-hyd` and `hydroid adapt`: fits, from files to run
+folders."""
 
 import builtins
 from collections.abc import Sequence
@@ -54,8 +55,8 @@ def fit_mech(
 ) -> FitResult:
     """Estimate gain, damping, stiffness and link masses from logs (stage 1).
 
-    Writes a run folder with report.html, estimate.yaml, tables and the fitted arm. Then test the
-    estimate on a log that it was not fitted to: `hydroid validate`.
+    Writes a run folder with report.html, estimate.yaml, tables and the fitted arm. Then
+    test the estimate on a log that it was not fitted to: `hydroid validate`.
 
     Example: hydroid fit-mech LOG.csv --out runs/mech
 
@@ -104,11 +105,12 @@ def fit_hyd(
     set: "SettingChanges" = None,
     repair: bool = False,
 ) -> FitResult:
-    """Estimate the hydraulic actuators (stage 2); the arm's parameters come from stage 1.
+    """Estimate the hydraulic actuators (stage 2); the arm's parameters come from stage
+    1.
 
-    By default it estimates piston areas, valve openings, onsets, delay and damping. The config can
-    free more, such as the amplifier's currents and the solenoid.
-    Writes a run folder as fit-mech does.
+    By default it estimates piston areas, valve openings, onsets, delay and damping. The
+    config can free more, such as the amplifier's currents and the solenoid. Writes a
+    run folder as fit-mech does.
 
     Example: hydroid fit-hyd LOG.csv --config mine/fit.yaml --out runs/hyd
 
@@ -181,14 +183,21 @@ class FitOptions:
         return budget
 
 
-def _fit(stage: str, options: FitOptions, mech: "ModelSource | None" = None) -> FitResult:
+def _fit(
+    stage: str, options: FitOptions, mech: "ModelSource | None" = None
+) -> FitResult:
     config = options.config
     changes = options.changes()
     settings = load_settings(config, changes)
     if settings.stage != stage:
-        what = f"has stage: {settings.stage}, but hydroid fit-{stage} needs stage: {stage}"
-        raise SettingsError(what, config, f"use hydroid fit-{settings.stage}, or another --config")
-    # what stage 1 and --start say are settings like any others: they are read with them once more
+        what = (
+            f"has stage: {settings.stage}, but hydroid fit-{stage} needs stage: {stage}"
+        )
+        raise SettingsError(
+            what, config, f"use hydroid fit-{settings.stage}, or another --config"
+        )
+    # what stage 1 and --start say are settings like any others: they are read with them
+    # once more
     known = Plain()
     if stage == "hyd":
         known |= held_mechanics(mech, settings, changes)
@@ -199,10 +208,15 @@ def _fit(stage: str, options: FitOptions, mech: "ModelSource | None" = None) -> 
         settings = load_settings(config, {**changes, **known, **changes})
     if config == f"fit-{stage}":
         what = f"note: the arm is the shipped {settings.arm.name}"
-        LOGGER.log(NOTE, f"{what}: for your machine give --config, which `hydroid init` writes")
+        LOGGER.log(
+            NOTE, f"{what}: for your machine give --config, which `hydroid init` writes"
+        )
     budget = options.seconds()
     read = read_logs(options.logs, settings, repair=options.repair)
-    with open_workers(options.dask) as workers, FitProgress(settings, budget) as watcher:
+    with (
+        open_workers(options.dask) as workers,
+        FitProgress(settings, budget) as watcher,
+    ):
         result = run_fit(
             settings,
             read,
@@ -228,14 +242,16 @@ def _starts(start: "ModelSource", settings: FitSettings, held: Plain) -> Plain:
     return starts
 
 
-def held_mechanics(mech: "ModelSource | None", settings: FitSettings, changes: Plain) -> Plain:
+def held_mechanics(
+    mech: "ModelSource | None", settings: FitSettings, changes: Plain
+) -> Plain:
     """Return what of stage 2's settings, read with `changes`, stage 1 says:
     its parameters at its estimate.
 
-    Of a run folder or a result of stage 1, or a YAML file of values by name, the masses hold, and
-    damping and stiffness where the settings state no start or nominal value of their own. None: the
-    settings fix them, or say what is known of them (a prior or a start), and they are estimated
-    with the others. `changes` have the last word.
+    Of a run folder or a result of stage 1, or a YAML file of values by name, the masses
+    hold, and damping and stiffness where the settings state no start or nominal value
+    of their own. None: the settings fix them, or say what is known of them (a prior or
+    a start), and they are estimated with the others. `changes` have the last word.
 
     Raises:
         RunError, SettingsError: no values there, or one that stage 2 needs is missing.
@@ -250,9 +266,13 @@ def held_mechanics(mech: "ModelSource | None", settings: FitSettings, changes: P
             continue
         held[key] = values[name]
         if summary is not None:
-            _warn_of_doubtful_mass(name, values[name], summary.estimate[name].flag, settings)
+            _warn_of_doubtful_mass(
+                name, values[name], summary.estimate[name].flag, settings
+            )
     missing = [
-        name for name, parameter in mechanical.items() if name not in values and _needs_value(parameter, mech)
+        name
+        for name, parameter in mechanical.items()
+        if name not in values and _needs_value(parameter, mech)
     ]
     if missing:
         hint = "give the run of stage 1 with --mech RUN, or set fixed, nominal or start for each"
@@ -269,7 +289,9 @@ def _stage_1(mech: "ModelSource | None") -> tuple[Plain, FitSummary | None]:
     values, summary = open_values(mech)
     if summary is not None and summary.stage != "mech":
         hint = "name a run of fit-mech, or begin at this fit with --start"
-        raise SettingsError("is a fit of stage 2, but --mech takes one of stage 1", mech, hint)
+        raise SettingsError(
+            "is a fit of stage 2, but --mech takes one of stage 1", mech, hint
+        )
     return values, summary
 
 
@@ -290,8 +312,11 @@ def _needs_value(parameter: ParameterSettings, mech: "ModelSource | None") -> bo
     return mech is not None or not parameter.states_start
 
 
-def _warn_of_doubtful_mass(name: str, value: float, flag: str | None, settings: FitSettings) -> None:
-    """Warn where a mass is held that stage 1 did not determine, far from what was expected."""
+def _warn_of_doubtful_mass(
+    name: str, value: float, flag: str | None, settings: FitSettings
+) -> None:
+    """Warn where a mass is held that stage 1 did not determine, far from what was
+    expected."""
     parameter = settings.parameters[name]
     if parameter.quantity != "mass" or flag in (None, "identifiable", "fixed"):
         return
@@ -317,9 +342,10 @@ def adapt(
 ) -> FitResult:
     """Adapt a fit to new logs: estimate a few parameters anew, and keep the others.
 
-    Use it after a change of the machine: a slower engine, a colder day, another tool. For a load of known
-    mass, set the payload of the logs instead: --set 'payloads={LOADED.csv: 250}'. Each freed parameter is
-    tested on parts of the logs that are left out. The result is a run that every command takes.
+    Use it after a change of the machine: a slower engine, a colder day, another tool.
+    For a load of known mass, set the payload of the logs instead: --set
+    'payloads={LOADED.csv: 250}'. Each freed parameter is tested on parts of the logs
+    that are left out. The result is a run that every command takes.
 
     Example: hydroid adapt LOADED.csv --fit runs/hyd --free P_flow,P_droop
 
@@ -328,14 +354,16 @@ def adapt(
 
     Args:
         logs (LOG): The new logs.
-        free (NAME,NAME): Parameters to be freed [default: masses, pump and effects of the logs'
-            groups, one after the other, as long as the error falls on every part of the logs left
-            out].
+        free (NAME,NAME): Parameters to be freed [default: masses, pump and effects of
+            the logs' groups, one after the other, as long as the error falls on every
+            part of the logs left out].
         out (DIR): Run folder [default of the command line: runs/adapt].
-        set (KEY=VALUE): Replace a setting of the fit, such as refinement.iterations=100.
+        set (KEY=VALUE): Replace a setting of the fit, such as
+            refinement.iterations=100.
 
     Raises:
-        HydroidError: an input or a folder that cannot be used, or no parameter that helps.
+        HydroidError: an input or a folder that cannot be used, or no parameter that
+            helps.
     """
     model = open_model(fit, overrides=set)
     read = read_logs(logs, model.settings, repair=repair)
@@ -352,7 +380,9 @@ def adapt(
     chosen = [step["parameter"] for step in path[1:]]
     if not chosen:
         hint = "name parameters with --free, or fit anew with --start RUN"
-        raise SettingsError("no parameter lowers the error on parts left out", model.source, hint)
+        raise SettingsError(
+            "no parameter lowers the error on parts left out", model.source, hint
+        )
     settings = adapted(model, chosen, read)
     with FitProgress(settings) as watcher:
         result = run_fit(settings, read, out, progress=watcher).begun_from(fit)
@@ -368,4 +398,7 @@ def adapt(
 
 def _own_payloads(fit: "ModelSource", logs: Sequence[Log]) -> builtins.set[str]:
     """Return the logs that may have a payload: these, and those of the fit itself."""
-    return {*open_model(fit).settings.payloads, *(log_file(log.source).name for log in logs)}
+    return {
+        *open_model(fit).settings.payloads,
+        *(log_file(log.source).name for log in logs),
+    }

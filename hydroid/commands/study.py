@@ -32,9 +32,9 @@ def study(
 ) -> "Result[tuple[Row, ...]]":
     """Compare settings over many seeds.
 
-    The file names a config, the settings that vary, and the logs. Every run leaves a small file in
-    DIR/runs when it ends. To continue a study that was stopped, give the same command again: it
-    ends with the same bits.
+    The file names a config, the settings that vary, and the logs. Every run leaves a
+    small file in DIR/runs when it ends. To continue a study that was stopped, give the
+    same command again: it ends with the same bits.
 
     Example: hydroid study my-study.yaml --out runs/my-study
 
@@ -59,11 +59,17 @@ def study(
     from hydroid.studies import processes as open_processes, run_study
 
     try:
-        with locked(folder), open_processes(processes) as executor, Progress() as progress:
+        with (
+            locked(folder),
+            open_processes(processes) as executor,
+            Progress() as progress,
+        ):
             runs = run_study(path, folder, read_logs, executor, progress)
     except KeyboardInterrupt:
         count = len(list(folder.glob("runs/*.json")))
-        raise Stopped(f"{folder} holds {count} runs that have ended; the same command goes on") from None
+        raise Stopped(
+            f"{folder} holds {count} runs that have ended; the same command goes on"
+        ) from None
     run_rows = list[Plain]()
     names = set[str]()
     failures = list[str]()

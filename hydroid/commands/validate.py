@@ -47,8 +47,9 @@ def validate(
     """Test fits on logs that they have not seen: a verdict on each joint,
     beside the errors of simple models.
 
-    Each fit reads the logs with its own settings. The page shows every response with its errors
-    (article, table 9). From then on, the report of the fit's own run shows these logs too.
+    Each fit reads the logs with its own settings. The page shows every response with
+    its errors (article, table 9). From then on, the report of the fit's own run shows
+    these logs too.
 
     Example: hydroid validate OTHER.csv --fit runs/mech --fit runs/hyd
 
@@ -56,13 +57,14 @@ def validate(
         print(validated.result[0]["shoulder"].rms)  # [deg]
 
     Args:
-        fit (RUN|YAML): An estimate: a run folder, a folder written by Plant.save (Python), or a
-            YAML file. Repeat the option for several estimates.
-        tolerance (0.001 to 90): The rms error [deg] that you accept for every joint; config.yaml
-            can hold one for each (tolerance_deg) [default: that of the fit, or else 2 % of a
-            joint's travel].
-        apart: These logs are of other conditions than the fit's, such as another load: its own
-            report shows them, and does not count them in its verdict. Without it, they count again.
+        fit (RUN|YAML): An estimate: a run folder, a folder written by Plant.save
+            (Python), or a YAML file. Repeat the option for several estimates.
+        tolerance (0.001 to 90): The rms error [deg] that you accept for every joint;
+            config.yaml can hold one for each (tolerance_deg) [default: that of the fit,
+            or else 2 % of a joint's travel].
+        apart: These logs are of other conditions than the fit's, such as another load:
+            its own report shows them, and does not count them in its verdict. Without
+            it, they count again.
 
     Raises:
         LogError: a log cannot be used.
@@ -73,7 +75,12 @@ def validate(
     read = [read_logs(logs, model.settings, repair=repair) for model in models]
     from hydroid.fitting.verdict import standing_out
     from hydroid.reporting.predictions import validation_page
-    from hydroid.reporting.verdict_table import next_lines, next_step, ordered, verdict_lines
+    from hydroid.reporting.verdict_table import (
+        next_lines,
+        next_step,
+        ordered,
+        verdict_lines,
+    )
     from hydroid.run.record import run_of
 
     tested: dict[str, _Tested] = {}
@@ -129,7 +136,8 @@ def _content(
 
 @record
 class _Tested:
-    """A fit, what it makes of its own logs and of those that test it, and the verdict."""
+    """A fit, what it makes of its own logs and of those that test it, and the
+    verdict."""
 
     model: IdentifiedModel
     fitted: "Sequence[Prediction]"
@@ -165,15 +173,20 @@ def _test(
     settings = model.settings
     if tolerance is not None:
         settings = settings.changed({"tolerance_deg": tolerance})
-    return _Tested(model, fitted, predictions, judge(settings, fitted, baselines, predictions))
+    return _Tested(
+        model, fitted, predictions, judge(settings, fitted, baselines, predictions)
+    )
 
 
 def _keep(test: _Tested, *, apart: bool) -> None:
-    """Store what a fit makes of unseen logs in its own run, whose report shows them from now on."""
+    """Store what a fit makes of unseen logs in its own run, whose report shows them
+    from now on."""
     from hydroid.reporting.predictions import draw
     from hydroid.run.record import keep_validation
 
-    run = keep_validation(test.model, [replace(p, apart=apart) for p in test.predictions])
+    run = keep_validation(
+        test.model, [replace(p, apart=apart) for p in test.predictions]
+    )
     if run:
         draw(run)
 
@@ -197,10 +210,11 @@ def report(
     figures: bool = False,
     out: "Source | None" = None,
 ) -> "Result[tuple[Record, ...]]":
-    """Draw the reports of finished runs anew, or merge runs of one fit with different seeds.
+    """Draw the reports of finished runs anew, or merge runs of one fit with different
+    seeds.
 
-    Nothing is simulated, and no log is needed: a run stores all that its report shows, which is
-    written again in its folder. `hydroid validate` compares several fits.
+    Nothing is simulated, and no log is needed: a run stores all that its report shows,
+    which is written again in its folder. `hydroid validate` compares several fits.
 
     Example: hydroid report runs/mech runs/hyd
 
@@ -209,14 +223,15 @@ def report(
 
     Args:
         runs (RUN): Folders of finished runs; with --merge also a quoted pattern.
-        merge: The folders are runs of one fit with different seeds: show median and spread of their
-            estimates. Runs that are not finished or damaged are left out, with a warning.
+        merge: The folders are runs of one fit with different seeds: show median and
+            spread of their estimates. Runs that are not finished or damaged are left
+            out, with a warning.
         figures: Also write every chart as PNG and SVG, to figures/.
         out (DIR): Folder for the tables of --merge.
 
     Raises:
-        RunError: a folder holds no finished run of this version, runs to be merged differ in more
-            than their seeds, or the page cannot be written.
+        RunError: a folder holds no finished run of this version, runs to be merged
+            differ in more than their seeds, or the page cannot be written.
     """
     folders = as_list(runs)
     if merge:
@@ -229,7 +244,9 @@ def report(
     return Result(files, {"files": files}, ())
 
 
-def _merged(folders: Sequence[str], out: "Source | None") -> "Result[tuple[Record, ...]]":
+def _merged(
+    folders: Sequence[str], out: "Source | None"
+) -> "Result[tuple[Record, ...]]":
     """Return median and spread of the estimates of one fit with different seeds."""
     from hydroid.reporting.merged_report import merged_tables
     from hydroid.run.record import read_runs
@@ -242,7 +259,9 @@ def _merged(folders: Sequence[str], out: "Source | None") -> "Result[tuple[Recor
         "out": out and str(out),
         "best": best.folder,
         "runs": {},
-        "parameters": [dict(zip(spread.header, row, strict=True)) for row in spread.rows],
+        "parameters": [
+            dict(zip(spread.header, row, strict=True)) for row in spread.rows
+        ],
     }
     for run in collected:
         fitted_deg = {joint.name: joint.fitted_deg for joint in run.summary.verdict}

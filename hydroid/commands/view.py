@@ -60,16 +60,18 @@ def simulate(
     """Simulate commands with an estimate and write the log: a prediction,
     or synthetic data to test a fit.
 
-    A pair of arms is simulated as two separate arms: they share no pump, and their carrier stands still.
+    A pair of arms is simulated as two separate arms: they share no pump, and their
+    carrier stands still.
 
     Example: hydroid simulate COMMANDS.csv --fit runs/hyd --out sim.csv
 
         log = hydroid.simulate("commands.csv", fit="runs/a", out="predicted.csv").log
 
     Args:
-        commands (COMMANDS.csv): A log of commands. Its angles before the first command give the
-            start pose.
-        out (LOG.csv): The log to write [default of the command line: runs/simulated.csv].
+        commands (COMMANDS.csv): A log of commands. Its angles before the first command
+            give the start pose.
+        out (LOG.csv): The log to write [default of the command line:
+            runs/simulated.csv].
         noise_deg (0 to 90): Standard deviation of Gaussian noise on the angles [deg].
 
     Raises:
@@ -99,7 +101,9 @@ def simulate(
     if out is None:
         return Simulated([], content, logs)
     columns = model.settings.log
-    with_columns = [(log, columns.of_arm(name) if arm else columns) for name, log in logs.items()]
+    with_columns = [
+        (log, columns.of_arm(name) if arm else columns) for name, log in logs.items()
+    ]
     write_logs(Path(out), with_columns, arm=model.settings.arm)
     return Simulated([str(out)], content, logs)
 
@@ -118,32 +122,35 @@ def view(
     set: "SettingChanges" = None,
     repair: bool = False,
 ) -> "Result[Clearance | None]":
-    """Show the moving arm in MuJoCo's viewer, in real time, beside the ghost of the measured one.
+    """Show the moving arm in MuJoCo's viewer, in real time, beside the ghost of the
+    measured one.
 
-    Without a log, the sliders in the panel "Control" on the right set the commands in %. Backspace
-    restarts. With -o FILE it writes a film or a picture instead. This needs no display, but OpenGL
-    by EGL or OSMesa. In a program of your own,
-    set MUJOCO_GL to egl or osmesa before anything is imported.
+    Without a log, the sliders in the panel "Control" on the right set the commands in
+    %. Backspace restarts. With -o FILE it writes a film or a picture instead. This
+    needs no display, but OpenGL by EGL or OSMesa. In a program of your own, set
+    MUJOCO_GL to egl or osmesa before anything is imported.
 
     Example: hydroid view runs/hyd -o arm.mp4
 
         hydroid.view("a.csv", out="a.png", fit="runs/a", span="2:")
 
     Args:
-        source (RUN|LOG): A run folder, whose first log drives the arm; or a log, with --fit.
-        out (FILE): Write a film (.mp4, .gif) or the beginning of the span (.png) instead of opening
-            a window.
-        fit (RUN|YAML): An estimate, as a run folder or a YAML file [default: the arm's file and
-            `hydraulics` in the settings].
+        source (RUN|LOG): A run folder, whose first log drives the arm; or a log, with
+            --fit.
+        out (FILE): Write a film (.mp4, .gif) or the beginning of the span (.png)
+            instead of opening a window.
+        fit (RUN|YAML): An estimate, as a run folder or a YAML file [default: the arm's
+            file and `hydraulics` in the settings].
         span (FROM:TO): Part of the log to film [s], such as 10:20 [default: all].
-        collisions: Instead, find which bodies meet along the log's joint angles: of the arm, its
-            base and the floor; with --arm also of the carrier and the other arm. The exit status is
-            1 if bodies meet.
+        collisions: Instead, find which bodies meet along the log's joint angles: of the
+            arm, its base and the floor; with --arm also of the carrier and the other
+            arm. The exit status is 1 if bodies meet.
         config (YAML): Settings [default: config.yaml in the folder of the estimate,
             or else fit-hyd].
 
     Raises:
-        RunError: no window, no OpenGL, no package that writes films, or the simulation diverged.
+        RunError: no window, no OpenGL, no package that writes films, or the simulation
+            diverged.
         SettingsError: another kind of file, no such arm or pose, a span without time.
     """
     if out is not None:
@@ -152,13 +159,19 @@ def view(
     log = source
     if isinstance(source, str | Path) and is_file(Path(source) / "run.json"):
         if fit is not None:
-            raise SettingsError("is a run itself", source, f"name a log, or leave out --fit {fit}")
+            raise SettingsError(
+                "is a run itself", source, f"name a log, or leave out --fit {fit}"
+            )
         # a run names both its fit and its logs
         fit = source
         log = run_logs(Path(source))[0]
     if log is None:
         # only the sliders need no log
-        for option, given in {"--collisions": collisions, "--arm": arm, "--out": out}.items():
+        for option, given in {
+            "--collisions": collisions,
+            "--arm": arm,
+            "--out": out,
+        }.items():
             if given:
                 raise SettingsError("needs a log or a run", option, "name the log")
         _show(open_model(fit, config, set, nominal=True), None, pose)
@@ -180,7 +193,10 @@ def view(
 
 
 def _write_film(
-    model: "IdentifiedModel", logs: "dict[str, Log]", out: Path, span: tuple[float, float]
+    model: "IdentifiedModel",
+    logs: "dict[str, Log]",
+    out: Path,
+    span: tuple[float, float],
 ) -> None:
     """Write a film or a picture of simulated logs, by its ending, of a span [s]."""
     from hydroid.viewer.film import KINDS, render_motion
@@ -188,13 +204,17 @@ def _write_film(
 
     kind = out.suffix.lower()
     if kind not in KINDS:
-        raise SettingsError("is no film or picture", out, f"end it in {', '.join(KINDS)}")
+        raise SettingsError(
+            "is no film or picture", out, f"end it in {', '.join(KINDS)}"
+        )
     with Progress() as progress:
         film = render_motion(simulated_motion(model, logs), kind, span, progress)
     write_atomic(out, film)
 
 
-def _show(model: "IdentifiedModel", logs: "dict[str, Log] | None", pose: str | None) -> None:
+def _show(
+    model: "IdentifiedModel", logs: "dict[str, Log] | None", pose: str | None
+) -> None:
     """Show simulated logs in a window; without logs the arm, moved by sliders."""
     from hydroid.plant import Plant
     from hydroid.viewer.film import show
@@ -247,4 +267,6 @@ def _span(text: str) -> tuple[float, float]:
     try:
         return float(begin or 0.0), float(end or "inf")
     except ValueError:
-        raise SettingsError(f"{text!r} is no span", "--span", "write FROM:TO in seconds") from None
+        raise SettingsError(
+            f"{text!r} is no span", "--span", "write FROM:TO in seconds"
+        ) from None

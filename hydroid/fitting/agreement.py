@@ -1,13 +1,14 @@
-"""Do logs agree? How each joint moves in each log, against the others, by three numbers.
+"""Do logs agree? How each joint moves in each log, against the others, by three
+numbers.
 
-Nine numbers (`baselines`) are fitted to a joint's motion in the other logs. Then a log says by which
-factor its speeds differ from these, by how much its dead bands are wider, and by how much later it
-moves: each number alone, as if the others were right. Errors are taken within short windows and
-without their means, so that no drift counts, and the windows' own scatter gives the standard
-deviations.
+Nine numbers (`baselines`) are fitted to a joint's motion in the other logs. Then a log
+says by which factor its speeds differ from these, by how much its dead bands are wider,
+and by how much later it moves: each number alone, as if the others were right. Errors
+are taken within short windows and without their means, so that no drift counts, and the
+windows' own scatter gives the standard deviations.
 
-A log stands out if it differs from the rest by far more than its standard deviation and the rest's
-spread, and by enough to matter.
+A log stands out if it differs from the rest by far more than its standard deviation and
+the rest's spread, and by enough to matter.
 """
 
 from collections.abc import Sequence
@@ -19,7 +20,14 @@ from scipy.optimize import least_squares
 from scipy.special import ndtri, stdtr
 
 from hydroid.arrays import Array, Mask, record
-from hydroid.fitting.baselines import LOWER, NAMES, SCALE, UPPER, Baseline, fit_baselines
+from hydroid.fitting.baselines import (
+    LOWER,
+    NAMES,
+    SCALE,
+    UPPER,
+    Baseline,
+    fit_baselines,
+)
 from hydroid.log import Log
 from hydroid.progress import Progress, no_progress
 
@@ -56,7 +64,8 @@ class Agreement:
         joint: number, from 1.
         sources: the logs', n.
         numbers: speed as a factor, dead bands wider by [%], later by [s], shape (n, 3).
-        sd: standard deviations of these, with the spread of the other logs, shape (n, 3).
+        sd: standard deviations of these, with the spread of the other logs, shape (n,
+            3).
         odd: which log stands out, and by which of the numbers; None: none does.
     """
 
@@ -68,9 +77,12 @@ class Agreement:
 
 
 def compare_logs(
-    logs: Sequence[Log], ranges: Sequence[tuple[float, float]], progress: Progress = no_progress
+    logs: Sequence[Log],
+    ranges: Sequence[tuple[float, float]],
+    progress: Progress = no_progress,
 ) -> list[Agreement]:
-    """Compare logs, joint by joint (`ranges` [rad]), of those joints that at least three of them move."""
+    """Compare logs, joint by joint (`ranges` [rad]), of those joints that at least
+    three of them move."""
     found = list[Agreement]()
     for joint, limits in enumerate(ranges, 1):
         moved = [_thinned(log) for log in logs if _moves(log, joint)]
@@ -85,7 +97,8 @@ def compare_logs(
 
 def _moves(log: Log, joint: int) -> bool:
     angle = log.angle[:, joint - 1]
-    return bool(log.driven[joint - 1]) and np.rad2deg(np.ptp(angle)) > LEAST_WAY  # NaN: not measured
+    # NaN: not measured
+    return bool(log.driven[joint - 1]) and np.rad2deg(np.ptp(angle)) > LEAST_WAY
 
 
 def _thinned(log: Log) -> Log:
@@ -115,7 +128,8 @@ class _Course:
     Attributes:
         log: of T samples.
         joint: number, from 1.
-        used: samples that count, shape (T,): not those at an end of its travel or range.
+        used: samples that count, shape (T,): not those at an end of its travel or
+            range.
         window: of these, from 0.
         count: samples of each window.
     """
@@ -127,12 +141,15 @@ class _Course:
     count: NDArray[np.int64]
 
     def errors(self, predicted: Array) -> Array:
-        """Return errors of angles [rad], shape (T,), less the mean of their window, where they count."""
+        """Return errors of angles [rad], shape (T,), less the mean of their window,
+        where they count."""
         error = (self.log.angle[:, self.joint - 1] - predicted)[self.used]
         return error - (np.bincount(self.window, error) / self.count)[self.window]
 
 
-def _compare(logs: Sequence[Log], joint: int, limits: tuple[float, float]) -> Agreement | None:
+def _compare(
+    logs: Sequence[Log], joint: int, limits: tuple[float, float]
+) -> Agreement | None:
     courses = [_course(log, joint, limits) for log in logs]
     courses = [course for course in courses if len(course.count) >= LEAST_WINDOWS]
     if len(courses) < LEAST_LOGS:
@@ -147,10 +164,13 @@ def _compare(logs: Sequence[Log], joint: int, limits: tuple[float, float]) -> Ag
     for k, course in enumerate(courses):
         others = [other for other in courses if other is not course]
         rests.append(_refit(common, others))
-        costs[k] = sum(np.sum(other.errors(rests[k].predict(other.log)) ** 2) for other in others)
+        costs[k] = sum(
+            np.sum(other.errors(rests[k].predict(other.log)) ** 2) for other in others
+        )
     own = _numbers(rests, courses)
     sources = tuple(course.log.source for course in courses)
-    # the log without which the others fit best; it spoils the rest of each of the others
+    # the log without which the others fit best; it spoils the rest of each of the
+    # others
     seeming = int(np.argmin(costs + own.costs.min(axis=1)))
     clean = _numbers([rests[seeming]] * len(courses), courses)
     odd = _odd(clean, seeming, len(courses[seeming].count))
@@ -164,7 +184,8 @@ def _compare(logs: Sequence[Log], joint: int, limits: tuple[float, float]) -> Ag
 
 @record
 class _Numbers:
-    """Three numbers of n logs, each alone, their variances, and squares of errors; all (n, 3)."""
+    """Three numbers of n logs, each alone, their variances, and squares of errors; all
+    (n, 3)."""
 
     values: Array
     variances: Array
@@ -185,9 +206,11 @@ def _numbers(models: Sequence[Baseline], courses: Sequence[_Course]) -> _Numbers
 
 
 def _stretched(courses: Sequence[_Course], model: Baseline) -> list[_Course]:
-    """Return motions in a measure of the angle in which speed depends on the command alone.
+    """Return motions in a measure of the angle in which speed depends on the command
+    alone.
 
-    A cylinder turns a joint faster where its lever is short, and logs differ in where they move.
+    A cylinder turns a joint faster where its lever is short, and logs differ in where
+    they move.
     """
     joint = model.joint - 1
     angles = [course.log.angle[:, joint] for course in courses]
@@ -202,10 +225,13 @@ def _stretched(courses: Sequence[_Course], model: Baseline) -> list[_Course]:
         places.append((0.5 * (angle[rows:] + angle[:-rows]))[inside])
     move, ask = np.concatenate(moved), np.concatenate(asked)
     at = (np.concatenate(places) - least) / (most - least)
-    # the moves asked for, times 1, the place and its square; 1 as if by a few seconds more of data
+    # the moves asked for, times 1, the place and its square; 1 as if by a few seconds
+    # more of data
     rows = ask[:, None] * at[:, None] ** np.arange(3)
     weak = 1e-3 * np.sum(ask**2) + TINY
-    shape = np.linalg.solve(rows.T @ rows + weak * np.eye(3), rows.T @ move + weak * np.array([1, 0, 0]))
+    shape = np.linalg.solve(
+        rows.T @ rows + weak * np.eye(3), rows.T @ move + weak * np.array([1, 0, 0])
+    )
     grid = np.linspace(0.0, 1.0, 201)
     ease = np.polyval(shape[::-1], grid)
     if ease.mean() <= 0:  # it moves against its commands, or without them
@@ -240,16 +266,21 @@ def _refit(model: Baseline, courses: Sequence[_Course]) -> Baseline:
 
     def errors(x: Array) -> Array:
         changed = made(x)
-        return np.concatenate([course.errors(changed.predict(course.log)) for course in courses])
+        return np.concatenate(
+            [course.errors(changed.predict(course.log)) for course in courses]
+        )
 
     start = np.array([*model.numbers.ravel(), model.delay])
     inside = np.clip(start, np.array(LOWER) + 1e-6, np.array(UPPER) - 1e-6)
     bounds = LOWER, UPPER
-    return made(least_squares(errors, inside, bounds=bounds, x_scale=SCALE, max_nfev=15).x)
+    return made(
+        least_squares(errors, inside, bounds=bounds, x_scale=SCALE, max_nfev=15).x
+    )
 
 
 def _alone(rest: Baseline, course: _Course, number: int) -> tuple[float, float, float]:
-    """Return one number of a log against a model of the others, its variance, and squares of errors."""
+    """Return one number of a log against a model of the others, its variance, and
+    squares of errors."""
 
     def errors(value: Array) -> Array:
         x = SAME.copy()
@@ -258,8 +289,11 @@ def _alone(rest: Baseline, course: _Course, number: int) -> tuple[float, float, 
 
     bounds = LEAST_NUMBERS[number], MOST_NUMBERS[number]
     scale = STEPS[number]
-    fitted = least_squares(errors, SAME[number], bounds=bounds, x_scale=scale, diff_step=1e-3)
-    # of the windows' scores: errors within a window last, so that its samples say little more
+    fitted = least_squares(
+        errors, SAME[number], bounds=bounds, x_scale=scale, diff_step=1e-3
+    )
+    # of the windows' scores: errors within a window last, so that its samples say
+    # little more
     (slope,) = fitted.jac.T
     scores = np.bincount(course.window, slope * fitted.fun)
     few = len(course.count) / (len(course.count) - 1)
@@ -268,7 +302,8 @@ def _alone(rest: Baseline, course: _Course, number: int) -> tuple[float, float, 
 
 
 def _predict(model: Baseline, log: Log, x: Array) -> Array:
-    """Return the angles of a joint that is faster by a factor, has wider dead bands, and is later."""
+    """Return the angles of a joint that is faster by a factor, has wider dead bands,
+    and is later."""
     speed, dead, delay = x
     numbers = model.numbers.copy()
     numbers[0] = (numbers[0] + dead).clip(0.0, 95.0)
@@ -278,7 +313,8 @@ def _predict(model: Baseline, log: Log, x: Array) -> Array:
 
 
 def _course(log: Log, joint: int, limits: tuple[float, float]) -> _Course:
-    """Return a joint's motion in a log in windows, which also end where it reaches an end."""
+    """Return a joint's motion in a log in windows, which also end where it reaches an
+    end."""
     angle = log.angle[:, joint - 1]
     margin = 0.01 * np.ptp(angle)
     low, high = max(limits[0], angle.min()), min(limits[1], angle.max())
@@ -299,7 +335,8 @@ def _spread(values: Array, variances: Array) -> Array:
 
 
 def _odd(numbers: _Numbers, k: int, windows: int) -> int | None:
-    """Return which of its numbers explains best how a log differs; None: it does not differ enough."""
+    """Return which of its numbers explains best how a log differs; None: it does not
+    differ enough."""
     away = np.abs(numbers.values[k] - SAME)
     # of few windows, standard deviations are rough: as many of a normal distribution
     chance = stdtr(windows - 1, -away / _deviations(numbers, k))

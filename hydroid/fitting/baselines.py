@@ -1,13 +1,15 @@
-"""What anybody would try before a model: each joint's speed follows its command, and nothing else.
+"""What anybody would try before a model: each joint's speed follows its command, and
+nothing else.
 
-Three models of one joint, fitted to logs in about a second: it does not move; a table of mean
-speeds with a delay; nine numbers: dead band, exponent, speed and lag of each direction, and one
-delay. A model of the arm must predict better than they do, and can start its own fit from them.
+Three models of one joint, fitted to logs in about a second: it does not move; a table
+of mean speeds with a delay; nine numbers: dead band, exponent, speed and lag of each
+direction, and one delay. A model of the arm must predict better than they do, and can
+start its own fit from them.
 
-They are fitted to angles, not to innovations as a model of the arm is (`posterior.error_model`). So
-simple a model errs far more than any noise, the error model takes all of that for drift, and what
-is left is a fit of speeds from sample to sample:
-it predicts 1 to 10 s worse (`make bench B=simple_models`).
+They are fitted to angles, not to innovations as a model of the arm is
+(`posterior.error_model`). So simple a model errs far more than any noise, the error
+model takes all of that for drift, and what is left is a fit of speeds from sample to
+sample: it predicts 1 to 10 s worse (`make bench B=simple_models`).
 """
 
 from collections.abc import Iterator, Sequence
@@ -31,7 +33,8 @@ LONGEST_DELAY = 1.0
 LOWER = (0.0, 0.0, 0.3, 0.3, -np.inf, -np.inf, 0.0, 0.0, 0.0)
 UPPER = (90.0, 90.0, 5.0, 5.0, np.inf, np.inf, 1.5, 1.5, LONGEST_DELAY)
 SCALE = (10.0, 10.0, 0.5, 0.5, 0.2, 0.2, 0.1, 0.1, 0.1)
-"""bounds and scales of nine numbers: those of `Baseline.numbers`, row by row, and the delay"""
+"""bounds and scales of nine numbers: those of `Baseline.numbers`, row by row, and the
+delay"""
 
 
 @record
@@ -42,11 +45,11 @@ class Baseline:
         joint: number, from 1.
         limits: its range [rad], where it stops, shape (2,).
         delay: [s].
-        table: commands [%], ascending, and their speeds [rad/s], shape (N, 2); None: by the
-            numbers.
-        numbers: dead band [%], exponent of the command beyond it, speed at full command [rad/s], of
-            either sign, and time constant of the speed [s], of positive and negative commands:
-            shape (4, 2).
+        table: commands [%], ascending, and their speeds [rad/s], shape (N, 2); None: by
+            the numbers.
+        numbers: dead band [%], exponent of the command beyond it, speed at full command
+            [rad/s], of either sign, and time constant of the speed [s], of positive and
+            negative commands: shape (4, 2).
     """
 
     joint: int
@@ -56,7 +59,8 @@ class Baseline:
     numbers: Array = field(default_factory=partial(np.zeros, (4, 2)))
 
     def predict(self, log: Log) -> Array:
-        """Return the angle from the log's start pose under its commands alone [rad], shape (T,)."""
+        """Return the angle from the log's start pose under its commands alone [rad],
+        shape (T,)."""
         command = log.command[:, self.joint - 1]
         side = (command < 0).astype(int)
         if self.table is not None:
@@ -65,7 +69,9 @@ class Baseline:
         else:
             dead, exponent, speed = self.numbers[:3, side]
             beyond = (np.abs(command) - dead) / (100.0 - dead)
-            share = np.power(beyond, exponent, out=np.zeros_like(beyond), where=beyond > 0)
+            share = np.power(
+                beyond, exponent, out=np.zeros_like(beyond), where=beyond > 0
+            )
             target = speed * share
         return follow(
             target * log.period,
@@ -78,7 +84,9 @@ class Baseline:
 
     def errors(self, logs: Sequence[Log]) -> Array:
         """Return measured minus predicted angles of all logs [rad]."""
-        return np.concatenate([log.angle[:, self.joint - 1] - self.predict(log) for log in logs])
+        return np.concatenate(
+            [log.angle[:, self.joint - 1] - self.predict(log) for log in logs]
+        )
 
 
 @njit(cache=True)
@@ -117,17 +125,20 @@ def follow(
     return angles
 
 
-def fit_baselines(logs: Sequence[Log], joint: int, limits: tuple[float, float]) -> dict[str, Baseline]:
+def fit_baselines(
+    logs: Sequence[Log], joint: int, limits: tuple[float, float]
+) -> dict[str, Baseline]:
     """Fit the baselines of a joint (number, from 1) to the logs that measure it.
 
-    `limits` is its range [rad]. They are by name, the simplest first. A joint that is never driven
-    has only that.
+    `limits` is its range [rad]. They are by name, the simplest first. A joint that is
+    never driven has only that.
     """
     measured = [log for log in logs if log.measured[joint - 1]]
     still = Baseline(joint, np.asarray(limits, float))
     if not any(log.driven[joint - 1] for log in measured):
         return {NAMES[0]: still}
-    # the table has no delay of its own to be fitted: the best of all that are tried is taken
+    # the table has no delay of its own to be fitted: the best of all that are tried is
+    # taken
     delays = np.arange(0, LONGEST_DELAY, max(0.02, measured[0].period))
     tables = (_mean_speeds(measured, still, delay) for delay in delays)
     table = min(tables, key=lambda model: np.mean(model.errors(measured) ** 2))
@@ -136,10 +147,13 @@ def fit_baselines(logs: Sequence[Log], joint: int, limits: tuple[float, float]) 
 
 
 def _fit_numbers(logs: Sequence[Log], table: Baseline) -> Baseline:
-    """Fit nine numbers: the best of short fits from the table's speeds goes on to its end."""
+    """Fit nine numbers: the best of short fits from the table's speeds goes on to its
+    end."""
 
     def made(x: Array) -> Baseline:
-        return replace(table, table=None, delay=float(x[8]), numbers=x[:8].reshape(4, 2))
+        return replace(
+            table, table=None, delay=float(x[8]), numbers=x[:8].reshape(4, 2)
+        )
 
     def fit(start: Array, evaluations: int) -> OptimizeResult:
         return least_squares(
@@ -157,8 +171,8 @@ def _fit_numbers(logs: Sequence[Log], table: Baseline) -> Baseline:
 
 
 def _mean_speeds(logs: Sequence[Log], still: Baseline, delay: float) -> Baseline:
-    """Return the mean speed in each of BINS of a command that acts after a delay, but for zero
-    command."""
+    """Return the mean speed in each of BINS of a command that acts after a delay, but
+    for zero command."""
     pairs = list[Array]()
     for log in logs:
         command = log.command[:, still.joint - 1]
@@ -182,8 +196,8 @@ def _mean_speeds(logs: Sequence[Log], still: Baseline, delay: float) -> Baseline
 
 
 def _starts(table: Baseline) -> Iterator[Array]:
-    """Yield starts of nine numbers: dead bands that end where the table begins to move, its last
-    speeds, and three exponents."""
+    """Yield starts of nine numbers: dead bands that end where the table begins to move,
+    its last speeds, and three exponents."""
     assert table.table is not None
     commands, speeds = table.table.T
     dead = np.zeros(2)

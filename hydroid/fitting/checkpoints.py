@@ -1,7 +1,9 @@
-"""Checkpoints of a fit: arrays by the name of what is under way, stored every few seconds.
+"""Checkpoints of a fit: arrays by the name of what is under way, stored every few
+seconds.
 
-A run folder keeps them in a file (`run.archive`); elsewhere a plain dict will do. Of a search they are the
-objectives of all candidates simulated so far: none is simulated twice, also not by a resumed run.
+A run folder keeps them in a file (`run.archive`); elsewhere a plain dict will do. Of a
+search they are the objectives of all candidates simulated so far: none is simulated
+twice, also not by a resumed run.
 """
 
 import time
@@ -19,18 +21,21 @@ from hydroid.problem.problem import Problem
 SAVE_EVERY = 5.0
 """seconds between checkpoints: a lost one costs no more"""
 SHARE = 0.05
-"""of the time that writing them takes at most: the Jacobians of a large fit are hundreds of MB"""
+"""of the time that writing them takes at most: the Jacobians of a large fit are
+hundreds of MB"""
 
 Arrays = dict[str, NDArray[Any]]
 Checkpoints = MutableMapping[str, Arrays]
 
 
 @contextmanager
-def saving(checkpoints: Checkpoints, name: str) -> Generator[Callable[[Callable[[], Arrays]], None]]:
+def saving(
+    checkpoints: Checkpoints, name: str
+) -> Generator[Callable[[Callable[[], Arrays]], None]]:
     """Yield a function that takes how the newest state is stored.
 
-    A state is stored every SAVE_EVERY seconds, or more seldom where that takes long, and the last one
-    where the block ends, also by an interrupt.
+    A state is stored every SAVE_EVERY seconds, or more seldom where that takes long,
+    and the last one where the block ends, also by an interrupt.
     """
     pending = None
     saved = time.monotonic()
@@ -55,13 +60,16 @@ def saving(checkpoints: Checkpoints, name: str) -> Generator[Callable[[Callable[
 class Memo:
     """Evaluates each candidate once: identical chromosomes are not simulated again.
 
-    A search is deterministic. So its memo is all that a checkpoint needs: a resumed search begins anew, and
-    gets what is stored until it asks for the first candidate that is not.
+    A search is deterministic. So its memo is all that a checkpoint needs: a resumed
+    search begins anew, and gets what is stored until it asks for the first candidate
+    that is not.
 
     Attributes:
         infeasible: candidates whose simulation diverged.
-        elsewhere: candidates that a local method simulated on its way to those evaluated here.
-        stored: objectives of the resumed run's candidates that have not been asked for yet.
+        elsewhere: candidates that a local method simulated on its way to those
+            evaluated here.
+        stored: objectives of the resumed run's candidates that have not been asked for
+            yet.
     """
 
     def __init__(self, problem: Problem, stored: Arrays | None = None) -> None:
@@ -73,7 +81,8 @@ class Memo:
 
     @property
     def simulated(self) -> int:
-        """Candidates simulated so far, those of a run that this one resumes included."""
+        """Candidates simulated so far, those of a run that this one resumes
+        included."""
         return len(self._values) + self.elsewhere
 
     @property
@@ -95,7 +104,8 @@ class Memo:
             )
         if unknown:
             rows = self.problem.evaluate(np.array([new[key] for key in unknown]))
-            # a candidate with one infinite objective is infeasible: none of its objectives may win
+            # a candidate with one infinite objective is infeasible: none of its
+            # objectives may win
             rows[~np.isfinite(rows).all(axis=1)] = np.inf
             values |= zip(unknown, rows, strict=True)
         self.infeasible += sum(not np.isfinite(row[-1]) for row in values.values())
@@ -103,7 +113,8 @@ class Memo:
         return np.array([self._values[row.tobytes()] for row in theta])
 
     def arrays(self) -> Arrays:
-        """Return all candidates and their objectives, overall last: shapes (m, P) and (m, S + 1)."""
+        """Return all candidates and their objectives, overall last: shapes (m, P) and
+        (m, S + 1)."""
         return {
             "theta": np.array([np.frombuffer(key) for key in self._values]),
             "values": np.array(list(self._values.values())),

@@ -1,15 +1,16 @@
 """Whether a fit predicts better than a simple model: errors compared in pairs,
 with a standard error.
 
-Both predict the same starts, so that a hard part of a log is hard for both, and the difference of
-their squared errors is what counts. Starts 2 s apart overlap, and what a model gets wrong lasts:
-neighbours are no independent evidence. So the differences are summed over blocks of BLOCK or
-longer, and the sums scatter as far as the mean is uncertain (batch means; over blocks of unequal
-length the variance of a ratio). Of whole logs each is a block.
+Both predict the same starts, so that a hard part of a log is hard for both, and the
+difference of their squared errors is what counts. Starts 2 s apart overlap, and what a
+model gets wrong lasts: neighbours are no independent evidence. So the differences are
+summed over blocks of BLOCK or longer, and the sums scatter as far as the mean is
+uncertain (batch means; over blocks of unequal length the variance of a ratio). Of whole
+logs each is a block.
 
-The fit is *better* or *worse* where the difference is beyond the 95 % quantile of Student's
-distribution, 1.64 standard errors where blocks are many. Else, and of fewer than LEAST_BLOCKS,
-it *cannot be told*.
+The fit is *better* or *worse* where the difference is beyond the 95 % quantile of
+Student's distribution, 1.64 standard errors where blocks are many. Else, and of fewer
+than LEAST_BLOCKS, it *cannot be told*.
 """
 
 from collections.abc import Sequence
@@ -42,10 +43,11 @@ def in_blocks(errors: Array, between: float) -> list[Array]:
 
 
 def compare(ours: Sequence[Array], theirs: Sequence[Array]) -> Comparison:
-    """Compare errors [rad] of a fit with those of a simple model, in the same blocks, each of shape
-    (n,).
+    """Compare errors [rad] of a fit with those of a simple model, in the same blocks,
+    each of shape (n,).
 
-    An infinite error stands for a simulation that diverged. A fit that diverges is worse.
+    An infinite error stands for a simulation that diverged. A fit that diverges is
+    worse.
     """
     blocks = len(ours)
     if not all(np.isfinite(block).all() for block in ours):

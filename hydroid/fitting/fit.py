@@ -1,4 +1,5 @@
-"""A fit: search, the estimates taken from it, refinement, and the uncertainty of the last estimate."""
+"""A fit: search, the estimates taken from it, refinement, and the uncertainty of the
+last estimate."""
 
 import time
 from collections.abc import Mapping, Sequence
@@ -20,12 +21,13 @@ from hydroid.search.pareto import average, non_dominated, segment_best, utopia
 class Fit:
     """The estimates of a fit, and what is known of the one to use.
 
-    problem: with the settings of the estimate to use, which `final` names. estimates: by name, that of the
-    search first. front: the non-dominated candidates, (n, P), and their objectives, (n, S + 1). history:
-    (G, len(HISTORY)). refinements: by the estimate that each gave. ends: costs at which the starts of a
-    multi-start ended, by the joint that was fitted alone (0: all together). uncertainty, quantities: of the
-    final estimate. seconds: wall-clock time of "search", "refinement" and "uncertainty" [s]; of a resumed
-    fit, since it was resumed.
+    problem: with the settings of the estimate to use, which `final` names. estimates:
+    by name, that of the search first. front: the non-dominated candidates, (n, P), and
+    their objectives, (n, S + 1). history: (G, len(HISTORY)). refinements: by the
+    estimate that each gave. ends: costs at which the starts of a multi-start ended, by
+    the joint that was fitted alone (0: all together). uncertainty, quantities: of the
+    final estimate. seconds: wall-clock time of "search", "refinement" and "uncertainty"
+    [s]; of a resumed fit, since it was resumed.
     """
 
     problem: Problem
@@ -54,13 +56,20 @@ class Silent(Watcher):
     """Progress that is not shown."""
 
 
-def fit(problem: Problem, watch: Watcher | None = None, checkpoints: Checkpoints | None = None) -> Fit:
-    """Search, take the estimates, refine the best of them, and say what the last one is worth.
+def fit(
+    problem: Problem,
+    watch: Watcher | None = None,
+    checkpoints: Checkpoints | None = None,
+) -> Fit:
+    """Search, take the estimates, refine the best of them, and say what the last one is
+    worth.
 
     Args:
         problem: the estimation problem with its settings.
-        watch: takes the progress, and says when time is up: the fit then ends with what it has.
-        checkpoints: what an interrupted fit stored, to continue from; takes the states of this one.
+        watch: takes the progress, and says when time is up: the fit then ends with what
+            it has.
+        checkpoints: what an interrupted fit stored, to continue from; takes the states
+            of this one.
 
     Raises:
         RunError: every simulated candidate diverged.
@@ -96,7 +105,8 @@ def fit(problem: Problem, watch: Watcher | None = None, checkpoints: Checkpoints
 
 
 def _candidates(problem: Problem, searched: Searched) -> dict[str, Array]:
-    """The estimates that a search gives, by name, the one that the settings ask for first."""
+    """The estimates that a search gives, by name, the one that the settings ask for
+    first."""
     theta, memo = searched.theta, searched.memo
     if searched.single:
         return {"best": theta[segment_best(searched.population.objectives)[0]]}
@@ -112,7 +122,9 @@ def _candidates(problem: Problem, searched: Searched) -> dict[str, Array]:
 
 def _front(searched: Searched) -> tuple[Array, Array]:
     """The different non-dominated candidates of the last population."""
-    theta = searched.theta[np.sort(np.unique(searched.theta, axis=0, return_index=True)[1])]
+    theta = searched.theta[
+        np.sort(np.unique(searched.theta, axis=0, return_index=True)[1])
+    ]
     values = searched.memo.evaluate(theta)
     best = non_dominated(values[:, :-1])
     return theta[best], values[best]

@@ -1,9 +1,10 @@
-"""The ladder of a fit: refinements one after another, each of a model that has more in it than the last one.
+"""The ladder of a fit: refinements one after another, each of a model that has more in
+it than the last one.
 
-A rung is kept where it foretells parts of the logs that it has not seen better than the one below, by more
-than the uncertainty of that (`left_out.is_better`). Which rung that is shows long before least squares has
-converged, so that ends early on the way (`FIRM`). What is kept at the end is refined to the tolerance of the
-settings.
+A rung is kept where it foretells parts of the logs that it has not seen better than the
+one below, by more than the uncertainty of that (`left_out.is_better`). Which rung that
+is shows long before least squares has converged, so that ends early on the way
+(`FIRM`). What is kept at the end is refined to the tolerance of the settings.
 """
 
 from collections.abc import Callable, Mapping
@@ -28,7 +29,8 @@ from hydroid.settings.fit import FitSettings
 from hydroid.settings.search import RefinementSettings
 
 FIRST = 10
-"""iterations after which another model must be more likely than the last one: each is slow to simulate"""
+"""iterations after which another model must be more likely than the last one: each is
+slow to simulate"""
 FIRM = 1e-3  # gain below which least squares ends where another rung may follow
 
 
@@ -36,10 +38,11 @@ FIRM = 1e-3  # gain below which least squares ends where another rung may follow
 class Estimate:
     """One parameter set with its response.
 
-    theta: shape (P,). segments: objectives by segment, shape (S,). overall: norm over the whole record.
-    rms: of the output error [rad]. responses: simulated outputs [rad], (T, K) a log. gained: of an estimate
-    with another term or model, by how much it foretells parts of the logs left out better than the one below,
-    and the standard error of that (`left_out.gain`).
+    theta: shape (P,). segments: objectives by segment, shape (S,). overall: norm over
+    the whole record. rms: of the output error [rad]. responses: simulated outputs
+    [rad], (T, K) a log. gained: of an estimate with another term or model, by how much
+    it foretells parts of the logs left out better than the one below, and the standard
+    error of that (`left_out.gain`).
     """
 
     name: str
@@ -52,18 +55,23 @@ class Estimate:
 
     @property
     def usable(self) -> bool:
-        """Whether it could be simulated: the mean of several candidates that could need not."""
+        """Whether it could be simulated: the mean of several candidates that could need
+        not."""
         return bool(np.isfinite(self.rms))
 
 
 def measured(problem: Problem, candidates: Mapping[str, Array]) -> dict[str, Estimate]:
-    """Simulate candidates by name, each of shape (P,), and measure them; those that diverged come last."""
+    """Simulate candidates by name, each of shape (P,), and measure them; those that
+    diverged come last."""
     theta = np.array(list(candidates.values()))
     responses = problem.responses(theta)
     errors = problem.errors(responses)
     norms, rms = problem.norms(errors), problem.rms(errors)
-    angles = zip(*(response.angle for response in responses), strict=True)  # of each candidate
-    estimates = map(Estimate, candidates, theta, norms[:, :-1], norms[:, -1], rms, angles)
+    # of each candidate
+    angles = zip(*(response.angle for response in responses), strict=True)
+    estimates = map(
+        Estimate, candidates, theta, norms[:, :-1], norms[:, -1], rms, angles
+    )
     return {e.name: e for e in sorted(estimates, key=lambda e: not e.usable)}
 
 
@@ -74,7 +82,8 @@ class Watcher(Protocol):
         """Take a row of HISTORY; return whether the search is to end."""
 
     def refining(self, step: Step, simulated: int, rms: float) -> bool | None:
-        """Take a step, its number of simulations, and its rms error [rad]; return whether it is to end."""
+        """Take a step, its number of simulations, and its rms error [rad]; return
+        whether it is to end."""
 
 
 class Ladder:
@@ -88,7 +97,11 @@ class Ladder:
     """
 
     def __init__(
-        self, problem: Problem, estimates: dict[str, Estimate], watch: Watcher, checkpoints: Checkpoints
+        self,
+        problem: Problem,
+        estimates: dict[str, Estimate],
+        watch: Watcher,
+        checkpoints: Checkpoints,
     ) -> None:
         self.problem, self.estimates = problem, estimates
         self.refinements = dict[str, Refinement]()
@@ -97,18 +110,25 @@ class Ladder:
         self._step = step_of(self.kept.name)
 
     def climb(self, whole: Problem) -> None:
-        """Refine the estimate with each model and term that the settings of a fit's problem name."""
+        """Refine the estimate with each model and term that the settings of a fit's
+        problem name."""
         settings, refinement = whole.settings, whole.settings.refinement
         assert refinement is not None
         two = settings.stage == "hyd" and settings.simulation.model == "ladder"
         climbs = two or bool(settings.terms())
-        tolerance = max(FIRM, refinement.gain_tolerance) if climbs else refinement.gain_tolerance
+        tolerance = (
+            max(FIRM, refinement.gain_tolerance)
+            if climbs
+            else refinement.gain_tolerance
+        )
         on_the_way = refinement.changed({"gain_tolerance": tolerance})
         lone = self._lone_terms(settings)
         for model in ("refined", "dynamic")[: 1 + two]:
             possible = settings.terms(model)
             terms = tuple(term for term in possible if term in self._step.terms)
-            self._rung(whole, Step(model, terms), on_the_way, if_better=model == "dynamic")
+            self._rung(
+                whole, Step(model, terms), on_the_way, if_better=model == "dynamic"
+            )
             for term in possible if self._step.model == model else ():
                 if term not in (*terms, *lone):
                     with_term = self._step.changed(terms=(*self._step.terms, term))
@@ -121,21 +141,29 @@ class Ladder:
         if climbs:
             kept = self.kept
             likelihood = make_likelihood(self.problem)
-            # with an error that another model has left, the first error model would have too much drift
-            last = self._refined(likelihood, kept.theta, refinement, self._step, refine_from_afar)
+            # with an error that another model has left, the first error model would
+            # have too much drift
+            last = self._refined(
+                likelihood, kept.theta, refinement, self._step, refine_from_afar
+            )
             new = self._measured(self.problem, last, self._step)
             self.kept = self.estimates[kept.name] = replace(new, gained=kept.gained)
         if settings.joint_refinement:
-            self._rung(whole, self._step.changed(model="joint"), refinement, if_better=False)
+            self._rung(
+                whole, self._step.changed(model="joint"), refinement, if_better=False
+            )
 
     def known(self, theta: Array) -> Uncertainty:
-        """Return how well the logs determine theta, (P,): the estimate that is kept, or one of a search."""
+        """Return how well the logs determine theta, (P,): the estimate that is kept, or
+        one of a search."""
         problem, descent = self.problem, self.refinements.get(self.kept.name)
         if descent is None or not len(descent.jacobian):
             return uncertainty(problem, theta)
         # what least squares ended with
         parameters, free = problem.parameters, problem.parameters.free
-        change = estimate_box(parameters, theta).scale[free] / parameters.width(theta)[free]
+        change = (
+            estimate_box(parameters, theta).scale[free] / parameters.width(theta)[free]
+        )
         slopes = descent.jacobian[: problem.measured.size].T * change[:, None]
         return uncertainty(problem, theta, slopes, descent.numbers)
 
@@ -148,9 +176,11 @@ class Ladder:
         if_better: bool,
         begun: Array | None = None,
     ) -> None:
-        """Refine with the settings of an estimate, from the one kept; keep the result where it is better.
+        """Refine with the settings of an estimate, from the one kept; keep the result
+        where it is better.
 
-        if_better: else it is kept in any case. begun: where it begins, shape (P,), if not at the kept one.
+        if_better: else it is kept in any case. begun: where it begins, shape (P,), if
+        not at the kept one.
         """
         last, start = self.problem, self.kept
         if if_better and (self._late or last.leaves_noise(start.theta)):
@@ -160,17 +190,22 @@ class Ladder:
         likelihood = make_likelihood(own)
         other_model = own.settings.quasi_static != last.settings.quasi_static
         if other_model:
-            if self._is_white():  # there is nothing for a model that is slow to simulate
+            # there is nothing for a model that is slow to simulate
+            if self._is_white():
                 return
             few = settings.changed({"iterations": FIRST})
-            first = self._refined(likelihood, theta, few, step.changed(phase="at first"))
+            first = self._refined(
+                likelihood, theta, few, step.changed(phase="at first")
+            )
             theta = own.parameters.from_unit(first.point)
             if self._explained(own, theta) < 0.0:
                 return
         # what a search, or another model, ended at may be far from an optimum
         far = not if_better or other_model or _new_curves(own, last)
         how = refine_from_afar if far else refine
-        result = self._refined(likelihood, theta, settings, step.changed(phase="on the way"), how)
+        result = self._refined(
+            likelihood, theta, settings, step.changed(phase="on the way"), how
+        )
         if self._late and if_better:
             return
         new = self._measured(own, result, step)
@@ -185,11 +220,19 @@ class Ladder:
             self._keep(own, new, step)
 
     def _lone_terms(self, settings: FitSettings) -> dict[str, int]:
-        """Return the terms of one joint that can be fitted alone, and that joint, numbered from 1."""
-        return {term: joint for joint in lone_joints(self.problem) for term in settings.terms_of(joint)}
+        """Return the terms of one joint that can be fitted alone, and that joint,
+        numbered from 1."""
+        return {
+            term: joint
+            for joint in lone_joints(self.problem)
+            for term in settings.terms_of(joint)
+        }
 
-    def _add_lone_terms(self, whole: Problem, lone: Mapping[str, int], settings: RefinementSettings) -> None:
-        """Try each term of one joint on that joint alone, which takes seconds; then the better ones together.
+    def _add_lone_terms(
+        self, whole: Problem, lone: Mapping[str, int], settings: RefinementSettings
+    ) -> None:
+        """Try each term of one joint on that joint alone, which takes seconds; then the
+        better ones together.
 
         The other joints follow their logs meanwhile.
         """
@@ -204,50 +247,73 @@ class Ladder:
             self._rung(whole, step, settings, if_better=True, begun=theta)
 
     def _better_alone(
-        self, last: Problem, problem: Problem, theta: Array, step: Step, settings: RefinementSettings
+        self,
+        last: Problem,
+        problem: Problem,
+        theta: Array,
+        step: Step,
+        settings: RefinementSettings,
     ) -> Array | None:
-        """Return where a joint alone leads, (P,), from the theta of the last problem; None: not better."""
+        """Return where a joint alone leads, (P,), from the theta of the last problem;
+        None: not better."""
         before = alone(last, step.joint, theta)
         if self._late or before.leaves_noise(theta):
             return None
         begun = _begun(problem, last, theta)
         after = alone(problem, step.joint, begun)
-        without = self._refined(make_likelihood(before), theta, settings, step.changed(phase="without it"))
-        with_it = self._refined(make_likelihood(after), begun, settings, step, refine_from_afar)
-        if self._late or not is_better(self._left_out_of(after, with_it), self._left_out_of(before, without)):
+        without = self._refined(
+            make_likelihood(before), theta, settings, step.changed(phase="without it")
+        )
+        with_it = self._refined(
+            make_likelihood(after), begun, settings, step, refine_from_afar
+        )
+        if self._late or not is_better(
+            self._left_out_of(after, with_it), self._left_out_of(before, without)
+        ):
             return None
         return after.parameters.from_unit(with_it.point)
 
-    def _try_without(self, whole: Problem, term: str, settings: RefinementSettings) -> None:
-        """Drop a term that was kept below, unless this model foretells clearly better with it.
+    def _try_without(
+        self, whole: Problem, term: str, settings: RefinementSettings
+    ) -> None:
+        """Drop a term that was kept below, unless this model foretells clearly better
+        with it.
 
         A term may have stood for what only a richer model has.
         """
         if self._late:
             return
-        step = self._step.changed(terms=tuple(one for one in self._step.terms if one != term))
+        step = self._step.changed(
+            terms=tuple(one for one in self._step.terms if one != term)
+        )
         own = whole.varied(whole.settings.of_estimate(step.estimate))
         parameters, before = own.parameters, self.problem.parameters
         theta = parameters.started(before.mapping(self.kept.theta))
-        result = self._refined(make_likelihood(own), theta, settings, step.changed(phase="on the way"))
+        result = self._refined(
+            make_likelihood(own), theta, settings, step.changed(phase="on the way")
+        )
         with_it = self._left_out_of(self.problem, self.refinements[self.kept.name])
         without = self._left_out_of(own, result)
         if not self._late and not is_better(with_it, without):
             self._keep(own, self._measured(own, result, step), step)
 
     def _explained(self, problem: Problem, theta: Array) -> float:
-        """Rise of the log-likelihood from the kept estimate to another, (P,), of a problem of the same logs.
+        """Rise of the log-likelihood from the kept estimate to another, (P,), of a
+        problem of the same logs.
 
         Both are weighed by the errors of the kept one.
         """
-        kept = likelihood_at(self.problem, self.kept.theta, self.refinements[self.kept.name].numbers)
+        kept = likelihood_at(
+            self.problem, self.kept.theta, self.refinements[self.kept.name].numbers
+        )
         other = replace(kept, problem=problem)
         before = kept.rows(self.kept.theta[None])[0]
         after = other.rows(theta[None])[0]
         return 0.5 * float(before @ before - after @ after)
 
     def _is_white(self) -> bool:
-        """Whether the errors of the estimate that is kept leave innovations that are white."""
+        """Whether the errors of the estimate that is kept leave innovations that are
+        white."""
         numbers = self.refinements[self.kept.name].numbers
         shown = likelihood_at(self.problem, self.kept.theta, numbers).shown
         errors = self.problem.output_errors(self.kept.theta[None])
@@ -267,14 +333,18 @@ class Ladder:
         step: Step,
         how: Callable[..., Refinement] = refine,
     ) -> Refinement:
-        result = how(likelihood, theta, settings, self._watch.refining, self._checkpoints, step)
+        result = how(
+            likelihood, theta, settings, self._watch.refining, self._checkpoints, step
+        )
         self._late |= result.ending is Ending.TIME
         return result
 
     def _measured(self, problem: Problem, end: Refinement, step: Step) -> Estimate:
         """Measure an end of least squares, and list it."""
         name = step.estimate
-        self.estimates |= measured(problem, {name: problem.parameters.from_unit(end.point)})
+        self.estimates |= measured(
+            problem, {name: problem.parameters.from_unit(end.point)}
+        )
         self.refinements[name] = end
         return self.estimates[name]
 
@@ -282,8 +352,8 @@ class Ladder:
 def _begun(problem: Problem, last: Problem, theta: Array) -> Array:
     """Return where another model begins, from theta, (P,), of the last one.
 
-    A valve that has a curve now begins at the speeds that the logs show: from a power law, least squares
-    seldom finds a valve that opens all at once.
+    A valve that has a curve now begins at the speeds that the logs show: from a power
+    law, least squares seldom finds a valve that opens all at once.
     """
     begun = problem.parameters.started(last.parameters.mapping(theta))
     for joint in _new_curves(problem, last):
@@ -292,10 +362,16 @@ def _begun(problem: Problem, last: Problem, theta: Array) -> Array:
 
 
 def _new_curves(problem: Problem, last: Problem) -> list[int]:
-    """The joints, from 1, whose valves have a curve here and had none in the last model.
+    """The joints, from 1, whose valves have a curve here and had none in the last
+    model.
 
-    None of a dynamic model: without the oil and the inertia, the speeds are no better start.
+    None of a dynamic model: without the oil and the inertia, the speeds are no better
+    start.
     """
     if not problem.settings.quasi_static:
         return []
-    return [j for j in problem.settings.outputs if has_curve(problem, j) and not has_curve(last, j)]
+    return [
+        j
+        for j in problem.settings.outputs
+        if has_curve(problem, j) and not has_curve(last, j)
+    ]

@@ -1,11 +1,11 @@
 """Parts of the logs left out: each is predicted by a fit that has not seen it.
 
-A fit is repeated without each part (`predict_parts`), or its parameters without each block of time follow
-from its Jacobian (`predict_blocks`), which costs no simulation.
+A fit is repeated without each part (`predict_parts`), or its parameters without each
+block of time follow from its Jacobian (`predict_blocks`), which costs no simulation.
 
-Models are compared by the predictive likelihood of these parts, a sum over blocks of time whose differences
-also tell how certain the comparison is. Errors over a whole log would be a lottery: the drift of a joint in
-one log is one draw.
+Models are compared by the predictive likelihood of these parts, a sum over blocks of
+time whose differences also tell how certain the comparison is. Errors over a whole log
+would be a lottery: the drift of a joint in one log is one draw.
 """
 
 import math
@@ -24,14 +24,18 @@ from hydroid.search.descent import derivatives
 BLOCK = 5.0
 """length of a block [s]: longer than what is left of an error lasts (ours)"""
 LEAST_BLOCKS = 8
-"""that all logs together have; those of short logs are shorter: from a few, a standard error is a guess"""
+"""that all logs together have; those of short logs are shorter: from a few, a standard
+error is a guess"""
 RANK = 1e-12
-"""relative size of an eigenvalue of the normal equations below which nothing is known of its direction"""
+"""relative size of an eigenvalue of the normal equations below which nothing is known
+of its direction"""
 CERTAIN = 1.64
-"""standard errors that a gain must exceed: in 5 % of the cases one without a reason does"""
+"""standard errors that a gain must exceed: in 5 % of the cases one without a reason
+does"""
 
 Refit = Callable[[Likelihood, Array, int], Refinement]
-"""refines an estimate, shape (P,), by a likelihood; takes the number of the part left out, from 1"""
+"""refines an estimate, shape (P,), by a likelihood; takes the number of the part left
+out, from 1"""
 
 
 @record
@@ -41,7 +45,8 @@ class LeftOut:
     Attributes:
         problem: with all logs.
         thetas: of the fit without each part, shape (G, P).
-        errors: weighted output errors of each part in the fit without it [rad], shape (R,).
+        errors: weighted output errors of each part in the fit without it [rad], shape
+            (R,).
     """
 
     problem: Problem
@@ -53,14 +58,17 @@ class LeftOut:
         """Rms error of each compared joint by name [deg]."""
         settings = self.problem.settings
         names, rms = settings.arm.joint_names, self.problem.rms
-        return {names[j - 1]: finite(np.degrees(rms(self.errors[None], [j])[0])) for j in settings.outputs}
+        return {
+            names[j - 1]: finite(np.degrees(rms(self.errors[None], [j])[0]))
+            for j in settings.outputs
+        }
 
 
 def predict_parts(problem: Problem, starts: Array, refit: Refit) -> LeftOut:
     """Fit a problem without each of its G parts, and predict these parts.
 
-    `starts`, shape (G, P), are where each fit starts: estimates that have not seen the part, or one that is
-    far from an optimum.
+    `starts`, shape (G, P), are where each fit starts: estimates that have not seen the
+    part, or one that is far from an optimum.
     """
     number = parts(problem)
     several = len(problem.logs) > 1
@@ -81,11 +89,12 @@ def predict_parts(problem: Problem, starts: Array, refit: Refit) -> LeftOut:
 
 
 def predict_blocks(likelihood: Likelihood, end: Refinement) -> LeftOut:
-    """Predict each block of time by the parameters that least squares would find without it.
+    """Predict each block of time by the parameters that least squares would find
+    without it.
 
-    They follow to first order from the normal equations without the block's rows (R. D. Cook, 1977), within
-    the bounds. All logs keep a share in each fit: one of two logs alone may leave a parameter open, and then
-    tells nothing of a model.
+    They follow to first order from the normal equations without the block's rows (R. D.
+    Cook, 1977), within the bounds. All logs keep a share in each fit: one of two logs
+    alone may leave a parameter open, and then tells nothing of a model.
     """
     problem = likelihood.problem
     weighing = replace(likelihood, shown=replace(likelihood.shown, numbers=end.numbers))
@@ -94,7 +103,9 @@ def predict_blocks(likelihood: Likelihood, end: Refinement) -> LeftOut:
     if not len(jacobian):
         rows = weighing.rows(theta[None])[0]
         jacobian = derivatives(
-            lambda unit: weighing.rows(problem.parameters.from_unit(unit)), end.point, rows
+            lambda unit: weighing.rows(problem.parameters.from_unit(unit)),
+            end.point,
+            rows,
         ).T
     # a parameter at a bound stays there
     inside = (end.point > 0.0) & (end.point < 1.0)
@@ -109,7 +120,9 @@ def predict_blocks(likelihood: Likelihood, end: Refinement) -> LeftOut:
     for block in range(len(thetas)):
         own = np.flatnonzero(number == block)
         of_block = slopes[own]
-        others = np.linalg.pinv(normal - of_block.T @ of_block, rcond=RANK, hermitian=True)
+        others = np.linalg.pinv(
+            normal - of_block.T @ of_block, rcond=RANK, hermitian=True
+        )
         change = others @ (of_block.T @ innovations[own])
         change = np.clip(end.point + change, 0.0, 1.0) - end.point
         thetas[block] = problem.parameters.from_unit(end.point + change)
@@ -130,12 +143,14 @@ def parts(problem: Problem) -> Ints:
 
 
 def gain(after: LeftOut, before: LeftOut) -> tuple[float, float]:
-    """Return by how much one model foretells the parts better than another, and the standard error of that.
+    """Return by how much one model foretells the parts better than another, and the
+    standard error of that.
 
-    It is a difference of log-likelihoods by blocks, half by the weights that the errors of the one show
-    on the parts, half by those of the other. By the weights of one alone, the other's errors would seem
-    impossible wherever it errs a little more. The standard error is infinite where there is one block
-    only, or where either model cannot be simulated.
+    It is a difference of log-likelihoods by blocks, half by the weights that the errors
+    of the one show on the parts, half by those of the other. By the weights of one
+    alone, the other's errors would seem impossible wherever it errs a little more. The
+    standard error is infinite where there is one block only, or where either model
+    cannot be simulated.
     """
     problem = before.problem
     able = [bool(np.isfinite(one.errors).all()) for one in (after, before)]
@@ -154,7 +169,8 @@ def gain(after: LeftOut, before: LeftOut) -> tuple[float, float]:
 
 
 def is_better(after: LeftOut, before: LeftOut) -> bool:
-    """Whether one model foretells the parts better than another by more than the uncertainty of that.
+    """Whether one model foretells the parts better than another by more than the
+    uncertainty of that.
 
     So does one that can be simulated where the other cannot.
     """
@@ -162,7 +178,8 @@ def is_better(after: LeftOut, before: LeftOut) -> bool:
 
 
 def is_clear(rise: float, error: float) -> bool:
-    """Whether a gain and its standard error, as `gain` returns them, say that a model is better."""
+    """Whether a gain and its standard error, as `gain` returns them, say that a model
+    is better."""
     return rise > CERTAIN * error or rise == np.inf
 
 
@@ -179,6 +196,7 @@ def blocks(problem: Problem) -> Ints:
 
 
 def _of_logs(problem: Problem, samples: Sequence[bool] | Array) -> Problem:
-    """Return the problem of the logs that some samples, (R,), are of; parts are whole logs."""
+    """Return the problem of the logs that some samples, (R,), are of; parts are whole
+    logs."""
     kept = sorted({c.log for c in problem.channels if samples[c.rows.start]})
     return problem.varied(problem.settings, [problem.logs[i] for i in kept])

@@ -1,16 +1,19 @@
-"""Multi-start least squares: from the stated start and random ones, each over a growing part of the record.
+"""Multi-start least squares: from the stated start and random ones, each over a growing
+part of the record.
 
-From far off, the response over a whole record says nothing to a local method: it runs to the joints' stops,
-where no parameter has an effect. Over the first seconds it cannot get that far. A start is therefore fitted
-to the first quarter of a second, to the first seconds, and then to all of it (a *progressive horizon*). Each
-fit keeps the longer response near the record. With 27 parameters and starts a factor of 10 off, 30 of 30
-starts reached the noise this way. One in eight of those fitted to the whole record at once ended at the
-stops.
+From far off, the response over a whole record says nothing to a local method: it runs
+to the joints' stops, where no parameter has an effect. Over the first seconds it cannot
+get that far. A start is therefore fitted to the first quarter of a second, to the first
+seconds, and then to all of it (a *progressive horizon*). Each fit keeps the longer
+response near the record. With 27 parameters and starts a factor of 10 off, 30 of 30
+starts reached the noise this way. One in eight of those fitted to the whole record at
+once ended at the stops.
 
-Several hydraulic joints are fitted joint by joint: each start is fitted to every joint alone, while the other
-joints follow their logged motion. A joint has few parameters, which are soon found, and each joint may take
-another start's. What the joints share (masses, the pump) stays at the start's values. Fitting all parameters
-together is left to the refinement that follows the search.
+Several hydraulic joints are fitted joint by joint: each start is fitted to every joint
+alone, while the other joints follow their logged motion. A joint has few parameters,
+which are soon found, and each joint may take another start's. What the joints share
+(masses, the pump) stays at the start's values. Fitting all parameters together is left
+to the refinement that follows the search.
 """
 
 from collections import defaultdict
@@ -35,15 +38,17 @@ from hydroid.search.genetic import Population
 
 DRAWS = 64  # candidates drawn for a start that can be simulated
 MOVES = 0.01
-"""part of an angle's travel over the whole record, below which a shorter part of it shows no motion"""
+"""part of an angle's travel over the whole record, below which a shorter part of it
+shows no motion"""
 COST = itemgetter(0)  # of a negative log-likelihood and the theta that it is of
 
 
 class Multistart:
-    """Least squares from one random start after the other: a search whose chromosomes are theta.
+    """Least squares from one random start after the other: a search whose chromosomes
+    are theta.
 
-    Its objective is the negative log-likelihood, priors included. A start depends on the seed and its number
-    alone.
+    Its objective is the negative log-likelihood, priors included. A start depends on
+    the seed and its number alone.
 
     Args:
         problem: what is minimised.
@@ -54,14 +59,23 @@ class Multistart:
 
     single = True
 
-    def __init__(self, problem: Problem, memo: Memo, progress: Refining, checkpoints: Checkpoints) -> None:
+    def __init__(
+        self, problem: Problem, memo: Memo, progress: Refining, checkpoints: Checkpoints
+    ) -> None:
         self.settings = problem.settings.search.multistart
-        self._problem, self._memo, self._progress, self._checkpoints = problem, memo, progress, checkpoints
+        self._problem, self._memo, self._progress, self._checkpoints = (
+            problem,
+            memo,
+            progress,
+            checkpoints,
+        )
         self._best: dict[int, tuple[float, Array]] = {}
-        """the best fit of each joint alone, over the starts so far: its negative log-likelihood, and theta"""
+        """the best fit of each joint alone, over the starts so far: its negative
+        log-likelihood, and theta"""
         self._cost = np.inf
         self.ends = defaultdict[int, list[float]](list)
-        """negative log-likelihoods at which starts ended, by the joint fitted alone, 0: all together"""
+        """negative log-likelihoods at which starts ended, by the joint fitted alone, 0:
+        all together"""
 
     @property
     def generations(self) -> int:
@@ -69,7 +83,8 @@ class Multistart:
         return self.settings.generations
 
     def theta(self, chromosomes: Genes) -> Array:
-        """Return the candidates that chromosomes stand for, which they are, shape (n, P)."""
+        """Return the candidates that chromosomes stand for, which they are, shape (n,
+        P)."""
         return chromosomes
 
     def ask(self, population: Population | None, rng: Generator) -> Genes:
@@ -81,9 +96,13 @@ class Multistart:
             self._memo.elsewhere += 1
             likelihood = likelihood_at(self._problem, theta)
             rows = likelihood.rows(theta[None])[0]
-            self._cost = likelihood.negative_log(rows) if np.isfinite(rows).all() else np.inf
+            self._cost = (
+                likelihood.negative_log(rows) if np.isfinite(rows).all() else np.inf
+            )
         else:
-            self._cost, theta = self._grown(self._problem, theta, Step("start", start=number + 1))
+            self._cost, theta = self._grown(
+                self._problem, theta, Step("start", start=number + 1)
+            )
             self.ends[0].append(self._cost)
         return theta[None]
 
@@ -93,7 +112,8 @@ class Multistart:
         return reached if population is None else population.join(reached)
 
     def start(self, number: int) -> Array:
-        """Draw start `number`, shape (P,): the first of DRAWS that can be simulated at all.
+        """Draw start `number`, shape (P,): the first of DRAWS that can be simulated at
+        all.
 
         The first one is the start that the parameters state, if they do.
         """
@@ -106,17 +126,22 @@ class Multistart:
         return drawn[np.argmax(np.isfinite(shortest.output_errors(drawn)).all(axis=1))]
 
     def _joint_by_joint(self, number: int, theta: Array) -> Array:
-        """Fit start `number`, (P,), to every joint alone; the last start takes the best one of each joint."""
+        """Fit start `number`, (P,), to every joint alone; the last start takes the best
+        one of each joint."""
         for joint in lone_joints(self._problem):
             problem = alone(self._problem, joint, theta)
             step = Step("start", start=number + 1, joint=joint)
             start = by_numbers(problem, joint, theta)
             tried = [self._grown(problem, start, step.changed(numbers=True))]
             if not problem.leaves_noise(tried[0][1]):
-                tried.append(self._grown(problem, by_speeds(problem, joint, theta), step))
+                tried.append(
+                    self._grown(problem, by_speeds(problem, joint, theta), step)
+                )
             result = min(tried, key=COST)
             self.ends[joint] += map(COST, tried)
-            best = self._best[joint] = min(self._best.get(joint, result), result, key=COST)
+            best = self._best[joint] = min(
+                self._best.get(joint, result), result, key=COST
+            )
             _, reached = best if number == self.settings.generations else result
             theta = np.where(problem.parameters.free, reached, theta)
         return theta
@@ -133,7 +158,9 @@ class Multistart:
                 make_likelihood(part),
                 theta,
                 self.settings,
-                lambda what, n, rms, before=before: self._progress(what, before + n, rms),
+                lambda what, n, rms, before=before: self._progress(
+                    what, before + n, rms
+                ),
                 self._checkpoints,
                 step.changed(horizon=number),
             )
@@ -145,40 +172,58 @@ class Multistart:
     def _parts(self, problem: Problem) -> list[Problem]:
         """The problem's first seconds, more and more of them, and at last all of it.
 
-        A part in which nothing moves yet, as at the start from a stop, would only lead a start astray.
+        A part in which nothing moves yet, as at the start from a stop, would only lead
+        a start astray.
         """
         longest = max(log.duration for log in problem.logs)
         settings = problem.settings.changed({"objective.segments": 1})
-        travels, parts = [MOVES * np.ptp(c.measured) for c in problem.channels], list[Problem]()
+        travels, parts = (
+            [MOVES * np.ptp(c.measured) for c in problem.channels],
+            list[Problem](),
+        )
         for seconds in (one for one in self.settings.horizons if one < longest):
-            part = problem.varied(settings, [log.first(seconds) for log in problem.logs])
-            if any(np.ptp(c.measured) > far for c, far in zip(part.channels, travels, strict=True)):
+            part = problem.varied(
+                settings, [log.first(seconds) for log in problem.logs]
+            )
+            if any(
+                np.ptp(c.measured) > far
+                for c, far in zip(part.channels, travels, strict=True)
+            ):
                 parts.append(part)
         return [*parts, problem]
 
 
 def lone_joints(problem: Problem) -> tuple[int, ...]:
-    """Return the joints that can be fitted alone, numbered from 1: hydraulic ones with their own parameters.
+    """Return the joints that can be fitted alone, numbered from 1: hydraulic ones with
+    their own parameters.
 
-    There are none if there are fewer than two, or if a log does not measure how a driven joint moves.
+    There are none if there are fewer than two, or if a log does not measure how a
+    driven joint moves.
     """
     measured = all(log.measured[log.driven].all() for log in problem.logs)
     settings = problem.settings
-    joints = tuple(j for j in settings.outputs if problem.driven[j - 1] and settings.acting_on(j))
+    joints = tuple(
+        j for j in settings.outputs if problem.driven[j - 1] and settings.acting_on(j)
+    )
     return joints if settings.stage == "hyd" and measured and len(joints) > 1 else ()
 
 
 def alone(problem: Problem, joint: int, theta: Array) -> Problem:
-    """Return the problem of one joint's own parameters; all other joints follow their logged motion.
+    """Return the problem of one joint's own parameters; all other joints follow their
+    logged motion.
 
-    All other parameters are held at theta, shape (P,). Logs that do not drive the joint are left out.
+    All other parameters are held at theta, shape (P,). Logs that do not drive the joint
+    are left out.
     """
     settings = problem.settings.alone(joint, problem.parameters.mapping(theta))
-    return problem.varied(settings, [log.driving(joint) for log in problem.logs if log.driven[joint - 1]])
+    return problem.varied(
+        settings, [log.driving(joint) for log in problem.logs if log.driven[joint - 1]]
+    )
 
 
 def by_numbers(problem: Problem, joint: int, theta: Array) -> Array:
-    """Return theta, (P,), with the valve of a joint whose speed follows the command alone: nine numbers."""
+    """Return theta, (P,), with the valve of a joint whose speed follows the command
+    alone: nine numbers."""
     ends = [*problem.settings.arm.ranges.values()][joint - 1]
     found = fit_baselines(problem.logs, joint, ends)[NAMES[-1]]
     values = {"delay": found.delay, "pilot_lag": 0.0}
@@ -191,7 +236,8 @@ def by_numbers(problem: Problem, joint: int, theta: Array) -> Array:
 
 
 def by_speeds(problem: Problem, joint: int, theta: Array) -> Array:
-    """Return theta, (P,), with the valve of a joint at the speeds that its logs show (`speed_curve`).
+    """Return theta, (P,), with the valve of a joint at the speeds that its logs show
+    (`speed_curve`).
 
     It is theta itself where its valve has no curve, or the logs show none.
     """
@@ -220,11 +266,17 @@ def _sided(name: str, a: float, b: float) -> dict[str, float]:
 
 
 def _with_valve(
-    problem: Problem, joint: int, theta: Array, values: Mapping[str, float], speeds: Array
+    problem: Problem,
+    joint: int,
+    theta: Array,
+    values: Mapping[str, float],
+    speeds: Array,
 ) -> Array:
-    """Return theta, (P,), with quantities of a joint by name, and openings for its full speeds [rad/s], (2,).
+    """Return theta, (P,), with quantities of a joint by name, and openings for its full
+    speeds [rad/s], (2,).
 
-    No load slows it, its actuator is strong enough for any, and its lever is the same everywhere.
+    No load slows it, its actuator is strong enough for any, and its lever is the same
+    everywhere.
     """
     settings = problem.settings
     straight = {"lever_slope": 0.0, "lever_bend": 0.0, "compensation": 1.0}
@@ -234,10 +286,14 @@ def _with_valve(
             prior, places[one.quantity] = problem.parameters.parameters[i].prior, i
             start[i] = {**straight, **values}.get(one.quantity, start[i])
             if one.quantity.startswith("area") and prior is not None:
-                start[i] = prior.value(1.0)  # a weaker one may stall, where nothing has an effect
+                # a weaker one may stall, where nothing has an effect
+                start[i] = prior.value(1.0)
     bench = make_bench(settings, problem.logs, joint)
     for side, (name, full) in enumerate((("opening_a", 100.0), ("opening_b", -100.0))):
-        speed = bench.movement(full).speeds(problem.bindings.candidates(start[None])).max() / bench.unit[0]
+        speed = (
+            bench.movement(full).speeds(problem.bindings.candidates(start[None])).max()
+            / bench.unit[0]
+        )
         if name in places and speed > 0:  # in proportion, where no load slows it
             start[places[name]] *= speeds[side] / speed
     return np.clip(start, problem.parameters.lower, problem.parameters.upper)

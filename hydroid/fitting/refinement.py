@@ -1,4 +1,5 @@
-"""Refinement of an estimate: maximum likelihood by least squares, with the priors as further measurements."""
+"""Refinement of an estimate: maximum likelihood by least squares, with the priors as
+further measurements."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -15,14 +16,16 @@ from hydroid.search.least_squares import step
 from hydroid.settings.search import RefinementSettings
 
 SETTLED = 1.0
-"""gain of the log-likelihood below which the numbers of the error model stay as they are: so they settle"""
+"""gain of the log-likelihood below which the numbers of the error model stay as they
+are: so they settle"""
 
 ROUGH = 1e-3
-"""gain below which a least squares of output errors ends that is to lead near an optimum"""
+"""gain below which a least squares of output errors ends that is to lead near an
+optimum"""
 
 Refining = Callable[[Step, int, float], bool | None]
-"""takes a step of the fit, its number of simulations, and its rms error [rad] so far; returns
-whether its time is up"""
+"""takes a step of the fit, its number of simulations, and its rms error [rad] so far;
+returns whether its time is up"""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -31,7 +34,8 @@ class Refinement(Descent):
 
     Attributes:
         numbers: of the model of the errors, shape (S, 5).
-        negative_log: of likelihood and priors at the point: what starts are compared by.
+        negative_log: of likelihood and priors at the point: what starts are compared
+            by.
     """
 
     numbers: Array
@@ -53,13 +57,13 @@ def refine(
 ) -> Refinement:
     """Improve an estimate by bounded least squares of innovations.
 
-    The error model is estimated at the start, anew where a Jacobian is taken, and at the end, until it
-    settles. Between two Jacobians nothing is stored: a resumed refinement repeats the steps since the last
-    one.
+    The error model is estimated at the start, anew where a Jacobian is taken, and at
+    the end, until it settles. Between two Jacobians nothing is stored: a resumed
+    refinement repeats the steps since the last one.
 
-    It starts at theta, shape (P,). It continues from `checkpoints`, and stores there how far it is by the
-    name of the step; a result too.
-    Raises RunError: the checkpoint cannot be written.
+    It starts at theta, shape (P,). It continues from `checkpoints`, and stores there
+    how far it is by the name of the step; a result too. Raises RunError: the checkpoint
+    cannot be written.
     """
     parameters = likelihood.problem.parameters
     name = what.name
@@ -87,7 +91,8 @@ def refine(
         now = replace(now, negative_log=_at(likelihood, now).negative_log(now.residual))
         if now.ended and what.on_its_way:
             now = now.without_jacobian
-        if moved or now.ended:  # else a start that itself may have been reached too late
+        # else a start that itself may have been reached too late
+        if moved or now.ended:
             keep(now.arrays)
     if not now.ended:  # the checkpoint is where it goes on
         now = replace(now, ending=Ending.TIME)
@@ -105,8 +110,9 @@ def refine_from_afar(
 ) -> Refinement:
     """Improve an estimate that may be far off, as `refine` does.
 
-    There a model of the errors takes what the parameters have not explained yet for drift. Output errors know
-    no drift. So a rough least squares of output errors comes first.
+    There a model of the errors takes what the parameters have not explained yet for
+    drift. Output errors know no drift. So a rough least squares of output errors comes
+    first.
     """
     if np.isinf(likelihood.memory):
         return refine(likelihood, theta, settings, progress, checkpoints, what)
@@ -134,7 +140,8 @@ def _begun(likelihood: Likelihood, unit: Array) -> Refinement:
 
 
 def _with_new_numbers(likelihood: Likelihood, now: Refinement) -> Refinement:
-    """Return the refinement with the error model of its point, if that is clearly more likely.
+    """Return the refinement with the error model of its point, if that is clearly more
+    likely.
 
     One that had converged then goes on.
     """
@@ -143,7 +150,10 @@ def _with_new_numbers(likelihood: Likelihood, now: Refinement) -> Refinement:
     before = _at(likelihood, now)
     after = before.estimated(errors[0])
     now = replace(now, evaluations=now.evaluations + 1)
-    if after.shown.log_likelihood(errors[0]) - before.shown.log_likelihood(errors[0]) < SETTLED:
+    if (
+        after.shown.log_likelihood(errors[0]) - before.shown.log_likelihood(errors[0])
+        < SETTLED
+    ):
         return now
     innovations = after.errors.innovations(errors)[0]
     rows = np.append(innovations, now.residual[innovations.size :])
@@ -165,7 +175,8 @@ def _at(likelihood: Likelihood, now: Refinement) -> Likelihood:
 
 
 def _rows(likelihood: Likelihood, now: Refinement) -> Callable[[Array], Array]:
-    """What least squares minimises: points of the unit box, (n, p), to innovations and scores."""
+    """What least squares minimises: points of the unit box, (n, p), to innovations and
+    scores."""
     parameters, rows = likelihood.problem.parameters, _at(likelihood, now).rows
     return lambda unit: rows(parameters.from_unit(unit))
 

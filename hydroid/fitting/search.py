@@ -20,8 +20,8 @@ from hydroid.search.moo import PymooSearch
 from hydroid.search.protocol import BoxSearch
 
 HISTORY = ("generation", "evaluations", "simulated", "infeasible", "best", "median")
-"""Columns of a run's history; `best` is over the run so far, `median` over the population, both of
-(18) or (19) over the whole record."""
+"""Columns of a run's history; `best` is over the run so far, `median` over the
+population, both of (18) or (19) over the whole record."""
 
 
 @record
@@ -29,8 +29,9 @@ class Searched:
     """Result of a search: its last population, theta (n, P), all candidates simulated,
     and its history.
 
-    `single`: whether it minimised one objective, not that of each segment. `ends`: costs at which
-    the starts of a multi-start ended, by the joint that was fitted alone (0: all together).
+    `single`: whether it minimised one objective, not that of each segment. `ends`:
+    costs at which the starts of a multi-start ended, by the joint that was fitted alone
+    (0: all together).
     """
 
     theta: Array
@@ -57,7 +58,8 @@ class Search(Protocol):
 
     @property
     def ends(self) -> Mapping[int, Sequence[float]]:
-        """Costs at which starts ended, by the joint that was fitted alone (0: all together)."""
+        """Costs at which starts ended, by the joint that was fitted alone (0: all
+        together)."""
         ...
 
     def theta(self, chromosomes: Genes) -> Array:
@@ -69,7 +71,8 @@ class Search(Protocol):
         ...
 
     def tell(self, population: Population | None, offspring: Population) -> Population:
-        """Take what was evaluated, and return the population from which the search goes on."""
+        """Take what was evaluated, and return the population from which the search goes
+        on."""
         ...
 
 
@@ -92,21 +95,26 @@ class InBox:
 
 
 def box_search(problem: Problem) -> BoxSearch:
-    """Return the algorithm that the settings name, in the unit box of the free parameters."""
+    """Return the algorithm that the settings name, in the unit box of the free
+    parameters."""
     settings = problem.settings.search
     free = int(problem.parameters.free.sum())
     if settings.algorithm == "ga":
         return SimpleGa(settings.ga, free, problem.start)
     if settings.algorithm == "pymoo":
-        return PymooSearch(settings.pymoo, free, problem.settings.objective.segments, problem.start)
+        return PymooSearch(
+            settings.pymoo, free, problem.settings.objective.segments, problem.start
+        )
     return Nsga2(settings.nsga2, free, problem.start)
 
 
 def search(problem: Problem, watch: Watcher, checkpoints: Checkpoints) -> Searched:
-    """Search to the last generation, from the seed or from what `checkpoints` holds as "search".
+    """Search to the last generation, from the seed or from what `checkpoints` holds as
+    "search".
 
-    `watch` takes a row of HISTORY after every generation, but for those that a resumed run repeats,
-    and says whether that was the last; it also watches least squares within multi-start.
+    `watch` takes a row of HISTORY after every generation, but for those that a resumed
+    run repeats, and says whether that was the last; it also watches least squares
+    within multi-start.
 
     Raises RunError: the search does not repeat what it did before the checkpoint.
     """
@@ -134,7 +142,9 @@ def search(problem: Problem, watch: Watcher, checkpoints: Checkpoints) -> Search
     history = np.empty((0, len(HISTORY)))
     evaluations = 0
     with saving(checkpoints, "search") as keep:
-        while population is None or (len(history) <= algorithm.generations and not late):
+        while population is None or (
+            len(history) <= algorithm.generations and not late
+        ):
             repeats = bool(memo.stored)
             chromosomes = algorithm.ask(population, rng)
             result = memo.evaluate(algorithm.theta(chromosomes))

@@ -1,12 +1,14 @@
 """The speed of a joint against its command, as its logs show it.
 
-A delay, and one speed for each command that never falls with it: isotonic regression of the speeds on the
-delayed commands (R. E. Barlow, D. J. Bartholomew, J. M. Bremner and H. D. Brunk, 1972), by the delay at which
-it errs least. It assumes no law, so it shows what a law of few numbers cannot be: dead bands of unlike sides,
-a valve that opens all at once.
+A delay, and one speed for each command that never falls with it: isotonic regression of
+the speeds on the delayed commands (R. E. Barlow, D. J. Bartholomew, J. M. Bremner and
+H. D. Brunk, 1972), by the delay at which it errs least. It assumes no law, so it shows
+what a law of few numbers cannot be: dead bands of unlike sides, a valve that opens all
+at once.
 
-Speeds count less while the command changes, when they follow it late, and not at all near the ends of a
-joint's travel: there it may stand at a stop, or its sensor at the end of its range.
+Speeds count less while the command changes, when they follow it late, and not at all
+near the ends of a joint's travel: there it may stand at a stop, or its sensor at the
+end of its range.
 """
 
 from collections.abc import Sequence
@@ -41,9 +43,10 @@ class SpeedCurve:
 
     Attributes:
         delay: at which the speed follows the command best, the lags included [s].
-        command: those of the logs, ascending, ALIKE apart, below 0 for the negative side [%], shape (n,).
-        speed: of each in the direction in which positive commands move the joint, never falling [rad/s],
-            shape (n,); 0 at a command of 0.
+        command: those of the logs, ascending, ALIKE apart, below 0 for the negative
+            side [%], shape (n,).
+        speed: of each in the direction in which positive commands move the joint, never
+            falling [rad/s], shape (n,); 0 at a command of 0.
         weight: how many samples each stands for, shape (n,).
         direction: 1 where a positive command moves the joint to larger angles, else -1.
     """
@@ -55,7 +58,8 @@ class SpeedCurve:
     direction: float
 
     def side(self, sign: int) -> "SpeedCurve":
-        """Return the side of positive (1) or negative (-1) commands, both command and speed above 0."""
+        """Return the side of positive (1) or negative (-1) commands, both command and
+        speed above 0."""
         own = sign * self.command >= LEAST_COMMAND
         order = np.argsort(sign * self.command[own], kind="stable")
         return SpeedCurve(
@@ -68,18 +72,21 @@ class SpeedCurve:
 
     @property
     def top(self) -> float:
-        """Speed that a side reaches, but for a few samples, which may be wrong [rad/s]."""
+        """Speed that a side reaches, but for a few samples, which may be wrong
+        [rad/s]."""
         reached = np.cumsum(self.weight) / self.weight.sum()
         return float(np.interp(REACHED, reached, self.speed))
 
     @property
     def one_size(self) -> bool:
-        """Whether a side has commands of one size only, as a valve has that is open or shut."""
+        """Whether a side has commands of one size only, as a valve has that is open or
+        shut."""
         return one_size(self.command, self.weight)
 
 
 def measured_speeds(logs: Sequence[Log], joint: int) -> SpeedCurve | None:
-    """Return the speeds of a joint (number, from 1) in the logs that drive and measure it.
+    """Return the speeds of a joint (number, from 1) in the logs that drive and measure
+    it.
 
     None where there are none.
     """
@@ -90,8 +97,11 @@ def measured_speeds(logs: Sequence[Log], joint: int) -> SpeedCurve | None:
     reach = float(angles.min()), float(angles.max())
     period = min(log.period for log in own)
     delays = np.arange(0.0, LONGEST_DELAY, period).tolist()
-    # which delay is right is seen where commands change, and how fast it moves where they do not
-    tried = [(_isotonic(own, joint, reach, delay, steady=False), delay) for delay in delays]
+    # which delay is right is seen where commands change, and how fast it moves where
+    # they do not
+    tried = [
+        (_isotonic(own, joint, reach, delay, steady=False), delay) for delay in delays
+    ]
     shown = [(result[0], delay) for result, delay in tried if result is not None]
     if not shown:
         return None
@@ -100,26 +110,38 @@ def measured_speeds(logs: Sequence[Log], joint: int) -> SpeedCurve | None:
 
 
 def _isotonic(
-    logs: Sequence[Log], joint: int, reach: tuple[float, float], delay: float, *, steady: bool
+    logs: Sequence[Log],
+    joint: int,
+    reach: tuple[float, float],
+    delay: float,
+    *,
+    steady: bool,
 ) -> tuple[float, SpeedCurve] | None:
-    """Return the curve of a delay [s], and the mean square that it leaves, as a part of the speeds'.
+    """Return the curve of a delay [s], and the mean square that it leaves, as a part of
+    the speeds'.
 
     `steady`: whether speeds count less while the command changes.
     """
     pairs = [_pairs(log, joint, reach, delay) for log in logs]
     command, speed, weight = np.hstack(pairs)
-    if len(command) < LEAST_SAMPLES or not np.ptp(command) > LEAST_COMMAND or not speed.any():
+    if (
+        len(command) < LEAST_SAMPLES
+        or not np.ptp(command) > LEAST_COMMAND
+        or not speed.any()
+    ):
         return None
     if not steady:
         weight = np.ones(len(command))
     direction = 1.0 if np.average(command * speed, weights=weight) >= 0.0 else -1.0
-    # commands that are alike have one speed: sorted by chance, they would seem to rise with each other
+    # commands that are alike have one speed: sorted by chance, they would seem to rise
+    # with each other
     number = np.unique(np.round(command / ALIKE), return_inverse=True)[1]
     total: Array = np.bincount(number, weight).astype(float)
     asked = np.bincount(number, weight * command) / total
     mean = np.bincount(number, weight * direction * speed) / total
     fitted = isotonic_regression(mean, weights=total).x
-    # a drift at rest, such as a sensor's, is no speed of the valve: the curve has one sign at each side
+    # a drift at rest, such as a sensor's, is no speed of the valve: the curve has one
+    # sign at each side
     fitted = np.where(asked > 0.0, np.maximum(fitted, 0.0), np.minimum(fitted, 0.0))
     left = np.average((direction * speed - fitted[number]) ** 2, weights=weight)
     curve = SpeedCurve(delay, asked, fitted, total, direction)
@@ -127,7 +149,8 @@ def _isotonic(
 
 
 def _pairs(log: Log, joint: int, reach: tuple[float, float], delay: float) -> Array:
-    """Return commands [%], the speeds that follow them [rad/s], and their weights, shape (3, n)."""
+    """Return commands [%], the speeds that follow them [rad/s], and their weights,
+    shape (3, n)."""
     command, angle = log.command[:, joint - 1], log.angle[:, joint - 1]
     half = max(round(0.5 * WINDOW / log.period), 1)
     late, before = round(delay / log.period), round(SETTLING / log.period)

@@ -1,11 +1,12 @@
-"""What a fit does next: one least squares, as a record that names its checkpoint and its line of progress."""
+"""What a fit does next: one least squares, as a record that names its checkpoint and
+its line of progress."""
 
 from dataclasses import dataclass, replace
 from typing import Literal
 
 Phase = Literal["", "from afar", "at first", "on the way", "without it"]
-"""of a rung: by output errors, to see whether it is likely at all, to see whether it is better,
-without its last term, or to the end (no words)"""
+"""of a rung: by output errors, to see whether it is likely at all, to see whether it is
+better, without its last term, or to the end (no words)"""
 
 
 @dataclass(frozen=True)
@@ -13,13 +14,15 @@ class Step:
     """One least squares of a fit.
 
     Attributes:
-        model: start (a start of the search), refined, dynamic or joint; or what a comparison calls it.
+        model: start (a start of the search), refined, dynamic or joint; or what a
+            comparison calls it.
         terms: that the model has.
         phase: of the rung.
         start: number of the start, from 1; 0: none.
         joint: that is fitted alone, from 1; 0: all joints.
         numbers: whether it begins at the nine numbers of the joint.
-        horizon: number of the part of the logs that it is fitted to, from 1; 0: all of them.
+        horizon: number of the part of the logs that it is fitted to, from 1; 0: all of
+            them.
         without: number of the part of the logs that is left out, from 1; 0: none.
     """
 
@@ -50,7 +53,8 @@ class Step:
 
     @property
     def on_its_way(self) -> bool:
-        """Whether another least squares goes on from where it ends, and only that end counts."""
+        """Whether another least squares goes on from where it ends, and only that end
+        counts."""
         return self.model == "start" or self.phase in ("from afar", "at first")
 
     def changed(self, **changes: object) -> "Step":

@@ -1,11 +1,19 @@
-"""A fit's result as `estimate.yaml` and `--json` hold it, with what a reader must know before using it."""
+"""A fit's result as `estimate.yaml` and `--json` hold it, with what a reader must know
+before using it."""
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from hydroid.estimate import AngleError, FitSummary, NamedEstimate, ParameterEstimate, finite, finite_ends
+from hydroid.estimate import (
+    AngleError,
+    FitSummary,
+    NamedEstimate,
+    ParameterEstimate,
+    finite,
+    finite_ends,
+)
 from hydroid.findings import Finding
 from hydroid.fitting.fit import Fit
 from hydroid.fitting.ladder import Estimate
@@ -20,7 +28,8 @@ from hydroid.quantity_table import CHOICES
 from hydroid.search.descent import Ending
 
 STRAINED_ABOVE = 2.0
-"""standard deviations from its prior beyond which an estimate strains it, if the logs determine it"""
+"""standard deviations from its prior beyond which an estimate strains it, if the logs
+determine it"""
 SAME_OPTIMUM = 10.0
 """log-likelihood below the best up to which a start has found the same optimum"""
 MOST_COMBINATIONS = 6
@@ -39,7 +48,8 @@ _KINDS = (
 
 
 def summarise(problem: Problem, fit: Fit) -> FitSummary:
-    """Return the final estimate with its uncertainty, and the estimates it was chosen from."""
+    """Return the final estimate with its uncertainty, and the estimates it was chosen
+    from."""
     known = account(fit.problem, fit.uncertainty)
     scalars, curves = fit.quantities
     simulations, diverged = fit.history[-1, 2:4]
@@ -59,7 +69,10 @@ def summarise(problem: Problem, fit: Fit) -> FitSummary:
             "simulations": int(simulations),
             "diverged": int(diverged),
             "findings": (*fit_findings(fit), *known.findings),
-            "estimates": {one.name: _named_estimate(problem, one) for one in fit.estimates.values()},
+            "estimates": {
+                one.name: _named_estimate(problem, one)
+                for one in fit.estimates.values()
+            },
             "quantities": scalars,
             "curves": curves,
         }
@@ -69,12 +82,18 @@ def summarise(problem: Problem, fit: Fit) -> FitSummary:
 def _named_estimate(problem: Problem, estimate: Estimate) -> NamedEstimate:
     """Return an estimate as it is stored: by names, and in degrees."""
     settings = problem.settings
-    objective = estimate.overall if settings.objective.relative else np.degrees(estimate.overall)
+    objective = (
+        estimate.overall
+        if settings.objective.relative
+        else np.degrees(estimate.overall)
+    )
     gained = None
     if estimate.gained is not None:
         gained = finite_ends(np.array(estimate.gained))
     return NamedEstimate(
-        values=settings.of_estimate(estimate.name).parameter_set().mapping(estimate.theta),
+        values=settings.of_estimate(estimate.name)
+        .parameter_set()
+        .mapping(estimate.theta),
         rms_deg=finite(np.degrees(estimate.rms)),
         objective=finite(objective),
         gained=gained,
@@ -94,20 +113,29 @@ def account(problem: Problem, known: Uncertainty) -> FitSummary:
     if logs.differing:
         findings.append(Finding("logs disagree", "warning", logs.differing))
     findings += _lasting_findings(problem, errors)
-    several = [one for one in identifiability(problem, known).combinations if len(one) > 1]
+    several = [
+        one for one in identifiability(problem, known).combinations if len(one) > 1
+    ]
     # the table of directions has all
-    findings += [Finding("combination", "note", tuple(one)) for one in several[:MOST_COMBINATIONS]]
+    findings += [
+        Finding("combination", "note", tuple(one))
+        for one in several[:MOST_COMBINATIONS]
+    ]
     return FitSummary(
         stage=problem.settings.stage,
         estimate=estimate,
         findings=tuple(sorted(findings, key=lambda finding: finding.level == "note")),
         covariance=known.posterior.stored(parameters),
         errors=errors,
-        left_out_deg={angle: tuple(left_out) for angle, left_out in logs.left_out.items()},
+        left_out_deg={
+            angle: tuple(left_out) for angle, left_out in logs.left_out.items()
+        },
     )
 
 
-def _parameter_estimate(unit: str, i: int, known: Uncertainty, logs: ByLog) -> ParameterEstimate:
+def _parameter_estimate(
+    unit: str, i: int, known: Uncertainty, logs: ByLog
+) -> ParameterEstimate:
     """Return parameter number i of an estimate, with what is known of it."""
     status = known.status[i]
     return ParameterEstimate(
@@ -146,19 +174,32 @@ def angle_errors(known: Uncertainty) -> dict[str, AngleError]:
 
 
 def _deviation_ahead(errors: ErrorModel, i: int, seconds: float) -> float:
-    """Standard deviation of a signal so many seconds ahead, at its mean speed in the logs [rad]."""
+    """Standard deviation of a signal so many seconds ahead, at its mean speed in the
+    logs [rad]."""
     sensor, rate, way, lasting_square, _ = errors.numbers[i]
-    courses = [course for course, own in zip(errors.courses, errors.of, strict=True) if own == i]
-    speed = sum(course.way.sum() for course in courses) / sum(c.period * len(c.way) for c in courses)
+    courses = [
+        course
+        for course, own in zip(errors.courses, errors.of, strict=True)
+        if own == i
+    ]
+    speed = sum(course.way.sum() for course in courses) / sum(
+        c.period * len(c.way) for c in courses
+    )
     return np.sqrt(sensor + lasting_square + (rate + way * speed) * seconds)
 
 
 def fit_findings(fit: Fit) -> list[Finding]:
     """Return what is to be said about a fit's way to its estimate."""
     findings = [*_ending_findings(fit), *_optima_findings(fit), *_prior_findings(fit)]
-    findings += [Finding("diverged", "warning", (e.name,)) for e in fit.estimates.values() if not e.usable]
+    findings += [
+        Finding("diverged", "warning", (e.name,))
+        for e in fit.estimates.values()
+        if not e.usable
+    ]
     # half of a 95 % interval as large as the value, or without end
-    lost = dict.fromkeys(q.label for q in fit.quantities[0].values() if not q.within <= 1.0)
+    lost = dict.fromkeys(
+        q.label for q in fit.quantities[0].values() if not q.within <= 1.0
+    )
     if lost:
         findings.append(Finding("quantities open", "note", tuple(lost)))
     return findings
@@ -172,7 +213,11 @@ def _ending_findings(fit: Fit) -> Iterator[Finding]:
     ending = fit.refinement.ending
     if ending.converged:
         return
-    kind = "not converged" if fit.problem.settings.seeded else "not converged from its start"
+    kind = (
+        "not converged"
+        if fit.problem.settings.seeded
+        else "not converged from its start"
+    )
     if ending is Ending.TIME:
         kind = "time up"
     yield Finding(kind, "warning", (fit.final,), {"ending": ending.value})
@@ -180,17 +225,26 @@ def _ending_findings(fit: Fit) -> Iterator[Finding]:
 
 def _optima_findings(fit: Fit) -> Iterator[Finding]:
     """Yield the joints whose starts ended at different optima."""
-    apart = [joint for joint, ends in fit.ends.items() if max(ends) > SAME_OPTIMUM + min(ends)]
+    apart = [
+        joint
+        for joint, ends in fit.ends.items()
+        if max(ends) > SAME_OPTIMUM + min(ends)
+    ]
     if apart:
-        names = [fit.problem.settings.arm.joint_names[joint - 1] for joint in apart if joint]
+        names = [
+            fit.problem.settings.arm.joint_names[joint - 1] for joint in apart if joint
+        ]
         yield Finding("several optima", "note", tuple(names or ["all joints"]))
 
 
 def _prior_findings(fit: Fit) -> Iterator[Finding]:
-    """Yield the priors from which the logs have led the estimate far away, the farthest first."""
+    """Yield the priors from which the logs have led the estimate far away, the farthest
+    first."""
     priors = fit.problem.priors
     vague = set[str]()
-    for name, status in zip(fit.problem.parameters.names, fit.uncertainty.status, strict=True):
+    for name, status in zip(
+        fit.problem.parameters.names, fit.uncertainty.status, strict=True
+    ):
         if status.source is Source.PRIOR or status.flag is Flag.UNIDENTIFIABLE:
             vague.add(name)
     # heavy tails foresee any distance
@@ -205,17 +259,26 @@ def _prior_findings(fit: Fit) -> Iterator[Finding]:
         yield Finding("strained prior", "warning", tuple(far), details=far)
 
 
-def _lasting_findings(problem: Problem, errors: Mapping[str, AngleError]) -> list[Finding]:
+def _lasting_findings(
+    problem: Problem, errors: Mapping[str, AngleError]
+) -> list[Finding]:
     """Return the joints whose innovations are not white."""
     names = problem.settings.arm.joint_names
     return [
-        Finding("error lasts", "note", (names[joint - 1],), {"time": errors[f"q{joint}"].lasts_s})
+        Finding(
+            "error lasts",
+            "note",
+            (names[joint - 1],),
+            {"time": errors[f"q{joint}"].lasts_s},
+        )
         for joint in problem.settings.outputs
         if errors[f"q{joint}"].lasts_s > 0
     ]
 
 
-def _parameter_findings(problem: Problem, estimate: Mapping[str, ParameterEstimate]) -> list[Finding]:
+def _parameter_findings(
+    problem: Problem, estimate: Mapping[str, ParameterEstimate]
+) -> list[Finding]:
     """What is to be said about what the logs determine; a bound of 0 cannot be widened.
 
     That no log has an effect of other groups is meant to be so.
@@ -231,20 +294,28 @@ def _parameter_findings(problem: Problem, estimate: Mapping[str, ParameterEstima
             continue
         kind = one.source if one.source == Source.PRIOR and not idle else one.flag
         kinds[str(kind), ""].append(parameter.name)
-        if one.effect_deg is None and one.flag != Flag.FIXED:  # simulations diverge where it is changed
+        # simulations diverge where it is changed
+        if one.effect_deg is None and one.flag != Flag.FIXED:
             kinds["effect unknown", ""].append(parameter.name)
     findings = list[Finding]()
     for kind in _KINDS:
         level = "warning" if kind in _WARNINGS else "note"
         for (own, side), names in kinds.items():
             if own == kind:
-                findings.append(Finding(kind, level, tuple(names), {"side": side} if side else {}))
+                findings.append(
+                    Finding(kind, level, tuple(names), {"side": side} if side else {})
+                )
     return findings
 
 
 def _at_bound(problem: Problem, parameter: Parameter, side: str) -> str:
-    """Return the kind of finding of an estimate at a bound: none asks to widen what nobody can widen."""
+    """Return the kind of finding of an estimate at a bound: none asks to widen what
+    nobody can widen."""
     if side == "lower":
         return "at zero" if parameter.lower == 0 else "at bound"
     limits = CHOICES[problem.settings.parameters[parameter.name].quantity].limits
-    return "at limit" if limits is not None and parameter.upper >= limits[1] else "at bound"
+    return (
+        "at limit"
+        if limits is not None and parameter.upper >= limits[1]
+        else "at bound"
+    )

@@ -1,5 +1,5 @@
-"""How well a model predicts a log: its response with a band, and the article's error indices (table
-9).
+"""How well a model predicts a log: its response with a band, and the article's error
+indices (table 9).
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -48,7 +48,8 @@ class ErrorIndices:
 
 @record
 class JointPrediction:
-    """What a model makes of one joint in a log, in deg, or in mm of a joint that slides.
+    """What a model makes of one joint in a log, in deg, or in mm of a joint that
+    slides.
 
     Attributes:
         name: of the joint.
@@ -92,13 +93,14 @@ class Prediction:
         response: their angles [rad], shape (T, K).
         bands: prediction bands by joint; empty of a model that is no fit.
         unseen: whether the model was made without this log; None: not known.
-        apart: whether a user has said that it is of other conditions than the fit's: no verdict
-            counts it.
-        pressure: of both chambers of the joints [Pa], shape (T, K, 2); NaN of those without
-            commands; None: the model has no hydraulics.
+        apart: whether a user has said that it is of other conditions than the fit's: no
+            verdict counts it.
+        pressure: of both chambers of the joints [Pa], shape (T, K, 2); NaN of those
+            without commands; None: the model has no hydraulics.
         names: of the joints; empty: their numbers stand for them.
         slides: numbers of those joints that slide.
-        ahead: `errors_ahead` of the joints [rad], shape (N, HORIZONS, K); none where N is 0.
+        ahead: `errors_ahead` of the joints [rad], shape (N, HORIZONS, K); none where N
+            is 0.
     """
 
     fit: str
@@ -121,7 +123,9 @@ class Prediction:
         named = dict(zip(self._named, self.joints, strict=True))
         number = named.get(joint, joint) if isinstance(joint, str) else joint
         if number not in self.joints:
-            raise KeyError(f"no joint {joint!r} is predicted; there {_are(self._named)}")
+            raise KeyError(
+                f"no joint {joint!r} is predicted; there {_are(self._named)}"
+            )
         _, unit, factor = display(slides=number in self.slides)
         column = self.joints.index(number)
         band = self.bands.get(number)
@@ -144,8 +148,8 @@ class Prediction:
     def to_frame(self) -> "pandas.DataFrame":
         """Return one row per sample, by its time [s].
 
-        Columns are, for each joint, `measured`, `response`, `error`, and where there is a band
-        `half` of it, in deg, or in mm of a joint that slides.
+        Columns are, for each joint, `measured`, `response`, `error`, and where there is
+        a band `half` of it, in deg, or in mm of a joint that slides.
         """
         import pandas
 
@@ -162,7 +166,10 @@ class Prediction:
 
     def __repr__(self) -> str:
         seen = {True: ", unseen", False: ", fitted", None: ""}[self.unseen]
-        errors = [f"{one.name} {three_digits(one.rms)} {one.unit}" for one in map(self.__getitem__, self)]
+        errors = [
+            f"{one.name} {three_digits(one.rms)} {one.unit}"
+            for one in map(self.__getitem__, self)
+        ]
         name = next(iter(self), "JOINT")
         return (
             f"{self.fit} on {Path(self.log.source).name}: {self.log.duration:.0f} s{seen}\n"
@@ -173,7 +180,10 @@ class Prediction:
     @property
     def indices(self) -> dict[int, ErrorIndices]:
         """By joint."""
-        return {j: error_indices(self.log.angle[:, j - 1], self.error(j)) for j in self.joints}
+        return {
+            j: error_indices(self.log.angle[:, j - 1], self.error(j))
+            for j in self.joints
+        }
 
     def error(self, joint: int) -> Array:
         """Return measured minus simulated angle of a joint [rad], shape (T,)."""
@@ -186,12 +196,21 @@ class Prediction:
         """
         rows: list[Plain] = []
         for joint, one in self.indices.items():
-            row = Plain({"fit": self.fit, "log": self.log.source, "joint": joint, "name": names[joint - 1]})
+            row = Plain(
+                {
+                    "fit": self.fit,
+                    "log": self.log.source,
+                    "joint": joint,
+                    "name": names[joint - 1],
+                }
+            )
             errors = {"mae": one.mean_absolute, "rms": one.rms, "max": one.largest}
             if band := self.bands.get(joint):
                 row["inside_percent"] = 100 * band.inside
                 errors |= {"noise": band.noise, "expected": band.expected}
-            row |= {f"{name}_deg": finite(degrees(error)) for name, error in errors.items()}
+            row |= {
+                f"{name}_deg": finite(degrees(error)) for name, error in errors.items()
+            }
             rows.append(row | {"fit_percent": finite(one.fit)})
         return rows
 
@@ -201,21 +220,28 @@ def _are(names: Sequence[str]) -> str:
 
 
 def error_indices(measured: Array, error: Array) -> ErrorIndices:
-    """Return the indices of an error of the measured angle [rad], both of shape (T,)."""
+    """Return the indices of an error of the measured angle [rad], both of shape
+    (T,)."""
     size, spread, part = rms(error), np.std(measured), np.abs(error)
-    fit = 100 * (1 - size / spread) if spread > 1e-9 else np.nan  # else it moves by rounding only
+    # else it moves by rounding only
+    fit = 100 * (1 - size / spread) if spread > 1e-9 else np.nan
     return ErrorIndices(part.mean(), size, part.max(), fit)
 
 
 def predicted(model: IdentifiedModel, log: Log, unseen: bool | None) -> Prediction:
-    """Return a model's prediction of a log: NaN, with a warning, where the simulation diverges."""
+    """Return a model's prediction of a log: NaN, with a warning, where the simulation
+    diverges."""
     joints = tuple(model.settings.outputs)
     response, pressure = predict_with_pressures(model, log, joints)
     bands = dict[int, Band]()
     if np.isfinite(response).all():
         bands = prediction_bands(model, log, response)
     else:
-        LOGGER.warning("warning: %s predicts no joint in %s: its simulation diverged", model.name, log.source)
+        LOGGER.warning(
+            "warning: %s predicts no joint in %s: its simulation diverged",
+            model.name,
+            log.source,
+        )
 
     def errors(part: Log) -> Array:
         return part.angle[:, [j - 1 for j in joints]] - predict(model, part, joints)
@@ -237,20 +263,21 @@ def predicted(model: IdentifiedModel, log: Log, unseen: bool | None) -> Predicti
 
 
 def errors_ahead(log: Log, errors: Callable[[Log], Array]) -> Array:
-    """Return by how much predicted changes of angles over HORIZONS are off, from starts all along a
-    log.
+    """Return by how much predicted changes of angles over HORIZONS are off, from starts
+    all along a log.
 
-    Each start is simulated from SETTLING before it, at the angles measured there: valves, pilot
-    stages and pump are then as the commands have left them. `errors` are those of a part of the log
-    [rad], shape (T,) or (T, K). Each start has a row [rad], shape (N, HORIZONS) or
-    (N, HORIZONS, K); NaN where the log ends before.
+    Each start is simulated from SETTLING before it, at the angles measured there:
+    valves, pilot stages and pump are then as the commands have left them. `errors` are
+    those of a part of the log [rad], shape (T,) or (T, K). Each start has a row [rad],
+    shape (N, HORIZONS) or (N, HORIZONS, K); NaN where the log ends before.
     """
     before, rows = round(SETTLING / log.period), list[Array]()
     steps = np.array([before + round(seconds / log.period) for seconds in HORIZONS])
     for first in range(0, len(log.time) - int(steps[0]), before):
         error = errors(log.part(first, first + int(steps[-1]) + 1))
         row, there = np.full((len(steps), *error.shape[1:]), np.nan), steps < len(error)
-        row[there] = np.nan_to_num(error[steps[there]] - error[before], nan=np.inf)  # NaN: it diverged
+        # NaN: it diverged
+        row[there] = np.nan_to_num(error[steps[there]] - error[before], nan=np.inf)
         rows.append(row)
     return np.array(rows)
 
@@ -273,7 +300,9 @@ def fitted(fit: Fit) -> tuple[Prediction, ...]:
             False,
             names=tuple(settings.arm.joint_names[joint - 1] for joint in joints),
             slides=tuple(settings.arm.slides),
-            pressure=predict_with_pressures(model, log, joints)[1] if settings.stage == "hyd" else None,
+            pressure=predict_with_pressures(model, log, joints)[1]
+            if settings.stage == "hyd"
+            else None,
         )
         predictions.append(one)
     return tuple(predictions)

@@ -1,27 +1,31 @@
-"""The verdict on a fit, joint by joint: what it predicts, beside what anybody would try first.
+"""The verdict on a fit, joint by joint: what it predicts, beside what anybody would try
+first.
 
-Errors are rms over the logs that drive the joint. The tolerance is `tolerance_deg` of the settings,
-or 2 % of the joint's travel in the unseen logs. With each simple model the fit is compared in pairs
-at JUDGED times ahead (`fitting.comparison`). It is ahead of one if it is better at one of these
-times. The first of these that is true is the verdict:
+Errors are rms over the logs that drive the joint. The tolerance is `tolerance_deg` of
+the settings, or 2 % of the joint's travel in the unseen logs. With each simple model
+the fit is compared in pairs at JUDGED times ahead (`fitting.comparison`). It is ahead
+of one if it is better at one of these times. The first of these that is true is the
+verdict:
 
-1. predicts: the error on the unseen logs is within the tolerance, whatever the simple models do;
-2. does not fit: on the fitted logs the error is outside the tolerance, and a simple model's is
-smaller; where
+1. predicts: the error on the unseen logs is within the tolerance, whatever the simple
+  models do;
+2. does not fit: on the fitted logs the error is outside the tolerance, and a simple
+model's is smaller; where
    there are unseen logs, the fit is not ahead of each simple model there either;
 3. not tested: no unseen log drives the joint;
-4. predicts no better than a simple model: it is not ahead of that one, and at one of these times it
-is worse;
+4. predicts no better than a simple model: it is not ahead of that one, and at one of
+these times it is worse;
    the simplest such is named;
-5. predicts worse than it fits: the error on the unseen logs is more than twice that on the fitted
-ones, or
+5. predicts worse than it fits: the error on the unseen logs is more than twice that on
+the fitted ones, or
    it diverges;
-6. predicts little: the error on the unseen logs is more than half of what standing still errs by
-there;
-7. cannot be told from a simple model: it is not ahead of that one, and at none of these times
-worse; of
+6. predicts little: the error on the unseen logs is more than half of what standing
+still errs by there;
+7. cannot be told from a simple model: it is not ahead of that one, and at none of these
+times worse; of
    several such that with the smallest error is named;
-8. predicts roughly: none of these. It is ahead of every simple model, and outside the tolerance.
+8. predicts roughly: none of these. It is ahead of every simple model, and outside the
+  tolerance.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -39,18 +43,20 @@ from hydroid.log import Log
 from hydroid.settings.fit import FitSettings
 
 JUDGED = (1.0, 5.0, 10.0)
-"""of HORIZONS, what a controller needs: over these a fit must be ahead of simple models [s]"""
+"""of HORIZONS, what a controller needs: over these a fit must be ahead of simple models
+[s]"""
 SHARE = 0.02
 """of a joint's travel that its error may be where no tolerance is stated"""
 CLEARLY = 0.9
 """part of another model's error on the fitted logs that a better one stays below"""
 LEAST_TOLERANCE = 0.001
-"""the least that a tolerance can be [deg]; none follows from a joint that is never driven,
-or never moves"""
+"""the least that a tolerance can be [deg]; none follows from a joint that is never
+driven, or never moves"""
 WORSE = 2.0
 """times the error on fitted logs, beyond which a fit predicts worse than it fits"""
 LITTLE = 0.5
-"""part of the error of standing still, above which a fit predicts little of the motion"""
+"""part of the error of standing still, above which a fit predicts little of the
+motion"""
 STANDING_OUT = 3.0
 """times the median error of the other unseen logs, beyond which a log is named"""
 THE_FIT = "the fit"
@@ -64,7 +70,10 @@ Baselines = Mapping[int, Mapping[str, Baseline]]
 def baselines_of(settings: FitSettings, logs: Sequence[Log]) -> Baselines:
     """Fit the baselines of all compared joints to logs."""
     ranges = [*settings.arm.ranges.values()]
-    return {joint: fit_baselines(logs, joint, ranges[joint - 1]) for joint in settings.outputs}
+    return {
+        joint: fit_baselines(logs, joint, ranges[joint - 1])
+        for joint in settings.outputs
+    }
 
 
 def judge(
@@ -75,22 +84,28 @@ def judge(
 ) -> tuple[JointVerdict, ...]:
     """Return the verdict on each compared joint.
 
-    `fitted` is what the fit makes of its own logs; none of values that are no fit's. `baselines`
-    are fitted to the same logs; none: a joint is compared with standing still. Of the predictions
-    `unseen`, those of logs that the fit has seen test nothing, and those that are `apart` do not
-    count.
+    `fitted` is what the fit makes of its own logs; none of values that are no fit's.
+    `baselines` are fitted to the same logs; none: a joint is compared with standing
+    still. Of the predictions `unseen`, those of logs that the fit has seen test
+    nothing, and those that are `apart` do not count.
     """
     verdicts = list[JointVerdict]()
     for joint in settings.outputs:
         models = baselines.get(joint) or {NAMES[0]: Baseline(joint, ANYWHERE)}
         fitted_there = [p for p in fitted if p.log.driven[joint - 1]]
-        verdicts.append(_judged(settings, models, fitted_there, _tests(unseen, joint), joint))
+        verdicts.append(
+            _judged(settings, models, fitted_there, _tests(unseen, joint), joint)
+        )
     return tuple(verdicts)
 
 
 def _tests(unseen: Sequence[Prediction], joint: int) -> list[Prediction]:
     """Return the predictions that test a joint."""
-    return [p for p in unseen if p.log.driven[joint - 1] and p.unseen is not False and not p.apart]
+    return [
+        p
+        for p in unseen
+        if p.log.driven[joint - 1] and p.unseen is not False and not p.apart
+    ]
 
 
 @record
@@ -118,7 +133,10 @@ def _judged(
     if ahead:
         compared = {name: _compared(ahead[THE_FIT], ahead[name]) for name in models}
     compared_whole = _compared_whole(models, unseen, joint)
-    outcomes = {name: _outcome(compared.get(name), whole) for name, whole in compared_whole.items()}
+    outcomes = {
+        name: _outcome(compared.get(name), whole)
+        for name, whole in compared_whole.items()
+    }
     verdict, beside = _verdict(fitted_errors, unseen_errors, outcomes, tolerance)
     banded = [p for p in unseen if joint in p.bands]
     return JointVerdict(
@@ -134,16 +152,22 @@ def _judged(
         inside_percent=_inside(banded, joint),
         expected_deg=_expected(banded, joint) if len(fitted) > 1 else None,
         baselines_deg=dict(unseen_errors.simple or fitted_errors.simple),
-        horizons_deg={name: _rms_ahead(np.concatenate(rows)) for name, rows in ahead.items()},
+        horizons_deg={
+            name: _rms_ahead(np.concatenate(rows)) for name, rows in ahead.items()
+        },
         compared=compared,
         compared_whole=compared_whole,
     )
 
 
 def _tolerance(
-    settings: FitSettings, fitted: Sequence[Prediction], unseen: Sequence[Prediction], joint: int
+    settings: FitSettings,
+    fitted: Sequence[Prediction],
+    unseen: Sequence[Prediction],
+    joint: int,
 ) -> float:
-    """Return the tolerance of a joint [deg]: the stated one, or a share of its travel."""
+    """Return the tolerance of a joint [deg]: the stated one, or a share of its
+    travel."""
     stated = settings.tolerance_deg
     if isinstance(stated, dict):
         stated = stated.get(joint)
@@ -154,7 +178,9 @@ def _tolerance(
     return max(float(np.degrees(share)), LEAST_TOLERANCE)
 
 
-def _errors(models: Mapping[str, Baseline], predictions: Sequence[Prediction], joint: int) -> _Errors:
+def _errors(
+    models: Mapping[str, Baseline], predictions: Sequence[Prediction], joint: int
+) -> _Errors:
     if not predictions:
         return _Errors(None, {})
     simple = dict[str, float]()
@@ -187,8 +213,8 @@ def _samples(predictions: Sequence[Prediction]) -> list[int]:
 def _ahead(
     models: Mapping[str, Baseline], unseen: Sequence[Prediction], joint: int
 ) -> dict[str, list[Array]]:
-    """Return errors of predicted changes, (N, HORIZONS) of each log, by model; empty where no log
-    has any.
+    """Return errors of predicted changes, (N, HORIZONS) of each log, by model; empty
+    where no log has any.
 
     A log that is shorter than the shortest horizon has no starts.
     """
@@ -202,12 +228,14 @@ def _ahead(
 
 
 def _ahead_of(model: Baseline, log: Log) -> Array:
-    """Return a simple model's errors of predicted changes of a log, shape (N, HORIZONS)."""
+    """Return a simple model's errors of predicted changes of a log, shape (N,
+    HORIZONS)."""
     return errors_ahead(log, lambda part: model.errors([part]))
 
 
 def _compared(ours: Sequence[Array], theirs: Sequence[Array]) -> tuple[Comparison, ...]:
-    """Compare the fit with a simple model at each of HORIZONS; errors are those of `_ahead`."""
+    """Compare the fit with a simple model at each of HORIZONS; errors are those of
+    `_ahead`."""
     comparisons = list[Comparison]()
     for column in range(len(HORIZONS)):
         our_blocks = _blocks(ours, column)
@@ -217,7 +245,8 @@ def _compared(ours: Sequence[Array], theirs: Sequence[Array]) -> tuple[Compariso
 
 
 def _blocks(errors: Sequence[Array], column: int) -> list[Array]:
-    """Return the errors of all logs at one of HORIZONS, in blocks that are independent enough."""
+    """Return the errors of all logs at one of HORIZONS, in blocks that are independent
+    enough."""
     blocks = list[Array]()
     for log in errors:
         blocks += in_blocks(log[:, column], SETTLING)
@@ -239,8 +268,8 @@ def _compared_whole(
 
 
 def _outcome(compared: Sequence[Comparison] | None, whole: Comparison) -> Outcome:
-    """Return whether the fit is ahead of a simple model at all, by JUDGED times; without starts by
-    whole logs."""
+    """Return whether the fit is ahead of a simple model at all, by JUDGED times;
+    without starts by whole logs."""
     if compared is None:
         return whole.outcome
     outcomes = [
@@ -259,12 +288,14 @@ def _verdict(
 ) -> tuple[Verdict, str | None]:
     """Return the verdict, and the simple model that it names.
 
-    Errors are those on the fitted and on the unseen logs; `outcomes` are those of `_outcome` by
-    simple model, the simplest first.
+    Errors are those on the fitted and on the unseen logs; `outcomes` are those of
+    `_outcome` by simple model, the simplest first.
     """
     if _is_within(unseen.fit, tolerance):
         return Verdict.PREDICTS, None
-    not_ahead = [name for name, outcome in outcomes.items() if outcome is not Outcome.BETTER]
+    not_ahead = [
+        name for name, outcome in outcomes.items() if outcome is not Outcome.BETTER
+    ]
     if _misfits(fitted, tolerance) and (unseen.fit is None or not_ahead):
         return Verdict.MISFIT, None
     if unseen.fit is None:
@@ -279,12 +310,16 @@ def _verdict(
 
 
 def _rough_verdict(
-    fitted: float | None, unseen: float, simple: Mapping[str, float], not_ahead: Sequence[str]
+    fitted: float | None,
+    unseen: float,
+    simple: Mapping[str, float],
+    not_ahead: Sequence[str],
 ) -> tuple[Verdict, str | None]:
-    """Return the verdict on a fit that is outside the tolerance, and no worse than a simple model.
+    """Return the verdict on a fit that is outside the tolerance, and no worse than a
+    simple model.
 
-    Errors are the fit's, and those of simple models on unseen logs; `not_ahead` are the simple
-    models that the fit cannot be told from.
+    Errors are the fit's, and those of simple models on unseen logs; `not_ahead` are the
+    simple models that the fit cannot be told from.
     """
     if fitted is not None and _is_beyond(unseen, WORSE * fitted):
         return Verdict.WORSE_THAN_FITTED, None
@@ -301,7 +336,8 @@ def _is_within(error: float | None, limit: float) -> bool:
 
 
 def _is_beyond(error: float, limit: float) -> bool:
-    """Return whether an error is above a limit, or NaN: that of a simulation that diverged."""
+    """Return whether an error is above a limit, or NaN: that of a simulation that
+    diverged."""
     return not error <= limit
 
 
@@ -316,11 +352,11 @@ def _misfits(fitted: _Errors, tolerance: float) -> bool:
 def standing_out(
     unseen: Sequence[Prediction], verdicts: Sequence[JointVerdict], where: str = "RUN"
 ) -> list[Finding]:
-    """Return which unseen logs err by more than STANDING_OUT times what the other ones do, in any
-    joint.
+    """Return which unseen logs err by more than STANDING_OUT times what the other ones
+    do, in any joint.
 
-    Three logs at least, and beyond the tolerance. Whether such a log counts is for its user to say:
-    the hint has the command, with the run's folder `where`.
+    Three logs at least, and beyond the tolerance. Whether such a log counts is for its
+    user to say: the hint has the command, with the run's folder `where`.
     """
     names = list[str]()
     for verdict in verdicts:
@@ -341,8 +377,8 @@ def standing_out(
 
 
 def behind(settings: FitSettings, verdicts: Sequence[JointVerdict]) -> list[Finding]:
-    """Return that a fit of the hydraulics errs more on its own logs than nine numbers do, which it
-    holds."""
+    """Return that a fit of the hydraulics errs more on its own logs than nine numbers
+    do, which it holds."""
     if settings.stage != "hyd":
         return []
     joints = list[str]()
@@ -352,7 +388,11 @@ def behind(settings: FitSettings, verdicts: Sequence[JointVerdict]) -> list[Find
             joints.append(verdict.name)
     if not joints:
         return []
-    kind = "behind nine numbers" if settings.seeded else "behind nine numbers from its start"
+    kind = (
+        "behind nine numbers"
+        if settings.seeded
+        else "behind nine numbers from its start"
+    )
     return [Finding(kind, "warning", tuple(joints))]
 
 

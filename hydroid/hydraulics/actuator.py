@@ -1,14 +1,16 @@
-"""The actuators of a population beside MuJoCo: how they start, and the pressures in their chambers.
+"""The actuators of a population beside MuJoCo: how they start, and the pressures in
+their chambers.
 
-`make_plugin` lays out what compiled code reads, and `at_rest` the state that it changes; then
-`hydroid.simulation.rollout` repeats, for one candidate at a time,
+`make_plugin` lays out what compiled code reads, and `at_rest` the state that it
+changes; then `hydroid.simulation.rollout` repeats, for one candidate at a time,
 
-    kernel.look_ahead: MuJoCo's step gets qfrc_applied = torque and dof_armature = armature plus the arm's own
-    kernel.take_over: MuJoCo's qpos becomes the angle that follows from its new velocity
+    kernel.look_ahead: MuJoCo's step gets qfrc_applied = torque and dof_armature =
+    armature plus the arm's own kernel.take_over: MuJoCo's qpos becomes the angle that
+    follows from its new velocity
 
-J is the number of moving joints, n that of candidates. All joints that move belong in, also those without
-hydraulics (kind NONE): their inertia couples. The plugin integrates viscous damping, so MuJoCo's dof_damping
-must be 0.
+J is the number of moving joints, n that of candidates. All joints that move belong in,
+also those without hydraulics (kind NONE): their inertia couples. The plugin integrates
+viscous damping, so MuJoCo's dof_damping must be 0.
 """
 
 import numpy as np
@@ -19,14 +21,18 @@ from hydroid.hydraulics.kernel import Plugin
 from hydroid.hydraulics.records import JOINT_STATE, NONE, Records, coefficients
 from hydroid.hydraulics.solenoid import drive, resting_stroke
 
-START_PRESSURE = 50e5  # in chamber B at the start where neither settings nor log say [Pa]; ours
+# in chamber B at the start where neither settings nor log say [Pa]; ours
+START_PRESSURE = 50e5
 
 
-def make_plugin(joints: Records, entries: Index, period: float, substeps: int) -> Plugin:
-    """Return the actuators of n candidates, of JOINT, (n, J), with substeps in MuJoCo's step, the period [s].
+def make_plugin(
+    joints: Records, entries: Index, period: float, substeps: int
+) -> Plugin:
+    """Return the actuators of n candidates, of JOINT, (n, J), with substeps in MuJoCo's
+    step, the period [s].
 
-    The coil of an infeasible candidate has no force. `entries` say where M[i, j] stands in a row of MuJoCo's
-    sparse mass matrix, shape (J, J).
+    The coil of an infeasible candidate has no force. `entries` say where M[i, j] stands
+    in a row of MuJoCo's sparse mass matrix, shape (J, J).
     """
     driven = joints.kind[0] != NONE
     order = np.argsort(driven, stable=True)
@@ -36,10 +42,11 @@ def make_plugin(joints: Records, entries: Index, period: float, substeps: int) -
 
 
 def at_rest(plugin: Plugin, angle: Array, torque: Array) -> Structs:
-    """Return the state at rest at `angle` [rad], with the coils at I_min, of JOINT_STATE, shape (n, J).
+    """Return the state at rest at `angle` [rad], with the coils at I_min, of
+    JOINT_STATE, shape (n, J).
 
-    The torque g(q) [N·m] is what the actuators must hold, or what a joint rests on where oil is trapped; both
-    have the shape (n, J).
+    The torque g(q) [N·m] is what the actuators must hold, or what a joint rests on
+    where oil is trapped; both have the shape (n, J).
     """
     c: Records = plugin.coefficients.view(np.recarray)
     lever = rod_motion(angle, c)[1]
@@ -51,13 +58,17 @@ def at_rest(plugin: Plugin, angle: Array, torque: Array) -> Structs:
     pressure_a = np.where(rests, c.trapped_pressure, pressure_a)
     pressure_b = np.where(rests, level, pressure_b)
     state = np.zeros(c.shape, JOINT_STATE)
-    for side, pressure, fill in zip("ab", (pressure_a, pressure_b), fills(angle, c), strict=True):
+    for side, pressure, fill in zip(
+        "ab", (pressure_a, pressure_b), fills(angle, c), strict=True
+    ):
         z = state[side]
         z["oil"] = pressure + c.bulk_modulus * fill
         z["drive"] = drive(0.0, c)
         z["stroke"] = resting_stroke(z["drive"], c.gap, c.plunger_stiffness)
     state["hold"], state["external"] = torque, -torque
-    carried = np.where(rests, torque - lever * (c.a.area * pressure_a - c.b.area * pressure_b), 0.0)
+    carried = np.where(
+        rests, torque - lever * (c.a.area * pressure_a - c.b.area * pressure_b), 0.0
+    )
     state["contact"], state["stop"] = carried / GIVE, angle + np.sign(carried) * GIVE
     state["line"], state["share"] = c.relief, c.pump_idle
     state["displacement"] = np.nan
@@ -65,20 +76,26 @@ def at_rest(plugin: Plugin, angle: Array, torque: Array) -> Structs:
 
 
 def pressures(coefficients: Structs, state: Structs, angle: Array) -> Array:
-    """Return the pressures of chambers A and B [Pa], shape (n, J, 2), 0 of a joint without actuator.
+    """Return the pressures of chambers A and B [Pa], shape (n, J, 2), 0 of a joint
+    without actuator.
 
-    They are those of COEFFICIENTS and states at `angle` [rad], shape (n, J). With the coefficients of one
-    candidate, shape (J,), n may as well be the samples of its record.
+    They are those of COEFFICIENTS and states at `angle` [rad], shape (n, J). With the
+    coefficients of one candidate, shape (J,), n may as well be the samples of its
+    record.
     """
     c: Records = coefficients.view(np.recarray)
     oil = [
-        state[side]["oil"] - c.bulk_modulus * fill for side, fill in zip("ab", fills(angle, c), strict=True)
+        state[side]["oil"] - c.bulk_modulus * fill
+        for side, fill in zip("ab", fills(angle, c), strict=True)
     ]
-    return np.where((c.kind != NONE)[..., None], np.maximum(np.stack(oil, axis=-1), 0.0), 0.0)
+    return np.where(
+        (c.kind != NONE)[..., None], np.maximum(np.stack(oil, axis=-1), 0.0), 0.0
+    )
 
 
 def swallowed(c: Records, angle: Array, velocity: Array) -> Array:
-    """Flow [m³/s] that a motion takes from the pump at an angle [rad] and velocity [rad/s].
+    """Flow [m³/s] that a motion takes from the pump at an angle [rad] and velocity
+    [rad/s].
 
     Elementwise over COEFFICIENTS; 0 of a joint without actuator.
     """

@@ -1,15 +1,17 @@
-"""Cylinder or rotary actuator (article 2.2, equation (9)) and the oil in its two chambers.
+"""Cylinder or rotary actuator (article 2.2, equation (9)) and the oil in its two
+chambers.
 
     ṗ_A = β/V_A (Q_A − A_A ẋ),   ṗ_B = β/V_B (A_B ẋ − Q_B),   F_R = A_A p_A − A_B p_B − F_c
 
-with V = dead volume + area × travel. A rotary actuator has D_m for both areas, the joint's angle for its
-travel, and chambers of constant volume. The block that the article used has stiff oil; a large β is that
-limit.
+with V = dead volume + area × travel. A rotary actuator has D_m for both areas, the
+joint's angle for its travel, and chambers of constant volume. The block that the
+article used has stiff oil; a large β is that limit.
 
-What is stored is not pressure but *oil*: y = p + β ln(V/V_0) (for a rotary chamber y = p ± β D_m q/V_0). It
-changes by valve flow alone, ẏ = β Q / V, whatever the joint does, so that shut chambers conserve their oil to
-the last digit and pressures come back with the angle. Where oil alone does not fill the chamber, the
-pressure rests at vapour pressure, which is taken for 0, and y remembers the missing volume: no oil is made or
+What is stored is not pressure but *oil*: y = p + β ln(V/V_0) (for a rotary chamber y =
+p ± β D_m q/V_0). It changes by valve flow alone, ẏ = β Q / V, whatever the joint does,
+so that shut chambers conserve their oil to the last digit and pressures come back with
+the angle. Where oil alone does not fill the chamber, the pressure rests at vapour
+pressure, which is taken for 0, and y remembers the missing volume: no oil is made or
 lost.
 """
 
@@ -26,9 +28,11 @@ from hydroid.hydraulics.records import LINEAR, ROTARY
 from hydroid.settings import linkage
 
 SLIDING = 1e-3  # speed [m/s, or rad/s] above which dry friction is nearly full; ours
-GIVE = 5e-4  # what a joint's rest gives under the load that it carries at the start [rad]; ours
+# what a joint's rest gives under the load that it carries at the start [rad]; ours
+GIVE = 5e-4
 SMALLEST = 0.1
-"""part of the dead volume that a chamber keeps, however far a joint is driven beyond its stops; ours"""
+"""part of the dead volume that a chamber keeps, however far a joint is driven beyond
+its stops; ours"""
 
 triangle = compilable(linkage.triangle)
 four_bar = compilable(linkage.four_bar)
@@ -48,23 +52,30 @@ def filling(travel, area, dead) -> Any:
 
 @compilable
 def rod(angle: float, c) -> Any:
-    """Travel x [m], moment arm r = dx/dq [m/rad] and dr/dq of one cylinder at a joint angle [rad]."""
+    """Travel x [m], moment arm r = dx/dq [m/rad] and dr/dq of one cylinder at a joint
+    angle [rad]."""
     psi, first, second = angle, 1.0, 0.0
     if c.rocker > 0.0:
         psi, first, second = four_bar(angle, c)
-    travel, arm, slope = triangle(psi, c.pivot_distance_1, c.pivot_distance_2, c.theta0, c.shortest)
+    travel, arm, slope = triangle(
+        psi, c.pivot_distance_1, c.pivot_distance_2, c.theta0, c.shortest
+    )
     return travel, arm * first, slope * first * first + arm * second
 
 
 @compilable
 def bent(angle, c) -> Any:
-    """Way of a rotary actuator at an angle [rad], its moment arm, relative to that in the middle, and slope.
+    """Way of a rotary actuator at an angle [rad], its moment arm, relative to that in
+    the middle, and slope.
 
-    A joint that a linkage of unknown size turns is taken for a rotary actuator whose moment arm
-    r = 1 + slope s + bend s² depends on the place s in the joint's range, -1 to 1. The way is its integral.
+    A joint that a linkage of unknown size turns is taken for a rotary actuator whose
+    moment arm r = 1 + slope s + bend s² depends on the place s in the joint's range, -1
+    to 1. The way is its integral.
     """
     place = (angle - c.middle) / c.half
-    way = angle + c.half * place * place * (0.5 * c.lever_slope + c.lever_bend * place / 3.0)
+    way = angle + c.half * place * place * (
+        0.5 * c.lever_slope + c.lever_bend * place / 3.0
+    )
     return (
         way,
         1.0 + place * (c.lever_slope + c.lever_bend * place),
@@ -73,33 +84,46 @@ def bent(angle, c) -> Any:
 
 
 def fills(angle: Array, c) -> list[Array]:
-    """ln(V/V_0) of chambers A and B at angles [rad] of COEFFICIENTS; ± D_m q/V_0 of a rotary actuator."""
+    """ln(V/V_0) of chambers A and B at angles [rad] of COEFFICIENTS; ± D_m q/V_0 of a
+    rotary actuator."""
     travel, linear, dead = rod_motion(angle, c)[0], c.kind == LINEAR, c.dead_volume
     sides = (c.a.area, travel, travel), (c.b.area, c.stroke - travel, -travel)
-    return [np.where(linear, filling(out, area, dead), turn * area / dead) for area, out, turn in sides]
+    return [
+        np.where(linear, filling(out, area, dead), turn * area / dead)
+        for area, out, turn in sides
+    ]
 
 
 def rod_motion(angle: Array, c) -> list[Array]:
-    """Travel x [m], moment arm r = dx/dq [m/rad] and dr/dq of COEFFICIENTS at angles [rad], elementwise.
+    """Travel x [m], moment arm r = dx/dq [m/rad] and dr/dq of COEFFICIENTS at angles
+    [rad], elementwise.
 
     Of a rotary actuator x is the angle, and r is 1, unless its moment arm is `bent`.
     """
     still = angle, 1.0, 0.0
     with np.errstate(all="ignore"):  # joints without a range, a rocker or a triangle
         turned, rocked = bent(angle, c), four_bar(angle, c)
-        psi, first, second = (np.where(c.rocker > 0, x, y) for x, y in zip(rocked, still, strict=True))
-        travel, arm, slope = triangle(psi, c.pivot_distance_1, c.pivot_distance_2, c.theta0, c.shortest)
+        psi, first, second = (
+            np.where(c.rocker > 0, x, y) for x, y in zip(rocked, still, strict=True)
+        )
+        travel, arm, slope = triangle(
+            psi, c.pivot_distance_1, c.pivot_distance_2, c.theta0, c.shortest
+        )
         cylinder = travel, arm * first, slope * first**2 + arm * second
     kinds = c.kind == LINEAR, c.kind == ROTARY
-    return [np.select(kinds, [x, y], z) for x, y, z in zip(cylinder, turned, still, strict=True)]
+    return [
+        np.select(kinds, [x, y], z)
+        for x, y, z in zip(cylinder, turned, still, strict=True)
+    ]
 
 
 @compilable
 def stop_damping(travel, speed, stroke, penetration) -> Any:
-    """F_c / ẋ of the hard stops [N·s/m], equation (9): K_p × penetration, only while moving further in.
+    """F_c / ẋ of the hard stops [N·s/m], equation (9): K_p × penetration, only while
+    moving further in.
 
-    F_c opposes the motion at both ends; the article's sign at the lower one would push the rod out of the
-    barrel. Travel x and stroke S [m], speed ẋ [m/s], K_p [N·s/m²].
+    F_c opposes the motion at both ends; the article's sign at the lower one would push
+    the rod out of the barrel. Travel x and stroke S [m], speed ẋ [m/s], K_p [N·s/m²].
     """
     beyond = travel - stroke if speed > 0.0 else -travel if speed < 0.0 else 0.0
     return penetration * np.maximum(beyond, 0.0)
@@ -115,18 +139,21 @@ def friction_damping(speed, friction) -> Any:
 def contact_torque(depth, contact) -> Any:
     """Torque [N·m] of what a joint rests on, at the angle [rad] left until they part.
 
-    The stiffness `contact` [N·m/rad] is below 0, and so is the angle, if it holds the joint from above.
+    The stiffness `contact` [N·m/rad] is below 0, and so is the angle, if it holds the
+    joint from above.
     """
     return np.abs(contact) * depth if depth * contact > 0.0 else 0.0
 
 
 def holding_pressures(force, area_a, area_b, supply, tank, level) -> tuple[Any, Any]:
-    """Chamber pressures p_A, p_B [Pa] that hold the arm at the start of a run, elementwise (ours).
+    """Chamber pressures p_A, p_B [Pa] that hold the arm at the start of a run,
+    elementwise (ours).
 
-    They satisfy A_A p_A − A_B p_B = force. Balance leaves their common level open: p_B is `level`,
-    raised or lowered until both pressures lie between tank and supply. For a load too heavy for that, the
-    nearest pressures that hold it are returned, one of them above supply. Of a rotary actuator the force is
-    the torque [N·m] and both areas are D_m [m³/rad].
+    They satisfy A_A p_A − A_B p_B = force. Balance leaves their common level open: p_B
+    is `level`, raised or lowered until both pressures lie between tank and supply. For
+    a load too heavy for that, the nearest pressures that hold it are returned, one of
+    them above supply. Of a rotary actuator the force is the torque [N·m] and both areas
+    are D_m [m³/rad].
     """
     low = np.maximum(tank, (area_a * tank - force) / area_b)
     high = np.minimum(supply, (area_a * supply - force) / area_b)

@@ -1,8 +1,8 @@
 """Functions written once for Python and for a compiled loop.
 
-A component's law is a plain Python function of floats; one that no branch depends on takes arrays that
-broadcast, too (population axis first). Marked `compilable`, the very same function is compiled into the
-kernel.
+A component's law is a plain Python function of floats; one that no branch depends on
+takes arrays that broadcast, too (population axis first). Marked `compilable`, the very
+same function is compiled into the kernel.
 """
 
 # pyright: reportMissingParameterType=false
@@ -26,10 +26,12 @@ def compilable(function: F) -> F:
 
 @compilable
 def implicit_weight(speed) -> Any:
-    """Weight of the new state in a linearised step, from rate times step (dimensionless).
+    """Weight of the new state in a linearised step, from rate times step
+    (dimensionless).
 
-    One half, the second-order trapezoidal rule, while the step resolves the rate; towards one, backward
-    Euler, where it does not, which is the least weight that keeps a decay free of overshoot.
+    One half, the second-order trapezoidal rule, while the step resolves the rate;
+    towards one, backward Euler, where it does not, which is the least weight that keeps
+    a decay free of overshoot.
     """
     return 1.0 - 1.0 / np.maximum(speed, 2.0)
 
@@ -41,9 +43,11 @@ def kept(steps) -> Any:
 
 
 def ringing(frequency: Array, ratio: Array, step: float) -> tuple[Array, Array]:
-    """What a damped oscillation leaves after a step [s]: factors C and S [s] that `overshoot` takes.
+    """What a damped oscillation leaves after a step [s]: factors C and S [s] that
+    `overshoot` takes.
 
-    frequency: without damping [Hz]; of an infinite one they mean nothing. ratio: of the damping, below 1.
+    frequency: without damping [Hz]; of an infinite one they mean nothing. ratio: of the
+    damping, below 1.
     """
     pace = 2.0 * np.pi * np.where(np.isfinite(frequency), frequency, 0.0)
     turn, decay = pace * np.sqrt(1.0 - ratio**2) * step, np.exp(-ratio * pace * step)

@@ -1,8 +1,10 @@
-"""One joint of one candidate during a look-ahead: what the compiled loops of `kernel` do with it.
+"""One joint of one candidate during a look-ahead: what the compiled loops of `kernel`
+do with it.
 
-c is its record of COEFFICIENTS, z its JOINT_STATE, w its SCRATCH space: `hydroid.hydraulics.records` lists
-their fields. Each has a record for side A and one for B, whose lever is negative. Only compiled code calls
-these functions; the components' laws, called here, also work on numpy. They run millions of times a second,
+c is its record of COEFFICIENTS, z its JOINT_STATE, w its SCRATCH space:
+`hydroid.hydraulics.records` lists their fields. Each has a record for side A and one
+for B, whose lever is negative. Only compiled code calls these functions; the
+components' laws, called here, also work on numpy. They run millions of times a second,
 so a branch leaves out what is switched off.
 """
 
@@ -22,18 +24,31 @@ from hydroid.hydraulics.cylinder import (
 )
 from hydroid.hydraulics.elementwise import compilable, implicit_weight, kept
 from hydroid.hydraulics.records import LINEAR, NONE, ROTARY
-from hydroid.hydraulics.solenoid import beyond_dead_band, drive, plunger_step, plunger_weight, side_voltage
+from hydroid.hydraulics.solenoid import (
+    beyond_dead_band,
+    drive,
+    plunger_step,
+    plunger_weight,
+    side_voltage,
+)
 from hydroid.hydraulics.valve import curved, slot_share
 
 STILL = 1e-15
-"""speed of a plunger before and after a sub-step, below which rounding alone moves it [m/s]"""
+"""speed of a plunger before and after a sub-step, below which rounding alone moves it
+[m/s]"""
 
 
 @compilable
 def begin(c, z, w, angle: float, velocity: float) -> None:
     """Geometry and chamber pressures at the start of the step."""
     z.angle, z.velocity = angle, velocity
-    w.way, w.speed, w.torque, w.resistance, w.oil_stiffness = 0.0, velocity, 0.0, 0.0, 0.0
+    w.way, w.speed, w.torque, w.resistance, w.oil_stiffness = (
+        0.0,
+        velocity,
+        0.0,
+        0.0,
+        0.0,
+    )
     w.a.flow, w.b.flow = 0.0, 0.0
     bulk, dead = c.bulk_modulus, c.dead_volume
     if c.kind == LINEAR:
@@ -49,7 +64,8 @@ def begin(c, z, w, angle: float, velocity: float) -> None:
 
 @compilable
 def command(c, z, w, commands, now: int) -> None:
-    """Take the delayed commands [%]: that towards each side changes `fresh` sub-steps into this step.
+    """Take the delayed commands [%]: that towards each side changes `fresh` sub-steps
+    into this step.
 
     `commands` are those of all steps, of which that at `now` is given in this one.
     """
@@ -60,24 +76,37 @@ def command(c, z, w, commands, now: int) -> None:
 
 @compilable
 def _advance(c, side, z, asked: float, step: float, whole: bool) -> float:
-    """Advance a pilot stage and its plunger under a command towards their side [%]; the mean stroke [m].
+    """Advance a pilot stage and its plunger under a command towards their side [%]; the
+    mean stroke [m].
 
     `whole`: whether the step is a sub-step, and not a part of one.
     """
-    pilot_steps, keep, weight, driven = side.pilot_steps, side.pilot_keep, side.plunger_weight, z.drive
+    pilot_steps, keep, weight, driven = (
+        side.pilot_steps,
+        side.pilot_keep,
+        side.plunger_weight,
+        z.drive,
+    )
     if not whole:
         pilot_steps = side.pilot_lag / step
         keep, weight = kept(pilot_steps), plunger_weight(side.plunger_damping, step, c)
-    if z.held != asked:  # else the coil's drive stays; while the pilot stage follows, it is a mean of its own
+    # else the coil's drive stays; while the pilot stage follows, it is a mean of its
+    # own
+    if z.held != asked:
         z.held = asked if z.pilot == asked else np.nan
-        beyond, part = beyond_dead_band(z.pilot, asked, pilot_steps, keep, side.dead_band)
+        beyond, part = beyond_dead_band(
+            z.pilot, asked, pilot_steps, keep, side.dead_band
+        )
         z.pilot = asked + (z.pilot - asked) * keep
         z.drive = drive(side_voltage(beyond, part, side.onset, side.dead_band), c)
     before, speed = z.stroke, z.speed
-    balanced = before > 0.0 or z.drive == 0.0  # a coil pulls a plunger off its seat again
+    # a coil pulls a plunger off its seat again
+    balanced = before > 0.0 or z.drive == 0.0
     if balanced and speed == 0.0 and z.drive == driven:
         return before
-    z.stroke, z.speed = plunger_step((before, speed), z.drive, side.plunger_damping, step, weight, c)
+    z.stroke, z.speed = plunger_step(
+        (before, speed), z.drive, side.plunger_damping, step, weight, c
+    )
     # in a short part of a step no plunger is fast, even if a new command pulls it
     steady = whole or z.drive == driven
     if steady and abs(speed) < STILL and abs(z.speed) < STILL:
@@ -87,8 +116,10 @@ def _advance(c, side, z, asked: float, step: float, whole: bool) -> float:
 
 @compilable
 def _move_plunger(c, side, z, w, substep: int, step: float) -> float:
-    """Advance a side over a sub-step, up to the moment at which its command changes and on; mean stroke."""
-    later = min(max(substep + 1.0 - side.fresh, 0.0), 1.0)  # part of the sub-step under the new command
+    """Advance a side over a sub-step, up to the moment at which its command changes and
+    on; mean stroke."""
+    # part of the sub-step under the new command
+    later = min(max(substep + 1.0 - side.fresh, 0.0), 1.0)
     if later in (0.0, 1.0) or w.before == w.after:
         return _advance(c, side, z, w.after if later > 0.0 else w.before, step, True)
     mean = (1.0 - later) * _advance(c, side, z, w.before, (1.0 - later) * step, False)
@@ -97,7 +128,8 @@ def _move_plunger(c, side, z, w, substep: int, step: float) -> float:
 
 @compilable
 def opened(side, travel: float) -> float:
-    """Opening of a side's pump edge [m²] at a spool travel towards it [m], without leakage."""
+    """Opening of a side's pump edge [m²] at a spool travel towards it [m], without
+    leakage."""
     share = slot_share(travel, side)
     if side.opening_exponent != 1.0:
         share = share**side.opening_exponent
@@ -108,13 +140,19 @@ def opened(side, travel: float) -> float:
 
 @compilable
 def net_opening(c, z, w, substep: int, step: float) -> float:
-    """Advance both plungers over a sub-step; the mean opening [m²], below 0 towards B."""
+    """Advance both plungers over a sub-step; the mean opening [m²], below 0 towards
+    B."""
     # of the spool [m], equation (6)
     displacement = _move_plunger(c, c.a, z.a, w.a, substep, step)
     displacement -= _move_plunger(c, c.b, z.b, w.b, substep, step)
-    if z.displacement != displacement:  # else the spool rests, and its power law is not worked out again
+    # else the spool rests, and its power law is not worked out again
+    if z.displacement != displacement:
         z.displacement = displacement
-        z.open = opened(c.a, displacement) if displacement > 0.0 else -opened(c.b, -displacement)
+        z.open = (
+            opened(c.a, displacement)
+            if displacement > 0.0
+            else -opened(c.b, -displacement)
+        )
     net = z.open
     left = (z.opening - net) * (1.0 - c.opening_keep)
     z.opening -= left
@@ -123,7 +161,8 @@ def net_opening(c, z, w, substep: int, step: float) -> float:
 
 @compilable
 def mean_opening(c, z, w, commands, now: int, plugin) -> float:
-    """Advance the plungers over a step of the `plugin` under `command`; the mean opening as `net_opening`."""
+    """Advance the plungers over a step of the `plugin` under `command`; the mean
+    opening as `net_opening`."""
     command(c, z, w, commands, now)
     net = 0.0
     for i in range(plugin.substeps):
@@ -133,7 +172,8 @@ def mean_opening(c, z, w, commands, now: int, plugin) -> float:
 
 @compilable
 def _press(w, lever: float, rate: float) -> float:
-    """How a chamber answers to flow and motion; its stiffness at the joint times the step."""
+    """How a chamber answers to flow and motion; its stiffness at the joint times the
+    step."""
     w.lever, w.rate = lever, rate
     relax = w.filled * rate * w.relief
     w.weight = implicit_weight(relax)
@@ -143,7 +183,8 @@ def _press(w, lever: float, rate: float) -> float:
 
 @compilable
 def load(c, z, w, step: float) -> None:
-    """Torque, oil stiffness and resistance of the sub-step, with both chambers eliminated."""
+    """Torque, oil stiffness and resistance of the sub-step, with both chambers
+    eliminated."""
     turn = w.way + 0.5 * step * w.speed
     arm, rub = w.arm + w.slope * turn, 0.0
     volume_a, volume_b = c.dead_volume, c.dead_volume
@@ -163,14 +204,18 @@ def load(c, z, w, step: float) -> None:
         rest = contact_torque(z.stop - z.angle - w.way, z.contact)
         if rest != 0.0:
             w.stiffness += step * abs(z.contact)
-            if z.contact * w.speed < 0.0:  # further in: damped, so that it does not bounce
+            # further in: damped, so that it does not bounce
+            if z.contact * w.speed < 0.0:
                 w.drag += 2.0 * np.sqrt(abs(z.contact) * w.inertia)
     rings, fades = step * w.stiffness, step * w.drag
     w.weight = 0.5
     if not (rings <= 4.0 * w.inertia and fades <= 2.0 * w.inertia):
         w.weight = implicit_weight(max(np.sqrt(rings / w.inertia), fades / w.inertia))
     w.push = rest + w.a.lever * w.a.pushing + w.b.lever * w.b.pushing
-    flowing = w.a.filled * w.a.lever * w.a.rise * w.a.inflow + w.b.filled * w.b.lever * w.b.rise * w.b.inflow
+    flowing = (
+        w.a.filled * w.a.lever * w.a.rise * w.a.inflow
+        + w.b.filled * w.b.lever * w.b.rise * w.b.inflow
+    )
     w.push += w.weight * flowing
 
 
@@ -192,7 +237,8 @@ def _take_flow(z, w, mean: float) -> None:
 
 @compilable
 def settle(c, z, w, gain: float, step: float) -> None:
-    """Take over a velocity gain [rad/s]: pressures, oil, way and torque of the sub-step."""
+    """Take over a velocity gain [rad/s]: pressures, oil, way and torque of the
+    sub-step."""
     mean = w.speed + w.weight * gain
     if c.kind != NONE:
         _take_flow(z.a, w.a, mean)

@@ -1,28 +1,33 @@
 """The compiled loop: all joints of every candidate look ahead over one MuJoCo step.
 
-Oil is stiff: with the arm it rings at 60 to 300 rad/s, so a torque that is computed, then held for 0.01 s, is
-unstable or wrong. Instead the actuators look ahead. With the arm's mass matrix M as it is, and all that is
-neither hydraulic nor damping (gravity, Coriolis, springs, stops) as a torque e per joint held over the step
-as it was in the last one, they integrate
+Oil is stiff: with the arm it rings at 60 to 300 rad/s, so a torque that is computed,
+then held for 0.01 s, is unstable or wrong. Instead the actuators look ahead. With the
+arm's mass matrix M as it is, and all that is neither hydraulic nor damping (gravity,
+Coriolis, springs, stops) as a torque e per joint held over the step as it was in the
+last one, they integrate
 
     M v̇ = r F_R − D v + e,   ẏ_A = β Q_A/V_A,   ẏ_B = β Q_B/V_B,   and the plungers
 
-in sub-steps of a linearised trapezoidal rule: chambers are eliminated, then one symmetric system gives the
-velocities of all joints. The result is each joint's way, its mean torque τ* and a predicted velocity v*.
+in sub-steps of a linearised trapezoidal rule: chambers are eliminated, then one
+symmetric system gives the velocities of all joints. The result is each joint's way, its
+mean torque τ* and a predicted velocity v*.
 
-MuJoCo then finds the true new velocity v from true forces; the torque answers a difference, which grows over
-the step, by −κ (v − v*) in the mean, κ = h C / 6 + D / 2 with C the stiffness of the oil [N·m/rad]. To be
-solved for v at once, κ is added to MuJoCo's inertia:
+MuJoCo then finds the true new velocity v from true forces; the torque answers a
+difference, which grows over the step, by −κ (v − v*) in the mean, κ = h C / 6 + D / 2
+with C the stiffness of the oil [N·m/rad]. To be solved for v at once, κ is added to
+MuJoCo's inertia:
 
     M (v − v₀)/h = τ* − κ (v − v*) + …   is   (M + h κ) (v − v₀)/h = τ* + κ (v* − v₀) + …
 
-As a damping it would be the same but for stops and contacts: their solver ignores implicit damping, and where
-that is strong throws the arm about. After the step `take_over` puts the joint at q + way + h (v − v*)/2 and
-takes e from what really happened. Where M and e do not change within a step, this *is* the sub-stepped
-solution, of second order in the sub-step and stable for any stiffness; their change is first order in
-MuJoCo's step.
+As a damping it would be the same but for stops and contacts: their solver ignores
+implicit damping, and where that is strong throws the arm about. After the step
+`take_over` puts the joint at q + way + h (v − v*)/2 and takes e from what really
+happened. Where M and e do not change within a step, this *is* the sub-stepped solution,
+of second order in the sub-step and stable for any stiffness; their change is first
+order in MuJoCo's step.
 
-Every candidate is computed from its own numbers in a fixed order, so threads change no bit.
+Every candidate is computed from its own numbers in a fixed order, so threads change no
+bit.
 """
 
 # pyright: reportMissingParameterType=false
@@ -42,21 +47,25 @@ from hydroid.hydraulics.valve import meter
 from hydroid.settings import linkage
 
 RAMP_TORQUE, RAMP_WAY = 1.0 / 6.0, 1.0 / 2.0
-"""means of t²/2 and t over a unit step: what a velocity error growing from 0 to 1 does to oil and way"""
+"""means of t²/2 and t over a unit step: what a velocity error growing from 0 to 1 does
+to oil and way"""
 
 
 def source_key(*more: str | None) -> int:
-    """Return a number that changes with the text of the hydraulics' files, and of `more` files.
+    """Return a number that changes with the text of the hydraulics' files, and of
+    `more` files.
 
-    Numba keys its cache on one file only. As a default argument of a compiled function, this number makes all
-    files part of the key from which the function takes code in.
+    Numba keys its cache on one file only. As a default argument of a compiled function,
+    this number makes all files part of the key from which the function takes code in.
     """
     files = [
         *sorted(Path(__file__).parent.glob("*.py")),
         Path(linkage.__file__),
         *map(Path, filter(None, more)),
     ]
-    return int.from_bytes(hashlib.sha256(b"".join(file.read_bytes() for file in files)).digest()[:7])
+    return int.from_bytes(
+        hashlib.sha256(b"".join(file.read_bytes() for file in files)).digest()[:7]
+    )
 
 
 SOURCE = source_key()
@@ -64,9 +73,11 @@ SOURCE = source_key()
 
 @compilable
 def eliminate(matrix, start: int, stop: int) -> None:
-    """Factorise rows `start` to `stop` of a symmetric positive matrix, (J, J), in place as L D Lᵀ.
+    """Factorise rows `start` to `stop` of a symmetric positive matrix, (J, J), in place
+    as L D Lᵀ.
 
-    Only diagonal and upper half are used: they come to hold D⁻¹ and Lᵀ, and from `stop` on what is left.
+    Only diagonal and upper half are used: they come to hold D⁻¹ and Lᵀ, and from `stop`
+    on what is left.
     """
     size = matrix.shape[0]
     for k in range(start, stop):
@@ -81,7 +92,8 @@ def eliminate(matrix, start: int, stop: int) -> None:
 
 @compilable
 def substitute(matrix, vector) -> None:
-    """Replace `vector`, (J,), by the solution of a system that is factorised throughout."""
+    """Replace `vector`, (J,), by the solution of a system that is factorised
+    throughout."""
     size = matrix.shape[0]
     for k in range(size):
         for i in range(k + 1, size):
@@ -94,7 +106,8 @@ def substitute(matrix, vector) -> None:
 
 
 class Plugin(NamedTuple):
-    """What stays the same during a run, of one candidate's J joints; `of` takes one of n."""
+    """What stays the same during a run, of one candidate's J joints; `of` takes one of
+    n."""
 
     coefficients: Any  # (J,), of COEFFICIENTS, or (n, J)
     order: Any  # the joints, those without actuator first, (J,)
@@ -114,8 +127,9 @@ class Plugin(NamedTuple):
 
 
 class Pad(NamedTuple):
-    """Scratch space of one look-ahead: (J,) of SCRATCH, (1,) of LINE; what the matrices of all sub-steps
-    share, and one of them, (J, J); the right side, then the gain in velocity, (J,)."""
+    """Scratch space of one look-ahead: (J,) of SCRATCH, (1,) of LINE; what the matrices
+    of all sub-steps share, and one of them, (J, J); the right side, then the gain in
+    velocity, (J,)."""
 
     joints: Any
     line: Any
@@ -134,11 +148,12 @@ def make_pad(joints: int) -> Pad:
 
 @compilable
 def look_ahead(plugin: Plugin, state, commands, now: int, arm, pad: Pad) -> None:
-    """Look ahead over one step of one candidate; writes torques and armatures of its `arm` in MuJoCo.
+    """Look ahead over one step of one candidate; writes torques and armatures of its
+    `arm` in MuJoCo.
 
-    `state` is its actuators', (J,) of JOINT_STATE; of the commands [%], (.., J), that at `now` holds. The
-    joints are the `columns` of the arm's angle, velocity, applied torque and armature, and `own` is their
-    armature without oil.
+    `state` is its actuators', (J,) of JOINT_STATE; of the commands [%], (.., J), that
+    at `now` holds. The joints are the `columns` of the arm's angle, velocity, applied
+    torque and armature, and `own` is their armature without oil.
     """
     coefficients, order, entries, idle, period, substeps = plugin
     work, lines, common, matrix, gain = pad
@@ -175,7 +190,11 @@ def look_ahead(plugin: Plugin, state, commands, now: int, arm, pad: Pad) -> None
             j = order[a]
             c, z, w = coefficients[j], state[j], work[j]
             if a >= idle:
-                supply = min(line.pressure, c.supply_pressure) if shared else c.supply_pressure
+                supply = (
+                    min(line.pressure, c.supply_pressure)
+                    if shared
+                    else c.supply_pressure
+                )
                 meter(c, w, net_opening(c, z, w, i, step), supply)
                 load(c, z, w, step)
                 if shared:
@@ -193,7 +212,9 @@ def look_ahead(plugin: Plugin, state, commands, now: int, arm, pad: Pad) -> None
                 gain[a] += step * u.weight * u.thrust * line.change
                 for b in range(a, joints):
                     w = work[order[b]]
-                    matrix[a, b] += step * line.softness * u.weight * u.pull * w.weight * w.pull
+                    matrix[a, b] += (
+                        step * line.softness * u.weight * u.pull * w.weight * w.pull
+                    )
         eliminate(matrix, idle, joints)
         substitute(matrix, gain)
         if shared:
@@ -210,25 +231,39 @@ def look_ahead(plugin: Plugin, state, commands, now: int, arm, pad: Pad) -> None
         z, w = state[j], work[j]
         z.way, z.predicted = w.way, w.speed
         z.a.flow, z.b.flow = part * w.a.flow, part * w.b.flow
-        kappa = part * (RAMP_TORQUE * period * w.oil_stiffness + RAMP_WAY * w.resistance)
+        kappa = part * (
+            RAMP_TORQUE * period * w.oil_stiffness + RAMP_WAY * w.resistance
+        )
         z.armature = period * kappa
         z.torque = part * w.torque + kappa * (w.speed - z.velocity)
-        arm.applied[arm.columns[j]], arm.armature[arm.columns[j]] = z.torque, arm.own[j] + z.armature
+        arm.applied[arm.columns[j]], arm.armature[arm.columns[j]] = (
+            z.torque,
+            arm.own[j] + z.armature,
+        )
         if shared:
             z.line, z.share, z.demand = line.pressure, line.share, line.demand
 
 
 @compilable
 def take_over(plugin: Plugin, state, arm, pad: Pad) -> None:
-    """Take over one candidate's true new velocities from MuJoCo, and give it the new angles."""
-    order, entries, period, change = plugin.order, plugin.entries, plugin.period, pad.gain
+    """Take over one candidate's true new velocities from MuJoCo, and give it the new
+    angles."""
+    order, entries, period, change = (
+        plugin.order,
+        plugin.entries,
+        plugin.period,
+        pad.gain,
+    )
     for a in range(order.size):
         z, place = state[order[a]], arm.columns[order[a]]
         velocity = arm.velocity[place]
-        arm.angle[place] = z.angle + z.way + RAMP_WAY * period * (velocity - z.predicted)
+        arm.angle[place] = (
+            z.angle + z.way + RAMP_WAY * period * (velocity - z.predicted)
+        )
         change[a], z.velocity = velocity - z.velocity, velocity
     for a in range(order.size):
-        # (M + h κ) q̈ − torque is what neither oil nor damping did; the bound M contains h κ
+        # (M + h κ) q̈ − torque is what neither oil nor damping did; the bound M
+        # contains h κ
         momentum = 0.0
         for b in range(order.size):
             momentum += arm.mass[entries[a, b]] * change[b]

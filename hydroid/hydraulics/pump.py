@@ -1,35 +1,37 @@
 """One pump for all actuators: the pressure of the line between pump and valves.
 
-Without a `pump_flow` every valve has supply pressure at its port, whatever flows. With one, the line has a
-pressure P of its own. Its oil is compressible, as in the chambers:
+Without a `pump_flow` every valve has supply pressure at its port, whatever flows. With
+one, the line has a pressure P of its own. Its oil is compressible, as in the chambers:
 
     Ṗ = β/V_line (Q_P(P) − Σ Q_i),   P ≤ supply pressure, where the relief valve opens,
 
-with Q_i the flow that actuator i takes from it: `draw` times what enters its chamber. The rest comes from the
-other chamber, through a regeneration valve, or from the tank. So P falls until the flows, opening times root
-of what the load leaves of P, add up to what the pump gives, and no equation has to be solved for it. The pump
-gives
+with Q_i the flow that actuator i takes from it: `draw` times what enters its chamber.
+The rest comes from the other chamber, through a regeneration valve, or from the tank.
+So P falls until the flows, opening times root of what the load leaves of P, add up to
+what the pump gives, and no equation has to be solved for it. The pump gives
 
     Q_P = φ Q_max min(1, (p_S − P)/droop),
 
-so that the pressure falls in proportion to the flow, by no more than `pump_limit`: there it gives whatever is
-taken. It comes up after a demand: φ is `pump_idle` at rest, and from `pump_delay` after the first command on
-it rises to 1 with the time constant `pump_rise`. Every section of the valve has a load check valve: oil never
-runs back to the pump. A joint whose own supply pressure is lower than the line's has a reducing valve.
-Joints without an actuator take nothing. One that follows a log takes what its actuator's chamber swallows at
-the logged speed, however low P falls.
+so that the pressure falls in proportion to the flow, by no more than `pump_limit`:
+there it gives whatever is taken. It comes up after a demand: φ is `pump_idle` at rest,
+and from `pump_delay` after the first command on it rises to 1 with the time constant
+`pump_rise`. Every section of the valve has a load check valve: oil never runs back to
+the pump. A joint whose own supply pressure is lower than the line's has a reducing
+valve. Joints without an actuator take nothing. One that follows a log takes what its
+actuator's chamber swallows at the logged speed, however low P falls.
 
-A sub-step is implicit in P, as it is in the chamber pressures and velocities. With the chambers eliminated,
-P changes by
+A sub-step is implicit in P, as it is in the chamber pressures and velocities. With the
+chambers eliminated, P changes by
 
     δ = (R − Σ g_i v̄_i) / D,   D = V_line/(β h) − dQ_P/dP + Σ draw k (1 − k r) > 0,
 
-v̄ the joints' mean velocities, k = dQ/dP of a metering edge and r a chamber's rise of pressure per flow. It
-pushes joint i with the torque f_i δ, and g_i is f_i times the draw. To the symmetric system of the velocities
-that adds the matrix √(f g) √(f g)ᵀ h / D, which is positive: the sub-step stays as stable as it is without a
-pump. (Between joints whose draws differ this is not f gᵀ: the predicted velocities err in the second order of
-the sub-step, no oil is lost.) Where P would pass the relief pressure, or the limit of its fall, δ is what is
-missing to it.
+v̄ the joints' mean velocities, k = dQ/dP of a metering edge and r a chamber's rise of
+pressure per flow. It pushes joint i with the torque f_i δ, and g_i is f_i times the
+draw. To the symmetric system of the velocities that adds the matrix √(f g) √(f g)ᵀ h /
+D, which is positive: the sub-step stays as stable as it is without a pump. (Between
+joints whose draws differ this is not f gᵀ: the predicted velocities err in the second
+order of the sub-step, no oil is lost.) Where P would pass the relief pressure, or the
+limit of its fall, δ is what is missing to it.
 """
 
 # pyright: reportMissingParameterType=false
@@ -44,7 +46,8 @@ from hydroid.hydraulics.elementwise import compilable
 
 @compilable
 def delivery(pressure: float, share: float, c) -> Any:
-    """Flow Q_P [m³/s] of the pump at a line pressure [Pa], and -dQ_P/dP; `share` is φ."""
+    """Flow Q_P [m³/s] of the pump at a line pressure [Pa], and -dQ_P/dP; `share` is
+    φ."""
     full = share * c.pump_flow
     left = c.relief - pressure
     if left < c.pump_droop:
@@ -74,7 +77,8 @@ def come_up(line, c, step: float) -> float:
 
 @compilable
 def begin_line(line, c, z, demanded: bool, step: float) -> None:
-    """The line at the start of a step, from the state of a joint; `demanded`: whether a command is not 0."""
+    """The line at the start of a step, from the state of a joint; `demanded`: whether a
+    command is not 0."""
     line.pressure, line.share, line.demand = z.line, z.share, z.demand
     line.demanded = 1.0 if demanded else 0.0
     line.decay = np.exp(-step / c.pump_rise) if c.pump_rise > 0.0 else 0.0
@@ -83,12 +87,18 @@ def begin_line(line, c, z, demanded: bool, step: float) -> None:
 
 @compilable
 def draw(line, c, w) -> None:
-    """Add what one actuator takes from the line in a sub-step, and how that answers to pressure and speed."""
+    """Add what one actuator takes from the line in a sub-step, and how that answers to
+    pressure and speed."""
     if line.pressure > c.supply_pressure:
         w.a.give, w.b.give = 0.0, 0.0
     back_a, back_b = w.a.filled * w.a.give * w.a.rise, w.b.filled * w.b.give * w.b.rise
     a, b = c.a.draw, c.b.draw
-    line.drawn += a * w.a.pumped - a * back_a * w.a.inflow + b * w.b.pumped - b * back_b * w.b.inflow
+    line.drawn += (
+        a * w.a.pumped
+        - a * back_a * w.a.inflow
+        + b * w.b.pumped
+        - b * back_b * w.b.inflow
+    )
     line.softness += a * w.a.give * (1.0 - back_a) + b * w.b.give * (1.0 - back_b)
     w.thrust = back_a * w.a.lever + back_b * w.b.lever
     w.sweep = a * back_a * w.a.lever + b * back_b * w.b.lever
@@ -98,9 +108,12 @@ def draw(line, c, w) -> None:
 
 @compilable
 def open_line(line, c, step: float) -> None:
-    """Make the sums of `draw` ready for the sub-step: δ at the present speeds, and 1/D."""
+    """Make the sums of `draw` ready for the sub-step: δ at the present speeds, and
+    1/D."""
     flow, fall = delivery(line.pressure, come_up(line, c, step), c)
-    line.softness = 1.0 / (c.line_volume / (c.bulk_modulus * step) + fall + line.softness)
+    line.softness = 1.0 / (
+        c.line_volume / (c.bulk_modulus * step) + fall + line.softness
+    )
     line.change = line.softness * (flow - line.drawn - line.swept)
     missing = c.relief - line.pressure
     least = lowest(c) - line.pressure

@@ -1,10 +1,12 @@
-"""Structured arrays of the hydraulics: what a joint is, what it carries from step to step, scratch space.
+"""Structured arrays of the hydraulics: what a joint is, what it carries from step to
+step, scratch space.
 
 A population's joints are one record array, shape (n, J), with a field per quantity of
-`hydroid.quantity_table`, in SI: `joints.area_a` is an array, shape (n, J), and `joints[i, j]` one joint. A
-rotary actuator's area_a and area_b are displacements [m³/rad], its dead_volume is the constant volume of a
-chamber, its dry_friction a torque [N·m]. Quantities that may be null are inf where they are. What the kernel
-reads and writes has a record for each side, A and B, so that each law of a side is written once.
+`hydroid.quantity_table`, in SI: `joints.area_a` is an array, shape (n, J), and
+`joints[i, j]` one joint. A rotary actuator's area_a and area_b are displacements
+[m³/rad], its dead_volume is the constant volume of a chamber, its dry_friction a torque
+[N·m]. Quantities that may be null are inf where they are. What the kernel reads and
+writes has a record for each side, A and B, so that each law of a side is written once.
 """
 
 import keyword
@@ -27,7 +29,8 @@ Records: TypeAlias = np.recarray[Any, Any]
 Fields = list[tuple[str, Any]]
 
 NONE, LINEAR, ROTARY = 0, 1, 2
-"""kinds of actuator; a joint with none keeps the constant torque that holds its start pose"""
+"""kinds of actuator; a joint with none keeps the constant torque that holds its start
+pose"""
 
 
 def _fields(names: str) -> Fields:
@@ -42,25 +45,30 @@ JOINT = np.dtype(
         *_fields(f"middle half sense retracted stroke {' '.join(BARS)}"),
     ]
 )
-"""all quantities of a joint and its actuator, in SI, and how it is moved: kind (NONE, LINEAR or ROTARY);
-middle of its range and half of it [rad]; of a cylinder 1 if the rod runs out towards positive angles, else
--1, the angle at its triangle with the rod fully in [rad], as at the end of the joint's range, and the stroke
-[m]; ground to branch are those of `linkage.four_bar`, and rocker is 0 without one"""
+"""all quantities of a joint and its actuator, in SI, and how it is moved: kind (NONE,
+LINEAR or ROTARY); middle of its range and half of it [rad]; of a cylinder 1 if the rod
+runs out towards positive angles, else -1, the angle at its triangle with the rod fully
+in [rad], as at the end of the joint's range, and the stroke [m]; ground to branch are
+those of `linkage.four_bar`, and rocker is 0 without one"""
 
 _SIDED = [row.name for row in ROWS if isinstance(row.default, tuple)]
 _PLAIN = [name for name in JOINT.names or () if name[:-2] not in _SIDED]
-_SIDE_FIELDS = {name: f"{name}_" if keyword.iskeyword(name) else name for name in _SIDED}
+_SIDE_FIELDS = {
+    name: f"{name}_" if keyword.iskeyword(name) else name for name in _SIDED
+}
 
 SIDE = np.dtype(
     [
         *((field, np.float64) for field in _SIDE_FIELDS.values()),
         ("late", np.int64),  # whole steps of the delay,
         ("fresh", np.float64),  # and sub-steps of the rest
-        ("pilot_keep", np.float64),  # part of the pilot stage's error that a sub-step leaves,
+        # part of the pilot stage's error that a sub-step leaves,
+        ("pilot_keep", np.float64),
         ("pilot_steps", np.float64),  # and its lag in sub-steps
         ("plunger_weight", np.float64),  # of its new state in a sub-step
         ("has_curve", np.bool_),
-        # parts of the opening that the power law gives where the parts of the valve's curve end
+        # parts of the opening that the power law gives where the parts of the valve's
+        # curve end
         *((f"knot_{k}", np.float64) for k in range(1, len(KNOTS) + 1)),
     ]
 )
@@ -71,22 +79,29 @@ COEFFICIENTS = np.dtype(
         *((name, JOINT[name]) for name in _PLAIN),
         ("a", SIDE),
         ("b", SIDE),
-        *_fields("theta0 shortest coil gap conductance opening_keep opening_steps backflow relief"),
+        *_fields(
+            "theta0 shortest coil gap conductance opening_keep opening_steps backflow relief"
+        ),
         *_fields("ring_cosine ring_sine"),
     ]
 )
-"""what the kernel reads of a joint: its fields of JOINT, and constants that follow from them; theta0 is the
-pivots' angle at joint angle 0 [rad], below 0 if the rod runs out towards negative angles, shortest the
-cylinder's length with the rod fully in [m], opening_keep the part of the opening's error that a sub-step
-leaves, opening_steps its lag in sub-steps, backflow the least flow from the pump [m³/s], relief the pressure
-of the pump's relief valve [Pa]; ring_cosine and ring_sine [s] are those of `elementwise.ringing`"""
+"""what the kernel reads of a joint: its fields of JOINT, and constants that follow from
+them; theta0 is the pivots' angle at joint angle 0 [rad], below 0 if the rod runs out
+towards negative angles, shortest the cylinder's length with the rod fully in [m],
+opening_keep the part of the opening's error that a sub-step leaves, opening_steps its
+lag in sub-steps, backflow the least flow from the pump [m³/s], relief the pressure of
+the pump's relief valve [Pa]; ring_cosine and ring_sine [s] are those of
+`elementwise.ringing`"""
 
 SIDE_STATE = np.dtype(
     _fields(
         "stroke speed drive "  # of the plunger [m, m/s], its coil [N·m²]
         "held "  # command that has settled, of which `drive` is [%]; else NaN
-        "asked pilot "  # delayed command towards this side [%], and what the pilot stage has of it
-        "oil flow"  # oil [Pa] as `cylinder` defines it; mean flow into the chamber over the last step [m³/s]
+        # delayed command towards this side [%], and what the pilot stage has of it
+        "asked pilot "
+        # oil [Pa] as `cylinder` defines it; mean flow into the chamber over the last
+        # step [m³/s]
+        "oil flow"
     )
 )
 JOINT_STATE = np.dtype(
@@ -94,16 +109,21 @@ JOINT_STATE = np.dtype(
         ("a", SIDE_STATE),
         ("b", SIDE_STATE),
         *_fields(
-            "external hold "  # torque e that is neither oil nor damping; torque that held the start [N·m]
+            # torque e that is neither oil nor damping; torque that held the start [N·m]
+            "external hold "
             "angle velocity "  # at the start of the step [rad]; at its end [rad/s]
-            "turning surge "  # on ringing oil: velocity [rad/s], and how it changes [rad/s²]
+            # on ringing oil: velocity [rad/s], and how it changes [rad/s²]
+            "turning surge "
             "opening "  # of the valve, below 0 towards B [m²]
-            "displacement open "  # of the spool [m], NaN before the first; what it opens without a lag [m²]
-            "way predicted torque armature "  # of the look-ahead: turn [rad], velocity v*, torque, h κ
-            # contact with what the joint rests on at the start: stiffness, below 0 if from above [N·m/rad],
-            # and angle at which it ends [rad]
+            # of the spool [m], NaN before the first; what it opens without a lag [m²]
+            "displacement open "
+            # of the look-ahead: turn [rad], velocity v*, torque, h κ
+            "way predicted torque armature "
+            # contact with what the joint rests on at the start: stiffness, below 0 if
+            # from above [N·m/rad], and angle at which it ends [rad]
             "contact stop "
-            # of the pump, the same at all joints: pressure of its line [Pa], its φ, time of the demand [s]
+            # of the pump, the same at all joints: pressure of its line [Pa], its φ,
+            # time of the demand [s]
             "line share demand"
         ),
     ]
@@ -112,10 +132,13 @@ JOINT_STATE = np.dtype(
 
 SIDE_SCRATCH = np.dtype(
     _fields(
-        "pressure flow before after "  # of the step: pressure, sum of flows, delayed command before and after
-        # of a sub-step: whether oil fills the chamber, pressure, inflow and its fall with the pressure
+        # of the step: pressure, sum of flows, delayed command before and after
+        "pressure flow before after "
+        # of a sub-step: whether oil fills the chamber, pressure, inflow and its fall
+        # with the pressure
         "filled pushing inflow relief "
-        # torque per pressure, pressure per volume, weight of the new state, pressure rise per flow
+        # torque per pressure, pressure per volume, weight of the new state, pressure
+        # rise per flow
         "lever rate weight rise "
         "pumped give"  # flow from the pump, its rise with the pump's pressure
     )
@@ -127,8 +150,8 @@ SCRATCH = np.dtype(
         *_fields(
             # of the whole step: running sums over its sub-steps, and where the joint is
             "inertia way speed torque resistance oil_stiffness travel arm slope "
-            # of a sub-step: damping, oil stiffness times step, weight of the new state, torque at rest,
-            # f and g of `pump`, and the mean of both
+            # of a sub-step: damping, oil stiffness times step, weight of the new state,
+            # torque at rest, f and g of `pump`, and the mean of both
             "drag stiffness weight push thrust sweep pull"
         ),
     ]
@@ -137,26 +160,39 @@ SCRATCH = np.dtype(
 
 LINE = np.dtype(
     _fields(
-        # of the step: state, whether there is a command, decay of φ, flow into joints that follow a log
+        # of the step: state, whether there is a command, decay of φ, flow into joints
+        # that follow a log
         "pressure share demand demanded decay taken "
-        "drawn softness swept change"  # of a sub-step: as `pump` sums them; change of pressure
+        # of a sub-step: as `pump` sums them; change of pressure
+        "drawn softness swept change"
     )
 )
 """scratch space of the pump's line during a look-ahead"""
 
 
 def nominal_joints(arm: Arm, settings: HydraulicSettings) -> Structs:
-    """Return what the settings and the arm's file say of the arm's joints, of JOINT, shape (J,)."""
+    """Return what the settings and the arm's file say of the arm's joints, of JOINT,
+    shape (J,)."""
     table = np.zeros(len(arm.joints), JOINT)
     for row, joint in zip(table, arm.joints, strict=True):
         actuator, ends = joint.actuator, np.array(joint.limits)
         for name, value in actuator_values(actuator, settings).items():
             if name != "mass":
-                row[name] = math.inf if value is None else value * QUANTITIES[name].factor
+                row[name] = (
+                    math.inf if value is None else value * QUANTITIES[name].factor
+                )
         if actuator is not None:
-            row["kind"], row["middle"], row["half"] = ROTARY, ends.mean(), 0.5 * np.ptp(ends)
+            row["kind"], row["middle"], row["half"] = (
+                ROTARY,
+                ends.mean(),
+                0.5 * np.ptp(ends),
+            )
         if isinstance(actuator, LinearActuator):
-            row["kind"], row["sense"], row["stroke"] = LINEAR, actuator.sense, 1e-3 * actuator.stroke
+            row["kind"], row["sense"], row["stroke"] = (
+                LINEAR,
+                actuator.sense,
+                1e-3 * actuator.stroke,
+            )
             row["retracted"] = ends[np.argmin(actuator.length(ends))]
             if (bars := actuator.settings.four_bar) is not None:
                 for name in BARS:
@@ -166,12 +202,16 @@ def nominal_joints(arm: Arm, settings: HydraulicSettings) -> Structs:
 
 
 def has_force_curve(joints: Any) -> Mask:
-    """Return which candidates have a force-stroke curve at every actuator, shape (n,)."""
-    return curve_exists(joints.force_1, joints.force_2, joints.stroke_1, joints.stroke_2).all(axis=1)
+    """Return which candidates have a force-stroke curve at every actuator, shape
+    (n,)."""
+    return curve_exists(
+        joints.force_1, joints.force_2, joints.stroke_1, joints.stroke_2
+    ).all(axis=1)
 
 
 def coefficients(joints: Records, period: float = 0.01, substeps: int = 1) -> Records:
-    """Lay out what the kernel reads of n candidates' V joints, of COEFFICIENTS, shape (n, V).
+    """Lay out what the kernel reads of n candidates' V joints, of COEFFICIENTS, shape
+    (n, V).
 
     `period` is that of a step [s].
     """
@@ -181,15 +221,23 @@ def coefficients(joints: Records, period: float = 0.01, substeps: int = 1) -> Re
     p = joints
     table["theta0"] = p.sense * p.pivot_angle
     with np.errstate(invalid="ignore"):  # joints without a cylinder have no triangle
-        triangles = triangle(p.retracted, p.pivot_distance_1, p.pivot_distance_2, table.theta0)
+        triangles = triangle(
+            p.retracted, p.pivot_distance_1, p.pivot_distance_2, table.theta0
+        )
     table["shortest"] = triangles[0]
-    table["coil"], table["gap"] = force_curve(p.force_1, p.force_2, p.stroke_1, p.stroke_2, p.rated_current)
+    table["coil"], table["gap"] = force_curve(
+        p.force_1, p.force_2, p.stroke_1, p.stroke_2, p.rated_current
+    )
     table["conductance"] = conductance(p.flow_coefficient)
     table["opening_steps"] = p.opening_lag * substeps / period
     table["opening_keep"] = kept(table["opening_steps"])
-    table["ring_cosine"], table["ring_sine"] = ringing(p.oil_frequency, p.oil_damping, period)
+    table["ring_cosine"], table["ring_sine"] = ringing(
+        p.oil_frequency, p.oil_damping, period
+    )
     table["backflow"] = np.where(np.isinf(p.pump_flow), -np.inf, 0.0)
-    table["relief"] = np.max(p.supply_pressure, axis=1, where=p.kind != NONE, initial=0.0)[:, None]
+    table["relief"] = np.max(
+        p.supply_pressure, axis=1, where=p.kind != NONE, initial=0.0
+    )[:, None]
     for end, side in (("a", table.a), ("b", table.b)):
         for name, field in _SIDE_FIELDS.items():
             side[field] = joints[f"{name}_{end}"]
@@ -197,7 +245,9 @@ def coefficients(joints: Records, period: float = 0.01, substeps: int = 1) -> Re
         side["fresh"] = (side.delay / period - side.late) * substeps
         side["pilot_steps"] = side.pilot_lag * substeps / period
         side["pilot_keep"] = kept(side["pilot_steps"])
-        side["plunger_weight"] = plunger_weight(side.plunger_damping, period / substeps, table)
+        side["plunger_weight"] = plunger_weight(
+            side.plunger_damping, period / substeps, table
+        )
         side["has_curve"] = np.any([side[name] != 1.0 for name in CURVE], axis=0)
         for k, knot in enumerate(KNOTS, 1):
             side[f"knot_{k}"] = knot**side.opening_exponent

@@ -1,27 +1,31 @@
 """Four-way spool valve (article 2.2, equations (6) to (8)).
 
-For x > 0 oil runs from the pump to chamber A and from B to the tank, for x < 0 from the pump to B and from A
+For x > 0 oil runs from the pump to chamber A and from B to the tank, for x < 0 from the
+pump to B and from A
 to the tank; the article prints x > 0 only. Its law Q = C_q A sgn(Δp) √(2|Δp|/ρ) has an infinite slope at Δp =
 0, so below the transition pressure p_cr it becomes a straight line:
 
     Q = C_q A √(2/ρ) Δp / (Δp² + p_cr²)^(1/4).
 
 The article leaves A(x) open. Ours: A_max min((|x| − overlap)/w, 1)^n, each direction with its own A_max,
-overlap, w and n, plus a leakage area on all four edges. With a flow limit, the pump gives no more than that
-to this actuator; with a check valve (`hydroid.hydraulics.pump`) no oil runs back to it.
+overlap, w and n, plus a leakage area on all four edges. With a flow limit, the pump
+gives no more than that to this actuator; with a check valve (`hydroid.hydraulics.pump`)
+no oil runs back to it.
 
-A spool is cut with notches, and a servo may drive it through a small part of its travel, so its opening is
-no one power of the travel. Four factors, `curve_1` to `curve_4`, multiply the increments of the power law
-over the first 4, to 15, to 40 and to 70 % of the travel (`KNOTS`). That of the last part is 1. So the curve
-is monotone, and it still ends at A_max: what counts is how steep a part is beside the last one. The first
-part is so short that it stands for a jump.
+A spool is cut with notches, and a servo may drive it through a small part of its
+travel, so its opening is no one power of the travel. Four factors, `curve_1` to
+`curve_4`, multiply the increments of the power law over the first 4, to 15, to 40 and
+to 70 % of the travel (`KNOTS`). That of the last part is 1. So the curve is monotone,
+and it still ends at A_max: what counts is how steep a part is beside the last one. The
+first part is so short that it stands for a jump.
 
-The article's edges open alike. A real spool's do not: `return_a` and `return_b` are the openings of A→T and
-B→T as multiples of those of P→B and P→A. So a load that is lowered can be held by the oil that leaves, while
-the other chamber fills from the tank through an anti-cavitation check valve.
+The article's edges open alike. A real spool's do not: `return_a` and `return_b` are the
+openings of A→T and B→T as multiples of those of P→B and P→A. So a load that is lowered
+can be held by the oil that leaves, while the other chamber fills from the tank through
+an anti-cavitation check valve.
 
-A pressure compensator before the pump edge leaves the edge a drop of MARGIN p_S, so that a load does not slow
-the motion while the supply can lift it. The drop is
+A pressure compensator before the pump edge leaves the edge a drop of MARGIN p_S, so
+that a load does not slow the motion while the supply can lift it. The drop is
 
     Δp = p_S - p - κ max(p_S - p - MARGIN p_S, 0),
 
@@ -39,8 +43,10 @@ from hydroid.hydraulics.elementwise import compilable
 
 DENSITY = 860.0  # ρ of the oil [kg/m³]; ours
 
-MARGIN = 0.25  # part of the supply pressure that a compensator leaves the pump edge; ours
-KNOTS = (0.04, 0.15, 0.4, 0.7)  # parts of the spool's travel where the parts of a valve's curve end; ours
+# part of the supply pressure that a compensator leaves the pump edge; ours
+MARGIN = 0.25
+# parts of the spool's travel where the parts of a valve's curve end; ours
+KNOTS = (0.04, 0.15, 0.4, 0.7)
 
 
 @compilable
@@ -51,23 +57,29 @@ def slot_share(travel, side) -> Any:
 
 @compilable
 def bent_opening(share, factors, ends) -> Any:
-    """Part of the full opening, from the part that the power law gives: 0 to 1, as the result.
+    """Part of the full opening, from the part that the power law gives: 0 to 1, as the
+    result.
 
-    Its slope has a factor of each part, up to each of `ends`, and 1 beyond the last one. Where all factors
-    are 1, the result is the power law's, to the bit.
+    Its slope has a factor of each part, up to each of `ends`, and 1 beyond the last
+    one. Where all factors are 1, the result is the power law's, to the bit.
     """
     more, whole, low = 0.0, 0.0, 0.0
     for factor, high in zip(factors, ends):  # noqa: B905  # compiled code knows no strict=
-        more = more + (factor - 1.0) * np.minimum(np.maximum(share - low, 0.0), high - low)
+        more = more + (factor - 1.0) * np.minimum(
+            np.maximum(share - low, 0.0), high - low
+        )
         whole, low = whole + (factor - 1.0) * (high - low), high
     return (share + more) / (1.0 + whole)
 
 
 @compilable
 def curved(share, side) -> Any:
-    """Part of the full opening on the side's curve, from the part that the power law gives."""
+    """Part of the full opening on the side's curve, from the part that the power law
+    gives."""
     factors = side.curve_1, side.curve_2, side.curve_3, side.curve_4
-    return bent_opening(share, factors, (side.knot_1, side.knot_2, side.knot_3, side.knot_4))
+    return bent_opening(
+        share, factors, (side.knot_1, side.knot_2, side.knot_3, side.knot_4)
+    )
 
 
 def conductance(flow_coefficient) -> Any:
@@ -86,10 +98,11 @@ def root(drop, transition) -> Any:
 
 @compilable
 def port_flow(pressure, supply, pump_area, tank_area, c) -> Any:
-    """Flow Q [m³/s] into a chamber at a pressure [Pa] through its two edges, openings [m²], (7) and (8).
+    """Flow Q [m³/s] into a chamber at a pressure [Pa] through its two edges, openings
+    [m²], (7) and (8).
 
-    Also returns -dQ/dp [m³/(s Pa)], which is never negative, the part of Q that comes from the pump, at
-    `supply` pressure [Pa], and its rise with that pressure.
+    Also returns -dQ/dp [m³/(s Pa)], which is never negative, the part of Q that comes
+    from the pump, at `supply` pressure [Pa], and its rise with that pressure.
     """
     drop, kept, fed = supply - pressure, 1.0, 1.0
     if c.compensation > 0.0 and drop > MARGIN * supply:
@@ -100,23 +113,35 @@ def port_flow(pressure, supply, pump_area, tank_area, c) -> Any:
     pumped = c.conductance * pump_area * into
     pumped_slope = c.conductance * pump_area * into_slope
     if pumped >= c.flow_limit or pumped < c.backflow:
-        pumped, pumped_slope = np.maximum(np.minimum(pumped, c.flow_limit), c.backflow), 0.0
+        pumped, pumped_slope = (
+            np.maximum(np.minimum(pumped, c.flow_limit), c.backflow),
+            0.0,
+        )
     filling = c.anticavitation if pressure < c.tank_pressure else 0.0
     drained = c.conductance * (tank_area + filling)
-    return pumped - drained * out, kept * pumped_slope + drained * out_slope, pumped, fed * pumped_slope
+    return (
+        pumped - drained * out,
+        kept * pumped_slope + drained * out_slope,
+        pumped,
+        fed * pumped_slope,
+    )
 
 
 @compilable
 def _fill(c, w, supply: float, pump_area: float, tank_area: float) -> None:
-    # oil that cavitates pushes with vapour pressure, whatever volume is missing, and does not resist
+    # oil that cavitates pushes with vapour pressure, whatever volume is missing, and
+    # does not resist
     w.filled = 1.0 if w.pressure > 0.0 else 0.0
     w.pushing = max(w.pressure, 0.0)
-    w.inflow, w.relief, w.pumped, w.give = port_flow(w.pushing, supply, pump_area, tank_area, c)
+    w.inflow, w.relief, w.pumped, w.give = port_flow(
+        w.pushing, supply, pump_area, tank_area, c
+    )
 
 
 @compilable
 def meter(c, w, area: float, supply: float) -> None:
-    """Flows into both chambers from `supply` pressure [Pa], and how they fall with the chambers' own.
+    """Flows into both chambers from `supply` pressure [Pa], and how they fall with the
+    chambers' own.
 
     `area` is the net opening [m²]; w is the joint's scratch space of a look-ahead.
     """

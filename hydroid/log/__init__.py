@@ -1,4 +1,5 @@
-"""File -> `Log`: read, checked, repaired on request, resampled to one period; and back."""
+"""File -> `Log`: read, checked, repaired on request, resampled to one period; and
+back."""
 
 from hydroid.log.binary import FORMATS as FORMATS
 from hydroid.log.checks import motion_findings as motion_findings

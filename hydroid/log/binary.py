@@ -1,7 +1,9 @@
-"""Formats of arrays -> a table: .mat (v4 to v7 by scipy, v7.3 by h5py), Parquet by pyarrow; all formats.
+"""Formats of arrays -> a table: .mat (v4 to v7 by scipy, v7.3 by h5py), Parquet by
+pyarrow; all formats.
 
-Of a .mat a vector is a column of the variable's name; column k of a matrix is `name[k]`, from 1, and its
-longer axis is the time; fields of structs follow after a dot; element k of a cell array is `name[k]`.
+Of a .mat a vector is a column of the variable's name; column k of a matrix is
+`name[k]`, from 1, and its longer axis is the time; fields of structs follow after a
+dot; element k of a cell array is `name[k]`.
 """
 
 from collections.abc import Generator, Iterator, Mapping
@@ -16,7 +18,13 @@ from hydroid.arrays import record
 from hydroid.errors import LogError
 from hydroid.log.bags import open_bag
 from hydroid.log.mat5 import large_variables
-from hydroid.log.table import MOST_NUMBERS, Table, TextColumn, format_library, refuse_large
+from hydroid.log.table import (
+    MOST_NUMBERS,
+    Table,
+    TextColumn,
+    format_library,
+    refuse_large,
+)
 from hydroid.progress import Progress
 from hydroid.settings.log import LogSettings
 from hydroid.words import listed
@@ -39,9 +47,14 @@ def open_mat(path: Path, _settings: LogSettings, _progress: Progress) -> Table:
             names = [name for name, *_ in library.whosmat(str(path))]
             large += large_variables(path, names, 8 * MOST_NUMBERS)
             wanted = [name for name in names if name not in large]
-            variables = library.loadmat(str(path), simplify_cells=True, variable_names=wanted)
+            variables = library.loadmat(
+                str(path), simplify_cells=True, variable_names=wanted
+            )
         columns = dict(_columns("", variables))
-    remarks = tuple(f"{name} holds more than {MOST_NUMBERS:,} numbers and is left out" for name in large)
+    remarks = tuple(
+        f"{name} holds more than {MOST_NUMBERS:,} numbers and is left out"
+        for name in large
+    )
     if not columns and large:
         raise LogError(remarks[0], path, "save what is needed of it")
     if not columns:
@@ -50,7 +63,9 @@ def open_mat(path: Path, _settings: LogSettings, _progress: Progress) -> Table:
             "time = ts.Time; data = ts.Data; save('arrays.mat', 'time', 'data')"
         )
         raise LogError("holds no array of numbers", path, hint)
-    return Table(source=str(path), names=tuple(columns), columns=columns, remarks=remarks)
+    return Table(
+        source=str(path), names=tuple(columns), columns=columns, remarks=remarks
+    )
 
 
 @record
@@ -74,7 +89,11 @@ class ParquetColumns(Mapping[str, NDArray[Any]]):
             refuse_large(str(path), file.metadata.num_rows, 1)
             fields = file.schema_arrow
             nested = {field.name for field in fields if field.type.num_fields}
-            texts = {field.name for field in fields if str(field.type) in TEXTS or "dict" in str(field.type)}
+            texts = {
+                field.name
+                for field in fields
+                if str(field.type) in TEXTS or "dict" in str(field.type)
+            }
         self._names = [name for name in fields.names if name not in nested]
         self._texts = texts
 
@@ -103,7 +122,12 @@ class ParquetColumns(Mapping[str, NDArray[Any]]):
                 return file.read(columns=[name])[name].to_numpy()
             column = TextColumn()
             for batch in file.iter_batches(TEXTS_AT_ONCE, columns=[name]):
-                column.extend(["" if cell is None else str(cell) for cell in batch.column(0).to_pylist()])
+                column.extend(
+                    [
+                        "" if cell is None else str(cell)
+                        for cell in batch.column(0).to_pylist()
+                    ]
+                )
         return column.values()
 
     def cell(self, name: str, row: int) -> object:
@@ -133,22 +157,28 @@ def _columns(name: str, value: Any) -> Iterator[tuple[str, NDArray[Any]]]:
     elif isinstance(value, list) or getattr(value, "dtype", None) == "O":
         for k, inner in enumerate(value, 1):
             yield from _columns(f"{name}[{k}]", inner)
-    elif isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and value.size > 1:
+    elif (
+        isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and value.size > 1
+    ):
         array = value.squeeze()
-        array = array.T if array.ndim == 2 and array.shape[0] < array.shape[1] else array
+        array = (
+            array.T if array.ndim == 2 and array.shape[0] < array.shape[1] else array
+        )
         parts = array.reshape(len(array), -1).T
         for k, values in enumerate(parts, 1):
             yield (name if len(parts) == 1 else f"{name}[{k}]"), values
 
 
 def _without_hdf5(item: Any, large: list[str]) -> Any:
-    """Return a group as a dict and an array as MATLAB shows it: a v7.3 file stores arrays transposed.
+    """Return a group as a dict and an array as MATLAB shows it: a v7.3 file stores
+    arrays transposed.
 
     Names of arrays that are too large go to `large`.
     """
     if hasattr(item, "items"):
         return {name: _without_hdf5(inner, large) for name, inner in item.items()}
-    if item is None or item.size is None:  # a link to an object that is not there, an array without a shape
+    # a link to an object that is not there, an array without a shape
+    if item is None or item.size is None:
         return None
     if item.size > MOST_NUMBERS:
         large.append(item.name.lstrip("/"))
@@ -170,7 +200,8 @@ BINARY = {
     "MCAP": (open_bag, (b"\x89MCAP0",)),
     ".mat": (open_mat, (b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file", HDF5)),
 }
-"""by a format's name: what reads a file with the log's settings, and how such files begin; a name that is an
-ending marks a file as well, and comes last: the bytes count first"""
+"""by a format's name: what reads a file with the log's settings, and how such files
+begin; a name that is an ending marks a file as well, and comes last: the bytes count
+first"""
 FORMATS = listed(["CSV", *BINARY])
 """all formats that are read, for `--help` and messages"""

@@ -12,19 +12,27 @@ RAW = ("voltage", "current")
 
 
 def words(name: str) -> list[str]:
-    """Return the words of a column's name in lower case: "valveCmd_2 [V]" gives valve, cmd, 2, v."""
-    return [word.lower() for word in re.findall(r"[A-Z]?[a-zäöüß]+|[A-Z]+(?![a-z])|\d+", name)]
+    """Return the words of a column's name in lower case: "valveCmd_2 [V]" gives valve,
+    cmd, 2, v."""
+    return [
+        word.lower()
+        for word in re.findall(r"[A-Z]?[a-zäöüß]+|[A-Z]+(?![a-z])|\d+", name)
+    ]
 
 
 def column_unit(name: str, given: str) -> Unit | None:
-    """Return the unit that the file gives, or the one in or at the end of the name; None: there is none."""
+    """Return the unit that the file gives, or the one in or at the end of the name;
+    None: there is none."""
     inside = re.search(r"[\[(<]([^\])>]*)[\])>]\s*$", name)
-    units = map(unit_of, (given, inside[1] if inside else "", re.split(r"[_ .]", name)[-1]))
+    units = map(
+        unit_of, (given, inside[1] if inside else "", re.split(r"[_ .]", name)[-1])
+    )
     return next((unit for unit in units if unit and unit.quantity != "ambiguous"), None)
 
 
 def kind_of(name: str, unit: Unit | None) -> str:
-    """Return time, command, angle or other: what the unit, or else the words of a name say of a column."""
+    """Return time, command, angle or other: what the unit, or else the words of a name
+    say of a column."""
     there = words(name)
     if {*there} & {*CLUES["derived"]}:
         return "other"
@@ -36,12 +44,18 @@ def kind_of(name: str, unit: Unit | None) -> str:
         return CLUES["units"].get(unit.quantity, "other")
     if {*there} & {"cmd", "command", "commands", "joystick", "joy"}:
         return "command"  # also in /joint_commands.position[boom]
-    named = (kind for word in reversed(there) for kind, those in CLUES["kinds"].items() if word in those)
+    named = (
+        kind
+        for word in reversed(there)
+        for kind, those in CLUES["kinds"].items()
+        if word in those
+    )
     return next(named, "command" if direction(name)[0] else "other")
 
 
 def own_part(name: str) -> str:
-    """Return what a column has for itself: of `/CalibratedJointVals3.position[Boom]` Boom, else its name.
+    """Return what a column has for itself: of `/CalibratedJointVals3.position[Boom]`
+    Boom, else its name.
 
     What stands before the brackets names the topic of a bag, whose columns share it.
     """
@@ -50,7 +64,8 @@ def own_part(name: str) -> str:
 
 
 def joint_of(name: str, joints: Sequence[str]) -> int | None:
-    """Return the number [from 1] of the only joint whose name a column's name holds; None: of none.
+    """Return the number [from 1] of the only joint whose name a column's name holds;
+    None: of none.
 
     Words of three letters and more may be cut short: `tele1_cmd` is the telescope's.
     """
@@ -58,7 +73,10 @@ def joint_of(name: str, joints: Sequence[str]) -> int | None:
         return hit
     there = {*words(name)} - {"joint", "link"}
     exact = [{*words(joint)} - {"joint", "link"} for joint in joints]
-    alike = [own.union(*(group for group in CLUES["same"] if own & {*group})) for own in exact]
+    alike = [
+        own.union(*(group for group in CLUES["same"] if own & {*group}))
+        for own in exact
+    ]
     short = [{w[:n] for w in own for n in range(3, len(w))} for own in alike]
     for named in (exact, alike, short):
         hits = [k for k, mine in enumerate(named, 1) if mine & there]

@@ -1,4 +1,5 @@
-"""Whether a joint's commands in a direction have one size: those of a valve that is open or shut.
+"""Whether a joint's commands in a direction have one size: those of a valve that is
+open or shut.
 
 They tell one speed, and nothing of what lies between.
 """
@@ -13,11 +14,13 @@ from hydroid.log.log import Log
 LEAST_COMMAND = 2.0
 """below which a command is none [%]"""
 ONE_SIZE = 5.0
-"""commands of one size differ by less, from the tenth to the ninetieth percentile [%]"""
+"""commands of one size differ by less, from the tenth to the ninetieth percentile
+[%]"""
 
 
 def one_size(sizes: Array, weights: Array) -> bool:
-    """Return whether commands are of one size, from ascending sizes [%] and their weights, each (n,)."""
+    """Return whether commands are of one size, from ascending sizes [%] and their
+    weights, each (n,)."""
     if len(sizes) == 0:
         return True
     reached = np.cumsum(weights) / weights.sum()
@@ -26,7 +29,8 @@ def one_size(sizes: Array, weights: Array) -> bool:
 
 
 def only_command(logs: Sequence[Log], joint: int, sign: float) -> float | None:
-    """Return the size of the commands that a joint (number, from 1) gets in a direction (1 or -1) [%].
+    """Return the size of the commands that a joint (number, from 1) gets in a direction
+    (1 or -1) [%].
 
     None where they have several sizes, or there are none.
     """

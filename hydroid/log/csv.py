@@ -1,11 +1,13 @@
 """Bytes -> lines -> table: the CSV dialects that loggers and spreadsheets write.
 
-Accepted: `,` `;` `|` tab, or spaces; decimal commas where the separator is no comma, comment lines `#`, a
-byte order mark, UTF-8, UTF-16 or Latin-1, any line ends, quoted cells, blank lines, dates and times of day.
+Accepted: `,` `;` `|` tab, or spaces; decimal commas where the separator is no comma,
+comment lines `#`, a byte order mark, UTF-8, UTF-16 or Latin-1, any line ends, quoted
+cells, blank lines, dates and times of day.
 
-Loggers write a preamble above the names, or a row of units below them. The data begin with the first line
-that has a number in the first column of numbers, and half as many as most lines; the names stand above it. A
-line below the names is left out only if it holds no number: any other fault there is a fault of the data.
+Loggers write a preamble above the names, or a row of units below them. The data begin
+with the first line that has a number in the first column of numbers, and half as many
+as most lines; the names stand above it. A line below the names is left out only if it
+holds no number: any other fault there is a fault of the data.
 """
 
 import csv
@@ -29,8 +31,11 @@ from hydroid.units import bare, unit_of
 from hydroid.words import listed
 
 SEPARATORS = "\t;,| "
-csv.field_size_limit(2**31 - 1)  # a longer cell is no number, which is said, with its place
-IS_CSV = f"formats of logs are {FORMATS}; a CSV file has a header and one row per sample"
+# a longer cell is no number, which is said, with its place
+csv.field_size_limit(2**31 - 1)
+IS_CSV = (
+    f"formats of logs are {FORMATS}; a CSV file has a header and one row per sample"
+)
 
 
 SAMPLE = 400  # lines by which separator, names and width are recognised
@@ -40,7 +45,8 @@ PIECE = 256  # lines whose cells are held as text at a time
 
 @record
 class CsvTable(Table):
-    """The numbers of a CSV file; the text of a cell is read again where a message shows it."""
+    """The numbers of a CSV file; the text of a cell is read again where a message shows
+    it."""
 
     encoding: str
     split_row: Callable[[str], list[str]]
@@ -88,14 +94,24 @@ def _read_table(path: Path, encoding: str, file: Iterable[str]) -> Table:
     header, left_out = _header(rows)
     names = rows[header]
     if all(number(name.replace(",", ".")) is not None for name in names if name):
-        hint = "write the columns' names above it (a line that starts with # is a comment)"
-        raise LogError("has no header: this line holds numbers", f"{path}, line {header}", hint)
+        hint = (
+            "write the columns' names above it (a line that starts with # is a comment)"
+        )
+        raise LogError(
+            "has no header: this line holds numbers", f"{path}, line {header}", hint
+        )
     if len(names) == 1:
-        raise LogError("has one column only", path, "part cells by , ; | tabs or spaces")
+        raise LogError(
+            "has one column only", path, "part cells by , ; | tabs or spaces"
+        )
     above = f"the names are in line {header}; what stands above is left out"
     remarks = [above] if next(iter(sample)) < header else []
     remarks += [f"line {k} is text and left out" for k in left_out]
-    cells_of_units = (zip(names, map(bare, rows[k]), strict=True) for k in left_out if _are_units(rows[k]))
+    cells_of_units = (
+        zip(names, map(bare, rows[k]), strict=True)
+        for k in left_out
+        if _are_units(rows[k])
+    )
     units = dict(chain.from_iterable(cells_of_units))
     below = {k: line for k, line in sample.items() if k > header and k not in left_out}
     usual = _usual_width([rows[k] for k in below], len(names))
@@ -107,7 +123,8 @@ def _read_table(path: Path, encoding: str, file: Iterable[str]) -> Table:
     decimal_comma = separator != ","
 
     def split_row(line: str) -> list[str]:
-        """Return as many cells as there are names; empty ones of a line that has fewer or more."""
+        """Return as many cells as there are names; empty ones of a line that has fewer
+        or more."""
         if decimal_comma and "," in line:
             line = line.replace(",", ".")
         row = split(line, separator)
@@ -117,7 +134,11 @@ def _read_table(path: Path, encoding: str, file: Iterable[str]) -> Table:
         return row[: len(names)] if whole else [""] * len(names)
 
     columns, at, commas = [TextColumn() for _ in names], array("q"), False
-    data = ((k, line) for k, line in chain(below.items(), lines) if _is_content(line, separator))
+    data = (
+        (k, line)
+        for k, line in chain(below.items(), lines)
+        if _is_content(line, separator)
+    )
     while piece := [*islice(data, PIECE)]:
         commas |= decimal_comma and any("," in line for _, line in piece)
         at.extend(k for k, _ in piece)
@@ -129,7 +150,9 @@ def _read_table(path: Path, encoding: str, file: Iterable[str]) -> Table:
     return CsvTable(
         source=str(path),
         names=tuple(names),
-        columns={name: column.values() for name, column in zip(names, columns, strict=True)},
+        columns={
+            name: column.values() for name, column in zip(names, columns, strict=True)
+        },
         header=header,
         units=units,
         remarks=tuple(remarks),
@@ -140,7 +163,8 @@ def _read_table(path: Path, encoding: str, file: Iterable[str]) -> Table:
 
 
 def _usual_width(rows: Sequence[Sequence[str]], names: int) -> int:
-    """Return how many cells lines have, where that is not as many as names: fewer, or a row's number more.
+    """Return how many cells lines have, where that is not as many as names: fewer, or a
+    row's number more.
 
     Lines that differ from each other are torn ones, but for separators at their ends.
     """
@@ -160,7 +184,8 @@ def _counts_up(numbers: Sequence[float | None]) -> bool:
 
 
 def _encoding(path: Path) -> str:
-    """Return how a text is encoded: a byte that is no UTF-8 makes it Latin-1, wherever it stands."""
+    """Return how a text is encoded: a byte that is no UTF-8 makes it Latin-1, wherever
+    it stands."""
     with path.open("rb") as file:
         if file.read(2) in (b"\xff\xfe", b"\xfe\xff"):
             return "utf-16"
@@ -171,7 +196,9 @@ def _encoding(path: Path) -> str:
             line += text.count(b"\n")
             if nul and line > 1 and encoding == "utf-8-sig":
                 hint = "a logger keeps room by them, or lost power: cut the file there"
-                raise LogError("holds NUL bytes from here on", f"{path}, line {line}", hint)
+                raise LogError(
+                    "holds NUL bytes from here on", f"{path}, line {line}", hint
+                )
             if nul:
                 raise _no_text(path)
             if encoding == "utf-8-sig":
@@ -192,7 +219,8 @@ def _no_text(path: Path) -> LogError:
 
 
 def split(line: str, separator: str) -> list[str]:
-    """Return the cells of a line; of a line in columns of spaces, however many part them."""
+    """Return the cells of a line; of a line in columns of spaces, however many part
+    them."""
     spaces = separator == " "
     if '"' in line:
         line = line.strip() if spaces else line
@@ -203,7 +231,8 @@ def split(line: str, separator: str) -> list[str]:
 
 
 def _separator(sample: Sequence[str]) -> str:
-    """Choose what parts most lines into the same number of numbers, or parts any line at all."""
+    """Choose what parts most lines into the same number of numbers, or parts any line
+    at all."""
 
     def merit(separator: str) -> tuple[int, bool, int]:
         rows = [split(line, separator) for line in sample]
@@ -215,32 +244,50 @@ def _separator(sample: Sequence[str]) -> str:
 
 
 def _header(rows: Mapping[int, Sequence[str]]) -> tuple[int, list[int]]:
-    """Return the line of names among lines of cells, and the lines of text between it and the data."""
+    """Return the line of names among lines of cells, and the lines of text between it
+    and the data."""
     numbers = {k: _numbers(row) for k, row in rows.items()}
     common = Counter(map(len, numbers.values()))
     usual = max(common, key=lambda n: (n * common[n], n))
-    pattern = Counter(at for at in numbers.values() if len(at) == usual).most_common(1)[0][0]
-    data = (k for k, at in numbers.items() if pattern and pattern[0] in at and 2 * len(at) >= usual)
+    pattern = Counter(at for at in numbers.values() if len(at) == usual).most_common(1)[
+        0
+    ][0]
+    data = (
+        k
+        for k, at in numbers.items()
+        if pattern and pattern[0] in at and 2 * len(at) >= usual
+    )
     first = next(data, max(rows) + 1)
-    texts = {k: [*filter(None, row)] for k, row in rows.items() if k < first and not numbers[k]}
+    texts = {
+        k: [*filter(None, row)]
+        for k, row in rows.items()
+        if k < first and not numbers[k]
+    }
     texts = {k: cells for k, cells in texts.items() if len(cells) >= max(usual / 2, 1)}
     named = [k for k in texts if not _are_units(texts[k])] or texts
     # names differ, are many, and stand below other texts
     order = {k: (len({*texts[k]}) == len(texts[k]), len(texts[k]), k) for k in named}
     header = max(order, key=lambda k: order[k], default=next(iter(rows)))
-    return header, [k for k in texts if k > header and len(rows[k]) == len(rows[header])]
+    return header, [
+        k for k in texts if k > header and len(rows[k]) == len(rows[header])
+    ]
 
 
 def _numbers(row: Sequence[str]) -> tuple[int, ...]:
     """Return which cells hold a number, maybe with a decimal comma, or a time."""
     return tuple(
-        c for c, x in enumerate(row) if number(x.replace(",", ".")) is not None or clock(x) is not None
+        c
+        for c, x in enumerate(row)
+        if number(x.replace(",", ".")) is not None or clock(x) is not None
     )
 
 
 def _is_content(line: str, separator: str = ",") -> bool:
-    """Return whether a line is neither blank, nor empty cells, nor a comment, nor names a separator."""
-    return line.strip(" \t" + separator)[:1] not in ("", "#") and not line.startswith("sep=")
+    """Return whether a line is neither blank, nor empty cells, nor a comment, nor names
+    a separator."""
+    return line.strip(" \t" + separator)[:1] not in ("", "#") and not line.startswith(
+        "sep="
+    )
 
 
 def _are_units(row: Sequence[str]) -> bool:

@@ -1,4 +1,5 @@
-"""What a file is read as: the log as the rest of the program sees it, and findings about it."""
+"""What a file is read as: the log as the rest of the program sees it, and findings
+about it."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -19,16 +20,21 @@ class Log:
     Attributes:
         source: the file it came from.
         time: [s], shape (T,), k · period from 0.
-        command: [%], shape (T, J), in [-100, 100], held until the next sample; 0 where undriven.
+        command: [%], shape (T, J), in [-100, 100], held until the next sample; 0 where
+            undriven.
         angle: [rad], shape (T, J); a column of NaN where unmeasured.
         period: [s].
-        pressure: of chambers A and B [Pa], shape (T, J, 2), NaN where unmeasured; None: the log has none.
-        rest: samples before the first command of the recording; None: before the first one in `command`.
-        recorded: samples that stand in for a row of the file, shape (T,): angles of the others lie between
-            two rows, and say nothing new. None: all do.
-        pose: in which joints stand that are not measured [rad], shape (J,); None: it is not known.
+        pressure: of chambers A and B [Pa], shape (T, J, 2), NaN where unmeasured; None:
+            the log has none.
+        rest: samples before the first command of the recording; None: before the first
+            one in `command`.
+        recorded: samples that stand in for a row of the file, shape (T,): angles of the
+            others lie between two rows, and say nothing new. None: all do.
+        pose: in which joints stand that are not measured [rad], shape (J,); None: it is
+            not known.
         begin: time of its first sample in the recording, of which it may be a part [s].
-        clock: time of day at which the recording begins, HH:MM:SS; empty where the file has none.
+        clock: time of day at which the recording begins, HH:MM:SS; empty where the file
+            has none.
     """
 
     source: str
@@ -60,7 +66,8 @@ class Log:
 
     @property
     def posed(self) -> Array:
-        """Angles of all joints [rad], shape (T, J): of those that are not measured that of `pose`."""
+        """Angles of all joints [rad], shape (T, J): of those that are not measured that
+        of `pose`."""
         return self._with_pose(self.angle)
 
     def _with_pose(self, angle: Array) -> Array:
@@ -78,30 +85,39 @@ class Log:
 
     @property
     def start(self) -> Array:
-        """The start pose [rad], shape (J,): the mean of the angles while the arm still rests, or `pose`.
+        """The start pose [rad], shape (J,): the mean of the angles while the arm still
+        rests, or `pose`.
 
-        A simulation starts there, and an error of its start stays in the whole response. A command moves
-        nothing before the sample after it; of a log that begins with a command the first sample must do.
+        A simulation starts there, and an error of its start stays in the whole
+        response. A command moves nothing before the sample after it; of a log that
+        begins with a command the first sample must do.
         """
         return self._with_pose(self._mean_at_rest(self.angle))
 
     @property
     def start_pressure(self) -> Array:
-        """Chamber pressures before the first command, as `start` [Pa], shape (J, 2), NaN where unmeasured."""
+        """Chamber pressures before the first command, as `start` [Pa], shape (J, 2),
+        NaN where unmeasured."""
         unknown = np.full((self.joints, 2), np.nan)
         return unknown if self.pressure is None else self._mean_at_rest(self.pressure)
 
     @property
     def start_samples(self) -> Array:
-        """Independent samples whose mean `start` is as precise as, shape (J,): few if the rest drifts."""
+        """Independent samples whose mean `start` is as precise as, shape (J,): few if
+        the rest drifts."""
         resting = self._at_rest(self.angle)
         if len(resting) < 3:
             return np.full(self.joints, float(len(resting)))
         return independent_samples(resting - self.start)
 
     def driving(self, joint: int) -> "Log":
-        """Return the recording without the commands of all joints but this one (number, from 1)."""
-        return replace(self, command=self.command * (np.arange(self.joints) == joint - 1), rest=self._rest)
+        """Return the recording without the commands of all joints but this one (number,
+        from 1)."""
+        return replace(
+            self,
+            command=self.command * (np.arange(self.joints) == joint - 1),
+            rest=self._rest,
+        )
 
     def first(self, seconds: float) -> "Log":
         """Return the recording from its start to `seconds` after its first command."""
@@ -109,7 +125,8 @@ class Log:
         return replace(self.part(0, end), rest=self.rest)
 
     def part(self, first: int, end: int) -> "Log":
-        """Return the samples from `first` to before `end`, which start where they were measured."""
+        """Return the samples from `first` to before `end`, which start where they were
+        measured."""
         at = slice(first, end)
         return replace(
             self,
@@ -132,7 +149,8 @@ class Log:
 
     def _mean_at_rest(self, signal: Array) -> Array:
         resting = self._at_rest(signal)
-        return resting[0] + (resting - resting[0]).mean(axis=0)  # of equal values to the last bit
+        # of equal values to the last bit
+        return resting[0] + (resting - resting[0]).mean(axis=0)
 
 
 @dataclass(frozen=True)
@@ -161,25 +179,40 @@ def log_finding(
 ) -> LogFinding:
     """Make a finding about a file, at a `row` such as "line 12"; joints are named."""
     where = ", ".join(filter(None, (source, row, column and f"column {column}")))
-    return LogFinding(kind, level, tuple(map(str, subjects)), numbers, where, source, column)
+    return LogFinding(
+        kind, level, tuple(map(str, subjects)), numbers, where, source, column
+    )
 
 
 def by_level(findings: Iterable[LogFinding]) -> list[LogFinding]:
     """Return findings, errors first, then warnings, then notes."""
-    return sorted(findings, key=lambda finding: ("error", "warning", "note").index(finding.level))
+    return sorted(
+        findings, key=lambda finding: ("error", "warning", "note").index(finding.level)
+    )
 
 
 def grouped(findings: Iterable[LogFinding]) -> list[tuple[Level, str]]:
-    """Return findings as lines with their levels: what several joints or logs share stands once."""
+    """Return findings as lines with their levels: what several joints or logs share
+    stands once."""
     groups: dict[tuple[object, ...], list[LogFinding]] = {}
     for finding in by_level(findings):
-        several = "{names}" in WORDS[finding.kind][0]  # its sentence has room for several subjects
-        about = finding.hint if several else (finding.subjects, finding.column, finding.numbers.get("what"))
+        # its sentence has room for several subjects
+        several = "{names}" in WORDS[finding.kind][0]
+        about = (
+            finding.hint
+            if several
+            else (finding.subjects, finding.column, finding.numbers.get("what"))
+        )
         groups.setdefault((finding.level, finding.kind, about), []).append(finding)
     lines = list[tuple[Level, str]]()
     for group in groups.values():
-        subjects = tuple(dict.fromkeys(subject for finding in group for subject in finding.subjects))
-        others = [Path(source).name for source in dict.fromkeys(finding.source for finding in group)][1:]
+        subjects = tuple(
+            dict.fromkeys(subject for finding in group for subject in finding.subjects)
+        )
+        others = [
+            Path(source).name
+            for source in dict.fromkeys(finding.source for finding in group)
+        ][1:]
         also = f" (also in {listed(others, 3)})" if others else ""
         lines.append((group[0].level, f"{replace(group[0], subjects=subjects)}{also}"))
     return lines

@@ -1,7 +1,8 @@
 """MATLAB files of version 5 to 7 as bytes, looked through before scipy reads them.
 
-A variable is an element: a tag of kind and size, and its content, which for a matrix is elements again. scipy
-crashes on kinds of numbers that do not exist, and unpacks a variable of any size.
+A variable is an element: a tag of kind and size, and its content, which for a matrix is
+elements again. scipy crashes on kinds of numbers that do not exist, and unpacks a
+variable of any size.
 """
 
 import struct
@@ -14,7 +15,8 @@ MATRIX, COMPRESSED = 14, 15
 NUMBERS = (1, 2, 3, 4, 5, 6, 7, 9, 12, 13, 16, 17, 18)
 """kinds of elements that hold numbers or text"""
 HOLDERS = (1, 2, 3, 16, 17)
-"""classes of matrices that hold others: cells, structs, objects, functions, opaque ones"""
+"""classes of matrices that hold others: cells, structs, objects, functions, opaque
+ones"""
 DEEPEST = 100
 PIECE = 1 << 16
 
@@ -69,7 +71,8 @@ class _Compressed:
 
 
 def large_variables(path: Path, names: Sequence[str], most: int) -> list[str]:
-    """Return the variables of a file, by `names` in its order, that unpack to more than `most` bytes.
+    """Return the variables of a file, by `names` in its order, that unpack to more than
+    `most` bytes.
 
     Version 4 has no compressed ones, and the file's size is that of the others.
 
@@ -108,14 +111,18 @@ def _look_through(data: _Bytes, size: int, order: str, depth: int) -> None:
             _refuse(f"an element is of kind {kind}")
         elif first and used > 8:
             flags = data.read(used - 8)
-            holds = struct.unpack(f"{order}I", flags[:4].ljust(4, b"\0"))[0] & 0xFF in HOLDERS
+            holds = (
+                struct.unpack(f"{order}I", flags[:4].ljust(4, b"\0"))[0] & 0xFF
+                in HOLDERS
+            )
         else:
             data.skip(used - 8)
         first = False
 
 
 def _tag(data: _Bytes, order: str) -> tuple[int, int, int]:
-    """Read a tag: the kind, the length of the content, and of both with their padding [bytes].
+    """Read a tag: the kind, the length of the content, and of both with their padding
+    [bytes].
 
     Up to four bytes of content stand in the tag.
     """

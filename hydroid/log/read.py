@@ -1,4 +1,5 @@
-"""A log file -> `Log`: open, map, repair, check, resample; and back to CSV, which reads the same."""
+"""A log file -> `Log`: open, map, repair, check, resample; and back to CSV, which reads
+the same."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
@@ -34,14 +35,19 @@ Ranges = Mapping[str, tuple[float, float]]
 """of all joints [rad, m], by their names"""
 
 
-def open_table(path: Path, settings: LogSettings = DEFAULT, progress: Progress = no_progress) -> Table:
+def open_table(
+    path: Path, settings: LogSettings = DEFAULT, progress: Progress = no_progress
+) -> Table:
     """Open a log of any format, recognised by its first bytes.
 
-    The settings name the time column, and the period to which the channels of a bag are resampled.
+    The settings name the time column, and the period to which the channels of a bag are
+    resampled.
     """
     try:
         # a ROS 2 bag is a folder
-        data = b"#ROSBAG V" if (path / "metadata.yaml").is_file() else _first_bytes(path)
+        data = (
+            b"#ROSBAG V" if (path / "metadata.yaml").is_file() else _first_bytes(path)
+        )
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise LogError(f"cannot be read ({reason})", path) from None
@@ -52,16 +58,20 @@ def open_table(path: Path, settings: LogSettings = DEFAULT, progress: Progress =
 
 
 def _first_bytes(path: Path) -> bytes:
-    """Return the first bytes of a regular file: to open a pipe would wait for its writer."""
+    """Return the first bytes of a regular file: to open a pipe would wait for its
+    writer."""
     if path.exists() and not (path.is_file() or path.is_dir()):
-        raise LogError("is no file, but a pipe or a device", path, "write the log to a file first")
+        raise LogError(
+            "is no file, but a pipe or a device", path, "write the log to a file first"
+        )
     return first_bytes(path)
 
 
 def check_log(
     path: Path, settings: LogSettings, ranges: Ranges, **how: Any
 ) -> tuple[Log | None, list[LogFinding]]:
-    """Return the longest part of a log between its gaps, None if it cannot be used, and all findings.
+    """Return the longest part of a log between its gaps, None if it cannot be used, and
+    all findings.
 
     The arguments are those of `check_parts`.
     """
@@ -79,35 +89,53 @@ def check_parts(
     repair: bool = False,
     progress: Progress = no_progress,
 ) -> tuple[list[Log], list[LogFinding]]:
-    """Find everything that is wrong with a log: return its parts between gaps, and all findings.
+    """Find everything that is wrong with a log: return its parts between gaps, and all
+    findings.
 
     There are no parts if any finding is an error, and one if there is no long gap.
 
     Args:
         ranges: (-inf, inf) for a continuous joint. Findings call joints by these names.
-        outputs: joints (numbers, from 1) whose angles a fit compares; None: a joint whose angle column the
-            file lacks is unmeasured, which else is an error.
-        arm: whose cylinders have lengths that stand for angles; a positive command turns its joints
-            `backward` to negative angles.
+        outputs: joints (numbers, from 1) whose angles a fit compares; None: a joint
+            whose angle column the file lacks is unmeasured, which else is an error.
+        arm: whose cylinders have lengths that stand for angles; a positive command
+            turns its joints `backward` to negative angles.
         repair: fill holes up to `settings.repair_s`.
         progress: how much of the file is read [MB].
     """
-    source, parts, findings, compared = str(path), list[Log](), list[LogFinding](), outputs or ()
+    source, parts, findings, compared = (
+        str(path),
+        list[Log](),
+        list[LogFinding](),
+        outputs or (),
+    )
     try:
-        needed, signals = {*compared, *settings.joints}, map_signals(settings, ranges, arm)
+        needed, signals = (
+            {*compared, *settings.joints},
+            map_signals(settings, ranges, arm),
+        )
         if (last := max(needed, default=0)) > len(ranges):
             what = f"no joint {last}; the arm has joints 1 to {len(ranges)}"
             raise LogError(what, source, "correct outputs or log.joints")
-        if unmapped := [joint for joint in compared if settings.columns("angle", joint) is None]:
+        if unmapped := [
+            joint for joint in compared if settings.columns("angle", joint) is None
+        ]:
             what = f"output joint {[*ranges][unmapped[0] - 1]} has no angle column"
             raise LogError(what, source, "map it in log.joints, or take another")
         table = open_table(path, settings, progress)
         if outputs is None:
-            signals = [s for s in signals if s.kind in ("time", "command") or s.name in table.names]
+            signals = [
+                s
+                for s in signals
+                if s.kind in ("time", "command") or s.name in table.names
+            ]
         signals = _match(table, signals, needed, findings)
         recording = table.read(signals)
         del table  # with the columns that are not used
-        findings += [log_finding("note", "layout", source, what=one) for one in recording.table.remarks]
+        findings += [
+            log_finding("note", "layout", source, what=one)
+            for one in recording.table.remarks
+        ]
         recording = as_angles(recording, findings)
         recording = without_bad_rows(recording, settings, findings, repair=repair)
         findings += check_recording(recording, settings)
@@ -116,16 +144,25 @@ def check_parts(
             del recording
             backward = arm.backward if arm else ()
             for part in parts:
-                findings += check_motion(part, signals, compared, backward, settings.delay_s)
+                findings += check_motion(
+                    part, signals, compared, backward, settings.delay_s
+                )
     except LogError as error:
         numbers = {"what": error.what, "hint": error.hint}
-        findings.append(LogFinding("unreadable", "error", (), numbers, error.where, source))
+        findings.append(
+            LogFinding("unreadable", "error", (), numbers, error.where, source)
+        )
         parts = []
     return parts, by_level(findings)
 
 
 def _parts(
-    recording: Recording, settings: LogSettings, joints: int, findings: list[LogFinding], *, repair: bool
+    recording: Recording,
+    settings: LogSettings,
+    joints: int,
+    findings: list[LogFinding],
+    *,
+    repair: bool,
 ) -> list[Log]:
     """Return the parts of a recording between its gaps as logs."""
     parts = list[Log]()
@@ -139,13 +176,18 @@ def _parts(
     return [replace(one, source=f"{one.source}[{k}]") for k, one in enumerate(parts, 1)]
 
 
-def map_signals(settings: LogSettings, ranges: Ranges, arm: Arm | None = None) -> list[Signal]:
+def map_signals(
+    settings: LogSettings, ranges: Ranges, arm: Arm | None = None
+) -> list[Signal]:
     """Return the signals that the settings ask for, time first.
 
-    Raises LogError: lengths stand for the angles of a joint of the arm that no known cylinder turns.
+    Raises LogError: lengths stand for the angles of a joint of the arm that no known
+    cylinder turns.
     """
     rods = rods_of(arm) if arm and _has_lengths(settings) else {}
-    signals = [Signal(settings.time.column, "time", gain=UNITS[settings.time.unit].factor)]
+    signals = [
+        Signal(settings.time.column, "time", gain=UNITS[settings.time.unit].factor)
+    ]
     for kind in get_args(Kind):
         for joint, (owner, (low, high)) in enumerate(ranges.items(), 1):
             if columns := settings.columns(kind, joint):
@@ -162,9 +204,25 @@ def map_signals(settings: LogSettings, ranges: Ranges, arm: Arm | None = None) -
                     shown, rod = "deg", rods.get(joint)
                     if rod is None:
                         what = f"{listed(columns.column)} is a length, but no cylinder of {owner} is known"
-                        raise LogError(what, arm.where, f"give {owner} a cylinder with its pivots there")
+                        raise LogError(
+                            what,
+                            arm.where,
+                            f"give {owner} a cylinder with its pivots there",
+                        )
                 for part, name in enumerate(columns.column):
-                    signals.append(Signal(name, kind, joint, part, *scale, *limits, shown, owner, rod=rod))
+                    signals.append(
+                        Signal(
+                            name,
+                            kind,
+                            joint,
+                            part,
+                            *scale,
+                            *limits,
+                            shown,
+                            owner,
+                            rod=rod,
+                        )
+                    )
     return signals
 
 
@@ -174,39 +232,76 @@ def _has_lengths(settings: LogSettings) -> bool:
 
 
 def angle_margin(low: float, high: float) -> float:
-    """Return how far angles may lie outside a range [rad]: sensors are noisy at stops, and ranges rough."""
+    """Return how far angles may lie outside a range [rad]: sensors are noisy at stops,
+    and ranges rough."""
     return max(np.deg2rad(1.0), 0.02 * (high - low))
 
 
 def _match(
-    table: Table, wanted: Sequence[Signal], needed: Collection[int], findings: list[LogFinding]
+    table: Table,
+    wanted: Sequence[Signal],
+    needed: Collection[int],
+    findings: list[LogFinding],
 ) -> list[Signal]:
     """Return the signals whose columns a file has.
 
-    Joints that are not `needed` may be absent from a file that has columns of others. A column of a similar
-    name speaks against it: it is rather misspelt.
+    Joints that are not `needed` may be absent from a file that has columns of others. A
+    column of a similar name speaks against it: it is rather misspelt.
     """
-    free = {name.lower(): name for name in sorted({*table.names} - {signal.name for signal in wanted})}
+    free = {
+        name.lower(): name
+        for name in sorted({*table.names} - {signal.name for signal in wanted})
+    }
     missing = [signal for signal in wanted if signal.name not in table.names]
-    close = {s.name: free[n] for s in missing for n in get_close_matches(s.name.lower(), free, 1, 0.75)}
-    there = {signal.joint for signal in wanted if signal not in missing or signal.name in close} - {0}
-    absent = {signal.joint for signal in wanted} - there - {0, *needed} if there else set[int]()
+    close = {
+        s.name: free[n]
+        for s in missing
+        for n in get_close_matches(s.name.lower(), free, 1, 0.75)
+    }
+    there = {
+        signal.joint
+        for signal in wanted
+        if signal not in missing or signal.name in close
+    } - {0}
+    absent = (
+        {signal.joint for signal in wanted} - there - {0, *needed}
+        if there
+        else set[int]()
+    )
     if absent:
-        names = dict(sorted((signal.joint, signal.owner) for signal in wanted if signal.joint in absent))
-        findings.append(log_finding("note", "absent joints", table.source, *names.values()))
+        names = dict(
+            sorted(
+                (signal.joint, signal.owner)
+                for signal in wanted
+                if signal.joint in absent
+            )
+        )
+        findings.append(
+            log_finding("note", "absent joints", table.source, *names.values())
+        )
     wanted = [signal for signal in wanted if signal.joint not in absent]
     for signal in wanted:
         count = table.names.count(signal.name)
         shared = [str(other) for other in wanted if other.name == signal.name]
         if count == len(shared) == 1:
             continue
-        what, hint = f"column {signal.name!r} cannot be {listed(shared)}", "correct log.joints in the config"
+        what, hint = (
+            f"column {signal.name!r} cannot be {listed(shared)}",
+            "correct log.joints in the config",
+        )
         if count > 1:
             what, hint = f"has {count} columns {signal.name!r}", "rename all but one"
         elif count == 0:
-            lacking = sorted((one for one in wanted if one in missing), key=lambda one: one.name not in close)
-            guess = {name: f", did you mean {other!r}?" for name, other in close.items()}
-            what = listed([f"{one.name!r} ({one}{guess.get(one.name, '')})" for one in lacking], 2)
+            lacking = sorted(
+                (one for one in wanted if one in missing),
+                key=lambda one: one.name not in close,
+            )
+            guess = {
+                name: f", did you mean {other!r}?" for name, other in close.items()
+            }
+            what = listed(
+                [f"{one.name!r} ({one}{guess.get(one.name, '')})" for one in lacking], 2
+            )
             what = f"lacks {what}; unused: {listed([*filter(None, free.values())] or ['none'], 3)}"
             places = listed([*dict.fromkeys(f"log.{one.kind}" for one in lacking)])
             hint = f"in the config, set {places} to the right column, or to null if the log has none"
@@ -216,33 +311,49 @@ def _match(
 
 
 def write_log(
-    path: Path, log: Log, settings: LogSettings, *, exact: bool = False, arm: Arm | None = None
+    path: Path,
+    log: Log,
+    settings: LogSettings,
+    *,
+    exact: bool = False,
+    arm: Arm | None = None,
 ) -> None:
-    """Write a log, whole or not at all. The `arm` has the cylinders whose lengths stand for angles.
+    """Write a log, whole or not at all. The `arm` has the cylinders whose lengths stand
+    for angles.
 
-    Cells have ten digits, or with `exact` as many as it takes to read the same bits back; where no cell does
-    (degrees for a value that was in radians) the last bit may differ. The command is written ahead by
-    `settings.delay_s`, so that reading delays it to what `log` holds.
+    Cells have ten digits, or with `exact` as many as it takes to read the same bits
+    back; where no cell does (degrees for a value that was in radians) the last bit may
+    differ. The command is written ahead by `settings.delay_s`, so that reading delays
+    it to what `log` holds.
 
-    Raises LogError: the settings map no column for a joint that is driven, or one for an angle that was not
-    measured.
+    Raises LogError: the settings map no column for a joint that is driven, or one for
+    an angle that was not measured.
     """
     write_logs(path, [(log, settings)], exact=exact, arm=arm)
 
 
 def write_logs(
-    path: Path, logs: Sequence[tuple[Log, LogSettings]], *, exact: bool = False, arm: Arm | None = None
+    path: Path,
+    logs: Sequence[tuple[Log, LogSettings]],
+    *,
+    exact: bool = False,
+    arm: Arm | None = None,
 ) -> None:
-    """Write logs of the same time side by side into one file, each with its settings, as `write_log` does."""
+    """Write logs of the same time side by side into one file, each with its settings,
+    as `write_log` does."""
     columns: dict[str, list[str]] = {}
     for log, settings in logs:
         free = dict.fromkeys(map(str, range(1, 1 + log.joints)), (np.inf, np.inf))
         signals = map_signals(settings, free, arm)
         mapped = {(signal.kind, signal.joint) for signal in signals}
-        for joint, (driven, measured) in enumerate(zip(log.driven, log.measured, strict=True), 1):
+        for joint, (driven, measured) in enumerate(
+            zip(log.driven, log.measured, strict=True), 1
+        ):
             if driven and ("command", joint) not in mapped:
                 what = f"joint {joint} is driven but no column holds its command"
-                raise LogError(what, path, f"map a column in log.joints.{joint}.command")
+                raise LogError(
+                    what, path, f"map a column in log.joints.{joint}.command"
+                )
             if not measured and ("angle", joint) in mapped:
                 hint = f"set log.joints.{joint}.angle: null"
                 raise LogError(f"joint {joint} has no angle to write", path, hint)
@@ -250,10 +361,14 @@ def write_logs(
         for signal in signals:
             values, joint = log.time, signal.joint - 1
             if signal.kind == "command":
-                values = (-command if signal.part else command)[:, joint].clip(min=signal.low)
+                values = (-command if signal.part else command)[:, joint].clip(
+                    min=signal.low
+                )
             elif signal.kind == "angle":
                 angle = log.angle[:, joint]
-                values = angle if signal.rod is None else signal.rod.cylinder.length(angle)
+                values = (
+                    angle if signal.rod is None else signal.rod.cylinder.length(angle)
+                )
             elif signal.kind == "pressure":
                 if log.pressure is None:
                     continue
@@ -262,7 +377,9 @@ def write_logs(
             wanted = (values - signal.offset) / signal.gain
             cells = np.array([f"{cell:.10g}" for cell in wanted], dtype=object)
             for digits in (15, 16, 17) if exact else ():
-                wrong = np.flatnonzero(cells.astype(float) * signal.gain + signal.offset != values)
+                wrong = np.flatnonzero(
+                    cells.astype(float) * signal.gain + signal.offset != values
+                )
                 cells[wrong] = [f"{cell:.{digits}g}" for cell in wanted[wrong]]
             columns[signal.name] = cells.tolist()
     write_atomic(path, csv_text([columns, *zip(*columns.values(), strict=True)]))

@@ -1,11 +1,13 @@
-"""A recording's samples -> one period: repairs that invent no data, then commands held, angles interpolated.
+"""A recording's samples -> one period: repairs that invent no data, then commands held,
+angles interpolated.
 
-Each command holds until the next one. Where samples are not the new ones, by jitter or another rate, commands
-are averaged over each new sample: the arm has felt all of them, each for as long as it held.
+Each command holds until the next one. Where samples are not the new ones, by jitter or
+another rate, commands are averaged over each new sample: the arm has felt all of them,
+each for as long as it held.
 
-A faster log is thinned by plain interpolation of its angles, without a filter before it: the fit compares
-angles sample by sample, and white sensor noise stays what it was, while a filter would colour it and delay
-the angle.
+A faster log is thinned by plain interpolation of its angles, without a filter before
+it: the fit compares angles sample by sample, and white sensor noise stays what it was,
+while a filter would colour it and delay the angle.
 """
 
 from dataclasses import replace
@@ -19,13 +21,17 @@ from hydroid.log.log import Log, LogFinding
 from hydroid.log.table import Recording
 from hydroid.settings.log import LogSettings
 
-GAP = 1.95  # in sample periods: a longer step is a gap, a shorter one jitter; one dropped sample makes it 2
-BRIDGED = 3.05  # in periods of the samples or of the settings: a gap that is no longer is bridged
+# in sample periods: a longer step is a gap, a shorter one jitter; one dropped sample
+# makes it 2
+GAP = 1.95
+# in periods of the samples or of the settings: a gap that is no longer is bridged
+BRIDGED = 3.05
 SHORTEST = 0.5  # of a log [s]
 MOST_LEFT_OUT = 0.05
 """part of the rows that may hold no numbers"""
 MOST_AGAIN = 0.005
-"""part of the rows that may stand at a time which has been: more are a clock that was set back"""
+"""part of the rows that may stand at a time which has been: more are a clock that was
+set back"""
 
 
 def sample_period(time: Array) -> float:
@@ -40,28 +46,39 @@ def unwrap(recording: Recording, findings: list[LogFinding]) -> Recording:
     None turns by 180 deg within one sample: other jumps are errors.
     """
     values, turn = recording.values, 2 * np.pi
-    if all(np.isfinite(signal.high) for signal in recording.signals if signal.unit == "deg"):
+    if all(
+        np.isfinite(signal.high) for signal in recording.signals if signal.unit == "deg"
+    ):
         return recording
     values = values.copy()
     for signal, column in zip(recording.signals, values.T, strict=True):
         if signal.unit == "deg" and not np.isfinite(signal.high):
             rows = np.flatnonzero(~np.isnan(column))
             steps = np.diff(column[rows])
-            wraps = np.abs(np.abs(steps) - turn) < np.pi / 4  # the motion within one sample
+            # the motion within one sample
+            wraps = np.abs(np.abs(steps) - turn) < np.pi / 4
             jumps = (np.abs(steps) > np.pi) & ~wraps
             if wraps.any():
                 column[rows[1:]] -= turn * np.cumsum(np.sign(steps) * wraps)
-                findings.append(recording.finding("note", "wrap", rows[1:][wraps], signal))
+                findings.append(
+                    recording.finding("note", "wrap", rows[1:][wraps], signal)
+                )
             if jumps.any():
                 step = np.rad2deg(steps[jumps][0])
-                findings.append(recording.finding("error", "jump", rows[1:][jumps], signal, step=step))
+                findings.append(
+                    recording.finding(
+                        "error", "jump", rows[1:][jumps], signal, step=step
+                    )
+                )
     return replace(recording, values=values)
 
 
 def fill(recording: Recording, longest: float, findings: list[LogFinding]) -> Recording:
-    """Interpolate angles and hold commands in holes of at most `longest` [s] besides the usual step.
+    """Interpolate angles and hold commands in holes of at most `longest` [s] besides
+    the usual step.
 
-    Rows without a time are dropped. Samples that were never recorded are counted: `resample` bridges them.
+    Rows without a time are dropped. Samples that were never recorded are counted:
+    `resample` bridges them.
     """
     timed = ~np.isnan(recording.time)
     values, rows = recording.values[timed], recording.rows[timed]
@@ -82,17 +99,27 @@ def fill(recording: Recording, longest: float, findings: list[LogFinding]) -> Re
     added = np.rint(steps[(steps > GAP * period) & (steps <= reach)] / period - 1).sum()
     cells, lost = float((empty & ~np.isnan(values)).sum()), float((~timed).sum())
     if cells or added or lost:
-        findings.append(recording.finding("warning", "repair", cells=cells, samples=added, lost=lost))
+        findings.append(
+            recording.finding(
+                "warning", "repair", cells=cells, samples=added, lost=lost
+            )
+        )
     return replace(recording, values=values, rows=rows)
 
 
 def without_bad_rows(
-    recording: Recording, settings: LogSettings, findings: list[LogFinding], *, repair: bool
+    recording: Recording,
+    settings: LogSettings,
+    findings: list[LogFinding],
+    *,
+    repair: bool,
 ) -> Recording:
-    """Return the rows that can be used, with angles unwrapped and, on request, holes filled.
+    """Return the rows that can be used, with angles unwrapped and, on request, holes
+    filled.
 
-    A row is left out if a cell in it holds no number, or if its time does not follow that of the rows before.
-    Where many rows are such, none is left out: the file holds something else than the settings say.
+    A row is left out if a cell in it holds no number, or if its time does not follow
+    that of the rows before. Where many rows are such, none is left out: the file holds
+    something else than the settings say.
     """
     if repair:
         recording = fill(unwrap(recording, findings), settings.repair_s, findings)
@@ -105,10 +132,20 @@ def without_bad_rows(
         column = int(np.isnan(values[rows[0]]).argmax())
         torn = np.isnan(values[rows[0]]).all()
         signal = None if torn else recording.signals[column]
-        text = "" if signal is None else recording.table.text(signal.name, int(recording.rows[rows[0]]))
+        text = (
+            ""
+            if signal is None
+            else recording.table.text(signal.name, int(recording.rows[rows[0]]))
+        )
         what = f"{text[:30]!r} is not a number" if text else "no value is there"
-        what = f"does not hold {len(recording.table.names)} cells with numbers" if torn else what
-        findings.append(recording.finding("warning", "row left out", rows, signal, what=what))
+        what = (
+            f"does not hold {len(recording.table.names)} cells with numbers"
+            if torn
+            else what
+        )
+        findings.append(
+            recording.finding("warning", "row left out", rows, signal, what=what)
+        )
         recording = recording.kept(np.flatnonzero(~bad))
     elif bad.any():
         return recording
@@ -117,18 +154,29 @@ def without_bad_rows(
     if 0 < again.sum() <= max(MOST_AGAIN * len(time), 1):
         rows = 1 + np.flatnonzero(again)
         what = f"time does not increase: {time[rows[0]]:.6g} s follows {time[rows[0] - 1]:.6g} s"
-        findings.append(recording.finding("warning", "row left out", rows, recording.signals[0], what=what))
+        findings.append(
+            recording.finding(
+                "warning", "row left out", rows, recording.signals[0], what=what
+            )
+        )
         recording = recording.kept(np.delete(np.arange(len(time)), rows))
     return recording
 
 
 def without_cut_end(recording: Recording, findings: list[LogFinding]) -> Recording:
-    """Leave out the last row if it is cut off, as when a logger is killed: its last cell holds no number."""
+    """Leave out the last row if it is cut off, as when a logger is killed: its last
+    cell holds no number."""
     table, values = recording.table, recording.values
     if table.header is None or len(values) < 2:
         return recording
-    ends = [column for column, signal in enumerate(recording.signals) if signal.name == table.names[-1]]
-    cut = np.isnan(values[-1]).all() or any(np.isnan(values[-1, column]) for column in ends)
+    ends = [
+        column
+        for column, signal in enumerate(recording.signals)
+        if signal.name == table.names[-1]
+    ]
+    cut = np.isnan(values[-1]).all() or any(
+        np.isnan(values[-1, column]) for column in ends
+    )
     if not cut or np.isnan(values[-2]).all():
         return recording
     findings.append(recording.finding("warning", "cut end", [len(values) - 1]))
@@ -136,12 +184,18 @@ def without_cut_end(recording: Recording, findings: list[LogFinding]) -> Recordi
 
 
 def between_gaps(
-    recording: Recording, settings: LogSettings, findings: list[LogFinding], *, repair: bool
+    recording: Recording,
+    settings: LogSettings,
+    findings: list[LogFinding],
+    *,
+    repair: bool,
 ) -> list[Recording]:
-    """Return the parts of a recording between gaps, without those shorter than SHORTEST.
+    """Return the parts of a recording between gaps, without those shorter than
+    SHORTEST.
 
-    Gaps of up to two samples, or with `repair` of up to `settings.repair_s` besides the usual step, are none:
-    `resample` bridges them. Raises LogError: no part is long enough.
+    Gaps of up to two samples, or with `repair` of up to `settings.repair_s` besides the
+    usual step, are none: `resample` bridges them. Raises LogError: no part is long
+    enough.
     """
     time, signal = recording.time, recording.signals[0]
     steps, period = np.diff(time), sample_period(time)
@@ -151,27 +205,41 @@ def between_gaps(
     lost = 1 + np.flatnonzero((steps > GAP * period) & (steps <= bridged))
     if len(lost) and not repair:
         samples = float(np.rint(steps[lost - 1] / period - 1).sum())
-        findings.append(recording.finding("warning", "lost", lost, signal, samples=samples))
+        findings.append(
+            recording.finding("warning", "lost", lost, signal, samples=samples)
+        )
     gaps = 1 + np.flatnonzero(steps > bridged)
     ends = [0, *gaps.tolist(), len(time)]
     every = [slice(first, end) for first, end in pairwise(ends)]
-    kept = [rows for rows in every if time[rows.stop - 1] - time[rows.start] >= SHORTEST]
+    kept = [
+        rows for rows in every if time[rows.stop - 1] - time[rows.start] >= SHORTEST
+    ]
     if not kept:
         hint = "log at a higher rate, or use --repair"
-        raise LogError(f"has no part of {SHORTEST} s without a gap", recording.table.source, hint)
+        raise LogError(
+            f"has no part of {SHORTEST} s without a gap", recording.table.source, hint
+        )
     if len(gaps):
         first, left = gaps[0], len(every) - len(kept)
-        numbers = {"gap": time[first] - time[first - 1], "period": period, "parts": float(len(kept))}
+        numbers = {
+            "gap": time[first] - time[first - 1],
+            "period": period,
+            "parts": float(len(kept)),
+        }
         more = f", {left} shorter than {SHORTEST:g} s left out" if left else ""
-        findings.append(recording.finding("warning", "gap", gaps, signal, **numbers, left=more))
+        findings.append(
+            recording.finding("warning", "gap", gaps, signal, **numbers, left=more)
+        )
     return [recording.kept(at) for at in kept]
 
 
 def resample(recording: Recording, settings: LogSettings, joints: int) -> Log:
-    """Bring a recording without holes to the period of the settings, from its first sample to its last.
+    """Bring a recording without holes to the period of the settings, from its first
+    sample to its last.
 
-    Commands act `settings.delay_s` later than logged, and are 0 % before the first one acts. On a finer grid
-    they change on a line from sample to sample: when between them is not known.
+    Commands act `settings.delay_s` later than logged, and are 0 % before the first one
+    acts. On a finer grid they change on a line from sample to sample: when between them
+    is not known.
     """
     period, time = settings.period_s, recording.time - recording.time[0]
     grid = period * np.arange(int(time[-1] / period + 0.01) + 1, dtype=np.float64)
@@ -180,7 +248,9 @@ def resample(recording: Recording, settings: LogSettings, joints: int) -> Log:
     shape = len(grid), joints
     command, angle, pressure = np.zeros(shape), np.full(shape, np.nan), None
     given = dict[int, Array]()
-    for signal, values in zip(recording.signals[1:], recording.values.T[1:], strict=True):
+    for signal, values in zip(
+        recording.signals[1:], recording.values.T[1:], strict=True
+    ):
         joint = signal.joint - 1
         if signal.kind == "command":
             given[joint] = given.get(joint, 0.0) + (-values if signal.part else values)
@@ -210,17 +280,19 @@ def resample(recording: Recording, settings: LogSettings, joints: int) -> Log:
 
 
 def on_grid(time: Array, period: float) -> Array | None:
-    """Return times as multiples of a period; None if any is off by more than 1 % of the period."""
+    """Return times as multiples of a period; None if any is off by more than 1 % of the
+    period."""
     steps = np.rint(time / period)
     return period * steps if (np.abs(time / period - steps) <= 0.01).all() else None
 
 
 def hold(time: Array, command: Array, at: Array, period: float) -> Array:
-    """Return the command for a period from each time in `at` [s]; 0 before the first, shape (len(at), J).
+    """Return the command for a period from each time in `at` [s]; 0 before the first,
+    shape (len(at), J).
 
-    Each sample holds until the next one. Of samples on the periods' own grid it is the last one at or before
-    that time; of others, of a faster log or one with jitter, the mean over the period: the last one would be
-    too old by up to a period.
+    Each sample holds until the next one. Of samples on the periods' own grid it is the
+    last one at or before that time; of others, of a faster log or one with jitter, the
+    mean over the period: the last one would be too old by up to a period.
     """
     exact = on_grid(time, period)
     if exact is None:
@@ -231,8 +303,11 @@ def hold(time: Array, command: Array, at: Array, period: float) -> Array:
             """Return the integral of the command until some times [% s]."""
             index = np.searchsorted(time, end, side="right") - 1
             since = (end - time[index])[:, None]
-            return np.where(index[:, None] >= 0, areas[index] + since * command[index], 0.0)
+            return np.where(
+                index[:, None] >= 0, areas[index] + since * command[index], 0.0
+            )
 
         return (area(at + period) - area(at)) / period
-    index = np.searchsorted(exact, at + 1e-6 * period, side="right") - 1  # but for rounding
+    # but for rounding
+    index = np.searchsorted(exact, at + 1e-6 * period, side="right") - 1
     return np.where(index[:, None] >= 0, command[index], 0.0)

@@ -1,4 +1,5 @@
-"""Lengths of cylinders -> angles of the joints that they turn, by the triangle of their pins."""
+"""Lengths of cylinders -> angles of the joints that they turn, by the triangle of their
+pins."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -40,7 +41,8 @@ class Rod:
         return MARGIN * (longest - shortest)
 
     def reading(self, cells: Array, unit: str) -> tuple[str, float] | None:
-        """Return the unit of cells, (R,), which are its lengths or its rod's travel, and the offset in it.
+        """Return the unit of cells, (R,), which are its lengths or its rod's travel,
+        and the offset in it.
 
         `unit`: the one that the file states; empty: none. None: they are neither.
         """
@@ -51,16 +53,21 @@ class Rod:
             factor = UNITS[name].factor
             low, high = factor * known.min(), factor * known.max()
             for offset in (0.0, shortest):
-                inside = low + offset >= shortest - self.margin and high + offset <= longest + self.margin
+                inside = (
+                    low + offset >= shortest - self.margin
+                    and high + offset <= longest + self.margin
+                )
                 if inside:
                     fitting.append((high - low, name, offset / factor))
         if not fitting:
             return None
-        _, name, offset = max(fitting, key=lambda one: one[0])  # in which the rod moves farthest
+        # in which the rod moves farthest
+        _, name, offset = max(fitting, key=lambda one: one[0])
         return name, float(f"{offset:.9g}")
 
     def angle(self, length: Array) -> Array:
-        """Return the joint's angle [rad] at lengths [m], (R,); those outside count as the nearest end.
+        """Return the joint's angle [rad] at lengths [m], (R,); those outside count as
+        the nearest end.
 
         The length rises or falls throughout the range, or the arm would be refused.
         """
@@ -71,12 +78,15 @@ class Rod:
         within = np.clip(length, table[0], table[-1])
         angle = np.interp(within, table, grid)
         for _ in range(STEPS):
-            angle = angle - (self.cylinder.length(angle) - within) / self.cylinder.moment_arm(angle)
+            angle = angle - (
+                self.cylinder.length(angle) - within
+            ) / self.cylinder.moment_arm(angle)
         return angle
 
 
 def rods_of(arm: Arm) -> Mapping[int, Rod]:
-    """Return the cylinders of an arm that turn joints, by the joints' numbers (from 1)."""
+    """Return the cylinders of an arm that turn joints, by the joints' numbers (from
+    1)."""
     rods = dict[int, Rod]()
     for number, joint in enumerate(arm.joints, 1):
         if isinstance(joint.actuator, LinearActuator) and not joint.slides:
@@ -85,7 +95,8 @@ def rods_of(arm: Arm) -> Mapping[int, Rod]:
 
 
 def as_angles(recording: Recording, findings: list[LogFinding]) -> Recording:
-    """Return a recording with the angles of joints in place of the lengths of their cylinders.
+    """Return a recording with the angles of joints in place of the lengths of their
+    cylinders.
 
     Lengths that the cylinder cannot have are an error.
     """
@@ -97,11 +108,19 @@ def as_angles(recording: Recording, findings: list[LogFinding]) -> Recording:
             continue
         shortest, longest = rod.ends
         with np.errstate(invalid="ignore"):
-            out = np.flatnonzero((column < shortest - rod.margin) | (column > longest + rod.margin))
+            out = np.flatnonzero(
+                (column < shortest - rod.margin) | (column > longest + rod.margin)
+            )
         if len(out):
-            numbers = {"length": 1e3 * column[out[0]], "low": 1e3 * shortest, "high": 1e3 * longest}
+            numbers = {
+                "length": 1e3 * column[out[0]],
+                "low": 1e3 * shortest,
+                "high": 1e3 * longest,
+            }
             findings.append(
-                recording.finding("error", "length outside", out, signal, signal.owner, **numbers)
+                recording.finding(
+                    "error", "length outside", out, signal, signal.owner, **numbers
+                )
             )
         column[:] = rod.angle(column)
     return replace(recording, values=values)

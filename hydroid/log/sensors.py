@@ -1,8 +1,9 @@
-"""Faults of a sensor or a logger that the readings of one angle show: leaps, and steps that are too coarse.
+"""Faults of a sensor or a logger that the readings of one angle show: leaps, and steps
+that are too coarse.
 
-A spike, a drop-out to zero, a zero point that shifts, and seconds that were cut out and renumbered all make
-an angle leap within one sample, as no joint moves: faster than it ever does elsewhere, and in between samples
-in which it hardly moves.
+A spike, a drop-out to zero, a zero point that shifts, and seconds that were cut out and
+renumbered all make an angle leap within one sample, as no joint moves: faster than it
+ever does elsewhere, and in between samples in which it hardly moves.
 """
 
 from collections.abc import Iterator
@@ -16,11 +17,13 @@ from hydroid.log.table import Recording
 from hydroid.units import way
 
 LEAST_LEAP = np.radians(1.0)
-"""of an angle within one sample [rad]; positions [m] take the same number, about 17 mm"""
+"""of an angle within one sample [rad]; positions [m] take the same number, about 17
+mm"""
 LEAST_SPEED = np.radians(100.0)
 """of a leap [rad/s, m/s]"""
 ABOVE_USUAL, ABOVE_NEAR = 3.0, 5.0
-"""how many times larger a leap is than nearly all steps of the log, and than the steps around it"""
+"""how many times larger a leap is than nearly all steps of the log, and than the steps
+around it"""
 NEARLY_ALL = 99.5  # per cent
 COARSE = np.radians(0.5)
 """steps of a sensor [rad] that hide how a joint starts and stops"""
@@ -38,7 +41,9 @@ def check_sensors(recording: Recording) -> Iterator[LogFinding]:
         if len(rows):
             size = abs(values[rows[0]] - values[rows[0] - 1])
             by = way(np.rad2deg(size), slides=slides)
-            yield recording.finding("warning", "leap", rows, signal, signal.owner, by=by)
+            yield recording.finding(
+                "warning", "leap", rows, signal, signal.owner, by=by
+            )
         step = resolution(values)
         if step >= COARSE and np.nanmax(values) - np.nanmin(values) > FEW_STEPS * step:
             by = way(np.rad2deg(step), slides=slides)
@@ -46,7 +51,8 @@ def check_sensors(recording: Recording) -> Iterator[LogFinding]:
 
 
 def leaps(time: Array, angle: Array) -> Index:
-    """Return the rows after leaps of an angle [rad], (R,), but for gaps in the time [s], (R,)."""
+    """Return the rows after leaps of an angle [rad], (R,), but for gaps in the time
+    [s], (R,)."""
     period = sample_period(time)
     steps = np.abs(np.diff(angle))
     whole = np.diff(time) <= GAP * period
@@ -56,7 +62,8 @@ def leaps(time: Array, angle: Array) -> Index:
     usual = np.percentile(steps, NEARLY_ALL)
     least = max(LEAST_LEAP, LEAST_SPEED * period, ABOVE_USUAL * usual)
     large = np.flatnonzero(steps > least)
-    # a leap and the one back may be up to three samples apart: the largest step nearby does not count
+    # a leap and the one back may be up to three samples apart: the largest step nearby
+    # does not count
     around = np.clip(large[:, None] + [-4, -3, -2, 2, 3, 4], 0, len(steps) - 1)
     near = np.sort(steps[around], axis=1)[:, -2]
     return 1 + large[steps[large] > ABOVE_NEAR * near]

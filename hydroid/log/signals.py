@@ -1,4 +1,5 @@
-"""What the numbers of a command are in: one table of signals serves `init`, `check` and the docs."""
+"""What the numbers of a command are in: one table of signals serves `init`, `check` and
+the docs."""
 
 from typing import NamedTuple
 
@@ -9,7 +10,8 @@ from hydroid.files import read_table
 from hydroid.units import unit_of
 
 SLACK = 0.06
-"""part of half a range by which converters overshoot, and by which joysticks rest beside the middle"""
+"""part of half a range by which converters overshoot, and by which joysticks rest
+beside the middle"""
 USED = 0.1
 """part of half a range beyond which both sides of the middle are used"""
 FARTHEST_REST = 0.3
@@ -19,24 +21,29 @@ COMMON = 0.05
 
 
 class CommandRange(NamedTuple):
-    """A range by its name, and what brings it to percent: command [%] = scale · cell + offset."""
+    """A range by its name, and what brings it to percent: command [%] = scale · cell +
+    offset."""
 
     name: str
     scale: float
     offset: float
 
     def remedy(self, gain: float, offset: float) -> dict[str, str]:
-        """Return its name, and the settings that bring it to percent where those of the log are given."""
+        """Return its name, and the settings that bring it to percent where those of the
+        log are given."""
         offset = self.offset + self.scale * offset
         more = f" and log.command.offset: {offset:g}" if offset else ""
         return {"range": self.name, "scale": f"{self.scale * gain:g}{more}"}
 
     def with_overshoot(self, values: Array) -> "CommandRange":
-        """Return a range in which no cell is beyond 100 %, for converters that overshoot."""
+        """Return a range in which no cell is beyond 100 %, for converters that
+        overshoot."""
         most = float(np.nanmax(np.abs(self.scale * values + self.offset))) / 100
         if most <= 1 + 1e-8:
             return self
-        scale, offset = (float(f"{one / (most + 1e-5):.6g}") for one in (self.scale, self.offset))
+        scale, offset = (
+            float(f"{one / (most + 1e-5):.6g}") for one in (self.scale, self.offset)
+        )
         return self._replace(scale=scale, offset=offset)
 
 
@@ -79,11 +86,15 @@ ON_EACH_SIDE = CommandRange("4 to 20 mA on each side", 6.25, -25.0)
 """of a column for each direction, of which one rests"""
 
 
-def likely_range(values: Array, negative: Array | None = None, unit: str = "") -> CommandRange | None:
-    """Return the range that fits the cells of a command, shape (R,), or of its two directions, or None.
+def likely_range(
+    values: Array, negative: Array | None = None, unit: str = ""
+) -> CommandRange | None:
+    """Return the range that fits the cells of a command, shape (R,), or of its two
+    directions, or None.
 
-    Converters overshoot, and joysticks do not rest exactly in the middle. A range with a positive middle must
-    be used on both sides of it, and rest there: first or most of the time. `unit`: of the cells, if stated.
+    Converters overshoot, and joysticks do not rest exactly in the middle. A range with
+    a positive middle must be used on both sides of it, and rest there: first or most of
+    the time. `unit`: of the cells, if stated.
     """
     if negative is not None:
         both = np.stack([values, negative])
@@ -110,11 +121,12 @@ def likely_range(values: Array, negative: Array | None = None, unit: str = "") -
 def resting_range(
     values: Array, likely: CommandRange | None, usual: CommandRange | None
 ) -> tuple[float, CommandRange] | None:
-    """Return where a command rests that rests beside the middle of its range, and the range from there.
+    """Return where a command rests that rests beside the middle of its range, and the
+    range from there.
 
-    Cells are in the `likely` range, or in the `usual` one of the log's other commands, whose whole it does
-    not leave. None: it rests in the middle, or the log does not tell: it begins at rest and rests most of
-    the time.
+    Cells are in the `likely` range, or in the `usual` one of the log's other commands,
+    whose whole it does not leave. None: it rests in the middle, or the log does not
+    tell: it begins at rest and rests most of the time.
     """
     values = values[~np.isnan(values)]
     kinds, counts = np.unique(values, return_counts=True)

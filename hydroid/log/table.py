@@ -1,4 +1,5 @@
-"""What every file format is read as: a table of named columns, some of which are read into a recording."""
+"""What every file format is read as: a table of named columns, some of which are read
+into a recording."""
 
 import re
 from array import array
@@ -30,13 +31,15 @@ _TIME = re.compile(
 
 @record
 class Signal:
-    """One column in use: value = gain · cell + offset in [s], [%], [rad], [m] or [Pa], from `low` to `high`.
+    """One column in use: value = gain · cell + offset in [s], [%], [rad], [m] or [Pa],
+    from `low` to `high`.
 
-    `name` is that in the header, `kind` time, command, angle or pressure, `joint` a number from 1, or 0 for
-    the time, `owner` the joint's name. `part` is 0, or 1 for the column of a command's negative direction and
-    of the pressure in chamber B. `unit` is the one to be read: %, deg, mm of a joint that slides, or bar.
-    `rest` is the value of a command before its first message, in a format of messages. `rod` is the cylinder
-    whose length the cells of an angle are.
+    `name` is that in the header, `kind` time, command, angle or pressure, `joint` a
+    number from 1, or 0 for the time, `owner` the joint's name. `part` is 0, or 1 for
+    the column of a command's negative direction and of the pressure in chamber B.
+    `unit` is the one to be read: %, deg, mm of a joint that slides, or bar. `rest` is
+    the value of a command before its first message, in a format of messages. `rod` is
+    the cylinder whose length the cells of an angle are.
     """
 
     name: str
@@ -63,7 +66,8 @@ class Table:
     Attributes:
         names: of the columns, in order; "" for one without.
         columns: their cells by name, shape (R,): numbers, times or text.
-        header: line of the names [1-based], in a format whose rows are lines; None elsewhere.
+        header: line of the names [1-based], in a format whose rows are lines; None
+            elsewhere.
         units: that the file gives to columns, by name.
         remarks: what the reader skipped and what it took parts of the file for.
         lines: of the rows [1-based], shape (R,); None: 1, 2, ...
@@ -79,7 +83,8 @@ class Table:
     lines: Ints | None = None
 
     def text(self, name: str, row: int) -> str:
-        """Return the text of a cell that holds no number, for a message; empty where it is no text."""
+        """Return the text of a cell that holds no number, for a message; empty where it
+        is no text."""
         cell = self.columns[name][row]
         return cell if isinstance(cell, str) else ""
 
@@ -90,9 +95,13 @@ class Table:
         for signal, column in zip(signals, values.T, strict=True):
             cells = self.columns[signal.name]
             if len(cells) != len(column):
-                what = f"holds {len(cells)} values, but column {first} holds {len(column)}"
+                what = (
+                    f"holds {len(cells)} values, but column {first} holds {len(column)}"
+                )
                 where = f"{self.source}, column {signal.name}"
-                raise LogError(what, where, "all columns of a log have one clock: resample it")
+                raise LogError(
+                    what, where, "all columns of a log have one clock: resample it"
+                )
             numbers, timed = _as_numbers(cells)
             with np.errstate(all="ignore"):
                 column[:] = numbers * (1.0 if timed else signal.gain) + signal.offset
@@ -103,12 +112,14 @@ class Table:
 
 @record
 class Recording:
-    """The used columns of one file, a table: R rows of C signals, the first of which is the time.
+    """The used columns of one file, a table: R rows of C signals, the first of which is
+    the time.
 
     Attributes:
         values: in the signals' units, shape (R, C), NaN where the file holds no number.
         rows: of the table [0-based], shape (R,).
-        clock: time of day of the table's first row, HH:MM:SS; empty where the file has none.
+        clock: time of day of the table's first row, HH:MM:SS; empty where the file has
+            none.
     """
 
     table: Table
@@ -135,18 +146,25 @@ class Recording:
         *subjects: object,
         **numbers: Any,
     ) -> LogFinding:
-        """Make a finding at the first of `rows`, about a signal or other subjects; it counts the others."""
+        """Make a finding at the first of `rows`, about a signal or other subjects; it
+        counts the others."""
         word, of = "line" if self.table.header else "row", self.table.lines
-        at = [f"{word} {row + 1 if of is None else of[row]}" for row in self.rows[[*rows[:1], *rows[-1:]]]]
+        at = [
+            f"{word} {row + 1 if of is None else of[row]}"
+            for row in self.rows[[*rows[:1], *rows[-1:]]]
+        ]
         more = f" (and {len(rows) - 1} more, to {at[1]})" if len(rows) > 1 else ""
         about = subjects or ((signal,) if signal else ())
         row, column = at[0] if at else "", signal.name if signal else ""
         source = self.table.source
-        return log_finding(level, kind, source, *about, row=row, column=column, rows=more, **numbers)
+        return log_finding(
+            level, kind, source, *about, row=row, column=column, rows=more, **numbers
+        )
 
 
 def number(cell: str) -> float | None:
-    """Return what float() reads, but for the digit groups of Python's literals (1_000); None: no number."""
+    """Return what float() reads, but for the digit groups of Python's literals (1_000);
+    None: no number."""
     try:
         return float(cell) if "_" not in cell else None
     except ValueError:
@@ -160,7 +178,9 @@ def clock(cell: str) -> int | None:
         return None
     hour, minute, second, fraction, half = match.groups()
     hours = int(hour) % 12 + 12 * (half in "Pp") if half else int(hour)
-    return ((hours * 60 + int(minute)) * 60 + int(second)) * 10**9 + int((fraction or "0").ljust(9, "0"))
+    return ((hours * 60 + int(minute)) * 60 + int(second)) * 10**9 + int(
+        (fraction or "0").ljust(9, "0")
+    )
 
 
 def time_of_day(cells: NDArray[Any]) -> str:
@@ -171,10 +191,11 @@ def time_of_day(cells: NDArray[Any]) -> str:
 
 
 class TextColumn:
-    """The numbers in a column of text, which comes in pieces; or times, if its first cell with text is one.
+    """The numbers in a column of text, which comes in pieces; or times, if its first
+    cell with text is one.
 
-    Dates do not count, which programs write in many ways: a time of day that falls by more than half a day
-    has passed midnight.
+    Dates do not count, which programs write in many ways: a time of day that falls by
+    more than half a day has passed midnight.
     """
 
     def __init__(self) -> None:
@@ -195,9 +216,14 @@ class TextColumn:
             self._numbers.extend(_numbers(cells))
 
     def values(self) -> NDArray[Any]:
-        """Return numbers, NaN where there is none, or times, NaT where there is none; shape (R,)."""
+        """Return numbers, NaN where there is none, or times, NaT where there is none;
+        shape (R,)."""
         if self._ticks is None:
-            return np.frombuffer(self._numbers, np.float64) if self._numbers else np.zeros(0)
+            return (
+                np.frombuffer(self._numbers, np.float64)
+                if self._numbers
+                else np.zeros(0)
+            )
         ticks = np.array(self._ticks, np.int64)
         there = ticks != _NO_TIME
         days = np.cumsum(np.diff(ticks[there], prepend=ticks[there][:1]) < -_DAY // 2)
@@ -215,7 +241,8 @@ def _numbers(cells: Sequence[str]) -> "array[float]":
 
 
 def _as_numbers(cells: NDArray[Any]) -> tuple[Array, bool]:
-    """Return cells as numbers, NaN where there is none, and whether they are times [s] from the first."""
+    """Return cells as numbers, NaN where there is none, and whether they are times [s]
+    from the first."""
     if cells.dtype.kind in "fiub":
         return cells.astype(np.float64), False
     if cells.dtype.kind == "m":
@@ -233,24 +260,36 @@ def _as_numbers(cells: NDArray[Any]) -> tuple[Array, bool]:
 
 
 MOST_NUMBERS = 30_000_000
-"""that are read of one log: hours of it, and about 1 GB of memory until it is resampled"""
+"""that are read of one log: hours of it, and about 1 GB of memory until it is
+resampled"""
 
 
 def refuse_large(source: str, rows: int, columns: int) -> None:
     """Raise a LogError where a log is too long for the memory of a usual computer."""
     if rows * columns > MOST_NUMBERS:
-        most = f"at most {MOST_NUMBERS // columns:,} rows of {columns} columns can be read"
+        most = (
+            f"at most {MOST_NUMBERS // columns:,} rows of {columns} columns can be read"
+        )
         what = f"has {rows:,} rows; {most}"
         raise LogError(what, source, "cut it, or record at a lower rate")
 
 
-BLIND = (ArithmeticError, AssertionError, AttributeError, LookupError, MemoryError, TypeError)
-"""errors of a library that met bytes which its authors did not expect: their text says nothing of the file"""
+BLIND = (
+    ArithmeticError,
+    AssertionError,
+    AttributeError,
+    LookupError,
+    MemoryError,
+    TypeError,
+)
+"""errors of a library that met bytes which its authors did not expect: their text says
+nothing of the file"""
 
 
 @contextmanager
 def format_library(package: str, extra: str, path: Path, kind: str) -> Generator[Any]:
-    """Yield a library that reads a format; whatever it raises on damaged bytes becomes a `LogError`."""
+    """Yield a library that reads a format; whatever it raises on damaged bytes becomes
+    a `LogError`."""
     try:
         library = import_module(package)
     except ImportError:
@@ -261,5 +300,11 @@ def format_library(package: str, extra: str, path: Path, kind: str) -> Generator
     except LogError:
         raise
     except Exception as error:
-        reason = "damaged" if isinstance(error, BLIND) else " ".join(str(error).split())[:200]
-        raise LogError(f"cannot be read as {kind} ({reason or 'damaged'})", path, "save it again") from None
+        reason = (
+            "damaged"
+            if isinstance(error, BLIND)
+            else " ".join(str(error).split())[:200]
+        )
+        raise LogError(
+            f"cannot be read as {kind} ({reason or 'damaged'})", path, "save it again"
+        ) from None

@@ -1,10 +1,11 @@
 """Which Dask scheduler hydroid uses: its own on this machine, or one that runs already.
 
-A Dask scheduler runs whatever code reaches its port. The one that is started here therefore uses
-TLS with credentials made for the run, and refuses clients and workers without them. A scheduler
-that was started elsewhere needs TLS too, with the credentials of Dask's configuration, unless it
-listens on the loopback interface. `python -m hydroid.parallel.cluster FOLDER` makes credentials for
-a scheduler and workers that a script starts, as examples/cluster/dask.sbatch does.
+A Dask scheduler runs whatever code reaches its port. The one that is started here
+therefore uses TLS with credentials made for the run, and refuses clients and workers
+without them. A scheduler that was started elsewhere needs TLS too, with the credentials
+of Dask's configuration, unless it listens on the loopback interface. `python -m
+hydroid.parallel.cluster FOLDER` makes credentials for a scheduler and workers that a
+script starts, as examples/cluster/dask.sbatch does.
 """
 
 import ipaddress
@@ -34,8 +35,9 @@ def open_workers(dask: str | None) -> Generator[DaskWorkers | None]:
     """Connect to workers; at the end, stop those that were started here.
 
     Args:
-        dask: `local[:N]` starts N workers on this machine, one per core if N is left out; anything
-            else is the address of a scheduler, or its scheduler file. None: no workers.
+        dask: `local[:N]` starts N workers on this machine, one per core if N is left
+            out; anything else is the address of a scheduler, or its scheduler file.
+            None: no workers.
 
     Raises:
         SettingsError: Dask is not installed, or the address is refused.
@@ -49,16 +51,23 @@ def open_workers(dask: str | None) -> Generator[DaskWorkers | None]:
         from distributed import Client
     except ImportError as error:
         hint = "install it: pip install 'hydroid[cluster]'"
-        raise SettingsError(f"Dask cannot be imported ({error})", "--dask", hint) from None
+        raise SettingsError(
+            f"Dask cannot be imported ({error})", "--dask", hint
+        ) from None
     with ExitStack() as stack:
         # HTTP servers of what is started here have no TLS, and serve nothing
-        closed = {f"distributed.{name}.http.routes": list[str]() for name in ("scheduler", "worker")}
+        closed = {
+            f"distributed.{name}.http.routes": list[str]()
+            for name in ("scheduler", "worker")
+        }
         stack.enter_context(config.set(closed))
         own = re.fullmatch("local(?::([1-9][0-9]{0,3}))?", dask)
         if own:
-            # a worker that dies is started again, and Dask would give it up for good if that takes
-            # longer than 15 s, as on a busy machine
-            stack.enter_context(config.set({"distributed.deploy.lost-worker-timeout": "1 hour"}))
+            # a worker that dies is started again, and Dask would give it up for good if
+            # that takes longer than 15 s, as on a busy machine
+            stack.enter_context(
+                config.set({"distributed.deploy.lost-worker-timeout": "1 hour"})
+            )
             target = _start_local(stack, int(own[1] or os.cpu_count() or 1))
         else:
             target = _address(dask)
@@ -66,17 +75,20 @@ def open_workers(dask: str | None) -> Generator[DaskWorkers | None]:
 
 
 def _connected(stack: ExitStack, kind: Any, target: Any, dask: str) -> Any:
-    """Return a client of a kind that is connected to a scheduler until the stack ends."""
+    """Return a client of a kind that is connected to a scheduler until the stack
+    ends."""
     client: Any = kind.__new__(kind)
     try:
         client.__init__(target, timeout=CONNECT)
     except (OSError, ValueError, TypeError, RuntimeError) as error:
-        # a refused client left open is closed when it is collected; in the thread that another
-        # waits for, that would wait for the other
+        # a refused client left open is closed when it is collected; in the thread that
+        # another waits for, that would wait for the other
         _close(client)
         words = " ".join(str(error).split())
         hint = "check the address; for tls:// name the folder of its credentials in DASK_CONFIG"
-        raise RunError(f"no Dask scheduler answers ({words})", f"--dask {dask}", hint) from None
+        raise RunError(
+            f"no Dask scheduler answers ({words})", f"--dask {dask}", hint
+        ) from None
     stack.callback(_close, client)
     return client
 
@@ -85,8 +97,8 @@ def write_credentials(folder: Path) -> None:
     """Write new TLS credentials, as a Dask configuration,
     into a new folder that only its user can read.
 
-    Scheduler, workers and hydroid use them where the environment variable DASK_CONFIG names the
-    folder. Raises FileExistsError: the folder is there already.
+    Scheduler, workers and hydroid use them where the environment variable DASK_CONFIG
+    names the folder. Raises FileExistsError: the folder is there already.
     """
     from distributed.security import Security
 
@@ -127,7 +139,8 @@ def _start_local(stack: ExitStack, count: int) -> Any:
 
 @contextmanager
 def _signals_blocked() -> Generator[None]:
-    """Let threads that start in here, and their processes, ignore Ctrl-C and a cluster's notice."""
+    """Let threads that start in here, and their processes, ignore Ctrl-C and a
+    cluster's notice."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
@@ -141,7 +154,8 @@ def _signals_blocked() -> Generator[None]:
 
 
 def _address(given: str) -> str:
-    """Return the address that is given itself or by a scheduler file, if code may be sent there."""
+    """Return the address that is given itself or by a scheduler file, if code may be
+    sent there."""
     from distributed.comm.addressing import get_address_host, parse_address
 
     address = given
@@ -159,7 +173,9 @@ def _address(given: str) -> str:
         raise SettingsError("is no Dask scheduler", where, hint) from None
     if scheme != "tls" and not _is_this_machine(host):
         what = "without TLS anyone who reaches it can run code as you"
-        raise SettingsError(what, where, "start it with TLS as examples/cluster/dask.sbatch does")
+        raise SettingsError(
+            what, where, "start it with TLS as examples/cluster/dask.sbatch does"
+        )
     return address
 
 

@@ -26,7 +26,8 @@ _lock = threading.Lock()
 
 
 class DaskWorkers:
-    """The workers of a scheduler, to which a client is connected, for a problem's candidates."""
+    """The workers of a scheduler, to which a client is connected, for a problem's
+    candidates."""
 
     def __init__(self, client: Any) -> None:
         self.client = client
@@ -37,13 +38,16 @@ class DaskWorkers:
         """Workers connected now; 1 where there is none."""
         return max(1, len(self.client.nthreads()))
 
-    def __call__(self, target: object, method: str, theta: Array, columns: int) -> Array:
-        """Apply `target.method`, which maps rows (m, P) to (m, columns), to theta, (n, P),
-        on the workers.
+    def __call__(
+        self, target: object, method: str, theta: Array, columns: int
+    ) -> Array:
+        """Apply `target.method`, which maps rows (m, P) to (m, columns), to theta, (n,
+        P), on the workers.
 
-        Each worker gets one chunk of the rows. When a worker dies, another one takes its chunk. The
-        target can be pickled, and is sent once. The result, (n, columns), is in theta's order; NaN
-        in the row of a candidate that kills its workers.
+        Each worker gets one chunk of the rows. When a worker dies, another one takes
+        its chunk. The target can be pickled, and is sent once. The result, (n,
+        columns), is in theta's order; NaN in the row of a candidate that kills its
+        workers.
 
         Raises RunError: the scheduler is gone.
         """
@@ -51,7 +55,9 @@ class DaskWorkers:
         try:
             # a task and no data: what a dead worker held is computed again
             if target not in self._sent:
-                self._sent[target] = self.client.submit(bytes, pickle.dumps(target), pure=False)
+                self._sent[target] = self.client.submit(
+                    bytes, pickle.dumps(target), pure=False
+                )
             parts = self._parts(len(theta))
             chunks = self._map(target, method, [theta[part] for part in parts])
             for part, rows in zip(parts, chunks, strict=True):
@@ -73,7 +79,9 @@ class DaskWorkers:
         edges = np.linspace(0, rows, min(self.count, rows) + 1).astype(int).tolist()
         return [slice(begin, end) for begin, end in pairwise(edges)]
 
-    def _one_by_one(self, target: object, method: str, theta: Array, part: slice, result: Array) -> None:
+    def _one_by_one(
+        self, target: object, method: str, theta: Array, part: slice, result: Array
+    ) -> None:
         """Try each candidate of a chunk alone that Dask has given up.
 
         It also gives up chunks that waited behind a killer.
@@ -86,8 +94,11 @@ class DaskWorkers:
             else:
                 result[i] = row[0]
 
-    def _map(self, target: object, method: str, chunks: Sequence[Array]) -> list[Array | None]:
-        """Return results in the chunks' order; None for a chunk that Dask has given up."""
+    def _map(
+        self, target: object, method: str, chunks: Sequence[Array]
+    ) -> list[Array | None]:
+        """Return results in the chunks' order; None for a chunk that Dask has given
+        up."""
         from distributed.scheduler import KilledWorker
 
         where: Any = list(self.client.nthreads()) or None
@@ -119,7 +130,8 @@ class DaskWorkers:
                 self.client.cancel(futures)
 
     def _wait(self, futures: Sequence[Any]) -> None:
-        """Wait for tasks, and look from time to time whether there is anybody to do them."""
+        """Wait for tasks, and look from time to time whether there is anybody to do
+        them."""
         import distributed
 
         while True:
@@ -132,12 +144,16 @@ class DaskWorkers:
                 _log.warning("the Dask scheduler has no workers; waiting for some")
 
 
-def _apply(pickled: bytes, versions: dict[str, str], method: str, theta: Array) -> Array:
+def _apply(
+    pickled: bytes, versions: dict[str, str], method: str, theta: Array
+) -> Array:
     """Compute a chunk in a worker, one at a time however many threads it has."""
     for name, ours in versions.items():
         if VERSIONS[name] != ours:
             words = f"a Dask worker has {name} {VERSIONS[name]}, here is {ours}"
-            raise RunError(words, hint="install the same everywhere: others may compute other bits")
+            raise RunError(
+                words, hint="install the same everywhere: others may compute other bits"
+            )
     with _lock:
         return getattr(_loaded(pickled), method)(theta)
 

@@ -1,7 +1,8 @@
 """Many plants of one machine, stepped in one call: a population, at its speed.
 
-The plants have settings in common, and each its own parameters, such as draws of what the logs leave open.
-One compiled loop steps a share of them per thread, so that Python is met once per call.
+The plants have settings in common, and each its own parameters, such as draws of what
+the logs leave open. One compiled loop steps a share of them per thread, so that Python
+is met once per call.
 """
 
 # pyright: reportMissingParameterType=false
@@ -32,7 +33,9 @@ def _typed_pointer(typing: Any, address: Any) -> Any:
     """Return the signature of `_pointer` and what makes its code."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return builder.inttoptr(arguments[0], context.get_value_type(signature.return_type))
+        return builder.inttoptr(
+            arguments[0], context.get_value_type(signature.return_type)
+        )
 
     return types.voidptr(types.int64), generate
 
@@ -42,7 +45,8 @@ _pointer: Any = intrinsic(_typed_pointer)
 
 
 class Population(NamedTuple):
-    """What n plants have, each with a row; `places` are addresses in MuJoCo, in the order of `_places`."""
+    """What n plants have, each with a row; `places` are addresses in MuJoCo, in the
+    order of `_places`."""
 
     places: Ints  # (n, 10)
     coefficients: Any  # (n, J), of COEFFICIENTS
@@ -55,16 +59,31 @@ class Population(NamedTuple):
 
 def _places(plant: Plant) -> list[int]:
     model, data = plant.model, plant.data
-    arrays = [data.qpos, data.qvel, data.M, data.qfrc_applied, model.dof_armature, data.qfrc_bias]
-    addresses = [array.ctypes.data for array in (*arrays, model.qpos_spring, data.warning.number)]
+    arrays = [
+        data.qpos,
+        data.qvel,
+        data.M,
+        data.qfrc_applied,
+        model.dof_armature,
+        data.qfrc_bias,
+    ]
+    addresses = [
+        array.ctypes.data for array in (*arrays, model.qpos_spring, data.warning.number)
+    ]
     return [model._address, data._address, *addresses]  # pyright: ignore[reportPrivateUsage]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _roll_some(
-    rows, shared: Handles, plugin: Plugin, plants: Population, quasi: bool, source: int = SOURCE
+    rows,
+    shared: Handles,
+    plugin: Plugin,
+    plants: Population,
+    quasi: bool,
+    source: int = SOURCE,
 ) -> None:
-    """Roll some plants out, from rows[0] to before rows[1]; `shared` has what is alike of all."""
+    """Roll some plants out, from rows[0] to before rows[1]; `shared` has what is alike
+    of all."""
     joints, entries, nothing = shared.angle.size, shared.mass.size, np.empty(0)
     for i in range(rows[0], rows[1]):
         if plants.failed[i]:
@@ -88,15 +107,24 @@ def _roll_some(
             shared.limits,
         )
         own = Plugin(
-            plants.coefficients[i], plugin.order, plugin.entries, plugin.idle, plugin.period, plugin.substeps
+            plants.coefficients[i],
+            plugin.order,
+            plugin.entries,
+            plugin.idle,
+            plugin.period,
+            plugin.substeps,
         )
         course = Course(plants.commands[i], plants.torque[i], nothing, np.empty((0, 0)))
-        record = Record(plants.angle[i], np.empty((0, plants.state.shape[1]), plants.state.dtype))
+        record = Record(
+            plants.angle[i], np.empty((0, plants.state.shape[1]), plants.state.dtype)
+        )
         if quasi:
             roll_quasi_static(handles, own, plants.state[i], course, record)
         else:
             roll(handles, own, plants.state[i], course, record)
-        plants.failed[i] = handles.warnings.any() or not np.isfinite(handles.angle).all()
+        plants.failed[i] = (
+            handles.warnings.any() or not np.isfinite(handles.angle).all()
+        )
 
 
 class RowState(NamedTuple):
@@ -116,12 +144,14 @@ class RowState(NamedTuple):
 
 
 class PlantBatch:
-    """n plants that are stepped together; no bit depends on the others, or on how many threads there are.
+    """n plants that are stepped together; no bit depends on the others, or on how many
+    threads there are.
 
     A plant must not be stepped, reset or changed by itself while it is in a batch.
 
     Args:
-        plants: of one machine: with the same joints, period and settings but for their parameters.
+        plants: of one machine: with the same joints, period and settings but for their
+            parameters.
         threads: that step them; None: one per core.
 
     Raises:
@@ -129,9 +159,15 @@ class PlantBatch:
     """
 
     def __init__(self, plants: Sequence[Plant], *, threads: int | None = None) -> None:
-        kinds = {(one.identified.settings.stage, one.joints, one.period, one.quasi_static) for one in plants}
+        kinds = {
+            (one.identified.settings.stage, one.joints, one.period, one.quasi_static)
+            for one in plants
+        }
         if len(kinds) != 1 or len({one.timestep for one in plants}) != 1:
-            raise SettingsError("needs plants with the same joints, period and model", "a batch of plants")
+            raise SettingsError(
+                "needs plants with the same joints, period and model",
+                "a batch of plants",
+            )
         self.plants = tuple(plants)
         count = min(threads or os.cpu_count() or 1, len(plants))
         self._pool = ThreadPoolExecutor(count)
@@ -147,7 +183,8 @@ class PlantBatch:
 
     @property
     def angle(self) -> Array:
-        """Joint angles [rad], shape (n, J), a copy; NaN of a plant that diverged, until its reset."""
+        """Joint angles [rad], shape (n, J), a copy; NaN of a plant that diverged, until
+        its reset."""
         angle = self._pose.copy()
         angle[:, self._columns] = self._angle[:, 0]
         angle[self._population.failed] = np.nan
@@ -158,7 +195,9 @@ class PlantBatch:
         """Since each plant's reset [s], shape (n,), a copy."""
         return self._time.copy()
 
-    def reset(self, pose: str | ArrayLike | None = None, rows: ArrayLike | None = None) -> Array:
+    def reset(
+        self, pose: str | ArrayLike | None = None, rows: ArrayLike | None = None
+    ) -> Array:
         """Put plants at rest, in static balance.
 
         Args:
@@ -177,7 +216,8 @@ class PlantBatch:
         return self.angle
 
     def state(self, row: int) -> "RowState":
-        """Return where the plant of a row stands; to `restore` it is a hundredth of a reset."""
+        """Return where the plant of a row stands; to `restore` it is a hundredth of a
+        reset."""
         plant, population = self.plants[row], self._population
         physics = np.empty(mujoco.mj_stateSize(plant.model, PHYSICS))
         mujoco.mj_getState(plant.model, plant.data, physics, PHYSICS)
@@ -216,15 +256,19 @@ class PlantBatch:
         self._time[row] = state.time
 
     def step(self, command: ArrayLike) -> Array:
-        """Hold commands [%] for one period: shape (n, J), or (J,) for all plants; cut to [-100, 100].
+        """Hold commands [%] for one period: shape (n, J), or (J,) for all plants; cut
+        to [-100, 100].
 
         Returns:
             The joint angles [rad], shape (n, J); NaN of a plant that diverged.
 
         Raises:
-            ValueError: another shape, or a command that is not finite or for a joint that takes none.
+            ValueError: another shape, or a command that is not finite or for a joint
+                that takes none.
         """
-        given = np.broadcast_to(np.asarray(command, float), (len(self), len(self._active)))
+        given = np.broadcast_to(
+            np.asarray(command, float), (len(self), len(self._active))
+        )
         if not np.isfinite(given).all() or given[:, ~self._active].any():
             raise ValueError("commands must be finite, and 0 of joints that take none")
         moving = given[:, self._columns].clip(-100.0, 100.0)
@@ -232,7 +276,9 @@ class PlantBatch:
         commands[:, :-steps] = commands[:, steps:]
         commands[:, -steps:] = moving[:, None, self._coupled]
         if self._pushed.size:
-            self._population.torque[:] = (self._gain * moving + self._balance)[:, None, self._pushed]
+            self._population.torque[:] = (self._gain * moving + self._balance)[
+                :, None, self._pushed
+            ]
         with quiet_mujoco():
             if len(self._calls) == 1:
                 self._calls[0]()
@@ -246,7 +292,11 @@ class PlantBatch:
         """Stack what the plants have, and bind the compiled calls to it."""
         first, n = self.plants[0], len(self)
         parts = first.parts
-        self._columns, self._coupled, self._pushed = parts.columns, parts.chain.columns, parts.chain.pushed
+        self._columns, self._coupled, self._pushed = (
+            parts.columns,
+            parts.chain.columns,
+            parts.chain.pushed,
+        )
         steps, joints = parts.course.torque.shape[0], len(self._coupled)
         self._angle = np.empty((n, 1, len(self._columns)))
         self._pose = np.empty((n, len(first.names)))
@@ -265,7 +315,8 @@ class PlantBatch:
         shared = parts.arm.handles, parts.plugin
         pairs = [self._shares[k : k + 2].copy() for k in range(len(self._shares) - 1)]
         self._calls = [
-            bind(_roll_some, rows, *shared, self._population, first.quasi_static) for rows in pairs
+            bind(_roll_some, rows, *shared, self._population, first.quasi_static)
+            for rows in pairs
         ]
 
     def _take(self, row: int) -> None:

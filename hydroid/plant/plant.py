@@ -46,7 +46,8 @@ class PlantParts(NamedTuple):
 
 
 class PlantState(NamedTuple):
-    """Where a plant stands, to the bit: `Plant.state` makes it, `Plant.restore` takes it. It pickles."""
+    """Where a plant stands, to the bit: `Plant.state` makes it, `Plant.restore` takes
+    it. It pickles."""
 
     start: Array
     taken: int
@@ -62,22 +63,25 @@ class Plant:
 
     Args:
         identified: settings and parameters.
-        joints: numbers, from 1, or names of the joints that take commands; by default those that the fit
-            drove or compared, and without a fit those that the settings compare. With `other_joints: passive`
-            in the settings all others move under their springs and dampers; otherwise they are locked where
+        joints: numbers, from 1, or names of the joints that take commands; by default
+            those that the fit drove or compared, and without a fit those that the
+            settings compare. With `other_joints: passive` in the settings all others
+            move under their springs and dampers; otherwise they are locked where
             `reset` puts them.
-        period: how long one command is held [s], a multiple of MuJoCo's step; by default the logs' period.
+        period: how long one command is held [s], a multiple of MuJoCo's step; by
+            default the logs' period.
         payload: mass in the gripper [kg].
 
     Attributes:
         joints: those that take commands.
-        model: the arm in MuJoCo, with one motor per moving joint, whose `ctrl` holds the command. Locked
-            joints are fused; `reset` to a pose with other angles of locked joints replaces model and data.
+        model: the arm in MuJoCo, with one motor per moving joint, whose `ctrl` holds
+            the command. Locked joints are fused; `reset` to a pose with other angles of
+            locked joints replaces model and data.
         data: its state.
 
     Raises:
-        SettingsError: a joint that does not exist, a period that is no multiple, a payload without a place,
-            or parameters without a force-stroke curve.
+        SettingsError: a joint that does not exist, a period that is no multiple, a
+            payload without a place, or parameters without a force-stroke curve.
     """
 
     def __init__(
@@ -92,7 +96,9 @@ class Plant:
         arm = settings.arm
         self.identified, names = identified, dict(enumerate(arm.joint_names, 1))
         wanted = set(joints or identified.summarise().joints or settings.outputs)
-        self.joints = tuple(number for number, name in names.items() if wanted & {number, name})
+        self.joints = tuple(
+            number for number, name in names.items() if wanted & {number, name}
+        )
         self._named = [names[joint] for joint in self.joints]
         self._active = np.isin([*names], self.joints)
         if stray := wanted.difference(names, names.values()):
@@ -103,7 +109,10 @@ class Plant:
         self.period = settings.log.period_s if period is None else period
         self._steps = round(self.period / self.timestep)
         if self._steps < 1 or abs(self._steps * self.timestep - self.period) > 1e-9:
-            raise SettingsError(f"must be a multiple of {self.timestep:g} s", f"period {self.period:g} s")
+            raise SettingsError(
+                f"must be a multiple of {self.timestep:g} s",
+                f"period {self.period:g} s",
+            )
         self._spec = load_model(arm)
         if payload:
             self._spec = add_payload(self._spec, arm, payload)
@@ -111,7 +120,11 @@ class Plant:
         self._locked_pose = np.empty(0)  # none yet
         if settings.stage == "hyd" and not has_force_curve(self._candidate.joints)[0]:
             hint = "it takes F1 > F2 > 0, x2 > x1 > 0 and F1/F2 < (x2/x1)²"
-            raise SettingsError("no force-stroke curve runs through its two points", identified.source, hint)
+            raise SettingsError(
+                "no force-stroke curve runs through its two points",
+                identified.source,
+                hint,
+            )
         compile_rollout()
         self.reset()
 
@@ -143,12 +156,20 @@ class Plant:
         """What it is made of, since its last reset."""
         chain, arm, course = self._chain, self._arm, self._course
         return PlantParts(
-            self._columns, chain, arm, self._plugin, self._state, course, self._gain, self._balance
+            self._columns,
+            chain,
+            arm,
+            self._plugin,
+            self._state,
+            course,
+            self._gain,
+            self._balance,
         )
 
     @property
     def actuators(self) -> Records:
-        """Quantities of all joints' actuators in SI, (J,) of `hydraulics.records.JOINT`."""
+        """Quantities of all joints' actuators in SI, (J,) of
+        `hydraulics.records.JOINT`."""
         return self._candidate.joints[0]
 
     @property
@@ -165,16 +186,23 @@ class Plant:
 
     @property
     def angle(self) -> Array:
-        """Joint angles [rad], shape (J,), a copy; the true ones, whatever lag or scale their sensors have."""
+        """Joint angles [rad], shape (J,), a copy; the true ones, whatever lag or scale
+        their sensors have."""
         angle = self._pose.copy()
         angle[self._columns] = self.data.qpos
         return angle
 
     @property
     def pressure(self) -> Array:
-        """Pressures of chambers A and B [Pa], shape (J, 2); NaN where a joint has no hydraulics."""
-        pressure, angle = np.full((len(self._pose), 2), np.nan), self.data.qpos[self._chain.columns]
-        pressure[self._chain.joints] = pressures(self._plugin.coefficients, self._state, angle)
+        """Pressures of chambers A and B [Pa], shape (J, 2); NaN where a joint has no
+        hydraulics."""
+        pressure, angle = (
+            np.full((len(self._pose), 2), np.nan),
+            self.data.qpos[self._chain.columns],
+        )
+        pressure[self._chain.joints] = pressures(
+            self._plugin.coefficients, self._state, angle
+        )
         pressure[~self._active] = np.nan
         return pressure
 
@@ -182,8 +210,8 @@ class Plant:
         """Put the arm at rest, in static balance, its springs slack.
 
         Args:
-            pose: a pose of the arm's file, or joint angles [rad], shape (J,); by default the settings' start
-                pose.
+            pose: a pose of the arm's file, or joint angles [rad], shape (J,); by
+                default the settings' start pose.
 
         Returns:
             The joint angles [rad], shape (J,).
@@ -191,7 +219,9 @@ class Plant:
         Raises:
             SettingsError: no such pose, or not J finite angles.
         """
-        self._pose = self._posed(self.identified.settings.start_pose if pose is None else pose)
+        self._pose = self._posed(
+            self.identified.settings.start_pose if pose is None else pose
+        )
         self._start = self._pose.copy()
         self._weighing: Weighing | None = None  # springs are slack where it starts
         locked = np.where(self._moving, 0.0, self._pose)
@@ -201,10 +231,14 @@ class Plant:
         self.model.qpos_spring[:] = start_angle
         with quiet_mujoco():
             self._balance = self._arm.start(self._values, [0], start_angle)
-            plugin, states = self._chain.start(self._candidate, start_angle, self._balance[None])
+            plugin, states = self._chain.start(
+                self._candidate, start_angle, self._balance[None]
+            )
             self._plugin, self._state = plugin.of(0), states[0]
             commands = np.zeros((self._plugin.past + self._steps, len(self._state)))
-            self._course = Course(commands, np.empty((self._steps, len(self._chain.pushed))))
+            self._course = Course(
+                commands, np.empty((self._steps, len(self._chain.pushed)))
+            )
             self._mass = self.data.M.copy()
         self._roll, self._taken = None, 0
         return self.angle
@@ -213,8 +247,9 @@ class Plant:
         """Hold a command for one period.
 
         Args:
-            command: [%], shape (J,), or by the joints' names, others 0. An amplifier saturates: it is cut
-                to [-100, 100]. It must be 0 of joints that take none.
+            command: [%], shape (J,), or by the joints' names, others 0. An amplifier
+                saturates: it is cut to [-100, 100]. It must be 0 of joints that take
+                none.
 
         Returns:
             The joint angles [rad], shape (J,).
@@ -233,23 +268,35 @@ class Plant:
         np.copyto(self.data.M, self._mass)
         with quiet_mujoco():
             if self._roll is None:
-                self._roll = self._arm.bind(self._plugin, self._state, self._course, self._record)
+                self._roll = self._arm.bind(
+                    self._plugin, self._state, self._course, self._record
+                )
             self._roll()
         np.copyto(self._mass, self.data.M)
         self._taken += self._steps
         if not self._arm.healthy:
-            raise RunError(f"the simulation diverged before {self.time:.2f} s", self.identified.source)
+            raise RunError(
+                f"the simulation diverged before {self.time:.2f} s",
+                self.identified.source,
+            )
         return self.angle
 
-    def speeds(self, commands: ArrayLike | Mapping[str, float], at: str | ArrayLike | None = None) -> Array:
-        """Return the speeds that joints settle to under commands that are held, all at once.
+    def speeds(
+        self,
+        commands: ArrayLike | Mapping[str, float],
+        at: str | ArrayLike | None = None,
+    ) -> Array:
+        """Return the speeds that joints settle to under commands that are held, all at
+        once.
 
         Args:
             commands: [%], shape (J,), or by the joints' names, others 0.
-            at: a pose of the arm's file, or joint angles [rad], shape (J,); by default where the plant is.
+            at: a pose of the arm's file, or joint angles [rad], shape (J,); by default
+                where the plant is.
 
         Returns:
-            [rad/s], of joints that slide [m/s], shape (J,): of the law itself (`simulation.settled`).
+            [rad/s], of joints that slide [m/s], shape (J,): of the law itself
+            (`simulation.settled`).
 
         Raises:
             ValueError: not J finite commands, or one for a joint that takes none.
@@ -263,17 +310,21 @@ class Plant:
     ) -> SteadyCommands:
         """Return the commands under which joints settle to wished speeds, all at once.
 
-        Dead band, curve, load, pump and compensation are in it. Where a wish cannot be had, the command gives
-        the nearest speed, and `limits` says by name why.
+        Dead band, curve, load, pump and compensation are in it. Where a wish cannot be
+        had, the command gives the nearest speed, and `limits` says by name why.
 
         Args:
-            speeds: [rad/s], of joints that slide [m/s], shape (J,), or by the joints' names, others 0.
+            speeds: [rad/s], of joints that slide [m/s], shape (J,), or by the joints'
+                names, others 0.
             at: as of `speeds`.
 
         Raises:
             ValueError, SettingsError: as of `speeds`.
         """
-        wished, pose = self._of_joints(speeds, "speed", "rad/s")[None], self._posed(at)[None]
+        wished, pose = (
+            self._of_joints(speeds, "speed", "rad/s")[None],
+            self._posed(at)[None],
+        )
         steady = self.steady()
         command, reached = steady.commands(wished, pose)
         (limits,) = steady.limits(wished, reached, command, pose)
@@ -288,25 +339,46 @@ class Plant:
         settings = self.identified.settings
         if settings.stage != "hyd":
             hint = "name a fit of stage 2"
-            raise SettingsError("a gain gives torques, not speeds", self.identified.source, hint)
+            raise SettingsError(
+                "a gain gives torques, not speeds", self.identified.source, hint
+            )
         if self._weighing is None:
-            self._weighing = Weighing(self._spec, settings.arm, self._candidate, self._start)
+            self._weighing = Weighing(
+                self._spec, settings.arm, self._candidate, self._start
+            )
         ranges = np.array([settings.arm.lower, settings.arm.upper]).T
-        return SteadyArm(self._weighing, self._plugin, self._chain.joints, ranges, settings.quasi_static)
+        return SteadyArm(
+            self._weighing,
+            self._plugin,
+            self._chain.joints,
+            ranges,
+            settings.quasi_static,
+        )
 
     def state(self) -> PlantState:
-        """Return where the plant stands, oil, valves and commands on their way included."""
+        """Return where the plant stands, oil, valves and commands on their way
+        included."""
         size = mujoco.mj_stateSize(self.model, PHYSICS)
         physics = np.empty(size)
         mujoco.mj_getState(self.model, self.data, physics, PHYSICS)
-        commands, armature = self._course.commands.copy(), self.model.dof_armature.copy()
+        commands, armature = (
+            self._course.commands.copy(),
+            self.model.dof_armature.copy(),
+        )
         mass = self._mass.copy()
         return PlantState(
-            self._start.copy(), self._taken, self._state.copy(), commands, physics, mass, armature
+            self._start.copy(),
+            self._taken,
+            self._state.copy(),
+            commands,
+            physics,
+            mass,
+            armature,
         )
 
     def restore(self, state: PlantState) -> Array:
-        """Go back to where the plant, or another one of its model, stood; it then steps to the same bits.
+        """Go back to where the plant, or another one of its model, stood; it then steps
+        to the same bits.
 
         Returns:
             The joint angles [rad], shape (J,).
@@ -321,17 +393,21 @@ class Plant:
         return self.angle
 
     def save(self, folder: str | Path) -> None:
-        """Write the plant, without payload, to a folder that `load_plant` reads; `export` to `model/` there.
+        """Write the plant, without payload, to a folder that `load_plant` reads;
+        `export` to `model/` there.
 
         Raises:
             RunError: the folder cannot be written.
         """
         write_settings(Path(folder), self.identified.settings)
-        write_estimate(Path(folder), self.identified.summarise().changed({"joints": self.joints}))
+        write_estimate(
+            Path(folder), self.identified.summarise().changed({"joints": self.joints})
+        )
         self.export(Path(folder) / "model")
 
     def export(self, folder: Path) -> None:
-        """Write the arm for other programs to `model/` of a saved plant or a run folder, beside `arm.xml`.
+        """Write the arm for other programs to `model/` of a saved plant or a run
+        folder, beside `arm.xml`.
 
         `README.txt` there says what the files are good for.
 
@@ -340,40 +416,60 @@ class Plant:
         """
         model, candidate = copy(self.model), self._candidate
         model.dof_damping[:] = self._values["dof_damping"][0]
-        model.dof_armature[:] = self._locked.model.dof_armature  # a rollout steps with another
+        # a rollout steps with another
+        model.dof_armature[:] = self._locked.model.dof_armature
         spec = read_mjcf(folder / "arm.xml")  # with the meshes' names there
         motors = np.array([self._gain, self._balance])[:, self._chain.pushed]
         actuators = Plain()
         if self._chain.joints.size:
-            hydraulic = {name: q for name, q in QUANTITIES.items() if name not in MECHANICAL}
+            hydraulic = {
+                name: q for name, q in QUANTITIES.items() if name not in MECHANICAL
+            }
             actuators["units"] = {name: q.unit for name, q in hydraulic.items()}
-            for joint, values in zip(self._named, candidate.joints[0, self._active], strict=True):
-                actuators[joint] = {name: float(values[name] / q.factor) for name, q in hydraulic.items()}
+            for joint, values in zip(
+                self._named, candidate.joints[0, self._active], strict=True
+            ):
+                actuators[joint] = {
+                    name: float(values[name] / q.factor)
+                    for name, q in hydraulic.items()
+                }
         fitted = locked_spec(spec, self._locked, model, motors)
         write_fitted(folder, fitted, ", ".join(self._named), actuators)
 
-    def _of_joints(self, values: ArrayLike | Mapping[str, float], what: str, unit: str) -> Array:
-        """Return values by joint, shape (J,), given so or by name; 0 of joints that take no commands."""
+    def _of_joints(
+        self, values: ArrayLike | Mapping[str, float], what: str, unit: str
+    ) -> Array:
+        """Return values by joint, shape (J,), given so or by name; 0 of joints that
+        take no commands."""
         if isinstance(values, Mapping):
             if stray := values.keys() - set(self.names):
-                raise ValueError(f"no joint {', '.join(stray)}; the arm has {', '.join(self.names)}")
+                raise ValueError(
+                    f"no joint {', '.join(stray)}; the arm has {', '.join(self.names)}"
+                )
             values = [values.get(name, 0.0) for name in self.names]
         given = np.asarray(values, float)
         if given.shape != self._active.shape or not np.isfinite(given).all():
-            raise ValueError(f"a {what} needs {len(self._active)} finite numbers [{unit}], not {values}")
+            raise ValueError(
+                f"a {what} needs {len(self._active)} finite numbers [{unit}], not {values}"
+            )
         if given[~self._active].any():
-            raise ValueError(f"only {', '.join(self._named)} take commands: name the others in joints=")
+            raise ValueError(
+                f"only {', '.join(self._named)} take commands: name the others in joints="
+            )
         return given
 
     def _posed(self, pose: str | ArrayLike | None) -> Array:
-        """Return the angles of a pose [rad], shape (J,), by its name or its angles; None: of where it is."""
+        """Return the angles of a pose [rad], shape (J,), by its name or its angles;
+        None: of where it is."""
         if pose is None:
             return self.angle
         if isinstance(pose, str):
             return self.identified.settings.arm.pose(pose)
         angle = np.array(pose, float)
         if angle.shape != self._active.shape or not np.isfinite(angle).all():
-            raise SettingsError(f"a pose needs {len(self._active)} finite angles [rad]", f"{pose}")
+            raise SettingsError(
+                f"a pose needs {len(self._active)} finite angles [rad]", f"{pose}"
+            )
         return angle
 
     def _lock(self, pose: Array) -> None:
@@ -385,9 +481,16 @@ class Plant:
         self._values = model_values(locked, candidate)
         self._gain = candidate.joints.gain[0, self._columns]
         moving = np.arange(len(self._columns))
-        pushed, substeps = moving[: 0 if settings.stage == "hyd" else None], settings.substeps
-        self._chain = chain = Chain(settings.arm, locked, self._active, substeps, pushed)
+        pushed, substeps = (
+            moving[: 0 if settings.stage == "hyd" else None],
+            settings.substeps,
+        )
+        self._chain = chain = Chain(
+            settings.arm, locked, self._active, substeps, pushed
+        )
         rollout = roll_quasi_static if settings.quasi_static else roll
         self._arm = SteppedArm(model, chain.columns, self._steps, rollout)
         self.model, self.data = self._arm.model, self._arm.data
-        self._record = Record(np.empty((1, len(moving))), np.empty((0, len(chain.columns)), JOINT_STATE))
+        self._record = Record(
+            np.empty((1, len(moving))), np.empty((0, len(chain.columns)), JOINT_STATE)
+        )

@@ -1,4 +1,5 @@
-"""The settled speeds of an arm in any pose, and the commands for wished ones, with what keeps them away."""
+"""The settled speeds of an arm in any pose, and the commands for wished ones, with what
+keeps them away."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -40,7 +41,8 @@ class SteadyCommands:
     Attributes:
         command: [%], shape (J,).
         speed: what the joints then have [rad/s], of those that slide [m/s], shape (J,).
-        limits: why it is not the wish, by the joint's name; the speed is then the nearest.
+        limits: why it is not the wish, by the joint's name; the speed is then the
+            nearest.
     """
 
     command: Array
@@ -54,13 +56,19 @@ class Weighing:
     `slack` are the angles at which its springs are slack [rad], shape (J,).
     """
 
-    def __init__(self, spec: mujoco.MjSpec, arm: Arm, candidate: Candidates, slack: Array) -> None:
+    def __init__(
+        self, spec: mujoco.MjSpec, arm: Arm, candidate: Candidates, slack: Array
+    ) -> None:
         whole = lock(spec, arm, np.ones(len(slack), dtype=bool), slack)
         whole.model.qpos_spring[:] = slack
-        self._values, self._arm = model_values(whole, candidate), SteppedArm(whole.model)
+        self._values, self._arm = (
+            model_values(whole, candidate),
+            SteppedArm(whole.model),
+        )
 
     def loads(self, pose: Array) -> Array:
-        """Return the torques [N·m] that hold the joints at angles [rad], both of shape (S, J)."""
+        """Return the torques [N·m] that hold the joints at angles [rad], both of shape
+        (S, J)."""
         with quiet_mujoco():
             rows = [self._arm.start(self._values, [0], angle) for angle in pose]
         return np.array(rows).reshape(pose.shape)
@@ -85,31 +93,47 @@ class SteadyArm:
     quasi_static: bool
 
     def speeds(self, command: Array, pose: Array) -> Array:
-        """Return settled speeds [rad/s] under commands [%] at angles [rad], all of shape (S, J)."""
+        """Return settled speeds [rad/s] under commands [%] at angles [rad], all of
+        shape (S, J)."""
         load = self.weighing.loads(pose)
         at = pose[:, self.columns], load[:, self.columns], command[:, self.columns]
-        return self._spread(settled_speeds(self.plugin, *at, quasi_static=self.quasi_static))
+        return self._spread(
+            settled_speeds(self.plugin, *at, quasi_static=self.quasi_static)
+        )
 
-    def commands(self, speed: Array, pose: Array, load: Array | None = None) -> tuple[Array, Array]:
-        """Return commands [%] for wished speeds [rad/s], and the speeds they have, all of shape (S, J).
+    def commands(
+        self, speed: Array, pose: Array, load: Array | None = None
+    ) -> tuple[Array, Array]:
+        """Return commands [%] for wished speeds [rad/s], and the speeds they have, all
+        of shape (S, J).
 
-        A joint at an end of its range moves no further. `load` is that of `weighing`, where it is known.
+        A joint at an end of its range moves no further. `load` is that of `weighing`,
+        where it is known.
         """
         held = self.weighing.loads(pose) if load is None else load
         wished = np.where(self.stopped(speed, pose), 0.0, speed)
         at = pose[:, self.columns], held[:, self.columns], wished[:, self.columns]
-        command, reached = settled_commands(self.plugin, *at, quasi_static=self.quasi_static)
+        command, reached = settled_commands(
+            self.plugin, *at, quasi_static=self.quasi_static
+        )
         return self._spread(command), self._spread(reached)
 
     def stopped(self, speed: Array, pose: Array) -> Mask:
-        """Return where joints at an end of their range should move beyond it, (S, J)."""
+        """Return where joints at an end of their range should move beyond it, (S,
+        J)."""
         low, high = self.ranges.T
         return ((speed < 0.0) & (pose <= low)) | ((speed > 0.0) & (pose >= high))
 
-    def limits(self, speed: Array, reached: Array, command: Array, pose: Array) -> list[dict[int, Limit]]:
-        """Return why joints (0-based) do not have their wished speeds, for each of S poses."""
+    def limits(
+        self, speed: Array, reached: Array, command: Array, pose: Array
+    ) -> list[dict[int, Limit]]:
+        """Return why joints (0-based) do not have their wished speeds, for each of S
+        poses."""
         away = np.abs(reached - speed) > np.maximum(CLOSE * np.abs(speed), LEAST_SPEED)
-        away &= np.isin(np.arange(len(self.ranges)), self.columns[self.plugin.order[self.plugin.idle :]])
+        away &= np.isin(
+            np.arange(len(self.ranges)),
+            self.columns[self.plugin.order[self.plugin.idle :]],
+        )
         stopped = self.stopped(speed, pose)
         found = [dict[int, Limit]() for _ in speed]
         rows = np.flatnonzero(away.any(axis=1))
@@ -129,10 +153,13 @@ class SteadyArm:
         return found
 
     def _with_endless_pump(self, speed: Array, pose: Array) -> Array:
-        """Return the speeds that joints would reach if the pump had no limit [rad/s], (S, J)."""
+        """Return the speeds that joints would reach if the pump had no limit [rad/s],
+        (S, J)."""
         endless = self.plugin.coefficients.copy()
         endless["pump_flow"] = np.inf
-        return replace(self, plugin=self.plugin._replace(coefficients=endless)).commands(speed, pose)[1]
+        return replace(
+            self, plugin=self.plugin._replace(coefficients=endless)
+        ).commands(speed, pose)[1]
 
     def _spread(self, values: Array) -> Array:
         """Spread values of the V joints over all, 0 of the others."""

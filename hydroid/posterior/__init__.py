@@ -1,1 +1,2 @@
-"""What the logs say about an estimate: errors and their likelihood, covariance, quantities, bands."""
+"""What the logs say about an estimate: errors and their likelihood, covariance,
+quantities, bands."""

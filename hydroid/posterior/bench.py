@@ -1,7 +1,9 @@
-"""One joint on the test bench: weighed in a pose, moved steadily there, and driven from it with a step.
+"""One joint on the test bench: weighed in a pose, moved steadily there, and driven from
+it with a step.
 
-All other joints are locked. Speeds are in the direction of the command. Events between two samples are
-interpolated, so that everything is smooth in the parameters, and differences give its derivatives.
+All other joints are locked. Speeds are in the direction of the command. Events between
+two samples are interpolated, so that everything is smooth in the parameters, and
+differences give its derivatives.
 """
 
 from collections.abc import Sequence
@@ -23,16 +25,17 @@ from hydroid.simulation.scenario import Scenario
 from hydroid.simulation.steady import NEAR, steady_velocity
 
 ONSET, RISEN = 0.1, 1.0 - np.exp(-1.0)
-"""parts of the steady speed: it takes the dead time to reach the first, and from there the time constant to
-reach the second"""
+"""parts of the steady speed: it takes the dead time to reach the first, and from there
+the time constant to reach the second"""
 
 
 @record
 class Bench:
     """A joint, numbered from 1, whose quantities are wanted.
 
-    `angle`: at which it is tested [rad]; `period` between samples [s]; `scenario`: the joint alone; `only`:
-    size of the commands in positive and in negative direction [%], None where they have several.
+    `angle`: at which it is tested [rad]; `period` between samples [s]; `scenario`: the
+    joint alone; `only`: size of the commands in positive and in negative direction [%],
+    None where they have several.
     """
 
     settings: FitSettings
@@ -43,7 +46,8 @@ class Bench:
     only: tuple[float | None, float | None] = (None, None)
 
     def tells(self, command: float) -> bool:
-        """Return whether the logs tell what a command [%] does: all but between on and off."""
+        """Return whether the logs tell what a command [%] does: all but between on and
+        off."""
         only = self.only[0 if command > 0 else 1]
         return only is None or abs(abs(command) - only) <= ONE_SIZE
 
@@ -63,12 +67,20 @@ class Bench:
     def sense(self) -> float:
         """Direction in which a positive command turns the joint, 1 or -1."""
         actuator = self.settings.arm.joints[self.joint - 1].actuator
-        return np.sign(actuator.moment_arm(self.angle)) if isinstance(actuator, LinearActuator) else 1.0
+        return (
+            np.sign(actuator.moment_arm(self.angle))
+            if isinstance(actuator, LinearActuator)
+            else 1.0
+        )
 
     def weigh(self, candidates: Candidates) -> tuple[Array, Array]:
-        """Return gravity's torque [N·m] and the joint's inertia [kg·m²] at its angle, shape (n,) each."""
+        """Return gravity's torque [N·m] and the joint's inertia [kg·m²] at its angle,
+        shape (n,) each."""
         torque, inertia = np.empty((2, len(candidates)))
-        arm, values = SteppedArm(self.scenario.arm.model), self.scenario.values(candidates)
+        arm, values = (
+            SteppedArm(self.scenario.arm.model),
+            self.scenario.values(candidates),
+        )
         with quiet_mujoco():
             for row in range(len(candidates)):
                 arm.start(values, [row], np.array([self.angle]))
@@ -76,12 +88,16 @@ class Bench:
         return torque, inertia
 
     def loads(self, candidates: Candidates) -> Array:
-        """Return what holds the joint at its angle and NEAR before and behind it [N·m], shape (n, 3).
+        """Return what holds the joint at its angle and NEAR before and behind it [N·m],
+        shape (n, 3).
 
         Springs are slack where the first log starts.
         """
         load = np.empty((len(candidates), 3))
-        arm, values = SteppedArm(self.scenario.arm.model), self.scenario.values(candidates)
+        arm, values = (
+            SteppedArm(self.scenario.arm.model),
+            self.scenario.values(candidates),
+        )
         with quiet_mujoco():
             for row in range(len(candidates)):
                 for place in range(3):
@@ -90,13 +106,17 @@ class Bench:
         return load
 
     def steady(self, candidates: Candidates, commands: Array, loads: Array) -> Array:
-        """Return the joint's speeds at its angle under m commands [%] that are held, (n, m), unit per s.
+        """Return the joint's speeds at its angle under m commands [%] that are held,
+        (n, m), unit per s.
 
-        They are those of `hydroid.simulation.steady`, positive where its angle grows. `loads` are its.
+        They are those of `hydroid.simulation.steady`, positive where its angle grows.
+        `loads` are its.
         """
         joint: Records = candidates.joints[:, self.joint - 1]  # pyright: ignore[reportAssignmentType]
         quasi_static = self.settings.quasi_static
-        return self.unit[0] * steady_velocity(joint, self.angle, loads, commands, quasi_static=quasi_static)
+        return self.unit[0] * steady_velocity(
+            joint, self.angle, loads, commands, quasi_static=quasi_static
+        )
 
     def movement(self, command: float, seconds: float = 1.2) -> "Movement":
         """Return the movement from the joint's angle under a command [%]."""
@@ -122,8 +142,8 @@ class Movement:
     def angles(self, candidates: Candidates) -> Array:
         """Return the angles of n candidates from rest, shape (n, 1 + samples) [rad].
 
-        They are the joint's as its sensor reads them, late but to scale. Springs are slack where the first
-        log starts.
+        They are the joint's as its sensor reads them, late but to scale. Springs are
+        slack where the first log starts.
         """
         settings, to_scale = self.bench.settings, candidates.joints.copy()
         to_scale["sensor_scale"] = 1.0
@@ -142,24 +162,33 @@ class Movement:
         return factor * np.diff(angles, axis=1)
 
     def reaches(self, speeds: Array, level: Array) -> Array:
-        """Return when speeds, shape (n, samples), first reach a level, shape (n,) [s]; NaN where never."""
+        """Return when speeds, shape (n, samples), first reach a level, shape (n,) [s];
+        NaN where never."""
         over, row = speeds >= level[:, None], np.arange(len(speeds))
         k, from_rest = over.argmax(axis=1), np.pad(speeds, ((0, 0), (1, 0)))
-        times = np.append(0.0, np.arange(self.samples) + 0.5)  # a speed is that between two samples
+        # a speed is that between two samples
+        times = np.append(0.0, np.arange(self.samples) + 0.5)
         before, after = from_rest[row, k], from_rest[row, k + 1]
         with np.errstate(all="ignore"):
-            time = times[k] + (times[k + 1] - times[k]) * (level - before) / (after - before)
+            time = times[k] + (times[k + 1] - times[k]) * (level - before) / (
+                after - before
+            )
         return np.where(over.any(axis=1), self.bench.period * time, np.nan)
 
 
 def make_bench(settings: FitSettings, logs: Sequence[Log], joint: int) -> Bench:
-    """Return a joint at the middle of its logged travel; the other joints are as the first log starts."""
+    """Return a joint at the middle of its logged travel; the other joints are as the
+    first log starts."""
     arm, pose, period = settings.arm, logs[0].start, logs[0].period
     shown = [log for log in logs if log.measured[joint - 1]] or logs
     angles = np.concatenate([log.posed[:, joint - 1] for log in shown])
     middle = (angles.min() + angles.max()) / 2  # then as words say it
     slides = arm.joints[joint - 1].slides
-    middle = np.round(1e3 * middle) / 1e3 if slides else np.radians(np.round(np.degrees(middle)))
+    middle = (
+        np.round(1e3 * middle) / 1e3
+        if slides
+        else np.radians(np.round(np.degrees(middle)))
+    )
     command, still = np.zeros((2, len(pose))), np.tile(pose, (2, 1))
     rest = Log("a test movement", np.array([0.0, period]), command, still, period)
     alone = settings.simulation.changed({"other_joints": "locked"})
@@ -169,9 +198,11 @@ def make_bench(settings: FitSettings, logs: Sequence[Log], joint: int) -> Bench:
 
 
 def actuator(bench: Bench, candidates: Candidates) -> tuple[Records, Array, Array]:
-    """Return n candidates' COEFFICIENTS of the joint, and travel and moment arm [m] at its angle, (n,) each.
+    """Return n candidates' COEFFICIENTS of the joint, and travel and moment arm [m] at
+    its angle, (n,) each.
 
-    Of a rotary actuator, whose areas are displacements, the travel is the angle and the moment arm is 1.
+    Of a rotary actuator, whose areas are displacements, the travel is the angle and the
+    moment arm is 1.
     """
     j = bench.joint - 1
     joints: Records = candidates.joints[:, [j]]  # pyright: ignore[reportAssignmentType]

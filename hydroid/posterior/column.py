@@ -1,5 +1,5 @@
-"""A quantity of a joint before its interval is known: its name, its words, and its value for
-candidates.
+"""A quantity of a joint before its interval is known: its name, its words, and its
+value for candidates.
 """
 
 from collections.abc import Iterator
@@ -11,9 +11,9 @@ from hydroid.arrays import Array
 class Column(NamedTuple):
     """One quantity of a joint, or one point of one of its curves.
 
-    name: plain ASCII. label: the same in words. positive: it cannot be negative, and its interval
-    is multiplicative. at: where the point of a curve is, `along` what; the points of a curve share
-    their name.
+    name: plain ASCII. label: the same in words. positive: it cannot be negative, and
+    its interval is multiplicative. at: where the point of a curve is, `along` what; the
+    points of a curve share their name.
     """
 
     name: str

@@ -1,10 +1,10 @@
-"""Curves of a joint, point by point: its valve's opening, its answer to a step, its frequency
-response.
+"""Curves of a joint, point by point: its valve's opening, its answer to a step, its
+frequency response.
 
-The frequency response is that of the step: the Fourier transform of the derivative of the speed,
-over the command. A linear joint has no other. That of a hydraulic one depends on the size of the
-command, which the curve's label says. It is taken from the start of the step alone: further on the
-joint has left its pose.
+The frequency response is that of the step: the Fourier transform of the derivative of
+the speed, over the command. A linear joint has no other. That of a hydraulic one
+depends on the size of the command, which the curve's label says. It is taken from the
+start of the step alone: further on the joint has left its pose.
 """
 
 from collections.abc import Callable
@@ -26,12 +26,13 @@ FREQUENCY_POINTS = 24
 LEAST_PERIODS = 4.0
 """samples in a period of the highest frequency"""
 DENSE = 400
-"""frequencies between which a phase is followed: a late joint turns it by several circles"""
+"""frequencies between which a phase is followed: a late joint turns it by several
+circles"""
 MARGIN = 0.02
 """part of a joint's range before its ends where a step response stops to be one"""
 LEAST_START, TIME_CONSTANTS = 1.0, 5.0
-"""how long the start of a step lasts at least [s], and how many time constants after the dead
-time"""
+"""how long the start of a step lasts at least [s], and how many time constants after
+the dead time"""
 LOWEST = 0.2
 """the lowest frequency [Hz]: below it the speed follows the command"""
 
@@ -40,7 +41,8 @@ StepCurves = Callable[[Array], Measured]
 
 
 def opening_curve(bench: Bench, candidates: Candidates, sign: float) -> Measured:
-    """The opening of the pump edge against commands of a sign that are held [mm²], without leakage.
+    """The opening of the pump edge against commands of a sign that are held [mm²],
+    without leakage.
 
     Commands that are on or off in the logs tell of no others.
     """
@@ -57,12 +59,17 @@ def opening_curve(bench: Bench, candidates: Candidates, sign: float) -> Measured
         # the law of the compiled loops, candidate by candidate: it branches
         areas = [opened(one, float(way)) for one, way in zip(side, travel, strict=True)]
         area = 1e6 * np.array(areas, dtype=float)
-        yield Column("opening", "opening of the valve", "mm²", False, sign * command), area
+        yield (
+            Column("opening", "opening of the valve", "mm²", False, sign * command),
+            area,
+        )
 
 
-def step_curves(step: Movement, estimate: Candidates, ending: str, word: str) -> StepCurves:
-    """Return what makes the curves of a step from the speeds of candidates, up to an end of the
-    range.
+def step_curves(
+    step: Movement, estimate: Candidates, ending: str, word: str
+) -> StepCurves:
+    """Return what makes the curves of a step from the speeds of candidates, up to an
+    end of the range.
 
     `ending` and `word` name the direction, as in the other quantities.
     """
@@ -82,29 +89,41 @@ def step_curves(step: Movement, estimate: Candidates, ending: str, word: str) ->
         for k in points.tolist():
             label = f"speed after a step to {size}"
             at = (k + 0.5) * bench.period  # a speed is that between two samples
-            yield Column(f"step_{ending}", label, unit, False, at, "time [s]"), speeds[:, k]
-        amplitude, phase = frequency_response(speeds[:, :start], frequencies, bench.period)
+            yield (
+                Column(f"step_{ending}", label, unit, False, at, "time [s]"),
+                speeds[:, k],
+            )
+        amplitude, phase = frequency_response(
+            speeds[:, :start], frequencies, bench.period
+        )
         label = f"speed over command after a step to {size}"
         along = "frequency [Hz]"
         for i, at in enumerate(frequencies.tolist()):
             gain = amplitude[:, i] / abs(step.command)
-            yield Column(f"amplitude_{ending}", label, f"{unit} per %", True, at, along), gain
+            yield (
+                Column(f"amplitude_{ending}", label, f"{unit} per %", True, at, along),
+                gain,
+            )
         for i, at in enumerate(frequencies.tolist()):
             yield Column(f"phase_{ending}", label, "deg", False, at, along), phase[:, i]
 
     return curves
 
 
-def frequency_response(speeds: Array, frequencies: Array, period: float) -> tuple[Array, Array]:
+def frequency_response(
+    speeds: Array, frequencies: Array, period: float
+) -> tuple[Array, Array]:
     """Return amplitude and phase [deg] over a unit step, (n, F), from speeds after it,
     (n, samples).
 
-    A speed is the mean between two samples, `period` [s] apart; after the last one it is taken to
-    stay. The mean and the difference each damp a frequency by a sinc, which is divided out again.
+    A speed is the mean between two samples, `period` [s] apart; after the last one it
+    is taken to stay. The mean and the difference each damp a frequency by a sinc, which
+    is divided out again.
     """
     impulse = np.diff(speeds, axis=1, prepend=0.0)
     time = period * np.arange(speeds.shape[1])
-    dense = np.geomspace(frequencies[0] / 100.0, frequencies[-1], DENSE)  # from next to 0, where it is 0
+    # from next to 0, where it is 0
+    dense = np.geomspace(frequencies[0] / 100.0, frequencies[-1], DENSE)
     every = np.unique(np.concatenate([dense, frequencies]))
     response = impulse @ np.exp(-2j * np.pi * np.outer(time, every))
     wanted = np.searchsorted(every, frequencies)
@@ -114,8 +133,8 @@ def frequency_response(speeds: Array, frequencies: Array, period: float) -> tupl
 
 
 def _before_the_end(bench: Bench, angles: Array) -> int:
-    """Return how many of the angles after a step, (samples,), come before an end of the joint's
-    range.
+    """Return how many of the angles after a step, (samples,), come before an end of the
+    joint's range.
     """
     lower, upper = [*bench.settings.arm.ranges.values()][bench.joint - 1]
     margin = MARGIN * (upper - lower) if np.isfinite(upper - lower) else 0.0
@@ -124,7 +143,8 @@ def _before_the_end(bench: Bench, angles: Array) -> int:
 
 
 def _start(step: Movement, speeds: Array) -> int:
-    """Return how many samples of a step, speeds of shape (1, samples), are its start."""
+    """Return how many samples of a step, speeds of shape (1, samples), are its
+    start."""
     highest = speeds.max(axis=1)
     onset, risen = (step.reaches(speeds, part * highest)[0] for part in (ONSET, RISEN))
     seconds = onset + TIME_CONSTANTS * (risen - onset)

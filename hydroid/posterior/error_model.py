@@ -1,35 +1,39 @@
-"""The error of a model: sensor's noise, errors that last for a moment, and a drift that grows with the way.
+"""The error of a model: sensor's noise, errors that last for a moment, and a drift that
+grows with the way.
 
-A joint on a valve integrates. A command that changes between two samples, oil that warms, a spool that
-sticks: each moves all that follows in a log by a little. So what a model leaves of a measured signal y is not
-white noise but
+A joint on a valve integrates. A command that changes between two samples, oil that
+warms, a spool that sticks: each moves all that follows in a log by a little. So what a
+model leaves of a measured signal y is not white noise but
 
     y_k = ŷ_k(θ) + d_k + c_k + v_k,      Var v = σ²,
     d_{k+1} = d_k + w_k,                 Var w_k = (rate) h + (way) |Δy_k|,
     c_{k+1} = ρ c_k + n_k,               Var c = (lasting), ρ = exp(-h / (time)).
 
-The drift d is the local-level model (A. C. Harvey, *Forecasting, Structural Time Series Models and the Kalman
-Filter*, 1989); it begins as uncertain as the start angle. The lasting error c is what a model that is not
-quite right does besides, such as an arm that rings where the model does not: without it the drift would have
-to follow it, and nothing slow would count. Both are 0 where the joint stands at a stop. The five numbers are
-those of a joint's angle, or of a chamber's pressure, in all logs. They follow from the residual by maximum
-likelihood.
+The drift d is the local-level model (A. C. Harvey, *Forecasting, Structural Time Series
+Models and the Kalman Filter*, 1989); it begins as uncertain as the start angle. The
+lasting error c is what a model that is not quite right does besides, such as an arm
+that rings where the model does not: without it the drift would have to follow it, and
+nothing slow would count. Both are 0 where the joint stands at a stop. The five numbers
+are those of a joint's angle, or of a chamber's pressure, in all logs. They follow from
+the residual by maximum likelihood.
 
-A Kalman filter turns the residual into *innovations*: what the past of the log does not foretell of each
-sample (L. Ljung, *System Identification*, 1999, chapters 3, 7 and 14). Divided by their standard deviation
-they are white with variance 1. The filter's gains depend on the measured way, not on θ: the filter is a
-linear map of the residual.
+A Kalman filter turns the residual into *innovations*: what the past of the log does not
+foretell of each sample (L. Ljung, *System Identification*, 1999, chapters 3, 7 and 14).
+Divided by their standard deviation they are white with variance 1. The filter's gains
+depend on the measured way, not on θ: the filter is a linear map of the residual.
 
-Least squares does not take the innovations of this model, though: maximum likelihood does so where the model
-is right, and is misled where it errs. What a model does wrong for a moment (a start that is late and a stop
-that is late as well) returns; a filter that forgets within a tenth of a second takes it for drift, fits how
-the joint moves from one sample to the next, and lets it end degrees away. So a second, simpler model weighs
-the errors (`ErrorModel.weighing`): noise, and a drift that is followed within `MEMORY` at the fastest. Its
-noise is as large as makes least squares as certain as it may be by the errors as they are; so priors count
-rightly. Covariances, bands and findings are those of the errors as they are.
+Least squares does not take the innovations of this model, though: maximum likelihood
+does so where the model is right, and is misled where it errs. What a model does wrong
+for a moment (a start that is late and a stop that is late as well) returns; a filter
+that forgets within a tenth of a second takes it for drift, fits how the joint moves
+from one sample to the next, and lets it end degrees away. So a second, simpler model
+weighs the errors (`ErrorModel.weighing`): noise, and a drift that is followed within
+`MEMORY` at the fastest. Its noise is as large as makes least squares as certain as it
+may be by the errors as they are; so priors count rightly. Covariances, bands and
+findings are those of the errors as they are.
 
-Stage 1 puts a gain in place of the hydraulics, and the article fits it by output errors: there the memory is
-endless.
+Stage 1 puts a gain in place of the hydraulics, and the article fits it by output
+errors: there the memory is endless.
 """
 
 from collections.abc import Sequence
@@ -48,17 +52,20 @@ from hydroid.problem.channels import Channel
 from hydroid.problem.problem import Problem
 
 NUMBERS = ("sensor", "rate", "way", "lasting", "time")
-"""of an error: variance of the sensor's noise [rad²], growth of the drift's variance with time [rad²/s] and
-with the way [rad²/rad], variance of the lasting error [rad²], and its time constant [s]; pressures in Pa"""
+"""of an error: variance of the sensor's noise [rad²], growth of the drift's variance
+with time [rad²/s] and with the way [rad²/rad], variance of the lasting error [rad²],
+and its time constant [s]; pressures in Pa"""
 LEAST_NOISE = {"angle": np.deg2rad(0.01), "pressure_a": 1e4, "pressure_b": 1e4}
-"""smallest standard deviation of a sensor's noise that a residual can show [rad, Pa]: no potentiometer or
-gauge is better (ours)"""
+"""smallest standard deviation of a sensor's noise that a residual can show [rad, Pa]:
+no potentiometer or gauge is better (ours)"""
 SHORTEST, LONGEST = 0.05, 30.0
-"""time constants of a lasting error [s]: what is shorter is noise, and what is longer is drift (ours)"""
+"""time constants of a lasting error [s]: what is shorter is noise, and what is longer
+is drift (ours)"""
 NONE = 1e-12
 """growth of a drift, as a part of the residual's mean square, that counts as none"""
 MEMORY = 5.0
-"""time within which least squares takes a lasting error for drift, at the fastest [s] (docs/measured.md)"""
+"""time within which least squares takes a lasting error for drift, at the fastest [s]
+(docs/measured.md)"""
 WAY_OVER = 0.25
 """time over which a way is measured [s]: the sensor's noise is no way"""
 AT_STOP = 0.002
@@ -66,7 +73,8 @@ AT_STOP = 0.002
 
 
 class Signal(NamedTuple):
-    """What an error model describes: the angle or a pressure of a joint (number, from 1), in all logs."""
+    """What an error model describes: the angle or a pressure of a joint (number, from
+    1), in all logs."""
 
     joint: int
     quantity: str
@@ -74,7 +82,8 @@ class Signal(NamedTuple):
 
 @record
 class Course:
-    """One channel's times as its error sees them: the same for all parameters of the model.
+    """One channel's times as its error sees them: the same for all parameters of the
+    model.
 
     Attributes:
         rows: of the channel in a row of all channels' residuals.
@@ -84,7 +93,8 @@ class Course:
         moved: the measured signal less its first value [rad], shape (T,).
         stops: whether the joint stands at an end of its range, shape (T,).
         readings: of which the start angle is the mean; inf where it is taken for exact.
-        used: samples that count, shape (T,); of the others nothing is taken to be measured.
+        used: samples that count, shape (T,); of the others nothing is taken to be
+            measured.
     """
 
     rows: slice
@@ -110,18 +120,22 @@ def make_course(channel: Channel, log: Log, problem: Problem) -> Course:
     way = travelled(channel.measured, log.period)
     used = np.ones(len(way), dtype=bool) if log.recorded is None else log.recorded
     moved = channel.measured - channel.measured[0]
-    return Course(channel.rows, channel.weight, log.period, way, moved, stops, readings, used)
+    return Course(
+        channel.rows, channel.weight, log.period, way, moved, stops, readings, used
+    )
 
 
 def travelled(signal: Array, period: float) -> Array:
-    """Return the way of a signal, (T,), from each sample to the next, without the noise of single samples."""
+    """Return the way of a signal, (T,), from each sample to the next, without the noise
+    of single samples."""
     half = max(round(0.5 * WAY_OVER / period), 1)
     padded = np.pad(signal, half, mode="edge")
     return np.abs(padded[2 * half :] - padded[: -2 * half]) / (2 * half)
 
 
 def at_stops(angle: Array, ends: tuple[float, float], period: float) -> Mask:
-    """Return where angles [rad], (T,), rest at an end of a joint's range, which may be infinite.
+    """Return where angles [rad], (T,), rest at an end of a joint's range, which may be
+    infinite.
 
     A joint that turns back at once has not been at its stop.
     """
@@ -131,7 +145,9 @@ def at_stops(angle: Array, ends: tuple[float, float], period: float) -> Mask:
         return np.zeros(len(angle), dtype=bool)
     there = (angle < lower + margin) | (angle > upper - margin)
     window = 2 * max(round(0.5 * WAY_OVER / period), 1) + 1
-    return binary_erosion(there, np.ones(window, dtype=bool), border_value=1).astype(np.bool_)
+    return binary_erosion(there, np.ones(window, dtype=bool), border_value=1).astype(
+        np.bool_
+    )
 
 
 @record
@@ -143,7 +159,8 @@ class ErrorModel:
         numbers: NUMBERS of each, shape (S, 5).
         courses: of each channel.
         of: the index of each channel's signal.
-        given: variance of the sensor's noise that the settings give, shape (S,); NaN: none.
+        given: variance of the sensor's noise that the settings give, shape (S,); NaN:
+            none.
     """
 
     signals: tuple[Signal, ...]
@@ -159,7 +176,8 @@ class ErrorModel:
         return [make_filter(course, self.numbers[i]) for course, i in pairs]
 
     def innovations(self, errors: Array) -> Array:
-        """Return the innovations [1] of weighted output errors, (n, R): 0 where a sample does not count."""
+        """Return the innovations [1] of weighted output errors, (n, R): 0 where a
+        sample does not count."""
         result = np.empty(errors.shape)
         for course, one in zip(self.courses, self._filters, strict=True):
             part = np.ascontiguousarray(errors[:, course.rows]) / course.weight
@@ -183,19 +201,24 @@ class ErrorModel:
         return np.concatenate([course.used for course in self.courses])
 
     def without(self, samples: Mask) -> "ErrorModel":
-        """Return the model of the same errors if some samples, (R,), had not been measured."""
-        courses = [replace(one, used=one.used & ~samples[one.rows]) for one in self.courses]
+        """Return the model of the same errors if some samples, (R,), had not been
+        measured."""
+        courses = [
+            replace(one, used=one.used & ~samples[one.rows]) for one in self.courses
+        ]
         return replace(self, courses=tuple(courses))
 
     @cached_property
     def log_scale(self) -> Array:
-        """Logarithm of each sample's density at an innovation of 0, shape (R,); 0 where it does not count."""
+        """Logarithm of each sample's density at an innovation of 0, shape (R,); 0 where
+        it does not count."""
         scales = np.concatenate([one.scale for one in self._filters])
         scales[~self.used] = 1.0
         return np.where(self.used, np.log(scales) - 0.5 * np.log(2 * np.pi), 0.0)
 
     def log_density(self, innovations: Array) -> Array:
-        """Return the logarithm of each sample's predictive density, from a row of innovations, shape (R,)."""
+        """Return the logarithm of each sample's predictive density, from a row of
+        innovations, shape (R,)."""
         return self.log_scale - 0.5 * innovations**2
 
     def log_likelihood(self, errors: Array) -> float:
@@ -203,7 +226,8 @@ class ErrorModel:
         return float(self.log_density(self.innovations(errors[None])[0]).sum())
 
     def estimated(self, errors: Array) -> "ErrorModel":
-        """Return the error model whose numbers make weighted output errors, (R,), most likely."""
+        """Return the error model whose numbers make weighted output errors, (R,), most
+        likely."""
         numbers = self.numbers.copy()
         for i, signal in enumerate(self.signals):
             pairs = [(c, errors[c.rows] / c.weight) for c in self.courses_of(i)]
@@ -212,15 +236,17 @@ class ErrorModel:
         return replace(self, numbers=numbers)
 
     def weighing(self, memory: float, *, alike: bool) -> "ErrorModel":
-        """Return the model by which least squares weighs output errors that are as here.
+        """Return the model by which least squares weighs output errors that are as
+        here.
 
-        It has noise, and a drift that is followed within `memory` [s] or more slowly: inf takes all of the
-        error for noise. Errors that last tell less than as many independent ones. So the noise is as large as
-        makes a change of a joint's speed, whose effect is along its own motion, as uncertain as it is by the
-        errors as they are.
+        It has noise, and a drift that is followed within `memory` [s] or more slowly:
+        inf takes all of the error for noise. Errors that last tell less than as many
+        independent ones. So the noise is as large as makes a change of a joint's speed,
+        whose effect is along its own motion, as uncertain as it is by the errors as
+        they are.
 
-        alike: weighted errors of all signals are equally large, so that weights count; else each signal's
-        are as large as they are.
+        alike: weighted errors of all signals are equally large, so that weights count;
+        else each signal's are as large as they are.
         """
         signals = range(len(self.signals))
         numbers = np.array([self._unit(i, memory) for i in signals])
@@ -234,14 +260,17 @@ class ErrorModel:
         return replace(self, numbers=numbers)
 
     def _unit(self, i: int, memory: float) -> Array:
-        """NUMBERS of signal i by which least squares weighs, for noise of variance 1, shape (5,)."""
+        """NUMBERS of signal i by which least squares weighs, for noise of variance 1,
+        shape (5,)."""
         sensor, rate, way, lasting, time = self.numbers[i].tolist()
         courses = self.courses_of(i)
         samples = sum(int(course.used.sum()) for course in courses)
         seconds = sum(course.period * len(course.used) for course in courses)
         between = seconds / max(samples, 1)
         noise = sensor * between
-        growth = rate + way * sum(float(course.way.sum()) for course in courses) / seconds
+        growth = (
+            rate + way * sum(float(course.way.sum()) for course in courses) / seconds
+        )
         if time < MEMORY:
             noise += 2.0 * lasting * time
         else:  # it is as good as a drift
@@ -250,7 +279,8 @@ class ErrorModel:
         return np.array([1.0, between / max(own, memory) ** 2, 0.0, 0.0, SHORTEST])
 
     def _level(self, unit: "ErrorModel", i: int) -> float:
-        """Variance of signal i's errors summed along its motion, over that of white noise of 1."""
+        """Variance of signal i's errors summed along its motion, over that of white
+        noise of 1."""
         variance = 0.0
         white = 0.0
         for number, course in enumerate(self.courses):
@@ -264,17 +294,24 @@ class ErrorModel:
 
     def courses_of(self, i: int) -> list[Course]:
         """Return the courses of the channels of signal i."""
-        return [course for course, own in zip(self.courses, self.of, strict=True) if own == i]
+        return [
+            course
+            for course, own in zip(self.courses, self.of, strict=True)
+            if own == i
+        ]
 
     def scatter(self, channel: int, rows: Array, fitted: "ErrorModel") -> Array:
-        """Covariance of `rows` times a channel's innovations, shape (p, p), where its errors are as here.
+        """Covariance of `rows` times a channel's innovations, shape (p, p), where its
+        errors are as here.
 
-        The innovations are those by the model that was `fitted`; `rows`, (p, T), are of the channel.
+        The innovations are those by the model that was `fitted`; `rows`, (p, T), are of
+        the channel.
         """
         course, i = self.courses[channel], self.of[channel]
         own = make_filter(course, self.numbers[i])
         on_errors = _adjoint(np.ascontiguousarray(rows), *fitted._filters[channel])
-        # sensor's noise, the start, and steps of drift and lasting error: each reaches what comes after it
+        # sensor's noise, the start, and steps of drift and lasting error: each reaches
+        # what comes after it
         drift = _summed_ahead(on_errors, own.carry[0])
         lasting = _summed_ahead(on_errors, own.carry[1])
         free = np.where(course.stops[1:], 0.0, 1.0)
@@ -287,15 +324,23 @@ class ErrorModel:
         return sum((part @ part.T for part in parts), np.zeros((len(rows), len(rows))))
 
     def drift(self, course: Course, i: int) -> Array:
-        """Return the variance of signal i's drift and lasting error from the start of a course on, (T,)."""
+        """Return the variance of signal i's drift and lasting error from the start of a
+        course on, (T,)."""
         own = make_filter(course, self.numbers[i])
         start = float(self.numbers[i, 0]) / course.readings
-        return _variances(start, own.step[0], own.carry[0]) + _variances(0.0, own.step[1], own.carry[1])
+        return _variances(start, own.step[0], own.carry[0]) + _variances(
+            0.0, own.step[1], own.carry[1]
+        )
 
 
 def make_error_model(problem: Problem) -> ErrorModel:
-    """Return an error model of a problem without drift, whose numbers are still to be estimated."""
-    channels, logs, objective = problem.channels, problem.logs, problem.settings.objective
+    """Return an error model of a problem without drift, whose numbers are still to be
+    estimated."""
+    channels, logs, objective = (
+        problem.channels,
+        problem.logs,
+        problem.settings.objective,
+    )
     of_channel = [Signal(channel.joint, channel.quantity) for channel in channels]
     signals = tuple(dict.fromkeys(of_channel))
     numbers = np.zeros((len(signals), len(NUMBERS)))
@@ -306,7 +351,9 @@ def make_error_model(problem: Problem) -> ErrorModel:
             given[i] = np.deg2rad(noise) ** 2
         numbers[i, 0] = np.nan_to_num(given[i], nan=LEAST_NOISE[signal.quantity] ** 2)
         numbers[i, 4] = SHORTEST
-    courses = tuple(make_course(channel, logs[channel.log], problem) for channel in channels)
+    courses = tuple(
+        make_course(channel, logs[channel.log], problem) for channel in channels
+    )
     of = tuple(map(signals.index, of_channel))
     return ErrorModel(signals, numbers, courses, of, given)
 
@@ -318,8 +365,9 @@ class Likelihood:
     Attributes:
         problem: whose output errors these are.
         shown: the model of these errors, as they are.
-        memory: within which least squares takes an error for drift, at the fastest [s]; inf in stage 1, which
-            is fitted by output errors as in the article, and on the way from afar.
+        memory: within which least squares takes an error for drift, at the fastest [s];
+            inf in stage 1, which is fitted by output errors as in the article, and on
+            the way from afar.
     """
 
     problem: Problem
@@ -333,7 +381,8 @@ class Likelihood:
         return self.shown.weighing(self.memory, alike=alike)
 
     def innovations(self, theta: Array) -> Array:
-        """Return innovations [1] of theta, shape (n, P): (n, R); NaN where a simulation diverged."""
+        """Return innovations [1] of theta, shape (n, P): (n, R); NaN where a simulation
+        diverged."""
         return self.errors.innovations(self.problem.output_errors(theta))
 
     def rows(self, theta: Array) -> Array:
@@ -341,23 +390,32 @@ class Likelihood:
         return np.hstack([self.innovations(theta), self.problem.priors.scores(theta)])
 
     def negative_log(self, rows: Array) -> float:
-        """Return the negative log-likelihood, but for a constant, of a row of `rows` with priors.
+        """Return the negative log-likelihood, but for a constant, of a row of `rows`
+        with priors.
 
-        It is that of errors as large as they are, whatever the numbers; so it tells starts apart that end
-        with different ones. Each sample counts as if it were independent.
+        It is that of errors as large as they are, whatever the numbers; so it tells
+        starts apart that end with different ones. Each sample counts as if it were
+        independent.
         """
         errors = self.errors
         squares = rows[: self.problem.measured.size] ** 2
         total = 0.5 * float(np.sum(rows[squares.size :] ** 2))
         for i, signal in enumerate(errors.signals):
             courses = errors.courses_of(i)
-            shown = np.concatenate([squares[course.rows][course.used] for course in courses])
+            shown = np.concatenate(
+                [squares[course.rows][course.used] for course in courses]
+            )
             level = float(np.mean(shown)) * float(errors.numbers[i, 0])
-            total += 0.5 * shown.size * float(np.log(max(level, LEAST_NOISE[signal.quantity] ** 2)))
+            total += (
+                0.5
+                * shown.size
+                * float(np.log(max(level, LEAST_NOISE[signal.quantity] ** 2)))
+            )
         return total
 
     def estimated(self, errors: Array) -> "Likelihood":
-        """Return the likelihood for what weighted output errors, (R,), show of their model."""
+        """Return the likelihood for what weighted output errors, (R,), show of their
+        model."""
         return replace(self, shown=self.shown.estimated(errors))
 
 
@@ -367,8 +425,11 @@ def make_likelihood(problem: Problem) -> Likelihood:
     return Likelihood(problem, make_error_model(problem), memory)
 
 
-def likelihood_at(problem: Problem, theta: Array, numbers: Array | None = None) -> Likelihood:
-    """Return the likelihood of a problem with the errors that it shows at theta, shape (P,).
+def likelihood_at(
+    problem: Problem, theta: Array, numbers: Array | None = None
+) -> Likelihood:
+    """Return the likelihood of a problem with the errors that it shows at theta, shape
+    (P,).
 
     With `numbers`, (S, 5), it shows these.
     """
@@ -381,9 +442,10 @@ def likelihood_at(problem: Problem, theta: Array, numbers: Array | None = None) 
 class Filter(NamedTuple):
     """A Kalman filter of one channel: arrays over its T samples.
 
-    gain: of drift and lasting error, shape (2, T). carry: part of each that reaches the next sample, (2, T).
-    scale: 1 over the standard deviation of the innovation, (T,); 0 where a sample does not count.
-    step: variance of what is added to each before the next sample, (2, T).
+    gain: of drift and lasting error, shape (2, T). carry: part of each that reaches the
+    next sample, (2, T). scale: 1 over the standard deviation of the innovation, (T,); 0
+    where a sample does not count. step: variance of what is added to each before the
+    next sample, (2, T).
     """
 
     gain: Array
@@ -401,7 +463,8 @@ def make_filter(course: Course, numbers: Array) -> Filter:
 
 
 def _model(course: Course, numbers: Array) -> tuple[Array, Array]:
-    """Return carry and step of drift and lasting error: both end where the joint stands at a stop then."""
+    """Return carry and step of drift and lasting error: both end where the joint stands
+    at a stop then."""
     _, rate, way, lasting, time = numbers.tolist()
     samples = len(course.way)
     kept = np.exp(-course.period / time)
@@ -414,14 +477,19 @@ def _model(course: Course, numbers: Array) -> tuple[Array, Array]:
     return carry, step
 
 
-def _most_likely(pairs: Sequence[tuple[Course, Array]], least: float, given: float) -> Array:
-    """Return the most likely NUMBERS of one signal's errors, each of shape (T,), with their courses.
+def _most_likely(
+    pairs: Sequence[tuple[Course, Array]], least: float, given: float
+) -> Array:
+    """Return the most likely NUMBERS of one signal's errors, each of shape (T,), with
+    their courses.
 
-    `least` is the smallest variance of the sensor's noise; where it is `given`, it is that (NaN: it is not).
-    The search is over logarithms. It starts from a guess that is mostly noise, and from one that is mostly
-    drift.
+    `least` is the smallest variance of the sensor's noise; where it is `given`, it is
+    that (NaN: it is not). The search is over logarithms. It starts from a guess that is
+    mostly noise, and from one that is mostly drift.
     """
-    square = float(np.mean(np.concatenate([error[course.used] for course, error in pairs]) ** 2))
+    square = float(
+        np.mean(np.concatenate([error[course.used] for course, error in pairs]) ** 2)
+    )
     square = max(square, least)
     seconds = sum(course.period * len(error) for course, error in pairs) / len(pairs)
     way = max(sum(float(course.way.sum()) for course, _ in pairs) / len(pairs), 1e-3)
@@ -433,7 +501,9 @@ def _most_likely(pairs: Sequence[tuple[Course, Array]], least: float, given: flo
 
     def cost(logarithms: Array) -> float:
         values = np.exp(logarithms)
-        return sum(_negative_log_likelihood(course, error, values) for course, error in pairs)
+        return sum(
+            _negative_log_likelihood(course, error, values) for course, error in pairs
+        )
 
     steady = np.array([0.5, 0.1 / seconds, 0.1 / way, 0.1, 0.0]) * square
     drifting = np.array([1e-3, 10 / seconds, 10 / way, 1e-2, 0.0]) * square
@@ -442,7 +512,9 @@ def _most_likely(pairs: Sequence[tuple[Course, Array]], least: float, given: flo
     ended = list[OptimizeResult]()
     for start in (steady, drifting):
         begin = np.clip(np.log(np.maximum(start, 1e-300)), *bounds.T)
-        ended.append(minimize(cost, begin, method="L-BFGS-B", bounds=bounds, options=options))
+        ended.append(
+            minimize(cost, begin, method="L-BFGS-B", bounds=bounds, options=options)
+        )
     return np.exp(min(ended, key=lambda one: one.fun).x)
 
 
@@ -453,18 +525,24 @@ def _negative_log_likelihood(course: Course, error: Array, numbers: Array) -> fl
 
 
 def whitened(rows: Array, period: float, sensor: float, rate: float) -> Array:
-    """Return innovations of rows [rad], (n, T), for a sensor's variance and a drift that grows with time."""
+    """Return innovations of rows [rad], (n, T), for a sensor's variance and a drift
+    that grows with time."""
     samples = rows.shape[1]
     everywhere = np.ones(samples, dtype=np.bool_)
     still = np.zeros(samples)
-    course = Course(slice(0), 1.0, period, still, still, ~everywhere, np.inf, everywhere)
+    course = Course(
+        slice(0), 1.0, period, still, still, ~everywhere, np.inf, everywhere
+    )
     numbers = np.array([sensor, rate, 0.0, 0.0, SHORTEST])
     return _innovations(np.ascontiguousarray(rows), *make_filter(course, numbers))
 
 
 @njit(cache=True)
-def _gains(used: Mask, sensor: float, start: float, step: Array, carry: Array) -> tuple[Array, Array]:
-    """Kalman gains, (2, T), and 1 over the standard deviation of the innovations, (T,); 0 if not used."""
+def _gains(
+    used: Mask, sensor: float, start: float, step: Array, carry: Array
+) -> tuple[Array, Array]:
+    """Kalman gains, (2, T), and 1 over the standard deviation of the innovations, (T,);
+    0 if not used."""
     samples = len(used)
     gain = np.zeros((2, samples))
     scale = np.zeros(samples)
@@ -492,7 +570,9 @@ def _gains(used: Mask, sensor: float, start: float, step: Array, carry: Array) -
 
 
 @njit(cache=True)
-def _innovations(errors: Array, gain: Array, carry: Array, scale: Array, step: Array) -> Array:
+def _innovations(
+    errors: Array, gain: Array, carry: Array, scale: Array, step: Array
+) -> Array:
     """Innovations over their standard deviation, (n, T), of errors, (n, T)."""
     result = np.empty_like(errors)
     for i in range(len(errors)):
@@ -506,8 +586,11 @@ def _innovations(errors: Array, gain: Array, carry: Array, scale: Array, step: A
 
 
 @njit(cache=True)
-def _adjoint(rows: Array, gain: Array, carry: Array, scale: Array, step: Array) -> Array:
-    """Rows that give the same products with errors as `rows`, (p, T), with their innovations."""
+def _adjoint(
+    rows: Array, gain: Array, carry: Array, scale: Array, step: Array
+) -> Array:
+    """Rows that give the same products with errors as `rows`, (p, T), with their
+    innovations."""
     result = np.empty_like(rows)
     for i in range(len(rows)):
         drift, lasting = 0.0, 0.0
@@ -521,7 +604,9 @@ def _adjoint(rows: Array, gain: Array, carry: Array, scale: Array, step: Array) 
 
 
 @njit(cache=True)
-def _errors(innovations: Array, gain: Array, carry: Array, scale: Array, step: Array) -> Array:
+def _errors(
+    innovations: Array, gain: Array, carry: Array, scale: Array, step: Array
+) -> Array:
     """The errors, (n, T), that leave these innovations, (n, T)."""
     result = np.empty_like(innovations)
     for i in range(len(innovations)):
@@ -535,7 +620,9 @@ def _errors(innovations: Array, gain: Array, carry: Array, scale: Array, step: A
 
 
 @njit(cache=True)
-def _cost(error: Array, used: Mask, sensor: float, start: float, step: Array, carry: Array) -> float:
+def _cost(
+    error: Array, used: Mask, sensor: float, start: float, step: Array, carry: Array
+) -> float:
     """Negative log-likelihood of an error, (T,), but for a constant."""
     drift, lasting, both = start, 0.0, 0.0
     drifted, lasted, cost = 0.0, 0.0, 0.0
@@ -577,7 +664,8 @@ def _variances(start: float, step: Array, carry: Array) -> Array:
 
 @njit(cache=True)
 def _summed_ahead(rows: Array, carry: Array) -> Array:
-    """What an error of 1 at each sample adds to products with rows, (p, T): sums of all that it reaches."""
+    """What an error of 1 at each sample adds to products with rows, (p, T): sums of all
+    that it reaches."""
     result = np.empty_like(rows)
     for i in range(len(rows)):
         total = 0.0

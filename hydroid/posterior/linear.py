@@ -1,4 +1,5 @@
-"""Least squares linearised at an estimate, by finite differences as wide as the uncertainty."""
+"""Least squares linearised at an estimate, by finite differences as wide as the
+uncertainty."""
 
 from dataclasses import replace
 from functools import cached_property
@@ -19,15 +20,18 @@ NO_EFFECT_BELOW = 1e-6
 
 @record
 class Linear:
-    """Derivatives at an estimate by relative changes of the p parameters that vary, of P.
+    """Derivatives at an estimate by relative changes of the p parameters that vary, of
+    P.
 
-    Innovations, the M priors' scores and the weak priors of the p parameters stand in one row; its
-    derivatives are J = V D U. All have a variance of 1.
+    Innovations, the M priors' scores and the weak priors of the p parameters stand in
+    one row; its derivatives are J = V D U. All have a variance of 1.
 
     Attributes:
-        box: the estimate, its bounds, what a relative change of 1 is, and which parameters vary.
+        box: the estimate, its bounds, what a relative change of 1 is, and which
+            parameters vary.
         innovations: shape (R,).
-        slopes: their derivatives, shape (p, R); 0 without effect, and where they diverge.
+        slopes: their derivatives, shape (p, R); 0 without effect, and where they
+            diverge.
         prior_slopes: derivatives of the priors' scores, shape (p, M).
         diverging: parameters whose simulations diverge on both sides, shape (p,).
     """
@@ -51,7 +55,8 @@ class Linear:
 
     @property
     def changes(self) -> Array:
-        """Relative change of each parameter per unit of each effect, V D^-1, shape (p, p)."""
+        """Relative change of each parameter per unit of each effect, V D^-1, shape (p,
+        p)."""
         return self._svd[0] / self._svd[1]
 
     @property
@@ -67,23 +72,30 @@ class Linear:
 
     def of(self, kept: Mask) -> "Linear":
         """Return it with only some of the p parameters varying, shape (p,)."""
-        rows = {name: getattr(self, name)[kept] for name in ("slopes", "prior_slopes", "diverging")}
+        rows = {
+            name: getattr(self, name)[kept]
+            for name in ("slopes", "prior_slopes", "diverging")
+        }
         return replace(self, box=self.box.of(kept), **rows)
 
     def spread(self, values: Array) -> Array:
-        """Return values of the parameters that vary, shape (p,), among all, shape (P,); NaN elsewhere."""
+        """Return values of the parameters that vary, shape (p,), among all, shape (P,);
+        NaN elsewhere."""
         whole = np.full(self.box.at.size, np.nan)
         whole[self.box.varied] = values
         return whole
 
 
-def linearised(likelihood: Likelihood, theta: Array, first: Array | None = None) -> Linear:
+def linearised(
+    likelihood: Likelihood, theta: Array, first: Array | None = None
+) -> Linear:
     """Return the derivatives at theta, shape (P,), by its p free parameters.
 
-    The first differences are by each parameter, p simulations. Then come differences of a standard deviation
-    to each side along the axes of the covariance that follows, 2 p or more. They are taken once more where a
-    standard deviation changed to four times or a quarter: the first axes were that far off. `first` are
-    derivatives to begin with, shape (p, R), such as those of the least squares that ended there.
+    The first differences are by each parameter, p simulations. Then come differences of
+    a standard deviation to each side along the axes of the covariance that follows, 2 p
+    or more. They are taken once more where a standard deviation changed to four times
+    or a quarter: the first axes were that far off. `first` are derivatives to begin
+    with, shape (p, R), such as those of the least squares that ended there.
     """
     problem = likelihood.problem
     box = estimate_box(problem.parameters, theta)
@@ -100,7 +112,9 @@ def linearised(likelihood: Likelihood, theta: Array, first: Array | None = None)
     now = Linear(box, here, slopes, prior_slopes(problem.priors, box), diverging)
     for _ in range(2):
         white = now.white
-        slopes = differentiate(likelihood.innovations, box, white.axes(step=1.0), here, now.slopes)
+        slopes = differentiate(
+            likelihood.innovations, box, white.axes(step=1.0), here, now.slopes
+        )
         now = replace(now, slopes=slopes)
         before = white.deviations
         after = now.white.deviations
@@ -115,27 +129,34 @@ def linearised(likelihood: Likelihood, theta: Array, first: Array | None = None)
 
 
 def estimate_box(parameters: ParameterSet, theta: Array) -> Box:
-    """Return theta, (P,), between its bounds, with the scale of relative changes; the free ones vary.
+    """Return theta, (P,), between its bounds, with the scale of relative changes; the
+    free ones vary.
 
-    A relative change of 1 is the value; on a linear scale at least a hundredth of the bounds' width, of an
-    effect of a group its prior's standard deviation.
-    Raises SettingsError: a free parameter on a log scale is 0.
+    A relative change of 1 is the value; on a linear scale at least a hundredth of the
+    bounds' width, of an effect of a group its prior's standard deviation. Raises
+    SettingsError: a free parameter on a log scale is 0.
     """
     least = np.where(parameters.log, 0.0, 0.01 * (parameters.upper - parameters.lower))
-    scale = np.maximum(np.maximum(np.abs(theta), least), [p.least for p in parameters.parameters])
+    scale = np.maximum(
+        np.maximum(np.abs(theta), least), [p.least for p in parameters.parameters]
+    )
     for name in parameters.named(parameters.free & (scale == 0)):
         raise SettingsError(
-            f"parameter {name} is 0", hint="it is on a log scale: state a value above 0, or fix it"
+            f"parameter {name} is 0",
+            hint="it is on a log scale: state a value above 0, or fix it",
         )
     return Box(theta, parameters.lower, parameters.upper, scale, parameters.free)
 
 
 def prior_slopes(priors: Priors, box: Box) -> Array:
-    """Derivatives of the M priors' scores, shape (p, M), per relative change of each free parameter."""
-    return differentiate(priors.weighed_at(box.at), box, single_axes(box, 1e-4))  # they are smooth
+    """Derivatives of the M priors' scores, shape (p, M), per relative change of each
+    free parameter."""
+    # they are smooth
+    return differentiate(priors.weighed_at(box.at), box, single_axes(box, 1e-4))
 
 
 def white_posterior(box: Box, *parts: Array) -> Posterior:
-    """Return the posterior of independent measurements, each (p, m): derivatives over their noise."""
+    """Return the posterior of independent measurements, each (p, m): derivatives over
+    their noise."""
     weak = np.eye(box.varied.sum()) / WEAK_PRIOR
     return Posterior(box, regular(np.vstack([weak, *(part.T for part in parts)])))

@@ -1,10 +1,13 @@
-"""What is known of the parameters: one Gaussian posterior, and what follows from it by the delta method.
+"""What is known of the parameters: one Gaussian posterior, and what follows from it by
+the delta method.
 
 It is about relative changes v of the parameters that vary, with C^-1 = G' G: a change is |G v| standard
-deviations long. A weak prior on every parameter (`WEAK_PRIOR`) makes G regular. A direction that nothing
-measures keeps the prior's standard deviation, which no result can be mistaken for.
+deviations long. A weak prior on every parameter (`WEAK_PRIOR`) makes G regular. A
+direction that nothing measures keeps the prior's standard deviation, which no result
+can be mistaken for.
 
-Let g be the derivatives of a quantity per relative change. To first order its variance is
+Let g be the derivatives of a quantity per relative change. To first order its variance
+is
 g' C g = |G^-T g|² (G. W. Oehlert, *A note on the delta method*, 1992).
 """
 
@@ -22,20 +25,25 @@ from hydroid.identified_model import IdentifiedModel
 from hydroid.parameters import ParameterSet
 from hydroid.search.axes import Axes, Box, covariance_axes, differentiate
 
-UNIDENTIFIABLE_ABOVE = 1.0  # relative standard deviation above which a linear interval means nothing
+# relative standard deviation above which a linear interval means nothing
+UNIDENTIFIABLE_ABOVE = 1.0
 COVERAGE = 0.95  # probability with which an interval covers the true value
 NORMAL = float(normal.ppf(0.5 + COVERAGE / 2))
 """half the interval of a normal estimate of known variance, in standard deviations"""
-WEAK_PRIOR = 10.0  # relative standard deviation of every parameter before any log and any stated prior (ours)
-STEP = 0.1  # step of the differences in standard deviations: wide enough for the small jumps that events make
+# relative standard deviation of every parameter before any log and any stated prior
+# (ours)
+WEAK_PRIOR = 10.0
+# step of the differences in standard deviations: wide enough for the small jumps that
+# events make
+STEP = 0.1
 
 
 @record
 class Known:
     """Some quantities at an estimate, shape (m,), NaN where one does not exist.
 
-    `sd` is infinite where not determined, NaN where unknown; `interval` is of 95 %, (m, 2); no parameter
-    changes those that are `given`.
+    `sd` is infinite where not determined, NaN where unknown; `interval` is of 95 %, (m,
+    2); no parameter changes those that are `given`.
     """
 
     value: Array
@@ -48,7 +56,8 @@ class Known:
 class Posterior:
     """What is known of p parameters that vary together at an estimate.
 
-    `root` is G, upper triangular and regular, (p, p); `quantile` half a 95 % interval in standard deviations.
+    `root` is G, upper triangular and regular, (p, p); `quantile` half a 95 % interval
+    in standard deviations.
     """
 
     box: Box
@@ -67,28 +76,34 @@ class Posterior:
         return np.sqrt(np.diag(self.covariance))
 
     def parts(self, slopes: Array) -> Array:
-        """What each of p independent directions does to quantities, (p, m), from derivatives, (p, m).
+        """What each of p independent directions does to quantities, (p, m), from
+        derivatives, (p, m).
 
         The sum of their squares is the variance.
         """
         return solve_triangular(self.root.T, slopes, lower=True)
 
     def sd(self, slopes: Array) -> Array:
-        """Standard deviations of quantities, shape (m,), from derivatives per relative change, (p, m)."""
+        """Standard deviations of quantities, shape (m,), from derivatives per relative
+        change, (p, m)."""
         return np.linalg.norm(self.parts(slopes), axis=0)
 
     def add(self, rows: Array) -> "Posterior":
-        """Return it with information rows' rows, (k, p): derivatives per relative change over their sd."""
+        """Return it with information rows' rows, (k, p): derivatives per relative
+        change over their sd."""
         return replace(self, root=regular(np.vstack([self.root, rows])))
 
     def axes(self, step: float) -> Axes:
-        """Return steps of so many standard deviations along the axes of the covariance."""
+        """Return steps of so many standard deviations along the axes of the
+        covariance."""
         return covariance_axes(self.box, self.root, step)
 
     def of(self, chosen: Mask) -> "Posterior":
-        """Return what is known of some of the parameters, shape (P,), whatever the others are."""
+        """Return what is known of some of the parameters, shape (P,), whatever the
+        others are."""
         inside = chosen[self.box.varied]
-        # with the others first, the last block of the triangle is the root of what is left (Schur complement)
+        # with the others first, the last block of the triangle is the root of what is
+        # left (Schur complement)
         triangle = regular(self.root[:, np.argsort(inside, kind="stable")])
         others = np.sum(~inside)
         return replace(self, box=self.box.of(inside), root=triangle[others:, others:])
@@ -99,13 +114,15 @@ class Posterior:
         positive: Mask | bool,
         concerned: Mask | None = None,
     ) -> Known:
-        """Return the quantities that a function of the parameters, (n, P) -> (n, m), gives at the estimate.
+        """Return the quantities that a function of the parameters, (n, P) -> (n, m),
+        gives at the estimate.
 
-        It is called with the estimate, and with all points of the differences at once. The interval of a
-        `positive` quantity, (m,), is multiplicative. A quantity is not determined where parameters known to
-        100 % each would determine it as well, or where the standard deviation of a positive one exceeds the
-        value: a first-order interval then means nothing. `concerned` are parameters on which any can depend,
-        shape (P,); None: all.
+        It is called with the estimate, and with all points of the differences at once.
+        The interval of a `positive` quantity, (m,), is multiplicative. A quantity is
+        not determined where parameters known to 100 % each would determine it as well,
+        or where the standard deviation of a positive one exceeds the value: a
+        first-order interval then means nothing. `concerned` are parameters on which any
+        can depend, shape (P,); None: all.
         """
         concerned = np.ones_like(self.box.varied) if concerned is None else concerned
         own, inside = self.of(concerned), concerned[self.box.varied]
@@ -117,11 +134,14 @@ class Posterior:
         sd = np.where(finite, self.sd(np.where(finite, slopes, 0.0)), np.nan)
         logarithmic = positive & (value > 0)
         lost = sd > UNIDENTIFIABLE_ABOVE * np.linalg.norm(slopes, axis=0)
-        lost |= logarithmic & (self.quantile * sd > UNIDENTIFIABLE_ABOVE * NORMAL * value)
+        lost |= logarithmic & (
+            self.quantile * sd > UNIDENTIFIABLE_ABOVE * NORMAL * value
+        )
         sd[lost] = np.inf
         ends = interval(value, self.quantile * sd, logarithmic)
         ends[lost & positive, 0] = 0.0
-        # a relative change by less than a thousandth of a parameter's: the settings give it
+        # a relative change by less than a thousandth of a parameter's: the settings
+        # give it
         return Known(value, sd, ends, np.all(abs(slopes) <= 1e-3 * abs(value), axis=0))
 
     def stored(self, parameters: ParameterSet) -> Covariance:
@@ -136,7 +156,8 @@ class Posterior:
 
 
 def interval(value: Array, half: Array, multiplicative: Mask) -> Array:
-    """Return ends, (m, 2), value ± half, or value times and over exp(half / value), from shapes (m,)."""
+    """Return ends, (m, 2), value ± half, or value times and over exp(half / value),
+    from shapes (m,)."""
     with np.errstate(all="ignore"):
         factor = np.exp(np.where(multiplicative, half / value, 0.0))
     change = np.where(multiplicative, 0.0, half)
@@ -144,13 +165,15 @@ def interval(value: Array, half: Array, multiplicative: Mask) -> Array:
 
 
 def regular(rows: Array) -> Array:
-    """Return the upper triangle G, (p, p), of G' G = rows' rows, from rows of full rank, shape (k, p)."""
+    """Return the upper triangle G, (p, p), of G' G = rows' rows, from rows of full
+    rank, shape (k, p)."""
     triangle = np.asarray(np.linalg.qr(rows, mode="r"), dtype=float)
     return triangle * np.where(np.diag(triangle) < 0, -1.0, 1.0)[:, None]
 
 
 def stored_posterior(model: IdentifiedModel) -> Posterior | None:
-    """Return the posterior that a fit kept; None where there is none for these parameters.
+    """Return the posterior that a fit kept; None where there is none for these
+    parameters.
 
     Those that the settings no longer free, or whose values changed, are not the fit's.
     """
@@ -159,7 +182,9 @@ def stored_posterior(model: IdentifiedModel) -> Posterior | None:
         return None
     known, fitted = summary.covariance, summary.estimate
     free = {*parameters.named(parameters.free)}
-    if any(name not in fitted or model.values[name] != fitted[name].value for name in free):
+    if any(
+        name not in fitted or model.values[name] != fitted[name].value for name in free
+    ):
         return None
     held = {name for name in free if fitted[name].at_bound}
     if not free - held <= set(known.parameters) <= free:

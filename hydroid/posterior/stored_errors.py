@@ -1,4 +1,5 @@
-"""The error model that a fit has stored, on logs: that of `estimate.yaml`, without the fit."""
+"""The error model that a fit has stored, on logs: that of `estimate.yaml`, without the
+fit."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -8,9 +9,11 @@ from hydroid.posterior.error_model import ErrorModel, make_error_model
 from hydroid.problem.problem import Problem
 
 
-def stored_error_model(problem: Problem, stored: Mapping[str, AngleError]) -> ErrorModel:
-    """Return the error model of a problem's logs with the numbers stored of each angle, such as
-    `q2`.
+def stored_error_model(
+    problem: Problem, stored: Mapping[str, AngleError]
+) -> ErrorModel:
+    """Return the error model of a problem's logs with the numbers stored of each angle,
+    such as `q2`.
 
     Pressures keep those of a model that is still to be estimated.
     """

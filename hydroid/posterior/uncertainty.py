@@ -1,20 +1,23 @@
-"""Uncertainty of an estimate: its covariance, and the intervals and flags that follow from it.
+"""Uncertainty of an estimate: its covariance, and the intervals and flags that follow
+from it.
 
-The estimate minimises the sum of squares of innovations and of the priors' scores, all of variance 1. Let J,
-shape (p, R), be their derivatives per relative change of the free parameters, and S their covariance. The
-covariance of the estimate is
+The estimate minimises the sum of squares of innovations and of the priors' scores, all
+of variance 1. Let J, shape (p, R), be their derivatives per relative change of the free
+parameters, and S their covariance. The covariance of the estimate is
 
     C = (J J')^-1 J S J' (J J')^-1        (G. A. F. Seber and C. J. Wild, *Nonlinear Regression*, 1989),
 
-which is (J J')^-1 where S = 1: where least squares weighs the errors as they are. That of stage 1 does not:
-it minimises output errors, and S is what their drift makes of it. C is computed from one singular value
-decomposition J = V D U as C^-1 = G' G with G = L^-1 D V', L L' = U S U'. No product J J' is formed. The weak
-prior on every parameter (`WEAK_PRIOR`), one more row each, makes J regular.
+which is (J J')^-1 where S = 1: where least squares weighs the errors as they are. That
+of stage 1 does not: it minimises output errors, and S is what their drift makes of it.
+C is computed from one singular value decomposition J = V D U as C^-1 = G' G with G =
+L^-1 D V', L L' = U S U'. No product J J' is formed. The weak prior on every parameter
+(`WEAK_PRIOR`), one more row each, makes J regular.
 
-The covariance is a local, first-order approximation. It assumes that the model is right: a wrong model shifts
-the estimate by more than an interval says (`by_log`, `whiteness`). A parameter within a tenth of a standard
-deviation of a bound is held there, and has no interval; but one that the logs do not determine says nothing
-by lying there, and stays free.
+The covariance is a local, first-order approximation. It assumes that the model is
+right: a wrong model shifts the estimate by more than an interval says (`by_log`,
+`whiteness`). A parameter within a tenth of a standard deviation of a bound is held
+there, and has no interval; but one that the logs do not determine says nothing by lying
+there, and stays free.
 """
 
 import math
@@ -39,7 +42,9 @@ from hydroid.posterior.posterior import (
 from hydroid.problem.problem import Problem
 from hydroid.search.axes import Box, held_by_bound
 
-WEAK_ABOVE = 0.3  # relative standard deviation above which a parameter or direction is weakly identifiable
+# relative standard deviation above which a parameter or direction is weakly
+# identifiable
+WEAK_ABOVE = 0.3
 
 
 class Flag(StrEnum):
@@ -67,7 +72,8 @@ class ParameterStatus:
     Attributes:
         flag: what the logs alone determine.
         at_bound: the bound that it lies at.
-        share: part of the information that the logs gave: 1 - posterior / prior variance.
+        share: part of the information that the logs gave: 1 - posterior / prior
+            variance.
         known: whether logs and priors together determine it.
     """
 
@@ -78,17 +84,26 @@ class ParameterStatus:
 
     @property
     def source(self) -> Source | None:
-        """Where the information comes from; None where there is none, or the parameter is fixed."""
+        """Where the information comes from; None where there is none, or the parameter
+        is fixed."""
         if self.flag is Flag.FIXED or not self.known:
             return None
         # nine tenths of the information are the only source that is named
-        return Source.DATA if self.share > 0.9 else Source.BOTH if self.share >= 0.1 else Source.PRIOR
+        return (
+            Source.DATA
+            if self.share > 0.9
+            else Source.BOTH
+            if self.share >= 0.1
+            else Source.PRIOR
+        )
 
 
 def flag_of(relative_sd: float, share: float = 1.0) -> Flag:
-    """Return the flag of a relative standard deviation, of which the logs gave a share of the information.
+    """Return the flag of a relative standard deviation, of which the logs gave a share
+    of the information.
 
-    The logs alone leave a variance of the posterior's divided by their share. NaN counts as infinite.
+    The logs alone leave a variance of the posterior's divided by their share. NaN
+    counts as infinite.
     """
     alone = relative_sd / math.sqrt(share) if share > 0 else math.inf
     if not alone <= UNIDENTIFIABLE_ABOVE:
@@ -102,17 +117,18 @@ class Uncertainty:
 
     Attributes:
         likelihood: that the estimate maximises.
-        linear: least squares linearised there, in the parameters that vary: free ones, but for those held at
-            a bound.
+        linear: least squares linearised there, in the parameters that vary: free ones,
+            but for those held at a bound.
         errors: the model of the output errors, as they are.
         innovations: what it leaves of them, shape (R,).
         scatters: covariance of the effects by each channel's errors, shape (C, p, p).
-        sensitivity: rms change of the output error [rad] per 1 % of each parameter, shape (P,); NaN where
-            fixed or where simulations diverge.
+        sensitivity: rms change of the output error [rad] per 1 % of each parameter,
+            shape (P,); NaN where fixed or where simulations diverge.
         posterior: what is known of the parameters that vary.
-        relative: relative standard deviation of each parameter, shape (P,); inf where it is not
-            identifiable, NaN where it is fixed or held.
-        interval: of 95 %, shape (P, 2); infinite where not identifiable, NaN where fixed or at a bound.
+        relative: relative standard deviation of each parameter, shape (P,); inf where
+            it is not identifiable, NaN where it is fixed or held.
+        interval: of 95 %, shape (P, 2); infinite where not identifiable, NaN where
+            fixed or at a bound.
         status: of each parameter.
     """
 
@@ -133,7 +149,8 @@ class Uncertainty:
         return self.linear.box.at
 
     def variance(self, row: Array) -> float:
-        """Return the variance of the innovations that least squares takes, summed along a row, (R,)."""
+        """Return the variance of the innovations that least squares takes, summed along
+        a row, (R,)."""
         return float(_scatters(self.likelihood, self.errors, row[None]).sum())
 
     @property
@@ -143,19 +160,23 @@ class Uncertainty:
 
 
 def uncertainty(
-    problem: Problem, theta: Array, first: Array | None = None, numbers: Array | None = None
+    problem: Problem,
+    theta: Array,
+    first: Array | None = None,
+    numbers: Array | None = None,
 ) -> Uncertainty:
     """Return the uncertainty of theta, shape (P,) (`linearised`).
 
-    `numbers` of the errors, (S, 5), are those that least squares ended with; None: those that the errors
-    at theta show.
+    `numbers` of the errors, (S, 5), are those that least squares ended with; None:
+    those that the errors at theta show.
     """
     likelihood = likelihood_at(problem, theta, numbers)
     return uncertainty_from(likelihood, linearised(likelihood, theta, first))
 
 
 def uncertainty_from(likelihood: Likelihood, whole: Linear) -> Uncertainty:
-    """Return the uncertainty from derivatives by all free parameters, without simulations."""
+    """Return the uncertainty from derivatives by all free parameters, without
+    simulations."""
     problem, fitted = likelihood.problem, likelihood.errors
     free, room, white = whole.box.varied, whole.box.room, whole.white.deviations
     effects = 0.01 * rms(fitted.errors(whole.slopes), axis=1)
@@ -180,7 +201,9 @@ def uncertainty_from(likelihood: Likelihood, whole: Linear) -> Uncertainty:
     unknown = (known > UNIDENTIFIABLE_ABOVE) & ~(prior < 0.5 * WEAK_PRIOR)
     relative[unknown] = np.inf
     status = [ParameterStatus(Flag.FIXED)] * len(free)
-    for i, at_edge, (down, up) in zip(np.flatnonzero(free).tolist(), edge, room.T, strict=True):
+    for i, at_edge, (down, up) in zip(
+        np.flatnonzero(free).tolist(), edge, room.T, strict=True
+    ):
         flag = Flag.NO_EFFECT if sensitivity[i] == 0 else flag_of(known[i], shares[i])
         side = ("lower" if down <= up else "upper") if at_edge else None
         status[i] = ParameterStatus(flag, side, float(shares[i]), not unknown[i])
@@ -200,7 +223,8 @@ def uncertainty_from(likelihood: Likelihood, whole: Linear) -> Uncertainty:
 
 
 def _scatters(likelihood: Likelihood, errors: ErrorModel, rows: Array) -> Array:
-    """Covariance of rows, (n, R + ...), times the innovations, by each of C channels' errors, (C, n, n)."""
+    """Covariance of rows, (n, R + ...), times the innovations, by each of C channels'
+    errors, (C, n, n)."""
     parts = [
         errors.scatter(number, rows[:, channel.rows], likelihood.errors)
         for number, channel in enumerate(likelihood.problem.channels)
@@ -209,9 +233,11 @@ def _scatters(likelihood: Likelihood, errors: ErrorModel, rows: Array) -> Array:
 
 
 def ends(parameters: ParameterSet, box: Box, half: Array) -> Array:
-    """Return intervals, shape (P, 2), from half their widths in relative changes, shape (P,).
+    """Return intervals, shape (P, 2), from half their widths in relative changes, shape
+    (P,).
 
-    Those on a log scale are multiplicative. No end is below 0 where the parameter cannot be.
+    Those on a log scale are multiplicative. No end is below 0 where the parameter
+    cannot be.
     """
     between = interval(box.at, half * box.scale, parameters.log)
     low = between[:, 0]

@@ -1,16 +1,15 @@
-"""Whether innovations are white, and owe nothing to the command: else the model errs, not the
-sensor.
+"""Whether innovations are white, and owe nothing to the command: else the model errs,
+not the sensor.
 
-The error of a joint lasts until the autocorrelation of its innovations, over all logs, has fallen
-to 1/e of that between two samples, or below `FAINT`. Of a first-order process that is its time
-constant, however much white noise is added. It is said only where the innovations are not white (G.
-M. Ljung and G. E. P. Box, 1978), and clearly so: with thousands of samples the test alone finds
-what does not matter.
+The error of a joint lasts until the autocorrelation of its innovations, over all logs,
+has fallen to 1/e of that between two samples, or below `FAINT`. Of a first-order
+process that is its time constant, however much white noise is added. It is said only
+where the innovations are not white (G. M. Ljung and G. E. P. Box, 1978), and clearly
+so: with thousands of samples the test alone finds what does not matter.
 
-Innovations of a model that takes from a command all that is in it are not correlated with it at any
-lag (L. Ljung, *System Identification*, 1999, chapter 16). At negative lags only a controller would
-correlate
-them: there the command answers to the error.
+Innovations of a model that takes from a command all that is in it are not correlated
+with it at any lag (L. Ljung, *System Identification*, 1999, chapter 16). At negative
+lags only a controller would correlate them: there the command answers to the error.
 """
 
 from collections.abc import Sequence
@@ -26,8 +25,8 @@ from hydroid.posterior.posterior import NORMAL
 LONGEST = 5.0  # lag up to which innovations are compared [s]
 LEVEL = 0.01  # probability of the finding where innovations are white
 CLEAR = 0.05
-"""sum of the squares of the autocorrelations from which innovations are not white for any use of
-them"""
+"""sum of the squares of the autocorrelations from which innovations are not white for
+any use of them"""
 FAINT = 0.1  # autocorrelation that counts as none
 SHOWN = 3.0  # lag up to which the tests of a residual show correlations [s]
 
@@ -39,7 +38,8 @@ class ResidualTest:
     Attributes:
         lags: between two samples [s], from the first one on, shape (L,).
         autocorrelation: of the innovations at these lags, shape (L,).
-        command_lags: from a command to an innovation [s], negative ones too, shape (M,).
+        command_lags: from a command to an innovation [s], negative ones too, shape
+            (M,).
         with_command: correlation with the joint's own command at these, shape (M,).
         bound: within which 95 % of either lie if nothing is left.
     """
@@ -52,16 +52,19 @@ class ResidualTest:
 
     @property
     def outside(self) -> tuple[float, float]:
-        """Parts of the autocorrelations, and of the correlations with the command, beyond the
-        bound.
+        """Parts of the autocorrelations, and of the correlations with the command,
+        beyond the bound.
         """
         beyond = [
-            np.mean(np.abs(values) > self.bound) for values in (self.autocorrelation, self.with_command)
+            np.mean(np.abs(values) > self.bound)
+            for values in (self.autocorrelation, self.with_command)
         ]
         return float(beyond[0]), float(beyond[1])
 
 
-def residual_tests(errors: ErrorModel, innovations: Array, logs: Sequence[Log]) -> dict[int, ResidualTest]:
+def residual_tests(
+    errors: ErrorModel, innovations: Array, logs: Sequence[Log]
+) -> dict[int, ResidualTest]:
     """Return the tests of each joint's angle, by joint (from 1).
 
     `innovations` are a row of all the channels of the logs, shape (R,).
@@ -89,7 +92,8 @@ def residual_tests(errors: ErrorModel, innovations: Array, logs: Sequence[Log]) 
 
 
 def lasting(errors: ErrorModel, innovations: Array) -> dict[int, float]:
-    """Return for how long what is left of each joint's angle error lasts [s], by joint (from 1).
+    """Return for how long what is left of each joint's angle error lasts [s], by joint
+    (from 1).
 
     0: white.
 
@@ -104,7 +108,11 @@ def lasting(errors: ErrorModel, innovations: Array) -> dict[int, float]:
 
 def _courses(errors: ErrorModel, signal: int) -> list[Course]:
     """Return the courses of a signal, given by its index."""
-    return [course for course, own in zip(errors.courses, errors.of, strict=True) if own == signal]
+    return [
+        course
+        for course, own in zip(errors.courses, errors.of, strict=True)
+        if own == signal
+    ]
 
 
 def _lasting(courses: list[Course], innovations: Array) -> float:
@@ -137,20 +145,22 @@ def _lags(longest: float, period: float, logs: Sequence[Array]) -> int:
 
 
 def autocorrelation(logs: list[Array], lags: int) -> Array:
-    """Return the autocorrelation at lags 1 to `lags` of signals of mean zero, pooled, shape
-    (lags,).
+    """Return the autocorrelation at lags 1 to `lags` of signals of mean zero, pooled,
+    shape (lags,).
     """
     square = sum(float(log @ log) for log in logs)
-    products = [sum(float(log[lag:] @ log[:-lag]) for log in logs) for lag in range(1, lags + 1)]
+    products = [
+        sum(float(log[lag:] @ log[:-lag]) for log in logs) for lag in range(1, lags + 1)
+    ]
     return np.array(products) / max(square, np.finfo(float).tiny)
 
 
 def cross_correlation(logs: list[Array], causes: list[Array], lags: int) -> Array:
-    """Return the correlation of signals with causes `-lags` to `lags` samples before, shape (2 lags
-    + 1,).
+    """Return the correlation of signals with causes `-lags` to `lags` samples before,
+    shape (2 lags + 1,).
 
-    The signals have mean zero; each cause is taken without its mean, and all logs count together. 0
-    where a cause never changes.
+    The signals have mean zero; each cause is taken without its mean, and all logs count
+    together. 0 where a cause never changes.
     """
     products = np.zeros(2 * lags + 1)
     squares = np.zeros(2)

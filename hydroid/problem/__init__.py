@@ -1,1 +1,2 @@
-"""The estimation problem: parameters, channels, objectives and priors; candidates in, objectives out."""
+"""The estimation problem: parameters, channels, objectives and priors; candidates in,
+objectives out."""

@@ -1,4 +1,5 @@
-"""Where each parameter of a fit enters the model (article section 3, equations (15) and (16))."""
+"""Where each parameter of a fit enters the model (article section 3, equations (15) and
+(16))."""
 
 from collections.abc import Sequence
 
@@ -17,23 +18,31 @@ from hydroid.simulation import Candidates
 class Bindings:
     """Spreads a parameter vector over joints and links.
 
-    Each column of theta sets one quantity of some joints, or the mass of a link; with a group of logs it is
-    added to what is set otherwise, in these logs alone.
-    What the settings do not name has its nominal value: 0 for gains, dampers, springs and dry friction, else
-    what `hydraulics` and the arm's file say.
-    Raises SettingsError: a joint or link the arm lacks, or two parameters for the same thing.
+    Each column of theta sets one quantity of some joints, or the mass of a link; with a
+    group of logs it is added to what is set otherwise, in these logs alone. What the
+    settings do not name has its nominal value: 0 for gains, dampers, springs and dry
+    friction, else what `hydraulics` and the arm's file say. Raises SettingsError: a
+    joint or link the arm lacks, or two parameters for the same thing.
     """
 
     def __init__(self, settings: FitSettings) -> None:
-        self._arm, self._stage, self._group_of = settings.arm, settings.stage, settings.log.group_of
+        self._arm, self._stage, self._group_of = (
+            settings.arm,
+            settings.stage,
+            settings.log.group_of,
+        )
         self._nominal = nominal_joints(settings.arm, settings.hydraulics)
         rows = [
             (column, quantity, _places(settings.arm, name, p), p.per)
             for column, (name, p) in enumerate(settings.parameters.items())
             for quantity in TARGETS[p.quantity]
         ]
-        self._rows = sorted(rows, key=lambda row: row[-1] is not None)  # what is added comes last
-        names, taken = list(settings.parameters), dict[tuple[str, int, str | None], str]()
+        # what is added comes last
+        self._rows = sorted(rows, key=lambda row: row[-1] is not None)
+        names, taken = (
+            list(settings.parameters),
+            dict[tuple[str, int, str | None], str](),
+        )
         for column, quantity, places, group in self._rows:
             name = names[column]
             for place in places:
@@ -45,7 +54,8 @@ class Bindings:
                     )
 
     def candidates(self, theta: Array, log: str = "") -> Candidates:
-        """Spread theta, shape (n, P), over joints and links, in SI, as they are in a log of this name."""
+        """Spread theta, shape (n, P), over joints and links, in SI, as they are in a
+        log of this name."""
         own = self._group_of(log)
         joints: Records = np.tile(self._nominal, (len(theta), 1)).view(np.recarray)
         mass = np.tile(self._arm.masses, (len(theta), 1))
@@ -56,14 +66,22 @@ class Bindings:
                 target[:, places] = value * factor
             elif group == own:
                 least = QUANTITIES[quantity].lowest
-                target[:, places] = np.maximum(target[:, places] + value * factor, least * factor)
+                target[:, places] = np.maximum(
+                    target[:, places] + value * factor, least * factor
+                )
         return Candidates(joints, mass)
 
     def refuse_idle(self, driven: Mask, outputs: Sequence[int]) -> None:
-        """Refuse driven, (J,), or compared joints, 0-based, for which stage 1 has no gain or no damping."""
+        """Refuse driven, (J,), or compared joints, 0-based, for which stage 1 has no
+        gain or no damping."""
         moved = {*np.flatnonzero(driven).tolist(), *outputs}
         for quantity in ("gain", "damping") if self._stage == "mech" else ():
-            served = {place for _, what, places, _ in self._rows if what == quantity for place in places}
+            served = {
+                place
+                for _, what, places, _ in self._rows
+                if what == quantity
+                for place in places
+            }
             for joint in sorted(moved - served)[:1]:
                 raise SettingsError(
                     f"joint {joint + 1} is driven or compared, but no parameter is its {quantity}",
@@ -77,7 +95,11 @@ def _places(arm: Arm, name: str, settings: ParameterSettings) -> list[int]:
     where = f"parameters.{name}"
     if settings.link is not None:
         if settings.link not in arm.link_names:
-            raise SettingsError(f"no link {settings.link!r}", where, f"links: {', '.join(arm.link_names)}")
+            raise SettingsError(
+                f"no link {settings.link!r}",
+                where,
+                f"links: {', '.join(arm.link_names)}",
+            )
         return [arm.link_names.index(settings.link)]
     count = len(arm.joint_names)
     joints = range(1, count + 1) if settings.joints is None else settings.joints

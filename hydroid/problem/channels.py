@@ -1,16 +1,17 @@
-"""Channels, the signals that are compared, one of one log each; and objectives: norms of their errors
-(article 3.1) over segments of the record (3.2 and figure 18).
+"""Channels, the signals that are compared, one of one log each; and objectives: norms
+of their errors (article 3.1) over segments of the record (3.2 and figure 18).
 
-The error of equation (17), ε = y - ŷ, is an array (n, T): n candidates, T samples. Equation (18) is a *mean*
+The error of equation (17), ε = y - ŷ, is an array (n, T): n candidates, T samples.
+Equation (18) is a *mean*
 norm, (1/N Σ|ε|^p)^(1/p): the mean absolute error for p = 1, the root mean square for p = 2. For p = inf it is
 the largest |ε|.
 
-Equation (19) divides by "the p-norm of the measured data". We take the same mean norm (18) of y, so that (19)
-has no unit and means the same for short and long segments. A sum without 1/N would differ by a constant
-factor N^(-1/p) per segment.
+Equation (19) divides by "the p-norm of the measured data". We take the same mean norm
+(18) of y, so that (19) has no unit and means the same for short and long segments. A
+sum without 1/N would differ by a constant factor N^(-1/p) per segment.
 
-A segment is a pair of sample indices [first, end). Segments cover the record without overlap, and none is
-empty.
+A segment is a pair of sample indices [first, end). Segments cover the record without
+overlap, and none is empty.
 """
 
 from collections.abc import Sequence
@@ -36,9 +37,11 @@ class Channel:
     Attributes:
         log: index of the log.
         joint: number, from 1.
-        column: of the signal in the response's angles, or of its joint in the response's pressures.
+        column: of the signal in the response's angles, or of its joint in the
+            response's pressures.
         measured: [rad] or [Pa], shape (T,).
-        weight: error times weight is the residual [rad]: no unit for an angle, rad/Pa for a pressure.
+        weight: error times weight is the residual [rad]: no unit for an angle, rad/Pa
+            for a pressure.
         rows: its residuals in a row of all channels' residuals.
     """
 
@@ -51,19 +54,31 @@ class Channel:
     rows: slice
 
     def error(self, response: Response) -> Array:
-        """Return the weighted output error y - y_hat of (17) in its log's response [rad], shape (n, T)."""
+        """Return the weighted output error y - y_hat of (17) in its log's response
+        [rad], shape (n, T)."""
         if self.quantity == "angle":
             simulated = response.angle[:, :, self.column]
         else:
-            simulated = response.pressure[:, :, self.column, "ab".index(self.quantity[-1])]
+            simulated = response.pressure[
+                :, :, self.column, "ab".index(self.quantity[-1])
+            ]
         return self.weight * (self.measured - simulated)
 
 
 def compared_pressures(log: Log, settings: FitSettings) -> list[int]:
-    """Joints whose chamber pressures count in the objectives, 0-based: driven ones that the log measures."""
-    if settings.stage != "hyd" or settings.objective.pressure_weight == 0 or log.pressure is None:
+    """Joints whose chamber pressures count in the objectives, 0-based: driven ones that
+    the log measures."""
+    if (
+        settings.stage != "hyd"
+        or settings.objective.pressure_weight == 0
+        or log.pressure is None
+    ):
         return []
-    return [j for j in range(log.joints) if log.driven[j] and not np.isnan(log.pressure[0, j]).all()]
+    return [
+        j
+        for j in range(log.joints)
+        if log.driven[j] and not np.isnan(log.pressure[0, j]).all()
+    ]
 
 
 def make_channels(logs: Sequence[Log], settings: FitSettings) -> tuple[Channel, ...]:
@@ -84,18 +99,22 @@ def make_channels(logs: Sequence[Log], settings: FitSettings) -> tuple[Channel, 
                 measured = log.pressure[:, joint, side]
                 if not np.isnan(measured[0]):
                     rows = slice(end, end + samples)
-                    channels.append(Channel(i, joint + 1, quantity, column, measured, weight, rows))
+                    channels.append(
+                        Channel(i, joint + 1, quantity, column, measured, weight, rows)
+                    )
                     end += samples
     return tuple(channels)
 
 
 def norm(error: Array, p: float | str) -> Array:
-    """Return the p-norm (18) of each candidate's error, (n, T) -> (n,); p is 1, 2 or "inf".
+    """Return the p-norm (18) of each candidate's error, (n, T) -> (n,); p is 1, 2 or
+    "inf".
 
-    It is inf where the error is not finite or the norm overflows. A candidate's value does not depend, even
-    in its last bit, on the other candidates.
+    It is inf where the error is not finite or the norm overflows. A candidate's value
+    does not depend, even in its last bit, on the other candidates.
     """
-    # with the last axis contiguous numpy sums row by row; a transposed input would be summed in another order
+    # with the last axis contiguous numpy sums row by row; a transposed input would be
+    # summed in another order
     size = np.abs(np.ascontiguousarray(error))
     with np.errstate(all="ignore"):
         if p == 1:
@@ -107,8 +126,11 @@ def norm(error: Array, p: float | str) -> Array:
     return np.where(np.isfinite(value), value, np.inf)
 
 
-def overall_objective(error: Array, measured: Array, settings: ObjectiveSettings) -> Array:
-    """Return the norm (18) of each candidate's error, (n, T) -> (n,); where relative, (19)."""
+def overall_objective(
+    error: Array, measured: Array, settings: ObjectiveSettings
+) -> Array:
+    """Return the norm (18) of each candidate's error, (n, T) -> (n,); where relative,
+    (19)."""
     value = norm(error, settings.norm)
     if not settings.relative:
         return value
@@ -122,23 +144,30 @@ def overall_objective(error: Array, measured: Array, settings: ObjectiveSettings
     return value / scale
 
 
-def segment_objectives(error: Array, measured: Array, bounds: Ints, settings: ObjectiveSettings) -> Array:
+def segment_objectives(
+    error: Array, measured: Array, bounds: Ints, settings: ObjectiveSettings
+) -> Array:
     """Return one objective per segment, equations (21) and (22), shape (n, S).
 
-    A candidate whose error, (n, T), is not finite anywhere has inf in all segments: the first segments of a
-    simulation that diverged later count for nothing. `bounds` are [first, end) of each segment in samples,
-    (S, 2).
+    A candidate whose error, (n, T), is not finite anywhere has inf in all segments: the
+    first segments of a simulation that diverged later count for nothing. `bounds` are
+    [first, end) of each segment in samples, (S, 2).
     """
-    columns = [overall_objective(error[:, a:b], measured[a:b], settings) for a, b in bounds]
+    columns = [
+        overall_objective(error[:, a:b], measured[a:b], settings) for a, b in bounds
+    ]
     objectives = np.stack(columns, axis=1)
     objectives[~np.isfinite(objectives).all(axis=1)] = np.inf
     return objectives
 
 
 def segment_bounds(samples: int, segments: int) -> Ints:
-    """Cut a record of so many samples into segments of equal length: [first, end) of each, shape (S, 2)."""
+    """Cut a record of so many samples into segments of equal length: [first, end) of
+    each, shape (S, 2)."""
     if segments > samples:
         what = f"{segments} segments do not fit into {samples} samples"
-        raise SettingsError(what, "objective.segments", "each segment needs a sample of its own")
+        raise SettingsError(
+            what, "objective.segments", "each segment needs a sample of its own"
+        )
     edges = np.arange(segments + 1, dtype=np.int64) * samples // segments
     return np.stack((edges[:-1], edges[1:]), axis=1)

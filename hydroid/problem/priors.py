@@ -1,17 +1,20 @@
-"""Priors: single parameters, and linear combinations or ratios of them, that are known besides the logs.
+"""Priors: single parameters, and linear combinations or ratios of them, that are known
+besides the logs.
 
-Each has a value and a standard deviation; a combination without one is a constraint. A search stays where
-every prior holds within REACH standard deviations. The refinement and the uncertainty take each as one more
-measurement.
+Each has a value and a standard deviation; a combination without one is a constraint. A
+search stays where every prior holds within REACH standard deviations. The refinement
+and the uncertainty take each as one more measurement.
 
-One with heavy tails knows its scatter only roughly: it is Student's t with FREEDOM degrees of freedom, a
-normal distribution whose variance is drawn, and the draw is integrated out. The variance of the m bends of
-one curve is drawn once: a curve with one bend may have others, and one without is held straight by all of
-them. Of m distances r in units of the scale the negative logarithm is
+One with heavy tails knows its scatter only roughly: it is Student's t with FREEDOM
+degrees of freedom, a normal distribution whose variance is drawn, and the draw is
+integrated out. The variance of the m bends of one curve is drawn once: a curve with one
+bend may have others, and one without is held straight by all of them. Of m distances r
+in units of the scale the negative logarithm is
 
     ½ (ν + m) log(1 + r'r/ν),
 
-which is half the square of its scores, so that least squares minimises it. Such a prior confines no search.
+which is half the square of its scores, so that least squares minimises it. Such a prior
+confines no search.
 """
 
 from collections.abc import Callable, Mapping
@@ -26,10 +29,13 @@ from hydroid.settings.problem import PriorSettings
 
 REACH = 2.0  # standard deviations that a candidate of a search may be away from a prior
 CONSTRAINT_SD = 1e-5
-"""standard deviation of a constraint, as a part of the range that its parameters' bounds allow"""
+"""standard deviation of a constraint, as a part of the range that its parameters'
+bounds allow"""
 FREEDOM = 2.0
-"""degrees of freedom ν of a prior with heavy tails: 10 % of its values are beyond 3 scales, 1 % beyond 10"""
-MAX_SWEEPS = 200  # projections on all priors in turn; two that are nearly parallel need the most
+"""degrees of freedom ν of a prior with heavy tails: 10 % of its values are beyond 3
+scales, 1 % beyond 10"""
+# projections on all priors in turn; two that are nearly parallel need the most
+MAX_SWEEPS = 200
 
 
 @record
@@ -37,7 +43,8 @@ class _Combination:
     """A prior on factors·theta, or on a ratio a / b.
 
     A ratio has the factors of a - value b and the column of b as `divisor`.
-    step: the shortest change in the box of the free parameters that raises factors·theta by 1, shape (P,).
+    step: the shortest change in the box of the free parameters that raises
+    factors·theta by 1, shape (P,).
     """
 
     factors: Array
@@ -48,12 +55,15 @@ class _Combination:
 
     def excess(self, theta: Array) -> Array:
         """Distance from the value, shape (n,), times the divisor if any."""
-        # the sum along the last axis is the same for any number of rows; a matrix product may not be
+        # the sum along the last axis is the same for any number of rows; a matrix
+        # product may not be
         return (theta * self.factors).sum(axis=1) - self.value
 
     def tolerance(self, theta: Array) -> Array:
         """Excess of one standard deviation, shape (n,)."""
-        return self.sd * (np.ones(len(theta)) if self.divisor is None else theta[:, self.divisor])
+        return self.sd * (
+            np.ones(len(theta)) if self.divisor is None else theta[:, self.divisor]
+        )
 
     def distances(self, theta: Array) -> Array:
         """Distance from the value in standard deviations, shape (n, 1)."""
@@ -62,13 +72,15 @@ class _Combination:
 
 @record
 class _Bends:
-    """What a curve bends from one of its parts to the next: the columns of their factors, in order."""
+    """What a curve bends from one of its parts to the next: the columns of their
+    factors, in order."""
 
     columns: list[int]
     sd: float
 
     def distances(self, theta: Array) -> Array:
-        """Logarithms of the ratios of neighbours, the last one to 1, over the scale: (n, P) -> (n, m)."""
+        """Logarithms of the ratios of neighbours, the last one to 1, over the scale:
+        (n, P) -> (n, m)."""
         logs = np.log(theta[:, self.columns])
         ahead = np.hstack([logs[:, 1:], np.zeros((len(theta), 1))])
         return (logs - ahead) / self.sd
@@ -84,34 +96,48 @@ class _Heavy:
         """Scores, (n, m)."""
         distances = self.of.distances(theta)
         square = (distances * distances).sum(axis=1, keepdims=True)
-        far = np.maximum(square / FREEDOM, 1e-12)  # log(1 + x)/x is 1 there to the last digit
+        # log(1 + x)/x is 1 there to the last digit
+        far = np.maximum(square / FREEDOM, 1e-12)
         many = distances.shape[1]
         return distances * np.sqrt((FREEDOM + many) / FREEDOM * np.log1p(far) / far)
 
     def weight(self, theta: Array) -> float:
-        """Factor on distances at one theta, (1, P), by which a normal prior has the same slope there."""
+        """Factor on distances at one theta, (1, P), by which a normal prior has the
+        same slope there."""
         distances = self.of.distances(theta)[0]
-        return float(np.sqrt((FREEDOM + len(distances)) / (FREEDOM + distances @ distances)))
+        return float(
+            np.sqrt((FREEDOM + len(distances)) / (FREEDOM + distances @ distances))
+        )
 
 
 class Priors:
-    """Priors about P parameters, with M scores in all; those about fixed parameters only are left out.
+    """Priors about P parameters, with M scores in all; those about fixed parameters
+    only are left out.
 
-    Those of single parameters come first. `searched` are the parameters with bounds within REACH of these,
-    `names` those of the priors by score, and `firm` says which scores are those of normal distributions.
+    Those of single parameters come first. `searched` are the parameters with bounds
+    within REACH of these, `names` those of the priors by score, and `firm` says which
+    scores are those of normal distributions.
     """
 
-    def __init__(self, settings: Mapping[str, PriorSettings], parameters: ParameterSet) -> None:
+    def __init__(
+        self, settings: Mapping[str, PriorSettings], parameters: ParameterSet
+    ) -> None:
         self._own, narrowed = dict[int, Prior](), list(parameters.parameters)
         for column, p in enumerate(parameters.parameters):
             if p.prior is not None and p.fixed is None:
                 self._own[column] = p.prior
-                low, high = max(p.lower, p.prior.value(-REACH)), min(p.upper, p.prior.value(REACH))
+                low, high = (
+                    max(p.lower, p.prior.value(-REACH)),
+                    min(p.upper, p.prior.value(REACH)),
+                )
                 narrowed[column] = replace(p, lower=low, upper=high)
         self.searched = ParameterSet(tuple(narrowed))
         self._combinations = list[_Combination]()
         self._further = list[_Combination | _Heavy]()
-        names, firm = [parameters.names[column] for column in self._own], [True] * len(self._own)
+        names, firm = (
+            [parameters.names[column] for column in self._own],
+            [True] * len(self._own),
+        )
         for name, prior in settings.items():
             further = _further(name, prior, self.searched)
             if further is None:
@@ -125,7 +151,10 @@ class Priors:
         self.names = tuple(names)
         self.firm: Mask = np.array(firm, dtype=bool)
         if self._combinations:
-            off = np.abs(self.scores(self.project(self.searched.start[None]))[0]) * self.firm
+            off = (
+                np.abs(self.scores(self.project(self.searched.start[None]))[0])
+                * self.firm
+            )
             worst = np.argmax(off)
             if off[worst] > 1.5 * REACH:
                 raise SettingsError(
@@ -138,36 +167,50 @@ class Priors:
         return len(self.names)
 
     def scores(self, theta: Array) -> Array:
-        """Return the distance from each prior's value in standard deviations; (n, P) -> (n, M).
+        """Return the distance from each prior's value in standard deviations; (n, P) ->
+        (n, M).
 
-        Those of a prior with heavy tails have half of their squares for its negative logarithm.
+        Those of a prior with heavy tails have half of their squares for its negative
+        logarithm.
         """
         own = [prior.score(theta[:, [column]]) for column, prior in self._own.items()]
         further = [prior.distances(theta) for prior in self._further]
         return np.hstack([np.empty((len(theta), 0)), *own, *further])
 
     def weighed_at(self, theta: Array) -> Callable[[Array], Array]:
-        """Return scores, (n, P) -> (n, M), with priors of heavy tails as they act at theta, shape (P,).
+        """Return scores, (n, P) -> (n, M), with priors of heavy tails as they act at
+        theta, shape (P,).
 
-        They are normal there, with the scatter that theta shows: their slopes are those of the negative
-        logarithm, and their information is what theta's neighbours are known by.
+        They are normal there, with the scatter that theta shows: their slopes are those
+        of the negative logarithm, and their information is what theta's neighbours are
+        known by.
         """
-        weights = [1.0 if isinstance(p, _Combination) else p.weight(theta[None]) for p in self._further]
+        weights = [
+            1.0 if isinstance(p, _Combination) else p.weight(theta[None])
+            for p in self._further
+        ]
 
         def scores(near: Array) -> Array:
-            rows = [prior.score(near[:, [column]]) for column, prior in self._own.items()]
+            rows = [
+                prior.score(near[:, [column]]) for column, prior in self._own.items()
+            ]
             for prior, weight in zip(self._further, weights, strict=True):
-                distances = prior.distances if isinstance(prior, _Combination) else prior.of.distances
+                distances = (
+                    prior.distances
+                    if isinstance(prior, _Combination)
+                    else prior.of.distances
+                )
                 rows.append(weight * distances(near))
             return np.hstack([np.empty((len(near), 0)), *rows])
 
         return scores
 
     def project(self, theta: Array) -> Array:
-        """Return theta, (n, P), moved by the shortest steps to within REACH sd of every combination.
+        """Return theta, (n, P), moved by the shortest steps to within REACH sd of every
+        combination.
 
-        Projections on them in turn (S. Kaczmarz, 1937), within the bounds of `searched`. Each row is moved by
-        itself.
+        Projections on them in turn (S. Kaczmarz, 1937), within the bounds of
+        `searched`. Each row is moved by itself.
         """
         if not self._combinations:
             return theta
@@ -176,7 +219,10 @@ class Priors:
         for _ in range(MAX_SWEEPS):
             before = theta.copy()
             for combination in self._combinations:
-                excess, slack = combination.excess(theta), REACH * combination.tolerance(theta)
+                excess, slack = (
+                    combination.excess(theta),
+                    REACH * combination.tolerance(theta),
+                )
                 beyond = excess - np.clip(excess, -slack, slack)
                 theta -= beyond[:, None] * combination.step
                 theta[:, free] = np.clip(theta[:, free], low, high)
@@ -185,7 +231,9 @@ class Priors:
         return theta
 
 
-def _further(name: str, prior: PriorSettings, parameters: ParameterSet) -> _Combination | _Heavy | None:
+def _further(
+    name: str, prior: PriorSettings, parameters: ParameterSet
+) -> _Combination | _Heavy | None:
     """Return a prior on several parameters; None where all of them are fixed."""
     names = parameters.names
     for parameter in prior.names:
@@ -194,13 +242,23 @@ def _further(name: str, prior: PriorSettings, parameters: ParameterSet) -> _Comb
             raise SettingsError(f"no parameter {parameter!r}", f"priors.{name}", hint)
     if prior.smooth is None:
         combination = _combination(prior, parameters)
-        return combination if combination is None or prior.tails == "normal" else _Heavy(combination)
+        return (
+            combination
+            if combination is None or prior.tails == "normal"
+            else _Heavy(combination)
+        )
     columns = [names.index(parameter) for parameter in prior.smooth]
     for column in columns:
         p = parameters.parameters[column]
         if (p.lower if p.fixed is None else p.fixed) <= 0:
-            raise SettingsError(f"{p.name} may be 0", f"priors.{name}.smooth", "give it bounds above 0")
-    return _Heavy(_Bends(columns, prior.sd or 0.0)) if parameters.free[columns].any() else None
+            raise SettingsError(
+                f"{p.name} may be 0", f"priors.{name}.smooth", "give it bounds above 0"
+            )
+    return (
+        _Heavy(_Bends(columns, prior.sd or 0.0))
+        if parameters.free[columns].any()
+        else None
+    )
 
 
 def _combination(prior: PriorSettings, parameters: ParameterSet) -> _Combination | None:

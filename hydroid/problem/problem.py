@@ -1,7 +1,8 @@
 """The estimation problem: parameters in, objectives out (equations (17) to (22)).
 
-Evaluating a population is one function, `Problem.evaluate`; the search knows only its arrays. Candidates are
-simulated by threads of this process, or on workers (`DaskWorkers`); no bit of a result depends on how many.
+Evaluating a population is one function, `Problem.evaluate`; the search knows only its
+arrays. Candidates are simulated by threads of this process, or on workers
+(`DaskWorkers`); no bit of a result depends on how many.
 """
 
 from collections.abc import Collection, Sequence
@@ -32,15 +33,16 @@ from hydroid.simulation.scenario import Scenario
 CHUNK = 2**23  # residuals that are held in memory at a time, 64 MiB
 
 WHITE = 1.6
-"""mean square of the change between samples, in variances of the error, from which the error is noise; it is
-2 of white noise, and that of J. von Neumann (1941)"""
+"""mean square of the change between samples, in variances of the error, from which the
+error is noise; it is 2 of white noise, and that of J. von Neumann (1941)"""
 
 
 class Problem:
-    """Logs, each with its start pose, a model that should reproduce them, and the measure of the difference.
+    """Logs, each with its start pose, a model that should reproduce them, and the
+    measure of the difference.
 
-    Candidates are simulated by `spread`, where a worker has `simulation.threads` threads, one where that is
-    0; None: in this process.
+    Candidates are simulated by `spread`, where a worker has `simulation.threads`
+    threads, one where that is 0; None: in this process.
 
     Attributes:
         channels: the compared signals, in the order of a row of residuals.
@@ -49,7 +51,12 @@ class Problem:
         bounds: [first, end) of each objective's samples in it, shape (S, 2).
     """
 
-    def __init__(self, settings: FitSettings, logs: Sequence[Log], spread: DaskWorkers | None = None) -> None:
+    def __init__(
+        self,
+        settings: FitSettings,
+        logs: Sequence[Log],
+        spread: DaskWorkers | None = None,
+    ) -> None:
         spec, outputs = load_model(settings.arm), [j - 1 for j in settings.outputs]
         self.settings, self.logs, self.outputs = settings, tuple(logs), outputs
         self._spread = spread
@@ -58,17 +65,24 @@ class Problem:
         self.bindings.refuse_idle(self.driven, outputs)
         self.parameters = settings.parameter_set()
         if not self.parameters.free.any():
-            raise SettingsError("no parameter is free", "parameters", "fix fewer of them")
+            raise SettingsError(
+                "no parameter is free", "parameters", "fix fewer of them"
+            )
         self.priors = Priors(settings.priors, self.parameters)
         self._simulations = [
-            make_simulation(spec, log, outputs, settings, compared_pressures(log, settings)) for log in logs
+            make_simulation(
+                spec, log, outputs, settings, compared_pressures(log, settings)
+            )
+            for log in logs
         ]
         self.channels = make_channels(logs, settings)
         self.measured = np.concatenate([c.weight * c.measured for c in self.channels])
-        many = settings.objective.segments  # of an angle; a pressure is one objective, however long
+        # of an angle; a pressure is one objective, however long
+        many = settings.objective.segments
         self.bounds: Ints = np.concatenate(
             [
-                c.rows.start + segment_bounds(len(c.measured), many if c.quantity == "angle" else 1)
+                c.rows.start
+                + segment_bounds(len(c.measured), many if c.quantity == "angle" else 1)
                 for c in self.channels
             ]
         )
@@ -76,40 +90,57 @@ class Problem:
     @property
     def active_joints(self) -> tuple[int, ...]:
         """Joints that a log drives or that are compared, numbered from 1."""
-        return tuple(sorted({*(np.flatnonzero(self.driven) + 1).tolist(), *self.settings.outputs}))
+        return tuple(
+            sorted(
+                {*(np.flatnonzero(self.driven) + 1).tolist(), *self.settings.outputs}
+            )
+        )
 
-    def varied(self, settings: FitSettings, logs: Sequence[Log] | None = None) -> "Problem":
-        """Return the problem with other settings, or other logs too, simulated in the same place."""
+    def varied(
+        self, settings: FitSettings, logs: Sequence[Log] | None = None
+    ) -> "Problem":
+        """Return the problem with other settings, or other logs too, simulated in the
+        same place."""
         if settings is self.settings and logs is None:
             return self
         return Problem(settings, self.logs if logs is None else logs, self._spread)
 
     def started(self, log: Log) -> list[int]:
-        """Joints whose measured angle only their start is simulated from, numbered from 1."""
+        """Joints whose measured angle only their start is simulated from, numbered from
+        1."""
         follows = self.settings.simulation.other_joints == "measured"
         compared = np.isin(np.arange(log.joints), self.outputs)
-        return (np.flatnonzero(log.measured & (log.driven | compared | (not follows))) + 1).tolist()
+        return (
+            np.flatnonzero(log.measured & (log.driven | compared | (not follows))) + 1
+        ).tolist()
 
     def theta(self, unit: Array) -> Array:
-        """Return candidates, (n, P), from points of the search's unit box, moved to where the priors hold."""
+        """Return candidates, (n, P), from points of the search's unit box, moved to
+        where the priors hold."""
         return self.priors.project(self.priors.searched.from_unit(unit))
 
     @property
     def start(self) -> Array | None:
-        """The point of the search's unit box where it starts, shape (p,); None: not stated."""
+        """The point of the search's unit box where it starts, shape (p,); None: not
+        stated."""
         searched = self.priors.searched
-        stated = any(p.start is not None and p.fixed is None for p in searched.parameters)
+        stated = any(
+            p.start is not None and p.fixed is None for p in searched.parameters
+        )
         return searched.to_unit(searched.start) if stated else None
 
     def evaluate(self, theta: Array) -> Array:
-        """Return the objectives of theta, (n, P), by segment and overall last, shape (n, S + 1).
+        """Return the objectives of theta, (n, P), by segment and overall last, shape
+        (n, S + 1).
 
-        They are in rad, or relative; inf throughout where a simulation diverged. Memory does not grow with n
-        beyond the result.
+        They are in rad, or relative; inf throughout where a simulation diverged. Memory
+        does not grow with n beyond the result.
         """
         if self._spread is None:
             return self.objectives(theta)
-        values = self._spread(self._on_worker, "objectives", theta, len(self.bounds) + 1)
+        values = self._spread(
+            self._on_worker, "objectives", theta, len(self.bounds) + 1
+        )
         values[np.isnan(values)] = np.inf
         return values
 
@@ -121,23 +152,33 @@ class Problem:
         return np.vstack([*parts])
 
     def norms(self, errors: Array) -> Array:
-        """Return the objectives of output errors, (n, R), by segment and overall last: shape (n, S + 1)."""
+        """Return the objectives of output errors, (n, R), by segment and overall last:
+        shape (n, S + 1)."""
         objective = self.settings.objective
         segments = segment_objectives(errors, self.measured, self.bounds, objective)
-        return np.column_stack([segments, overall_objective(errors, self.measured, objective)])
+        return np.column_stack(
+            [segments, overall_objective(errors, self.measured, objective)]
+        )
 
     def output_errors(self, theta: Array) -> Array:
-        """Weighted output errors of (17) [rad] of theta, shape (n, P): (n, R); NaN where one diverged."""
+        """Weighted output errors of (17) [rad] of theta, shape (n, P): (n, R); NaN
+        where one diverged."""
         if self._spread is not None:
-            return self._spread(self._on_worker, "output_errors", theta, len(self.measured))
+            return self._spread(
+                self._on_worker, "output_errors", theta, len(self.measured)
+            )
         return self.errors(self.responses(theta))
 
     def errors(self, responses: Sequence[Response]) -> Array:
-        """Return the weighted output errors of n candidates' responses to all logs [rad], shape (n, R)."""
-        return np.concatenate([c.error(responses[c.log]) for c in self.channels], axis=1)
+        """Return the weighted output errors of n candidates' responses to all logs
+        [rad], shape (n, R)."""
+        return np.concatenate(
+            [c.error(responses[c.log]) for c in self.channels], axis=1
+        )
 
     def leaves_noise(self, theta: Array) -> bool:
-        """Whether errors at an estimate, (P,), change between samples as white noise does."""
+        """Whether errors at an estimate, (P,), change between samples as white noise
+        does."""
         error = self.output_errors(theta[None])[0]
         each = [error[c.rows] for c in self.channels]
         return all(np.mean(np.diff(one) ** 2) > WHITE * np.var(one) for one in each)
@@ -145,10 +186,14 @@ class Problem:
     def responses(self, theta: Array) -> list[Response]:
         """Simulate theta, shape (n, P); return one response of n candidates per log."""
         pairs = zip(self._simulations, self.logs, strict=True)
-        return [one.simulate(self.bindings.candidates(theta, log.source)) for one, log in pairs]
+        return [
+            one.simulate(self.bindings.candidates(theta, log.source))
+            for one, log in pairs
+        ]
 
     def angles(self, errors: Array, joints: Collection[int] = ()) -> Array:
-        """Return the output errors, of (n, R), of the angles of joints (from 1), or all, unweighted [rad]."""
+        """Return the output errors, of (n, R), of the angles of joints (from 1), or
+        all, unweighted [rad]."""
         angles = [
             errors[:, c.rows] / c.weight
             for c in self.channels
@@ -167,11 +212,16 @@ class Problem:
 
 
 def make_simulation(
-    spec: mujoco.MjSpec, log: Log, outputs: list[int], settings: FitSettings, pressures: Sequence[int] = ()
+    spec: mujoco.MjSpec,
+    log: Log,
+    outputs: list[int],
+    settings: FitSettings,
+    pressures: Sequence[int] = (),
 ) -> Simulation:
     """Return the simulation of one log in the settings' stage.
 
-    Its response has the angles of the joints `outputs` and the chamber pressures of `pressures`, 0-based.
+    Its response has the angles of the joints `outputs` and the chamber pressures of
+    `pressures`, 0-based.
     """
     payload = settings.payloads.get(log_file(log.source).name)
     if payload:

@@ -1,1 +1,2 @@
-"""A new project: arm file, model, settings of a fit and a picture, from a robot's file and logs."""
+"""A new project: arm file, model, settings of a fit and a picture, from a robot's file
+and logs."""

@@ -1,4 +1,5 @@
-"""An arm of boxes from the names of its joints and the lengths of its links, for a machine without CAD."""
+"""An arm of boxes from the names of its joints and the lengths of its links, for a
+machine without CAD."""
 
 from collections.abc import Sequence
 
@@ -7,12 +8,24 @@ from hydroid.log.clues import words
 
 UPRIGHT = 0.0
 """length that says that a joint turns about the vertical, as a slewing gear does [m]"""
-RANGES = {"swing": (-180, 180), "boom": (-30, 60), "stick": (-130, -20), "bucket": (-150, 30)}
+RANGES = {
+    "swing": (-180, 180),
+    "boom": (-30, 60),
+    "stick": (-130, -20),
+    "bucket": (-150, 30),
+}
 """of joints that are called so [deg]; ours, as excavators have them"""
-CALLED = {"slew": "swing", "azimuth": "swing", "arm": "stick", "dipper": "stick", "tool": "bucket"}
+CALLED = {
+    "slew": "swing",
+    "azimuth": "swing",
+    "arm": "stick",
+    "dipper": "stick",
+    "tool": "bucket",
+}
 OTHERS = (-90, 90)
 MASS = 45.0
-"""of a link over the square of its length [kg/m²]; ours, as of excavators of 1 to 20 t"""
+"""of a link over the square of its length [kg/m²]; ours, as of excavators of 1 to 20
+t"""
 DENSEST = 3000.0
 """of a link's box [kg/m³], where small links would weigh more than steel"""
 SLENDER = 7.0
@@ -22,34 +35,48 @@ LONGEST = 100.0
 
 
 def boxes_urdf(joints: Sequence[str], lengths: Sequence[float]) -> str:
-    """Return a URDF of an arm whose links are boxes; a joint of length 0 turns its link about the vertical.
+    """Return a URDF of an arm whose links are boxes; a joint of length 0 turns its link
+    about the vertical.
 
     Raises SettingsError: not a length for each joint, or one that no link has.
     """
     if not joints or len(joints) != len(lengths):
         what = f"{len(lengths)} lengths for {len(joints)} joints"
-        raise SettingsError(what, "--lengths", "as in --joints swing,boom,arm,bucket --lengths 0,3.7,1.6,0.9")
+        raise SettingsError(
+            what,
+            "--lengths",
+            "as in --joints swing,boom,arm,bucket --lengths 0,3.7,1.6,0.9",
+        )
     if odd := [joint for joint in joints if not joint.isidentifier()]:
-        raise SettingsError(f"{odd[0]!r} is no name of a joint", "--joints", "letters, digits and _")
+        raise SettingsError(
+            f"{odd[0]!r} is no name of a joint", "--joints", "letters, digits and _"
+        )
     if len({*joints}) < len(joints):
         raise SettingsError("holds a name twice", "--joints")
     wrong = [length for length in lengths if not 0 <= length <= LONGEST]
     if wrong or not any(lengths):
-        what = f"{wrong[0]:g} is no length of a link" if wrong else "no link has a length"
-        raise SettingsError(what, "--lengths", f"0 to {LONGEST:g} m; 0 for a joint that slews")
+        what = (
+            f"{wrong[0]:g} is no length of a link" if wrong else "no link has a length"
+        )
+        raise SettingsError(
+            what, "--lengths", f"0 to {LONGEST:g} m; 0 for a joint that slews"
+        )
     reach, parent, at = sum(lengths), "base", "0 0 1"
     parts = ['<link name="base"/>']
     for joint, length in zip(joints, lengths, strict=True):
         upright = length == UPRIGHT
         size = reach / SLENDER if upright else length
-        parts += [_link(f"{joint}_link", size, reach if upright else length, cube=upright)]
+        parts += [
+            _link(f"{joint}_link", size, reach if upright else length, cube=upright)
+        ]
         parts += [_joint(joint, parent, at, upright=upright)]
         parent, at = f"{joint}_link", f"{length:g} 0 0"
     return f'<robot name="boxes">{"".join(parts)}</robot>'
 
 
 def _link(name: str, size: float, length: float, *, cube: bool) -> str:
-    """Return a box along x, or one around the axis of a link that slews, which weighs as the arm does."""
+    """Return a box along x, or one around the axis of a link that slews, which weighs
+    as the arm does."""
     wide = size if cube else size / SLENDER
     mass = min(MASS * length**2, DENSEST * size * wide**2)
     middle = 0.0 if cube else size / 2

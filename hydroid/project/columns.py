@@ -52,7 +52,8 @@ def _described(table: Table, name: str) -> str:
 
 
 def _choices(values: Array, unit: str) -> Iterator[str]:
-    """Yield what numbers could be, by their range, their steps and the unit that is stated."""
+    """Yield what numbers could be, by their range, their steps and the unit that is
+    stated."""
     steps = np.diff(values)
     if len(steps) and (steps > 0).all():
         yield f"a time in {likely_time_unit(float(np.median(steps))) or 's'}"

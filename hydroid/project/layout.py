@@ -36,13 +36,15 @@ FOLLOWED = 1.0  # travel above which a joint that no command drives is followed 
 
 @record
 class Layout:
-    """The columns of a log, as the `log` section of a fit's settings, and what its numbers say.
+    """The columns of a log, as the `log` section of a fit's settings, and what its
+    numbers say.
 
-    `outputs` are joints that a log drives and measures, `motions` how the measured ones move, by
-    number from 1, and `valves` those by which the outputs follow commands of the sign that these
-    have in the section; `reasons` have a line for each column that is not `unused`; `followed`: a
-    joint that no command drives moves. `missing` says which columns a person must name, in a section
-    that is then no more than a start; `candidates` are lines about what each could be.
+    `outputs` are joints that a log drives and measures, `motions` how the measured ones
+    move, by number from 1, and `valves` those by which the outputs follow commands of
+    the sign that these have in the section; `reasons` have a line for each column that
+    is not `unused`; `followed`: a joint that no command drives moves. `missing` says
+    which columns a person must name, in a section that is then no more than a start;
+    `candidates` are lines about what each could be.
     """
 
     section: Plain
@@ -71,9 +73,11 @@ def find_layout(
     Without a log all joints have a command and an angle, and none is seen to move.
 
     Args:
-        order: names of the arm's joints in the order of the log's numbers; none: the arm's order.
+        order: names of the arm's joints in the order of the log's numbers; none: the
+            arm's order.
         given: what a person says of the columns, which are not guessed then.
-        others: further logs of the same columns; a joint that one of them drives can be fitted.
+        others: further logs of the same columns; a joint that one of them drives can be
+            fitted.
 
     Raises:
         SettingsError: no joint has one of the names.
@@ -82,7 +86,9 @@ def find_layout(
     """
     if table is None:
         every = tuple(range(1, len(arm.joints) + 1))
-        return Layout({"period_s": 0.01, "joints": {}}, every, (), (), {}, followed=False)
+        return Layout(
+            {"period_s": 0.01, "joints": {}}, every, (), (), {}, followed=False
+        )
     if given is not None:
         guess = _given(table, arm, given)
         return _seen(table, arm, guess, others, GIVEN)
@@ -93,7 +99,9 @@ def find_layout(
     return _seen(table, arm, guess, others, GUESSED)
 
 
-def _seen(table: Table, arm: Arm, guess: ColumnGuess, others: Sequence[Path], origin: str) -> Layout:
+def _seen(
+    table: Table, arm: Arm, guess: ColumnGuess, others: Sequence[Path], origin: str
+) -> Layout:
     """Return the layout of columns, with what the logs show of the joints' motion."""
     entries = guess.log["joints"]
     reasons = [*guess.reasons]
@@ -142,9 +150,13 @@ def _driven(
 
 
 def _turn_commands(
-    entries: dict[int, Plain], motions: Mapping[int, JointMotion], arm: Arm, reasons: list[str]
+    entries: dict[int, Plain],
+    motions: Mapping[int, JointMotion],
+    arm: Arm,
+    reasons: list[str],
 ) -> list[int]:
-    """Turn commands that act against the angle, and say what else is odd in how joints move.
+    """Turn commands that act against the angle, and say what else is odd in how joints
+    move.
 
     Returns the joints whose commands were turned.
     """
@@ -160,10 +172,13 @@ def _turn_commands(
     return wrong
 
 
-def _valves(logs: Sequence[Log], joints: Sequence[int], wrong: Sequence[int]) -> dict[int, JointStart]:
+def _valves(
+    logs: Sequence[Log], joints: Sequence[int], wrong: Sequence[int]
+) -> dict[int, JointStart]:
     """Return the valves of joints that follow their logged commands.
 
-    `logs` have the commands as they were recorded, of which those of `wrong` joints are then turned.
+    `logs` have the commands as they were recorded, of which those of `wrong` joints are
+    then turned.
     """
     valves = dict[int, JointStart]()
     for joint in joints:
@@ -185,8 +200,13 @@ def _lacking(entries: Mapping[int, Plain], names: Sequence[str]) -> Iterator[str
 
 
 def _has_targets(table: Table) -> bool:
-    """Return whether a column seems to hold the position that a controller is to reach."""
-    units = {name: column_unit(name, table.units.get(name, "")) for name in table.names if name}
+    """Return whether a column seems to hold the position that a controller is to
+    reach."""
+    units = {
+        name: column_unit(name, table.units.get(name, ""))
+        for name in table.names
+        if name
+    }
     return any(kind_of(name, unit) == "target" for name, unit in units.items())
 
 
@@ -200,7 +220,11 @@ def _skeleton(table: Table, arm: Arm, guess: ColumnGuess, missing: str) -> Layou
         unit = "m" if joint.slides else "deg"
         entry["angle"] = entry["angle"] or {"column": "ANGLE", "unit": unit}
         entries[number] = entry
-    placeholders = {"time": {"column": "TIME", "unit": "s"}, "command": None, "angle": None}
+    placeholders = {
+        "time": {"column": "TIME", "unit": "s"},
+        "command": None,
+        "angle": None,
+    }
     return Layout(
         placeholders | guess.log | {"joints": entries},
         tuple(entries),
@@ -246,8 +270,11 @@ def _read(
     return logs
 
 
-def _refuse_rest(table: Table, driven: Sequence[int], logs: Sequence[Log], names: Sequence[str]) -> None:
-    """Refuse logs in which no joint is driven and moves: nothing can be fitted to them."""
+def _refuse_rest(
+    table: Table, driven: Sequence[int], logs: Sequence[Log], names: Sequence[str]
+) -> None:
+    """Refuse logs in which no joint is driven and moves: nothing can be fitted to
+    them."""
     travels = dict[int, float]()
     for joint in driven:
         moved = [motion_of(log, joint).travel for log in logs if log.driven[joint - 1]]

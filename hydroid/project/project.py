@@ -37,10 +37,12 @@ FILES = (ARM, MODEL, PICTURE, FIT, STEPS, OLD, MESHES)
 
 @record
 class Project:
-    """A project that was written: its folder, and the names of its files and folders there.
+    """A project that was written: its folder, and the names of its files and folders
+    there.
 
-    `notes`: what the import assumed; `columns`: what each of the log is taken for; `unused`: the
-    others; `missing`: which columns of the log a person must name in the settings, empty if none.
+    `notes`: what the import assumed; `columns`: what each of the log is taken for;
+    `unused`: the others; `missing`: which columns of the log a person must name in the
+    settings, empty if none.
     """
 
     folder: Path
@@ -53,7 +55,11 @@ class Project:
 
 
 def write_project(
-    folder: Path, robot: Path | None, logs: Sequence[Path], joints: Sequence[str], **options: Any
+    folder: Path,
+    robot: Path | None,
+    logs: Sequence[Path],
+    joints: Sequence[str],
+    **options: Any,
 ) -> Project:
     """Write a project to a folder, new or with other things in it (`hydroid.init` says
     what is given)."""
@@ -67,7 +73,8 @@ def write_project(
         imported = import_arm(robot, table.names if table else (), **options)
     elif boxes:
         imported = _arm_of_boxes(boxes, options)
-    # all is written aside and read back, so that the folder has all of a project or nothing
+    # all is written aside and read back, so that the folder has all of a project or
+    # nothing
     with _stage(folder) as stage, _of_the_project(stage, folder, robot):
         if robot is not None and has_own_file:
             reference = _seen_from(folder, robot)
@@ -101,18 +108,24 @@ def _arm_of_boxes(urdf: str, options: Plain) -> ImportedArm:
 
 def _sizes(arm: Arm, layout: Layout) -> tuple[JointSize, ...]:
     """Return the sizes of what moves the joints, by the speeds that a log shows."""
-    return joint_sizes(arm, {joint: motion.speed for joint, motion in layout.motions.items()})
+    return joint_sizes(
+        arm, {joint: motion.speed for joint, motion in layout.motions.items()}
+    )
 
 
 def _stand_ins(arm: Arm) -> Iterator[str]:
     """Yield which joints have a stand-in for a cylinder that nobody has named."""
-    names = [joint.name for joint in arm.joints if isinstance(joint.actuator, RotaryActuator)]
+    names = [
+        joint.name for joint in arm.joints if isinstance(joint.actuator, RotaryActuator)
+    ]
     if names:
         what = "no cylinder is known. A stand-in predicts angles"
         yield f"{listed(names)}: {what}; its pressures and forces mean nothing"
 
 
-def go_on(folder: Path | None, config: Path, logs: Sequence[Path], *, force: bool) -> Project:
+def go_on(
+    folder: Path | None, config: Path, logs: Sequence[Path], *, force: bool
+) -> Project:
     """Write the settings anew, with starts from the logs,
     whose columns a person has named in `config`.
 
@@ -133,7 +146,9 @@ def go_on(folder: Path | None, config: Path, logs: Sequence[Path], *, force: boo
     layout = find_layout(table, arm, given=settings.log, others=_fitted(logs)[1:])
     steps = _steps(folder, logs, layout)
     reference = _seen_from(folder, Path(arm.where))
-    text = fit_text(arm, layout, _sizes(arm, layout), str(folder / FIT), reference, steps[0])
+    text = fit_text(
+        arm, layout, _sizes(arm, layout), str(folder / FIT), reference, steps[0]
+    )
     with _stage(folder) as stage, _of_the_project(stage, folder, config):
         if replaces_config:
             write_atomic(stage / OLD, config.read_bytes())
@@ -222,7 +237,8 @@ def _finished(
 
 @contextmanager
 def _of_the_project(stage: Path, folder: Path, source: Path | None) -> Generator[None]:
-    """Let errors name the source in place of a file that was to be written and is gone."""
+    """Let errors name the source in place of a file that was to be written and is
+    gone."""
     try:
         yield
     except HydroidError as error:
@@ -246,7 +262,11 @@ def _write_arm(
             ARM: fill_template("project/boxes.yaml"),
         }
     else:
-        files = {MODEL: imported.mjcf, ARM: arm_text(imported, arm, sizes), **imported.meshes}
+        files = {
+            MODEL: imported.mjcf,
+            ARM: arm_text(imported, arm, sizes),
+            **imported.meshes,
+        }
     for name, content in files.items():
         write_atomic(stage / name, content)
     return load_arm(stage / ARM)
@@ -257,7 +277,9 @@ def _stage(folder: Path) -> Generator[Path]:
     """Make a folder beside the project, or in it where it exists, that disappears."""
     home = next(filter(Path.is_dir, (folder.absolute(), *folder.absolute().parents)))
     with writing(folder):
-        stage = tempfile.TemporaryDirectory(prefix=".hydroid-init-", dir=home, ignore_cleanup_errors=True)
+        stage = tempfile.TemporaryDirectory(
+            prefix=".hydroid-init-", dir=home, ignore_cleanup_errors=True
+        )
     with stage as name:
         yield Path(name)
 

@@ -23,7 +23,8 @@ PERIOD = 0.02  # of a simulation of quick logs [s]
 def guessed_section(table: Table, arm: Arm, order: Sequence[str]) -> ColumnGuess:
     """Guess the columns; joints have the numbers of the arm.
 
-    `order` are names of the arm's joints in the order of the log's numbers; none: the arm's order.
+    `order` are names of the arm's joints in the order of the log's numbers; none: the
+    arm's order.
     """
     names = arm.joint_names
     for name in order:
@@ -46,14 +47,21 @@ def guessed_section(table: Table, arm: Arm, order: Sequence[str]) -> ColumnGuess
     links = [arm.link_names[place] for place in places]
     try:
         section, reasons, unused = guess_columns(
-            table, order or names, links=links, slides=slides, rods=own_rods, ranges=ranges
+            table,
+            order or names,
+            links=links,
+            slides=slides,
+            rods=own_rods,
+            ranges=ranges,
         )
     except LogError:
         if not holds_numbers(table):
             raise
         return ColumnGuess({"joints": {}}, (), ())
     section["period_s"] = _period(section["period_s"])
-    entries = {places[number - 1] + 1: entry for number, entry in section["joints"].items()}
+    entries = {
+        places[number - 1] + 1: entry for number, entry in section["joints"].items()
+    }
     section["joints"] = dict(sorted(entries.items()))
     return ColumnGuess(section, reasons, unused)
 

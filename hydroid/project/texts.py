@@ -25,15 +25,18 @@ from hydroid.settings.hydraulics import HydraulicSettings
 
 LONGEST_STEP = 0.025  # of MuJoCo [s], in a log of fewer samples
 VALVE_STEP = 0.002  # of valves and oil [s]
-DEAD = 0.8  # part of the command below which a joint seems to stand that its dead band is
+# part of the command below which a joint seems to stand that its dead band is
+DEAD = 0.8
 UNKNOWN_DEAD = 10.0  # dead band of a joint that no log moves [%]
 MOST_DEAD = 85.0  # the largest dead band to start at [%]
 UNKNOWN_LAG = 0.05  # of the opening of a joint that no log moves [s]
 LONGEST_DELAY = 0.9  # to start at [s]
 LONGEST_LAG = 0.5  # to start at [s]
-DRAG = 0.02  # part of the torque at the pump's pressure that damping takes at full speed
+# part of the torque at the pump's pressure that damping takes at full speed
+DRAG = 0.02
 USUAL_SPEED = 0.5  # of a joint of which no log tells its own [rad/s, m/s]
-LIFT = 2.0  # torque of a joint at the pump's pressure, over the largest that gravity asks of it
+# torque of a joint at the pump's pressure, over the largest that gravity asks of it
+LIFT = 2.0
 
 
 class JointSize(NamedTuple):
@@ -52,17 +55,19 @@ class JointSize(NamedTuple):
 
 
 def joint_sizes(arm: Arm, speeds: Mapping[int, float]) -> tuple[JointSize, ...]:
-    """Return the size of what moves every joint, (J,): starts and centres of wide priors,
-    not estimates.
+    """Return the size of what moves every joint, (J,): starts and centres of wide
+    priors, not estimates.
 
-    The displacement gives the torque at the pump's pressure; the opening gives the speed while the
-    arm is lifted, and both edges lose the same; the damping holds the speed at full command.
-    `speeds` are those that a log shows, by number of the joint [rad/s, m/s];
-    USUAL_SPEED for the others.
+    The displacement gives the torque at the pump's pressure; the opening gives the
+    speed while the arm is lifted, and both edges lose the same; the damping holds the
+    speed at full command. `speeds` are those that a log shows, by number of the joint
+    [rad/s, m/s]; USUAL_SPEED for the others.
     """
     pressure = 1e5 * HydraulicSettings().supply_pressure
     sizes = list[JointSize]()
-    for number, (joint, torque) in enumerate(zip(arm.joints, _torques(arm).tolist(), strict=True), 1):
+    for number, (joint, torque) in enumerate(
+        zip(arm.joints, _torques(arm).tolist(), strict=True), 1
+    ):
         speed = max(speeds.get(number, USUAL_SPEED), 0.01)
         displacement = 1e6 * torque / pressure
         sizes.append(
@@ -78,7 +83,8 @@ def joint_sizes(arm: Arm, speeds: Mapping[int, float]) -> tuple[JointSize, ...]:
 
 
 def _torques(arm: Arm) -> Array:
-    """Return the largest torque that each joint needs in random poses [N·m, N], shape (J,)."""
+    """Return the largest torque that each joint needs in random poses [N·m, N], shape
+    (J,)."""
     model = load_model(arm).compile()
     data = mujoco.MjData(model)
     low = np.maximum(arm.lower, -np.pi)
@@ -97,14 +103,15 @@ def _torques(arm: Arm) -> Array:
 
 
 def opening_at(displacement: float, speed: float) -> float:
-    """Return the valve's opening [mm²] that lets a joint of a displacement [cm³/rad] move at
-    a speed [rad/s].
+    """Return the valve's opening [mm²] that lets a joint of a displacement [cm³/rad]
+    move at a speed [rad/s].
 
     Of a joint that slides [mm², m/s].
     """
     settings = HydraulicSettings()
     pressure = 1e5 * settings.supply_pressure
-    through = settings.flow_coefficient * np.sqrt((1 - 1 / LIFT) * pressure / DENSITY)  # [m/s]
+    # [m/s]
+    through = settings.flow_coefficient * np.sqrt((1 - 1 / LIFT) * pressure / DENSITY)
     return displacement * speed / through
 
 
@@ -116,9 +123,11 @@ def _lever(joint: Joint) -> float:
 
 
 def _opening(joint: Joint, speed: float, usual: float) -> str:
-    """Return the nominal opening of a direction of a stand-in, from its speed at full command, as YAML.
+    """Return the nominal opening of a direction of a stand-in, from its speed at full
+    command, as YAML.
 
-    Empty where the arm's file has an opening that no `usual` speed of the joint gives: it holds.
+    Empty where the arm's file has an opening that no `usual` speed of the joint gives:
+    it holds.
     """
     actuator = joint.actuator
     if actuator is None:
@@ -151,28 +160,36 @@ class ValveSide(NamedTuple):
 def _sides(
     joint: Joint, valve: JointStart | None, motion: JointMotion | None, usual: float
 ) -> list[ValveSide]:
-    """Return both directions of a joint's valve, A first, at the speeds that the logs show.
+    """Return both directions of a joint's valve, A first, at the speeds that the logs
+    show.
 
-    `usual` is the speed of the joint at full command, by which its actuator was sized [rad/s].
+    `usual` is the speed of the joint at full command, by which its actuator was sized
+    [rad/s].
     """
     if valve is None:
         dead = DEAD * min(max(motion.dead_band, 5.0), 40.0) if motion else UNKNOWN_DEAD
         opening = _opening(joint, usual, usual) if motion else ""
         numbers = opening, short(dead), short(EXPONENT)
-        return [ValveSide("A", *numbers, one_size=False), ValveSide("B", *numbers, one_size=False)]
+        return [
+            ValveSide("A", *numbers, one_size=False),
+            ValveSide("B", *numbers, one_size=False),
+        ]
     sides = list[ValveSide]()
     for name, start in zip("AB", valve.sides, strict=True):
         opening = _opening(joint, start.speed, usual)
         band = short(min(start.dead_band, MOST_DEAD))
-        sides.append(ValveSide(name, opening, band, short(start.exponent), start.one_size))
+        sides.append(
+            ValveSide(name, opening, band, short(start.exponent), start.one_size)
+        )
     return sides
 
 
 def arm_text(imported: ImportedArm, arm: Arm | None, sizes: Sequence[JointSize]) -> str:
-    """Return the arm's file of an import, with an actuator of each joint of sizes, (J,).
+    """Return the arm's file of an import, with an actuator of each joint of sizes,
+    (J,).
 
-    `arm` is what an earlier text of it says; None: this is that text, and cylinders have a size
-    that nothing uses.
+    `arm` is what an earlier text of it says; None: this is that text, and cylinders
+    have a size that nothing uses.
     """
     actuators = dict[str, Plain]()
     if arm is None:
@@ -195,7 +212,8 @@ def arm_text(imported: ImportedArm, arm: Arm | None, sizes: Sequence[JointSize])
 
 
 def _actuator(cylinder: Plain | None, size: JointSize) -> Plain:
-    """Return the settings of an actuator of a size: of a cylinder, or of a stand-in for one."""
+    """Return the settings of an actuator of a size: of a cylinder, or of a stand-in for
+    one."""
     opening = {"max_opening": rounded(size.opening)}
     if cylinder is None:
         return {"kind": "rotary", "displacement": rounded(size.displacement)} | opening
@@ -206,7 +224,11 @@ def _actuator(cylinder: Plain | None, size: JointSize) -> Plain:
 
 def flow(value: Any) -> str:
     """Write a value as YAML, on one line."""
-    return yaml_text(value, default_flow_style=True, width=10_000).removesuffix("...\n").strip()
+    return (
+        yaml_text(value, default_flow_style=True, width=10_000)
+        .removesuffix("...\n")
+        .strip()
+    )
 
 
 def rounded(value: float) -> float:
@@ -224,8 +246,8 @@ def fit_text(
 ) -> str:
     """Return the settings of a fit of the whole chain.
 
-    `file` is their own name as a command takes it, and `arm_file` that of the arm as they name it;
-    `again` is the command that goes on once the columns are named.
+    `file` is their own name as a command takes it, and `arm_file` that of the arm as
+    they name it; `again` is the command that goes on once the columns are named.
     """
     flows = dict[int, float]()  # at full speed, by joint [L/min]
     for joint in layout.outputs:
@@ -264,10 +286,14 @@ def fit_text(
 
 
 def _joint_text(
-    joint: Joint, size: JointSize, motion: JointMotion | None, valve: JointStart | None, draw: float
+    joint: Joint,
+    size: JointSize,
+    motion: JointMotion | None,
+    valve: JointStart | None,
+    draw: float,
 ) -> Plain:
-    """Return what the settings of a fit say of a joint, and of its motion and valve where a log
-    shows them.
+    """Return what the settings of a fit say of a joint, and of its motion and valve
+    where a log shows them.
 
     `draw` is the usual flow of the machine's joints over that of this one.
     """
@@ -289,7 +315,8 @@ def _joint_text(
         "delay": min(delay, LONGEST_DELAY),
         "lag": min(lag, LONGEST_LAG),
         "unit": "N·s/m" if joint.slides else "N·m·s/rad",
-        # a stand-in's size is a guess, but the valves of one machine let like flows through
+        # a stand-in's size is a guess, but the valves of one machine let like flows
+        # through
         "draw": 1 if linear else short(draw),
     }
 

@@ -1,5 +1,5 @@
-"""What each joint's valve and actuator do, beside what was measured: speeds, openings, answers to a
-step.
+"""What each joint's valve and actuator do, beside what was measured: speeds, openings,
+answers to a step.
 """
 
 from collections.abc import Mapping, Sequence
@@ -17,8 +17,8 @@ from hydroid.settings.fit import FitSettings
 from hydroid.words import listed, two_digits
 
 OVER = 0.25
-"""time over which a speed is measured [s]; for as long before it the command must have stood
-still"""
+"""time over which a speed is measured [s]; for as long before it the command must have
+stood still"""
 STILL = 20.0
 """by how much a command that stands still may change [%]: a joystick never rests"""
 AT_END = 0.02
@@ -41,7 +41,9 @@ _STEP = (
 )
 
 
-def speed_section(settings: FitSettings, summary: FitSummary, logs: Sequence[Log]) -> Section | None:
+def speed_section(
+    settings: FitSettings, summary: FitSummary, logs: Sequence[Log]
+) -> Section | None:
     """Return the section of speed and valve opening against command, a tab per joint.
 
     None: no curves.
@@ -65,13 +67,23 @@ def speed_section(settings: FitSettings, summary: FitSummary, logs: Sequence[Log
         cloud = np.hstack(pairs) if pairs else np.empty((2, 0))
         commands = np.concatenate([log.command[:, joint - 1] for log in logs])
         drawing = partial(_speed_chart, name, (speed, opening), commands, cloud)
-        tabs.append(Plot(f"speed_{len(tabs) + 1}", f"{name}: {speed.label}", drawing, button=name))
+        tabs.append(
+            Plot(
+                f"speed_{len(tabs) + 1}", f"{name}: {speed.label}", drawing, button=name
+            )
+        )
         fastest.append(f"{name} {two_digits(max(map(abs, speed.value)))} {speed.unit}")
     if not tabs:
         return None
     title = "Speed and valve against command" if opens else "Speed against command"
     answer = f"fastest: {listed(fastest)}"
-    return Section(title, _SPEED if opens else _SPEED_ALONE, tabs=tuple(tabs), folded=True, answer=answer)
+    return Section(
+        title,
+        _SPEED if opens else _SPEED_ALONE,
+        tabs=tuple(tabs),
+        folded=True,
+        answer=answer,
+    )
 
 
 def step_section(settings: FitSettings, summary: FitSummary) -> Section | None:
@@ -98,11 +110,11 @@ def step_section(settings: FitSettings, summary: FitSummary) -> Section | None:
 
 
 def measured_speeds(log: Log, joint: int, late: float) -> tuple[Array, Array]:
-    """Return commands [%] and speeds [rad/s] of a joint, from 1, where its command stood still,
-    (n,) each.
+    """Return commands [%] and speeds [rad/s] of a joint, from 1, where its command
+    stood still, (n,) each.
 
-    The command is that of `late` [s] before. Stretches of OVER do not overlap; those without a
-    command, and those near an end of the travel, are left out.
+    The command is that of `late` [s] before. Stretches of OVER do not overlap; those
+    without a command, and those near an end of the travel, are left out.
     """
     command = log.command[:, joint - 1]
     angle = log.angle[:, joint - 1]
@@ -124,27 +136,44 @@ def measured_speeds(log: Log, joint: int, late: float) -> tuple[Array, Array]:
 
 
 def _dead_times(name: str, summary: FitSummary) -> list[QuantityEstimate]:
-    """Return the dead times of a joint in both directions, as far as the fit states them."""
-    times = [summary.quantities.get(f"{name}_dead_time_{towards}") for towards in TOWARDS]
+    """Return the dead times of a joint in both directions, as far as the fit states
+    them."""
+    times = [
+        summary.quantities.get(f"{name}_dead_time_{towards}") for towards in TOWARDS
+    ]
     return [one for one in times if one is not None]
 
 
 def _speed_chart(
-    name: str, curves: tuple[CurveEstimate, CurveEstimate | None], commands: Array, measured: Array
+    name: str,
+    curves: tuple[CurveEstimate, CurveEstimate | None],
+    commands: Array,
+    measured: Array,
 ) -> Chart:
-    """Draw speed and opening of a joint over its logged commands, and measured pairs, shape (2, n)."""
+    """Draw speed and opening of a joint over its logged commands, and measured pairs,
+    shape (2, n)."""
     speed, opening = curves
     left = np.array([-105.0, commands.max(initial=0.0)])
     right = np.array([commands.min(initial=0.0), 105.0])
     beyond = Mark("spans", left, end=right, color="pale", alpha=0.4)
     factor = 1e3 if speed.unit.startswith("mm") else np.degrees(1.0)
     command, turning = measured
-    cloud = Mark("points", command, factor * turning, color="ink", label="measured", width=5, alpha=0.35)
+    cloud = Mark(
+        "points",
+        command,
+        factor * turning,
+        color="ink",
+        label="measured",
+        width=5,
+        alpha=0.35,
+    )
     marks = (beyond, *_both_sides(speed), cloud)
     panels = [Panel("", f"speed [{speed.unit}]", marks, f"{name}: {speed.label}", 300)]
     if opening is not None:
         label = f"opening [{opening.unit}]"
-        panels.append(Panel("", label, (beyond, *_both_sides(opening)), opening.label, 200))
+        panels.append(
+            Panel("", label, (beyond, *_both_sides(opening)), opening.label, 200)
+        )
     panels[-1] = replace(panels[-1], x="command [%]")
     return Chart(tuple(panels), linked=True)
 
@@ -157,7 +186,17 @@ def _both_sides(curve: CurveEstimate) -> list[Mark]:
         side = sign * x > 0
         word = "positive" if sign > 0 else "negative"
         label = f"model, {word} command"
-        marks.append(Mark("band", x[side], low[side], high[side], color=color, label=label, alpha=0.25))
+        marks.append(
+            Mark(
+                "band",
+                x[side],
+                low[side],
+                high[side],
+                color=color,
+                label=label,
+                alpha=0.25,
+            )
+        )
         marks.append(Mark("line", x[side], y[side], color=color, label=label))
     return marks
 
@@ -165,20 +204,28 @@ def _both_sides(curve: CurveEstimate) -> list[Mark]:
 def _response_chart(name: str, curves: Mapping[str, CurveEstimate]) -> Chart:
     """Draw what the curves say of one joint in both directions."""
     panels = (
-        _response_panel("speed", f"{name}: step of the command", 250, _towards(name, "step", curves)),
-        _response_panel("amplitude", "frequency response", 200, _towards(name, "amplitude", curves)),
+        _response_panel(
+            "speed", f"{name}: step of the command", 250, _towards(name, "step", curves)
+        ),
+        _response_panel(
+            "amplitude", "frequency response", 200, _towards(name, "amplitude", curves)
+        ),
         _response_panel("phase", "", 200, _towards(name, "phase", curves)),
     )
     return Chart(panels)
 
 
-def _towards(name: str, kind: str, curves: Mapping[str, CurveEstimate]) -> dict[str, CurveEstimate]:
+def _towards(
+    name: str, kind: str, curves: Mapping[str, CurveEstimate]
+) -> dict[str, CurveEstimate]:
     """Return the curves of a kind by the direction of the command."""
     keys = {towards: f"{name}_{kind}_{towards}" for towards in TOWARDS}
     return {towards: curves[key] for towards, key in keys.items() if key in curves}
 
 
-def _response_panel(y: str, title: str, height: int, curves: Mapping[str, CurveEstimate]) -> Panel:
+def _response_panel(
+    y: str, title: str, height: int, curves: Mapping[str, CurveEstimate]
+) -> Panel:
     marks = list[Mark]()
     along, unit = "", ""
     for towards, curve in curves.items():
@@ -195,8 +242,8 @@ def _response_panel(y: str, title: str, height: int, curves: Mapping[str, CurveE
 
 
 def _rows(curve: CurveEstimate) -> Array:
-    """Return places, values, and both ends of the intervals, NaN where there is no limit, shape
-    (4, n).
+    """Return places, values, and both ends of the intervals, NaN where there is no
+    limit, shape (4, n).
     """
     ends = np.array(curve.interval, dtype=float)
     return np.array([curve.at, curve.value, ends[:, 0], ends[:, 1]], dtype=float)

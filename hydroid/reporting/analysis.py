@@ -26,7 +26,9 @@ _PROFILES = (
 )
 
 
-def analysis_page(settings: FitSettings, summary: FitSummary, profiles: Mapping[str, Profile]) -> Page:
+def analysis_page(
+    settings: FitSettings, summary: FitSummary, profiles: Mapping[str, Profile]
+) -> Page:
     """Return the page; its tables are `parameters` and `correlations`."""
     sections = [
         unknown_section(settings, summary),
@@ -39,27 +41,43 @@ def analysis_page(settings: FitSettings, summary: FitSummary, profiles: Mapping[
     warned = tuple(str(in_words(one, settings)) for one in warnings(summary))
     matrix = correlation_table(summary)
     files = {} if matrix is None else {"correlations": matrix}
-    return Page("analysis", "Analysis", lead, tuple(filter(None, sections)), warned, files=files)
+    return Page(
+        "analysis", "Analysis", lead, tuple(filter(None, sections)), warned, files=files
+    )
 
 
-def profile_section(settings: FitSettings, profiles: Mapping[str, Profile]) -> Section | None:
+def profile_section(
+    settings: FitSettings, profiles: Mapping[str, Profile]
+) -> Section | None:
     """Return the section of profiles as curves, a tab for each; None without any."""
     tabs = list[Plot]()
     for name, one in profiles.items():
         unit = settings.parameters[name].unit
         drawing = partial(profile_chart, f"{name} [{unit}]" if unit else name, one)
-        tabs.append(Plot(f"profile_{len(tabs) + 1}", named(settings, name), drawing, button=name))
+        tabs.append(
+            Plot(
+                f"profile_{len(tabs) + 1}", named(settings, name), drawing, button=name
+            )
+        )
     return Section("Profiles", _PROFILES, tabs=tuple(tabs)) if tabs else None
 
 
 def profile_chart(label: str, one: Profile) -> Chart:
-    """Draw the deviance against the values of a parameter, and the line that ends its interval."""
+    """Draw the deviance against the values of a parameter, and the line that ends its
+    interval."""
     values, deviances = one.points.T
     marks = (
-        Mark("rule", y=np.array([THRESHOLD]), color="grey", label="end of the 95 % interval"),
+        Mark(
+            "rule",
+            y=np.array([THRESHOLD]),
+            color="grey",
+            label="end of the 95 % interval",
+        ),
         Mark("line", values, deviances, color="blue", label="deviance"),
         Mark("points", values, deviances, color="blue", width=6, label="deviance"),
     )
     highest = max(3.0 * THRESHOLD, 1.1 * float(np.median(deviances)))
     lowest = min(-0.5, float(deviances.min()))
-    return Chart((Panel(label, "deviance [-]", marks, height=260, y_limits=(lowest, highest)),))
+    return Chart(
+        (Panel(label, "deviance [-]", marks, height=260, y_limits=(lowest, highest)),)
+    )

@@ -2,8 +2,8 @@
 
 The page draws it (`charts.js`), and `figure` as a file.
 
-Colours are named after Okabe and Ito's, which colour-blind readers tell apart; each look of the
-page has its own shade of them.
+Colours are named after Okabe and Ito's, which colour-blind readers tell apart; each
+look of the page has its own shade of them.
 """
 
 from dataclasses import field, replace
@@ -25,14 +25,15 @@ class Mark:
     """One thing drawn in a panel.
 
     Attributes:
-        kind: `line` or `step` through (x, y), with gaps at NaN; `points`; `band` from y to `end`;
-            `spans`, from x to `end` over the whole height; `rule` at a value y; `bars` from x to
-            `end` in row y; `cells` in column x and row y, whose `end`, -1 to 1, is how strongly
-            they are coloured: blue above 0, orange below.
+        kind: `line` or `step` through (x, y), with gaps at NaN; `points`; `band` from y
+            to `end`; `spans`, from x to `end` over the whole height; `rule` at a value
+            y; `bars` from x to `end` in row y; `cells` in column x and row y, whose
+            `end`, -1 to 1, is how strongly they are coloured: blue above 0, orange
+            below.
         x, y, end: as the kind says, shapes (n,).
         color: its name.
-        label: in the legend; marks with one label are shown and hidden together. Empty: not in the
-            legend.
+        label: in the legend; marks with one label are shown and hidden together. Empty:
+            not in the legend.
         width: of a line, or the size of a point [px].
         off: it is hidden until the reader asks for it. Files leave it out.
         alpha: opacity.
@@ -49,10 +50,11 @@ class Mark:
     alpha: float = 1.0
 
     def thinned(self, bins: int) -> "Mark":
-        """Return a curve by the lowest and the highest sample of each of at most `bins` parts.
+        """Return a curve by the lowest and the highest sample of each of at most `bins`
+        parts.
 
-        It is drawn as the whole curve would be. A short curve and what is no curve stay as they
-        are.
+        It is drawn as the whole curve would be. A short curve and what is no curve stay
+        as they are.
         """
         size = -(-len(self.y) // bins)
         curve = self.kind in ("line", "step", "band")
@@ -62,7 +64,9 @@ class Mark:
         keep = [np.array([0, last])]
         for values in (self.y, -self.y, self.end, -self.end):
             if len(values):
-                parts = np.pad(values, (0, -len(values) % size), mode="edge").reshape(-1, size)
+                parts = np.pad(values, (0, -len(values) % size), mode="edge").reshape(
+                    -1, size
+                )
                 lowest = np.where(np.isfinite(parts), parts, np.inf).argmin(axis=1)
                 keep.append(lowest + size * np.arange(len(parts)))
         at = np.unique(np.minimum(np.concatenate(keep), last))
@@ -72,11 +76,12 @@ class Mark:
 
 @record
 class Panel:
-    """A pair of axes, with marks in the order in which they are drawn, and its height in the page
-    [px].
+    """A pair of axes, with marks in the order in which they are drawn, and its height
+    in the page [px].
 
-    `x`, `y` label the axes; `y_limits` None: around all that is drawn. Where there are `rows`,
-    these are the names of y = 0, 1, ..., from the top down; `columns` are those of x.
+    `x`, `y` label the axes; `y_limits` None: around all that is drawn. Where there are
+    `rows`, these are the names of y = 0, 1, ..., from the top down; `columns` are those
+    of x.
     """
 
     x: str
@@ -95,8 +100,8 @@ class Panel:
 class Chart:
     """Panels that belong together, with one legend, one below the other.
 
-    Where `linked`, all share their x axis. Of a curve the lowest and the highest sample of `bins`
-    parts is drawn.
+    Where `linked`, all share their x axis. Of a curve the lowest and the highest sample
+    of `bins` parts is drawn.
     """
 
     panels: tuple[Panel, ...]

@@ -35,12 +35,15 @@ def correlations(covariance: Covariance) -> Array:
 
 
 def correlation_table(summary: FitSummary) -> Table | None:
-    """Return the correlations as a table, for scripts; None: the summary has no covariance."""
+    """Return the correlations as a table, for scripts; None: the summary has no
+    covariance."""
     known = summary.covariance
     if known is None or not known.parameters:
         return None
     rows = zip(known.parameters, correlations(known).tolist(), strict=True)
-    return Table("", ("symbol", *known.parameters), tuple((name, *row) for name, row in rows))
+    return Table(
+        "", ("symbol", *known.parameters), tuple((name, *row) for name, row in rows)
+    )
 
 
 def correlation_section(settings: FitSettings, summary: FitSummary) -> Section | None:
@@ -59,7 +62,11 @@ def correlation_section(settings: FitSettings, summary: FitSummary) -> Section |
         f"{named(settings, first)} and {named(settings, second)}: {_signed(value)}"
         for first, second, value in pairs
     )
-    plot = Plot("correlation", "Correlations of the estimates.", partial(correlation_map, matrix, names))
+    plot = Plot(
+        "correlation",
+        "Correlations of the estimates.",
+        partial(correlation_map, matrix, names),
+    )
     answer = "no pair is strongly correlated"
     if points:
         first, second, value = pairs[0]
@@ -69,7 +76,8 @@ def correlation_section(settings: FitSettings, summary: FitSummary) -> Section |
 
 
 def strongest(matrix: Array, names: tuple[str, ...]) -> list[tuple[str, str, float]]:
-    """Return the pairs of the strongest correlations, from STRONG on, the strongest first."""
+    """Return the pairs of the strongest correlations, from STRONG on, the strongest
+    first."""
     rows, columns = np.tril_indices(len(matrix), -1)
     values = matrix[rows, columns]
     order = np.argsort(-np.abs(values), kind="stable")[:MOST]
@@ -87,8 +95,8 @@ def correlation_map(matrix: Array, names: tuple[str, ...]) -> Chart:
 
 
 def _by_joint(settings: FitSettings, names: tuple[str, ...]) -> list[int]:
-    """Return the places of parameters in the order of their joints, so that those of one stand
-    together.
+    """Return the places of parameters in the order of their joints, so that those of
+    one stand together.
     """
 
     def joint(i: int) -> int:

@@ -1,4 +1,5 @@
-"""The page of commands along a path: predicted errors, where a wish cannot be had, the arm in motion."""
+"""The page of commands along a path: predicted errors, where a wish cannot be had, the
+arm in motion."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -27,15 +28,21 @@ def follow_page(name: str, followed: Followed, arm: Arm) -> Page:
     """Return the page; its file has the `name`, its table is `tracking`."""
     table = tracking_table(followed, arm)
     columns = [joint - 1 for joint in followed.joints]
-    moving = Prediction(name, followed.log, followed.joints, followed.angle[:, columns], {}, None)
+    moving = Prediction(
+        name, followed.log, followed.joints, followed.angle[:, columns], {}, None
+    )
     motion = motion_section(arm, {"the path": moving}, _MOTION)
     tabs = list[Plot]()
     for joint in followed.joints:
         name_of_joint = arm.joint_names[joint - 1]
         draw = partial(_chart, followed, joint, arm)
-        tabs.append(Plot(f"joint_{joint}", name_of_joint, draw, zoom=True, button=name_of_joint))
+        tabs.append(
+            Plot(f"joint_{joint}", name_of_joint, draw, zoom=True, button=name_of_joint)
+        )
     sections = (
-        Section(table.title, "", tuple(missed_lines(followed, arm)), {"tracking": table}),
+        Section(
+            table.title, "", tuple(missed_lines(followed, arm)), {"tracking": table}
+        ),
         *([motion] if motion else []),
         Section(
             "Joint by joint",
@@ -54,7 +61,15 @@ def tracking_table(followed: Followed, arm: Arm) -> Table:
         error, wide = (factor * size for size in followed.rms(joint))
         command = followed.log.command[:, joint - 1]
         full = 100.0 * float(np.mean(np.abs(command) >= 100.0))
-        rows.append((arm.joint_names[joint - 1], unit, error, wide if np.isfinite(wide) else None, full))
+        rows.append(
+            (
+                arm.joint_names[joint - 1],
+                unit,
+                error,
+                wide if np.isfinite(wide) else None,
+                full,
+            )
+        )
     header = ("joint", "unit", "error", "with its band", "full command [% of time]")
     return Table("Predicted tracking error", header, tuple(rows), _NOTE)
 
@@ -105,7 +120,15 @@ def _chart(followed: Followed, joint: int, arm: Arm) -> Chart:
     if (half := followed.half.get(joint)) is not None and np.isfinite(half).all():
         wide = factor * half
         middle.append(
-            Mark("band", time, error - wide, error + wide, color="orange", label="95 % band", alpha=0.18)
+            Mark(
+                "band",
+                time,
+                error - wide,
+                error + wide,
+                color="orange",
+                label="95 % band",
+                alpha=0.18,
+            )
         )
     middle.append(Mark("line", time, error, color="orange", label="predicted", width=1))
     command = Mark("step", time, followed.log.command[:, column], color="grey")
@@ -129,4 +152,6 @@ def _shaded(spans: Sequence[Missed], lead: float) -> list[Mark]:
         return []
     begin = np.array([one.from_s for one in spans]) - lead
     end = np.array([one.to_s for one in spans]) - lead
-    return [Mark("spans", x=begin, end=end, color="pink", label="cannot be had", alpha=0.3)]
+    return [
+        Mark("spans", x=begin, end=end, color="pink", label="cannot be had", alpha=0.3)
+    ]

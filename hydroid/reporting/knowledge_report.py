@@ -1,4 +1,5 @@
-"""What a fit knows of the machine, what it does not know, and how sure a prediction can be."""
+"""What a fit knows of the machine, what it does not know, and how sure a prediction can
+be."""
 
 from typing import Any
 
@@ -10,7 +11,8 @@ from hydroid.settings.fit import FitSettings
 from hydroid.words import interval_words, listed, two_digits
 
 BEST_WITHIN = 0.3
-"""half of a 95 % interval, relative to the value, up to which a property counts as known"""
+"""half of a 95 % interval, relative to the value, up to which a property counts as
+known"""
 MOST_KNOWN = 5
 """quantities of a joint that a page shows"""
 MOST_UNKNOWN = 6
@@ -29,7 +31,9 @@ def unknown_section(settings: FitSettings, summary: FitSummary) -> Section:
 
     Which parameters cannot be told apart, their correlations show.
     """
-    points = tuple(str(in_words(one, settings)) for one in _others(summary)[:MOST_UNKNOWN])
+    points = tuple(
+        str(in_words(one, settings)) for one in _others(summary)[:MOST_UNKNOWN]
+    )
     none = "" if points else "The logs determine every free parameter."
     return Section("What is not known", none, points)
 
@@ -41,7 +45,11 @@ def further_findings(summary: FitSummary) -> tuple[str, ...]:
 
 def _others(summary: FitSummary) -> list[Finding]:
     first = warnings(summary)
-    return [one for one in summary.findings if one not in first and one.kind != "combination"]
+    return [
+        one
+        for one in summary.findings
+        if one not in first and one.kind != "combination"
+    ]
 
 
 def quantity_section(settings: FitSettings, summary: FitSummary) -> Section | None:
@@ -51,20 +59,30 @@ def quantity_section(settings: FitSettings, summary: FitSummary) -> Section | No
     """
     cards = dict[str, Table]()
     for joint in settings.outputs:
-        known = [q for q in summary.quantities.values() if q.joint == joint and q.within <= BEST_WITHIN]
+        known = [
+            q
+            for q in summary.quantities.values()
+            if q.joint == joint and q.within <= BEST_WITHIN
+        ]
         known.sort(key=lambda one: one.within)
-        rows = [(q.label, f"{q.value:.3g}", q.unit, _within(q)) for q in known[:MOST_KNOWN]]
+        rows = [
+            (q.label, f"{q.value:.3g}", q.unit, _within(q)) for q in known[:MOST_KNOWN]
+        ]
         name = settings.arm.joint_names[joint - 1]
         if rows:
-            cards[f"known_{name}"] = Table(name, ("quantity", "value", "unit", "interval"), tuple(rows))
+            cards[f"known_{name}"] = Table(
+                name, ("quantity", "value", "unit", "interval"), tuple(rows)
+            )
     text = (
-        "With 95 % intervals, which are right only if the model is right. estimate.yaml has all quantities."
+        "With 95 % intervals, which are right only if the model is right. "
+        "estimate.yaml has all quantities."
     )
     return Section("What is known", text, cards=cards) if cards else None
 
 
 def _within(one: QuantityEstimate) -> str:
-    """Write an interval: of a percentage its ends, since ± 3 % of 40 % could mean either."""
+    """Write an interval: of a percentage its ends, since ± 3 % of 40 % could mean
+    either."""
     low, high = one.interval
     if one.unit == "%" and low is not None and high is not None:
         return f"{interval_words(low, high)} %"
@@ -109,4 +127,6 @@ def error_section(settings: FitSettings, summary: FitSummary) -> Section | None:
         "of the model, not the sensor's; empty: nothing lasts."
     )
     table = Table.of("", {name: name for name in rows[0]}, rows, note)
-    return Section("How sure a prediction can be", text, tables={"prediction_errors": table})
+    return Section(
+        "How sure a prediction can be", text, tables={"prediction_errors": table}
+    )

@@ -1,9 +1,10 @@
-"""The arm in motion, as a page draws it: the measured arm, and over it the simulated one.
+"""The arm in motion, as a page draws it: the measured arm, and over it the simulated
+one.
 
-A page gets the corners of each link once, and for each moment how its rigid parts are turned and
-moved in the world, and where a camera looks. Its script (`moving_arm.js`) draws both arms. The
-camera from the side turns with the machine, so that a slew never hides the arm behind itself;
-another one looks down on it.
+A page gets the corners of each link once, and for each moment how its rigid parts are
+turned and moved in the world, and where a camera looks. Its script (`moving_arm.js`)
+draws both arms. The camera from the side turns with the machine, so that a slew never
+hides the arm behind itself; another one looks down on it.
 """
 
 from collections.abc import Sequence
@@ -21,14 +22,17 @@ MOST = 1200
 RATE = 10.0
 """moments in a second; the page draws what lies between them"""
 SIDE = 112.0, -16.0
-"""where a camera looks to that sees an arm along x from its side: azimuth and elevation [deg]"""
+"""where a camera looks to that sees an arm along x from its side: azimuth and elevation
+[deg]"""
 UPRIGHT = 0.99
-"""part of an axis's direction that points upwards, from which on its joint slews the machine"""
+"""part of an axis's direction that points upwards, from which on its joint slews the
+machine"""
 SLEWS = np.radians(1.0)
 """turn of the machine from which on it is shown from above, too [rad]"""
 REACH = 0.05
 """part of the arm's size that it must reach sideways for its direction to be known"""
-_SIZE, _MARGIN = 1000, 30  # longer side of the picture from the side, and what stays free around the arm
+# longer side of the picture from the side, and what stays free around the arm
+_SIZE, _MARGIN = 1000, 30
 
 
 @record
@@ -37,8 +41,8 @@ class View:
 
     Attributes:
         size: of its picture, width and height.
-        axes: what points to the right and downwards in the picture, shape (F, 6); (1, 6) of a
-            camera that does not turn.
+        axes: what points to the right and downwards in the picture, shape (F, 6); (1,
+            6) of a camera that does not turn.
         corner: what is added to that [1], shape (2,).
         order: the shapes, the farthest first.
     """
@@ -56,11 +60,11 @@ class MovingArm:
     Attributes:
         shapes: each with the number of its rigid part as its body.
         time: of the moments [s], shape (F,).
-        poses: `measured` and `simulated`: rows of the 3 × 4 turn and place [m] of each part, shape
-            (parts, F, 12), or (1, 12) for one that stands still.
+        poses: `measured` and `simulated`: rows of the 3 × 4 turn and place [m] of each
+            part, shape (parts, F, 12), or (1, 12) for one that stands still.
         views: from the `side`, and from `above` if the machine slews.
-        errors: measured minus simulated angle by the joint's name [°], of one that slides [mm],
-            shape (F,).
+        errors: measured minus simulated angle by the joint's name [°], of one that
+            slides [mm], shape (F,).
         units: of the errors, by name.
         start: number of the moment with the largest error.
     """
@@ -75,9 +79,13 @@ class MovingArm:
 
 
 def moving_arm(
-    model: mujoco.MjModel, names: Sequence[str], prediction: Prediction, most: int = MOST
+    model: mujoco.MjModel,
+    names: Sequence[str],
+    prediction: Prediction,
+    most: int = MOST,
 ) -> MovingArm:
-    """Return how an arm with joints of these names moves, at `most` moments or fewer."""
+    """Return how an arm with joints of these names moves, at `most` moments or
+    fewer."""
     log = prediction.log
     compared = [joint - 1 for joint in prediction.joints]
     measured = log.posed
@@ -89,12 +97,20 @@ def moving_arm(
     parts = sorted(set(roots))
     count = int(np.clip(RATE * np.ptp(log.time) + 1, 2, most))
     moments = np.unique(np.linspace(0, len(log.time) - 1, count).round().astype(int))
-    poses = np.stack([body_poses(model, angle[moments]) for angle in (measured, simulated)])
+    poses = np.stack(
+        [body_poses(model, angle[moments]) for angle in (measured, simulated)]
+    )
 
     outlines = _rigid_parts(model, poses[1, 0], roots, parts)
-    placed = np.concatenate([one.placed(poses[:, :, parts]) for one in outlines], axis=2)
+    placed = np.concatenate(
+        [one.placed(poses[:, :, parts]) for one in outlines], axis=2
+    )
     heading = _heading(model, measured[moments])
-    side = _view(outlines, placed, [sight(SIDE[0] + np.degrees(turn), SIDE[1]) for turn in heading])
+    side = _view(
+        outlines,
+        placed,
+        [sight(SIDE[0] + np.degrees(turn), SIDE[1]) for turn in heading],
+    )
     views = {"side": side}
     if np.ptp(heading) > SLEWS:
         scale = float(np.linalg.norm(side.axes[0, :3]))
@@ -103,15 +119,17 @@ def moving_arm(
     lying = dict[str, list[Array]]()
     for name, arm in zip(("measured", "simulated"), poses[:, :, parts], strict=True):
         rows = arm.reshape(len(moments), len(parts), 12).swapaxes(0, 1)
-        lying[name] = [part if np.ptp(part, axis=0).any() else part[:1] for part in rows]
+        lying[name] = [
+            part if np.ptp(part, axis=0).any() else part[:1] for part in rows
+        ]
     errors, units = _errors(model, names, compared, error[moments])
     worst = int(np.abs([*errors.values()]).max(axis=0).argmax())
     return MovingArm(outlines, log.time[moments], lying, views, errors, units, worst)
 
 
 def _roots(model: mujoco.MjModel, moves: Array) -> list[int]:
-    """Return the body that each body turns with: itself if its joint `moves`, or one that carries
-    it.
+    """Return the body that each body turns with: itself if its joint `moves`, or one
+    that carries it.
     """
     moving = {0, *model.jnt_bodyid[moves].tolist()}
     roots = list[int]()
@@ -120,9 +138,11 @@ def _roots(model: mujoco.MjModel, moves: Array) -> list[int]:
     return roots
 
 
-def _rigid_parts(model: mujoco.MjModel, start: Array, roots: list[int], parts: list[int]) -> list[Shape]:
-    """Return all shapes in the frames of their rigid parts, from the poses at the start,
-    (nbody, 3, 4).
+def _rigid_parts(
+    model: mujoco.MjModel, start: Array, roots: list[int], parts: list[int]
+) -> list[Shape]:
+    """Return all shapes in the frames of their rigid parts, from the poses at the
+    start, (nbody, 3, 4).
     """
     outlines = list[Shape]()
     for shape in shapes(model):
@@ -133,9 +153,11 @@ def _rigid_parts(model: mujoco.MjModel, start: Array, roots: list[int], parts: l
 
 
 def _heading(model: mujoco.MjModel, angles: Array) -> Array:
-    """Return the direction that the machine faces at angles of all joints, (F, nq) -> (F,) [rad].
+    """Return the direction that the machine faces at angles of all joints, (F, nq) ->
+    (F,) [rad].
 
-    It is that of the arm at the start, and turns with the upright joints that carry all others.
+    It is that of the arm at the start, and turns with the upright joints that carry all
+    others.
     """
     data = mujoco.MjData(model)
     data.qpos[:] = angles[0]
@@ -143,7 +165,10 @@ def _heading(model: mujoco.MjModel, angles: Array) -> Array:
     turned = np.zeros(len(angles))
     base = data.xanchor[0]
     for joint in range(model.njnt):
-        if model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_HINGE or abs(data.xaxis[joint, 2]) < UPRIGHT:
+        if (
+            model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_HINGE
+            or abs(data.xaxis[joint, 2]) < UPRIGHT
+        ):
             break
         turned += np.sign(data.xaxis[joint, 2]) * (angles[:, joint] - angles[0, joint])
         base = data.xanchor[joint]
@@ -154,14 +179,22 @@ def _heading(model: mujoco.MjModel, angles: Array) -> Array:
     return turned + (np.arctan2(reach[1], reach[0]) if known else 0.0)
 
 
-def _view(outlines: Sequence[Shape], placed: Array, cameras: Sequence[Array], scale: float = 0.0) -> View:
-    """Return what a camera sees of corners [m], (2, F, n, 3), that looks (right, up, ahead) at each
-    moment.
+def _view(
+    outlines: Sequence[Shape],
+    placed: Array,
+    cameras: Sequence[Array],
+    scale: float = 0.0,
+) -> View:
+    """Return what a camera sees of corners [m], (2, F, n, 3), that looks (right, up,
+    ahead) at each moment.
 
     scale: of the picture [1/m]; 0: so that it is as large as it may be.
     """
-    axes = np.stack([camera[:2] for camera in cameras]) * np.array([[1.0], [-1.0]])  # y points down
-    seen = np.einsum("fij,afnj->afni" if len(cameras) > 1 else "gij,afnj->afni", axes, placed)
+    # y points down
+    axes = np.stack([camera[:2] for camera in cameras]) * np.array([[1.0], [-1.0]])
+    seen = np.einsum(
+        "fij,afnj->afni" if len(cameras) > 1 else "gij,afnj->afni", axes, placed
+    )
     low, high = seen.min(axis=(0, 1, 2)), seen.max(axis=(0, 1, 2))
     scale = scale or (_SIZE - 2 * _MARGIN) / float(max(high - low))
     width, height = (scale * (high - low) + 2 * _MARGIN).round().astype(int).tolist()
@@ -172,14 +205,19 @@ def _view(outlines: Sequence[Shape], placed: Array, cameras: Sequence[Array], sc
         depths.append(float((corners @ cameras[0][2]).mean()))
         first += len(outline.corners)
     farthest_first = sorted(range(len(outlines)), key=lambda i: -depths[i])
-    return View((width, height), scale * axes.reshape(-1, 6), _MARGIN - scale * low, farthest_first)
+    return View(
+        (width, height),
+        scale * axes.reshape(-1, 6),
+        _MARGIN - scale * low,
+        farthest_first,
+    )
 
 
 def _errors(
     model: mujoco.MjModel, names: Sequence[str], compared: Sequence[int], error: Array
 ) -> tuple[dict[str, Array], dict[str, str]]:
-    """Return the errors of the compared joints [°, mm] and their units, by name, from [rad, m],
-    (F, nq).
+    """Return the errors of the compared joints [°, mm] and their units, by name, from
+    [rad, m], (F, nq).
     """
     errors = dict[str, Array]()
     units = dict[str, str]()

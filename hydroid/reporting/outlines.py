@@ -1,4 +1,5 @@
-"""The arm as outlines, without a renderer: the corners of its links, and where they are in poses."""
+"""The arm as outlines, without a renderer: the corners of its links, and where they are
+in poses."""
 
 import mujoco
 import numpy as np
@@ -10,13 +11,15 @@ from hydroid.cad.source import SHOWN
 
 @record
 class Shape:
-    """A shape of a body: its outermost corners in the body's frame [m], shape (n, 3)."""
+    """A shape of a body: its outermost corners in the body's frame [m], shape (n,
+    3)."""
 
     body: int
     corners: Array
 
     def placed(self, poses: Array) -> Array:
-        """Return the corners in poses of all bodies, (..., nbody, d, 4) -> (..., n, d)."""
+        """Return the corners in poses of all bodies, (..., nbody, d, 4) -> (..., n,
+        d)."""
         return placed(self.corners, poses[..., self.body, :, :])
 
 
@@ -26,7 +29,8 @@ def placed(corners: Array, pose: Array) -> Array:
 
 
 def shapes(model: mujoco.MjModel) -> list[Shape]:
-    """Return the shapes of all bodies; of an arm without any, lines from body to body."""
+    """Return the shapes of all bodies; of an arm without any, lines from body to
+    body."""
     directions = trimesh.creation.icosphere(subdivisions=1).vertices.T
     found: list[Shape] = []
     for geom in np.flatnonzero(model.geom_group <= SHOWN).tolist():
@@ -53,8 +57,8 @@ def body_poses(model: mujoco.MjModel, angles: Array) -> Array:
 
 
 def sight(azimuth: float, elevation: float) -> Array:
-    """Return to the right, up and ahead for a camera that looks to these angles [deg], rows of
-    (3, 3).
+    """Return to the right, up and ahead for a camera that looks to these angles [deg],
+    rows of (3, 3).
     """
     a, e = np.radians([azimuth, elevation])
     ahead = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
@@ -90,8 +94,12 @@ def _points(model: mujoco.MjModel, geom: int) -> Array | None:
         case kinds.mjGEOM_SPHERE | kinds.mjGEOM_ELLIPSOID:
             return make.icosphere(subdivisions=2).vertices * model.geom_aabb[geom, 3:]
         case kinds.mjGEOM_CYLINDER:
-            return make.cylinder(radius=size[0], height=2 * size[1], sections=24).vertices
+            return make.cylinder(
+                radius=size[0], height=2 * size[1], sections=24
+            ).vertices
         case kinds.mjGEOM_CAPSULE:
-            return make.capsule(radius=size[0], height=2 * size[1], count=[16, 16]).vertices
+            return make.capsule(
+                radius=size[0], height=2 * size[1], count=[16, 16]
+            ).vertices
         case _:
             return None

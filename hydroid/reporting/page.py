@@ -28,15 +28,16 @@ Cell = str | int | float | None  # text, a count, a measured number, or nothing
 
 
 class Given(float):
-    """A number from the user, such as a bound: it is shown as given, not rounded to three digits."""
+    """A number from the user, such as a bound: it is shown as given, not rounded to
+    three digits."""
 
 
 @record
 class Table:
     """A table; each row has one cell per column of the header.
 
-    The note stands below it. A narrow terminal leaves out `optional` columns, the least important
-    first.
+    The note stands below it. A narrow terminal leaves out `optional` columns, the least
+    important first.
     """
 
     title: str
@@ -62,7 +63,8 @@ class Table:
         return cls(title, tuple(columns.values()), cells, note, optional)
 
     def csv(self) -> str:
-        """Return header and rows with every bit of the numbers, without title and note."""
+        """Return header and rows with every bit of the numbers, without title and
+        note."""
         return csv_text([self.header, *self.rows])
 
     def show(self) -> None:
@@ -70,8 +72,8 @@ class Table:
 
         Elsewhere lines have any length.
 
-        Columns of text wrap at words. Where that does not suffice, `optional` columns are named
-        below it instead.
+        Columns of text wrap at words. Where that does not suffice, `optional` columns
+        are named below it instead.
         """
         from rich.console import Console
 
@@ -92,11 +94,13 @@ class Table:
         """The text of each cell for a reader."""
         return [[shown(cell) for cell in row] for row in self.rows]
 
-    def aligned(self, digit: str = FIGURE_SPACE, point: str = POINT_SPACE) -> list[list[str]]:
+    def aligned(
+        self, digit: str = FIGURE_SPACE, point: str = POINT_SPACE
+    ) -> list[list[str]]:
         """Return `shown` with numbers under each other at the point.
 
-        The blanks are as wide as a digit and a point. A column of text is aligned where each of its
-        cells begins with a number.
+        The blanks are as wide as a digit and a point. A column of text is aligned where
+        each of its cells begins with a number.
         """
         columns = list[list[str]]()
         for i, right in enumerate(self.numeric):
@@ -113,7 +117,9 @@ class Table:
     @cached_property
     def short(self) -> tuple[bool, ...]:
         """Columns of text whose cells are too short to be broken into lines."""
-        columns = zip(*self.shown, strict=True) if self.rows else [()] * len(self.header)
+        columns = (
+            zip(*self.shown, strict=True) if self.rows else [()] * len(self.header)
+        )
         return tuple(max(map(len, column), default=0) <= SHORT for column in columns)
 
     def _rich(self, left_out: Sequence[str]) -> "rich.table.Table":
@@ -122,9 +128,17 @@ class Table:
         from rich.table import Table as RichTable
         from rich.text import Text
 
-        note = f"{self.note} Left out for width: {', '.join(left_out)}." if left_out else self.note
+        note = (
+            f"{self.note} Left out for width: {', '.join(left_out)}."
+            if left_out
+            else self.note
+        )
         # Text, not str: rich would read [deg] as markup
-        table = RichTable(title=Text(self.title), caption=Text(note) if note else None, box=box.SIMPLE_HEAD)
+        table = RichTable(
+            title=Text(self.title),
+            caption=Text(note) if note else None,
+            box=box.SIMPLE_HEAD,
+        )
         table.padding, table.pad_edge, table.show_edge = (0, 1, 0, 0), False, False
         table.title_justify = table.caption_justify = "left"
         kept = [i for i, name in enumerate(self.header) if name not in left_out]
@@ -134,8 +148,10 @@ class Table:
             table.add_column(
                 Text(name.replace(" ", "\n") if right else name),
                 justify="right" if right else "left",
-                no_wrap=right,  # rich wraps words where room is short, but never numbers
-                min_width=None if right else min(widest, 18),  # before that optional columns go
+                # rich wraps words where room is short, but never numbers
+                no_wrap=right,
+                # before that optional columns go
+                min_width=None if right else min(widest, 18),
                 overflow="fold",
             )
         for row in self.aligned(" ", " "):
@@ -144,11 +160,13 @@ class Table:
 
 
 def _aligned(cells: list[str], digit: str, point: str, *, right: bool) -> list[str]:
-    """Return the cells of a column, which stands at the `right` or left, with their numbers at the
-    point.
+    """Return the cells of a column, which stands at the `right` or left, with their
+    numbers at the point.
     """
     numbers = [_NUMBER.match(cell) for cell in cells]
-    if not right and any(cell and not number for cell, number in zip(cells, numbers, strict=True)):
+    if not right and any(
+        cell and not number for cell, number in zip(cells, numbers, strict=True)
+    ):
         return cells
     parts = [number.groups("") if number else ("", "") for number in numbers]
     widest = max((len(whole) for whole, _ in parts), default=0)
@@ -173,12 +191,13 @@ def shown(cell: Cell) -> str:
 
 @record
 class Plot:
-    """A figure: its name on the page, what it shows in words, and the function that makes it.
+    """A figure: its name on the page, what it shows in words, and the function that
+    makes it.
 
     That returns a `Chart`, which the page shows with buttons to zoom it if `zoom`, or a
-    `MovingArm`. Of several figures of which a reader sees one at a time, `button` chooses it. The
-    button stands in a `row` and a `column`, where these are given; its `state` (`good`, `fair`,
-    `bad`) gives the colour.
+    `MovingArm`. Of several figures of which a reader sees one at a time, `button`
+    chooses it. The button stands in a `row` and a `column`, where these are given; its
+    `state` (`good`, `fair`, `bad`) gives the colour.
     """
 
     name: str
@@ -197,10 +216,10 @@ class Section:
 
     Folded sections open on demand.
 
-    Of the figures `beside`, which a note explains, the one of the row of the chosen tab is shown. A
-    folded section says its `answer` beside its heading, and stands on paper if it is `printed`.
-    `steps` are findings that say what to do and what it would bring; their number `command` does
-    it. `cards` are small tables side by side.
+    Of the figures `beside`, which a note explains, the one of the row of the chosen tab
+    is shown. A folded section says its `answer` beside its heading, and stands on paper
+    if it is `printed`. `steps` are findings that say what to do and what it would
+    bring; their number `command` does it. `cards` are small tables side by side.
     """
 
     title: str
@@ -224,10 +243,10 @@ class Page:
 
     Its file has the `name`, and an ending.
 
-    `warnings` must be read before using the answer, and stand behind the first section. What the
-    page was `made_from` and `versions` of the software stand at the foot. `data` are further files
-    by name, such as CSV for scripts; `files` are tables that stand in files alone, in place of
-    shorter ones of their names.
+    `warnings` must be read before using the answer, and stand behind the first section.
+    What the page was `made_from` and `versions` of the software stand at the foot.
+    `data` are further files by name, such as CSV for scripts; `files` are tables that
+    stand in files alone, in place of shorter ones of their names.
     """
 
     name: str
@@ -258,12 +277,18 @@ class Page:
 def log_names(sources: Iterable[str]) -> dict[str, str]:
     """Return short names of logs, all different, by their sources."""
     sources = list(sources)
-    return dict(zip(sources, numbered(short_name(Path(s).name or s) for s in sources), strict=True))
+    return dict(
+        zip(
+            sources,
+            numbered(short_name(Path(s).name or s) for s in sources),
+            strict=True,
+        )
+    )
 
 
 def short_name(name: str) -> str:
-    """Return a name with unprintable characters replaced and the middle of one over 40 letters left
-    out.
+    """Return a name with unprintable characters replaced and the middle of one over 40
+    letters left out.
     """
     text = "".join(c if c.isprintable() else "?" for c in name)
     return text if len(text) <= 40 else f"{text[:19]}…{text[-20:]}"

@@ -1,6 +1,8 @@
-"""A report as files: one page that loads nothing, tables, and data; and its charts as figures.
+"""A report as files: one page that loads nothing, tables, and data; and its charts as
+figures.
 
-The page is one HTML file: it carries its charts as data, with the script of Bokeh that draws them.
+The page is one HTML file: it carries its charts as data, with the script of Bokeh that
+draws them.
 """
 
 import base64
@@ -24,15 +26,19 @@ from hydroid.words import distinct
 
 
 def write_page(page: Page, out: Path) -> Path:
-    """Write a report to the folder `out`: its tables as CSV, its data, and last the page."""
-    return write_tables(page.tables, out, **page.data, **{f"{page.name}.html": html(page)})
+    """Write a report to the folder `out`: its tables as CSV, its data, and last the
+    page."""
+    return write_tables(
+        page.tables, out, **page.data, **{f"{page.name}.html": html(page)}
+    )
 
 
 def write_tables(tables: Mapping[str, Table], out: Path, **more: str) -> Path:
-    """Write tables as CSV, to tables/ in the folder `out`, and more files by name; return the last.
+    """Write tables as CSV, to tables/ in the folder `out`, and more files by name;
+    return the last.
 
-    A table's name, which may hold a joint's, leads nowhere else: what is no letter or digit becomes
-    `_`.
+    A table's name, which may hold a joint's, leads nowhere else: what is no letter or
+    digit becomes `_`.
     """
     content, taken = dict[str, str](), set[str]()
     for name, table in tables.items():
@@ -45,7 +51,8 @@ def write_tables(tables: Mapping[str, Table], out: Path, **more: str) -> Path:
 
 
 def write_figures(page: Page, out: Path) -> list[Path]:
-    """Write every chart of a page to the folder `out` as PNG and SVG; return the files."""
+    """Write every chart of a page to the folder `out` as PNG and SVG; return the
+    files."""
     from hydroid.reporting.figure import figure, saved, style
 
     written: list[Path] = []
@@ -68,7 +75,9 @@ def plain(drawn: Any) -> Any:
         case Chart():
             return vars(drawn.thinned())
         case np.ndarray() if drawn.ndim == 1:
-            return [float(f"{v:.5g}") if math.isfinite(v) else None for v in drawn.tolist()]
+            return [
+                float(f"{v:.5g}") if math.isfinite(v) else None for v in drawn.tolist()
+            ]
         case np.ndarray():
             return list(drawn)
         case _:
@@ -79,7 +88,9 @@ def html(page: Page) -> str:
     """Return the page as one file."""
     drawings = {plot.name: plot.draw() for plot in page.plots}
     charts = {name for name, drawing in drawings.items() if isinstance(drawing, Chart)}
-    content = _packed(json.dumps(drawings, default=plain, ensure_ascii=False, separators=(",", ":")))
+    content = _packed(
+        json.dumps(drawings, default=plain, ensure_ascii=False, separators=(",", ":"))
+    )
     scripts = [_script(), *([_library()] if charts else [])]
     return fill_template(
         "reporting/template.html.j2",
@@ -93,11 +104,15 @@ def html(page: Page) -> str:
 
 
 def _policy(*scripts: str) -> str:
-    """Return what a browser may run and load: these scripts, to the last letter, and nothing else.
+    """Return what a browser may run and load: these scripts, to the last letter, and
+    nothing else.
 
     A name that got into the page as HTML in spite of all care could then do nothing.
     """
-    hashes = (base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in scripts)
+    hashes = (
+        base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+        for script in scripts
+    )
     allowed = " ".join(f"'sha256-{one}'" for one in hashes)
     return (
         f"default-src 'none'; script-src {allowed}; style-src 'unsafe-inline'; img-src data:; "
@@ -109,14 +124,20 @@ def _policy(*scripts: str) -> str:
 def _script() -> str:
     """The page's own script."""
     folder = files("hydroid").joinpath("reporting")
-    return "\n".join(folder.joinpath(name).read_text("utf-8") for name in ("moving_arm.js", "charts.js"))
+    return "\n".join(
+        folder.joinpath(name).read_text("utf-8")
+        for name in ("moving_arm.js", "charts.js")
+    )
 
 
 @cache
 def _library() -> str:
     """Bokeh's scripts, from the installed package."""
     folder = files("bokeh").joinpath("server", "static", "js")
-    scripts = (folder.joinpath(name).read_text("utf-8") for name in ("bokeh.min.js", "bokeh-api.min.js"))
+    scripts = (
+        folder.joinpath(name).read_text("utf-8")
+        for name in ("bokeh.min.js", "bokeh-api.min.js")
+    )
     return ";\n".join(scripts)
 
 

@@ -1,4 +1,5 @@
-"""The parameters of a fit: their table, in words, and what the logs made of their priors."""
+"""The parameters of a fit: their table, in words, and what the logs made of their
+priors."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -37,7 +38,9 @@ _PRIORS = (
 )
 
 
-def parameter_section(settings: FitSettings, summary: FitSummary, *points: str) -> Section:
+def parameter_section(
+    settings: FitSettings, summary: FitSummary, *points: str
+) -> Section:
     """Return the section of all parameters. `points` are said first.
 
     It stands on paper even where it is folded.
@@ -46,11 +49,14 @@ def parameter_section(settings: FitSettings, summary: FitSummary, *points: str) 
     free = {p.quantity for p in settings.parameters.values() if p.fixed is None}
     supplied = "supply_pressure" in free or settings.objective.pressure_weight
     if settings.stage == "hyd" and not supplied:
-        supply = number(settings.hydraulics.supply_pressure)  # without pressures in the log only p A is known
+        # without pressures in the log only p A is known
+        supply = number(settings.hydraulics.supply_pressure)
         text = f"Areas, masses, torques and flows hold for the given supply of {supply} bar."
     tables = {"parameters": short_table(settings, summary)}
     answer = known_of_free(summary)
-    return Section("Parameters", text, points, tables, folded=True, answer=answer, printed=True)
+    return Section(
+        "Parameters", text, points, tables, folded=True, answer=answer, printed=True
+    )
 
 
 def known_of_free(summary: FitSummary) -> str:
@@ -75,9 +81,20 @@ def prior_section(settings: FitSettings, summary: FitSummary) -> Section | None:
 
 
 def short_table(settings: FitSettings, summary: FitSummary) -> Table:
-    """Return one line per parameter for a reader: `parameter_table` has bounds and more digits."""
+    """Return one line per parameter for a reader: `parameter_table` has bounds and more
+    digits."""
     by_log = ("by log",) if summary.left_out_deg else ()
-    header = ("joint", "side", "quantity", "symbol", "value", "unit", "interval", *by_log, "source")
+    header = (
+        "joint",
+        "side",
+        "quantity",
+        "symbol",
+        "value",
+        "unit",
+        "interval",
+        *by_log,
+        "source",
+    )
     rows = list[tuple[Cell, ...]]()
     for name, one in summary.estimate.items():
         what, side = quantity_and_side(settings, name)
@@ -86,21 +103,36 @@ def short_table(settings: FitSettings, summary: FitSummary) -> Table:
         share = ""
         if one.source == Source.BOTH and one.data_share:
             share = f" ({100 * one.data_share:.0f} %)"
-        rows.append((*said, one.value, one.unit, interval_words(*one.interval), *logs, origin(one) + share))
+        rows.append(
+            (
+                *said,
+                one.value,
+                one.unit,
+                interval_words(*one.interval),
+                *logs,
+                origin(one) + share,
+            )
+        )
     note = "interval: of 95 %; by log: the same, from the differences between logs."
     return Table("Parameters", header, tuple(rows), note)
 
 
-def parameter_table(settings: FitSettings, summary: FitSummary, profiles: Intervals | None = None) -> Table:
-    """Return one row per parameter: what it is, estimate, intervals, bounds, and what it is known
-    from.
+def parameter_table(
+    settings: FitSettings, summary: FitSummary, profiles: Intervals | None = None
+) -> Table:
+    """Return one row per parameter: what it is, estimate, intervals, bounds, and what
+    it is known from.
     """
 
     def row(p: Parameter) -> dict[str, Any]:
         one = summary.estimate[p.name]
         own = settings.parameters[p.name]
         low, high = map(Given, own.bounds) if own.bounds else (p.lower, p.upper)
-        ends = *one.interval, *one.interval_by_log, *(profiles or {}).get(p.name, (None, None))
+        ends = (
+            *one.interval,
+            *one.interval_by_log,
+            *(profiles or {}).get(p.name, (None, None)),
+        )
         what, side = quantity_and_side(settings, p.name)
         return {
             "joint": place(settings, p.name),
@@ -116,11 +148,22 @@ def parameter_table(settings: FitSettings, summary: FitSummary, profiles: Interv
         }
 
     by_log = ENDS[2:4] if summary.left_out_deg else ()
-    columns = ["joint", "side", "quantity", "symbol", "value", "unit", *ENDS[:2], *by_log]
+    columns = [
+        "joint",
+        "side",
+        "quantity",
+        "symbol",
+        "value",
+        "unit",
+        *ENDS[:2],
+        *by_log,
+    ]
     columns += [*(ENDS[4:] if profiles else ()), "lower", "upper", "data [%]", "source"]
     optional = ("quantity", "side", "joint", *by_log, "data [%]", "lower", "upper")
     rows = map(row, settings.parameter_set().parameters)
-    return Table.of("Parameters", {name: name for name in columns}, rows, _NOTE, optional)
+    return Table.of(
+        "Parameters", {name: name for name in columns}, rows, _NOTE, optional
+    )
 
 
 def in_words(finding: Finding, settings: FitSettings) -> Finding:
@@ -131,7 +174,11 @@ def in_words(finding: Finding, settings: FitSettings) -> Finding:
     groups = dict[str, list[str]]()
     details = dict(finding.details)
     for name in finding.subjects:
-        key = quantity_and_side(settings, name)[0] if name in settings.parameters else name
+        key = (
+            quantity_and_side(settings, name)[0]
+            if name in settings.parameters
+            else name
+        )
         groups.setdefault(key, []).append(name)
     subjects = list[str]()
     for what, names in groups.items():
@@ -140,15 +187,21 @@ def in_words(finding: Finding, settings: FitSettings) -> Finding:
         elif len(names) == 1:
             subjects.append(named(settings, names[0], details.pop(names[0], "")))
         else:
-            said = [f"{name}: {details.pop(name)}" if name in details else name for name in names]
+            said = [
+                f"{name}: {details.pop(name)}" if name in details else name
+                for name in names
+            ]
             subjects.append(f"{what} ({listed(said, MOST_ALIKE)})")
     return replace(finding, subjects=tuple(subjects), details=details)
 
 
 def status(estimate: ParameterEstimate) -> str:
-    """Say how well a parameter is known, in a few words; empty where its interval says it all."""
+    """Say how well a parameter is known, in a few words; empty where its interval says
+    it all."""
     flag, source = estimate.flag, estimate.source
-    plain = flag == Flag.IDENTIFIABLE or (source == Source.PRIOR and flag != Flag.NO_EFFECT)
+    plain = flag == Flag.IDENTIFIABLE or (
+        source == Source.PRIOR and flag != Flag.NO_EFFECT
+    )
     words = (
         "" if plain else flag,
         source if source in (Source.BOTH, Source.PRIOR) else "",
@@ -158,7 +211,8 @@ def status(estimate: ParameterEstimate) -> str:
 
 
 def origin(estimate: ParameterEstimate) -> str:
-    """Say what a parameter is known from, and how well: data, for one that the logs determine."""
+    """Say what a parameter is known from, and how well: data, for one that the logs
+    determine."""
     said = status(estimate)
     return said or estimate.source or ""
 
@@ -175,44 +229,79 @@ def prior_chart(settings: FitSettings, summary: FitSummary) -> Chart:
             (without if parameter.prior is None else with_prior).append(parameter)
     panels = list[Panel]()
     if with_prior:
-        scores = [_score(summary.estimate[p.name], p.prior) for p in with_prior if p.prior is not None]
+        scores = [
+            _score(summary.estimate[p.name], p.prior)
+            for p in with_prior
+            if p.prior is not None
+        ]
         x = "standard deviations from the prior's value"
-        expected = Mark("spans", np.array([-1.96]), end=np.array([1.96]), color="pale", label="prior, 95 %")
+        expected = Mark(
+            "spans",
+            np.array([-1.96]),
+            end=np.array([1.96]),
+            color="pale",
+            label="prior, 95 %",
+        )
         panels.append(
-            _bars("Beside their priors", x, with_prior, np.array(scores), replace(expected, alpha=0.6))
+            _bars(
+                "Beside their priors",
+                x,
+                with_prior,
+                np.array(scores),
+                replace(expected, alpha=0.6),
+            )
         )
     if without:
         places = [_position(summary.estimate[p.name], p) for p in without]
         x = "lower bound: 0; upper bound: 1"
-        panels.append(_bars("Without a prior: between their bounds", x, without, np.array(places)))
+        panels.append(
+            _bars("Without a prior: between their bounds", x, without, np.array(places))
+        )
     return Chart(tuple(panels))
 
 
 def _score(one: ParameterEstimate, prior: Prior) -> list[float]:
-    """Return estimate and ends of the interval in standard deviations from the prior's value."""
+    """Return estimate and ends of the interval in standard deviations from the prior's
+    value."""
     least = 1e-12 * abs(prior.nominal)  # a logarithm needs more than 0
     low, high = one.interval
     values = [
-        prior.score(np.array(max(value, least) if prior.log else value)) if value is not None else end
+        prior.score(np.array(max(value, least) if prior.log else value))
+        if value is not None
+        else end
         for value, end in ((one.value, 0.0), (low, -FARTHEST), (high, FARTHEST))
     ]
     return [float(np.clip(value, -FARTHEST, FARTHEST)) for value in values]
 
 
 def _position(one: ParameterEstimate, parameter: Parameter) -> list[float]:
-    """Return estimate and ends of the interval on the parameter's scale between its bounds."""
+    """Return estimate and ends of the interval on the parameter's scale between its
+    bounds."""
     low, high = one.interval
-    ends = [parameter.lower if low is None else low, parameter.upper if high is None else high]
+    ends = [
+        parameter.lower if low is None else low,
+        parameter.upper if high is None else high,
+    ]
     values = np.clip([one.value, *ends], parameter.lower, parameter.upper)
     return parameter.position(values).tolist()
 
 
-def _bars(title: str, x: str, parameters: list[Parameter], rows: Array, *behind: Mark) -> Panel:
+def _bars(
+    title: str, x: str, parameters: list[Parameter], rows: Array, *behind: Mark
+) -> Panel:
     """Draw estimates and the ends of their intervals, shape (n, 3), each in a row."""
     at = np.arange(float(len(rows)))
     marks = (
         *behind,
-        Mark("bars", rows[:, 1], at, rows[:, 2], color="blue", label="posterior, 95 %", alpha=0.5),
+        Mark(
+            "bars",
+            rows[:, 1],
+            at,
+            rows[:, 2],
+            color="blue",
+            label="posterior, 95 %",
+            alpha=0.5,
+        ),
         Mark("points", rows[:, 0], at, color="blue", width=5, label="estimate"),
     )
     height = 70 + ROW * len(rows)

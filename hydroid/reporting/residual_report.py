@@ -1,5 +1,5 @@
-"""Whether the residuals are white and owe nothing to the command: what an engineer asks of any
-model.
+"""Whether the residuals are white and owe nothing to the command: what an engineer asks
+of any model.
 """
 
 from collections.abc import Sequence
@@ -39,7 +39,9 @@ def residual_section(
     None: nothing can be tested.
     """
     usable = [one for one in fitted if np.isfinite(one.response).all()]
-    if not usable or any(f"q{joint}" not in summary.errors for joint in settings.outputs):
+    if not usable or any(
+        f"q{joint}" not in summary.errors for joint in settings.outputs
+    ):
         return None
     tests = _tests(settings, summary, usable)
     tabs = list[Plot]()
@@ -48,7 +50,14 @@ def residual_section(
     for joint, test in tests.items():
         name = settings.arm.joint_names[joint - 1]
         drawing = partial(_correlations, name, test)
-        tabs.append(Plot(f"residual_{len(tabs) + 1}", f"{name}: correlations", drawing, button=name))
+        tabs.append(
+            Plot(
+                f"residual_{len(tabs) + 1}",
+                f"{name}: correlations",
+                drawing,
+                button=name,
+            )
+        )
         own, command = (100 * part for part in test.outside)
         largest = float(np.abs(test.with_command).max())
         rows.append((name, two_digits(own), two_digits(command), two_digits(largest)))
@@ -58,7 +67,9 @@ def residual_section(
     title = "Are the residuals white?"
     table = Table("", _HEADER, tuple(rows))
     tables = {"residuals": table}
-    return Section(title, _TEXT, tables=tables, tabs=tuple(tabs), folded=True, answer=answer)
+    return Section(
+        title, _TEXT, tables=tables, tabs=tuple(tabs), folded=True, answer=answer
+    )
 
 
 def _tests(
@@ -78,7 +89,13 @@ def _tests(
 def _correlations(name: str, test: ResidualTest) -> Chart:
     return Chart(
         (
-            _panel(f"{name}: autocorrelation", "lag [s]", test.lags, test.autocorrelation, test.bound),
+            _panel(
+                f"{name}: autocorrelation",
+                "lag [s]",
+                test.lags,
+                test.autocorrelation,
+                test.bound,
+            ),
             _panel(
                 f"{name}: correlation with the command",
                 "lag behind the command [s]",

@@ -1,4 +1,5 @@
-"""How the search went: its learning curve, the Pareto set, and what each refinement took."""
+"""How the search went: its learning curve, the Pareto set, and what each refinement
+took."""
 
 from collections.abc import Mapping, Sequence
 from functools import partial
@@ -24,7 +25,9 @@ def search_section(record: Record) -> Section:
     if len(result.history):
         _, tried, simulated, diverged = (f"{int(v):,}" for v in result.history[-1, :4])
         name = record.settings.search.algorithm
-        points.append(f"{name}: {tried} candidates, {simulated} simulated, {diverged} of them diverged.")
+        points.append(
+            f"{name}: {tried} candidates, {simulated} simulated, {diverged} of them diverged."
+        )
     points += [_refined(record, one) for one in result.refinements]
     plots = list[Plot]()
     if len(result.history) > 1:
@@ -33,7 +36,9 @@ def search_section(record: Record) -> Section:
         shown = partial(learning, result.history, objective)
         plots.append(Plot("learning", "Best candidate so far.", shown))
         front = partial(pareto, result.front[1], segments, objective)
-        plots.append(Plot("pareto", "The Pareto set: lower fits that segment better.", front))
+        plots.append(
+            Plot("pareto", "The Pareto set: lower fits that segment better.", front)
+        )
     if any(len(costs) > 1 for costs in result.starts.values()):
         caption = "Where least squares ended from each start: starts at 0 found the best optimum."
         drawing = partial(starts, record.settings.arm.joint_names, result.starts)
@@ -41,7 +46,9 @@ def search_section(record: Record) -> Section:
     efforts = sum(one.simulations for one in result.refinements)
     answer = f"{efforts:,} simulations of the refinement" if efforts else ""
     title = "How the search went"
-    return Section(title, points=tuple(points), plots=tuple(plots), folded=True, answer=answer)
+    return Section(
+        title, points=tuple(points), plots=tuple(plots), folded=True, answer=answer
+    )
 
 
 def _refined(record: Record, one: Effort) -> str:
@@ -69,13 +76,18 @@ def starts(names: Sequence[str], costs: Mapping[int, Sequence[float]]) -> Chart:
         x += [cost - min(finite_ones) for cost in finite_ones]
         y += [float(len(rows))] * len(finite_ones)
         rows.append(names[joint - 1] if joint else "all joints")
-    marks = (Mark("points", np.array(x), np.array(y), color="blue", width=8, alpha=0.6),)
+    marks = (
+        Mark("points", np.array(x), np.array(y), color="blue", width=8, alpha=0.6),
+    )
     label = "negative log-likelihood above the best start's"
-    return Chart((Panel(label, "", marks, height=80 + 30 * len(rows), rows=tuple(rows)),))
+    return Chart(
+        (Panel(label, "", marks, height=80 + 30 * len(rows), rows=tuple(rows)),)
+    )
 
 
 def learning(history: Array, objective: ObjectiveSettings) -> Chart:
-    """Draw the best objective so far and the population's median against evaluations."""
+    """Draw the best objective so far and the population's median against
+    evaluations."""
     tried = history[:, 1]
     best, median = _shown(objective, history[:, 4:6].T)
     return _chart(
@@ -87,20 +99,36 @@ def learning(history: Array, objective: ObjectiveSettings) -> Chart:
     )
 
 
-def pareto(objectives: Array, estimates: dict[str, Array], objective: ObjectiveSettings) -> Chart:
-    """Draw each candidate of the Pareto set, and the estimates, as a line over the segments'
-    objectives.
+def pareto(
+    objectives: Array, estimates: dict[str, Array], objective: ObjectiveSettings
+) -> Chart:
+    """Draw each candidate of the Pareto set, and the estimates, as a line over the
+    segments' objectives.
 
-    `objectives`, shape (n, S + 1), end with that over the whole record; the 100 lowest there are
-    drawn.
+    `objectives`, shape (n, S + 1), end with that over the whole record; the 100 lowest
+    there are drawn.
     """
-    front = _shown(objective, objectives[np.argsort(objectives[:, -1], kind="stable")[:100], :-1])
+    front = _shown(
+        objective, objectives[np.argsort(objectives[:, -1], kind="stable")[:100], :-1]
+    )
     at = np.arange(1.0, front.shape[1] + 1)
     # one line with gaps: a line each would be a legend entry and a glyph each
     gap = np.full((len(front), 1), np.nan)
-    lines = (np.column_stack([one, gap]).ravel()[:-1] for one in (np.broadcast_to(at, front.shape), front))
+    lines = (
+        np.column_stack([one, gap]).ravel()[:-1]
+        for one in (np.broadcast_to(at, front.shape), front)
+    )
     kind = "points" if len(at) == 1 else "line"
-    marks = [Mark(kind, *lines, color="grey", label=f"Pareto set ({len(objectives)})", width=1, alpha=0.6)]
+    marks = [
+        Mark(
+            kind,
+            *lines,
+            color="grey",
+            label=f"Pareto set ({len(objectives)})",
+            width=1,
+            alpha=0.6,
+        )
+    ]
     for color, (name, segments) in zip(SERIES, estimates.items(), strict=False):
         one = _shown(objective, segments)
         marks.append(Mark("line", at, one, color=color, label=name, width=2))
@@ -109,7 +137,9 @@ def pareto(objectives: Array, estimates: dict[str, Array], objective: ObjectiveS
 
 
 def _chart(x: str, objective: ObjectiveSettings, *marks: Mark) -> Chart:
-    label = {1: "mean absolute error", 2: "rms error", "inf": "largest error"}[objective.norm]
+    label = {1: "mean absolute error", 2: "rms error", "inf": "largest error"}[
+        objective.norm
+    ]
     label = f"relative {label} [-]" if objective.relative else f"{label} [deg]"
     drawable = any(np.isfinite(mark.y).any() for mark in marks)
     return Chart((Panel(x, label, marks, height=280, log_y=drawable),))

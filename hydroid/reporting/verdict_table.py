@@ -1,4 +1,5 @@
-"""The verdict on fits as a terminal and a page show it: one row a joint, beside the baselines."""
+"""The verdict on fits as a terminal and a page show it: one row a joint, beside the
+baselines."""
 
 import shlex
 from collections.abc import Mapping, Sequence
@@ -26,7 +27,8 @@ _RIVALS = (
     "joint, which are dead band, exponent, top speed and lag of each direction, and one delay."
 )
 _FITTED = (
-    "Rms errors{unit} on the fitted logs. No other log tests the fit yet. Last three columns: simple models."
+    "Rms errors{unit} on the fitted logs. No other log tests the fit yet. "
+    "Last three columns: simple models."
 )
 _TESTED = (
     "Rms errors{unit} on {count} unseen log{s} (not fitted): of the change over 1, 5 and 10 s, and over "
@@ -44,7 +46,8 @@ Verdicts = Mapping[str, Sequence[JointVerdict]]  # by fit
 def verdict_table(fits: Verdicts) -> Table:
     """Return the verdicts on each joint of each fit.
 
-    Where unseen logs test a joint, its errors stand beside those of the best simple model there.
+    Where unseen logs test a joint, its errors stand beside those of the best simple
+    model there.
     """
     every = [one for verdicts in fits.values() for one in verdicts]
     count = max(one.unseen_logs for one in every)
@@ -76,7 +79,8 @@ def column_of(seconds: float) -> str:
 
 
 def _row(one: JointVerdict, *, tested: bool) -> dict[str, Cell]:
-    """Return a row of the table of verdicts by columns, where any joint is `tested` or none."""
+    """Return a row of the table of verdicts by columns, where any joint is `tested` or
+    none."""
     row: dict[str, Cell] = {
         "joint": one.name,
         "verdict": f"{one.verdict.sign} {one.text}",
@@ -84,7 +88,9 @@ def _row(one: JointVerdict, *, tested: bool) -> dict[str, Cell]:
         "fitted": _shown(one.fitted_deg, one.shown),
     }
     if not tested:
-        return row | {name: _shown(error, one.shown) for name, error in one.baselines_deg.items()}
+        return row | {
+            name: _shown(error, one.shown) for name, error in one.baselines_deg.items()
+        }
     if not one.unseen_logs:
         return row
     whole = {THE_FIT: one.unseen_deg} | one.baselines_deg
@@ -93,7 +99,9 @@ def _row(one: JointVerdict, *, tested: bool) -> dict[str, Cell]:
     for i, seconds in enumerate(HORIZONS):
         errors = {name: errors[i] for name, errors in one.horizons_deg.items()}
         compared = {name: comparisons[i] for name, comparisons in one.compared.items()}
-        row[column_of(seconds)] = _beside_best(errors, compared, one.shown) if errors else None
+        row[column_of(seconds)] = (
+            _beside_best(errors, compared, one.shown) if errors else None
+        )
     return row
 
 
@@ -103,12 +111,17 @@ def _beside_best(
     shown: Display,
     least: int = 0,
 ) -> str | None:
-    """Return the fit's error beside that of the best simple model, as "2.1 (2.3) cannot be told".
+    """Return the fit's error beside that of the best simple model, as "2.1 (2.3) cannot
+    be told".
 
-    Nothing where the logs are too short for the prediction time; no word of fewer than `least`
-    blocks.
+    Nothing where the logs are too short for the prediction time; no word of fewer than
+    `least` blocks.
     """
-    simple = {name: error for name, error in errors.items() if name in compared and error is not None}
+    simple = {
+        name: error
+        for name, error in errors.items()
+        if name in compared and error is not None
+    }
     if not simple:
         return None
     best = min(simple, key=simple.__getitem__)
@@ -122,7 +135,8 @@ def _beside_best(
 
 
 def _shown(error: float | None, shown: Display) -> Cell:
-    """Return an error [deg] as a table shows it, in the unit in which its joint is shown."""
+    """Return an error [deg] as a table shows it, in the unit in which its joint is
+    shown."""
     if error is None:
         return None
     return Given(two_digits(shown.of_degrees(error)))
@@ -131,8 +145,10 @@ def _shown(error: float | None, shown: Display) -> Cell:
 def left_out_table(
     title: str, columns: dict[str, str], rows: Sequence[Plain], arm: Arm, note: str = ""
 ) -> Table:
-    """Return a table of rows by key, with a further column for each joint of their `left_out_deg`."""
-    keys = dict[str, str]()  # of the joints' columns: a joint may be called as one of `columns`
+    """Return a table of rows by key, with a further column for each joint of their
+    `left_out_deg`."""
+    # of the joints' columns: a joint may be called as one of `columns`
+    keys = dict[str, str]()
     sliding = {joint.name for joint in arm.joints if joint.slides}
     cells = list[dict[str, Cell]]()
     for row in rows:
@@ -142,15 +158,16 @@ def left_out_table(
             keys[key] = name
             shown = display(slides=name in sliding)
             cell = _shown(error, shown)
-            if cell is not None and name in sliding:  # the note says that the others are in deg
+            # the note says that the others are in deg
+            if cell is not None and name in sliding:
                 cell = f"{cell:g} {shown.unit}"
             cells[-1][key] = cell
     return Table.of(title, columns | keys, cells, note + _LEFT_OUT)
 
 
 def verdict_sections(fits: Verdicts, *steps: Finding) -> tuple[Section, ...]:
-    """Return the sections that every page of predictions begins with: the verdicts, and what to do
-    next.
+    """Return the sections that every page of predictions begins with: the verdicts, and
+    what to do next.
     """
     table = verdict_table(fits)
     table = replace(table, note=f"{table.note} {_RIVALS}")
@@ -159,18 +176,24 @@ def verdict_sections(fits: Verdicts, *steps: Finding) -> tuple[Section, ...]:
 
 
 def horizon_section(fits: Verdicts) -> Section | None:
-    """Return the rms error of each angle's change over some times, of fits and baselines, if known."""
+    """Return the rms error of each angle's change over some times, of fits and
+    baselines, if known."""
     rows = list[dict[str, Cell]]()
     for fit, verdicts in fits.items():
         for one in verdicts:
             whole = {THE_FIT: one.unseen_deg} | one.baselines_deg
             for name, errors in one.horizons_deg.items():
                 of = short_name(fit) if name == THE_FIT and len(fits) > 1 else name
-                row: dict[str, Cell] = {"joint": one.name, "of": of, "unit": one.shown.unit}
+                row: dict[str, Cell] = {
+                    "joint": one.name,
+                    "of": of,
+                    "unit": one.shown.unit,
+                }
                 for seconds, error in zip(HORIZONS, errors, strict=True):
                     row[column_of(seconds)] = _shown(error, one.shown)
                 row[WHOLE] = _shown(whole[name], one.shown)
-                if row not in rows:  # the simple models of fits to the same logs are the same
+                # the simple models of fits to the same logs are the same
+                if row not in rows:
                     rows.append(row)
     names = ("joint", "of", "unit", *map(column_of, HORIZONS), WHOLE)
     columns = {name: name for name in names}
@@ -186,22 +209,28 @@ def horizon_section(fits: Verdicts) -> Section | None:
 
 
 def ordered(fits: Verdicts) -> Verdicts:
-    """Return the fits, the smallest errors first: in parts of the tolerances of the joints that all
-    compare.
+    """Return the fits, the smallest errors first: in parts of the tolerances of the
+    joints that all compare.
 
     Where there is no such joint, each fit counts by the mean of its own ones.
     """
-    shared = set.intersection(*({one.joint for one in verdicts} for verdicts in fits.values()))
+    shared = set.intersection(
+        *({one.joint for one in verdicts} for verdicts in fits.values())
+    )
 
     def size(verdicts: Sequence[JointVerdict]) -> float:
-        return float(np.mean([_size(one) for one in verdicts if one.joint in shared or not shared]))
+        return float(
+            np.mean(
+                [_size(one) for one in verdicts if one.joint in shared or not shared]
+            )
+        )
 
     return dict(sorted(fits.items(), key=lambda fit: size(fit[1])))
 
 
 def _error(one: JointVerdict) -> float:
-    """Return the error on the unseen logs, or of a joint that they do not test on the fitted ones
-    [deg].
+    """Return the error on the unseen logs, or of a joint that they do not test on the
+    fitted ones [deg].
     """
     error = one.unseen_deg if one.unseen_logs else one.fitted_deg
     return np.inf if error is None else error  # it diverged
@@ -212,13 +241,17 @@ def _size(one: JointVerdict) -> float:
 
     0 of a joint that no log drives, which has none.
     """
-    driven = one.unseen_logs or one.fitted_deg is not None or one.verdict is not Verdict.UNTESTED
+    driven = (
+        one.unseen_logs
+        or one.fitted_deg is not None
+        or one.verdict is not Verdict.UNTESTED
+    )
     return _error(one) / one.tolerance_deg if driven else 0.0
 
 
 def verdict_lines(fits: Verdicts) -> list[Table | str]:
-    """Return the verdicts as a terminal shows them: the table, and what is worst about the first
-    fit.
+    """Return the verdicts as a terminal shows them: the table, and what is worst about
+    the first fit.
     """
     first = next(iter(fits.values()))
     return [verdict_table(fits), *filter(None, [worst(first)]), *outside(first)]
@@ -230,8 +263,8 @@ def next_lines(step: Finding) -> tuple[str, str]:
 
 
 def lead(fits: Verdicts) -> str:
-    """Say of the first of the fits which joints it predicts, what is wrong with the others, and the
-    worst.
+    """Say of the first of the fits which joints it predicts, what is wrong with the
+    others, and the worst.
     """
     name, verdicts = next(iter(fits.items()))
     of = f"{short_name(name)} is best. " if len(fits) > 1 else ""
@@ -255,11 +288,16 @@ def outside(verdicts: Sequence[JointVerdict]) -> tuple[str, ...]:
         for one in verdicts
         if (part := one.inside_percent) is not None and part < 80
     ]
-    return (f"The 95 % bands hold only {listed(missed)} unseen samples.",) if missed else ()
+    return (
+        (f"The 95 % bands hold only {listed(missed)} unseen samples.",)
+        if missed
+        else ()
+    )
 
 
 def worst(verdicts: Sequence[JointVerdict]) -> str:
-    """Say which of several joints errs most, in parts of its tolerance; nothing of one joint."""
+    """Say which of several joints errs most, in parts of its tolerance; nothing of one
+    joint."""
     if len(verdicts) < 2:
         return ""
     one = max(verdicts, key=_size)
@@ -267,9 +305,13 @@ def worst(verdicts: Sequence[JointVerdict]) -> str:
         return f"Worst: {one.name}, whose simulation diverges."
     scale = one.shown.of_degrees(1.0)
     unit = one.shown.unit
-    good = f"{two_digits(scale * one.tolerance_deg)} {unit} (by default 2 % of its travel)"
+    good = (
+        f"{two_digits(scale * one.tolerance_deg)} {unit} (by default 2 % of its travel)"
+    )
     # a joint without simple models has no logs either, and nothing beside it
-    error, least = told_apart(scale * _error(one), scale * min(one.baselines_deg.values(), default=0.0))
+    error, least = told_apart(
+        scale * _error(one), scale * min(one.baselines_deg.values(), default=0.0)
+    )
     return (
         f"Worst: {one.name}, {error} {unit}; good is up to {good}, and simple models err by {least} {unit} "
         "or more."
@@ -277,9 +319,13 @@ def worst(verdicts: Sequence[JointVerdict]) -> str:
 
 
 def next_step(
-    summary: FitSummary, verdicts: Sequence[JointVerdict], folder: str, fitted: Sequence[Prediction]
+    summary: FitSummary,
+    verdicts: Sequence[JointVerdict],
+    folder: str,
+    fitted: Sequence[Prediction],
 ) -> Finding:
-    """Return what to do after a fit in a run folder, which made `fitted` of its logs, with the command."""
+    """Return what to do after a fit in a run folder, which made `fitted` of its logs,
+    with the command."""
     run = shlex.quote(folder)
     files = shlex.join(dict.fromkeys(str(log_file(one.log.source)) for one in fitted))
     joints = [one.name for one in verdicts if one.verdict is Verdict.UNTESTED]
@@ -308,8 +354,13 @@ def next_step(
 
 
 def _worse_than_expected(one: JointVerdict) -> bool:
-    """Return whether a fit fails unseen logs by more than its fitted logs let expect."""
-    if one.verdict is Verdict.PREDICTS or one.unseen_deg is None or not one.expected_deg:
+    """Return whether a fit fails unseen logs by more than its fitted logs let
+    expect."""
+    if (
+        one.verdict is Verdict.PREDICTS
+        or one.unseen_deg is None
+        or not one.expected_deg
+    ):
         return False
     return one.unseen_deg > WORSE * one.expected_deg
 
@@ -325,5 +376,6 @@ def _too_short(verdicts: Sequence[JointVerdict]) -> list[str]:
     return [
         one.name
         for one in untold
-        if min((at.blocks for at in one.compared.get(one.beside or "", ())), default=0) < LEAST_BLOCKS
+        if min((at.blocks for at in one.compared.get(one.beside or "", ())), default=0)
+        < LEAST_BLOCKS
     ]

@@ -1,1 +1,2 @@
-"""The run folder: what was asked, how far it came, what came out; and who works in it."""
+"""The run folder: what was asked, how far it came, what came out; and who works in
+it."""

@@ -27,9 +27,11 @@ LARGEST = 2**32  # bytes that a file may unpack to
 
 
 def pack(tree: object, *, compressed: bool = True) -> bytes:
-    """Return a tree as npz: its arrays as they are, and what is left as JSON under `content`.
+    """Return a tree as npz: its arrays as they are, and what is left as JSON under
+    `content`.
 
-    A digest of the file follows its last byte: a zip's own checks leave its headers out.
+    A digest of the file follows its last byte: a zip's own checks leave its headers
+    out.
     """
     arrays: dict[str, np.ndarray] = {}
 
@@ -53,10 +55,11 @@ def pack(tree: object, *, compressed: bool = True) -> bytes:
 
 
 def unpack(file: Path) -> Any:
-    """Read a tree that `pack` made, its dataclasses as mappings and its sequences as lists.
+    """Read a tree that `pack` made, its dataclasses as mappings and its sequences as
+    lists.
 
-    Raises OSError: the file cannot be read. ValueError: it is not what `pack` writes, or unpacks to
-    more than LARGEST.
+    Raises OSError: the file cannot be read. ValueError: it is not what `pack` writes,
+    or unpacks to more than LARGEST.
     """
     packed = read_file(file)
     data = packed[:-32]
@@ -70,7 +73,15 @@ def unpack(file: Path) -> Any:
             return arrays[value["array"]] if value.keys() == {"array"} else value
 
         return json.loads(arrays["content"].tobytes(), object_hook=filled)
-    except (KeyError, TypeError, EOFError, NotImplementedError, RecursionError, BadZipFile, zlib.error):
+    except (
+        KeyError,
+        TypeError,
+        EOFError,
+        NotImplementedError,
+        RecursionError,
+        BadZipFile,
+        zlib.error,
+    ):
         raise ValueError("content") from None
 
 
@@ -102,10 +113,11 @@ class CheckpointFile(UserDict[str, Arrays]):
     """Checkpoints by name; every change is written to one file,
     which is made with the first of a run's id.
 
-    The file before it is kept as `checkpoint.previous.npz`. Where the newest one is damaged, it is
-    put aside as `checkpoint.damaged.npz` with a warning, and the one before it is taken: what the
-    run did since is done again, to the same bits. Raises RunError: none is whole, or it is that of
-    another run; on a change, it cannot be written, and both files are as they were.
+    The file before it is kept as `checkpoint.previous.npz`. Where the newest one is
+    damaged, it is put aside as `checkpoint.damaged.npz` with a warning, and the one
+    before it is taken: what the run did since is done again, to the same bits. Raises
+    RunError: none is whole, or it is that of another run; on a change, it cannot be
+    written, and both files are as they were.
     """
 
     def __init__(self, file: Path, run: str) -> None:
@@ -120,7 +132,9 @@ class CheckpointFile(UserDict[str, Arrays]):
     def __setitem__(self, name: str, arrays: Arrays) -> None:
         self.data[name] = arrays
         # sorted: what a run ends with does not depend on where it was interrupted
-        tree = {part: dict(sorted(self.data[part].items())) for part in sorted(self.data)}
+        tree = {
+            part: dict(sorted(self.data[part].items())) for part in sorted(self.data)
+        }
         with undisturbed():
             packed = pack({"run": self._run, "parts": tree}, compressed=False)
             write_atomic(self._file, packed, keep=self._previous)
@@ -133,13 +147,19 @@ class CheckpointFile(UserDict[str, Arrays]):
         except (ValueError, OSError) as error:
             if not before:
                 hint = "remove the run's checkpoints to begin again from the seed"
-                raise RunError(f"is damaged ({type(error).__name__})", file, hint) from None
+                raise RunError(
+                    f"is damaged ({type(error).__name__})", file, hint
+                ) from None
             earlier = self._read(*before)
-            LOGGER.warning("%s: is damaged; going on from the checkpoint before it", file)
+            LOGGER.warning(
+                "%s: is damaged; going on from the checkpoint before it", file
+            )
             file.replace(file.with_suffix(f".damaged{file.suffix}"))
             return earlier
         if content.get("run") != self._run:
-            raise RunError("is another run's", file, "put the run's own checkpoint back")
+            raise RunError(
+                "is another run's", file, "put the run's own checkpoint back"
+            )
         return content["parts"]
 
 

@@ -38,7 +38,8 @@ VERSIONS = {name: version(name) for name in ("hydroid", "mujoco", "numpy")}
 
 
 def identity(settings: FitSettings, logs: Sequence[Log]) -> Plain:
-    """Return versions, the settings that decide, and hashes of the logs and of the arm's model."""
+    """Return versions, the settings that decide, and hashes of the logs and of the
+    arm's model."""
     hashes = [log_hash(log, settings) for log in logs]
     return VERSIONS | {
         "python": platform.python_version(),
@@ -50,20 +51,23 @@ def identity(settings: FitSettings, logs: Sequence[Log]) -> Plain:
 
 
 def deciding(settings: FitSettings) -> Plain:
-    """Return the settings that decide a result, the arm's too: no threads, unused searches,
-    or paths."""
+    """Return the settings that decide a result, the arm's too: no threads, unused
+    searches, or paths."""
     values = portable(settings)
     del values["simulation"]["threads"]
     used = settings.search.algorithm
     values["search"] = {
-        name: value for name, value in values["search"].items() if name == used or not isinstance(value, dict)
+        name: value
+        for name, value in values["search"].items()
+        if name == used or not isinstance(value, dict)
     }
     arm = settings.arm.model_dump(mode="json", exclude={"model", "pair"})
     return values | {"arm": arm}
 
 
 def difference(run: Mapping[str, Any], other: Mapping[str, Any], but: str = "") -> str:
-    """Say what makes a run another one, as "has search.seed = 1, not 2"; empty where nothing does.
+    """Say what makes a run another one, as "has search.seed = 1, not 2"; empty where
+    nothing does.
 
     Both are identities. The setting `but` may differ.
     """
@@ -75,7 +79,9 @@ def difference(run: Mapping[str, Any], other: Mapping[str, Any], but: str = "") 
     # the files may have moved
     if [*logs.values()] != [*other_logs.values()]:
         names = ", ".join(logs)
-        return f"has other logs, or others' contents: {names}, not {', '.join(other_logs)}"
+        return (
+            f"has other logs, or others' contents: {names}, not {', '.join(other_logs)}"
+        )
     settings = _flat(run.get("settings"))
     other_settings = _flat(other.get("settings"))
     for key in sorted(settings.keys() | other_settings.keys()):
@@ -90,13 +96,17 @@ def model_hash(arm: Arm) -> str:
     """Return the hash of the arm's MJCF and of its meshes."""
     spec = load_model(arm)
     folder = Path(spec.modelfiledir) / spec.meshdir
-    return file_hash(arm.model, *(folder / mesh.file for mesh in spec.meshes if mesh.file))
+    return file_hash(
+        arm.model, *(folder / mesh.file for mesh in spec.meshes if mesh.file)
+    )
 
 
 def log_hash(log: Log, settings: FitSettings) -> str:
-    """Return the hash of all of a log that decides a result: samples, and what its name stands for.
+    """Return the hash of all of a log that decides a result: samples, and what its name
+    stands for.
 
-    A file that was moved or saved again is the same log, and one that was repaired is another.
+    A file that was moved or saved again is the same log, and one that was repaired is
+    another.
     """
     name = log_file(log.source).name
     named = repr((settings.payloads.get(name), settings.log.group_of(name)))
@@ -118,7 +128,9 @@ def digest(content: Plain) -> str:
 
 def _names(values: Any) -> bool:
     """Return whether values as JSON holds them are texts by name."""
-    return isinstance(values, dict) and all(isinstance(value, str) for value in values.values())
+    return isinstance(values, dict) and all(
+        isinstance(value, str) for value in values.values()
+    )
 
 
 def _flat(values: Any, prefix: str = "") -> Plain:
@@ -147,11 +159,16 @@ class RunFolder:
         """Hold the folder against other processes,
         and write the `hydroid` logger's lines to `run.log`."""
         if self._is_of_others():
-            raise RunError("exists and holds no run", self.path, "choose another folder with --out")
+            raise RunError(
+                "exists and holds no run", self.path, "choose another folder with --out"
+            )
         with locked(self.path), run_log(self.path / "run.log"):
             # nobody else writes here
             for part in self.path.rglob(f".*{PART}"):
-                LOGGER.info("removed %s, left by a process that was killed while it wrote", part.name)
+                LOGGER.info(
+                    "removed %s, left by a process that was killed while it wrote",
+                    part.name,
+                )
                 part.unlink(missing_ok=True)
             try:
                 yield
@@ -166,7 +183,8 @@ class RunFolder:
     def _is_of_others(self) -> bool:
         """Return whether the folder holds something else.
 
-        It is the run's if it is empty, or holds a run's description or at least its lock.
+        It is the run's if it is empty, or holds a run's description or at least its
+        lock.
         """
         if not os.path.exists(self.path):
             return False
@@ -175,11 +193,14 @@ class RunFolder:
         return not self.path.is_dir() or any(self.path.iterdir())
 
     def begin(self, settings: FitSettings, logs: Sequence[Log]) -> CheckpointFile:
-        """Describe a new run, or check that the run here is the same; return its checkpoints."""
+        """Describe a new run, or check that the run here is the same; return its
+        checkpoints."""
         wanted = identity(settings, logs)
         if not self.exists:
             write_settings(self.path, settings)
-            self._describe(wanted | {"files": own_hashes(self.path), "status": "running"})
+            self._describe(
+                wanted | {"files": own_hashes(self.path), "status": "running"}
+            )
             return self.checkpoints()
         self.refuse_changes()
         # its own copy, to the last bit
@@ -187,7 +208,9 @@ class RunFolder:
             wanted["origin"] = self.identity().get("origin")
         other = difference(self.identity(), wanted)
         if other:
-            hint = "continue it with the command that began it, or choose another folder"
+            hint = (
+                "continue it with the command that began it, or choose another folder"
+            )
             raise RunError(f"the run here {other}", self.path, hint)
         checkpoints = self.checkpoints()
         self.status("running")
@@ -200,7 +223,9 @@ class RunFolder:
         for name, stored in self.identity().get("files", {}).items():
             if hashes.get(name) != stored:
                 hint = "put it back as it was, or choose another folder"
-                raise RunError("has changed since the run began", self.path / name, hint)
+                raise RunError(
+                    "has changed since the run began", self.path / name, hint
+                )
 
     def identity(self) -> Plain:
         """Read the run's description."""

@@ -25,18 +25,20 @@ try:
 except ImportError:  # Windows has none
     fcntl = None
 
-LOCK = ".lock"  # name of the lock's file; it stays, what counts is whether a process holds it
+# name of the lock's file; it stays, what counts is whether a process holds it
+LOCK = ".lock"
 
 
 @contextmanager
 def locked(folder: Path) -> Generator[None]:
     """Hold a folder, which is made if it is not there, against all other processes.
 
-    The lock is `flock`'s. A file that merely exists, with a process's number in it, would outlive a
-    killed process, and on a cluster nobody can tell whether that number lives on another machine.
-    Linux passes the lock on to NFS's server (since 2.6.12) and to Lustre's where it is mounted with
-    `flock`, so that it holds between machines; with `localflock`, or NFS's `nolock`, it holds on
-    one machine only. On a file system that has no locks there is none, but a warning.
+    The lock is `flock`'s. A file that merely exists, with a process's number in it,
+    would outlive a killed process, and on a cluster nobody can tell whether that number
+    lives on another machine. Linux passes the lock on to NFS's server (since 2.6.12)
+    and to Lustre's where it is mounted with `flock`, so that it holds between machines;
+    with `localflock`, or NFS's `nolock`, it holds on one machine only. On a file system
+    that has no locks there is none, but a warning.
 
     Raises RunError: another process holds the folder.
     """
@@ -58,7 +60,9 @@ def _lock(file: FileIO, folder: Path) -> None:
     except OSError as error:
         if error.errno in (errno.EWOULDBLOCK, errno.EACCES):
             file.seek(0)
-            holder = file.read(200).decode(errors="replace").strip() or "another process"
+            holder = (
+                file.read(200).decode(errors="replace").strip() or "another process"
+            )
             hint = "wait for it to end, or choose another --out"
             raise RunError(f"is in use by {holder}", folder, hint) from None
         words = "%s: no lock on this file system (%s); let no two runs use it"

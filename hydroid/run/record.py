@@ -1,9 +1,11 @@
-"""What a finished run stores, and from which its report is drawn: `estimate.yaml` and `result.npz`.
+"""What a finished run stores, and from which its report is drawn: `estimate.yaml` and
+`result.npz`.
 
     record = load_record("runs/a")
     record.summary.values, record.result.fitted[0].response
 
-A validation stores each unseen log as VALIDATIONS/NAME/result.npz in the folder of the run.
+A validation stores each unseen log as VALIDATIONS/NAME/result.npz in the folder of the
+run.
 """
 
 import glob
@@ -61,17 +63,19 @@ class Effort:
 
 @record
 class FitRecord:
-    """What a finished fit is, beside its summary: the same in memory and in a run's `result.npz`.
+    """What a finished fit is, beside its summary: the same in memory and in a run's
+    `result.npz`.
 
     Attributes:
         fitted: what its final estimate makes of its logs.
         history: of the search, shape (G, len(HISTORY)).
-        front: non-dominated candidates, (n, P), and their objectives by segment and overall,
-            (n, S + 1).
+        front: non-dominated candidates, (n, P), and their objectives by segment and
+            overall, (n, S + 1).
         segments: objectives of each estimate by segment, (S,), by its name.
         refinements: what each took.
         baselines: simple models fitted to the same logs, by joint and name.
-        starts: costs at which the starts of least squares ended, by joint (0: all joints together).
+        starts: costs at which the starts of least squares ended, by joint (0: all
+            joints together).
     """
 
     fitted: tuple[Prediction, ...]
@@ -80,13 +84,15 @@ class FitRecord:
     segments: Mapping[str, Array]
     refinements: tuple[Effort, ...]
     baselines: Baselines
-    starts: Mapping[int, tuple[float, ...]] = field(default_factory=dict[int, tuple[float, ...]])
+    starts: Mapping[int, tuple[float, ...]] = field(
+        default_factory=dict[int, tuple[float, ...]]
+    )
 
 
 @record
 class Record:
-    """A finished run: its folder, as a command takes it, the versions and the hashes of its logs,
-    and what it has found.
+    """A finished run: its folder, as a command takes it, the versions and the hashes of
+    its logs, and what it has found.
 
     After a joint refinement every parameter that was refined is free in the settings.
     """
@@ -115,10 +121,15 @@ class Record:
         return judge(self.settings, self.result.fitted, self.result.baselines, unseen)
 
 
-def fit_record(fit: Fit, fitted: tuple[Prediction, ...], baselines: Baselines) -> FitRecord:
-    """Return the record of a fit, with what it makes of its logs and the baselines of these."""
+def fit_record(
+    fit: Fit, fitted: tuple[Prediction, ...], baselines: Baselines
+) -> FitRecord:
+    """Return the record of a fit, with what it makes of its logs and the baselines of
+    these."""
     efforts = [
-        Effort(name, refinement.iterations, refinement.evaluations, refinement.ending.value)
+        Effort(
+            name, refinement.iterations, refinement.evaluations, refinement.ending.value
+        )
         for name, refinement in fit.refinements.items()
     ]
     return FitRecord(
@@ -144,11 +155,13 @@ def run_of(model: IdentifiedModel) -> Path | None:
     return file.parent if is_finished else None
 
 
-def keep_validation(model: IdentifiedModel, predictions: Sequence[Prediction]) -> Path | None:
+def keep_validation(
+    model: IdentifiedModel, predictions: Sequence[Prediction]
+) -> Path | None:
     """Store predictions of unseen logs in the run that a model is from; return it.
 
-    Nothing is stored of a model that is from no run, or whose settings are not the run's. What was
-    stored of the same file before is replaced.
+    Nothing is stored of a model that is from no run, or whose settings are not the
+    run's. What was stored of the same file before is replaced.
     """
     folder = run_of(model)
     unseen = [prediction for prediction in predictions if prediction.unseen]
@@ -167,8 +180,8 @@ def validation_name(log: Log) -> str:
     """Return the name of a log's folder among the validations: its file's,
     and a digest of the file's place.
 
-    Of a log that is no file the digest is that of its samples. A part of a file has its number in
-    both.
+    Of a log that is no file the digest is that of its samples. A part of a file has its
+    number in both.
     """
     file = log_file(log.source)
     # a name may be longer than Path allows
@@ -213,7 +226,8 @@ def record_of(model: IdentifiedModel) -> FitRecord | None:
 
 
 def load_record(folder: str | Path) -> Record:
-    """Read a finished run. A validation that cannot be read is left out, with a warning.
+    """Read a finished run. A validation that cannot be read is left out, with a
+    warning.
 
     Logs of one name have different ones there: `log.csv` and `log.csv (2)`.
     """
@@ -244,7 +258,8 @@ def _with_distinct_names(predictions: Sequence[Prediction]) -> list[Prediction]:
 
 
 def _validations(folder: Path) -> dict[str, Prediction]:
-    """Read the validations of a run, by their folders' names; a copy of a log counts once."""
+    """Read the validations of a run, by their folders' names; a copy of a log counts
+    once."""
     unseen = dict[str, Prediction]()
     contents = set[bytes]()
     for file in sorted(folder.glob(f"{VALIDATIONS}/*/{RESULT}")):
@@ -268,7 +283,9 @@ def _read(file: Path, kind: type[T], hint: str = "fit again with this version") 
     try:
         (tree,) = _adapter(kind).validate_python((unpack(file),))
     except FileNotFoundError:
-        raise RunError("holds no result", file.parent, "finish the fit: --resume") from None
+        raise RunError(
+            "holds no result", file.parent, "finish the fit: --resume"
+        ) from None
     except (OSError, ValueError, KeyError, EOFError, ValidationError) as error:
         what = f"cannot be read ({type(error).__name__})"
         raise RunError(what, file, hint) from None
@@ -301,7 +318,9 @@ def read_runs(names: Sequence[str], out: str | Path | None) -> tuple[Record, ...
             LOGGER.warning("left out: %s", error)
     if not runs:
         where = " ".join(names)
-        raise RunError("no finished run is there", where, "resume those that were stopped")
+        raise RunError(
+            "no finished run is there", where, "resume those that were stopped"
+        )
     runs.sort(key=lambda run: run.seed)
     for before, run in pairwise(runs):
         other = difference(run.identity, before.identity, but="search.seed")
@@ -313,7 +332,8 @@ def read_runs(names: Sequence[str], out: str | Path | None) -> tuple[Record, ...
 
 
 def _matching(names: Sequence[str]) -> list[str]:
-    """Return the paths that names mean, each once: a name that is no path may be a pattern."""
+    """Return the paths that names mean, each once: a name that is no path may be a
+    pattern."""
     paths = set[str]()
     for name in names:
         found = [] if os.path.exists(name) else glob.glob(name)

@@ -1,10 +1,10 @@
 """Derivatives by finite differences along the axes of a covariance,
 with steps as wide as the uncertainty.
 
-Where parameters trade, their effects nearly cancel: what is left of the derivatives of single
-parameters is the error of their differences. So the step goes along the combination itself, as far
-as the combination is uncertain. Its effect is then as large as the noise, and large against
-rounding and the small jumps that events make.
+Where parameters trade, their effects nearly cancel: what is left of the derivatives of
+single parameters is the error of their differences. So the step goes along the
+combination itself, as far as the combination is uncertain. Its effect is then as large
+as the noise, and large against rounding and the small jumps that events make.
 """
 
 from collections.abc import Callable
@@ -15,15 +15,18 @@ import numpy as np
 from hydroid.arrays import Array, Mask, record
 
 Function = Callable[[Array], Array]
-"""points (n, P) -> values (n, R); a row that is not finite is a point that cannot be simulated"""
+"""points (n, P) -> values (n, R); a row that is not finite is a point that cannot be
+simulated"""
 
 LARGEST = 0.1
 """largest relative change of a coordinate in a step:
 nothing holds over the width of an unknown direction"""
-EDGE = 0.1  # standard deviations from a bound, below which a coordinate counts as held by it
+# standard deviations from a bound, below which a coordinate counts as held by it
+EDGE = 0.1
 # part of a step within which both sides must have room; else it goes twice to one side
 UNBALANCED = 0.3
-SHORTER = 0.1  # a step whose effect may be mostly curvature is taken again, this part as long
+# a step whose effect may be mostly curvature is taken again, this part as long
+SHORTER = 0.1
 CURVED = 0.3
 """part of the long step's slope; where the short step's is smaller,
 the long one's is mostly curvature"""
@@ -57,7 +60,9 @@ class Box:
         rounding does not lead out of the bounds."""
         moved = np.tile(self.at, (len(changes), 1))
         moved[:, self.varied] += changes * self.scale[self.varied]
-        return np.clip(moved, np.minimum(self.lower, self.at), np.maximum(self.upper, self.at))
+        return np.clip(
+            moved, np.minimum(self.lower, self.at), np.maximum(self.upper, self.at)
+        )
 
 
 @record
@@ -65,8 +70,8 @@ class Axes:
     """Steps from a point along p directions of its varied coordinates, one a row,
     all within the bounds.
 
-    `steps` are signed lengths along each: to both sides, or one and two steps to one side, shape
-    (p, 2); to one side only, shape (p, 1).
+    `steps` are signed lengths along each: to both sides, or one and two steps to one
+    side, shape (p, 2); to one side only, shape (p, 1).
     """
 
     directions: Array
@@ -74,7 +79,8 @@ class Axes:
 
     @property
     def one_sided(self) -> "Axes":
-        """These axes with a step to one side only, as derivatives of first order need them."""
+        """These axes with a step to one side only, as derivatives of first order need
+        them."""
         return Axes(self.directions, self.steps[:, :1])
 
 
@@ -85,18 +91,19 @@ def differentiate(
     value: Array | None = None,
     former: Array | None = None,
 ) -> Array:
-    """Differentiate a function at a point by relative changes of its p varied coordinates,
-    shape (p, R).
+    """Differentiate a function at a point by relative changes of its p varied
+    coordinates, shape (p, R).
 
-    Along each axis the derivative is that of the parabola through the values at the point and at
-    both steps, or of the line where there is one step or where one of two fails. Where both sides
-    differ more than they have in common, or where the slope exceeds the former one by far, a
-    shorter step tells whether the effect of the long one is mostly curvature.
+    Along each axis the derivative is that of the parabola through the values at the
+    point and at both steps, or of the line where there is one step or where one of two
+    fails. Where both sides differ more than they have in common, or where the slope
+    exceeds the former one by far, a shorter step tells whether the effect of the long
+    one is mostly curvature.
 
-    The function is called with all points of the differences at once, and with those of the shorter
-    steps. Its `value` at the point, shape (R,), is given where it is known. `former` derivatives,
-    (p, R), are kept along axes that fail; without them, axes that are not single coordinates must
-    not: a coordinate's row is NaN.
+    The function is called with all points of the differences at once, and with those of
+    the shorter steps. Its `value` at the point, shape (R,), is given where it is known.
+    `former` derivatives, (p, R), are kept along axes that fail; without them, axes that
+    are not single coordinates must not: a coordinate's row is NaN.
     """
     centre = function(at.at[None])[0] if value is None else value
     expected = None if former is None else axes.directions @ former
@@ -131,9 +138,10 @@ def single_axes(at: Box, step: float) -> Axes:
 def covariance_axes(at: Box, root: Array, step: float) -> Axes:
     """Return steps of so many standard deviations along the axes of a covariance.
 
-    The axes are those of the coordinates off their bounds. A coordinate at a bound has a direction
-    of its own: the others change with it as the covariance says. So no direction leads out of the
-    bounds to both sides. `root` is G of C^-1 = G' G, of full rank, (p, p): a relative change v is
+    The axes are those of the coordinates off their bounds. A coordinate at a bound has
+    a direction of its own: the others change with it as the covariance says. So no
+    direction leads out of the bounds to both sides. `root` is G of C^-1 = G' G, of full
+    rank, (p, p): a relative change v is
     |G v| standard deviations long.
     """
     room = at.room
@@ -145,7 +153,8 @@ def covariance_axes(at: Box, root: Array, step: float) -> Axes:
     if len(inner):
         left, values, axes = np.linalg.svd(root[:, inner], full_matrices=False)
         directions[: len(inner), inner] = axes
-        # the change of the others that keeps a coordinate at its bound as short as can be
+        # the change of the others that keeps a coordinate at its bound as short as can
+        # be
         follow = axes.T @ ((left.T @ root[:, at_bound]) / values[:, None])
         directions[len(inner) :, inner] = -follow.T
     lengths = np.linalg.norm(root @ directions.T, axis=0)
@@ -153,14 +162,16 @@ def covariance_axes(at: Box, root: Array, step: float) -> Axes:
 
 
 def held_by_bound(room: Array, deviation: Array) -> Mask:
-    """Return whether coordinates are held by a bound, (p,), from the room to both, (2, p),
-    and their deviations."""
+    """Return whether coordinates are held by a bound, (p,), from the room to both, (2,
+    p), and their deviations."""
     return room.min(axis=0) < EDGE * np.minimum(deviation, LARGEST)
 
 
-def _slopes(function: Function, at: Box, axes: Axes, value: Array) -> tuple[Array, Mask]:
-    """Return slopes along each axis, (p, R), and where both sides differ more than they have in
-    common, (p,)."""
+def _slopes(
+    function: Function, at: Box, axes: Axes, value: Array
+) -> tuple[Array, Mask]:
+    """Return slopes along each axis, (p, R), and where both sides differ more than they
+    have in common, (p,)."""
     steps = axes.steps.T[:, :, None]
     changes = (steps * axes.directions).reshape(-1, axes.directions.shape[1])
     rows = function(at.points(changes)).reshape(*steps.shape[:2], -1)
@@ -171,13 +182,16 @@ def _slopes(function: Function, at: Box, axes: Axes, value: Array) -> tuple[Arra
         second = (rows[1] - value) / steps[1]
         # the slope at the point of the parabola through all three
         parabola = (first * steps[1] - second * steps[0]) / (steps[1] - steps[0])
-        curved = np.linalg.norm(first - parabola, axis=1) > np.linalg.norm(parabola, axis=1)
+        curved = np.linalg.norm(first - parabola, axis=1) > np.linalg.norm(
+            parabola, axis=1
+        )
     line = np.where(np.isfinite(first), first, second)
     return np.where(np.isfinite(parabola), parabola, line), curved
 
 
 def _fitted(directions: Array, wanted: Array, room: Array) -> Axes:
-    """Return steps of wanted lengths, (p,), shortened to LARGEST and to the room, (2, p)."""
+    """Return steps of wanted lengths, (p,), shortened to LARGEST and to the room, (2,
+    p)."""
     wanted = np.minimum(wanted, LARGEST / np.abs(directions).max(axis=1))
     below, above = room
     ahead = _longest(directions, above, below)
@@ -192,9 +206,11 @@ def _fitted(directions: Array, wanted: Array, room: Array) -> Axes:
 
 
 def _longest(directions: Array, rising: Array, falling: Array) -> Array:
-    """Return how far one can go along directions, (p, p), before a coordinate meets a bound, (p,).
+    """Return how far one can go along directions, (p, p), before a coordinate meets a
+    bound, (p,).
 
-    `rising` and `falling` are the room of coordinates that the direction raises or lowers, (p,).
+    `rising` and `falling` are the room of coordinates that the direction raises or
+    lowers, (p,).
     """
     share = np.abs(directions)
     room = np.where(directions > 0, rising, falling)

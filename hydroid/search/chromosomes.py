@@ -1,13 +1,15 @@
 """Chromosomes: the codings of equation (23), article 4.1 and 5.4, and roulette,
 crossover and mutation, 4.1.
 
-A chromosome is a row of genes; each element of equation (23), one parameter, owns `width` of them.
-Both codings divide a parameter's range into the same 65,535 steps, ends included.
+A chromosome is a row of genes; each element of equation (23), one parameter, owns
+`width` of them. Both codings divide a parameter's range into the same 65,535 steps,
+ends included.
 
-- Gray: the article's multivariable binary string. An element is 16 bits, highest first, in Gray
-  code: neighbouring values differ in one bit, so a flipped bit or a cut through an element need not
-  jump.
-- Integer: an element is one number from 0 to 65,535; operators never cut through a parameter.
+- Gray: the article's multivariable binary string. An element is 16 bits, highest first,
+  in Gray code: neighbouring values differ in one bit, so a flipped bit or a cut through
+  an element need not jump.
+- Integer: an element is one number from 0 to 65,535; operators never cut through a
+  parameter.
 
 The operators work on whole populations, leave their arguments alone,
 and draw from the generator passed in.
@@ -22,7 +24,8 @@ from numpy.typing import NDArray
 from hydroid.arrays import Array, Ints, Mask, record
 from hydroid.settings.search import GeneticSettings
 
-Genes = NDArray[Any]  # Chromosomes, shape (n, length): bits (uint8) or integers (uint16).
+# Chromosomes, shape (n, length): bits (uint8) or integers (uint16).
+Genes = NDArray[Any]
 
 BITS = 16
 STEPS = 2**BITS - 1
@@ -54,7 +57,9 @@ class GrayCoding:
 
     def altered(self, chromosomes: Genes, rng: Generator) -> Genes:
         """Flip one random bit of every element."""
-        flips = rng.integers(0, BITS, (len(chromosomes), self.parameters, 1)) == np.arange(BITS)
+        flips = rng.integers(
+            0, BITS, (len(chromosomes), self.parameters, 1)
+        ) == np.arange(BITS)
         return chromosomes ^ flips.reshape(chromosomes.shape).astype(np.uint8)
 
 
@@ -67,7 +72,9 @@ class IntegerCoding:
 
     def random(self, n: int, rng: Generator) -> Genes:
         """Uniform integers, shape (n, parameters)."""
-        return rng.integers(0, STEPS, (n, self.parameters), dtype=np.uint16, endpoint=True)
+        return rng.integers(
+            0, STEPS, (n, self.parameters), dtype=np.uint16, endpoint=True
+        )
 
     def decode(self, chromosomes: Genes) -> Array:
         """Points of the unit box, shape (n, parameters)."""
@@ -96,10 +103,11 @@ def roulette(objectives: Array, count: int, rng: Generator) -> Ints:
     """Indices of `count` parents from the weighted roulette wheel, with replacement,
     by objectives J, (n, 1).
 
-    The wheel needs a fitness to be proportional to, and the objective is to be small: the fitness
-    is the distance to the worst feasible candidate of this population, max(J) - J. The worst itself
-    and infeasible candidates, whose J is not finite, are never drawn; among equals, and where no
-    candidate is feasible, all are equally likely.
+    The wheel needs a fitness to be proportional to, and the objective is to be small:
+    the fitness is the distance to the worst feasible candidate of this population,
+    max(J) - J. The worst itself and infeasible candidates, whose J is not finite, are
+    never drawn; among equals, and where no candidate is feasible, all are equally
+    likely.
     """
     objective = objectives[:, 0]
     feasible = np.isfinite(objective)
@@ -127,8 +135,8 @@ def pointwise_swaps(pairs: int, length: int, points: int, rng: Generator) -> Mas
 
 
 def crossover(parents: Genes, settings: GeneticSettings, rng: Generator) -> Genes:
-    """Children of neighbouring parents (0 with 1, 2 with 3, ...), shape (n, length), n even,
-    as the parents'.
+    """Children of neighbouring parents (0 with 1, 2 with 3, ...), shape (n, length), n
+    even, as the parents'.
 
     At each gene the two children of a pair hold what its two parents held.
     """

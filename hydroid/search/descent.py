@@ -13,8 +13,10 @@ from hydroid.arrays import Array, Ints, record
 from hydroid.search.axes import Function
 
 WIDTH = 2.0**-26  # of the differences: the root of the rounding unit
-WIDER = 2.0**10  # how much wider the step is that tells a weak effect from rounding noise
-SUSPECT = 1e-3  # a column this much shorter than the longest one may be noise, and is taken twice
+# how much wider the step is that tells a weak effect from rounding noise
+WIDER = 2.0**10
+# a column this much shorter than the longest one may be noise, and is taken twice
+SUSPECT = 1e-3
 TOLERANCE = 1e-12
 """of the box-constrained minimum: slope, in units of a column and the residual,
 that is only rounding"""
@@ -37,7 +39,8 @@ class Ending(Enum):
 
     @property
     def converged(self) -> bool:
-        """Whether a local optimum was reached, as far as tolerance and rounding show it."""
+        """Whether a local optimum was reached, as far as tolerance and rounding show
+        it."""
         return self in (Ending.GAIN, Ending.SLOW, Ending.EXACT, Ending.NO_IMPROVEMENT)
 
 
@@ -82,7 +85,8 @@ class Descent:
         return f"{cost} in {self.evaluations} simulations; {self.ending.value}"
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """Return arrays by name, to be stored; without the residual once it has ended."""
+        """Return arrays by name, to be stored; without the residual once it has
+        ended."""
         values = {field.name: getattr(self, field.name) for field in fields(self)}
         values["ending"] = self.ending.name
         if self.ended:
@@ -101,7 +105,8 @@ class Descent:
 
 
 def start(point: Array, residual: Array) -> Descent:
-    """Return the descent from a point, shape (p,), whose residual was simulated, shape (R,)."""
+    """Return the descent from a point, shape (p,), whose residual was simulated, shape
+    (R,)."""
     cost = costs(residual[None])[0]
     ending = Ending.UNDER_WAY if np.isfinite(cost) else Ending.START_FAILED
     return Descent(point, residual, cost, cost, no_jacobian(point), ending=ending)
@@ -123,7 +128,8 @@ class LinearModel:
     """The linear model r + J s of the residual around a descent's point,
     for the parameters with effect.
 
-    A column of J of a parameter without effect is 0; `scale` has the lengths of the others.
+    A column of J of a parameter without effect is 0; `scale` has the lengths of the
+    others.
     """
 
     def __init__(self, at: Descent) -> None:
@@ -141,20 +147,26 @@ class LinearModel:
 
     def step(self, damping: float, row: Array | None = None) -> Array:
         """Minimise |row + J s|² + damping |D s|² inside the box; s of shape (moving,)."""
-        triangle, right = (self._triangle, self._right) if row is None else self.reduced(row)
+        triangle, right = (
+            (self._triangle, self._right) if row is None else self.reduced(row)
+        )
         size = np.linalg.norm(right)
         if not size:
             return np.zeros_like(right)
-        # in lengths of the columns and of the residual, in which the solver's tolerances mean
-        # something
+        # in lengths of the columns and of the residual, in which the solver's
+        # tolerances mean something
         unit = self.scale / size
         point = self.at.point[self._moving]
-        matrix = np.vstack([triangle / self.scale, np.sqrt(damping) * np.eye(len(unit))])
+        matrix = np.vstack(
+            [triangle / self.scale, np.sqrt(damping) * np.eye(len(unit))]
+        )
         target = np.append(-right / size, np.zeros(len(unit)))
         limits = (-point * unit, (1 - point) * unit)
         # changes of the active set: far more than it takes
         most = 20 * len(unit) + 20
-        solved = lsq_linear(matrix, target, limits, method="bvls", tol=TOLERANCE, max_iter=most)
+        solved = lsq_linear(
+            matrix, target, limits, method="bvls", tol=TOLERANCE, max_iter=most
+        )
         return solved.x / unit
 
     def gain(self, s: Array) -> float:
@@ -182,11 +194,11 @@ def triangle(rows: Array) -> Array:
 
 
 def derivatives(residuals: Function, point: Array, row: Array) -> Array:
-    """Return derivatives by each parameter at a point of the box, (p,), with its residuals, (R,):
-    shape (p, R).
+    """Return derivatives by each parameter at a point of the box, (p,), with its
+    residuals, (R,): shape (p, R).
 
-    They are 0 without effect. All differences are one batch. Those that fail are taken to the other
-    side in a second batch; where that fails too, they are not finite.
+    They are 0 without effect. All differences are one batch. Those that fail are taken
+    to the other side in a second batch; where that fails too, they are not finite.
     """
 
     def quotients(which: Ints, width: float) -> Array:
@@ -204,8 +216,8 @@ def derivatives(residuals: Function, point: Array, row: Array) -> Array:
     length = np.linalg.norm(columns, axis=1)
     suspect = np.flatnonzero((length > 0) & (length < SUSPECT * length.max()))
     if len(suspect):
-        # a derivative does not depend on the step; rounding noise divided by a wider step becomes
-        # smaller
+        # a derivative does not depend on the step; rounding noise divided by a wider
+        # step becomes smaller
         wider = np.linalg.norm(quotients(suspect, WIDER * WIDTH), axis=1)
         noise = wider < 0.1 * length[suspect]
         columns[suspect[noise]] = 0.0

@@ -1,4 +1,5 @@
-"""The article's two searches: the simple genetic algorithm (4.1, figure 12), and NSGA-II (4.2).
+"""The article's two searches: the simple genetic algorithm (4.1, figure 12), and
+NSGA-II (4.2).
 
 Both are a `hydroid.search.protocol.BoxSearch`.
 """
@@ -9,7 +10,15 @@ import numpy as np
 from numpy.random import Generator
 
 from hydroid.arrays import Array, Ints, record
-from hydroid.search.chromosomes import Coding, Genes, GrayCoding, IntegerCoding, crossover, mutate, roulette
+from hydroid.search.chromosomes import (
+    Coding,
+    Genes,
+    GrayCoding,
+    IntegerCoding,
+    crossover,
+    mutate,
+    roulette,
+)
 from hydroid.search.pareto import crowding, ranks
 from hydroid.settings.search import GeneticSettings
 
@@ -48,11 +57,12 @@ def crowded_order(objectives: Array) -> Ints:
 
 
 def tournament(objectives: Array, count: int, rng: Generator) -> Ints:
-    """Return winners, (count,), of binary tournaments by the crowded comparison of objectives,
-    (n, m).
+    """Return winners, (count,), of binary tournaments by the crowded comparison of
+    objectives, (n, m).
 
-    The contestants of each round are a random permutation of the population, so that every
-    candidate competes equally often. No infeasible candidate beats a feasible one.
+    The contestants of each round are a random permutation of the population, so that
+    every candidate competes equally often. No infeasible candidate beats a feasible
+    one.
     """
     rank = ranks(objectives)
     room = crowding(objectives, rank)
@@ -68,13 +78,15 @@ def tournament(objectives: Array, count: int, rng: Generator) -> Ints:
 
 @record
 class SimpleGa:
-    """Roulette, crossover, mutation; the best few survive, the children replace the rest.
+    """Roulette, crossover, mutation; the best few survive, the children replace the
+    rest.
 
     Attributes:
         settings: population, generations and rates.
         parameters: dimensions p of the unit box.
         start: point of the box that joins the first population, shape (p,).
-        single: whether it minimises one objective, shape (n, 1), rather than several at once.
+        single: whether it minimises one objective, shape (n, 1), rather than several at
+            once.
         elite: best candidates that survive unchanged,
             and are not simulated again (the article gives none).
     """
@@ -98,16 +110,20 @@ class SimpleGa:
         return kind(self.parameters)
 
     def ask(self, population: Population | None, rng: Generator) -> Genes:
-        """Return chromosomes to be evaluated: the first population, or the offspring of one."""
+        """Return chromosomes to be evaluated: the first population, or the offspring of
+        one."""
         if population is None:
             chromosomes = self.coding.random(self.settings.population, rng)
             if self.start is not None:
                 chromosomes[:1] = self.coding.encode(self.start[None])
             return chromosomes
         count = self.settings.population - self.elite
-        # parents come in pairs: of an odd number of children the last one's sibling is left out
+        # parents come in pairs: of an odd number of children the last one's sibling is
+        # left out
         parents = self.select(population.objectives, count + count % 2, rng)
-        children = crossover(population.chromosomes[parents], self.settings, rng)[:count]
+        children = crossover(population.chromosomes[parents], self.settings, rng)[
+            :count
+        ]
         return mutate(children, self.settings.mutation_rate, self.coding, rng)
 
     def tell(self, population: Population | None, offspring: Population) -> Population:
@@ -132,4 +148,6 @@ class Nsga2(SimpleGa):
     def tell(self, population: Population | None, offspring: Population) -> Population:
         """Return the best of parents and children together, in crowded order."""
         everyone = offspring if population is None else population.join(offspring)
-        return everyone.take(crowded_order(everyone.objectives)[: self.settings.population])
+        return everyone.take(
+            crowded_order(everyone.objectives)[: self.settings.population]
+        )

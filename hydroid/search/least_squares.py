@@ -6,19 +6,21 @@
 
 `step` is a pure function of a `Descent`: a stored one continues to the same bits.
 
-One step is one of two things. *Without a Jacobian* it takes one, by finite differences in one
-batch, and ends where the linear model promises no gain. *With one* it tries a step s that minimises
+One step is one of two things. *Without a Jacobian* it takes one, by finite differences
+in one batch, and ends where the linear model promises no gain. *With one* it tries a
+step s that minimises
 |r + J s|² + λ |D s|² inside the box, D the lengths of J's columns, with Nielsen's rule for the
 damping λ. What differs from a textbook:
 
-- A Jacobian of p simulations is expensive. After a step it is updated from that step (C. G.
-  Broyden, 1965) as long as the updated one lowers the logarithm of the cost by as much per
-  simulation as the one before did.
-- Beside each step from a new Jacobian a second one is tried, corrected for the curvature of the
-  residual along the first (geodesic acceleration, M. K. Transtrum and J. P. Sethna, 2012). It
-  follows the curved valleys of problems whose parameters compensate each other.
-- A parameter without effect stays where it is: its column of J is zero, or rounding noise
-  (`derivatives`).
+- A Jacobian of p simulations is expensive. After a step it is updated from that step
+  (C. G. Broyden, 1965) as long as the updated one lowers the logarithm of the cost by
+  as much per simulation as the one before did.
+- Beside each step from a new Jacobian a second one is tried, corrected for the
+  curvature of the residual along the first (geodesic acceleration, M. K. Transtrum and
+  J. P. Sethna, 2012). It follows the curved valleys of problems whose parameters
+  compensate each other.
+- A parameter without effect stays where it is: its column of J is zero, or rounding
+  noise (`derivatives`).
 - A candidate whose simulation fails is a step that does not help.
 """
 
@@ -59,7 +61,9 @@ SLOW_STEPS = 2
 """steps in a row that may gain less than the tolerance"""
 
 
-def least_squares(start_at: Array, residuals: Function, settings: RefinementSettings) -> Descent:
+def least_squares(
+    start_at: Array, residuals: Function, settings: RefinementSettings
+) -> Descent:
     """Minimise the sum of squared residuals from a point of the unit box, shape (p,);
     return the last state.
 
@@ -72,7 +76,8 @@ def least_squares(start_at: Array, residuals: Function, settings: RefinementSett
 
 
 def step(now: State, residuals: Function, settings: RefinementSettings) -> State:
-    """Return a descent that has not ended after taking a Jacobian, or after trying a step."""
+    """Return a descent that has not ended after taking a Jacobian, or after trying a
+    step."""
     simulated = 0
 
     def counted(points: Array) -> Array:
@@ -86,12 +91,16 @@ def step(now: State, residuals: Function, settings: RefinementSettings) -> State
     return replace(after, evaluations=now.evaluations + simulated)
 
 
-def _differentiate(now: State, residuals: Function, settings: RefinementSettings) -> State:
+def _differentiate(
+    now: State, residuals: Function, settings: RefinementSettings
+) -> State:
     """Take the Jacobian; end where it promises no gain."""
     columns = derivatives(residuals, now.point, now.residual)
     if not np.isfinite(columns).all():
         return replace(now, ending=Ending.JACOBIAN_FAILED)
-    after = replace(now, jacobian=columns.T, fresh=True, cycle=(now.cost, now.evaluations))
+    after = replace(
+        now, jacobian=columns.T, fresh=True, cycle=(now.cost, now.evaluations)
+    )
     model = LinearModel(after)
     promises = model.gain(model.step(UNDAMPED)) > settings.gain_tolerance * now.cost
     return after if promises else replace(after, ending=Ending.GAIN)
@@ -122,7 +131,9 @@ def _advance(now: State, residuals: Function, settings: RefinementSettings) -> S
     return replace(after, jacobian=_updated(now, after))
 
 
-def _corrected(now: Descent, model: LinearModel, first: Array, residuals: Function) -> Array | None:
+def _corrected(
+    now: Descent, model: LinearModel, first: Array, residuals: Function
+) -> Array | None:
     """Return a step corrected for the curvature of the residual along it.
 
     None: that cannot be measured, or the correction is too large to be believed.
@@ -139,7 +150,9 @@ def _corrected(now: Descent, model: LinearModel, first: Array, residuals: Functi
     return corrected if change < CURVED * length else None
 
 
-def _without_gain(now: State, model: LinearModel, settings: RefinementSettings) -> State:
+def _without_gain(
+    now: State, model: LinearModel, settings: RefinementSettings
+) -> State:
     """Take a new Jacobian, or a shorter step, after a step that does not help."""
     if not now.fresh:
         return replace(now, jacobian=no_jacobian(now.point))
@@ -153,8 +166,8 @@ def _without_gain(now: State, model: LinearModel, settings: RefinementSettings) 
 def _keeps_jacobian(now: Descent, after: Descent, ratio: float) -> bool:
     """Return whether the next step may begin with an updated Jacobian.
 
-    A new one must have promised well. Of an updated one the logarithm of the cost must fall by as
-    much in this one simulation as it has on average since the last new one.
+    A new one must have promised well. Of an updated one the logarithm of the cost must
+    fall by as much in this one simulation as it has on average since the last new one.
     """
     if now.fresh:
         return bool(ratio > TRUSTED)
@@ -164,15 +177,17 @@ def _keeps_jacobian(now: Descent, after: Descent, ratio: float) -> bool:
 
 
 def _updated(now: Descent, after: Descent) -> Array:
-    """Return Broyden's update: the Jacobian nearest to the present one, by its own scale, that
-    explains the step."""
+    """Return Broyden's update: the Jacobian nearest to the present one, by its own
+    scale, that explains the step."""
     move = after.point - now.point
     scaled = np.sum(now.jacobian**2, axis=0) * move
     unexplained = after.residual - now.residual - now.jacobian @ move
     return now.jacobian + np.outer(unexplained / (scaled @ move), scaled)
 
 
-def _moved(now: State, point: Array, row: Array, ratio: float, settings: RefinementSettings) -> State:
+def _moved(
+    now: State, point: Array, row: Array, ratio: float, settings: RefinementSettings
+) -> State:
     """Move to a better point, whose gain is `ratio` times the promised one;
     the Jacobian is to be taken."""
     cost = costs(row[None])[0]

@@ -1,10 +1,10 @@
 """Algorithms of pymoo by name, driven as hydroid's own (J. Blank and K. Deb, 2020).
 
-Those for several objectives: MOEA/D (Q. Zhang and H. Li, 2007), the particle swarm MOPSO-CD (C. R.
-Raquel and P. C. Naval, 2005), NSGA-III (K. Deb and H. Jain, 2014) and SPEA2 (E. Zitzler and others,
-2001), with pymoo's own rates. pymoo is an optional package. Its swarm CMOPSO is left out: in
-version 0.6.2 it does not draw from the generator that it is given,
-so that no run of it can be continued.
+Those for several objectives: MOEA/D (Q. Zhang and H. Li, 2007), the particle swarm
+MOPSO-CD (C. R. Raquel and P. C. Naval, 2005), NSGA-III (K. Deb and H. Jain, 2014) and
+SPEA2 (E. Zitzler and others, 2001), with pymoo's own rates. pymoo is an optional
+package. Its swarm CMOPSO is left out: in version 0.6.2 it does not draw from the
+generator that it is given, so that no run of it can be continued.
 """
 
 from importlib import import_module
@@ -30,7 +30,8 @@ ALGORITHMS = {
 BY_DIRECTIONS = ("moead", "nsga3")
 """algorithms that spread their candidates along directions of the objectives"""
 INFEASIBLE = 1e9
-"""what pymoo takes for an objective that is not finite: it calculates with all of them"""
+"""what pymoo takes for an objective that is not finite: it calculates with all of
+them"""
 
 
 @record
@@ -97,7 +98,11 @@ class PymooSearch:
             individual.evaluated.update({"F", "G", "H"})
         self._algorithm.tell(infills=self._asked)
         # of a swarm the particles only pass the best points, which are in its archive
-        kept = self._algorithm.pop if self._algorithm.archive is None else self._algorithm.archive
+        kept = (
+            self._algorithm.pop
+            if self._algorithm.archive is None
+            else self._algorithm.archive
+        )
         objectives = kept.get("F").astype(float)
         infeasible = (objectives >= INFEASIBLE).any(axis=1)
         objectives[infeasible] = np.inf
@@ -107,7 +112,8 @@ class PymooSearch:
         from pymoo.core.problem import Problem
 
         class Asked(Problem):
-            """The unit box; the objectives are told. A swarm evaluates once before it asks."""
+            """The unit box; the objectives are told. A swarm evaluates once before it
+            asks."""
 
             def _evaluate(self, x: Array, out: Any, *_: Any, **__: Any) -> None:
                 out["F"] = np.full((len(x), self.n_obj), INFEASIBLE)
@@ -126,7 +132,9 @@ def _algorithm(settings: PymooSettings, objectives: int) -> Any:
         kind = getattr(import_module(f"pymoo.algorithms.moo.{module}"), name)
     except (ImportError, AttributeError) as error:
         hint = "install it: pip install 'hydroid[moo]'"
-        raise SettingsError(f"pymoo has no {name} ({error})", "search.pymoo", hint) from None
+        raise SettingsError(
+            f"pymoo has no {name} ({error})", "search.pymoo", hint
+        ) from None
     if settings.algorithm not in BY_DIRECTIONS:
         return kind(pop_size=settings.population)
     directions = _directions(objectives, settings.population)
@@ -136,10 +144,11 @@ def _algorithm(settings: PymooSettings, objectives: int) -> Any:
 
 
 def _directions(objectives: int, count: int) -> Array:
-    """Return directions in the space of the objectives, one for each candidate, shape (count, m).
+    """Return directions in the space of the objectives, one for each candidate, shape
+    (count, m).
 
-    They are spread by a low discrepancy over the simplex; the axes, each objective alone, are among
-    them.
+    They are spread by a low discrepancy over the simplex; the axes, each objective
+    alone, are among them.
     """
     from scipy.stats import qmc
 

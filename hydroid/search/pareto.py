@@ -1,8 +1,8 @@
 """Pareto sets: dominance, ranks, crowding, utopia,
 and one estimate from a set (article 3.2 and 6.1).
 
-All objectives are to be small. A candidate with an objective that is not finite is infeasible:
-every feasible candidate dominates it.
+All objectives are to be small. A candidate with an objective that is not finite is
+infeasible: every feasible candidate dominates it.
 """
 
 import numpy as np
@@ -17,8 +17,8 @@ def feasible(objectives: Array) -> Mask:
 
 
 def dominates(values: Array) -> Mask:
-    """Whether candidate i (row) dominates j (column): nowhere worse, somewhere better; shape (n,
-    n)."""
+    """Whether candidate i (row) dominates j (column): nowhere worse, somewhere better;
+    shape (n, n)."""
     no_worse = np.ones((len(values), len(values)), dtype=bool)
     better = ~no_worse
     for column in values.T:
@@ -28,8 +28,8 @@ def dominates(values: Array) -> Mask:
 
 
 def ranks(objectives: Array) -> Ints:
-    """Fast non-dominated sorting (Deb 2002): the front of each candidate, (n,), by objectives, (n,
-    m).
+    """Fast non-dominated sorting (Deb 2002): the front of each candidate, (n,), by
+    objectives, (n, m).
 
     0 for those that nobody dominates, 1 for those that only these dominate, ...;
     infeasible ones are last.
@@ -54,10 +54,11 @@ def non_dominated(objectives: Array) -> Mask:
 
 
 def crowding(objectives: Array, rank: Ints) -> Array:
-    """Crowding distance (Deb 2002), (n,): the room that each of (n, m) has on its front, `rank`.
+    """Crowding distance (Deb 2002), (n,): the room that each of (n, m) has on its
+    front, `rank`.
 
-    The sum over the objectives of the gap between its two neighbours, in parts of the front's
-    range; inf at the ends of a front, 0 for the infeasible.
+    The sum over the objectives of the gap between its two neighbours, in parts of the
+    front's range; inf at the ends of a front, 0 for the infeasible.
     """
     crowd = np.zeros(objectives.shape)
     usable = feasible(objectives)
@@ -83,22 +84,22 @@ def segment_best(objectives: Array) -> Ints:
 
 
 def average(points: Array, objectives: Array) -> Array:
-    """The article's estimate, (p,): the mean of the best of points, (n, p), of all segments, (n,
-    S).
+    """The article's estimate, (p,): the mean of the best of points, (n, p), of all
+    segments, (n, S).
 
-    As a rule no candidate of the set, and inside the bounds where all are. The points' coordinates
-    are linear in the parameters.
+    As a rule no candidate of the set, and inside the bounds where all are. The points'
+    coordinates are linear in the parameters.
     """
     return points[segment_best(objectives)].mean(axis=0)
 
 
 def utopia(points: Array, objectives: Array) -> Array:
-    """Return the candidate nearest to the utopia point F⁰, (p,), of a Pareto set of points, (n, p),
-    by (n, S).
+    """Return the candidate nearest to the utopia point F⁰, (p,), of a Pareto set of
+    points, (n, p), by (n, S).
 
-    The article's criterion 1 is the sum of squares of F - F⁰. Segments in which the arm moves far
-    would decide alone, so each objective is first divided by its range over the set;
-    one without range is left out.
+    The article's criterion 1 is the sum of squares of F - F⁰. Segments in which the arm
+    moves far would decide alone, so each objective is first divided by its range over
+    the set; one without range is left out.
     """
     values = _ranked(objectives)
     usable = objectives[feasible(objectives)]

@@ -3,11 +3,13 @@
     population = None
     for _ in range(1 + search.generations):
         chromosomes = search.ask(population, rng)
-        offspring = Population(chromosomes, objectives(search.coding.decode(chromosomes)))
-        population = search.tell(population, offspring)
+        offspring = Population(chromosomes,
+        objectives(search.coding.decode(chromosomes))) population =
+        search.tell(population, offspring)
 
-A search draws from the generator passed in alone, and the same answers lead it the same way. So a
-run is continued by running it again from its seed, with the objectives that are known.
+A search draws from the generator passed in alone, and the same answers lead it the same
+way. So a run is continued by running it again from its seed, with the objectives that
+are known.
 """
 
 from typing import ClassVar, Protocol
@@ -31,7 +33,8 @@ class BoxSearch(Protocol):
     """A search for the smallest objectives in the unit box."""
 
     single: ClassVar[bool]
-    """whether it minimises one objective, shape (n, 1), rather than several at once, (n, m)"""
+    """whether it minimises one objective, shape (n, 1), rather than several at once,
+    (n, m)"""
 
     @property
     def generations(self) -> int:
@@ -48,5 +51,6 @@ class BoxSearch(Protocol):
         ...
 
     def tell(self, population: Population | None, offspring: Population) -> Population:
-        """Take what was evaluated, and return the population from which the search goes on."""
+        """Take what was evaluated, and return the population from which the search goes
+        on."""
         ...

@@ -1,7 +1,7 @@
 """A hydraulic arm: an MJCF, and one YAML file with what MJCF cannot say.
 
-The MJCF has links, joints, ranges, masses and meshes; its keyframes are the named poses. The YAML
-has the actuators, in units of a drawing (mm, mm², cm³/rad).
+The MJCF has links, joints, ranges, masses and meshes; its keyframes are the named
+poses. The YAML has the actuators, in units of a drawing (mm, mm², cm³/rad).
 """
 
 import math
@@ -25,8 +25,8 @@ from hydroid.units import Display, display
 Actuator: TypeAlias = LinearActuator | RotaryActuator
 
 FARTHEST_BY_CYLINDER = 200.0
-"""how far a cylinder turns a joint at most, with a linkage such as a bucket's [deg]; slewing gears
-and rotators turn farther"""
+"""how far a cylinder turns a joint at most, with a linkage such as a bucket's [deg];
+slewing gears and rotators turn farther"""
 SLIDE = 2  # MuJoCo's number of a joint that slides
 
 
@@ -44,8 +44,8 @@ class Joint:
     """A joint that turns [deg], or `slides` [m];
     what is said of angles then holds for its position.
 
-    A continuous one turns without stops: its range limits what is shown and tested. No actuator:
-    nothing that stage 2 knows moves it.
+    A continuous one turns without stops: its range limits what is shown and tested. No
+    actuator: nothing that stage 2 knows moves it.
     """
 
     name: str
@@ -64,19 +64,25 @@ class Joint:
 
     @property
     def shown(self) -> Display:
-        """How a reader is shown where it is: its angle in deg, or its position in mm."""
+        """How a reader is shown where it is: its angle in deg, or its position in
+        mm."""
         return display(slides=self.slides)
 
     @property
     def may_stand_in(self) -> bool:
-        """Whether its rotary actuator may stand in for a cylinder of unknown size and linkage."""
+        """Whether its rotary actuator may stand in for a cylinder of unknown size and
+        linkage."""
         if self.continuous or self.slides:
             return False
         low, high = self.range
-        return isinstance(self.actuator, RotaryActuator) and high - low <= FARTHEST_BY_CYLINDER
+        return (
+            isinstance(self.actuator, RotaryActuator)
+            and high - low <= FARTHEST_BY_CYLINDER
+        )
 
     def has(self, quantity: str) -> bool:
-        """Whether a quantity of a joint's actuator means anything of what moves this one."""
+        """Whether a quantity of a joint's actuator means anything of what moves this
+        one."""
         kind = CHOICES[quantity].of
         if kind == "cylinder":
             return isinstance(self.actuator, LinearActuator)
@@ -86,21 +92,23 @@ class Joint:
 
 
 class Arm(Settings):
-    """An arm as its YAML file and its MJCF describe it; the MJCF is read when something of it is
-    asked for. Raises SettingsError: where the MJCF is read, a setting that does not fit it;
-    ModelError: then, no MJCF, or one that hydroid cannot simulate.
+    """An arm as its YAML file and its MJCF describe it; the MJCF is read when something
+    of it is asked for. Raises SettingsError: where the MJCF is read, a setting that
+    does not fit it; ModelError: then, no MJCF, or one that hydroid cannot simulate.
     """
 
     model: Beside
     """the arm's MJCF, relative to this file; its keyframes are the named poses"""
-    actuators: dict[str, Annotated[Cylinder | RotaryActuator, Field(discriminator="kind")]] = {}
+    actuators: dict[
+        str, Annotated[Cylinder | RotaryActuator, Field(discriminator="kind")]
+    ] = {}
     """what moves the joints, by name; a joint that stage 2 does not drive needs none"""
     payload: str | None = None
     """site of the model where the gripper holds a payload's centre of mass; null:
     logs have no payloads"""
     pair: Beside | None = None
-    """MJCF of a machine with two of these arms, whose joints are named right_JOINT and left_JOINT;
-    null: the arm stands alone"""
+    """MJCF of a machine with two of these arms, whose joints are named right_JOINT and
+    left_JOINT; null: the arm stands alone"""
 
     def model_post_init(self, context: Any) -> None:
         """Keep where the settings came from beside what is read of the model:
@@ -108,8 +116,8 @@ class Arm(Settings):
         vars(self)["where"] = (context or {}).get("source", self.where)
 
     def __copy__(self) -> "Arm":
-        """Copy the settings alone: a copy with another model must not keep what was read
-        of this one."""
+        """Copy the settings alone: a copy with another model must not keep what was
+        read of this one."""
         copy = super().__copy__()
         for name in vars(copy).keys() - Arm.model_fields.keys():
             del vars(copy)[name]
@@ -128,10 +136,14 @@ class Arm(Settings):
         for name in self.actuators:
             if name not in names:
                 hint = f"the model's joints: {', '.join(names)}"
-                raise SettingsError(f"actuators.{name}: no such joint", self.where, hint)
+                raise SettingsError(
+                    f"actuators.{name}: no such joint", self.where, hint
+                )
         sites = [model.site(s).name for s in range(model.nsite)]
         if self.payload is not None and self.payload not in sites:
-            raise SettingsError(f"payload: the model has no site {self.payload!r}", self.where)
+            raise SettingsError(
+                f"payload: the model has no site {self.payload!r}", self.where
+            )
         return tuple(map(self._joint, names))
 
     def _joint(self, name: str) -> Joint:
@@ -159,7 +171,8 @@ class Arm(Settings):
     def mass_of(self) -> dict[str, float]:
         """Nominal masses of the links, the bodies that move [kg], by name.
 
-        Those of the joints come in their order, then parts that are fixed to them, L in all.
+        Those of the joints come in their order, then parts that are fixed to them, L in
+        all.
         """
         model = self._model
         bodies = [model.body(b) for b in range(1, model.nbody) if model.body_weldid[b]]
@@ -170,7 +183,8 @@ class Arm(Settings):
 
     @cached_property
     def poses(self) -> dict[str, tuple[float, ...]]:
-        """Angle of each joint by the pose's name [rad]: the model's keyframes, and `home`."""
+        """Angle of each joint by the pose's name [rad]: the model's keyframes, and
+        `home`."""
         model = self._model
         poses = {"home": tuple(model.qpos0.tolist())}
         for k in range(model.nkey):
@@ -206,7 +220,10 @@ class Arm(Settings):
         """Lower and upper stop of each joint by its name [rad], or [m] of a slide;
         infinite where none is."""
         free = (-math.inf, math.inf)
-        return {joint.name: free if joint.continuous else joint.limits for joint in self.joints}
+        return {
+            joint.name: free if joint.continuous else joint.limits
+            for joint in self.joints
+        }
 
     @property
     def slides(self) -> tuple[int, ...]:
@@ -215,12 +232,14 @@ class Arm(Settings):
 
     @property
     def backward(self) -> tuple[int, ...]:
-        """Joints, from 1, that turn to negative angles as their rods run out, at positive commands."""
+        """Joints, from 1, that turn to negative angles as their rods run out, at
+        positive commands."""
         joints = list[int]()
         for number, joint in enumerate(self.joints, 1):
             if not isinstance(joint.actuator, LinearActuator):
                 continue
-            # the same throughout the range, which need not hold the angle 0 at which the triangle is given
+            # the same throughout the range, which need not hold the angle 0 at which
+            # the triangle is given
             if joint.actuator.moment_arm(sum(joint.limits) / 2) < 0:
                 joints.append(number)
         return tuple(joints)
@@ -261,14 +280,17 @@ def _range(joint: Any, continuous: bool, slides: bool) -> tuple[float, float]:
 def _at_zero(path: Path) -> Any:
     """Return MuJoCo's data of a model with all joints at 0."""
     if not path.is_file():
-        raise ModelError("no such model", path, "give the arm's MJCF; `hydroid init` writes one")
+        raise ModelError(
+            "no such model", path, "give the arm's MJCF; `hydroid init` writes one"
+        )
     state = path.stat()
     return _compiled(path, state.st_mtime_ns, state.st_size)
 
 
 @lru_cache(maxsize=8)
 def _compiled(path: Path, _changed: int, _size: int) -> Any:
-    """Return the data of a file that did not change, without meshes that decide no inertia.
+    """Return the data of a file that did not change, without meshes that decide no
+    inertia.
 
     Meshes take long to compile.
     """
@@ -277,7 +299,10 @@ def _compiled(path: Path, _changed: int, _size: int) -> Any:
     from hydroid.mjcf import mujoco_errors, read_mjcf
 
     spec = read_mjcf(path)
-    if spec.compiler.inertiafromgeom != mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE:
+    if (
+        spec.compiler.inertiafromgeom
+        != mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
+    ):
         for geom in list(spec.geoms):
             is_mesh = geom.type == mujoco.mjtGeom.mjGEOM_MESH
             if is_mesh and not geom.name and geom.parent.explicitinertial:

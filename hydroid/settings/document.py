@@ -1,8 +1,8 @@
 """YAML text -> plain values: mappings, lists, text, numbers, true, false and null,
 and nothing else.
 
-Scalars are read as YAML 1.2 defines them. PyYAML's own rules, those of YAML 1.1, read 010 as 8,
-1:30 as 90 and 1e3 as text; here they are 10, text and 1000.
+Scalars are read as YAML 1.2 defines them. PyYAML's own rules, those of YAML 1.1, read
+010 as 8, 1:30 as 90 and 1e3 as text; here they are 10, text and 1000.
 """
 
 import re
@@ -34,11 +34,14 @@ _PLAIN = {
 """what the YAML reader stumbled over, by a part of its message"""
 _WORDS = {"": None, "~": None, "null": None, "true": True, "false": False}
 _INTEGER = re.compile(r"[-+]?[0-9]{1,300}")  # longer ones are beyond any float
-_NUMBER = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)(e[-+]?[0-9]+)?|[-+]?\.inf|\.nan", re.IGNORECASE)
+_NUMBER = re.compile(
+    r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)(e[-+]?[0-9]+)?|[-+]?\.inf|\.nan", re.IGNORECASE
+)
 
 
 def read_yaml(path: Path, times: int = 1) -> tuple[dict[str, Any], Lines]:
-    """Read a file that holds one mapping. It may be `times` as large as settings are."""
+    """Read a file that holds one mapping. It may be `times` as large as settings
+    are."""
     most = times * MOST_BYTES
     try:
         data = read_file(path, most + 1)
@@ -47,10 +50,14 @@ def read_yaml(path: Path, times: int = 1) -> tuple[dict[str, Any], Lines]:
         reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
         raise SettingsError(f"cannot be read ({reason})", path) from None
     if len(data) > most:
-        raise SettingsError(f"is larger than {most >> 10} KiB, too large for settings", path)
+        raise SettingsError(
+            f"is larger than {most >> 10} KiB, too large for settings", path
+        )
     values, lines = read_document(text, path, times)
     if not isinstance(values, dict):
-        raise SettingsError("must be a mapping of settings", path, "write `key: value` lines")
+        raise SettingsError(
+            "must be a mapping of settings", path, "write `key: value` lines"
+        )
     return values, lines
 
 
@@ -71,16 +78,21 @@ def read_document(text: str, source: object, times: int = 1) -> tuple[Any, Lines
 def _not_yaml(error: yaml.YAMLError, source: object) -> SettingsError:
     """Return what the YAML reader stumbled over, in plain words, and where."""
     mark = getattr(error, "problem_mark", None)
-    where = f"{source}, line {mark.line + 1}, column {mark.column + 1}" if mark else source
+    where = (
+        f"{source}, line {mark.line + 1}, column {mark.column + 1}" if mark else source
+    )
     problem = getattr(error, "problem", None) or getattr(error, "reason", None)
-    plain = next((words for part, words in _PLAIN.items() if part in str(problem)), problem)
+    plain = next(
+        (words for part, words in _PLAIN.items() if part in str(problem)), problem
+    )
     return SettingsError(f"is not YAML: {plain}", where)
 
 
 class _Reader:
     """Turns nodes into values, and notes the lines of all that is in them.
 
-    What stands behind an alias counts whenever it is used: a few lines cannot expand to billions.
+    What stands behind an alias counts whenever it is used: a few lines cannot expand to
+    billions.
     """
 
     def __init__(self, source: object, most: int) -> None:
@@ -103,19 +115,26 @@ class _Reader:
         if isinstance(node, yaml.ScalarNode):
             return self._scalar(node)
         if isinstance(node, yaml.SequenceNode):
-            return [self.value(item, (*path, str(index))) for index, item in enumerate(node.value)]
+            return [
+                self.value(item, (*path, str(index)))
+                for index, item in enumerate(node.value)
+            ]
         return self._mapping(node, path)
 
     def _mapping(self, node: yaml.Node, path: tuple[str, ...]) -> dict[Any, Any]:
         values: dict[Any, Any] = {}
         for key, item in node.value:
             if not isinstance(key, yaml.ScalarNode):
-                raise SettingsError("a key must be plain text or a number", self._place(key))
+                raise SettingsError(
+                    "a key must be plain text or a number", self._place(key)
+                )
             name = self._scalar(key)
             # paths hold text: 02 and 2 are the same joint
             item_path = (*path, str(name))
             if item_path in self.lines:
-                raise SettingsError(f"{'.'.join(item_path)} occurs twice", self._place(key))
+                raise SettingsError(
+                    f"{'.'.join(item_path)} occurs twice", self._place(key)
+                )
             self.lines[item_path] = key.start_mark.line + 1
             values[name] = self.value(item, item_path)
         return values
@@ -127,9 +146,13 @@ class _Reader:
         text = str(node.value)
         self._characters += len(text)
         if self._characters > MOST_CHARACTERS:
-            raise SettingsError(f"holds more than {MOST_CHARACTERS} characters of text", self._source)
+            raise SettingsError(
+                f"holds more than {MOST_CHARACTERS} characters of text", self._source
+            )
         if not all(letter.isprintable() or letter in "\t\n" for letter in text):
-            raise SettingsError("a text contains characters that cannot be printed", self._place(node))
+            raise SettingsError(
+                "a text contains characters that cannot be printed", self._place(node)
+            )
         # a plain scalar is neither quoted nor a block of text
         is_plain = node.style is None
         return _plain_value(text) if is_plain else text

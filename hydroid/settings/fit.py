@@ -19,7 +19,12 @@ from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.load import ByJoint, Joints, Positive, Settings, load, validate
 from hydroid.settings.log import LogSettings
 from hydroid.settings.parameters import by_group, expanded, make_parameter, with_curves
-from hydroid.settings.problem import ObjectiveSettings, ParameterSettings, PriorSettings, SimulationSettings
+from hydroid.settings.problem import (
+    ObjectiveSettings,
+    ParameterSettings,
+    PriorSettings,
+    SimulationSettings,
+)
 from hydroid.settings.search import DesignSettings, RefinementSettings, SearchSettings
 
 
@@ -27,26 +32,28 @@ class FitSettings(Settings):
     """All that a fit needs besides its logs."""
 
     stage: Literal["mech", "hyd"] = "mech"
-    """mech: the hydraulics are a gain; hyd: the whole chain from command to torque is simulated"""
+    """mech: the hydraulics are a gain; hyd: the whole chain from command to torque is
+    simulated"""
     arm: Arm = "hydrolek"  # pyright: ignore[reportAssignmentType]
     """name of a shipped arm, or path of an arm's YAML file,
     relative to this file or to the working folder"""
     outputs: Annotated[Joints, Field(min_length=1)] = (2,)
     """joints whose measured angle is compared"""
     tolerance_deg: Positive | ByJoint[Positive] | None = None
-    """rms error on unseen logs up to which joints are predicted [deg], of all or by joint; null: 2
-    % of their travel there"""
+    """rms error on unseen logs up to which joints are predicted [deg], of all or by
+    joint; null: 2 % of their travel there"""
     start_pose: str = "home"
     """name of the arm's pose that joints without a measured angle hold"""
     free_start: bool = True
-    """whether simulated angles may begin beside the truth, as far as the sensor's noise in the rest
-    before the first command allows: the drift of the errors begins as uncertain as that. false:
-    it is exact"""
+    """whether simulated angles may begin beside the truth, as far as the sensor's noise
+    in the rest before the first command allows: the drift of the errors begins as
+    uncertain as that. false: it is exact"""
     parameters: dict[str, ParameterSettings]
-    """the parameters of the model by name, those to be estimated and those that are fixed"""
+    """the parameters of the model by name, those to be estimated and those that are
+    fixed"""
     scale: Literal["log", "linear"] = "log"
-    """log: parameters with a lower bound above 0 are searched, refined and reported by their
-    logarithm; linear: by their value, as in equations (15) and (16)"""
+    """log: parameters with a lower bound above 0 are searched, refined and reported by
+    their logarithm; linear: by their value, as in equations (15) and (16)"""
     hydraulics: HydraulicSettings = HydraulicSettings()
     priors: dict[str, PriorSettings] = {}
     """what is known besides the logs, each under a name of your choice"""
@@ -85,7 +92,8 @@ class FitSettings(Settings):
             _check_names(parameters)
         context = info.context or {}
         arm = cls._arm_of(values, context.get("folder"))
-        # the context carries the arm to the validators of joints, which turn names into numbers
+        # the context carries the arm to the validators of joints, which turn names into
+        # numbers
         context["arm"] = arm if isinstance(arm, Arm) else None
         if isinstance(parameters, dict):
             compared = values.get("outputs", cls.model_fields["outputs"].default)
@@ -99,7 +107,8 @@ class FitSettings(Settings):
 
     @classmethod
     def _arm_of(cls, values: Plain, folder: Path | None) -> Any:
-        """Return the arm that values of settings name or hold; anything else as it stands."""
+        """Return the arm that values of settings name or hold; anything else as it
+        stands."""
         arm = values.get("arm", cls.model_fields["arm"].default)
         if isinstance(arm, str):
             return load_arm(arm, folder)
@@ -117,27 +126,37 @@ class FitSettings(Settings):
         simulation = values.get("simulation")
         if isinstance(simulation, SimulationSettings):
             simulation = simulation.model_dump()
-        if not isinstance(simulation, dict) or simulation.get("model") not in ("quasi-static", "ladder"):
+        if not isinstance(simulation, dict) or simulation.get("model") not in (
+            "quasi-static",
+            "ladder",
+        ):
             return values
         return {**values, "simulation": {**simulation, "model": "dynamic"}}
 
     @model_validator(mode="after")
     def _of_the_stage(self) -> "FitSettings":
         if self.joint_refinement and self.simulation.model == "ladder":
-            raise ValueError("joint_refinement: refines one model; set simulation.model to it")
+            raise ValueError(
+                "joint_refinement: refines one model; set simulation.model to it"
+            )
         for name, parameter in self.parameters.items():
             quantity = parameter.quantity
             if self.stage == "mech" and quantity not in MECHANICAL:
-                raise ValueError(f"parameters.{name}: stage mech has no {quantity}; set stage: hyd")
+                raise ValueError(
+                    f"parameters.{name}: stage mech has no {quantity}; set stage: hyd"
+                )
             if self.stage == "hyd" and quantity == "gain":
-                raise ValueError(f"parameters.{name}: stage hyd has no gain; the hydraulics take its place")
+                raise ValueError(
+                    f"parameters.{name}: stage hyd has no gain; the hydraulics take its place"
+                )
         # this raises where a parameter cannot be made
         self.parameter_set()
         return self
 
     @property
     def quasi_static(self) -> bool:
-        """Whether speeds follow valve and load at once, without oil stiffness and inertia."""
+        """Whether speeds follow valve and load at once, without oil stiffness and
+        inertia."""
         return self.stage == "hyd" and self.simulation.model != "dynamic"
 
     @property
@@ -146,7 +165,9 @@ class FitSettings(Settings):
         not one that begins at stated starts alone."""
         if not self._states_start:
             return True
-        return self.search.algorithm != "multistart" or self.search.multistart.starts > 1
+        return (
+            self.search.algorithm != "multistart" or self.search.multistart.starts > 1
+        )
 
     @property
     def _states_start(self) -> bool:
@@ -157,17 +178,22 @@ class FitSettings(Settings):
     def substeps(self) -> int:
         """Sub-steps of valves and oil in one step of the model."""
         simulation = self.simulation
-        return self.hydraulics.substeps * simulation.steps_per_sample // simulation.steps
+        return (
+            self.hydraulics.substeps * simulation.steps_per_sample // simulation.steps
+        )
 
     def terms(self, model: str = "quasi-static") -> tuple[str, ...]:
-        """Names of the terms that a fit may add to a model, in the order of the parameters.
+        """Names of the terms that a fit may add to a model, in the order of the
+        parameters.
 
         The oil of a quasi-static model is none of the dynamic one, which has its own.
         """
         parameters = self.parameters.values()
         if model == "dynamic":
             parameters = [p for p in parameters if not p.quantity.startswith("oil_")]
-        names = (parameter.term for parameter in parameters if parameter.term is not None)
+        names = (
+            parameter.term for parameter in parameters if parameter.term is not None
+        )
         return tuple(dict.fromkeys(names))
 
     def terms_of(self, joint: int) -> tuple[str, ...]:
@@ -179,10 +205,11 @@ class FitSettings(Settings):
         return tuple(term for term, joints in owners.items() if joints == {(joint,)})
 
     def of_estimate(self, name: str | None) -> "FitSettings":
-        """Return the settings that an estimate of a fit was refined with, and predicts with.
+        """Return the settings that an estimate of a fit was refined with, and predicts
+        with.
 
-        `name` is that of the estimate, then those of the terms that it has: refined+pump;
-        None: no fit's.
+        `name` is that of the estimate, then those of the terms that it has:
+        refined+pump; None: no fit's.
         """
         if name is None:
             return self
@@ -204,21 +231,28 @@ class FitSettings(Settings):
         return self.with_parameters(changed)
 
     def _with_terms(self, terms: Collection[str]) -> "FitSettings":
-        """Return the settings without the parameters of all other terms, and the priors on these."""
+        """Return the settings without the parameters of all other terms, and the priors
+        on these."""
         kept = {
             name: parameter
             for name, parameter in self.parameters.items()
             if parameter.term is None or parameter.term in terms
         }
         left_out = self.parameters.keys() - kept.keys()
-        priors = {name: prior for name, prior in self.priors.items() if left_out.isdisjoint(prior.names)}
+        priors = {
+            name: prior
+            for name, prior in self.priors.items()
+            if left_out.isdisjoint(prior.names)
+        }
         return self.changed({"parameters": kept, "priors": priors})
 
     def parameter_set(self) -> ParameterSet:
         """Return the parameters with units, bounds, priors and fixed values,
         in the order of theta."""
         parameters = [
-            make_parameter(name, settings, self.arm, self.hydraulics, log=self.scale == "log")
+            make_parameter(
+                name, settings, self.arm, self.hydraulics, log=self.scale == "log"
+            )
             for name, settings in self.parameters.items()
         ]
         if not self._states_start:
@@ -226,8 +260,11 @@ class FitSettings(Settings):
             parameters = [replace(parameter, start=None) for parameter in parameters]
         return ParameterSet(tuple(parameters))
 
-    def with_parameters(self, changed: Mapping[str, ParameterSettings]) -> "FitSettings":
-        """Return the settings with parameters changed, or further ones behind their own."""
+    def with_parameters(
+        self, changed: Mapping[str, ParameterSettings]
+    ) -> "FitSettings":
+        """Return the settings with parameters changed, or further ones behind their
+        own."""
         return self.changed({"parameters": self.parameters | dict(changed)})
 
     def acting_on(self, joint: int) -> set[str]:
@@ -239,7 +276,8 @@ class FitSettings(Settings):
         }
 
     def alone(self, joint: int, values: Mapping[str, float]) -> "FitSettings":
-        """Return the settings of one joint's own parameters, the others held at values by name.
+        """Return the settings of one joint's own parameters, the others held at values
+        by name.
 
         Joints that are not compared then follow their logged motion.
         """
@@ -254,7 +292,8 @@ class FitSettings(Settings):
 
 
 def _check_names(parameters: Mapping[Any, Any]) -> None:
-    """Raise ValueError where a parameter's name cannot be used in tables and by `--set`."""
+    """Raise ValueError where a parameter's name cannot be used in tables and by
+    `--set`."""
     for name in parameters:
         if not isinstance(name, str) or not name.isidentifier():
             raise ValueError("parameter names must be plain words such as K or M1")
@@ -263,7 +302,9 @@ def _check_names(parameters: Mapping[Any, Any]) -> None:
 def _groups(log: Any) -> Collection[str]:
     """Return the names of the groups of logs,
     of the settings of logs as YAML or Python gives them."""
-    groups = log.get("groups") if isinstance(log, dict) else getattr(log, "groups", None)
+    groups = (
+        log.get("groups") if isinstance(log, dict) else getattr(log, "groups", None)
+    )
     return groups if isinstance(groups, dict) else ()
 
 
@@ -282,16 +323,20 @@ class StudySettings(Settings):
     """settings to replace in every cell, by dotted key"""
     logs: Annotated[tuple[str, ...], Field(min_length=1)]
     """fitted logs, relative to the study's file"""
-    axes: dict[str, Annotated[dict[str, Changes] | tuple[Any, ...], Field(min_length=1)]] = {}
-    """what varies: a dotted key with a list of values, or a name with cells: {label: {key: value,
-    ...}}"""
+    axes: dict[
+        str, Annotated[dict[str, Changes] | tuple[Any, ...], Field(min_length=1)]
+    ] = {}
+    """what varies: a dotted key with a list of values, or a name with cells: {label:
+    {key: value, ...}}"""
     seeds: Annotated[int, Field(ge=0, le=10_000)] = 10
     """number of seeds, from 1"""
 
     def changes(self) -> dict[str, Changes]:
         """Return the settings that each cell replaces, by the cell's name."""
         if math.prod(map(len, self.axes.values())) > MOST_CELLS:
-            raise SettingsError(f"make more than {MOST_CELLS} cells", "axes", "leave some out")
+            raise SettingsError(
+                f"make more than {MOST_CELLS} cells", "axes", "leave some out"
+            )
         cells = dict[str, Changes]()
         for choice in product(*starmap(_options, self.axes.items())):
             name = ", ".join(label for label, _ in choice) or "all"
@@ -301,7 +346,9 @@ class StudySettings(Settings):
         return cells
 
 
-def _options(key: str, axis: Mapping[str, Changes] | tuple[Any, ...]) -> list[tuple[str, Changes]]:
+def _options(
+    key: str, axis: Mapping[str, Changes] | tuple[Any, ...]
+) -> list[tuple[str, Changes]]:
     """Return the cells along an axis of a study: their labels,
     and the settings that they replace."""
     if isinstance(axis, Mapping):
@@ -309,7 +356,9 @@ def _options(key: str, axis: Mapping[str, Changes] | tuple[Any, ...]) -> list[tu
     return [(f"{key} {value}", {key: value}) for value in axis]
 
 
-def cell_settings(study: StudySettings, path: Path, extra: Changes | None = None) -> dict[str, FitSettings]:
+def cell_settings(
+    study: StudySettings, path: Path, extra: Changes | None = None
+) -> dict[str, FitSettings]:
     """Return the settings of a fit of every cell, with `extra` ones replaced,
     by the cell's name."""
     config = find_config(study.base, path.parent)

@@ -1,7 +1,9 @@
-"""The hydraulics of an arm, from command to chamber pressure: quantities that hold for all joints.
+"""The hydraulics of an arm, from command to chamber pressure: quantities that hold for
+all joints.
 
-Each setting holds for every actuator of the arm; a parameter of a fit sets or frees it joint by joint. Areas,
-openings and pivots differ by joint: they stand in the arm's file.
+Each setting holds for every actuator of the arm; a parameter of a fit sets or frees it
+joint by joint. Areas, openings and pivots differ by joint: they stand in the arm's
+file.
 """
 
 import math
@@ -17,7 +19,9 @@ from hydroid.settings.load import Positive, Settings
 
 def _field(quantity: Quantity) -> Any:
     optional = quantity.optional or quantity.default is None
-    meaning = f"{quantity.meaning} [{quantity.unit}]" if quantity.unit else quantity.meaning
+    meaning = (
+        f"{quantity.meaning} [{quantity.unit}]" if quantity.unit else quantity.meaning
+    )
     low, high = quantity.limits or (0.0, math.inf)
     above, least = (low, None) if quantity.positive else (None, low)
     field = Field(quantity.default, description=meaning, gt=above, ge=least, le=high)
@@ -30,7 +34,8 @@ _Quantities: type[Any] = create_model(
 
 
 class HydraulicSettings(_Quantities):
-    """Values of quantities by name, for all joints; a name without _a or _b sets both sides."""
+    """Values of quantities by name, for all joints; a name without _a or _b sets both
+    sides."""
 
     rotary_volume: Positive = 50.0
     """volume of each chamber of a rotary actuator [cm³]"""
@@ -54,16 +59,23 @@ class HydraulicSettings(_Quantities):
 def actuator_values(
     actuator: LinearActuator | RotaryActuator | None, settings: HydraulicSettings
 ) -> dict[str, float | None]:
-    """Return the value of every quantity of a joint in the units of QUANTITIES; None: no limit.
+    """Return the value of every quantity of a joint in the units of QUANTITIES; None:
+    no limit.
 
-    Mechanical quantities are 0: only a fit states them. A joint without an actuator has the defaults, which
-    nothing uses: it is never driven in stage 2.
+    Mechanical quantities are 0: only a fit states them. A joint without an actuator has
+    the defaults, which nothing uses: it is never driven in stage 2.
     """
-    values: dict[str, Any] = {name: q.default for name, q in QUANTITIES.items()} | settings.model_dump()
+    values: dict[str, Any] = {
+        name: q.default for name, q in QUANTITIES.items()
+    } | settings.model_dump()
     if isinstance(actuator, LinearActuator):
         one, sides = actuator.settings, actuator.triangle
         values |= dict.fromkeys(TARGETS["opening"], one.max_opening)
-        values |= {"area_a": one.area_a, "area_b": one.area_b, "pivot_angle": abs(sides.theta0)}
+        values |= {
+            "area_a": one.area_a,
+            "area_b": one.area_b,
+            "pivot_angle": abs(sides.theta0),
+        }
         values |= {"pivot_distance_1": sides.a, "pivot_distance_2": sides.b}
     elif actuator is not None:
         values |= dict.fromkeys(TARGETS["opening"], actuator.max_opening)

@@ -1,9 +1,10 @@
-"""What turns a joint: a cylinder that spans a triangle with it, or a rotary actuator. Units as on a drawing.
+"""What turns a joint: a cylinder that spans a triangle with it, or a rotary actuator.
+Units as on a drawing.
 
-A cylinder's pivots lie at distances a and b from the joint's axis. The angle between them is θ = q + θ0, so
-by the law of cosines the cylinder is c(q) long. By virtual work, τ dq = F dc, its force F makes the torque
-τ = r F with the moment arm r = dc/dq. (The article leaves this geometry to its CAD model; the triangle and
-its numbers are ours.)
+A cylinder's pivots lie at distances a and b from the joint's axis. The angle between
+them is θ = q + θ0, so by the law of cosines the cylinder is c(q) long. By virtual work,
+τ dq = F dc, its force F makes the torque τ = r F with the moment arm r = dc/dq. (The
+article leaves this geometry to its CAD model; the triangle and its numbers are ours.)
 """
 
 # pyright: reportMissingParameterType=false
@@ -19,7 +20,9 @@ from hydroid.settings.load import Positive, Settings
 
 Vector = tuple[float, float, float]
 
-DIGITS = 9  # of lengths in m and angles in deg that are read off a model: what is finer is its rounding
+# of lengths in m and angles in deg that are read off a model: what is finer is its
+# rounding
+DIGITS = 9
 
 
 def triangle(angle, a, b, theta0, shortest=0.0) -> Any:
@@ -27,31 +30,43 @@ def triangle(angle, a, b, theta0, shortest=0.0) -> Any:
 
     The hydraulic kernel compiles this very function.
 
-    The pivots lie at distances a, b [m] from the joint's axis, theta0 [rad] apart at joint angle 0. It is
-    below 0 if the rod runs out towards negative angles.
-    `shortest` is the cylinder's length with the rod fully in [m]: with 0 the travel is the length itself.
-    With b = 0 the cylinder lies along a joint that slides, by `angle` [m], and its moment arm is 1 or -1.
+    The pivots lie at distances a, b [m] from the joint's axis, theta0 [rad] apart at
+    joint angle 0. It is below 0 if the rod runs out towards negative angles. `shortest`
+    is the cylinder's length with the rod fully in [m]: with 0 the travel is the length
+    itself. With b = 0 the cylinder lies along a joint that slides, by `angle` [m], and
+    its moment arm is 1 or -1.
     """
     slides = (b == 0.0) * np.sign(theta0)
     theta = angle + theta0
     cosine = a * b * np.cos(theta)
     length = np.sqrt(a * a + b * b - 2.0 * cosine)
     arm = a * b * np.sin(theta) / length
-    return length - shortest + slides * angle, arm + slides, (cosine - arm * arm) / length
+    return (
+        length - shortest + slides * angle,
+        arm + slides,
+        (cosine - arm * arm) / length,
+    )
 
 
 def four_bar(angle, bars) -> Any:
-    """Angle ψ [rad] of a rocker that turns a joint by a coupler, dψ/dq and d²ψ/dq², elementwise.
+    """Angle ψ [rad] of a rocker that turns a joint by a coupler, dψ/dq and d²ψ/dq²,
+    elementwise.
 
-    The hydraulic kernel compiles this very function. In the parent's plane the joint's axis is the origin and
-    the rocker's pivot lies at (ground, 0); ψ is the direction from there to the coupler's pin on the rocker.
-    The coupler's other pin, on the child, lies at the angle q + phase. `bars` has ground, rocker, coupler,
-    child [m], phase [rad] and `branch`, 1 or -1: the rocker's pin lies to the left or to the right of the
-    line from its pivot to the child's pin. NaN where the coupler cannot reach.
+    The hydraulic kernel compiles this very function. In the parent's plane the joint's
+    axis is the origin and the rocker's pivot lies at (ground, 0); ψ is the direction
+    from there to the coupler's pin on the rocker. The coupler's other pin, on the
+    child, lies at the angle q + phase. `bars` has ground, rocker, coupler, child [m],
+    phase [rad] and `branch`, 1 or -1: the rocker's pin lies to the left or to the right
+    of the line from its pivot to the child's pin. NaN where the coupler cannot reach.
     """
-    along, across = bars.child * np.cos(angle + bars.phase), bars.child * np.sin(angle + bars.phase)
+    along, across = (
+        bars.child * np.cos(angle + bars.phase),
+        bars.child * np.sin(angle + bars.phase),
+    )
     square = (along - bars.ground) ** 2 + across**2
-    reach = (bars.rocker**2 + square - bars.coupler**2) / (2.0 * bars.rocker * np.sqrt(square))
+    reach = (bars.rocker**2 + square - bars.coupler**2) / (
+        2.0 * bars.rocker * np.sqrt(square)
+    )
     psi = np.arctan2(across, along - bars.ground) + bars.branch * np.arccos(reach)
     # with the coupler (x, y), x² + y² = coupler²: its derivatives for q give those of ψ
     cosine, sine = bars.rocker * np.cos(psi), bars.rocker * np.sin(psi)
@@ -59,12 +74,18 @@ def four_bar(angle, bars) -> Any:
     lever = y * cosine - x * sine
     first = (y * along - x * across) / lever
     dx, dy = across - first * sine, first * cosine - along
-    bent = dx * dx + dy * dy + x * (along - first * first * cosine) + y * (across - first * first * sine)
+    bent = (
+        dx * dx
+        + dy * dy
+        + x * (along - first * first * cosine)
+        + y * (across - first * first * sine)
+    )
     return psi, first, -bent / lever
 
 
 class FourBar(Settings):
-    """A rocker on the parent link, which a cylinder turns, and a coupler to the child link: a bucket's."""
+    """A rocker on the parent link, which a cylinder turns, and a coupler to the child
+    link: a bucket's."""
 
     ground: Positive
     """distance of the rocker's pivot from the joint's axis [m]"""
@@ -75,9 +96,11 @@ class FourBar(Settings):
     child: Positive
     """distance of the coupler's pin on the child link from the joint's axis [m]"""
     phase_deg: float
-    """angle at the joint from the rocker's pivot to the pin on the child link, at joint angle 0 [deg]"""
+    """angle at the joint from the rocker's pivot to the pin on the child link, at joint
+    angle 0 [deg]"""
     side: Literal["left", "right"]
-    """side of the line from the rocker's pivot to the pin on the child link on which the rocker's pin lies"""
+    """side of the line from the rocker's pivot to the pin on the child link on which
+    the rocker's pin lies"""
 
     @property
     def branch(self) -> float:
@@ -91,7 +114,8 @@ class FourBar(Settings):
 
 
 class Pivots(Settings):
-    """The points where a cylinder is pinned in the assembled arm: in the world, with all joints at 0."""
+    """The points where a cylinder is pinned in the assembled arm: in the world, with
+    all joints at 0."""
 
     parent: Vector
     """pivot on the parent link (the base for the first joint) [m]"""
@@ -107,8 +131,8 @@ class Triangle(Settings):
     b: Positive
     """distance of the other pivot from the axis [m]"""
     theta0: float
-    """angle between the two pivots at angle 0 [deg]; below 0 if the rod runs out towards negative angles, to
-    which a positive command then turns the joint"""
+    """angle between the two pivots at angle 0 [deg]; below 0 if the rod runs out
+    towards negative angles, to which a positive command then turns the joint"""
 
 
 class Cylinder(Settings):
@@ -117,11 +141,14 @@ class Cylinder(Settings):
     kind: Literal["linear"]
     """linear: a cylinder"""
     pivots: Pivots | None = None
-    """both pivots; null: the sites JOINT_pivot_parent and JOINT_pivot_child of the model, or `triangle`"""
+    """both pivots; null: the sites JOINT_pivot_parent and JOINT_pivot_child of the
+    model, or `triangle`"""
     triangle: Triangle | None = None
-    """in place of pivots; with `four_bar` that at the rocker's pivot, with the rocker's angle"""
+    """in place of pivots; with `four_bar` that at the rocker's pivot, with the rocker's
+    angle"""
     four_bar: FourBar | None = None
-    """linkage between cylinder and joint, with its `triangle`; null: the cylinder acts on the joint itself"""
+    """linkage between cylinder and joint, with its `triangle`; null: the cylinder acts
+    on the joint itself"""
     stroke: Positive | None = None
     """stroke of the rod [mm]; null: what the joint's range takes"""
     area_a: Positive
@@ -141,7 +168,8 @@ class Cylinder(Settings):
 
 
 class RotaryActuator(Settings):
-    """A rotary vane or piston actuator on the joint's axis; of a joint that slides one of equal areas."""
+    """A rotary vane or piston actuator on the joint's axis; of a joint that slides one
+    of equal areas."""
 
     kind: Literal["rotary"]
     """rotary: a vane or piston actuator on the joint's axis"""

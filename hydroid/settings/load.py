@@ -6,7 +6,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Self, TypeVar
 
-from pydantic import BaseModel, BeforeValidator, Field, ValidationError, ValidationInfo, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    Field,
+    ValidationError,
+    ValidationInfo,
+    model_validator,
+)
 
 from hydroid.errors import SettingsError
 from hydroid.files import Plain
@@ -40,17 +47,24 @@ class Settings(BaseModel):
     """Base of all settings: frozen; an unknown key is an error,
     and so is true for a number or "3" for 3."""
 
-    model_config = {"frozen": True, "extra": "forbid", "allow_inf_nan": False, "strict": True}
+    model_config = {
+        "frozen": True,
+        "extra": "forbid",
+        "allow_inf_nan": False,
+        "strict": True,
+    }
 
     _of_yaml = model_validator(mode="before")(_with_tuples)
 
     @classmethod
     def names_of_joints(cls, values: Plain, folder: Path) -> tuple[str, ...]:
-        """Return the names of the joints that values of a file in a folder are about, if any."""
+        """Return the names of the joints that values of a file in a folder are about,
+        if any."""
         return ()
 
     def changed(self, changes: Mapping[str, Any]) -> Self:
-        """Return the settings with values replaced by dotted key, such as `search.seed`.
+        """Return the settings with values replaced by dotted key, such as
+        `search.seed`.
 
         The new values are not checked.
         """
@@ -78,7 +92,8 @@ def _number_of(key: Any, info: ValidationInfo) -> Any:
 
 
 def _is_number(key: str) -> bool:
-    """Return whether a text is a whole number; `isdecimal` alone takes the digits of any script."""
+    """Return whether a text is a whole number; `isdecimal` alone takes the digits of
+    any script."""
     return key.isascii() and key.isdecimal()
 
 
@@ -116,7 +131,9 @@ def each_once(joints: Any, names: Sequence[str]) -> None:
 
 def _each_once(joints: Any, info: ValidationInfo) -> Any:
     # keys of another type are no joints: pydantic refuses them in its own words
-    if isinstance(joints, dict | tuple) and all(isinstance(key, str | int) for key in joints):
+    if isinstance(joints, dict | tuple) and all(
+        isinstance(key, str | int) for key in joints
+    ):
         each_once(joints, _joint_names(info))
     return joints
 
@@ -166,8 +183,8 @@ def _replace(values: Plain, key: str, value: Any, names: Sequence[str]) -> str:
 
 
 def _same_key(mapping: Plain, key: str, names: Sequence[str]) -> Any:
-    """Return the key by which a mapping has a setting, such as a joint's name for its number;
-    or the key."""
+    """Return the key by which a mapping has a setting, such as a joint's name for its
+    number; or the key."""
     if key in mapping:
         return key
     joint = meant(key, names)
@@ -186,8 +203,8 @@ def validate(
     """Check a mapping against `kind` and report its faults with their places,
     of many the first four.
 
-    Files that the settings name are first looked up in `folder`. `overridden` are the keys that
-    `--set` gave, by those that they replace.
+    Files that the settings name are first looked up in `folder`. `overridden` are the
+    keys that `--set` gave, by those that they replace.
     """
     try:
         return kind.model_validate(values, context={"folder": folder, "source": source})
@@ -204,10 +221,13 @@ def validate(
             names_itself = fault["type"] in ("extra_forbidden", "missing")
             name = "" if names_itself else _shown(key)[1:-1]
             where = source + _line_of(key, lines or {})
-        # a value that is none of several types has a fault for each; they are one problem
+        # a value that is none of several types has a fault for each; they are one
+        # problem
         problems.setdefault(where, f"{name}: {problem}" if name else problem)
     (where, what), *others = problems.items()
-    further = [f"{place.removeprefix(f'{source}, ')}: {problem}" for place, problem in others]
+    further = [
+        f"{place.removeprefix(f'{source}, ')}: {problem}" for place, problem in others
+    ]
     hint = f"also {listed(further, 3)}" if further else ""
     raise SettingsError(what, where, hint)
 
@@ -235,12 +255,15 @@ def parse_override(text: str) -> tuple[str, Any]:
     """Split `key=value`; the value is read as YAML."""
     key, equals, value = text.partition("=")
     if not equals or not key.strip():
-        raise SettingsError("needs key=value", f"--set {text}", "for example --set search.seed=3")
+        raise SettingsError(
+            "needs key=value", f"--set {text}", "for example --set search.seed=3"
+        )
     return key.strip(), read_document(value, f"--set {text}")[0]
 
 
 def _rank(fault: Any) -> int:
-    """Order faults: a setting that does not exist first, for it may be why another is missing.
+    """Order faults: a setting that does not exist first, for it may be why another is
+    missing.
 
     Of a value of several types, the one that it has not comes last.
     """
@@ -252,7 +275,9 @@ def _rank(fault: Any) -> int:
 
 def _is_type(part: Any) -> bool:
     """Return whether pydantic means a type by a part of a place, not a setting."""
-    return isinstance(part, str) and (part.startswith("constrained-") or part.endswith("]"))
+    return isinstance(part, str) and (
+        part.startswith("constrained-") or part.endswith("]")
+    )
 
 
 def _explained(fault: Any, kind: type[Settings]) -> tuple[str, str]:
@@ -274,7 +299,8 @@ def _explained(fault: Any, kind: type[Settings]) -> tuple[str, str]:
 
 
 def _choice(location: Sequence[Any], kind: type[Settings]) -> str:
-    """Return which settings there are where an unknown one stands, or the one that it resembles."""
+    """Return which settings there are where an unknown one stands, or the one that it
+    resembles."""
     *outer, unknown = location
     settings: Any = kind
     for part in outer:

@@ -25,7 +25,8 @@ _PART = re.compile(r"\[\d+\]$")
 
 
 def log_file(source: str | Path) -> Path:
-    """Return the file of a log by its source: FILE[2] is the part of FILE after its first gap."""
+    """Return the file of a log by its source: FILE[2] is the part of FILE after its
+    first gap."""
     return Path(_PART.sub("", str(source)))
 
 
@@ -63,13 +64,14 @@ class Columns(Settings):
     or the default."""
 
     column: Annotated[tuple[Name, ...] | None, BeforeValidator(_one_or_more)] = None
-    """name in the header, with {joint} for the joint's number; or two names: the positive and the
-    negative direction of a command, whose values lie in [0, 100] % and are subtracted; chamber A,
-    which pushes to positive angles, and chamber B of a pressure. Default: u{joint}_pct,
-    q{joint}_deg, [pA{joint}_bar, pB{joint}_bar]"""
+    """name in the header, with {joint} for the joint's number; or two names: the
+    positive and the negative direction of a command, whose values lie in [0, 100] % and
+    are subtracted; chamber A, which pushes to positive angles, and chamber B of a
+    pressure. Default: u{joint}_pct, q{joint}_deg, [pA{joint}_bar, pB{joint}_bar]"""
     unit: Literal["%", "deg", "rad", "m", "cm", "mm", "bar", "Pa", "MPa"] | None = None
-    """unit of the scaled cells: of the angle of a joint that slides m, cm or mm, which of a joint
-    that turns are the length of its cylinder from pin to pin; default: %, deg, bar"""
+    """unit of the scaled cells: of the angle of a joint that slides m, cm or mm, which
+    of a joint that turns are the length of its cylinder from pin to pin; default: %,
+    deg, bar"""
     scale: Annotated[Number | None, AfterValidator(_nonzero)] = None
     """factor on the cells; default: 1"""
     offset: Number | None = None
@@ -77,7 +79,8 @@ class Columns(Settings):
 
 
 class ColumnMap(NamedTuple):
-    """The columns of one quantity of one joint, complete: value [unit] = scale · cell + offset."""
+    """The columns of one quantity of one joint, complete: value [unit] = scale · cell +
+    offset."""
 
     column: tuple[str, ...]
     unit: str
@@ -90,7 +93,8 @@ KINDS = {
     "angle": ((f"q{JOINT}_deg",), (1,), ("deg", "rad", "m", "cm", "mm")),
     "pressure": ((f"pA{JOINT}_bar", f"pB{JOINT}_bar"), (2,), ("bar", "Pa", "MPa")),
 }
-"""default columns of a quantity, how many may hold it, and their units, the default first"""
+"""default columns of a quantity, how many may hold it, and their units, the default
+first"""
 
 
 def _checked(columns: Columns | None, info: ValidationInfo) -> Columns | None:
@@ -124,7 +128,9 @@ def _common(columns: Columns | None) -> Columns | None:
         return None
     for name in columns.column or ():
         if JOINT not in name:
-            raise ValueError(f"column {name!r} is meant for all joints, so its name must contain {JOINT}")
+            raise ValueError(
+                f"column {name!r} is meant for all joints, so its name must contain {JOINT}"
+            )
     return columns
 
 
@@ -142,26 +148,29 @@ class LogSettings(Settings):
     pressure: Common = None
     """columns of the chamber pressures; null: the log holds none"""
     joints: ByJoint[JointColumns | None] = {}
-    """what differs for single joints, by joint; null: the log does not hold this joint"""
+    """what differs for single joints, by joint; null: the log does not hold this
+    joint"""
     period_s: Annotated[float, Field(ge=1e-4, le=1)] = 0.01
-    """sample period to which logs are resampled [s]: angles are interpolated, held commands
-    averaged over the period; those of a slower log change on a line from sample to sample"""
+    """sample period to which logs are resampled [s]: angles are interpolated, held
+    commands averaged over the period; those of a slower log change on a line from
+    sample to sample"""
     delay_s: Annotated[float, Field(ge=-10, le=10)] = 0.0
     """transport delay: commands act this much later than logged [s]"""
     groups: dict[
-        Annotated[str, Field(pattern=r"^\w+$")], Annotated[tuple[Name, ...], BeforeValidator(_one_or_more)]
+        Annotated[str, Field(pattern=r"^\w+$")],
+        Annotated[tuple[Name, ...], BeforeValidator(_one_or_more)],
     ] = {}
-    """logs that share a day, an oil temperature or an operator, by a name of your choice: a pattern
-    of file names, or several, as in {monday: mon_*.csv}.
-    Parameters may have an effect in each (`per: group`)"""
+    """logs that share a day, an oil temperature or an operator, by a name of your
+    choice: a pattern of file names, or several, as in {monday: mon_*.csv}. Parameters
+    may have an effect in each (`per: group`)"""
     repair_s: Annotated[float, Field(ge=0, le=10)] = 0.1
     """longest gap that --repair fills [s]"""
 
     _prefix: str = PrivateAttr("")
 
     def columns(self, kind: Kind, joint: int) -> ColumnMap | None:
-        """Return the columns of a joint (number, from 1), its number in their names; None: not in
-        the log."""
+        """Return the columns of a joint (number, from 1), its number in their names;
+        None: not in the log."""
         common: Columns | None = getattr(self, kind)
         of_joint = self.joints.get(joint, JointColumns())
         own: Columns | None = getattr(of_joint, kind, None)
@@ -175,7 +184,9 @@ class LogSettings(Settings):
             given |= common.model_dump(exclude_none=True)
         given |= own.model_dump(exclude_none=True)
         templates = given.pop("column")
-        names = tuple(self._prefix + name.replace(JOINT, str(joint)) for name in templates)
+        names = tuple(
+            self._prefix + name.replace(JOINT, str(joint)) for name in templates
+        )
         return ColumnMap(names, **given)
 
     def group_of(self, log: str) -> str:
@@ -189,7 +200,9 @@ class LogSettings(Settings):
             if any(fnmatch(name, pattern) for pattern in patterns):
                 found.append(group)
         if len(found) > 1:
-            raise SettingsError(f"{name} is in the groups {listed(found)}", "log.groups")
+            raise SettingsError(
+                f"{name} is in the groups {listed(found)}", "log.groups"
+            )
         return found[0] if found else OTHER
 
     def of_arm(self, side: str) -> "LogSettings":
@@ -203,5 +216,7 @@ class LogSettings(Settings):
         """Return the columns of a trajectory: whatever commands and pressures it holds
         are not read."""
         nothing = {"command": None, "pressure": None}
-        joints = {joint: own and own.changed(nothing) for joint, own in self.joints.items()}
+        joints = {
+            joint: own and own.changed(nothing) for joint, own in self.joints.items()
+        }
         return self.changed(nothing | {"joints": joints})

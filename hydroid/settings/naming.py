@@ -5,15 +5,18 @@ from hydroid.settings.fit import FitSettings
 
 
 def quantity_and_side(settings: FitSettings, name: str) -> tuple[str, str]:
-    """Return what a parameter is, in words, and the side of the actuator that it belongs to, if
-    any.
+    """Return what a parameter is, in words, and the side of the actuator that it
+    belongs to, if any.
     """
-    plain, _, side = CHOICES[settings.parameters[name].quantity].plain.partition(", side ")
+    plain, _, side = CHOICES[settings.parameters[name].quantity].plain.partition(
+        ", side "
+    )
     return plain, side
 
 
 def place(settings: FitSettings, name: str) -> str:
-    """Return the link or the joints that a parameter belongs to; empty where all share it."""
+    """Return the link or the joints that a parameter belongs to; empty where all share
+    it."""
     own = settings.parameters[name]
     if own.link is not None:
         return own.link
@@ -22,7 +25,8 @@ def place(settings: FitSettings, name: str) -> str:
 
 
 def named(settings: FitSettings, name: str, detail: str = "") -> str:
-    """Name a parameter in words, with joint, side, symbol, and a `detail` in brackets behind them.
+    """Name a parameter in words, with joint, side, symbol, and a `detail` in brackets
+    behind them.
 
     What is no parameter keeps its name.
     """

@@ -19,13 +19,16 @@ from hydroid.words import distinct
 
 MOST = 10_000  # parameters of all groups
 CURVES = {"curve": "", "curve_a": "_a", "curve_b": "_b"}
-"""quantities that stand for the factors of a valve's curve, and what the names of these end with"""
+"""quantities that stand for the factors of a valve's curve, and what the names of these
+end with"""
 CURVE_BOUNDS = (0.003, 300.0)
-"""of a factor: the first part of a valve that jumps open is some hundred times as steep as the last"""
+"""of a factor: the first part of a valve that jumps open is some hundred times as steep
+as the last"""
 CURVE_SD = 0.3
 """scatter of the logarithm of neighbouring factors that one expects (ours)"""
 BY_TURN = ("area", "area_a", "area_b", "dry_friction")
-"""quantities that a rotary actuator has by its angle, where a cylinder has them by its stroke"""
+"""quantities that a rotary actuator has by its angle, where a cylinder has them by its
+stroke"""
 GROUP = "group"
 """what `per` says of a parameter that has an effect in each group"""
 
@@ -34,9 +37,9 @@ def expanded(parameters: Mapping[str, Any], compared: Any, arm: Arm | None) -> P
     """Return the settings of parameters, as YAML gives them,
     one entry for each joint or link of `each`.
 
-    `compared` are the joints that `each: true` means; of masses it means all links. With one joint
-    a mechanical parameter serves all joints, because those that are driven but not compared need it
-    too.
+    `compared` are the joints that `each: true` means; of masses it means all links.
+    With one joint a mechanical parameter serves all joints, because those that are
+    driven but not compared need it too.
 
     Raises ValueError: a parameter with `joints` or `link` and `each`.
     """
@@ -53,7 +56,8 @@ def expanded(parameters: Mapping[str, Any], compared: Any, arm: Arm | None) -> P
 
 
 def _add(result: Plain, name: str, entry: Any) -> None:
-    """Add an entry that needs no expansion; it changes one that `each` has made under its name."""
+    """Add an entry that needs no expansion; it changes one that `each` has made under
+    its name."""
     if isinstance(entry, dict):
         entry = result.get(name, {}) | entry
     result[name] = entry
@@ -62,7 +66,9 @@ def _add(result: Plain, name: str, entry: Any) -> None:
 def _add_links(result: Plain, name: str, entry: Plain, arm: Arm | None) -> None:
     """Add a mass for each link of `each`."""
     if entry.get("link") is not None:
-        raise ValueError(f"parameters.{name}: give link or each: links that have their own, not both")
+        raise ValueError(
+            f"parameters.{name}: give link or each: links that have their own, not both"
+        )
     links: Any = entry["each"]
     if links is True:
         links = arm.link_names if arm else None
@@ -77,7 +83,9 @@ def _add_links(result: Plain, name: str, entry: Plain, arm: Arm | None) -> None:
         result[own_name] = shared | {"link": link} | result.get(own_name, {})
 
 
-def _add_joints(result: Plain, name: str, entry: Plain, compared: Any, arm: Arm | None) -> None:
+def _add_joints(
+    result: Plain, name: str, entry: Plain, compared: Any, arm: Arm | None
+) -> None:
     """Add a parameter for each joint of `each`."""
     if entry.get("joints") is not None:
         what = "joints that share it or each: joints that have their own, not both"
@@ -106,7 +114,9 @@ def _add_joints(result: Plain, name: str, entry: Plain, compared: Any, arm: Arm 
 
 
 def _are_all(values: Any, kind: Any) -> bool:
-    return isinstance(values, list | tuple) and all(isinstance(value, kind) for value in values)
+    return isinstance(values, list | tuple) and all(
+        isinstance(value, kind) for value in values
+    )
 
 
 def _without_each(entry: Plain) -> Plain:
@@ -120,7 +130,8 @@ def _name_at(name: str, label: Any, taken: set[str]) -> str:
 
 
 def _refuse(joints: Any, where: str, names: Sequence[str]) -> None:
-    """Raise ValueError where a joint occurs twice, or joints are more than there are."""
+    """Raise ValueError where a joint occurs twice, or joints are more than there
+    are."""
     try:
         each_once(joints, names)
     except ValueError as error:
@@ -141,7 +152,9 @@ def by_group(parameters: Mapping[str, Any], groups: Collection[str]) -> Plain:
             _add(result, name, entry)
             continue
         if not groups or GROUP in groups:
-            what = "per: group needs log.groups: {name: pattern}, none of them named group"
+            what = (
+                "per: group needs log.groups: {name: pattern}, none of them named group"
+            )
             raise ValueError(f"parameters.{name}: {what}")
         for group in (*groups, OTHER):
             if len(result) >= MOST:
@@ -152,18 +165,24 @@ def by_group(parameters: Mapping[str, Any], groups: Collection[str]) -> Plain:
 
 
 def with_curves(parameters: Mapping[str, Any], priors: Any) -> tuple[Plain, Any]:
-    """Return the settings of parameters and priors with the factors, and the smoothness, of valves' curves.
+    """Return the settings of parameters and priors with the factors, and the
+    smoothness, of valves' curves.
 
-    A parameter `curve_a`, `curve_b` or `curve` stands for the factors NAME_1, NAME_2, ... of the valve's
-    curve of one direction or both, and for a prior NAME by which they are alike (`PriorSettings.smooth`).
-    Raises ValueError: a start that is no list of as many numbers.
+    A parameter `curve_a`, `curve_b` or `curve` stands for the factors NAME_1, NAME_2,
+    ... of the valve's curve of one direction or both, and for a prior NAME by which
+    they are alike (`PriorSettings.smooth`). Raises ValueError: a start that is no list
+    of as many numbers.
     """
     result: Plain = {}
     smooth: Plain = {}
     for name, entry in parameters.items():
-        side = CURVES.get(str(entry.get("quantity"))) if isinstance(entry, dict) else None
+        side = (
+            CURVES.get(str(entry.get("quantity"))) if isinstance(entry, dict) else None
+        )
         if side is None:
-            result[name] = result.get(name, {}) | entry if isinstance(entry, dict) else entry
+            result[name] = (
+                result.get(name, {}) | entry if isinstance(entry, dict) else entry
+            )
             continue
         if entry.get("per") is not None:
             raise ValueError(f"parameters.{name}: a curve has no effect per group")
@@ -184,9 +203,11 @@ def with_curves(parameters: Mapping[str, Any], priors: Any) -> tuple[Plain, Any]
     return result, smooth | (priors or {})
 
 
-def nominal_value(arm: Arm, hydraulics: HydraulicSettings, settings: ParameterSettings) -> float | None:
-    """Return what its settings, `hydraulics` or the arm's file say of a parameter; None:
-    no one value."""
+def nominal_value(
+    arm: Arm, hydraulics: HydraulicSettings, settings: ParameterSettings
+) -> float | None:
+    """Return what its settings, `hydraulics` or the arm's file say of a parameter;
+    None: no one value."""
     if settings.nominal is not None:
         return settings.nominal
     if settings.per is not None:
@@ -205,14 +226,20 @@ def nominal_value(arm: Arm, hydraulics: HydraulicSettings, settings: ParameterSe
 
 
 def make_parameter(
-    name: str, settings: ParameterSettings, arm: Arm, hydraulics: HydraulicSettings, *, log: bool
+    name: str,
+    settings: ParameterSettings,
+    arm: Arm,
+    hydraulics: HydraulicSettings,
+    *,
+    log: bool,
 ) -> Parameter:
     """Return one parameter with its bounds, prior and start.
 
-    `log`: on a log scale where it is positive, as one with a log-normal prior always is.
+    `log`: on a log scale where it is positive, as one with a log-normal prior always
+    is.
 
-    Raises ValueError: a prior without a nominal value, or one that does not fit, with the
-    parameter's name.
+    Raises ValueError: a prior without a nominal value, or one that does not fit, with
+    the parameter's name.
     """
     nominal = nominal_value(arm, hydraulics, settings)
     prior = _prior(name, settings, nominal)
@@ -240,7 +267,9 @@ def make_parameter(
     )
 
 
-def _prior(name: str, settings: ParameterSettings, nominal: float | None) -> Prior | None:
+def _prior(
+    name: str, settings: ParameterSettings, nominal: float | None
+) -> Prior | None:
     if not settings.has_prior:
         return None
     if nominal is None:
@@ -254,17 +283,25 @@ def _prior(name: str, settings: ParameterSettings, nominal: float | None) -> Pri
         lower, upper = settings.bounds
         if not lower <= nominal <= upper:
             value = f"{nominal:g} {settings.unit}"
-            raise ValueError(f"parameters.{name}: the nominal value {value} lies outside the bounds")
+            raise ValueError(
+                f"parameters.{name}: the nominal value {value} lies outside the bounds"
+            )
     if settings.sd is not None:
         return Prior(nominal, settings.sd)
     if nominal <= 0:
-        raise ValueError(f"parameters.{name}: within: factor needs a nominal value above 0; give sd: instead")
-    # 95 % of a normal variable, here of the logarithm, lie within 1.96 standard deviations
+        raise ValueError(
+            f"parameters.{name}: within: factor needs a nominal value above 0; give sd: instead"
+        )
+    # 95 % of a normal variable, here of the logarithm, lie within 1.96 standard
+    # deviations
     return Prior(nominal, math.log(settings.within or 1.0) / 1.96, log=True)
 
 
-def _default_bounds(settings: ParameterSettings, prior: Prior | None) -> tuple[float, float]:
-    """Return the bounds of a parameter that states none: four standard deviations of its prior."""
+def _default_bounds(
+    settings: ParameterSettings, prior: Prior | None
+) -> tuple[float, float]:
+    """Return the bounds of a parameter that states none: four standard deviations of
+    its prior."""
     if prior is None:
         held = settings.fixed or 0.0
         return held, held
@@ -283,7 +320,8 @@ def _default_bounds(settings: ParameterSettings, prior: Prior | None) -> tuple[f
 def _unit(arm: Arm, settings: ParameterSettings) -> str:
     """Return the unit of a parameter.
 
-    Of joints that slide, and of rotary actuators that turn, it is another than the quantity's.
+    Of joints that slide, and of rotary actuators that turn, it is another than the
+    quantity's.
     """
     if not settings.joints:
         return settings.unit
@@ -291,16 +329,20 @@ def _unit(arm: Arm, settings: ParameterSettings) -> str:
     if all_slide and settings.quantity in MECHANICAL:
         return settings.unit.replace("N·m", "N").replace("rad", "m")
     actuators = _actuators(arm, settings)
-    all_rotary = bool(actuators) and all(isinstance(a, RotaryActuator) for a in actuators)
+    all_rotary = bool(actuators) and all(
+        isinstance(a, RotaryActuator) for a in actuators
+    )
     if all_rotary and not all_slide and settings.quantity in BY_TURN:
         return {"mm²": "cm³/rad", "N": "N·m"}[settings.unit]
     return settings.unit
 
 
 def _actuators(arm: Arm, settings: ParameterSettings) -> list[Actuator | None]:
-    """Return what moves the joints that a parameter acts on; joints that the arm lacks are refused
-    elsewhere."""
+    """Return what moves the joints that a parameter acts on; joints that the arm lacks
+    are refused elsewhere."""
     joints = settings.joints
     return [
-        joint.actuator for number, joint in enumerate(arm.joints, 1) if joints is None or number in joints
+        joint.actuator
+        for number, joint in enumerate(arm.joints, 1)
+        if joints is None or number in joints
     ]

@@ -24,16 +24,17 @@ class ParameterSettings(Settings):
     """
 
     quantity: str
-    """gain, damping, stiffness, friction or mass; in stage 2 also any quantity of `hydraulics` and
-    area_a, area_b, opening_a, opening_b, pivot_distance_1, pivot_distance_2, pivot_angle. curve_a,
-    curve_b, or curve for both: the factors NAME_1 to NAME_4 of the valve's curve, curve_1 to
-    curve_4, whose `start` is a list; they get bounds, and a prior NAME: smooth, of this `sd` (0.3)"""
+    """gain, damping, stiffness, friction or mass; in stage 2 also any quantity of
+    `hydraulics` and area_a, area_b, opening_a, opening_b, pivot_distance_1,
+    pivot_distance_2, pivot_angle. curve_a, curve_b, or curve for both: the factors
+    NAME_1 to NAME_4 of the valve's curve, curve_1 to curve_4, whose `start` is a list;
+    they get bounds, and a prior NAME: smooth, of this `sd` (0.3)"""
     joints: Joints | None = None
     """joints that share the parameter; null: all"""
     each: bool | Joints = False
-    """joints that have a parameter each, NAME_boom, NAME_arm, ...; true: those that are compared.
-    With one joint the name stays as it is. Entries under NAME_boom change the boom's. Of a mass:
-    links; true: all"""
+    """joints that have a parameter each, NAME_boom, NAME_arm, ...; true: those that are
+    compared. With one joint the name stays as it is. Entries under NAME_boom change the
+    boom's. Of a mass: links; true: all"""
     link: str | None = None
     """link whose mass the parameter is"""
     bounds: tuple[float, float] | None = None
@@ -50,16 +51,18 @@ class ParameterSettings(Settings):
     """where the search starts; null: nominal,
     else the middle of the bounds on the parameter's scale"""
     fixed: float | None = None
-    """value at which the parameter is held, in the unit of the quantity; null: it is estimated"""
+    """value at which the parameter is held, in the unit of the quantity; null: it is
+    estimated"""
     per: str | None = None
-    """group: an effect of each group of `log.groups`, NAME_monday, ..., which is added to the
-    quantity in its logs, around 0 with standard deviation `sd`, and one of all other logs,
-    NAME_other: an unseen day is predicted with the mean, and a wider band. The name of a group,
-    or other: an effect of that one"""
+    """group: an effect of each group of `log.groups`, NAME_monday, ..., which is added
+    to the quantity in its logs, around 0 with standard deviation `sd`, and one of all
+    other logs, NAME_other: an unseen day is predicted with the mean, and a wider band.
+    The name of a group, or other: an effect of that one"""
     term: Annotated[str, Field(pattern=r"^[^\W\d]\w*$")] | None = None
-    """name of a term of the model, of one parameter or several: a fit begins without it, adds it
-    after the refinement, and keeps it where it foretells parts of the logs left out clearly better.
-    One whose parameters all act on one joint is tried on that joint alone. null: always there"""
+    """name of a term of the model, of one parameter or several: a fit begins without
+    it, adds it after the refinement, and keeps it where it foretells parts of the logs
+    left out clearly better. One whose parameters all act on one joint is tried on that
+    joint alone. null: always there"""
 
     @model_validator(mode="after")
     def _consistent(self) -> "ParameterSettings":
@@ -78,13 +81,16 @@ class ParameterSettings(Settings):
         raise ValueError(f"no quantity {self.quantity!r}; did you mean {choice}?")
 
     def _check_place(self) -> None:
-        """Raise ValueError where the quantity cannot act on these joints or this link."""
+        """Raise ValueError where the quantity cannot act on these joints or this
+        link."""
         is_mass = self.quantity == "mass"
         names_joints = self.joints is not None or self.each
         if is_mass != (self.link is not None):
             raise ValueError("a mass names its link, and only a mass does")
         if CHOICES[self.quantity].of_the_pump and names_joints:
-            raise ValueError(f"all joints share the pump: a {self.quantity} has no joints")
+            raise ValueError(
+                f"all joints share the pump: a {self.quantity} has no joints"
+            )
         if is_mass and names_joints:
             raise ValueError("a mass belongs to a link, not to joints")
 
@@ -93,14 +99,19 @@ class ParameterSettings(Settings):
         effect_without_sd = self.per is not None and self.sd is None
         effect_on_mass = self.per is not None and self.quantity == "mass"
         if effect_without_sd or effect_on_mass:
-            raise ValueError("an effect per group needs sd: standard deviation, around 0, and is no mass")
+            raise ValueError(
+                "an effect per group needs sd: standard deviation, around 0, and is no mass"
+            )
         if self.within is not None and self.sd is not None:
             raise ValueError("give within: factor or sd: standard deviation, not both")
         if not self.can_be_free and self.fixed is None:
-            raise ValueError("needs bounds: [lower, upper], a prior (within: factor), or fixed: value")
+            raise ValueError(
+                "needs bounds: [lower, upper], a prior (within: factor), or fixed: value"
+            )
 
     def _check_values(self) -> None:
-        """Raise ValueError where bounds, nominal value, start or fixed value cannot be."""
+        """Raise ValueError where bounds, nominal value, start or fixed value cannot
+        be."""
         # an effect of a group is added to a quantity, so it may be of either sign
         least = -math.inf if self.per is not None else CHOICES[self.quantity].lowest
         lower, upper = self.bounds or (least, math.inf)
@@ -162,16 +173,18 @@ class PriorSettings(Settings):
     ratio: tuple[str, str] | None = None
     """two parameters: the ratio of the first to the second is meant"""
     smooth: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
-    """positive parameters, such as the factors of a valve's curve: the ratios of neighbours, and the last
-    one, are 1 but for a scatter of their logarithms of about `sd`, which the logs may show to be much less
-    or much more"""
+    """positive parameters, such as the factors of a valve's curve: the ratios of
+    neighbours, and the last one, are 1 but for a scatter of their logarithms of about
+    `sd`, which the logs may show to be much less or much more"""
     value: float | None = None
-    """value of the combination, in the unit of the parameters; of `smooth` there is none"""
+    """value of the combination, in the unit of the parameters; of `smooth` there is
+    none"""
     sd: Positive | None = None
     """standard deviation of the value; null: the constraint is exact"""
     tails: Literal["normal", "heavy"] = "normal"
-    """heavy: the value may also be many standard deviations off, if the logs say so: Student's t with 2
-    degrees of freedom, of scale sd, in place of a normal distribution"""
+    """heavy: the value may also be many standard deviations off, if the logs say so:
+    Student's t with 2 degrees of freedom, of scale sd, in place of a normal
+    distribution"""
 
     @model_validator(mode="after")
     def _names_parameters(self) -> "PriorSettings":
@@ -216,7 +229,8 @@ def _name_infinity(value: Any) -> Any:
 
 
 class ObjectiveSettings(Settings):
-    """Norm of the output error, equations (18) and (19), and the segments of equation (21)."""
+    """Norm of the output error, equations (18) and (19), and the segments of equation
+    (21)."""
 
     norm: Annotated[Literal[1, 2, "inf"], BeforeValidator(_name_infinity)] = "inf"
     """p of the norm: 1, 2 or inf (the article's choice, table 5)"""
@@ -225,17 +239,17 @@ class ObjectiveSettings(Settings):
     segments: Annotated[int, Field(ge=1, le=10_000)] = 8
     """number of segments of equal length, one objective each"""
     weights: ByJoint[Positive] = {}
-    """factor on the error of a joint's angle, by joint, in the searches and in stage 1; 1 for
-    joints that are not listed. The refinement of stage 2 weighs each joint by its own error
-    (docs/uncertainty.md)"""
+    """factor on the error of a joint's angle, by joint, in the searches and in stage 1;
+    1 for joints that are not listed. The refinement of stage 2 weighs each joint by its
+    own error (docs/uncertainty.md)"""
     pressure_weight: NotNegative = 0.0
-    """stage 2: factor that turns a chamber pressure's error into an angle's in the searches
-    [deg/bar]; 0: angles only. Above 0 the refinement compares pressures, too,
+    """stage 2: factor that turns a chamber pressure's error into an angle's in the
+    searches [deg/bar]; 0: angles only. Above 0 the refinement compares pressures, too,
     and weighs them by their own errors"""
     noise_deg: Positive | ByJoint[Positive] | None = None
-    """standard deviation of the sensor's noise of measured angles, for all joints or by joint
-    [deg]; null: it is estimated from the residuals. The other parts of an error, such as drift,
-    are always estimated"""
+    """standard deviation of the sensor's noise of measured angles, for all joints or by
+    joint [deg]; null: it is estimated from the residuals. The other parts of an error,
+    such as drift, are always estimated"""
 
     def noise_of(self, joint: int) -> float | None:
         """Return the stated noise of a joint's angle [deg]."""
@@ -248,21 +262,22 @@ class SimulationSettings(Settings):
     """How logs are simulated."""
 
     model: Literal["dynamic", "quasi-static", "ladder"] = "dynamic"
-    """of stage 2. dynamic: oil stiffness, inertia and stops; quasi-static: speed follows valve and
-    load at once, one step a sample; ladder: a fit searches and refines the quasi-static model, then
-    refines the dynamic one from there, and keeps it where it is clearly nearer to the logs"""
+    """of stage 2. dynamic: oil stiffness, inertia and stops; quasi-static: speed
+    follows valve and load at once, one step a sample; ladder: a fit searches and
+    refines the quasi-static model, then refines the dynamic one from there, and keeps
+    it where it is clearly nearer to the logs"""
     other_joints: Literal["locked", "passive", "measured"] = "locked"
-    """how to treat joints that have no command in the log and are not compared. locked: they stand
-    still, which is the fastest; passive: they move on their own spring and damper, as in the
-    article; measured:
-    they follow their logged motion"""
+    """how to treat joints that have no command in the log and are not compared. locked:
+    they stand still, which is the fastest; passive: they move on their own spring and
+    damper, as in the article; measured: they follow their logged motion"""
     steps_per_sample: Annotated[int, Field(ge=1, le=100)] = 1
-    """MuJoCo steps per sample of the log; in the quasi-static model only the valves have so many"""
+    """MuJoCo steps per sample of the log; in the quasi-static model only the valves
+    have so many"""
     threads: Annotated[int, Field(ge=0, le=1024)] = 0
     """number of threads. 0 means one per core; with --dask it means one per worker"""
     measured_cutoff_hz: Annotated[float, Field(gt=0, le=50)] = 4.0
-    """cutoff of the low-pass filter on motion that joints follow [Hz]; its second derivative
-    becomes a torque"""
+    """cutoff of the low-pass filter on motion that joints follow [Hz]; its second
+    derivative becomes a torque"""
 
     @property
     def steps(self) -> int:

@@ -1,5 +1,5 @@
-"""Settings of the searches, by default the article's table 5, and ours where it is silent;
-and of designs."""
+"""Settings of the searches, by default the article's table 5, and ours where it is
+silent; and of designs."""
 
 from typing import Annotated, Literal
 
@@ -17,9 +17,9 @@ Generations = Annotated[int, Field(ge=0)]
 class GeneticSettings(Settings):
     """A genetic algorithm of the article.
 
-    For NSGA-II table 5 says "proportional" parent selection too. With several objectives there is
-    no one fitness to be proportional to, and the article names NSGA-II:
-    parents come from its crowded tournament.
+    For NSGA-II table 5 says "proportional" parent selection too. With several
+    objectives there is no one fitness to be proportional to, and the article names
+    NSGA-II: parents come from its crowded tournament.
     """
 
     population: Population = 70
@@ -27,14 +27,16 @@ class GeneticSettings(Settings):
     generations: Generations = 40
     """number of populations after the first one"""
     crossover_rate: Rate = 0.8
-    """probability P_c that a pair of parents is crossed; otherwise its children are copies"""
+    """probability P_c that a pair of parents is crossed; otherwise its children are
+    copies"""
     mutation_rate: Rate = 0.05
     """probability P_m that an element (one parameter) of a child changes"""
     coding: Literal["binary", "integer"] = "binary"
     """binary: 16 Gray-coded bits per parameter, the article's MVBS; integer:
     one number per parameter"""
     crossover: Literal["pointwise", "uniform"] = "pointwise"
-    """pointwise: cut parents at two places; uniform: choose each element from either parent"""
+    """pointwise: cut parents at two places; uniform: choose each element from either
+    parent"""
 
 
 class ParetoSettings(GeneticSettings):
@@ -47,13 +49,15 @@ class ParetoSettings(GeneticSettings):
 
 
 class PymooSettings(Settings):
-    """A multi-objective algorithm of the package pymoo, beside NSGA-II (ours; not in the article).
+    """A multi-objective algorithm of the package pymoo, beside NSGA-II (ours; not in
+    the article).
 
     It needs `pip install 'hydroid[moo]'`.
     """
 
     algorithm: Literal["moead", "mopso-cd", "nsga3", "spea2"] = "moead"
-    """moead: MOEA/D, by decomposition; mopso-cd: a particle swarm; nsga3: NSGA-III; spea2: SPEA2"""
+    """moead: MOEA/D, by decomposition; mopso-cd: a particle swarm; nsga3: NSGA-III;
+    spea2: SPEA2"""
     population: Population = 20
     """number of candidates in a population"""
     generations: Generations = 140
@@ -61,24 +65,26 @@ class PymooSettings(Settings):
 
 
 class RefinementSettings(Settings):
-    """The refinement: bounded least squares that start from the search's estimate (ours; not in the
-    article)."""
+    """The refinement: bounded least squares that start from the search's estimate
+    (ours; not in the article)."""
 
     iterations: Count = 300
-    """largest number of steps; a step takes one to three simulations, some a Jacobian besides"""
+    """largest number of steps; a step takes one to three simulations, some a Jacobian
+    besides"""
     gain_tolerance: Part = 1e-8
-    """the refinement ends where a step promises to lower the sum of squared errors by less than
-    this fraction"""
+    """the refinement ends where a step promises to lower the sum of squared errors by
+    less than this fraction"""
 
 
 class MultistartSettings(RefinementSettings):
-    """Bounded least squares from several random start points (ours; not in the article)."""
+    """Bounded least squares from several random start points (ours; not in the
+    article)."""
 
     starts: Annotated[int, Field(ge=1, le=100_000)] = 10
     """number of start points"""
     horizons: tuple[Positive, ...] = (0.25, 1.0, 5.0, 20.0)
-    """lengths of the logs' beginnings that a start is fitted to before the whole logs, from the
-    first command on [s]; those in which nothing moves yet are left out"""
+    """lengths of the logs' beginnings that a start is fitted to before the whole logs,
+    from the first command on [s]; those in which nothing moves yet are left out"""
     iterations: Count = 100
     """largest number of steps of each of these fits"""
     gain_tolerance: Part = 1e-4
@@ -91,15 +97,16 @@ class MultistartSettings(RefinementSettings):
 
 
 class SearchSettings(Settings):
-    """The search: its algorithm, its seed, and how one estimate is taken from a Pareto set."""
+    """The search: its algorithm, its seed, and how one estimate is taken from a Pareto
+    set."""
 
     algorithm: Literal["ga", "nsga2", "multistart", "pymoo"] = "nsga2"
     """the search algorithm; its settings stand under the same name"""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 1
     """seed of all random numbers"""
     compromise: Literal["average", "utopia", "best"] = "average"
-    """average: mean of the best candidates of all segments, the article's; utopia: candidate
-    nearest to the utopia point; best: candidate of the lowest norm"""
+    """average: mean of the best candidates of all segments, the article's; utopia:
+    candidate nearest to the utopia point; best: candidate of the lowest norm"""
     ga: GeneticSettings = GeneticSettings()
     """the simple genetic algorithm, article 4.1"""
     nsga2: ParetoSettings = ParetoSettings()
@@ -109,19 +116,23 @@ class SearchSettings(Settings):
 
 
 class DesignSettings(Settings):
-    """Settings of `hydroid design`, the search for the next experiment; a fit does not use them."""
+    """Settings of `hydroid design`, the search for the next experiment; a fit does not
+    use them."""
 
     duration_s: Annotated[float, Field(ge=1, le=3600)] = 60.0
     """length of the experiment [s]"""
     joints: Annotated[Joints, Field(min_length=1)] | None = None
     """joints that may be driven; null: the outputs"""
-    poses: Annotated[tuple[str, ...], Field(min_length=1)] | Literal["any"] | None = None
-    """names of the arm's poses to start from; any: also random ones within the ranges; null: all
-    named poses"""
+    poses: Annotated[tuple[str, ...], Field(min_length=1)] | Literal["any"] | None = (
+        None
+    )
+    """names of the arm's poses to start from; any: also random ones within the ranges;
+    null: all named poses"""
     command_pct: Annotated[float, Field(gt=0, le=100)] = 100.0
     """largest command [%]"""
     rest_s: NotNegative = 1.0
-    """time without a command at the beginning [s]; a fit takes its start pose from it"""
+    """time without a command at the beginning [s]; a fit takes its start pose from
+    it"""
     slew_pct_s: Positive | None = 500.0
     """fastest change of a command [%/s]; null: it jumps"""
     dwell_s: tuple[Positive, Positive] = (1.0, 5.0)
@@ -130,15 +141,17 @@ class DesignSettings(Settings):
     speed_deg_s: Positive = 30.0
     """largest joint speed in the simulated experiment [deg/s]"""
     margin_deg: NotNegative = 5.0
-    """smallest distance of the simulated motion from the ends of the joints' ranges [deg]"""
+    """smallest distance of the simulated motion from the ends of the joints' ranges
+    [deg]"""
     clearance_m: Positive | None = 0.05
-    """smallest distance of the simulated arm from itself and from the floor; where the arm's file
-    has a pair, also from the carrier and the other arm, at rest in start_pose [m]; null:
-    collisions are not checked"""
+    """smallest distance of the simulated arm from itself and from the floor; where the
+    arm's file has a pair, also from the carrier and the other arm, at rest in
+    start_pose [m]; null: collisions are not checked"""
     noise_deg: Positive = 0.1
     """standard deviation of the angles' noise [deg]"""
     drift_deg: NotNegative = 0.0
-    """standard deviation of the drift of a prediction after 10 s [deg]; 0: white noise alone"""
+    """standard deviation of the drift of a prediction after 10 s [deg]; 0: white noise
+    alone"""
     effort: Annotated[int, Field(ge=2, le=1_000_000)] = 240
     """number of experiments that are tried: one in six drawn at random,
     the others changes of the best"""
@@ -146,7 +159,9 @@ class DesignSettings(Settings):
     @model_validator(mode="after")
     def _ordered(self) -> "DesignSettings":
         if not self.dwell_s[0] <= self.dwell_s[1] <= self.duration_s:
-            raise ValueError("dwell_s must be [shortest, longest], not longer than duration_s")
+            raise ValueError(
+                "dwell_s must be [shortest, longest], not longer than duration_s"
+            )
         if self.rest_s + self.dwell_s[0] > self.duration_s:
             raise ValueError("rest_s leaves no time for a command within duration_s")
         return self

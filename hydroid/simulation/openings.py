@@ -1,8 +1,9 @@
 """How far the valves of a population open in each step of a quasi-static rollout.
 
-What a valve opens follows from its command alone, whatever the arm does. So the openings of a population are
-computed before its arms move, and once for all candidates whose valve is the same: of two candidates that
-differ in one parameter, those are all joints but one.
+What a valve opens follows from its command alone, whatever the arm does. So the
+openings of a population are computed before its arms move, and once for all candidates
+whose valve is the same: of two candidates that differ in one parameter, those are all
+joints but one.
 """
 
 # pyright: reportMissingParameterType=false
@@ -20,18 +21,33 @@ from hydroid.hydraulics.kernel import SOURCE, Plugin
 from hydroid.hydraulics.records import SCRATCH
 
 BEHIND_VALVE = [
-    *("damping", "stiffness", "friction", "dry_friction", "lever_slope", "lever_bend", "compensation"),
+    *(
+        "damping",
+        "stiffness",
+        "friction",
+        "dry_friction",
+        "lever_slope",
+        "lever_bend",
+        "compensation",
+    ),
     *("oil_frequency", "oil_damping", "ring_cosine", "ring_sine"),
     *("pump_flow", "pump_droop", "pump_limit", "supply_pressure", "relief"),
 ]
 BEHIND_PORT = ["area", "draw", "return_"]
-"""what a valve's opening does not depend on, of a joint and of its sides; the others are taken to matter"""
+"""what a valve's opening does not depend on, of a joint and of its sides; the others
+are taken to matter"""
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _open(valve: Plugin, rest, commands, opening, source: int = SOURCE) -> None:
-    """Write the mean opening of one joint's valve in each step, (steps,), from its state at rest, (1,)."""
-    c, z, w, past = valve.coefficients[0], rest[0], np.zeros(1, SCRATCH)[0], commands.size - opening.size
+    """Write the mean opening of one joint's valve in each step, (steps,), from its
+    state at rest, (1,)."""
+    c, z, w, past = (
+        valve.coefficients[0],
+        rest[0],
+        np.zeros(1, SCRATCH)[0],
+        commands.size - opening.size,
+    )
     for k in range(opening.size):
         opening[k] = mean_opening(c, z, w, commands, past + k, valve)
 
@@ -39,10 +55,11 @@ def _open(valve: Plugin, rest, commands, opening, source: int = SOURCE) -> None:
 def valve_openings(
     plugin: Plugin, states: Structs, commands: Array, run: Callable[..., Iterable[None]]
 ) -> list[Array]:
-    """Return the mean opening of n candidates' valves in each step [m²], shape (steps, J) each.
+    """Return the mean opening of n candidates' valves in each step [m²], shape (steps,
+    J) each.
 
-    `states` are those of the start, shape (n, J), and `commands` those of a `Course`. `run` is that of a
-    pool. No bit depends on the other candidates.
+    `states` are those of the start, shape (n, J), and `commands` those of a `Course`.
+    `run` is that of a pool. No bit depends on the other candidates.
     """
     alike = plugin.coefficients.copy()
     alike[BEHIND_VALVE] = alike["a"][BEHIND_PORT] = alike["b"][BEHIND_PORT] = 0.0

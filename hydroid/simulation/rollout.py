@@ -1,10 +1,12 @@
-"""The compiled rollout: one candidate through its whole record, MuJoCo's steps included.
+"""The compiled rollout: one candidate through its whole record, MuJoCo's steps
+included.
 
-`mujoco.batch` has a rollout, but nothing can be done between its steps; and where Python does something at
-every step, threads wait for the interpreter. So the compiled loop calls `mj_step` of MuJoCo's own library
-itself, on an MjModel and MjData of the bindings, and no thread needs Python before the record's end. The bits
-are those of `mujoco.batch`. Only an error of MuJoCo's, not a divergence, would end the process instead of
-raising; a model that gets through `SteppedArm.start` has none to expect.
+`mujoco.batch` has a rollout, but nothing can be done between its steps; and where
+Python does something at every step, threads wait for the interpreter. So the compiled
+loop calls `mj_step` of MuJoCo's own library itself, on an MjModel and MjData of the
+bindings, and no thread needs Python before the record's end. The bits are those of
+`mujoco.batch`. Only an error of MuJoCo's, not a divergence, would end the process
+instead of raising; a model that gets through `SteppedArm.start` has none to expect.
 """
 
 # pyright: reportMissingParameterType=false
@@ -34,7 +36,9 @@ from hydroid.hydraulics.records import COEFFICIENTS, JOINT_STATE
 _log = logging.getLogger(__name__)
 
 NO_JOINTS = np.empty(0, np.intp)
-NO_ACTUATORS = Plugin(np.empty(0, COEFFICIENTS), NO_JOINTS, np.empty((0, 0), np.intp), 0, 0.0, 1)
+NO_ACTUATORS = Plugin(
+    np.empty(0, COEFFICIENTS), NO_JOINTS, np.empty((0, 0), np.intp), 0, 0.0, 1
+)
 """of an arm whose joints are all pushed"""
 
 # libmujoco.so.*, libmujoco.*.dylib or mujoco.dll: the one that the bindings have loaded
@@ -42,7 +46,8 @@ _library = ctypes.CDLL(str(next(Path(mujoco.__file__).parent.glob("*mujoco.*")))
 
 
 def mujoco_function(name: str, *arguments: Any) -> Any:
-    """Return a function of MuJoCo for compiled code, which returns nothing, by its arguments' numba types."""
+    """Return a function of MuJoCo for compiled code, which returns nothing, by its
+    arguments' numba types."""
     address = ctypes.cast(getattr(_library, name), ctypes.c_void_p).value
     llvmlite.binding.add_symbol(name, address)
     return types.ExternalFunction(name, types.void(*arguments))
@@ -52,7 +57,8 @@ _mj_step = mujoco_function("mj_step", types.intp, types.intp)
 
 
 class Handles(NamedTuple):
-    """One MuJoCo simulation for compiled code: addresses, and live arrays over its V moving joints."""
+    """One MuJoCo simulation for compiled code: addresses, and live arrays over its V
+    moving joints."""
 
     model: int
     data: int
@@ -66,7 +72,8 @@ class Handles(NamedTuple):
     own: Array  # the arm's own armature of these [kg·m²], (J,)
     pushed: Index  # the other joints, (P,)
     steps: int  # in one sample
-    gravity: Array  # torques that hold the arm, where a rollout asks for them [N·m], (V,)
+    # torques that hold the arm, where a rollout asks for them [N·m], (V,)
+    gravity: Array
     slack: Array  # angles at which springs are slack [rad], (V,)
     limits: Array  # of the angles [rad], (V, 2)
 
@@ -74,10 +81,11 @@ class Handles(NamedTuple):
 class Course(NamedTuple):
     """What drives an arm from step to step.
 
-    commands: held during each step [%], after those before the start, shape (past + T steps, J). torque: of
-    pushed joints [N·m], shape (T steps, P). taken: flow from the pump into pushed joints [m³/s], shape
-    (T steps,); or it is empty. opening: of the valves in the mean [m²], shape (T steps, J), where they are
-    known before a quasi-static rollout; or it is empty.
+    commands: held during each step [%], after those before the start, shape (past + T
+    steps, J). torque: of pushed joints [N·m], shape (T steps, P). taken: flow from the
+    pump into pushed joints [m³/s], shape (T steps,); or it is empty. opening: of the
+    valves in the mean [m²], shape (T steps, J), where they are known before a
+    quasi-static rollout; or it is empty.
     """
 
     commands: Array
@@ -87,27 +95,30 @@ class Course(NamedTuple):
 
 
 class Record(NamedTuple):
-    """What a rollout writes: angles of moving joints [rad], (T, V); states, (T, J) of JOINT_STATE, or ()."""
+    """What a rollout writes: angles of moving joints [rad], (T, V); states, (T, J) of
+    JOINT_STATE, or ()."""
 
     angle: Array
     states: Structs
 
 
 class SteppedArm:
-    """An arm in MuJoCo, a copy of a model, which candidates take in turn and compiled code steps.
+    """An arm in MuJoCo, a copy of a model, which candidates take in turn and compiled
+    code steps.
 
-    Without hydraulics several can be stepped at once (`hydroid.arm.locked.repeat`): V and P
-    count the joints of all of them, and each takes a candidate.
+    Without hydraulics several can be stepped at once (`hydroid.arm.locked.repeat`): V
+    and P count the joints of all of them, and each takes a candidate.
 
     Args:
-        columns: the moving joints with actuators, and those they couple with, shape (J,). The torques of the
-            P others are given.
+        columns: the moving joints with actuators, and those they couple with, shape
+            (J,). The torques of the P others are given.
         steps: of MuJoCo in one sample.
         rollout: the compiled one, with the arguments of `roll`, which it is by default.
         copies: how often the arm is in the model.
 
     Attributes:
-        model, data: with the values of the candidate that was started last, and its state.
+        model, data: with the values of the candidate that was started last, and its
+            state.
     """
 
     def __init__(
@@ -140,21 +151,26 @@ class SteppedArm:
             np.where(m.jnt_limited[:, None], m.jnt_range, [-np.inf, np.inf]),
         )
 
-    def start(self, values: dict[str, Array], rows: Sequence[int] | Index, pose: Array) -> Array:
-        """Put the candidate of a row of `values` into `pose` [rad], shape (V,), at rest; within
-        `quiet_mujoco`. `rows` has one for each copy of the arm.
+    def start(
+        self, values: dict[str, Array], rows: Sequence[int] | Index, pose: Array
+    ) -> Array:
+        """Put the candidate of a row of `values` into `pose` [rad], shape (V,), at
+        rest; within `quiet_mujoco`. `rows` has one for each copy of the arm.
 
-        `values` is what candidates change in the model, as `Scenario.values` returns it. Returned is what
-        holds it there, tau0 = g(q0) of equation (1), and springs that are not slack there [N·m], shape (V,).
+        `values` is what candidates change in the model, as `Scenario.values` returns
+        it. Returned is what holds it there, tau0 = g(q0) of equation (1), and springs
+        that are not slack there [N·m], shape (V,).
         """
         model, data = self.model, self.data
         for name, value in values.items():
             field = getattr(model, name)
-            world = len(field) % self.copies  # its row stands before those of all copies
+            # its row stands before those of all copies
+            world = len(field) % self.copies
             field[world:] = value[rows, world:].reshape(field[world:].shape)
         model.dof_armature[:] = self._armature  # a rollout steps with another
         mujoco.mj_setConst(model, data)
-        model.stat.meaninertia = self._inertia  # constraints are solved as well whoever stands beside
+        # constraints are solved as well whoever stands beside
+        model.stat.meaninertia = self._inertia
         mujoco.mj_resetData(model, data)
         data.qpos[:] = pose
         mujoco.mj_fwdPosition(model, data)
@@ -168,11 +184,15 @@ class SteppedArm:
     def healthy(self) -> bool:
         """Whether the arm is finite and drew no warning of MuJoCo's since its start."""
         return (
-            bool(np.isfinite([self.data.qpos, self.data.qvel]).all()) and not self.data.warning.number.any()
+            bool(np.isfinite([self.data.qpos, self.data.qvel]).all())
+            and not self.data.warning.number.any()
         )
 
-    def roll(self, plugin: Plugin, state: Structs, course: Course, record: Record) -> None:
-        """Step one candidate up to the first warning of MuJoCo's; call it within `quiet_mujoco`.
+    def roll(
+        self, plugin: Plugin, state: Structs, course: Course, record: Record
+    ) -> None:
+        """Step one candidate up to the first warning of MuJoCo's; call it within
+        `quiet_mujoco`.
 
         `state` is its actuators', (J,) of JOINT_STATE: steps change it.
         """
@@ -183,16 +203,19 @@ class SteppedArm:
         """What compiled code steps."""
         return self._handles
 
-    def bind(self, plugin: Plugin, state: Structs, course: Course, record: Record) -> Callable[[], object]:
+    def bind(
+        self, plugin: Plugin, state: Structs, course: Course, record: Record
+    ) -> Callable[[], object]:
         """Return a call of `roll` with these arrays, whatever they hold by then."""
         return bind(self._roll, self._handles, plugin, state, course, record)
 
 
 def bind(compiled: Any, *arguments: Any) -> Callable[[], object]:
-    """Return a call of a compiled function with these arguments, whose last one, `source`, is left out.
+    """Return a call of a compiled function with these arguments, whose last one,
+    `source`, is left out.
 
-    It takes 3 µs beside the function itself. Without it numba looks at the types at every call, and may take
-    1 ms for those of structured arrays.
+    It takes 3 µs beside the function itself. Without it numba looks at the types at
+    every call, and may take 1 ms for those of structured arrays.
     """
     (source,) = compiled.py_func.__defaults__
     kinds = (*map(typeof, arguments), types.Omitted(source))
@@ -210,7 +233,8 @@ def write_sample(arm, record, state, k: int) -> None:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def roll(arm, plugin: Plugin, state, course, record, source: int = SOURCE) -> None:
-    """Roll one candidate out as `SteppedArm.roll` does; `source` is the kernel's, for numba's cache."""
+    """Roll one candidate out as `SteppedArm.roll` does; `source` is the kernel's, for
+    numba's cache."""
     commands, torque, taken, _ = course
     pad, past = make_pad(state.size), commands.shape[0] - torque.shape[0]
     for k in range(torque.shape[0]):
@@ -228,7 +252,8 @@ def roll(arm, plugin: Plugin, state, course, record, source: int = SOURCE) -> No
 
 
 class _Announcement(event.Listener):
-    """Says once that numba compiles, which it does only where its cache holds nothing usable."""
+    """Says once that numba compiles, which it does only where its cache holds nothing
+    usable."""
 
     _made = False
 
@@ -243,11 +268,15 @@ class _Announcement(event.Listener):
 
 @cache
 def compile_rollout() -> None:
-    """Make the compiled loop ready: read it from numba's cache, or compile it and say so in the log."""
+    """Make the compiled loop ready: read it from numba's cache, or compile it and say
+    so in the log."""
     model = mujoco.MjModel.from_xml_string(
         "<mujoco><worldbody><body><joint/><geom size='1'/></body></worldbody></mujoco>"
     )
     nothing = np.empty((0, 1))
-    course, record = Course(nothing, nothing), Record(nothing, np.empty((0, 1), JOINT_STATE))
+    course, record = (
+        Course(nothing, nothing),
+        Record(nothing, np.empty((0, 1), JOINT_STATE)),
+    )
     with event.install_listener("numba:compile", _Announcement()):
         SteppedArm(model).roll(NO_ACTUATORS, np.empty(0, JOINT_STATE), course, record)

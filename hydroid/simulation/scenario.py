@@ -1,4 +1,5 @@
-"""What is simulated: a log's joints, start and commands, and in stage 2 the chain from command to torque."""
+"""What is simulated: a log's joints, start and commands, and in stage 2 the chain from
+command to torque."""
 
 from copy import copy
 from dataclasses import replace
@@ -19,21 +20,27 @@ from hydroid.settings.arm import Arm
 from hydroid.settings.problem import SimulationSettings
 
 ARMATURE = 1e6
-"""[kg·m²], against about 10 for the whole arm: the arm's torques move it by less than 1e-6 of a radian"""
-HEAVIEST = 1e4  # times the largest inertia of the arm: the armature of a machine that is heavier
-SERVO = 10.0  # natural frequency of the servo [rad/s], slow against a step and fast against drift
+"""[kg·m²], against about 10 for the whole arm: the arm's torques move it by less than
+1e-6 of a radian"""
+# times the largest inertia of the arm: the armature of a machine that is heavier
+HEAVIEST = 1e4
+# natural frequency of the servo [rad/s], slow against a step and fast against drift
+SERVO = 10.0
 
 
 class Prescribed:
-    """The torque that makes some joints follow their logged motion, whatever the arm does to them.
+    """The torque that makes some joints follow their logged motion, whatever the arm
+    does to them.
 
-    A prescribed joint gets an armature so large that nothing on the arm can move it, and the torque that
-    gives that armature the logged acceleration; a critically damped servo of the same scale takes up what
-    integration leaves over. The arm feels the joint's true motion, inertia coupling included. The stepped
-    model gets the armature, and springs that pull towards angle 0.
+    A prescribed joint gets an armature so large that nothing on the arm can move it,
+    and the torque that gives that armature the logged acceleration; a critically damped
+    servo of the same scale takes up what integration leaves over. The arm feels the
+    joint's true motion, inertia coupling included. The stepped model gets the armature,
+    and springs that pull towards angle 0.
 
     Attributes:
-        columns: positions of the joints, which are 0-based among the arm's, among the moving ones.
+        columns: positions of the joints, which are 0-based among the arm's, among the
+            moving ones.
         angle: at the start of each step [rad], shape (steps, P).
         velocity: during it [rad/s], shape (steps, P).
         torque: [N·m], shape (steps, P).
@@ -63,25 +70,34 @@ class Prescribed:
         acceleration = np.diff(velocity, axis=0) / step
         self.angle: Array = fine[:-1]
         self.velocity: Array = velocity[1:]
-        # semi-implicit Euler: the step from k to k+1 has the new velocity and the old angle
+        # semi-implicit Euler: the step from k to k+1 has the new velocity and the old
+        # angle
         self.torque: Array = (
-            armature * acceleration + self.damping * self.velocity + self.stiffness * self.angle
+            armature * acceleration
+            + self.damping * self.velocity
+            + self.stiffness * self.angle
         )
 
 
 def smooth(angle: Array, cutoff: float) -> Array:
-    """Low-pass angles, shape (T, K), without phase shift; `cutoff` is in cycles per sample."""
+    """Low-pass angles, shape (T, K), without phase shift; `cutoff` is in cycles per
+    sample."""
     if cutoff >= 0.5 or len(angle) < 16 or not angle.size:
         return angle
-    return sosfiltfilt(butter(2, 2 * cutoff, output="sos"), angle, axis=0, padlen=min(len(angle) - 1, 100))
+    return sosfiltfilt(
+        butter(2, 2 * cutoff, output="sos"),
+        angle,
+        axis=0,
+        padlen=min(len(angle) - 1, 100),
+    )
 
 
 @record
 class Candidates:
     """Physical values of n candidates, joints and links in the arm's order.
 
-    joints: of `hydroid.hydraulics.records.JOINT`, in SI but for the gain [N·m/%], shape (n, J). mass [kg]: of
-    the links, shape (n, L).
+    joints: of `hydroid.hydraulics.records.JOINT`, in SI but for the gain [N·m/%], shape
+    (n, J). mass [kg]: of the links, shape (n, L).
     """
 
     joints: Records
@@ -95,14 +111,16 @@ class Candidates:
 
 
 def distinct(*tables: Any) -> tuple[Index, Index]:
-    """Return which of n rows differ in any table, m of them, and which of these each row is, shape (n,)."""
+    """Return which of n rows differ in any table, m of them, and which of these each
+    row is, shape (n,)."""
     each = [b"".join(one.tobytes() for one in row) for row in zip(*tables, strict=True)]
     return np.unique(each, return_index=True, return_inverse=True)[1:]
 
 
 @record
 class Response:
-    """Simulated angles [rad], shape (n, T, K), of the K output joints; NaN throughout where one diverged.
+    """Simulated angles [rad], shape (n, T, K), of the K output joints; NaN throughout
+    where one diverged.
 
     `pressure` [Pa], shape
     (n, T, L, 2), are those of chambers A and B of the L joints that were asked for.
@@ -113,10 +131,11 @@ class Response:
 
 
 class Scenario:
-    """A log made ready for simulation: its commands drive, from the pose in which it rests before them.
+    """A log made ready for simulation: its commands drive, from the pose in which it
+    rests before them.
 
-    Joints that the log drives, and `outputs` (0-based), whose angles are wanted, are *active*. A setting says
-    what the others do.
+    Joints that the log drives, and `outputs` (0-based), whose angles are wanted, are
+    *active*. A setting says what the others do.
 
     Attributes:
         machine: the whole arm.
@@ -126,11 +145,17 @@ class Scenario:
         command: held during each step [%], shape (steps, V).
         period: between samples [s].
         prescribed: the joints that follow the log.
-        pressure: in which the moving joints' chambers rest at the start [Pa], (V, 2), NaN where not measured.
+        pressure: in which the moving joints' chambers rest at the start [Pa], (V, 2),
+            NaN where not measured.
     """
 
     def __init__(
-        self, spec: mujoco.MjSpec, arm: Arm, log: Log, outputs: list[int], settings: SimulationSettings
+        self,
+        spec: mujoco.MjSpec,
+        arm: Arm,
+        log: Log,
+        outputs: list[int],
+        settings: SimulationSettings,
     ) -> None:
         self.settings, self.machine = settings, arm
         self.active = log.driven.copy()
@@ -148,17 +173,19 @@ class Scenario:
         self.prescribed = Prescribed(self.arm.model, log, follows, columns, settings)
 
     def restarted(self, start: Array, command: Array) -> "Scenario":
-        """Return the same moving joints from another pose [rad], shape (V,), under other commands.
+        """Return the same moving joints from another pose [rad], shape (V,), under
+        other commands.
 
-        `command` is held during each step [%], shape (steps, V). No joint may follow the log. Springs are
-        slack where they were.
+        `command` is held during each step [%], shape (steps, V). No joint may follow
+        the log. Springs are slack where they were.
         """
         other = copy(self)
         other.arm, other.command = replace(self.arm, pose=start), command
         return other
 
     def values(self, candidates: Candidates) -> dict[str, Array]:
-        """Return what candidates change in the model, the prescribed joints' servo included."""
+        """Return what candidates change in the model, the prescribed joints' servo
+        included."""
         values, columns = model_values(self.arm, candidates), self.prescribed.columns
         values["dof_damping"][:, columns] = self.prescribed.damping
         values["jnt_stiffness"][:, columns] = self.prescribed.stiffness
@@ -167,7 +194,8 @@ class Scenario:
 
 
 def model_values(arm: LockedArm, candidates: Candidates) -> dict[str, Array]:
-    """Return the fields of mjModel that n candidates change, by name, shape (n, ...) each."""
+    """Return the fields of mjModel that n candidates change, by name, shape (n, ...)
+    each."""
     return arm.inertials(candidates.mass) | {
         "dof_damping": candidates.joints.damping[:, arm.columns],
         "jnt_stiffness": candidates.joints.stiffness[:, arm.columns],
@@ -175,22 +203,26 @@ def model_values(arm: LockedArm, candidates: Candidates) -> dict[str, Array]:
     }
 
 
-STOP_REACH = np.radians(1.0)  # how near an end of its range a joint must start to rest on its stop
+# how near an end of its range a joint must start to rest on its stop
+STOP_REACH = np.radians(1.0)
 
 
 class Chain:
     """The actuators of an arm, for any candidates.
 
-    `active` says which of the arm's joints have hydraulics, shape (J,), and `substeps` how many of valves and
-    oil there are in a MuJoCo step.
+    `active` says which of the arm's joints have hydraulics, shape (J,), and `substeps`
+    how many of valves and oil there are in a MuJoCo step.
 
     Attributes:
         columns: the moving joints that couple through their inertia: all but `pushed`.
         joints: the same among the arm's joints, 0-based.
-        pushed: columns of the moving joints whose torques are given instead: in stage 1 all.
+        pushed: columns of the moving joints whose torques are given instead: in stage 1
+            all.
     """
 
-    def __init__(self, arm: Arm, locked: LockedArm, active: Mask, substeps: int, pushed: Index) -> None:
+    def __init__(
+        self, arm: Arm, locked: LockedArm, active: Mask, substeps: int, pushed: Index
+    ) -> None:
         self.columns = np.setdiff1d(np.arange(len(locked.columns)), pushed)
         self.joints, self.pushed = locked.columns[self.columns], pushed
         self._pushed = locked.columns[pushed]
@@ -205,29 +237,40 @@ class Chain:
                 )
         self._range = np.array([arm.lower, arm.upper])[:, self.joints]
         model = locked.model
-        entries = np.zeros((model.nv, model.nv), np.intp)  # of M[i, j] in MuJoCo's sparse mass matrix
+        # of M[i, j] in MuJoCo's sparse mass matrix
+        entries = np.zeros((model.nv, model.nv), np.intp)
         rows, columns = np.repeat(np.arange(model.nv), model.M_rownnz), model.M_colind
         entries[rows, columns] = entries[columns, rows] = np.arange(model.nC)
         self._entries = entries[np.ix_(self.columns, self.columns)]
         self._period, self._substeps = model.opt.timestep, substeps
 
     def start(
-        self, candidates: Candidates, pose: Array, balance: Array, pressure: Array | None = None
+        self,
+        candidates: Candidates,
+        pose: Array,
+        balance: Array,
+        pressure: Array | None = None,
     ) -> tuple[Plugin, Structs]:
-        """Return the actuators of n candidates, with a force-stroke curve each, and their states at rest.
+        """Return the actuators of n candidates, with a force-stroke curve each, and
+        their states at rest.
 
-        `pose` is the moving joints' [rad], shape (V,); `balance` holds them there [N·m], shape (n, V).
-        Chamber pressures measured there [Pa], shape (V, 2), NaN where there are none, are taken by
-        candidates that have no start pressure of their own.
+        `pose` is the moving joints' [rad], shape (V,); `balance` holds them there
+        [N·m], shape (n, V). Chamber pressures measured there [Pa], shape (V, 2), NaN
+        where there are none, are taken by candidates that have no start pressure of
+        their own.
         """
         joints: Records = candidates.joints[:, self.joints]  # pyright: ignore[reportAssignmentType]
         away = np.min(abs(self._range - pose[self.columns]), axis=0) > STOP_REACH
         joints.trapped_pressure[:, away] = np.inf
         if pressure is not None:
             trapped, level = pressure[self.columns].T
-            asked = np.isinf(joints.start_pressure) & np.isfinite(pressure[self.columns]).all(axis=1)
+            asked = np.isinf(joints.start_pressure) & np.isfinite(
+                pressure[self.columns]
+            ).all(axis=1)
             rests = asked & np.isfinite(joints.trapped_pressure)
-            joints["trapped_pressure"] = np.where(rests, trapped, joints.trapped_pressure)
+            joints["trapped_pressure"] = np.where(
+                rests, trapped, joints.trapped_pressure
+            )
             joints["start_pressure"] = np.where(asked, level, joints.start_pressure)
         joints.kind[:, self._idle] = NONE
         plugin = make_plugin(joints, self._entries, self._period, self._substeps)
@@ -235,7 +278,8 @@ class Chain:
         return plugin, at_rest(plugin, angle, balance[:, self.columns])
 
     def taken(self, candidates: Candidates, motion: Prescribed) -> Array:
-        """What P joints that follow a log take from the pump [m³/s], (n, steps); (n, 0) if there are none."""
+        """What P joints that follow a log take from the pump [m³/s], (n, steps); (n, 0)
+        if there are none."""
         joints: Records = candidates.joints[:, self._pushed]  # pyright: ignore[reportAssignmentType]
         if not self.joints.size or np.isinf(joints.pump_flow).all():
             return np.empty((len(candidates), 0))

@@ -1,12 +1,14 @@
-"""Settled speeds of all joints at once, and their inverse: the commands at which joints move as wished.
+"""Settled speeds of all joints at once, and their inverse: the commands at which joints
+move as wished.
 
-As in `steady`, commands are held, all that starts, lags or rings has passed, and lever and load
-are those of the pose; here the joints share the pump's line. At a line pressure P each joint is
-alone: its speed rises with its command, so that halvings find the least command that is enough.
-What the joints then draw from the line rises with P, and what the pump gives falls, so that there
-is one P.
+As in `steady`, commands are held, all that starts, lags or rings has passed, and lever
+and load are those of the pose; here the joints share the pump's line. At a line
+pressure P each joint is alone: its speed rises with its command, so that halvings find
+the least command that is enough. What the joints then draw from the line rises with P,
+and what the pump gives falls, so that there is one P.
 
-What the dynamic model's oil takes in because load and lever change on the way is left out.
+What the dynamic model's oil takes in because load and lever change on the way is left
+out.
 """
 
 # pyright: reportMissingParameterType=false
@@ -32,12 +34,14 @@ HALVINGS = 32
 MOST_PRESSURES = 40
 """of the line that are tried; five suffice"""
 CLOSE = 1e-9  # part of the relief pressure that two pressures of the line may be apart
-SETTLED = 1e-6  # part of the pump's flow that may be left: more than the halvings leave of a command
+# part of the pump's flow that may be left: more than the halvings leave of a command
+SETTLED = 1e-6
 
 
 @compilable
 def settled_rod(c, w, supply: float, quasi: bool) -> Any:
-    """Speed of a rod [m/s] and the flow that it takes from the line [m³/s], at the opening `w.travel`."""
+    """Speed of a rod [m/s] and the flow that it takes from the line [m³/s], at the
+    opening `w.travel`."""
     if quasi:
         speed, drawn, _ = rod_speed(c, w, supply)
         return speed if w.travel > 0.0 else -speed, drawn
@@ -48,7 +52,8 @@ def settled_rod(c, w, supply: float, quasi: bool) -> Any:
 
 @compilable
 def fast_enough(c, w, wished: float, supply: float, quasi: bool) -> bool:
-    """Whether a rod moves at least as fast as wished [m/s], in that direction, at the opening `w.travel`."""
+    """Whether a rod moves at least as fast as wished [m/s], in that direction, at the
+    opening `w.travel`."""
     sign = 1.0 if wished > 0.0 else -1.0
     if quasi:
         return sign * w.travel > 0.0 and rod_speed(c, w, supply)[0] >= abs(wished)
@@ -58,7 +63,8 @@ def fast_enough(c, w, wished: float, supply: float, quasi: bool) -> bool:
 
 @compilable
 def least_command(c, w, wished: float, supply: float, quasi: bool) -> float:
-    """Least command [%] at which a rod moves as fast as wished [m/s]; the full one where none is enough."""
+    """Least command [%] at which a rod moves as fast as wished [m/s]; the full one
+    where none is enough."""
     if wished == 0.0:
         return 0.0
     sign, low, high = 1.0 if wished > 0.0 else -1.0, 0.0, FULL_COMMAND
@@ -73,8 +79,11 @@ def least_command(c, w, wished: float, supply: float, quasi: bool) -> float:
 
 
 @compilable
-def nearest_command(c, w, wished: float, command: float, supply: float, quasi: bool) -> float:
-    """The least command that is enough, or the one below it where that is nearer to the wish.
+def nearest_command(
+    c, w, wished: float, command: float, supply: float, quasi: bool
+) -> float:
+    """The least command that is enough, or the one below it where that is nearer to the
+    wish.
 
     A valve that opens with a jump has a slowest speed.
     """
@@ -91,14 +100,16 @@ def nearest_command(c, w, wished: float, command: float, supply: float, quasi: b
 
 
 class Law(NamedTuple):
-    """What is sought: commands for speeds if `inverse`, or speeds; of the quasi-static model or not."""
+    """What is sought: commands for speeds if `inverse`, or speeds; of the quasi-static
+    model or not."""
 
     inverse: bool
     quasi: bool
 
 
 class Rods(NamedTuple):
-    """Of the J joints: scratch space, commands [%], wished speeds [rad/s], and those of the rods [m/s]."""
+    """Of the J joints: scratch space, commands [%], wished speeds [rad/s], and those of
+    the rods [m/s]."""
 
     work: Any
     command: Any
@@ -107,7 +118,8 @@ class Rods(NamedTuple):
 
 
 class Places(NamedTuple):
-    """Where S poses have the joints [rad], and what holds them there [N·m], shape (S, J) each."""
+    """Where S poses have the joints [rad], and what holds them there [N·m], shape (S,
+    J) each."""
 
     angle: Array
     load: Array
@@ -115,14 +127,17 @@ class Places(NamedTuple):
 
 @compilable
 def drawn_at(plugin: Plugin, rods: Rods, law: Law, pressure: float) -> float:
-    """Flow from the line [m³/s] at its pressure [Pa]; writes the rods' speeds, and inversely commands."""
+    """Flow from the line [m³/s] at its pressure [Pa]; writes the rods' speeds, and
+    inversely commands."""
     drawn = 0.0
     for a in range(plugin.idle, plugin.order.size):
         j = plugin.order[a]
         c, w = plugin.coefficients[j], rods.work[j]
         supply = min(pressure, c.supply_pressure)
         if law.inverse:
-            rods.command[j] = least_command(c, w, rods.wished[j] * w.arm, supply, law.quasi)
+            rods.command[j] = least_command(
+                c, w, rods.wished[j] * w.arm, supply, law.quasi
+            )
         w.travel = steady_opening(rods.command[j], c)
         rods.speed[j], flow = settled_rod(c, w, supply, law.quasi)
         drawn += flow
@@ -131,10 +146,11 @@ def drawn_at(plugin: Plugin, rods: Rods, law: Law, pressure: float) -> float:
 
 @compilable
 def shared_pressure(plugin: Plugin, rods: Rods, law: Law) -> float:
-    """Pressure of the line [Pa] at which the pump gives what joints draw; inf where it has no limit.
+    """Pressure of the line [Pa] at which the pump gives what joints draw; inf where it
+    has no limit.
 
-    Regula falsi by the Illinois rule: what joints draw at wished speeds hardly depends on the
-    pressure.
+    Regula falsi by the Illinois rule: what joints draw at wished speeds hardly depends
+    on the pressure.
     """
     some = plugin.coefficients[plugin.order[plugin.order.size - 1]]
     if some.pump_flow == np.inf:
@@ -143,18 +159,22 @@ def shared_pressure(plugin: Plugin, rods: Rods, law: Law) -> float:
     over = drawn_at(plugin, rods, law, high)
     if over <= 0.0:
         return high
-    if over < some.pump_flow:  # where the pump gives this flow; at less pressure no more is drawn
+    # where the pump gives this flow; at less pressure no more is drawn
+    if over < some.pump_flow:
         low = max(low, high - some.pump_droop * over / some.pump_flow)
     under = drawn_at(plugin, rods, law, low) - delivery(low, 1.0, some)[0]
     if abs(under) <= SETTLED * some.pump_flow or under >= 0.0:
         return low
     for count in range(MOST_PRESSURES):
-        if high - low <= CLOSE * some.relief:  # a pump without a droop gives any flow there
+        # a pump without a droop gives any flow there
+        if high - low <= CLOSE * some.relief:
             break
         pressure = low - under * (high - low) / (over - under)
         if count % 4 == 3:
             pressure = 0.5 * (low + high)
-        excess = drawn_at(plugin, rods, law, pressure) - delivery(pressure, 1.0, some)[0]
+        excess = (
+            drawn_at(plugin, rods, law, pressure) - delivery(pressure, 1.0, some)[0]
+        )
         if abs(excess) <= SETTLED * some.pump_flow:
             return pressure
         if excess > 0.0:
@@ -168,14 +188,19 @@ def shared_pressure(plugin: Plugin, rods: Rods, law: Law) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _settle(plugin: Plugin, places: Places, law: Law, command, velocity, source: int = SOURCE) -> None:
-    """Replace velocities [rad/s], (S, J), by the settled ones; inversely commands by those that do it."""
+def _settle(
+    plugin: Plugin, places: Places, law: Law, command, velocity, source: int = SOURCE
+) -> None:
+    """Replace velocities [rad/s], (S, J), by the settled ones; inversely commands by
+    those that do it."""
     joints = plugin.order.size
     work, speed, wished = make_pad(joints).joints, np.zeros(joints), np.zeros(joints)
     for k in range(places.angle.shape[0]):
         for a in range(plugin.idle, joints):
             j = plugin.order[a]
-            weigh(plugin.coefficients[j], work[j], places.angle[k, j], places.load[k, j])
+            weigh(
+                plugin.coefficients[j], work[j], places.angle[k, j], places.load[k, j]
+            )
         wished[:] = velocity[k]
         rods = Rods(work, command[k], wished, speed)
         pressure = shared_pressure(plugin, rods, law)
@@ -185,36 +210,46 @@ def _settle(plugin: Plugin, places: Places, law: Law, command, velocity, source:
             c, w = plugin.coefficients[j], work[j]
             if law.inverse and wished[j] != 0.0:
                 supply = min(pressure, c.supply_pressure)
-                command[k, j] = nearest_command(c, w, wished[j] * w.arm, command[k, j], supply, law.quasi)
+                command[k, j] = nearest_command(
+                    c, w, wished[j] * w.arm, command[k, j], supply, law.quasi
+                )
                 w.travel = steady_opening(command[k, j], c)
                 speed[j] = settled_rod(c, w, supply, law.quasi)[0]
             velocity[k, j] = speed[j] / w.arm + 0.0  # no -0
 
 
-def settled_speeds(plugin: Plugin, angle: Array, load: Array, command: Array, *, quasi_static: bool) -> Array:
-    """Return the settled velocities of J joints [rad/s] under commands [%], shape (S, J).
+def settled_speeds(
+    plugin: Plugin, angle: Array, load: Array, command: Array, *, quasi_static: bool
+) -> Array:
+    """Return the settled velocities of J joints [rad/s] under commands [%], shape (S,
+    J).
 
     Args:
         plugin: the actuators of one candidate.
         angle: [rad], shape (S, J).
-        load: torques that hold the joints against gravity and springs [N·m], shape (S, J).
+        load: torques that hold the joints against gravity and springs [N·m], shape (S,
+            J).
         command: [%], shape (S, J).
         quasi_static: whether the law is that of the quasi-static model.
 
-    Of a joint that slides they are in m/s, and loads are forces [N]. One without actuator has 0.
+    Of a joint that slides they are in m/s, and loads are forces [N]. One without
+    actuator has 0.
     """
     velocity = np.zeros(angle.shape)
-    _settle(plugin, Places(angle, load), Law(False, quasi_static), command.copy(), velocity)
+    _settle(
+        plugin, Places(angle, load), Law(False, quasi_static), command.copy(), velocity
+    )
     return velocity
 
 
 def settled_commands(
     plugin: Plugin, angle: Array, load: Array, velocity: Array, *, quasi_static: bool
 ) -> tuple[Array, Array]:
-    """Return commands [%] at which joints have wished velocities [rad/s], (S, J), and those they then have.
+    """Return commands [%] at which joints have wished velocities [rad/s], (S, J), and
+    those they then have.
 
-    Where a wish cannot be had it is the nearest of what the joint can do beside the others.
-    Arguments are as of `settled_speeds`.
+    Where a wish cannot be had it is the nearest of what the joint can do beside the
+    others. Arguments are as of `settled_speeds`.
     """
     command, reached = np.zeros(angle.shape), velocity.copy()
     _settle(plugin, Places(angle, load), Law(True, quasi_static), command, reached)

@@ -1,18 +1,21 @@
-"""The speed at which a joint moves steadily through a pose: the law itself, without a simulated motion.
+"""The speed at which a joint moves steadily through a pose: the law itself, without a
+simulated motion.
 
-The command is held, and all that starts, lags or rings has passed: the plungers rest, and the pump gives its
-full flow. Lever and load are those of the pose. The flow into a chamber is then its area times the speed of
-the rod,
+The command is held, and all that starts, lags or rings has passed: the plungers rest,
+and the pump gives its full flow. Lever and load are those of the pose. The flow into a
+chamber is then its area times the speed of the rod,
 
     Q_A(p_A, P) = A_A v,   Q_B(p_B, P) = −A_B v,   A_A p_A − A_B p_B = F + d v + dry friction,
 
-with the flows of `valve.port_flow`, the pump's line at P where the pump gives what is drawn, and a chamber at
-0 where it cavitates. The force that is left falls with v, and the pressures are monotone in it, so there is
-one speed. It is 0 where the joint's dry friction holds the load.
+with the flows of `valve.port_flow`, the pump's line at P where the pump gives what is
+drawn, and a chamber at 0 where it cavitates. The force that is left falls with v, and
+the pressures are monotone in it, so there is one speed. It is 0 where the joint's dry
+friction holds the load.
 
-Lever and load change on the way, and the oil yields to that: a chamber takes in V/β ṗ more. With the steady
-pressures at both sides of the pose, ṗ = v dp/dx, which counts as a change of the area that oil has to fill.
-What is left out is of second order: the joint's acceleration on the way.
+Lever and load change on the way, and the oil yields to that: a chamber takes in V/β ṗ
+more. With the steady pressures at both sides of the pose, ṗ = v dp/dx, which counts as
+a change of the area that oil has to fill. What is left out is of second order: the
+joint's acceleration on the way.
 
 In the quasi-static model the speed is that of `quasi_static.rod_speed`.
 """
@@ -32,18 +35,31 @@ from hydroid.hydraulics.joint import opened
 from hydroid.hydraulics.kernel import Plugin, make_pad, source_key
 from hydroid.hydraulics.pump import delivery, lowest
 from hydroid.hydraulics.records import LINEAR, Records, coefficients, has_force_curve
-from hydroid.hydraulics.solenoid import beyond_dead_band, drive, resting_stroke, side_voltage
+from hydroid.hydraulics.solenoid import (
+    beyond_dead_band,
+    drive,
+    resting_stroke,
+    side_voltage,
+)
 from hydroid.hydraulics.valve import port_flow
 from hydroid.simulation import quasi_static, rollout
-from hydroid.simulation.quasi_static import LEAST_LEVER, line_pressure, linkage, rod_speed, weigh
+from hydroid.simulation.quasi_static import (
+    LEAST_LEVER,
+    line_pressure,
+    linkage,
+    rod_speed,
+    weigh,
+)
 
 SOURCE = source_key(rollout.__file__, quasi_static.__file__)
 FIRST_SPEED, MOST_SPEED = 1e-6, 1e3
 """a rod's speeds between which the steady one is sought [m/s], or [rad/s]"""
 MOST_PRESSURE = 1e12  # of a chamber from which nothing can leave [Pa]
-NEAR = 1e-2  # how far from the pose pressures are compared with those in it [rad], or [m]
+# how far from the pose pressures are compared with those in it [rad], or [m]
+NEAR = 1e-2
 LEAST_AREA = 0.1
-"""part of its area by which a chamber takes in oil at least, however much the oil yields on the way"""
+"""part of its area by which a chamber takes in oil at least, however much the oil
+yields on the way"""
 PRECISE = 1e-13  # relative error at which a search ends
 HALVINGS = 60  # of the line's pressure: to rounding
 
@@ -58,14 +74,18 @@ def steady_stroke(asked: float, side, c) -> float:
 
 @compilable
 def steady_opening(command: float, c) -> float:
-    """Net opening [m²] of a valve under a command [%] that is held, below 0 towards B."""
+    """Net opening [m²] of a valve under a command [%] that is held, below 0 towards
+    B."""
     travel = steady_stroke(command, c.a, c) - steady_stroke(-command, c.b, c)
     return opened(c.a, travel) if travel > 0.0 else -opened(c.b, -travel)
 
 
 @compilable
-def chamber_pressure(flow: float, supply: float, pump_area: float, tank_area: float, c) -> Any:
-    """Pressure [Pa] at which a flow [m³/s] enters a chamber through its edges [m²], and what the pump gives.
+def chamber_pressure(
+    flow: float, supply: float, pump_area: float, tank_area: float, c
+) -> Any:
+    """Pressure [Pa] at which a flow [m³/s] enters a chamber through its edges [m²], and
+    what the pump gives.
 
     It is 0 where the flow is more than an empty chamber takes in.
     """
@@ -73,10 +93,15 @@ def chamber_pressure(flow: float, supply: float, pump_area: float, tank_area: fl
     if into <= flow:
         return 0.0, pumped
     low, high = 0.0, max(supply, c.tank_pressure)
-    while high < MOST_PRESSURE and port_flow(high, supply, pump_area, tank_area, c)[0] > flow:
+    while (
+        high < MOST_PRESSURE
+        and port_flow(high, supply, pump_area, tank_area, c)[0] > flow
+    ):
         low, high = high, 2.0 * high
     pressure, change = 0.5 * (low + high), high - low
-    while True:  # Newton's method, or a halving where its steps do not halve: at an edge without a drop
+    # Newton's method, or a halving where its steps do not halve: at an edge without a
+    # drop
+    while True:
         into, fall, pumped, _ = port_flow(pressure, supply, pump_area, tank_area, c)
         if into > flow:
             low = pressure
@@ -93,21 +118,27 @@ def chamber_pressure(flow: float, supply: float, pump_area: float, tank_area: fl
 
 @compilable
 def oil_at(speed: float, supply: float, c, w, takes) -> Any:
-    """Pressures of chambers A and B [Pa] at a rod's speed [m/s], and flow from the pump [m³/s].
+    """Pressures of chambers A and B [Pa] at a rod's speed [m/s], and flow from the pump
+    [m³/s].
 
-    `w` has the valve's net opening `travel` [m²]. The chambers take in oil as pistons of the areas that
-    `takes` has [m²] do.
+    `w` has the valve's net opening `travel` [m²]. The chambers take in oil as pistons
+    of the areas that `takes` has [m²] do.
     """
     a, b = max(w.travel, 0.0), max(-w.travel, 0.0)
     return_a, return_b = c.leakage + b * c.a.return_, c.leakage + a * c.b.return_
-    pressure_a, pumped_a = chamber_pressure(takes[0] * speed, supply, c.leakage + a, return_a, c)
-    pressure_b, pumped_b = chamber_pressure(-takes[1] * speed, supply, c.leakage + b, return_b, c)
+    pressure_a, pumped_a = chamber_pressure(
+        takes[0] * speed, supply, c.leakage + a, return_a, c
+    )
+    pressure_b, pumped_b = chamber_pressure(
+        -takes[1] * speed, supply, c.leakage + b, return_b, c
+    )
     return pressure_a, pressure_b, c.a.draw * pumped_a + c.b.draw * pumped_b
 
 
 @compilable
 def surplus(speed: float, supply: float, c, w, takes) -> Any:
-    """Force [N] that oil at a rod's speed [m/s] has beyond load and damping, and flow from the pump [m³/s].
+    """Force [N] that oil at a rod's speed [m/s] has beyond load and damping, and flow
+    from the pump [m³/s].
 
     `w` has the load `push` [N], and the damping `drag` [N·s/m].
     """
@@ -118,7 +149,8 @@ def surplus(speed: float, supply: float, c, w, takes) -> Any:
 
 @compilable
 def balanced_speed(supply: float, c, w, takes) -> Any:
-    """Speed [m/s] of the rod at which no force is left, and flow from the pump [m³/s], at a supply [Pa]."""
+    """Speed [m/s] of the rod at which no force is left, and flow from the pump [m³/s],
+    at a supply [Pa]."""
     left, drawn = surplus(0.0, supply, c, w, takes)
     held = c.friction / max(abs(w.arm), LEAST_LEVER)
     if abs(left) <= held:
@@ -130,7 +162,8 @@ def balanced_speed(supply: float, c, w, takes) -> Any:
         low, force_low, high = high, force_high, 4.0 * high
         force_high = sign * surplus(sign * high, supply, c, w, takes)[0] - held
     speed, last, count = high, 0, 0
-    while high - low > PRECISE * high:  # regula falsi by the Illinois rule, now and then a halving
+    # regula falsi by the Illinois rule, now and then a halving
+    while high - low > PRECISE * high:
         before, count = speed, count + 1
         speed = low + (high - low) * force_low / (force_low - force_high)
         if count % 8 == 0 or not low < speed < high:
@@ -151,11 +184,13 @@ def balanced_speed(supply: float, c, w, takes) -> Any:
 
 @compilable
 def fed_speed(c, w, takes) -> Any:
-    """Speed [m/s] of the rod at which forces and the pump's flow balance, and the supply [Pa] there."""
+    """Speed [m/s] of the rod at which forces and the pump's flow balance, and the
+    supply [Pa] there."""
     if c.pump_flow == np.inf:
         return balanced_speed(c.supply_pressure, c, w, takes)[0], c.supply_pressure
     low, high, pressure = lowest(c), c.relief, c.relief
-    for _ in range(HALVINGS):  # what is drawn rises with the line's pressure, and what is given falls
+    # what is drawn rises with the line's pressure, and what is given falls
+    for _ in range(HALVINGS):
         _, drawn = balanced_speed(min(pressure, c.supply_pressure), c, w, takes)
         if drawn > delivery(pressure, 1.0, c)[0]:
             high = pressure
@@ -170,9 +205,11 @@ def fed_speed(c, w, takes) -> Any:
 
 @compilable
 def areas_on_the_way(c, w, angle: float, load, command: float) -> Any:
-    """Areas [m²] by which chambers A and B take in oil where their pressures change on the way.
+    """Areas [m²] by which chambers A and B take in oil where their pressures change on
+    the way.
 
-    `load` holds the joint [N·m] at the `angle` [rad] and NEAR before and behind it, (3,).
+    `load` holds the joint [N·m] at the `angle` [rad] and NEAR before and behind it,
+    (3,).
     """
     areas, seen = (c.a.area, c.b.area), np.empty((2, 2))
     w.travel = steady_opening(command, c)
@@ -193,7 +230,11 @@ def areas_on_the_way(c, w, angle: float, load, command: float) -> Any:
 
 @compilable
 def _quasi_static(plugin: Plugin, pad) -> float:
-    c, w, supply = plugin.coefficients[0], pad.joints[0], plugin.coefficients[0].supply_pressure
+    c, w, supply = (
+        plugin.coefficients[0],
+        pad.joints[0],
+        plugin.coefficients[0].supply_pressure,
+    )
     if c.pump_flow < np.inf:
         pad.line[0].pressure = c.relief
         supply = min(supply, line_pressure(plugin, pad.joints, pad.line[0], 1.0, c))
@@ -202,12 +243,22 @@ def _quasi_static(plugin: Plugin, pad) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _steady(plugin: Plugin, angle, load, commands, quasi: bool, velocity, source: int = SOURCE) -> None:
-    """Write the velocities [rad/s] of n candidates' joint under m commands [%], (n, m); loads are (n, 3)."""
+def _steady(
+    plugin: Plugin, angle, load, commands, quasi: bool, velocity, source: int = SOURCE
+) -> None:
+    """Write the velocities [rad/s] of n candidates' joint under m commands [%], (n, m);
+    loads are (n, 3)."""
     pad = make_pad(1)
     w = pad.joints[0]
     for i in range(velocity.shape[0]):
-        one = Plugin(plugin.coefficients[i : i + 1], plugin.order, plugin.entries, 0, plugin.period, 1)
+        one = Plugin(
+            plugin.coefficients[i : i + 1],
+            plugin.order,
+            plugin.entries,
+            0,
+            plugin.period,
+            1,
+        )
         c = one.coefficients[0]
         for k in range(commands.size):
             w.travel = steady_opening(commands[k], c)
@@ -226,20 +277,29 @@ def _steady(plugin: Plugin, angle, load, commands, quasi: bool, velocity, source
 def steady_velocity(
     joint: Records, angle: float, load: Array, commands: Array, *, quasi_static: bool
 ) -> Array:
-    """Return the velocities [rad/s] at which a joint turns steadily under m commands [%], shape (n, m).
+    """Return the velocities [rad/s] at which a joint turns steadily under m commands
+    [%], shape (n, m).
 
     Args:
         joint: n candidates' values, of JOINT, shape (n,).
         angle: of the pose [rad].
-        load: torques that hold the joint against gravity and springs, at the angle - NEAR, at the angle, and
-            at the angle + NEAR [N·m], shape (n, 3).
+        load: torques that hold the joint against gravity and springs, at the angle -
+            NEAR, at the angle, and at the angle + NEAR [N·m], shape (n, 3).
         quasi_static: whether the law is that of the quasi-static model.
 
-    Of a joint that slides they are in m/s, and loads are forces [N]. NaN where no force-stroke curve exists.
+    Of a joint that slides they are in m/s, and loads are forces [N]. NaN where no
+    force-stroke curve exists.
     """
     alone: Records = joint[:, None]  # pyright: ignore[reportAssignmentType]
     table, place = coefficients(alone)[:, 0].view(np.ndarray), np.zeros(1, np.intp)
     velocity = np.empty((len(joint), len(commands)))
-    _steady(Plugin(table, place, place[None], 0, 1.0, 1), angle, load, commands, quasi_static, velocity)
+    _steady(
+        Plugin(table, place, place[None], 0, 1.0, 1),
+        angle,
+        load,
+        commands,
+        quasi_static,
+        velocity,
+    )
     velocity[~has_force_curve(alone)] = np.nan
     return velocity

@@ -1,1 +1,2 @@
-"""What an identified arm is for: commands along a path, draws, an environment, files of other programs."""
+"""What an identified arm is for: commands along a path, draws, an environment, files of
+other programs."""

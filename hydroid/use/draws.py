@@ -1,16 +1,20 @@
-"""Machines that the logs do not rule out: draws of all parameters together, and of the errors of the model.
+"""Machines that the logs do not rule out: draws of all parameters together, and of the
+errors of the model.
 
-The posterior is Gaussian about relative changes of the parameters (`posterior.posterior`), cut off at their
-bounds. Draws of it are exact (A. Pakman, L. Paninski, *Exact Hamiltonian Monte Carlo for truncated
-multivariate Gaussians*, 2014): a point gets a random speed and moves as a pendulum does, for a quarter of its
-period, and bounces off the bounds. Nothing has to be tuned, and away from bounds draws are independent.
+The posterior is Gaussian about relative changes of the parameters
+(`posterior.posterior`), cut off at their bounds. Draws of it are exact (A. Pakman, L.
+Paninski, *Exact Hamiltonian Monte Carlo for truncated multivariate Gaussians*, 2014): a
+point gets a random speed and moves as a pendulum does, for a quarter of its period, and
+bounces off the bounds. Nothing has to be tuned, and away from bounds draws are
+independent.
 
-A model is not linear: far from the estimate a draw of the Gaussian may fit the logs much worse than it
-should. Then it is moved back along what the logs leave wide open, and where that is not enough altogether,
-until the logs are as likely as the Gaussian has it.
+A model is not linear: far from the estimate a draw of the Gaussian may fit the logs
+much worse than it should. Then it is moved back along what the logs leave wide open,
+and where that is not enough altogether, until the logs are as likely as the Gaussian
+has it.
 
-What a machine does besides its parameters says the error model: its angle drifts from the model's with time
-and way, and its sensor has noise.
+What a machine does besides its parameters says the error model: its angle drifts from
+the model's with time and way, and its sensor has noise.
 """
 
 from collections.abc import Iterator
@@ -33,10 +37,12 @@ from hydroid.problem.problem import Problem
 from hydroid.run.record import record_of
 
 FORGOTTEN, BETWEEN = 20, 4
-"""motions before the first draw, and between two: with bounds, one alone does not forget where it began"""
+"""motions before the first draw, and between two: with bounds, one alone does not
+forget where it began"""
 MOST_BOUNCES = 10_000  # of one motion
 WIDE_OPEN = 0.1
-"""relative standard deviation from which on a direction is one in which no model is linear"""
+"""relative standard deviation from which on a direction is one in which no model is
+linear"""
 HALVINGS = 6  # of a draw's part: to 2 %
 TOUCHING = 1e-9  # of a period, within which a wall is the one that was just met
 
@@ -77,24 +83,30 @@ class Draws:
 
     @property
     def errors(self) -> dict[str, AngleError]:
-        """What the residuals of each compared angle show of its error, by angle: `q2` of joint 2."""
+        """What the residuals of each compared angle show of its error, by angle: `q2`
+        of joint 2."""
         return self.model.summarise().errors
 
     @property
     def apart(self) -> float:
-        """How far from the estimate independent draws of each parameter's own interval are, by the logs.
+        """How far from the estimate independent draws of each parameter's own interval
+        are, by the logs.
 
-        Root mean square over parameters, in standard deviations; 1 of draws of all together.
+        Root mean square over parameters, in standard deviations; 1 of draws of all
+        together.
         """
         information = np.sum(self.posterior.root**2, axis=0)
         return float(np.sqrt(np.mean(information * np.diag(self.posterior.covariance))))
 
 
-def draw(model: IdentifiedModel, n: int, seed: int = 0, problem: Problem | None = None) -> Draws:
+def draw(
+    model: IdentifiedModel, n: int, seed: int = 0, problem: Problem | None = None
+) -> Draws:
     """Return n draws of what the logs leave open; the same seed gives the same ones.
 
-    Parameters that a bound held in the fit stay there. The logs are those of the `problem`, or of the run
-    that the model is from; without either a draw is one of the Gaussian alone.
+    Parameters that a bound held in the fit stay there. The logs are those of the
+    `problem`, or of the run that the model is from; without either a draw is one of the
+    Gaussian alone.
 
     Raises:
         RunError: the model holds no covariance of its parameters: it is no fit.
@@ -116,13 +128,16 @@ def draw(model: IdentifiedModel, n: int, seed: int = 0, problem: Problem | None 
 
 
 def on_their_level(known: Posterior, changes: Array, problem: Problem) -> Array:
-    """Return changes, (n, p), moved back until logs and priors are as likely as the Gaussian has it there."""
+    """Return changes, (n, p), moved back until logs and priors are as likely as the
+    Gaussian has it there."""
     likelihood, wide = likelihood_at(problem, known.box.at), known.quantile / NORMAL
     level = 0.5 * np.sum((changes @ known.root.T / wide) ** 2, axis=1)
     least = 0.5 * float(np.sum(likelihood.rows(known.box.at[None]) ** 2))
 
     def too_unlikely(some: Array, rows: Index) -> Mask:
-        cost = 0.5 * np.sum(likelihood.rows(known.box.points(some)) ** 2, axis=1) - least
+        cost = (
+            0.5 * np.sum(likelihood.rows(known.box.points(some)) ** 2, axis=1) - least
+        )
         return np.nan_to_num(cost, nan=np.inf) > wide**2 * level[rows]
 
     variances, axes = np.linalg.eigh(known.covariance)
@@ -132,7 +147,10 @@ def on_their_level(known: Posterior, changes: Array, problem: Problem) -> Array:
     left = every[too_unlikely(changes, every)]
     hopeless = left[too_unlikely(inner[left], left)]
     found = changes.copy()
-    for rows, base in ((np.setdiff1d(left, hopeless), inner), (hopeless, np.zeros_like(inner))):
+    for rows, base in (
+        (np.setdiff1d(left, hopeless), inner),
+        (hopeless, np.zeros_like(inner)),
+    ):
         away = (inner if rows is hopeless else changes)[rows] - base[rows]
         part, step = np.zeros(len(rows)), 0.5
         for _ in range(HALVINGS if len(rows) else 0):
@@ -145,12 +163,15 @@ def on_their_level(known: Posterior, changes: Array, problem: Problem) -> Array:
 
 
 def within(known: Posterior, n: int, rng: Generator) -> Array:
-    """Return n draws of relative changes of the p parameters that vary, inside their bounds, (n, p).
+    """Return n draws of relative changes of the p parameters that vary, inside their
+    bounds, (n, p).
 
     They are as wide as the intervals, which are Student's.
     """
     # with z standard normal, a change is `spread` z
-    spread = known.quantile / NORMAL * solve_triangular(known.root, np.eye(len(known.root)))
+    spread = (
+        known.quantile / NORMAL * solve_triangular(known.root, np.eye(len(known.root)))
+    )
     walls = np.concatenate([spread, -spread])
     gaps = known.box.room.ravel()
     point, drawn = np.zeros(len(spread)), np.empty((n, len(spread)))
@@ -162,7 +183,8 @@ def within(known: Posterior, n: int, rng: Generator) -> Array:
 
 @njit(cache=True)
 def _move(point: Array, speed: Array, walls: Array, gaps: Array) -> None:
-    """Move a point, (p,), for a quarter of a period, inside walls · point + gaps >= 0, (m, p) and (m,)."""
+    """Move a point, (p,), for a quarter of a period, inside walls · point + gaps >= 0,
+    (m, p) and (m,)."""
     left = 0.5 * np.pi
     for _ in range(MOST_BOUNCES):
         towards, there = walls @ speed, walls @ point
@@ -172,7 +194,9 @@ def _move(point: Array, speed: Array, walls: Array, gaps: Array) -> None:
             if reach <= gaps[k]:
                 continue
             phase = np.arctan2(-towards[k], there[k])
-            time = (np.arccos(min(max(-gaps[k] / reach, -1.0), 1.0)) - phase) % (2.0 * np.pi)
+            time = (np.arccos(min(max(-gaps[k] / reach, -1.0), 1.0)) - phase) % (
+                2.0 * np.pi
+            )
             if TOUCHING < time < first:
                 first, met = time, k
         moved = speed * np.sin(first) + point * np.cos(first)
@@ -186,11 +210,12 @@ def _move(point: Array, speed: Array, walls: Array, gaps: Array) -> None:
 
 
 class DriftingAngles:
-    """Angles of n machines that drift from their models', as the error model says, and sensors with noise.
+    """Angles of n machines that drift from their models', as the error model says, and
+    sensors with noise.
 
     Args:
-        numbers: of each of J joints' error (`posterior.error_model.NUMBERS`) in rad and s, shape (J, 5); 0 of
-            those without errors.
+        numbers: of each of J joints' error (`posterior.error_model.NUMBERS`) in rad and
+            s, shape (J, 5); 0 of those without errors.
         n: machines.
         period: between steps [s].
     """
@@ -209,7 +234,8 @@ class DriftingAngles:
         self._passing[rows] = 0.0  # pyright: ignore[reportArgumentType, reportCallIssue]
 
     def step(self, way: Array, rng: Generator) -> Array:
-        """Go on for a period in which models moved by a way [rad]; return the errors [rad], (n, J) each."""
+        """Go on for a period in which models moved by a way [rad]; return the errors
+        [rad], (n, J) each."""
         drifted, lasted = rng.normal(size=(2, *way.shape))
         self._drift += np.sqrt(self._grown + self._way * np.abs(way)) * drifted
         self._passing = self._kept * self._passing + self._lasting * lasted
@@ -221,7 +247,8 @@ class DriftingAngles:
 
 
 def error_numbers(model: IdentifiedModel) -> Array:
-    """Return the numbers of each joint's error in rad and s, (J, 5); 0 where a fit did not compare it."""
+    """Return the numbers of each joint's error in rad and s, (J, 5); 0 where a fit did
+    not compare it."""
     errors = model.summarise().errors
     joints = model.settings.arm.joint_names
     rows = [

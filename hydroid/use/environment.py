@@ -1,12 +1,14 @@
-"""Environments of gymnasium from any fit: bring joints to angles, on machines that the logs do not rule out.
+"""Environments of gymnasium from any fit: bring joints to angles, on machines that the
+logs do not rule out.
 
-An action is the command of each joint that takes one, as a part of full command. An observation has for each
-of these joints, in halves of its range, its angle from the middle, how far its target is, and its speed per
-second, as a sensor with the noise of the logs reads them. The reward is minus the mean distance to the
-targets, in halves of the range. An episode begins at rest in a random pose and is cut off after its time.
+An action is the command of each joint that takes one, as a part of full command. An
+observation has for each of these joints, in halves of its range, its angle from the
+middle, how far its target is, and its speed per second, as a sensor with the noise of
+the logs reads them. The reward is minus the mean distance to the targets, in halves of
+the range. An episode begins at rest in a random pose and is cut off after its time.
 
-A machine is the fit's own estimate, or a draw (`use.draws`); its angles drift from the model's as the fit's
-error model says.
+A machine is the fit's own estimate, or a draw (`use.draws`); its angles drift from the
+model's as the fit's error model says.
 """
 
 from collections.abc import Sequence
@@ -30,12 +32,15 @@ try:
     from gymnasium.vector import AutoresetMode, VectorEnv as GymnasiumVectorEnv
     from gymnasium.vector.utils import batch_space
 except ImportError:
-    raise ImportError("environments need gymnasium: pip install 'hydroid[gym]'") from None
+    raise ImportError(
+        "environments need gymnasium: pip install 'hydroid[gym]'"
+    ) from None
 
 Floats = NDArray[np.float32]
 
 POSES = 16
-"""random poses in which episodes begin: to be put into one that is ready takes a hundredth of a reset"""
+"""random poses in which episodes begin: to be put into one that is ready takes a
+hundredth of a reset"""
 ENDLESS = np.pi
 """end of the range of a joint that turns without end [rad]"""
 LARGEST = 10.0  # of an observation
@@ -56,7 +61,13 @@ class _Machines:
     """
 
     def __init__(
-        self, model: IdentifiedModel, thetas: Array, *, errors: bool, decision: float, threads: int | None
+        self,
+        model: IdentifiedModel,
+        thetas: Array,
+        *,
+        errors: bool,
+        decision: float,
+        threads: int | None,
     ) -> None:
         settings, arm = model.settings, model.settings.arm
         self.joints = Plant(model).joints
@@ -69,7 +80,9 @@ class _Machines:
         self._middle, self._half = 0.5 * (low + high), 0.5 * (high - low)
         self._pose = arm.pose(settings.start_pose)
         numbers = error_numbers(model)[self._columns]
-        self._drift = DriftingAngles(numbers if errors else np.zeros_like(numbers), len(thetas), period)
+        self._drift = DriftingAngles(
+            numbers if errors else np.zeros_like(numbers), len(thetas), period
+        )
         self._ready: dict[tuple[int, int], RowState] = {}
         reach = np.random.default_rng(0).uniform(-1.0, 1.0, (POSES, len(self.joints)))
         self._starts = self._middle + (1.0 - 2.0 * MARGIN) * self._half * reach
@@ -92,7 +105,11 @@ class _Machines:
             self.batch.restore(row, self._ready[row, number])
         reach = (1.0 - 2.0 * MARGIN) * rng.uniform(-1.0, 1.0, len(self.joints))
         wished = options.get("target")
-        target = self._middle + self._half * reach if wished is None else np.asarray(wished, float)
+        target = (
+            self._middle + self._half * reach
+            if wished is None
+            else np.asarray(wished, float)
+        )
         if target.shape != self._middle.shape:
             raise ValueError(f"a target needs {len(self.joints)} angles [rad]")
         self.target[row] = target
@@ -113,14 +130,21 @@ class _Machines:
     def observe(self, rng: Generator) -> Floats:
         """Return what the sensors read, (n, 3 K)."""
         noise = self._drift.noise(rng)
-        parts = self._angle + noise - self._middle, self.target - self._angle - noise, self._speed
+        parts = (
+            self._angle + noise - self._middle,
+            self.target - self._angle - noise,
+            self._speed,
+        )
         seen = np.nan_to_num(np.hstack([part / self._half for part in parts]))
         return seen.clip(-LARGEST, LARGEST).astype(np.float32)
 
     @property
     def reward(self) -> Array:
         """Minus the mean distance to the targets in halves of the range, (n,)."""
-        return -np.mean(np.abs(np.nan_to_num(self.target - self._angle, nan=10.0)) / self._half, axis=1)
+        return -np.mean(
+            np.abs(np.nan_to_num(self.target - self._angle, nan=10.0)) / self._half,
+            axis=1,
+        )
 
     @property
     def diverged(self) -> Any:
@@ -130,7 +154,11 @@ class _Machines:
 
 def _opened(source: Any) -> IdentifiedModel:
     """Return the model of a run folder, of the result of a fit, or itself."""
-    return load_identified(source) if isinstance(source, str | Path) else getattr(source, "model", source)
+    return (
+        load_identified(source)
+        if isinstance(source, str | Path)
+        else getattr(source, "model", source)
+    )
 
 
 def _spaces(joints: int) -> tuple[Any, Any]:
@@ -145,8 +173,9 @@ class Env(gymnasium.Env[Floats, Floats]):
         env = hydroid.Env("runs/hyd", draws=20)
         observation, info = env.reset(seed=1, options={"draw": 3})
 
-    Options of `reset`: `draw`, 0 for the fit's estimate and else the number of a draw, by default a random
-    one of them; `pose`, of all joints [rad] or a name; `target`, angles [rad] of joints that take commands.
+    Options of `reset`: `draw`, 0 for the fit's estimate and else the number of a draw,
+    by default a random one of them; `pose`, of all joints [rad] or a name; `target`,
+    angles [rad] of joints that take commands.
 
     Args:
         source: a run folder, or the result of a fit.
@@ -154,7 +183,8 @@ class Env(gymnasium.Env[Floats, Floats]):
         seed: of the draws.
         seconds: of an episode.
         decision_s: time that an action is held, about [s].
-        errors: whether angles drift and sensors have noise, as the fit's error model says.
+        errors: whether angles drift and sensors have noise, as the fit's error model
+            says.
 
     Raises:
         RunError: the folder holds no estimate, or with draws no covariance.
@@ -173,7 +203,11 @@ class Env(gymnasium.Env[Floats, Floats]):
         errors: bool = True,
     ) -> None:
         self._model, self._seconds = _opened(source), seconds
-        drawn = draw(self._model, draws, seed).theta if draws else np.empty((0, len(self._model.theta)))
+        drawn = (
+            draw(self._model, draws, seed).theta
+            if draws
+            else np.empty((0, len(self._model.theta)))
+        )
         self._thetas = np.vstack([self._model.theta, drawn])
         self._errors, self._decision = errors, decision_s
         self._made: dict[int, _Machines] = {}
@@ -188,10 +222,16 @@ class Env(gymnasium.Env[Floats, Floats]):
         super().reset(seed=seed)
         options = options or {}
         number = options.get("draw")
-        number = int(self.np_random.integers(len(self._thetas))) if number is None else int(number)
+        number = (
+            int(self.np_random.integers(len(self._thetas)))
+            if number is None
+            else int(number)
+        )
         if not 0 <= number < len(self._thetas):
             raise SettingsError(
-                f"is {number}", "draw", f"0 to {len(self._thetas) - 1}: name more with draws="
+                f"is {number}",
+                "draw",
+                f"0 to {len(self._thetas) - 1}: name more with draws=",
             )
         self._now = self._machine(number)
         self._now.begin(0, self.np_random, options)
@@ -254,21 +294,35 @@ class VectorEnv(GymnasiumVectorEnv[Floats, Floats, Any]):
         thetas = np.tile(model.theta, (num_envs, 1))
         if draws and num_envs > 1:
             thetas[1:] = draw(model, num_envs - 1, seed).theta
-        self._machines = _Machines(model, thetas, errors=errors, decision=decision_s, threads=threads)
-        self._seconds, self.num_envs, self.joints = seconds, num_envs, self._machines.joints
-        self.single_observation_space, self.single_action_space = _spaces(len(self.joints))
+        self._machines = _Machines(
+            model, thetas, errors=errors, decision=decision_s, threads=threads
+        )
+        self._seconds, self.num_envs, self.joints = (
+            seconds,
+            num_envs,
+            self._machines.joints,
+        )
+        self.single_observation_space, self.single_action_space = _spaces(
+            len(self.joints)
+        )
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._over = np.zeros(num_envs, dtype=bool)
 
     def reset(
-        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
     ) -> tuple[Floats, dict[str, Any]]:
-        """Begin an episode of every machine, or of those that `options["reset_mask"]` has, (n,)."""
+        """Begin an episode of every machine, or of those that `options["reset_mask"]`
+        has, (n,)."""
         if seed is not None:
             self._np_random = np.random.default_rng(seed)  # pyright: ignore[reportArgumentType]
         options = options or {}
-        for row in np.flatnonzero(options.get("reset_mask", np.ones(self.num_envs, dtype=bool))).tolist():
+        for row in np.flatnonzero(
+            options.get("reset_mask", np.ones(self.num_envs, dtype=bool))
+        ).tolist():
             self._machines.begin(row, self.np_random, options)
         self._over[:] = False
         return self._machines.observe(self.np_random), {}

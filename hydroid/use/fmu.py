@@ -1,6 +1,8 @@
-"""A plant as an FMU for co-simulation (FMI 2), by pythonfmu: for Simulink, OpenModelica, Dymola and others.
+"""A plant as an FMU for co-simulation (FMI 2), by pythonfmu: for Simulink,
+OpenModelica, Dymola and others.
 
-The file holds the plant and a script that steps it. Where it runs, Python must find hydroid.
+The file holds the plant and a script that steps it. Where it runs, Python must find
+hydroid.
 """
 
 import re
@@ -14,7 +16,8 @@ from hydroid.plant import Plant
 
 
 def fmu_bytes(plant: Plant) -> bytes:
-    """Return a plant as an FMU: inputs `u_JOINT` [%], outputs `q_JOINT` [rad, m], from its start pose.
+    """Return a plant as an FMU: inputs `u_JOINT` [%], outputs `q_JOINT` [rad, m], from
+    its start pose.
 
     Raises:
         RunError: pythonfmu is not installed.
@@ -22,7 +25,9 @@ def fmu_bytes(plant: Plant) -> bytes:
     try:
         builder = import_module("pythonfmu.builder").FmuBuilder
     except ImportError:
-        raise RunError("needs the package pythonfmu", "--to fmu", "pip install 'hydroid[fmu]'") from None
+        raise RunError(
+            "needs the package pythonfmu", "--to fmu", "pip install 'hydroid[fmu]'"
+        ) from None
     columns = [joint - 1 for joint in plant.joints]
     names = [plant.names[column] for column in columns]
     joints = {name: re.sub(r"\W", "_", name) for name in names}
@@ -30,6 +35,11 @@ def fmu_bytes(plant: Plant) -> bytes:
         folder = Path(place)
         plant.save(folder / "plant")
         script = folder / "hydroid_plant.py"
-        script.write_text(fill_template("use/fmu.py.j2", joints=joints, columns=columns), encoding="utf-8")
-        built = builder.build_FMU(script, dest=folder / "out", project_files=[folder / "plant"])
+        script.write_text(
+            fill_template("use/fmu.py.j2", joints=joints, columns=columns),
+            encoding="utf-8",
+        )
+        built = builder.build_FMU(
+            script, dest=folder / "out", project_files=[folder / "plant"]
+        )
         return Path(built).read_bytes()

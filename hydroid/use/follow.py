@@ -1,10 +1,13 @@
-"""Commands that lead an arm along angles over time: a feed-forward by inversion, looking ahead.
+"""Commands that lead an arm along angles over time: a feed-forward by inversion,
+looking ahead.
 
-The wished speeds go through the inverse of the settled speeds (`plant.steady`), earlier by each joint's delay
-and lags. What valves and oil do on the way besides is learnt from the model itself: the commands are
-simulated, and the speeds that are missing are added to the wish, without the frequencies that the lags keep
-from being followed (iterative learning control; D. A. Bristow, M. Tharayil, A. G. Alleyne, *A survey of
-iterative learning control*, 2006). No measurement is needed for that: a model errs the same way every time.
+The wished speeds go through the inverse of the settled speeds (`plant.steady`), earlier
+by each joint's delay and lags. What valves and oil do on the way besides is learnt from
+the model itself: the commands are simulated, and the speeds that are missing are added
+to the wish, without the frequencies that the lags keep from being followed (iterative
+learning control; D. A. Bristow, M. Tharayil, A. G. Alleyne, *A survey of iterative
+learning control*, 2006). No measurement is needed for that: a model errs the same way
+every time.
 """
 
 from collections.abc import Mapping
@@ -27,20 +30,23 @@ GAINED = 0.02
 """part by which an error must fall for another turn to be worth it"""
 TURNS_WITHOUT = 3  # in a row before learning ends
 PASSED = 0.25
-"""of the speeds that are missing, what is slower than so much over a joint's lags is learnt [cycles]"""
+"""of the speeds that are missing, what is slower than so much over a joint's lags is
+learnt [cycles]"""
 FASTEST = 0.2  # of that, at most so much of a sample's rate
 QUIET = 0.005
-"""part of a joint's largest wished speed below which it stands: no valve should chatter on its dead band"""
+"""part of a joint's largest wished speed below which it stands: no valve should chatter
+on its dead band"""
 AWAY, AWAY_SLOW = 0.02, 0.1
-"""part of its largest wished speed by which a joint must miss a wish for a span to be named; the second of
-wishes that are slow, which every path has where it turns round"""
+"""part of its largest wished speed by which a joint must miss a wish for a span to be
+named; the second of wishes that are slow, which every path has where it turns round"""
 
 
 @record
 class Missed:
     """A span in which a joint cannot have its wished speeds, and why.
 
-    `wished` and `had` are the speeds [rad/s], of joints that slide [m/s], where they differ most.
+    `wished` and `had` are the speeds [rad/s], of joints that slide [m/s], where they
+    differ most.
     """
 
     joint: int  # 0-based
@@ -53,14 +59,18 @@ class Missed:
 
 @record
 class Followed:
-    """Commands along a path, and what the model makes of them, over T samples of J joints.
+    """Commands along a path, and what the model makes of them, over T samples of J
+    joints.
 
     Attributes:
-        log: the commands [%], with the wished angles; it may begin with a rest of `lead_s`.
+        log: the commands [%], with the wished angles; it may begin with a rest of
+            `lead_s`.
         angle: that the commands give [rad], shape (T, J).
-        half: of the 95 % band of this angle [rad], shape (T,), by joint (number, from 1).
+        half: of the 95 % band of this angle [rad], shape (T,), by joint (number, from
+            1).
         missed: where a wish cannot be had.
-        lead_s: time by which the path begins later than asked, so that commands can come before it [s].
+        lead_s: time by which the path begins later than asked, so that commands can
+            come before it [s].
         joints: that take commands, numbered from 1.
         turns: simulations in which commands were learnt.
     """
@@ -74,11 +84,13 @@ class Followed:
     turns: int
 
     def error(self, joint: int) -> Array:
-        """Return wished minus predicted angle of a joint (number, from 1) [rad], shape (T,)."""
+        """Return wished minus predicted angle of a joint (number, from 1) [rad], shape
+        (T,)."""
         return self.log.angle[:, joint - 1] - self.angle[:, joint - 1]
 
     def rms(self, joint: int) -> tuple[float, float]:
-        """Return the predicted rms error of a joint (number, from 1) [rad], and that within its band."""
+        """Return the predicted rms error of a joint (number, from 1) [rad], and that
+        within its band."""
         error = self.error(joint)
         half = self.half.get(joint)
         wide = np.inf if half is None else float(np.sqrt(np.mean(error**2 + half**2)))
@@ -100,22 +112,29 @@ def follow(model: IdentifiedModel, path: Log, *, payload: float = 0.0) -> Follow
     """
     plant = Plant(model, payload=payload)
     if model.settings.stage != "hyd":
-        raise SettingsError("a gain gives torques, not speeds", model.source, "name a fit of stage 2")
+        raise SettingsError(
+            "a gain gives torques, not speeds", model.source, "name a fit of stage 2"
+        )
     _refuse_unmoved(plant, path)
     lags = joint_lags(plant)
-    wished, missed = _within_range(plant, _with_rest(path, float(lags.max(initial=0.0))))
+    wished, missed = _within_range(
+        plant, _with_rest(path, float(lags.max(initial=0.0)))
+    )
     tracker = _Tracker(plant, wished, lags)
     missed += tracker.missed()
     command, angle, turns = tracker.learn()
     log = replace(wished, command=command)
-    bands = prediction_bands(model, log, angle[:, [j - 1 for j in model.settings.outputs]])
+    bands = prediction_bands(
+        model, log, angle[:, [j - 1 for j in model.settings.outputs]]
+    )
     half = {joint: band.half for joint, band in bands.items() if joint in plant.joints}
     lead = (len(log.time) - len(path.time)) * path.period
     return Followed(log, angle, half, tuple(missed), lead, plant.joints, turns)
 
 
 def joint_lags(plant: Plant) -> Array:
-    """Return by how much joints are late [s], shape (J,): delay and lags, the mean of both sides."""
+    """Return by how much joints are late [s], shape (J,): delay and lags, the mean of
+    both sides."""
     own, lags = plant.actuators, np.zeros(len(plant.names))
     late = own["opening_lag"] + 0.5 * (own["delay_a"] + own["delay_b"])
     late = late + 0.5 * (own["pilot_lag_a"] + own["pilot_lag_b"])
@@ -129,7 +148,8 @@ def joint_lags(plant: Plant) -> Array:
 
 
 def _refuse_unmoved(plant: Plant, path: Log) -> None:
-    """Refuse a path that moves joints without commands, or that has too few samples to be one."""
+    """Refuse a path that moves joints without commands, or that has too few samples to
+    be one."""
     if len(path.time) < 3:
         raise LogError("holds no path", path.source, "give three samples at least")
     still = np.ptp(path.posed, axis=0) < LEAST_SPEED
@@ -137,7 +157,9 @@ def _refuse_unmoved(plant: Plant, path: Log) -> None:
         if joint + 1 not in plant.joints:
             named = ", ".join(plant.names[j - 1] for j in plant.joints)
             what = f"joint {plant.names[joint]} should move, but the fit gives commands to {named} only"
-            raise LogError(what, path.source, "leave its column out, or fit a log that drives it")
+            raise LogError(
+                what, path.source, "leave its column out, or fit a log that drives it"
+            )
 
 
 def _with_rest(path: Log, lag: float) -> Log:
@@ -167,7 +189,8 @@ def _within_range(plant: Plant, path: Log) -> tuple[Log, list[Missed]]:
 
 
 def _named(limit: Limit | None, away: float) -> bool:
-    """Whether a reason is named where a joint misses its wish by a part of its largest one."""
+    """Whether a reason is named where a joint misses its wish by a part of its largest
+    one."""
     if limit is None:
         return False
     return away > (AWAY_SLOW if limit in (Limit.SLOWEST, Limit.LEAKS) else AWAY)
@@ -182,7 +205,10 @@ class _Tracker:
         self._steady = plant.steady()
         angle = path.angle
         self._pose = np.concatenate([0.5 * (angle[1:] + angle[:-1]), angle[-1:]])
-        self._speed = np.concatenate([np.diff(angle, axis=0), np.zeros((1, path.joints))]) / path.period
+        self._speed = (
+            np.concatenate([np.diff(angle, axis=0), np.zeros((1, path.joints))])
+            / path.period
+        )
         self._load = self._steady.weighing.loads(self._pose)
         self._driven: Index = np.array(plant.joints) - 1
 
@@ -191,14 +217,18 @@ class _Tracker:
         speed, pose, time = self._speed, self._pose, self._path.time
         command, reached = self._steady.commands(speed, pose, self._load)
         rows = np.flatnonzero(np.any(np.abs(reached - speed) > self._quiet(), axis=1))
-        limits = self._steady.limits(speed[rows], reached[rows], command[rows], pose[rows])
+        limits = self._steady.limits(
+            speed[rows], reached[rows], command[rows], pose[rows]
+        )
         by_row = dict(zip(rows.tolist(), limits, strict=True))
         found = list[Missed]()
         for joint in self._driven.tolist():
             largest = max(float(np.abs(speed[:, joint]).max()), LEAST_SPEED)
             away = np.abs(reached - speed)[:, joint] / largest
             at = [row for row in by_row if _named(by_row[row].get(joint), away[row])]
-            for span in np.split(np.array(at, int), np.flatnonzero(np.diff(at) > 1) + 1):
+            for span in np.split(
+                np.array(at, int), np.flatnonzero(np.diff(at) > 1) + 1
+            ):
                 if len(span):
                     worst = int(span[np.argmax(away[span])])
                     speeds = float(speed[worst, joint]), float(reached[worst, joint])
@@ -207,7 +237,8 @@ class _Tracker:
         return found
 
     def learn(self) -> tuple[Array, Array, int]:
-        """Return commands [%] and the angles that they give [rad], (T, J), and the simulations it took."""
+        """Return commands [%] and the angles that they give [rad], (T, J), and the
+        simulations it took."""
         wish = self._speed.copy()
         command = self._commands(wish)
         best = command, self._simulate(command)
@@ -234,7 +265,8 @@ class _Tracker:
         return np.maximum(QUIET * np.abs(self._speed).max(axis=0), LEAST_SPEED)
 
     def _commands(self, wish: Array) -> Array:
-        """Commands [%] for wished speeds [rad/s], (T, J), earlier by the joints' lags."""
+        """Commands [%] for wished speeds [rad/s], (T, J), earlier by the joints'
+        lags."""
         time, period = self._path.time, self._path.period
         ahead, pose, load = np.zeros_like(wish), self._pose.copy(), self._load.copy()
         for joint in self._driven.tolist():
@@ -254,14 +286,20 @@ class _Tracker:
         return angle
 
     def _learnable(self, error: Array) -> Array:
-        """Speeds that are missing [rad/s] where angles err [rad], both (T, J), as far as lags let them."""
+        """Speeds that are missing [rad/s] where angles err [rad], both (T, J), as far
+        as lags let them."""
         period = self._path.period
-        missing = np.concatenate([np.diff(error, axis=0), np.zeros((1, error.shape[1]))]) / period
+        missing = (
+            np.concatenate([np.diff(error, axis=0), np.zeros((1, error.shape[1]))])
+            / period
+        )
         slow = np.zeros_like(missing)
         for joint in self._driven.tolist():
             lag = max(float(self._lags[joint]), period)
             cutoff = min(PASSED / lag, FASTEST / period)
             sections = butter(2, 2.0 * cutoff * period, output="sos")
             pad = min(len(missing) - 1, round(3.0 / (cutoff * period)))
-            slow[:, joint] = sosfiltfilt(sections, missing[:, joint], padlen=pad, padtype="constant")
+            slow[:, joint] = sosfiltfilt(
+                sections, missing[:, joint], padlen=pad, padtype="constant"
+            )
         return slow

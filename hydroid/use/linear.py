@@ -1,17 +1,20 @@
-"""A fitted arm near one pose and opening as a linear system: for scipy, python-control, or Bode's plots.
+"""A fitted arm near one pose and opening as a linear system: for scipy, python-control,
+or Bode's plots.
 
     ẋ = A x + B u(t − delay),   y = C x + D u,
 
-u: change of the commands [%]; y: change of the joints' angles and speeds. Each joint has the states of its
-pilot stage, its plunger, its opening and its oil where it has them, and its angle:
+u: change of the commands [%]; y: change of the joints' angles and speeds. Each joint
+has the states of its pilot stage, its plunger, its opening and its oil where it has
+them, and its angle:
 
-    pilot stage, opening: a lag each; plunger: m s² + λ s + K + 2 F/(x + δ) (`hydraulics.solenoid`);
-    oil: ω² / (s² + 2 ζ ω s + ω²).
+    pilot stage, opening: a lag each; plunger: m s² + λ s + K + 2 F/(x + δ)
+    (`hydraulics.solenoid`); oil: ω² / (s² + 2 ζ ω s + ω²).
 
-They turn a command into a wished speed, of which one static matrix says how it answers to all openings at
-once (they share the pump) and another one how to the angles (lever and load): both are differences of
-`Plant.speeds`. In the dynamic model ω² = C/M, with C the stiffness of both chambers' oil and M the joint's
-inertia, and ζ is half of √(C M) times what speed falls per load.
+They turn a command into a wished speed, of which one static matrix says how it answers
+to all openings at once (they share the pump) and another one how to the angles (lever
+and load): both are differences of `Plant.speeds`. In the dynamic model ω² = C/M, with C
+the stiffness of both chambers' oil and M the joint's inertia, and ζ is half of √(C M)
+times what speed falls per load.
 """
 
 import json
@@ -39,12 +42,14 @@ class LinearArm:
     """An arm linearised: K joints that take commands, X states.
 
     Attributes:
-        a, b, c, d: shapes (X, X), (X, K), (2 K, X), (2 K, K); y are K angles [rad], then K speeds [rad/s].
+        a, b, c, d: shapes (X, X), (X, K), (2 K, X), (2 K, K); y are K angles [rad],
+            then K speeds [rad/s].
         delay: of each command [s], (K,).
         joints: their names.
         states: names of the states.
         command, angle: about which it is linear [%], [rad], (K,).
-        speed: at which the joints move there [rad/s], (K,): the changes are against this motion.
+        speed: at which the joints move there [rad/s], (K,): the changes are against
+            this motion.
     """
 
     a: Array
@@ -60,21 +65,33 @@ class LinearArm:
 
     def text(self) -> str:
         """Return it as JSON."""
-        named = {key.upper() if len(key) == 1 else key: value for key, value in vars(self).items()}
-        return json.dumps({key: np.asarray(value).tolist() for key, value in named.items()}, indent=1)
+        named = {
+            key.upper() if len(key) == 1 else key: value
+            for key, value in vars(self).items()
+        }
+        return json.dumps(
+            {key: np.asarray(value).tolist() for key, value in named.items()}, indent=1
+        )
 
 
 def linearise(plant: Plant, command: Array) -> LinearArm:
-    """Return a plant of stage 2 where it stands, as a linear system about commands that are held [%], (J,).
+    """Return a plant of stage 2 where it stands, as a linear system about commands that
+    are held [%], (J,).
 
     Raises:
         SettingsError: a joint stands at a command of 0, where a dead band has no slope.
     """
     columns: Index = np.array(plant.joints) - 1
     names = tuple(plant.names[column] for column in columns.tolist())
-    if idle := [name for name, one in zip(names, command[columns].tolist(), strict=True) if one == 0.0]:
+    if idle := [
+        name
+        for name, one in zip(names, command[columns].tolist(), strict=True)
+        if one == 0.0
+    ]:
         what = f"{', '.join(idle)} at a command of 0 has a dead band, and no slope"
-        raise SettingsError(what, "--at", "name a command of every joint, such as boom=30")
+        raise SettingsError(
+            what, "--at", "name a command of every joint, such as boom=30"
+        )
     valves = [_valve(plant, joint, float(command[joint])) for joint in columns.tolist()]
     oils = [_oil(plant, joint, command) for joint in columns.tolist()]
     count = len(columns)
@@ -111,8 +128,21 @@ def linearise(plant: Plant, command: Array) -> LinearArm:
     states += [f"{name} angle" for name in names]
     angles = np.eye(total)[first_angle:]
     c, d = np.vstack([angles, moved]), np.vstack([np.zeros_like(fed), fed])
-    delay = np.array([_side(plant, joint, command)["delay"] for joint in columns.tolist()])
-    return LinearArm(a, b, c, d, delay, names, tuple(states), command[columns], plant.angle[columns], speed)
+    delay = np.array(
+        [_side(plant, joint, command)["delay"] for joint in columns.tolist()]
+    )
+    return LinearArm(
+        a,
+        b,
+        c,
+        d,
+        delay,
+        names,
+        tuple(states),
+        command[columns],
+        plant.angle[columns],
+        speed,
+    )
 
 
 def _side(plant: Plant, joint: int, command: Array) -> dict[str, float]:
@@ -123,9 +153,13 @@ def _side(plant: Plant, joint: int, command: Array) -> dict[str, float]:
 
 
 def _slopes(plant: Plant, command: Array, columns: Index) -> tuple[Array, Array, Array]:
-    """Slopes of the K settled speeds by commands and by angles, (K, K) each, and the speeds, (K,)."""
+    """Slopes of the K settled speeds by commands and by angles, (K, K) each, and the
+    speeds, (K,)."""
     steady, count = plant.steady(), len(columns)
-    commands, poses = np.tile(command, (4 * count + 1, 1)), np.tile(plant.angle, (4 * count + 1, 1))
+    commands, poses = (
+        np.tile(command, (4 * count + 1, 1)),
+        np.tile(plant.angle, (4 * count + 1, 1)),
+    )
     for k, joint in enumerate(columns.tolist()):
         commands[[4 * k, 4 * k + 1], joint] += [NEAR_COMMAND, -NEAR_COMMAND]
         poses[[4 * k + 2, 4 * k + 3], joint] += [NEAR_ANGLE, -NEAR_ANGLE]
@@ -136,12 +170,17 @@ def _slopes(plant: Plant, command: Array, columns: Index) -> tuple[Array, Array,
 
 
 def _valve(plant: Plant, joint: int, command: float) -> tuple[list[str], Array, Array]:
-    """States from a joint's command to its opening, each as a part of it: names, their matrix and input."""
+    """States from a joint's command to its opening, each as a part of it: names, their
+    matrix and input."""
     one = plant.actuators[joint]
-    side = _side(plant, joint, np.where(np.arange(len(plant.names)) == joint, command, 0.0))
+    side = _side(
+        plant, joint, np.where(np.arange(len(plant.names)) == joint, command, 0.0)
+    )
     c = _coefficients(plant, joint)
     beyond = abs(command) - side["dead_band"]
-    pull = drive(side_voltage(max(beyond, 0.0), 1.0, side["onset"], side["dead_band"]), c)
+    pull = drive(
+        side_voltage(max(beyond, 0.0), 1.0, side["onset"], side["dead_band"]), c
+    )
     stroke = float(resting_stroke(pull, c.gap, c.plunger_stiffness))
     stiffness = float(c.plunger_stiffness * (1.0 + 2.0 * stroke / (stroke + c.gap)))
     damping, mass = side["plunger_damping"], float(one["plunger_mass"])
@@ -164,7 +203,10 @@ def _valve(plant: Plant, joint: int, command: float) -> tuple[list[str], Array, 
         vector[fast] = stiffness / mass
     if one["opening_lag"] > SHORT:
         names.append("opening")
-        matrix[at + 1, at], matrix[at + 1, at + 1] = 1.0 / one["opening_lag"], -1.0 / one["opening_lag"]
+        matrix[at + 1, at], matrix[at + 1, at + 1] = (
+            1.0 / one["opening_lag"],
+            -1.0 / one["opening_lag"],
+        )
     return names, matrix, vector
 
 
@@ -174,7 +216,8 @@ def _coefficients(plant: Plant, joint: int) -> Any:
 
 
 def _oil(plant: Plant, joint: int, command: Array) -> tuple[float, float] | None:
-    """Natural frequency [rad/s] and damping ratio of a joint on its oil; None where it has none."""
+    """Natural frequency [rad/s] and damping ratio of a joint on its oil; None where it
+    has none."""
     one = plant.actuators[joint]
     if plant.quasi_static:
         if np.isinf(one["oil_frequency"]):
@@ -191,10 +234,17 @@ def _oil(plant: Plant, joint: int, command: Array) -> tuple[float, float] | None
     steady = plant.steady()
     columns, pose = steady.columns, plant.angle[None]
     load = steady.weighing.loads(pose)[:, columns]
-    place, change = int(np.flatnonzero(columns == joint)[0]), 0.01 * max(float(np.abs(load).max()), 1.0)
+    place, change = (
+        int(np.flatnonzero(columns == joint)[0]),
+        0.01 * max(float(np.abs(load).max()), 1.0),
+    )
     loads = np.repeat(load, 2, axis=0)
     loads[:, place] += [change, -change]
-    two = np.repeat(pose[:, columns], 2, axis=0), loads, np.repeat(command[None, columns], 2, axis=0)
+    two = (
+        np.repeat(pose[:, columns], 2, axis=0),
+        loads,
+        np.repeat(command[None, columns], 2, axis=0),
+    )
     speeds = settled_speeds(steady.plugin, *two, quasi_static=False)[:, place]
     yielding = float(speeds[1] - speeds[0]) / (2.0 * change)
     pace = float(np.sqrt(stiffness / inertia))

@@ -1,8 +1,10 @@
-"""A fitted arm for other programs: the user's own URDF with the fit's masses, and an MJCF that moves.
+"""A fitted arm for other programs: the user's own URDF with the fit's masses, and an
+MJCF that moves.
 
-Plain MuJoCo has no hydraulics. Its model gets a velocity actuator on each joint, and a loop of some twenty
-lines beside it sets their speeds from a table: settled speeds against command and angle, late by delay and
-lags. `README.txt` says what that leaves out.
+Plain MuJoCo has no hydraulics. Its model gets a velocity actuator on each joint, and a
+loop of some twenty lines beside it sets their speeds from a table: settled speeds
+against command and angle, late by delay and lags. `README.txt` says what that leaves
+out.
 """
 
 import re
@@ -31,13 +33,15 @@ _MOMENT = re.compile(r"(\bi[xyz]{2}\s*=\s*[\"'])([^\"']*)")
 
 
 def fitted_urdf(plant: Plant, robot: Path) -> tuple[str, list[str]]:
-    """Return a URDF with the masses of a fit, and the names of the links that it changed.
+    """Return a URDF with the masses of a fit, and the names of the links that it
+    changed.
 
-    A link's inertia is scaled with its mass, as if its shape stayed and its density changed. All other text
-    stays as it is.
+    A link's inertia is scaled with its mass, as if its shape stayed and its density
+    changed. All other text stays as it is.
 
     Raises:
-        ModelError: the file cannot be read, is no URDF, or has none of the arm's links with a mass.
+        ModelError: the file cannot be read, is no URDF, or has none of the arm's links
+            with a mass.
     """
     if read_robot(robot).tag != "robot":
         raise ModelError("is no URDF", robot, "name the URDF that hydroid init read")
@@ -53,7 +57,9 @@ def fitted_urdf(plant: Plant, robot: Path) -> tuple[str, list[str]]:
         text = text[: found.start()] + link + text[found.end() :]
         changed.append(name)
     if not changed:
-        raise ModelError(f"has none of the links {', '.join(arm.link_names)} with a mass", robot)
+        raise ModelError(
+            f"has none of the links {', '.join(arm.link_names)} with a mass", robot
+        )
     return text, changed
 
 
@@ -67,9 +73,11 @@ def _scaled(inertia: str, factor: float) -> str:
 
 
 def write_moving(plant: Plant, folder: Path) -> list[Path]:
-    """Write a plant, and beside it the model that plain MuJoCo steps; return the files to begin with.
+    """Write a plant, and beside it the model that plain MuJoCo steps; return the files
+    to begin with.
 
-    Of stage 1 that is the MJCF whose motors take the command, which `Plant.save` writes.
+    Of stage 1 that is the MJCF whose motors take the command, which `Plant.save`
+    writes.
 
     Raises:
         RunError: the folder cannot be written.
@@ -84,7 +92,9 @@ def write_moving(plant: Plant, folder: Path) -> list[Path]:
         body.gravcomp = 1.0
     for joint, own in zip(spec.joints, inertia.tolist(), strict=True):
         joint.damping, joint.stiffness, joint.frictionloss = [0.0] * 3, [0.0] * 3, 0.0
-        motor = spec.add_actuator(name=joint.name, target=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+        motor = spec.add_actuator(
+            name=joint.name, target=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT
+        )
         motor.set_to_velocity(kv=SERVO * own)
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     rows = [
@@ -93,7 +103,9 @@ def write_moving(plant: Plant, folder: Path) -> list[Path]:
         for row in table.tolist()
     ]
     lags = joint_lags(plant)
-    late = [[plant.names[joint - 1], f"{lags[joint - 1]:.6g}"] for joint in plant.joints]
+    late = [
+        [plant.names[joint - 1], f"{lags[joint - 1]:.6g}"] for joint in plant.joints
+    ]
     names = ", ".join(name for name, _ in late)
     content = {
         "moving.xml": mjcf_text(spec),
@@ -108,15 +120,23 @@ def write_moving(plant: Plant, folder: Path) -> list[Path]:
 
 
 def speed_grids(plant: Plant) -> dict[str, Array]:
-    """Return rows of angle [rad], command [%] and settled speed [rad/s] by joint, each joint alone."""
+    """Return rows of angle [rad], command [%] and settled speed [rad/s] by joint, each
+    joint alone."""
     arm, start, steady = plant.identified.settings.arm, plant.angle, plant.steady()
     grids: dict[str, Array] = {}
     for joint in plant.joints:
         column = joint - 1
         low, high = np.clip([arm.lower[column], arm.upper[column]], -ENDLESS, ENDLESS)
-        angle, command = np.meshgrid(np.linspace(low, high, ANGLES), COMMANDS, indexing="ij")
-        pose, given = np.tile(start, (angle.size, 1)), np.zeros((angle.size, len(start)))
+        angle, command = np.meshgrid(
+            np.linspace(low, high, ANGLES), COMMANDS, indexing="ij"
+        )
+        pose, given = (
+            np.tile(start, (angle.size, 1)),
+            np.zeros((angle.size, len(start))),
+        )
         pose[:, column], given[:, column] = angle.ravel(), command.ravel()
         speed = steady.speeds(given, pose)[:, column]
-        grids[plant.names[column]] = np.column_stack([angle.ravel(), command.ravel(), speed])
+        grids[plant.names[column]] = np.column_stack(
+            [angle.ravel(), command.ravel(), speed]
+        )
     return grids

@@ -1,4 +1,5 @@
-"""Tables for other programs: settled speeds for a PLC, draws of the parameters, and their ranges."""
+"""Tables for other programs: settled speeds for a PLC, draws of the parameters, and
+their ranges."""
 
 import numpy as np
 
@@ -26,7 +27,8 @@ standard deviations per parameter from the estimate in the mean; rows of draws.c
 
 
 def speed_tables(plant: Plant) -> dict[str, str]:
-    """Return a table per joint as CSV, by file name: settled speed against command, at places of its range.
+    """Return a table per joint as CSV, by file name: settled speed against command, at
+    places of its range.
 
     Each joint moves alone; the others stand where the plant does.
     """
@@ -38,10 +40,16 @@ def speed_tables(plant: Plant) -> dict[str, str]:
         factor, unit = (1e3, "mm") if slides else (float(np.degrees(1.0)), "deg")
         low, high = np.clip([arm.lower[column], arm.upper[column]], -ENDLESS, ENDLESS)
         places = low + np.array(PLACES) * (high - low)
-        header = ["command_pct", *(f"{unit}_per_s_at_{factor * place:.4g}_{unit}" for place in places)]
+        header = [
+            "command_pct",
+            *(f"{unit}_per_s_at_{factor * place:.4g}_{unit}" for place in places),
+        ]
         columns = [COMMANDS]
         for place in places:
-            pose, command = np.tile(start, (len(COMMANDS), 1)), np.zeros((len(COMMANDS), len(start)))
+            pose, command = (
+                np.tile(start, (len(COMMANDS), 1)),
+                np.zeros((len(COMMANDS), len(start))),
+            )
             pose[:, column], command[:, column] = place, COMMANDS
             columns.append(factor * steady.speeds(command, pose)[:, column])
         rows = [[f"{cell:.6g}" for cell in row] for row in np.column_stack(columns)]
@@ -50,16 +58,29 @@ def speed_tables(plant: Plant) -> dict[str, str]:
 
 
 def parameter_files(draws: Draws) -> dict[str, str]:
-    """Return draws, ranges and errors as CSV, by file name, with a text that says what to take."""
+    """Return draws, ranges and errors as CSV, by file name, with a text that says what
+    to take."""
     settings = draws.model.settings
     units = [settings.parameters[name].unit for name in draws.names]
     low, high = np.quantile(draws.theta, [0.025, 0.975], axis=0)
-    ranges = zip(draws.names, units, draws.model.theta.tolist(), low.tolist(), high.tolist(), strict=True)
+    ranges = zip(
+        draws.names,
+        units,
+        draws.model.theta.tolist(),
+        low.tolist(),
+        high.tolist(),
+        strict=True,
+    )
     keys = ("sensor_deg", "drift_per_s", "drift_per_way", "lasting_deg", "lasting_s")
-    errors = [[name, *(getattr(one, key) for key in keys)] for name, one in draws.errors.items()]
+    errors = [
+        [name, *(getattr(one, key) for key in keys)]
+        for name, one in draws.errors.items()
+    ]
     return {
         "draws.csv": csv_text([draws.names, *draws.theta.tolist()]),
-        "ranges.csv": csv_text([("parameter", "unit", "estimate", "lower", "upper"), *ranges]),
+        "ranges.csv": csv_text(
+            [("parameter", "unit", "estimate", "lower", "upper"), *ranges]
+        ),
         "errors.csv": csv_text([("angle", *keys), *errors]),
         "README.txt": RANGES_NOTE.format(apart=f"{draws.apart:.3g}"),
     }

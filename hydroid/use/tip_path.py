@@ -1,8 +1,9 @@
 """Joint angles along a path of the tip: MuJoCo's kinematics inverted, sample by sample.
 
-Each sample starts from the pose before it and takes damped least-squares steps (C. W. Wampler, *Manipulator
-inverse kinematic solutions based on vector formulations and damped least-squares methods*, 1986). Of several
-poses that reach a point it so finds one near the pose before: the joints move no more than the path asks for.
+Each sample starts from the pose before it and takes damped least-squares steps (C. W.
+Wampler, *Manipulator inverse kinematic solutions based on vector formulations and
+damped least-squares methods*, 1986). Of several poses that reach a point it so finds
+one near the pose before: the joints move no more than the path asks for.
 """
 
 from collections.abc import Sequence
@@ -22,7 +23,8 @@ COLUMNS = ("x_m", "y_m", "z_m")
 REACHED = 1e-6
 """distance from a point at which the tip counts as there [m]"""
 UNREACHED = 1e-3
-"""distance from a point from which a path is refused [m]: a valve leads no tip that closely"""
+"""distance from a point from which a path is refused [m]: a valve leads no tip that
+closely"""
 MOST_STEPS = 300
 """steps for a sample; a path's first point, far from the start pose, takes the most"""
 DAMPING = 1e-3
@@ -45,7 +47,9 @@ class Tip:
     def __init__(self, arm: Arm, joints: Sequence[int]) -> None:
         if arm.payload is None:
             hint = "add a site to the model, and name it: payload: SITE"
-            raise SettingsError("the arm's file does not say where its tip is", arm.where, hint)
+            raise SettingsError(
+                "the arm's file does not say where its tip is", arm.where, hint
+            )
         self._model = load_model(arm).compile()
         self._data = mujoco.MjData(self._model)
         self._site = self._model.site(arm.payload).id
@@ -53,14 +57,16 @@ class Tip:
         self._low, self._high = arm.lower, arm.upper
 
     def place(self, angle: Array) -> Array:
-        """Return where the tip is [m], shape (3,), at angles of all joints [rad], shape (J,)."""
+        """Return where the tip is [m], shape (3,), at angles of all joints [rad], shape
+        (J,)."""
         self._data.qpos[:] = angle
         mujoco.mj_kinematics(self._model, self._data)
         mujoco.mj_comPos(self._model, self._data)
         return self._data.site_xpos[self._site].copy()
 
     def angles(self, points: Array, start: Array) -> tuple[Array, Array]:
-        """Return angles [rad], shape (T, J), and how far the tip stays off [m], shape (T,).
+        """Return angles [rad], shape (T, J), and how far the tip stays off [m], shape
+        (T,).
 
         Args:
             points: of the tip [m], shape (T, 3).
@@ -75,7 +81,8 @@ class Tip:
         return angle, off
 
     def _reach(self, point: Array, pose: Array) -> tuple[Array, float]:
-        """Return the pose near another that brings the tip closest to a point, and the distance [m]."""
+        """Return the pose near another that brings the tip closest to a point, and the
+        distance [m]."""
         missing = point - self.place(pose)
         off = float(np.linalg.norm(missing))
         damping = DAMPING
@@ -93,22 +100,30 @@ class Tip:
         return pose, off
 
     def _step(self, missing: Array, pose: Array, damping: float) -> Array:
-        """Return the pose after a step towards a point; joints at an end of their range stay within."""
+        """Return the pose after a step towards a point; joints at an end of their range
+        stay within."""
         slopes = np.empty((3, self._model.nv))
         mujoco.mj_jacSite(self._model, self._data, slopes, None, self._site)
         free = self._moving
         next_pose = pose.copy()
         for _ in range(len(self._moving)):
             near = slopes[:, free]
-            step = near.T @ np.linalg.solve(near @ near.T + damping * np.eye(3), missing)
-            step *= min(1.0, LARGEST_TURN / max(float(np.abs(step).max()), LARGEST_TURN))
-            beyond = (pose[free] + step > self._high[free]) | (pose[free] + step < self._low[free])
+            step = near.T @ np.linalg.solve(
+                near @ near.T + damping * np.eye(3), missing
+            )
+            step *= min(
+                1.0, LARGEST_TURN / max(float(np.abs(step).max()), LARGEST_TURN)
+            )
+            beyond = (pose[free] + step > self._high[free]) | (
+                pose[free] + step < self._low[free]
+            )
             beyond &= (pose[free] >= self._high[free]) | (pose[free] <= self._low[free])
             next_pose[:] = pose
             next_pose[free] = pose[free] + step
             if not beyond.any() or beyond.all():
                 break
-            free = free[~beyond]  # a joint at its end cannot help: the others take its part
+            # a joint at its end cannot help: the others take its part
+            free = free[~beyond]
         return next_pose.clip(self._low, self._high)
 
 
@@ -137,11 +152,15 @@ def tip_path(table: Table, time: str, period: float, tip: Tip, start: Array) -> 
         start: pose from which the first point is sought [rad], shape (J,).
 
     Raises:
-        LogError: a column of times is missing, a cell holds no number, times do not increase, or a point
-            cannot be reached.
+        LogError: a column of times is missing, a cell holds no number, times do not
+            increase, or a point cannot be reached.
     """
     if time not in table.names:
-        raise LogError(f"column {time} is missing", table.source, "a path of the tip takes times [s]")
+        raise LogError(
+            f"column {time} is missing",
+            table.source,
+            "a path of the tip takes times [s]",
+        )
     signals = [Signal(time, "time"), *(Signal(name, "position") for name in COLUMNS)]
     recording = table.read(signals)
     values = recording.values
@@ -155,7 +174,9 @@ def tip_path(table: Table, time: str, period: float, tip: Tip, start: Array) -> 
     back = np.flatnonzero(np.diff(recording.time) <= 0)
     if len(back):
         where = f"{table.source}, {word} {lines[back[0] + 1]}, column {time}"
-        raise LogError("times do not increase", where, "each row must be later than the row before")
+        raise LogError(
+            "times do not increase", where, "each row must be later than the row before"
+        )
     if len(values) < 2:
         raise LogError("holds no path", table.source, "give two rows at least")
     since = recording.time - recording.time[0]
@@ -166,12 +187,17 @@ def tip_path(table: Table, time: str, period: float, tip: Tip, start: Array) -> 
         points[:, axis] = np.interp(at, since, values[:, 1 + axis])
     angle, off = tip.angles(points, start)
     if off.max() > UNREACHED:
-        raise _unreached(table.source, at + recording.time[0], points, off, tip.place(start))
+        raise _unreached(
+            table.source, at + recording.time[0], points, off, tip.place(start)
+        )
     return Log(str(table.source), at, np.zeros_like(angle), angle, period)
 
 
-def _unreached(source: str, time: Array, points: Array, off: Array, first: Array) -> LogError:
-    """Return the error of a path that the tip cannot follow: its worst point, and where the tip starts."""
+def _unreached(
+    source: str, time: Array, points: Array, off: Array, first: Array
+) -> LogError:
+    """Return the error of a path that the tip cannot follow: its worst point, and where
+    the tip starts."""
     worst = int(np.argmax(off))
     missed = int(np.sum(off > UNREACHED))
     what = (

@@ -1,6 +1,7 @@
 """The arm in motion under its hydraulics: in a window, or as a film.
 
-Its modules import MuJoCo, which looks then for a way to render: `choose_platform` comes first.
+Its modules import MuJoCo, which looks then for a way to render: `choose_platform` comes
+first.
 """
 
 import os
@@ -23,10 +24,13 @@ def choose_platform() -> None:
 
 
 def renders(platform: str) -> bool:
-    """Whether MuJoCo can draw with a platform here: its library may be there without a driver.
+    """Whether MuJoCo can draw with a platform here: its library may be there without a
+    driver.
 
     It is tried in a process of its own, since a process can load only one.
     """
     environment = os.environ | {"MUJOCO_GL": platform}
-    trial = subprocess.run([sys.executable, "-c", _TRIAL], env=environment, capture_output=True)
+    trial = subprocess.run(
+        [sys.executable, "-c", _TRIAL], env=environment, capture_output=True
+    )
     return trial.returncode == 0

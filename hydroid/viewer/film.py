@@ -1,5 +1,5 @@
-"""A motion on the screen, as a film or a picture: the simulated machine over the measured one, its
-ghost.
+"""A motion on the screen, as a film or a picture: the simulated machine over the
+measured one, its ghost.
 """
 
 import io
@@ -23,11 +23,17 @@ from hydroid.viewer.motion import Motion, Playback, Region, Replay
 
 Picture = NDArray[np.uint8]
 
-KINDS = {".mp4": ((1920, 1080), 20.0), ".gif": ((960, 540), 10.0), ".png": ((1920, 1080), 0.0)}
+KINDS = {
+    ".mp4": ((1920, 1080), 20.0),
+    ".gif": ((960, 540), 10.0),
+    ".png": ((1920, 1080), 0.0),
+}
 """width and height of a file's pictures [px], and pictures in a second"""
 
 
-def rendered(motion: Motion, size: tuple[int, int], frames: Iterable[tuple[float, str]]) -> Iterator[Picture]:
+def rendered(
+    motion: Motion, size: tuple[int, int], frames: Iterable[tuple[float, str]]
+) -> Iterator[Picture]:
     """Yield a machine at times [s], a text above each, in a size [px]: RGB, shape
     (height, width, 3).
     """
@@ -38,7 +44,8 @@ def rendered(motion: Motion, size: tuple[int, int], frames: Iterable[tuple[float
     look.map.shadowclip, look.quality.shadowsize = 3.0, 4096
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # glfw says in warnings what the error says as well
+            # glfw says in warnings what the error says as well
+            warnings.simplefilter("ignore")
             renderer = mujoco.Renderer(replay.model, height=height, width=width)
     except (mujoco.FatalError, ImportError, RuntimeError, AttributeError) as error:
         how = f"MUJOCO_GL={os.environ.get('MUJOCO_GL')}: {' '.join(str(error).split())}"
@@ -52,15 +59,20 @@ def rendered(motion: Motion, size: tuple[int, int], frames: Iterable[tuple[float
             renderer.update_scene(replay.data, camera)
             add_ghost(replay, renderer.scene, camera)
             picture, place = Image.fromarray(renderer.render()), (letters, letters // 2)
-            ImageDraw.Draw(picture).text(place, text, "black", ImageFont.load_default(letters))
+            ImageDraw.Draw(picture).text(
+                place, text, "black", ImageFont.load_default(letters)
+            )
             yield np.asarray(picture)
 
 
 def render_motion(
-    motion: Motion, kind: str, span: tuple[float, float], progress: Progress = no_progress
+    motion: Motion,
+    kind: str,
+    span: tuple[float, float],
+    progress: Progress = no_progress,
 ) -> bytes:
-    """Return the content of a film of a motion in a span [s], or of a picture of its beginning
-    (.png).
+    """Return the content of a film of a motion in a span [s], or of a picture of its
+    beginning (.png).
     """
     begin, end = max(span[0], 0.0), min(span[1], motion.time[-1])
     if not begin < end:
@@ -80,17 +92,21 @@ def render_motion(
 
 
 def look_at(camera: mujoco.MjvCamera, model: mujoco.MjModel, region: Region) -> None:
-    """Point a camera at a whole machine, so far away that its region is inside the picture."""
+    """Point a camera at a whole machine, so far away that its region is inside the
+    picture."""
     camera.lookat[:] = region.centre
     camera.distance = region.radius / np.sin(np.radians(model.vis.global_.fovy) / 2)
     camera.azimuth, camera.elevation = 125.0, -18.0  # [deg]
 
 
-def add_ghost(playback: Playback, scene: mujoco.MjvScene, camera: mujoco.MjvCamera) -> None:
-    """Add what moves of a playback's ghost, if it has one, to a scene, blue and translucent.
+def add_ghost(
+    playback: Playback, scene: mujoco.MjvScene, camera: mujoco.MjvCamera
+) -> None:
+    """Add what moves of a playback's ghost, if it has one, to a scene, blue and
+    translucent.
 
-    It stands 4 mm farther away from the camera: where both machines agree only the simulated one is
-    seen, and their surfaces do not flicker.
+    It stands 4 mm farther away from the camera: where both machines agree only the
+    simulated one is seen, and their surfaces do not flicker.
     """
     if playback.ghost is None:
         return
@@ -107,8 +123,19 @@ def _still(pictures: Iterable[Picture], kind: str) -> bytes:
     if kind == ".png":
         Image.fromarray(next(iter(pictures))).save(content, "PNG", optimize=True)
     else:
-        first, *rest = (Image.fromarray(one).quantize(96, dither=Image.Dither.NONE) for one in pictures)
-        first.save(content, "GIF", save_all=True, append_images=rest, duration=pause, loop=0, optimize=True)
+        first, *rest = (
+            Image.fromarray(one).quantize(96, dither=Image.Dither.NONE)
+            for one in pictures
+        )
+        first.save(
+            content,
+            "GIF",
+            save_all=True,
+            append_images=rest,
+            duration=pause,
+            loop=0,
+            optimize=True,
+        )
     return content.getvalue()
 
 
@@ -134,7 +161,8 @@ LATE = 0.1  # a machine too slow by this [s] shows slow motion instead of jumps
 
 
 def play(playback: Playback, viewer: Any) -> None:
-    """Show what moves in real time until the window is closed; the viewer's reset starts it again.
+    """Show what moves in real time until the window is closed; the viewer's reset
+    starts it again.
 
     `viewer` is a `mujoco.viewer.Handle`, or what behaves like one.
     """
@@ -163,10 +191,14 @@ def show(playback: Playback) -> None:
         import mujoco.viewer
 
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # glfw says in warnings what it returns as well
-            if sys.platform != "darwin" and not glfw.init():  # the viewer would end the whole program
+            # glfw says in warnings what it returns as well
+            warnings.simplefilter("ignore")
+            # the viewer would end the whole program
+            if sys.platform != "darwin" and not glfw.init():
                 raise RuntimeError("no display")
-        viewer = mujoco.viewer.launch_passive(playback.model, playback.data, show_left_ui=False)
+        viewer = mujoco.viewer.launch_passive(
+            playback.model, playback.data, show_left_ui=False
+        )
     except (ImportError, RuntimeError) as error:
         hint = "without a display write a file: hydroid view RUN -o arm.mp4"
         raise RunError(f"no window can be opened ({error})", hint=hint) from None

@@ -1,4 +1,5 @@
-"""Arms in motion: a simulated machine beside the measured one, or a plant under its sliders."""
+"""Arms in motion: a simulated machine beside the measured one, or a plant under its
+sliders."""
 
 from collections.abc import Mapping
 
@@ -19,11 +20,11 @@ MOMENTS = 60
 
 @record
 class Motion:
-    """A machine under the commands of logs: times [s], (T,), and angles of all joints [rad],
-    (T, nq).
+    """A machine under the commands of logs: times [s], (T,), and angles of all joints
+    [rad], (T, nq).
 
-    `measured` is None where the logs hold no motion; `error` is the rms difference of the driven
-    joints that were measured [deg], NaN where there are none.
+    `measured` is None where the logs hold no motion; `error` is the rms difference of
+    the driven joints that were measured [deg], NaN where there are none.
     """
 
     machine: Machine
@@ -34,12 +35,15 @@ class Motion:
 
 
 def simulated_motion(model: IdentifiedModel, logs: Mapping[str, Log]) -> Motion:
-    """Simulate the commands of logs, by the name of the arm that they move (`Machine.sides`)."""
+    """Simulate the commands of logs, by the name of the arm that they move
+    (`Machine.sides`)."""
     arm = model.settings.arm
     machine = load_machine(arm, pair=ALONE not in logs)
     for log in logs.values():
         if not log.driven.any():
-            raise SettingsError("commands nothing", log.source, "name a log with commands")
+            raise SettingsError(
+                "commands nothing", log.source, "name a log with commands"
+            )
     simulated = {side: predict_log(model, log).angle for side, log in logs.items()}
     rest = arm.pose(model.settings.start_pose)
     moved = {side: log.posed for side, log in logs.items() if _moves(log.angle).any()}
@@ -50,7 +54,8 @@ def simulated_motion(model: IdentifiedModel, logs: Mapping[str, Log]) -> Motion:
 
 
 def _rms_error(logs: Mapping[str, Log], simulated: Mapping[str, Array]) -> float:
-    """Return the rms difference [deg] of simulated angles [rad], (T, J), and the measured ones."""
+    """Return the rms difference [deg] of simulated angles [rad], (T, J), and the
+    measured ones."""
     errors = list[Array]()
     for side, log in logs.items():
         compared = log.driven & _moves(log.angle)
@@ -70,20 +75,27 @@ def _moves(angle: Array) -> Mask:
 def place(model: mujoco.MjModel, data: mujoco.MjData, angle: Array) -> None:
     """Bring all that is drawn of a machine to joint angles [rad], shape (nq,)."""
     data.qpos[:] = angle
-    for update in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_camlight, mujoco.mj_tendon):
+    for update in (
+        mujoco.mj_kinematics,
+        mujoco.mj_comPos,
+        mujoco.mj_camlight,
+        mujoco.mj_tendon,
+    ):
         update(model, data)
 
 
 @record
 class Region:
-    """A sphere around all that is drawn of a machine: its centre [m], shape (3,), and radius [m]."""
+    """A sphere around all that is drawn of a machine: its centre [m], shape (3,), and
+    radius [m]."""
 
     centre: Array
     radius: float
 
 
 def region_of(model: mujoco.MjModel, angles: Array) -> Region:
-    """Return the region of a machine at angles of all joints [rad], (F, nq), without the floor."""
+    """Return the region of a machine at angles of all joints [rad], (F, nq), without
+    the floor."""
     data = mujoco.MjData(model)
     solid = model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE
     if not solid.any():
@@ -101,8 +113,8 @@ def region_of(model: mujoco.MjModel, angles: Array) -> Region:
 
 
 class Sliders:
-    """A plant with all joints on the viewer's sliders, from a named pose or the settings' start
-    pose.
+    """A plant with all joints on the viewer's sliders, from a named pose or the
+    settings' start pose.
     """
 
     duration = np.inf
@@ -117,7 +129,8 @@ class Sliders:
         self.plant = plant
         self._start = pose
         self.restart()
-        # a plant that locks joints has a model of its own in each pose: take it after the reset
+        # a plant that locks joints has a model of its own in each pose: take it after
+        # the reset
         self.model = plant.model
         self.data = plant.data
 
@@ -143,7 +156,9 @@ class Replay:
     def region(self) -> Region:
         """Where the machine and its ghost are in the course of the motion."""
         motion = self._motion
-        moments = np.unique(np.linspace(0, len(motion.time) - 1, MOMENTS).round().astype(int))
+        moments = np.unique(
+            np.linspace(0, len(motion.time) - 1, MOMENTS).round().astype(int)
+        )
         angles = [motion.simulated[moments]]
         if motion.measured is not None:
             angles.append(motion.measured[moments])
@@ -172,5 +187,5 @@ class Replay:
 
 
 Playback = Sliders | Replay
-"""what is drawn (`model`, `data` and, where something was measured, `ghost`), the `time` that is
-shown and the `duration` after which all stands still [s]"""
+"""what is drawn (`model`, `data` and, where something was measured, `ghost`), the
+`time` that is shown and the `duration` after which all stands still [s]"""

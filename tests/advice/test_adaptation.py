@@ -19,11 +19,14 @@ SLOWER = TRUTH | {"flow": 90.0}
 
 
 def test_what_changed_is_freed_and_found(tmp_path):
-    settings = two_joints(tmp_path, payloads={"loaded.csv": 5.0})  # one of the fit's own logs
+    # one of the fit's own logs
+    settings = two_joints(tmp_path, payloads={"loaded.csv": 5.0})
     model, log = identified(settings, TRUTH, "a fit"), drive(settings, 3, SLOWER)
     path = steps(model, [log], (), no_progress)
     assert [step["parameter"] for step in path] == ["", "flow"]
-    assert max(path[1]["left_out_deg"].values()) < 0.3 * max(path[0]["left_out_deg"].values())
+    assert max(path[1]["left_out_deg"].values()) < 0.3 * max(
+        path[0]["left_out_deg"].values()
+    )
     result = hydroid.adapt(log, fit=model, free="flow", out=tmp_path / "run")
     assert result.summary.values["flow"] == pytest.approx(90.0, rel=0.02)
     assert result.summary.values | {"flow": TRUTH["flow"]} == TRUTH
@@ -33,7 +36,10 @@ def test_what_changed_is_freed_and_found(tmp_path):
 def test_an_unchanged_machine_needs_no_adaptation(tmp_path):
     settings = two_joints(tmp_path)
     model = identified(settings, TRUTH, "a fit")
-    assert [step["parameter"] for step in steps(model, [drive(settings, 4)], (), no_progress)] == [""]
+    assert [
+        step["parameter"]
+        for step in steps(model, [drive(settings, 4)], (), no_progress)
+    ] == [""]
     with pytest.raises(SettingsError, match="no parameter lowers the error"):
         hydroid.adapt(drive(settings, 4), fit=model, out=None)
 
@@ -49,7 +55,9 @@ def test_an_effect_of_a_new_day_is_freed_for_one_joint(tmp_path):
     first, then, *_ = steps(model, [log], (), no_progress)
     assert then["parameter"] == "day_other"
     assert then["left_out_deg"]["lift"] < 0.7 * first["left_out_deg"]["lift"]
-    assert then["left_out_deg"]["tilt"] == pytest.approx(first["left_out_deg"]["tilt"], rel=0.05)
+    assert then["left_out_deg"]["tilt"] == pytest.approx(
+        first["left_out_deg"]["tilt"], rel=0.05
+    )
 
 
 def test_a_load_is_said_to_be_a_payload_and_one_that_is_stated_moves_no_mass(tmp_path):
@@ -67,7 +75,9 @@ def test_a_load_is_said_to_be_a_payload_and_one_that_is_stated_moves_no_mass(tmp
 
 def test_an_adaptation_names_no_seed_which_it_does_not_have(tmp_path):
     settings = two_joints(tmp_path)
-    joint = JointVerdict(joint=1, name="lift", verdict=Verdict.MISFIT, fitted_deg=2, tolerance_deg=1)
+    joint = JointVerdict(
+        joint=1, name="lift", verdict=Verdict.MISFIT, fitted_deg=2, tolerance_deg=1
+    )
     bad = [joint.changed({"baselines_deg": {NAMES[-1]: 1.0}})]
     alone = adapted(identified(settings, TRUTH, "a fit"), ["flow"])
     assert (settings.seeded, alone.seeded) == (True, False)
@@ -79,9 +89,13 @@ def test_an_adaptation_names_no_seed_which_it_does_not_have(tmp_path):
 def test_settings_of_a_model_that_is_read_are_not_replaced_in_silence(tmp_path):
     settings = two_joints(tmp_path)
     model, log = identified(settings, TRUTH, "a fit"), drive(settings)
-    with pytest.raises(SettingsError, match="payloads: cannot be replaced in a model that is read"):
+    with pytest.raises(
+        SettingsError, match="payloads: cannot be replaced in a model that is read"
+    ):
         hydroid.adapt(log, fit=model, set={"payloads": {"drive_0.csv": 5.0}})
-    with pytest.raises(SettingsError, match="duration_s: cannot be replaced in a model that is read"):
+    with pytest.raises(
+        SettingsError, match="duration_s: cannot be replaced in a model that is read"
+    ):
         hydroid.design(log, fit=model, duration=5.0)
 
 

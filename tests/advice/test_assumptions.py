@@ -13,7 +13,9 @@ from hydroid.advice.assumptions import assumption_findings, doubts, exchanged
 @pytest.mark.parametrize("wrong", [None, "lift", "tilt"])
 def test_a_wrong_sign_is_named_and_no_right_one(tmp_path, wrong):
     logs = [drive(two_joints(tmp_path), seed) for seed in range(6)]
-    turned = BOOM.replace(f'name="{wrong}" axis="0 -1 0"', f'name="{wrong}" axis="0 1 0"')
+    turned = BOOM.replace(
+        f'name="{wrong}" axis="0 -1 0"', f'name="{wrong}" axis="0 1 0"'
+    )
     settings = two_joints(tmp_path, turned)
     found = assumption_findings(settings, logs, doubts(settings, logs))
     names = [(finding.kind, *finding.subjects) for finding in found]
@@ -23,7 +25,11 @@ def test_a_wrong_sign_is_named_and_no_right_one(tmp_path, wrong):
 def test_exchanged_commands_are_named(tmp_path):
     settings = two_joints(tmp_path)
     log = drive(settings)
-    for command, pairs in ((log.command, ()), (log.command[:, ::-1], ((1, 2),)), (0 * log.command, ())):
+    for command, pairs in (
+        (log.command, ()),
+        (log.command[:, ::-1], ((1, 2),)),
+        (0 * log.command, ()),
+    ):
         assert exchanged(settings, [replace(log, command=command)]) == pairs
 
 

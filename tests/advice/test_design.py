@@ -1,4 +1,5 @@
-"""The designed experiment: its limits, its information, and the search, held to laws."""
+"""The designed experiment: its limits, its information, and the search, held to
+laws."""
 
 import mujoco
 import numpy as np
@@ -32,7 +33,9 @@ TURNTABLE = """<mujoco model="turntable">
 </mujoco>"""
 """a house that turns 5 cm above its base, with a boom in front"""
 DESIGN = {"duration_s": 6, "effort": 24, "dwell_s": [0.5, 2], "poses": "any"}
-TWO: dict[str, object] = {f"parameters.{name}.fixed": TRUTH[name] for name in ("M1", "M4", "M5")}
+TWO: dict[str, object] = {
+    f"parameters.{name}.fixed": TRUTH[name] for name in ("M1", "M4", "M5")
+}
 TWO |= {"outputs": [2, 3], "simulation.other_joints": "locked"}
 
 
@@ -47,7 +50,8 @@ def designed() -> tuple[FitSettings, Design]:
 
 
 def keeps_limits(settings: FitSettings, result: Design) -> bool:
-    """Whether `simulate` gives the predicted motion, within the limits, after a rest, and without jumps."""
+    """Whether `simulate` gives the predicted motion, within the limits, after a rest,
+    and without jumps."""
     run, limits = simulate_log(settings, result.log, TRUTH), settings.design
     rest = round(limits.rest_s / settings.log.period_s)
     assert not run.command[:rest].any()
@@ -62,10 +66,13 @@ def keeps_limits(settings: FitSettings, result: Design) -> bool:
 
 
 def clearance(settings: FitSettings, angle: np.ndarray) -> np.ndarray:
-    """Distance [m] of the right arm from itself, the floor, the carrier and the left arm, shape (T,)."""
+    """Distance [m] of the right arm from itself, the floor, the carrier and the left
+    arm, shape (T,)."""
     machine = load_machine(settings.arm, pair=True)
     motion = machine.joined({"right": angle}, settings.arm.pose(settings.start_pose))
-    return machine.checker.clearance(np.arange(len(angle), dtype=float), motion).distance
+    return machine.checker.clearance(
+        np.arange(len(angle), dtype=float), motion
+    ).distance
 
 
 def test_experiments_keep_clear_where_others_collide():
@@ -81,7 +88,9 @@ def test_experiments_keep_clear_where_others_collide():
     assert len(checked) >= 3
 
 
-def test_a_design_keeps_its_limits_when_simulate_runs_it(designed: tuple[FitSettings, Design]):
+def test_a_design_keeps_its_limits_when_simulate_runs_it(
+    designed: tuple[FitSettings, Design],
+):
     settings, result = designed
     assert keeps_limits(settings, result)
     assert result.log.duration == pytest.approx(6.0)
@@ -91,14 +100,17 @@ def test_a_design_keeps_its_limits_when_simulate_runs_it(designed: tuple[FitSett
 
 
 @pytest.mark.parametrize(
-    "tight", [{"speed_deg_s": 3}, {"margin_deg": 25, "poses": ["study"]}, {"command_pct": 20}]
+    "tight",
+    [{"speed_deg_s": 3}, {"margin_deg": 25, "poses": ["study"]}, {"command_pct": 20}],
 )
 def test_tight_limits_are_kept_too(tight: dict[str, object]):
     settings = configured(**{"effort": 3} | tight)
     assert keeps_limits(settings, design(settings, THETA, [], 1, no_progress))
 
 
-def test_the_best_is_no_worse_than_any_random_one_and_repeats(designed: tuple[FitSettings, Design]):
+def test_the_best_is_no_worse_than_any_random_one_and_repeats(
+    designed: tuple[FitSettings, Design],
+):
     settings, result = designed
     least, at_random = (
         np.array([typical(result.known.add(t.gained), result.moved) for t in trials])
@@ -111,15 +123,20 @@ def test_the_best_is_no_worse_than_any_random_one_and_repeats(designed: tuple[Fi
     assert np.array_equal(again.best.gained, result.best.gained)
 
 
-def test_the_forecast_is_what_a_fit_to_the_same_log_knows(designed: tuple[FitSettings, Design]):
-    """The search's one-sided differences against the uncertainty of a fit; two logs have twice as much."""
+def test_the_forecast_is_what_a_fit_to_the_same_log_knows(
+    designed: tuple[FitSettings, Design],
+):
+    """The search's one-sided differences against the uncertainty of a fit; two logs
+    have twice as much."""
     settings, result = designed
     log = simulate_log(settings, result.log, TRUTH)
     given = settings.changed({"objective.noise_deg": settings.design.noise_deg})
     fitted = forecast(uncertainty(Problem(given, [log]), THETA).posterior)
     np.testing.assert_allclose(result.after.deviations, fitted.deviations, rtol=0.02)
     two = forecast(uncertainty(Problem(given, [log, log]), THETA).posterior)
-    np.testing.assert_allclose(result.after.add(result.best.gained).deviations, two.deviations, rtol=0.02)
+    np.testing.assert_allclose(
+        result.after.add(result.best.gained).deviations, two.deviations, rtol=0.02
+    )
 
 
 def test_the_information_of_least_squares_has_the_closed_form():
@@ -140,18 +157,35 @@ def test_the_information_of_least_squares_has_the_closed_form():
 
 
 def test_what_no_experiment_moves_hides_nothing_else(tmp_path):
-    """The damping of oil that does not ring, and an effect of the logs of another day."""
+    """The damping of oil that does not ring, and an effect of the logs of another
+    day."""
     ring = {"quantity": "oil_damping", "joints": [1], "within": 3}
     day = {"quantity": "dead_band", "joints": [1], "sd": 3, "per": "other"}
-    limits = {"duration_s": 10.0, "effort": 12, "clearance_m": None, "poses": "any", "speed_deg_s": 90.0}
-    settings = two_joints(tmp_path, parameters=PARAMETERS | {"ring": ring, "day": day}, design=limits)
-    theta = settings.parameter_set().vector(OIL | {"ring": 0.3, "day": 0.0}, "the truth")
+    limits = {
+        "duration_s": 10.0,
+        "effort": 12,
+        "clearance_m": None,
+        "poses": "any",
+        "speed_deg_s": 90.0,
+    }
+    settings = two_joints(
+        tmp_path, parameters=PARAMETERS | {"ring": ring, "day": day}, design=limits
+    )
+    theta = settings.parameter_set().vector(
+        OIL | {"ring": 0.3, "day": 0.0}, "the truth"
+    )
     result = design(settings, theta, [], 1, no_progress)
-    still = {name for name, moved in zip(result.names, result.moved, strict=True) if not moved}
+    still = {
+        name
+        for name, moved in zip(result.names, result.moved, strict=True)
+        if not moved
+    }
     assert {"ring", "day"} <= still
     assert "open_A_lift" not in still
     place = result.names.index("ring")
-    assert result.after.deviations[place] == pytest.approx(result.known.deviations[place])
+    assert result.after.deviations[place] == pytest.approx(
+        result.known.deviations[place]
+    )
 
 
 def test_a_base_and_what_turns_on_it_do_not_count_as_meeting():
@@ -159,7 +193,9 @@ def test_a_base_and_what_turns_on_it_do_not_count_as_meeting():
     checker = CollisionChecker(model)
     poses = np.random.default_rng(1).uniform(-1, 1, (20, 2))
     counted = checker.changing(poses)
-    names = {frozenset(pair) for pair, one in zip(checker.names, counted, strict=True) if one}
+    names = {
+        frozenset(pair) for pair, one in zip(checker.names, counted, strict=True) if one
+    }
     assert frozenset({"base", "house"}) not in names
     assert frozenset({"base", "boom"}) in names
     assert checker.first_below(poses, 0.2) == 0
@@ -182,9 +218,14 @@ def test_a_base_and_what_turns_on_it_do_not_count_as_meeting():
             {"margin_deg": 70},
             "margin_deg: none of 8 random experiments keeps the limits in simulation: .* nearer than 70 deg",
         ),
-        ({"clearance_m": 3.0}, r"clearance_m: none of 8 .* and .* nearer than 3 m in .* 100 % of the time"),
+        (
+            {"clearance_m": 3.0},
+            r"clearance_m: none of 8 .* and .* nearer than 3 m in .* 100 % of the time",
+        ),
     ],
 )
-def test_a_design_that_cannot_be_made_is_refused(changes: dict[str, object], message: str):
+def test_a_design_that_cannot_be_made_is_refused(
+    changes: dict[str, object], message: str
+):
     with pytest.raises(SettingsError, match=message):
         design(configured(**changes), THETA, [], 1, no_progress)

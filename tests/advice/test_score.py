@@ -1,4 +1,5 @@
-"""The score test: exact on linear problems, at its nominal rate where nothing is missing."""
+"""The score test: exact on linear problems, at its nominal rate where nothing is
+missing."""
 
 import numpy as np
 import pytest
@@ -18,9 +19,14 @@ def fitted(noise: np.ndarray, slopes: np.ndarray) -> Explained:
 
 def test_the_statistic_of_a_linear_problem_is_that_of_regression():
     rng = np.random.default_rng(1)
-    slopes, change, noise = rng.normal(size=(4, SAMPLES)), rng.normal(size=SAMPLES), rng.normal(size=SAMPLES)
+    slopes, change, noise = (
+        rng.normal(size=(4, SAMPLES)),
+        rng.normal(size=SAMPLES),
+        rng.normal(size=SAMPLES),
+    )
     score = fitted(noise, slopes).score(change)
-    # regression with the change as one more column: its coefficient over its standard deviation
+    # regression with the change as one more column: its coefficient over its standard
+    # deviation
     design = np.vstack([slopes, change]).T
     coefficient = np.linalg.lstsq(design, -noise)[0][-1]
     deviation = np.sqrt(np.linalg.inv(design.T @ design)[-1, -1])
@@ -29,17 +35,24 @@ def test_the_statistic_of_a_linear_problem_is_that_of_regression():
     assert_allclose(score.strength, 1 / deviation, rtol=1e-9)
     # what the column saves of half the sum of squares
     left = [-noise - m @ np.linalg.lstsq(m, -noise)[0] for m in (slopes.T, design)]
-    assert_allclose(score.gain, 0.5 * (left[0] @ left[0] - left[1] @ left[1]), rtol=1e-9)
+    assert_allclose(
+        score.gain, 0.5 * (left[0] @ left[0] - left[1] @ left[1]), rtol=1e-9
+    )
 
 
 @pytest.mark.parametrize("period", [5, 100])
 def test_the_rate_is_nominal_where_nothing_is_missing(period: int):
     """At 5 % of each of 1,000 records: within four standard errors."""
     rng = np.random.default_rng(5)
-    change = np.sign(np.sin(2 * np.pi * np.cumsum(rng.uniform(0.5, 1.5, SAMPLES)) / period))
-    slopes = np.vstack([np.ones(SAMPLES), np.cos(np.arange(SAMPLES) / 30), rng.normal(size=SAMPLES)])
+    change = np.sign(
+        np.sin(2 * np.pi * np.cumsum(rng.uniform(0.5, 1.5, SAMPLES)) / period)
+    )
+    slopes = np.vstack(
+        [np.ones(SAMPLES), np.cos(np.arange(SAMPLES) / 30), rng.normal(size=SAMPLES)]
+    )
     named = [
-        fitted(rng.normal(size=SAMPLES), slopes).score(change).chance(one_sided=False) < 0.05
+        fitted(rng.normal(size=SAMPLES), slopes).score(change).chance(one_sided=False)
+        < 0.05
         for _ in range(1000)
     ]
     assert np.mean(named) == pytest.approx(0.05, abs=0.028)

@@ -13,7 +13,9 @@ from hydroid.settings.cylinder import LinearActuator
 from hydroid.settings.linkage import triangle
 
 SHIPPED = load_arm("hydrolek")
-LINEAR = [joint for joint in SHIPPED.joints if isinstance(joint.actuator, LinearActuator)]
+LINEAR = [
+    joint for joint in SHIPPED.joints if isinstance(joint.actuator, LinearActuator)
+]
 
 
 def test_the_shipped_arm_is_the_articles():
@@ -21,7 +23,9 @@ def test_the_shipped_arm_is_the_articles():
     assert SHIPPED.link_names[-2:] == ("jaw_left", "jaw_right")
     assert SHIPPED.masses.sum() == pytest.approx(45.0)
     assert SHIPPED.masses[6:].sum() == pytest.approx(2.5)
-    np.testing.assert_allclose(np.degrees(SHIPPED.pose("study")), [0, 10, -60, 0, 0, 0, 20])
+    np.testing.assert_allclose(
+        np.degrees(SHIPPED.pose("study")), [0, 10, -60, 0, 0, 0, 20]
+    )
     for name in SHIPPED.poses:
         assert np.all(SHIPPED.lower <= SHIPPED.pose(name))
         assert np.all(SHIPPED.pose(name) <= SHIPPED.upper)
@@ -32,7 +36,11 @@ def test_the_shipped_arm_is_the_articles():
 @st.composite
 def triangles(draw):
     """Sides a, b and the angle between them, at which the triangle is not flat."""
-    return draw(st.floats(0.02, 1.0)), draw(st.floats(0.02, 1.0)), draw(st.floats(0.15, 3.0))
+    return (
+        draw(st.floats(0.02, 1.0)),
+        draw(st.floats(0.02, 1.0)),
+        draw(st.floats(0.15, 3.0)),
+    )
 
 
 @given(triangles())
@@ -53,22 +61,32 @@ def test_in_every_pose_a_cylinder_is_as_long_as_its_pivots_are_apart():
     model = load_model(SHIPPED).compile()
     rng = np.random.default_rng(1)
     for _ in range(5):
-        pose = rng.uniform(np.maximum(SHIPPED.lower, -np.pi), np.minimum(SHIPPED.upper, np.pi))
+        pose = rng.uniform(
+            np.maximum(SHIPPED.lower, -np.pi), np.minimum(SHIPPED.upper, np.pi)
+        )
         data = posed(model, pose)
         jacobian = np.zeros((model.ntendon, model.nv))
         rows = model.ten_J_rownnz, model.ten_J_rowadr, model.ten_J_colind
         mujoco.mju_sparse2dense(jacobian, data.ten_J, *rows)
         for joint in LINEAR:
-            column, tendon = model.joint(joint.name).id, model.tendon(f"{joint.name}_cylinder").id
+            column, tendon = (
+                model.joint(joint.name).id,
+                model.tendon(f"{joint.name}_cylinder").id,
+            )
             angle = data.qpos[column]
-            assert data.ten_length[tendon] == pytest.approx(joint.actuator.length(angle), abs=1e-9)
-            expected = joint.actuator.moment_arm(angle) * (np.arange(model.nv) == column)
+            assert data.ten_length[tendon] == pytest.approx(
+                joint.actuator.length(angle), abs=1e-9
+            )
+            expected = joint.actuator.moment_arm(angle) * (
+                np.arange(model.nv) == column
+            )
             np.testing.assert_allclose(jacobian[tendon], expected, atol=1e-9)
 
 
 @pytest.mark.parametrize("above", [1.0, -1.0])
 def test_a_cylinder_between_two_points_of_the_assembled_arm(tmp_path, above):
-    """The distance of the two points, carried by their links, is its length; sites say the same."""
+    """The distance of the two points, carried by their links, is its length; sites say
+    the same."""
     z = 2.0 + above * np.array([0.4, 0.5])
     ends = {"parent": [*PARENT[:2], float(z[0])], "child": [*CHILD[:2], float(z[1])]}
     arm = write_arm(tmp_path, actuators={"tilt": CYLINDER | {"pivots": ends}})
@@ -80,22 +98,44 @@ def test_a_cylinder_between_two_points_of_the_assembled_arm(tmp_path, above):
     for angle in (-0.9, 0.0, 0.7):
         data = posed(model, (0.3, angle))
         pairs = ((data.body("boom"), here), (data.body("bar"), there))
-        first, second = (body.xpos + body.xmat.reshape(3, 3) @ point for body, point in pairs)
-        assert np.linalg.norm(second - first) == pytest.approx(cylinder.length(angle), abs=1e-9)
-    assert (cylinder.length(0.1) > cylinder.length(0.0)) == (cylinder.sense > 0) == (above < 0)
-    assert cylinder.stroke == pytest.approx(1e3 * np.ptp(cylinder.length(np.radians([-60, 60]))), abs=1e-3)
-    before = {"parent": ('<body name="hook"', here), "child": ('<joint name="tilt"', there)}
+        first, second = (
+            body.xpos + body.xmat.reshape(3, 3) @ point for body, point in pairs
+        )
+        assert np.linalg.norm(second - first) == pytest.approx(
+            cylinder.length(angle), abs=1e-9
+        )
+    assert (
+        (cylinder.length(0.1) > cylinder.length(0.0))
+        == (cylinder.sense > 0)
+        == (above < 0)
+    )
+    assert cylinder.stroke == pytest.approx(
+        1e3 * np.ptp(cylinder.length(np.radians([-60, 60]))), abs=1e-3
+    )
+    before = {
+        "parent": ('<body name="hook"', here),
+        "child": ('<joint name="tilt"', there),
+    }
     sites = BOOM
     for name, (old, place) in before.items():
-        sites = sites.replace(old, f'<site name="tilt_pivot_{name}" pos="{text(place)}"/>{old}')
+        sites = sites.replace(
+            old, f'<site name="tilt_pivot_{name}" pos="{text(place)}"/>{old}'
+        )
     same = write_arm(tmp_path, sites, actuators={"tilt": CYLINDER}).joints[1].actuator
-    assert (same.triangle, same.stroke, same.pivots) == (cylinder.triangle, cylinder.stroke, cylinder.pivots)
+    assert (same.triangle, same.stroke, same.pivots) == (
+        cylinder.triangle,
+        cylinder.stroke,
+        cylinder.pivots,
+    )
 
 
 @pytest.mark.parametrize("above", [1.0, -1.0])
 @pytest.mark.parametrize("limits", ["-60 60", "-175 -135", "135 175"])
-def test_a_positive_command_turns_a_joint_back_whose_rod_runs_out_that_way(tmp_path, above, limits):
-    """The way in its range counts: at angle 0, which it need not reach, the rod may run out the other way."""
+def test_a_positive_command_turns_a_joint_back_whose_rod_runs_out_that_way(
+    tmp_path, above, limits
+):
+    """The way in its range counts: at angle 0, which it need not reach, the rod may run
+    out the other way."""
     z = 2.0 + above * np.array([0.4, 0.5])
     ends = {"parent": [*PARENT[:2], float(z[0])], "child": [*CHILD[:2], float(z[1])]}
     model = BOOM.replace('range="-60 60"', f'range="{limits}"')
@@ -111,7 +151,11 @@ def text(values):
 def test_any_mjcf_of_hinges_is_an_arm(tmp_path):
     """Masses may come from shapes; without a keyframe `home` is where MuJoCo starts."""
     arm = write_arm(tmp_path)
-    assert (arm.name, arm.joint_names, arm.link_names) == ("boom", ("lift", "tilt"), ("boom", "bar", "hook"))
+    assert (arm.name, arm.joint_names, arm.link_names) == (
+        "boom",
+        ("lift", "tilt"),
+        ("boom", "bar", "hook"),
+    )
     np.testing.assert_allclose(arm.masses, [1500, 90, 20])
     assert arm.poses == {"home": (0.0, 0.0)}
     assert arm.joints[0].actuator is None
@@ -121,7 +165,8 @@ def test_any_mjcf_of_hinges_is_an_arm(tmp_path):
 
 
 def test_defaults_classes_and_frames_are_read_as_mujoco_reads_them(tmp_path):
-    """Names and ranges are read without MuJoCo, masses and the order of links with it."""
+    """Names and ranges are read without MuJoCo, masses and the order of links with
+    it."""
     model = BOOM.replace(
         "<worldbody>",
         '<compiler angle="radian" autolimits="true"/><default><joint range="-0.5 0.5"/><default class="look">'
@@ -136,7 +181,9 @@ def test_defaults_classes_and_frames_are_read_as_mujoco_reads_them(tmp_path):
     np.testing.assert_allclose([arm.lower, arm.upper], [[-0.5, -np.inf], [0.5, np.inf]])
     assert compiled.jnt_limited.tolist() == [1, 0]
     assert arm.link_names == ("boom", "bar", "hook")
-    np.testing.assert_allclose(arm.masses, [compiled.body(name).mass[0] for name in arm.link_names])
+    np.testing.assert_allclose(
+        arm.masses, [compiled.body(name).mass[0] for name in arm.link_names]
+    )
 
 
 def test_a_payload_hangs_on_its_site(tmp_path):
@@ -183,7 +230,9 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("change", "settings", "message"), WRONG)
-def test_an_arm_that_hydroid_cannot_simulate_is_refused_in_one_line(tmp_path, change, settings, message):
+def test_an_arm_that_hydroid_cannot_simulate_is_refused_in_one_line(
+    tmp_path, change, settings, message
+):
     assert change[0] in BOOM
     with pytest.raises(HydroidError, match=message) as caught:
         assert write_arm(tmp_path, BOOM.replace(*change), **settings).joints

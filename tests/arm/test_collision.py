@@ -1,4 +1,5 @@
-"""Distances between bodies, held against MuJoCo's contacts, and against balls on sticks."""
+"""Distances between bodies, held against MuJoCo's contacts, and against balls on
+sticks."""
 
 import mujoco
 import numpy as np
@@ -19,9 +20,13 @@ def machine(arm: Arm) -> Machine:
 
 
 def sweep(arm: Arm, samples: int, seed: int = 0) -> np.ndarray:
-    """From the study pose to ever larger sines through the joints' ranges [rad], shape (samples, 14)."""
+    """From the study pose to ever larger sines through the joints' ranges [rad], shape
+    (samples, 14)."""
     rng = np.random.default_rng(seed)
-    low, high = np.tile(np.maximum(arm.lower, -3), 2), np.tile(np.minimum(arm.upper, 3), 2)
+    low, high = (
+        np.tile(np.maximum(arm.lower, -3), 2),
+        np.tile(np.minimum(arm.upper, 3), 2),
+    )
     part = np.linspace(0, 1, samples)[:, None]
     turned = np.sin(20 * part * rng.uniform(0.5, 2.0, 14) + rng.uniform(0, 6, 14))
     study = np.tile(arm.pose("study"), 2)
@@ -31,7 +36,9 @@ def sweep(arm: Arm, samples: int, seed: int = 0) -> np.ndarray:
 def test_bodies_meet_where_mujoco_finds_contacts(machine: Machine, arm: Arm):
     model, angle = machine.model, sweep(arm, 150)
     clearance = machine.checker.clearance(0.01 * np.arange(len(angle)), angle)
-    inside = [posed(model, pose).contact.dist.min(initial=0.0) < -1e-6 for pose in angle]
+    inside = [
+        posed(model, pose).contact.dist.min(initial=0.0) < -1e-6 for pose in angle
+    ]
     assert 0 < sum(inside) < len(angle)
     np.testing.assert_array_equal(clearance.distance < -1e-6, inside)
     for margin in (0.0, 0.03, 0.08):
@@ -43,7 +50,8 @@ def test_depth_and_time_of_a_meeting():
     text = SWINGS.replace('pos="3 0 2"', 'pos="2.1 0 2"')
     model = mujoco.MjModel.from_xml_string(text)
     time = np.linspace(0.0, 2.0, 201)
-    angle = np.column_stack([0.4 * (1 - time), np.zeros(201)])  # past the other ball, 0.1 m from it
+    # past the other ball, 0.1 m from it
+    angle = np.column_stack([0.4 * (1 - time), np.zeros(201)])
     (meeting,) = CollisionChecker(model).clearance(time, angle).meetings
     assert meeting.bodies == ["first", "second"]
     assert meeting.deepest_at_s == pytest.approx(1.0)
@@ -54,7 +62,9 @@ def test_depth_and_time_of_a_meeting():
 
 
 def test_a_model_without_shapes_is_refused():
-    model = mujoco.MjModel.from_xml_string(SWINGS.replace("<geom", '<geom contype="0" conaffinity="0"'))
+    model = mujoco.MjModel.from_xml_string(
+        SWINGS.replace("<geom", '<geom contype="0" conaffinity="0"')
+    )
     with pytest.raises(ModelError, match="no two of its bodies can collide"):
         CollisionChecker(model, "swings")
 
@@ -64,4 +74,6 @@ def test_nothing_meets_in_a_named_pose(machine: Machine, arm: Arm):
     clearance = machine.checker.clearance(np.arange(len(poses), dtype=float), poses)
     assert not clearance.meetings
     excluded = {frozenset(pair) for pair in clearance.excluded}
-    assert {frozenset({"carrier", f"{side}_link1"}) for side in ("right", "left")} <= excluded
+    assert {
+        frozenset({"carrier", f"{side}_link1"}) for side in ("right", "left")
+    } <= excluded

@@ -30,11 +30,16 @@ def locked_model(locked, masses):
 def random_state(rng):
     span = np.where(np.isinf(ARM.upper), np.pi, ARM.upper - ARM.lower)
     start = np.where(np.isinf(ARM.lower), -np.pi / 2, ARM.lower)
-    return start + span * rng.uniform(0.02, 0.98, J), rng.normal(size=J), 50 * rng.normal(size=J)
+    return (
+        start + span * rng.uniform(0.02, 0.98, J),
+        rng.normal(size=J),
+        50 * rng.normal(size=J),
+    )
 
 
 def constrained(masses, q, v, tau, moving):
-    """Accelerations and bias of the moving joints of the whole arm, others held: M_ff a_f = τ_f - bias_f."""
+    """Accelerations and bias of the moving joints of the whole arm, others held: M_ff
+    a_f = τ_f - bias_f."""
     model = with_masses(ARM, masses)
     data = mujoco.MjData(model)
     data.qpos[:], data.qvel[moving] = q, v[moving]
@@ -46,7 +51,9 @@ def constrained(masses, q, v, tau, moving):
 
 
 @settings(max_examples=40, deadline=None)
-@given(moving=st.sets(st.integers(0, J - 1), min_size=1), seed=st.integers(0, 2**32 - 1))
+@given(
+    moving=st.sets(st.integers(0, J - 1), min_size=1), seed=st.integers(0, 2**32 - 1)
+)
 def test_moves_like_the_whole_arm_with_the_other_joints_held(moving, seed):
     rng = np.random.default_rng(seed)
     moving = sorted(moving)
@@ -61,23 +68,40 @@ def test_moves_like_the_whole_arm_with_the_other_joints_held(moving, seed):
 
     scale = np.abs(bias).max() + np.abs(tau).max()
     np.testing.assert_allclose(data.qfrc_bias, bias, rtol=1e-9, atol=1e-11 * scale)
-    np.testing.assert_allclose(data.qacc, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
+    np.testing.assert_allclose(
+        data.qacc, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max()
+    )
 
 
 def test_what_a_users_model_says_of_its_joints_is_kept():
     spec = SPEC.copy()
     wrist = spec.joint("wrist")
-    wrist.armature, wrist.frictionloss, wrist.springref, wrist.ref = 0.3, 1.5, 20.0, 10.0
+    wrist.armature, wrist.frictionloss, wrist.springref, wrist.ref = (
+        0.3,
+        1.5,
+        20.0,
+        10.0,
+    )
     wrist.damping[0], wrist.stiffness[0] = 7.0, 11.0
     whole, part = spec.compile(), locked_arm(spec, ARM, ["wrist"], np.zeros(J)).model
-    for field in ("dof_armature", "dof_frictionloss", "dof_damping", "jnt_stiffness", "qpos_spring", "qpos0"):
+    for field in (
+        "dof_armature",
+        "dof_frictionloss",
+        "dof_damping",
+        "jnt_stiffness",
+        "qpos_spring",
+        "qpos0",
+    ):
         assert getattr(part, field)[0] == getattr(whole, field)[4] != 0, field
 
 
 def test_a_batch_follows_principal_axes_that_change_places(tmp_path):
     """Two blocks on one hinge: which axis is the longest depends on their masses."""
     blocks = {"a": (0.3, 0.2, 0.1), "b": (0.1, 0.2, 0.5)}
-    half = {name: " ".join(str(length / 2) for length in size) for name, size in blocks.items()}
+    half = {
+        name: " ".join(str(length / 2) for length in size)
+        for name, size in blocks.items()
+    }
     arm = write_arm(
         tmp_path,
         f"""<mujoco><worldbody><body name="a"><joint name="j" axis="0 -1 0" range="-90 90"/>
@@ -99,15 +123,24 @@ def test_a_batch_follows_principal_axes_that_change_places(tmp_path):
 
 @pytest.mark.parametrize("moving", [["lift"], ["tilt"]])
 def test_the_export_stands_where_the_whole_arm_does(tmp_path, moving):
-    """Also bodies in frames, turned by angles; only drawings are left of tendons, and no limits of motors."""
-    bar = BOOM[BOOM.index('<body name="bar"') : BOOM.index("</body>\n      </body>")] + "</body>"
-    turned = bar.replace('name="bar" pos="6 0 0"', 'name="bar" pos="1 0 0" euler="0 20 0"')
+    """Also bodies in frames, turned by angles; only drawings are left of tendons, and
+    no limits of motors."""
+    bar = (
+        BOOM[BOOM.index('<body name="bar"') : BOOM.index("</body>\n      </body>")]
+        + "</body>"
+    )
+    turned = bar.replace(
+        'name="bar" pos="6 0 0"', 'name="bar" pos="1 0 0" euler="0 20 0"'
+    )
     frame = f'<frame pos="5 0 1" euler="30 0 0"><site name="eye"/>{turned}</frame>'
     fixed = '<tendon><fixed><joint joint="tilt" coef="1"/></fixed></tendon></mujoco>'
     arm = write_arm(tmp_path, BOOM.replace(bar, frame).replace("</mujoco>", fixed))
     spec, pose = load_model(arm), np.array([0.3, -0.4])
     for joint in spec.joints:
-        joint.actfrclimited, joint.actfrcrange = mujoco.mjtLimited.mjLIMITED_TRUE, [-1, 1]
+        joint.actfrclimited, joint.actfrcrange = (
+            mujoco.mjtLimited.mjLIMITED_TRUE,
+            [-1, 1],
+        )
     locked, whole = locked_arm(spec, arm, moving, pose), spec.compile()
     model = locked_spec(spec, locked, locked.model, np.empty((2, 0))).compile()
     here, there = posed(model, locked.pose), posed(whole, pose)
@@ -115,4 +148,6 @@ def test_the_export_stands_where_the_whole_arm_does(tmp_path, moving):
     places = (d.geom_xpos[np.argsort(d.geom_xpos[:, 0])] for d in (here, there))
     np.testing.assert_allclose(*places, atol=1e-9)
     np.testing.assert_allclose(here.site_xpos, there.site_xpos, atol=1e-9)
-    np.testing.assert_allclose(here.qfrc_bias, there.qfrc_bias[locked.columns], atol=1e-6)
+    np.testing.assert_allclose(
+        here.qfrc_bias, there.qfrc_bias[locked.columns], atol=1e-6
+    )

@@ -1,4 +1,5 @@
-"""The shipped models: what the article and the meshes say of them, and mechanics that a reader can check."""
+"""The shipped models: what the article and the meshes say of them, and mechanics that a
+reader can check."""
 
 import shutil
 import subprocess
@@ -24,7 +25,9 @@ def test_making_the_models_again_changes_no_byte(tmp_path):
     """The inertias come from the meshes, and the two arms from the one."""
     for folder in ("meshes", "models"):
         shutil.copytree(assets() / folder, tmp_path / folder)
-    arm, dual = (tmp_path / "models" / name for name in ("hydrolek.xml", "hydrolek_dual.xml"))
+    arm, dual = (
+        tmp_path / "models" / name for name in ("hydrolek.xml", "hydrolek_dual.xml")
+    )
     arm.write_text(arm.read_text().replace('pos="0.27776318921062887 ', 'pos="0 '))
     dual.unlink()
     subprocess.run([sys.executable, tmp_path / "meshes" / "make_models.py"], check=True)
@@ -40,19 +43,28 @@ def test_the_committed_meshes_are_those_of_the_script(tmp_path):
         folder.mkdir()
         make = [sys.executable, assets() / "meshes" / "make_meshes.py", folder]
         subprocess.run(make, check=True, capture_output=True)
-    assert [path.name for path in MESHES] == sorted(path.name for path in folders[0].iterdir())
-    for path in MESHES:  # another release of manifold3d may cut other triangles from the same solid
-        assert (folders[0] / path.name).read_bytes() == (folders[1] / path.name).read_bytes()
+    assert [path.name for path in MESHES] == sorted(
+        path.name for path in folders[0].iterdir()
+    )
+    # another release of manifold3d may cut other triangles from the same solid
+    for path in MESHES:
+        assert (folders[0] / path.name).read_bytes() == (
+            folders[1] / path.name
+        ).read_bytes()
         kept, fresh = trimesh.load_mesh(path), trimesh.load_mesh(folders[0] / path.name)
         for name in ("volume", "center_mass", "moment_inertia"):
-            np.testing.assert_allclose(getattr(fresh, name), getattr(kept, name), rtol=1e-4, atol=1e-5)
+            np.testing.assert_allclose(
+                getattr(fresh, name), getattr(kept, name), rtol=1e-4, atol=1e-5
+            )
         assert path.stat().st_size < 100_000
 
 
 @pytest.mark.parametrize("joint", ["shoulder", "elbow", "wrist"])
 def test_positive_pitch_lifts_the_jaws(joint):
     angle = 0.1 * (np.array(ARM.joint_names) == joint)
-    there, here = (posed(MODEL, q).body("jaw_left").xipos[2] for q in (angle, 0 * angle))
+    there, here = (
+        posed(MODEL, q).body("jaw_left").xipos[2] for q in (angle, 0 * angle)
+    )
     assert there > here + 0.01
 
 
@@ -83,5 +95,8 @@ def test_each_arm_of_a_pair_is_the_one_that_stands_alone():
 def test_an_arm_that_names_no_pair_or_another_model_says_how():
     with pytest.raises(SettingsError, match=r"stands alone.*pair: MODEL"):
         load_machine(ARM.changed({"pair": None}), pair=True)
-    with pytest.raises(ModelError, match=r"not the model of two of the arm; the joints .* right_azimuth"):
+    with pytest.raises(
+        ModelError,
+        match=r"not the model of two of the arm; the joints .* right_azimuth",
+    ):
         load_machine(ARM.changed({"pair": ARM.model}), pair=True)

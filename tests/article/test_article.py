@@ -1,4 +1,5 @@
-"""The article's studies: files are sound, only what is missing runs, the page is what the results say."""
+"""The article's studies: files are sound, only what is missing runs, the page is what
+the results say."""
 
 import shutil
 import subprocess
@@ -12,7 +13,9 @@ from run import telling, with_what_needs_no_search
 from studies import BLIND, CENTRE, RECORDS, Plan, load_studies, read_runs
 
 STUDIES = load_studies()
-ITEMS = {f"table {n}" for n in range(1, 10) if n != 8} | {f"figure {n}" for n in (13, 14, 15, 16, 20)}
+ITEMS = {f"table {n}" for n in range(1, 10) if n != 8} | {
+    f"figure {n}" for n in (13, 14, 15, 16, 20)
+}
 FIGURES = {f"figure_{n}" for n in (10, 11, 13, 14, 15, 16, 19, 20)}
 ROOT = Path(__file__).parents[2]
 each_study = pytest.mark.parametrize("name", STUDIES)
@@ -29,7 +32,9 @@ def test_a_study_can_run_and_names_only_what_it_has(name: str):
     plan, study = Plan(name, STUDIES[name], quick=True), STUDIES[name]
     assert plan.log(1).duration <= 16
     for cell, settings in plan.cells.items():  # the article refines nothing
-        assert not study.seeds or (settings.refinement is None) == ("refined" not in cell)
+        assert not study.seeds or (settings.refinement is None) == (
+            "refined" not in cell
+        )
     named = {c for claim in study.claims for c in (claim.lower, claim.than)}
     named |= {c for figure in study.figures for c in figure.cells}
     named |= {c for table in study.tables for c in table.cells}
@@ -52,7 +57,12 @@ def test_what_is_committed_is_not_run_again_and_the_cheapest_claim_comes_first()
     runs = {name: read_runs(results / f"{name}_runs.csv") for name in plans}
     todo = telling(plans, runs)
     have = {(n, run["cell"], run["seed"]) for n, made in runs.items() for run in made}
-    wanted = {(n, c, s) for n, plan in plans.items() for c in plan.cells for s in plan.seeds(c)}
+    wanted = {
+        (n, c, s)
+        for n, plan in plans.items()
+        for c in plan.cells
+        for s in plan.seeds(c)
+    }
     assert len(todo) == len(set(todo))
     assert set(todo) == wanted - have
     fresh = telling(plans, {name: [] for name in runs})
@@ -73,18 +83,28 @@ def test_the_page_is_what_the_committed_results_say():
     assert page(DOCS / "reproduction") == text
     for study in STUDIES.values():
         assert all(f"| {claim.says} |" in text for claim in study.claims)
-    assert {file.stem for file in (DOCS / "reproduction").glob("figure_*.svg")} == FIGURES
+    assert {
+        file.stem for file in (DOCS / "reproduction").glob("figure_*.svg")
+    } == FIGURES
 
 
 @pytest.mark.slow
 def test_all_studies_run_in_their_short_form():
     results = ROOT / "runs" / "article-quick" / "results"
     shutil.rmtree(results, ignore_errors=True)  # an older run's
-    command = [sys.executable, str(ROOT / "benchmarks" / "article" / "run.py"), "--quick"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=600, cwd=ROOT)
+    command = [
+        sys.executable,
+        str(ROOT / "benchmarks" / "article" / "run.py"),
+        "--quick",
+    ]
+    done = subprocess.run(
+        command, capture_output=True, text=True, timeout=600, cwd=ROOT
+    )
     assert done.returncode == 0, done.stderr
     assert {file.stem for file in results.glob("figure_*.svg")} == FIGURES
-    assert "short form" in Path(done.stdout.strip().splitlines()[-1]).read_text(encoding="utf-8")
+    assert "short form" in Path(done.stdout.strip().splitlines()[-1]).read_text(
+        encoding="utf-8"
+    )
     for name, study in STUDIES.items():
         runs = read_runs(results / f"{name}_runs.csv")
         plan = Plan(name, study, quick=True)

@@ -12,13 +12,24 @@ BASE, NOISE = RNG.uniform(1, 2, 10), np.exp(RNG.normal(0, 0.1, 10))
 HALF = Table(title="", columns=("error",), article={"A": (1.0,), "B": (2.0,)})
 TWICE = Table(title="", columns=("error",), article={"A": (2.0,), "B": (1.0,)})
 HOLDS, OPPOSITE, EXCLUDED, UNDECIDED = Outcome
-EQUAL = Claim(says="A is as good as B", item="table 1", column="error", lower="A", than="B", equal=True)
+EQUAL = Claim(
+    says="A is as good as B",
+    item="table 1",
+    column="error",
+    lower="A",
+    than="B",
+    equal=True,
+)
 OF_ONE = Claim(says="A is below 2", item="table 1", column="error", lower="A", below=2)
 
 
 def rows(**measures) -> Runs:
     """One run of A and B with each seed; a measure is a pair of their values."""
-    made = [{"cell": c, "seed": s + 1} for c in "AB" for s in range(len(next(iter(measures.values()))[0]))]
+    made = [
+        {"cell": c, "seed": s + 1}
+        for c in "AB"
+        for s in range(len(next(iter(measures.values()))[0]))
+    ]
     for name, pair in measures.items():
         for run, value in zip(made, np.concatenate(pair), strict=True):
             run[name] = float(value)
@@ -31,7 +42,8 @@ def rows(**measures) -> Runs:
         (CLAIM, BASE, 2 * BASE * NOISE, True, HOLDS),  # an effect of the article's size
         (CLAIM, 2 * BASE * NOISE, BASE, True, OPPOSITE),
         (CLAIM, BASE, BASE * NOISE, True, EXCLUDED),  # none
-        (CLAIM, BASE, BASE * NOISE, False, EXCLUDED),  # no halving, where the article prints nothing
+        # no halving, where the article prints nothing
+        (CLAIM, BASE, BASE * NOISE, False, EXCLUDED),
         (CLAIM, BASE[:2], 2 * BASE[:2] * NOISE[:2], True, UNDECIDED),  # too few seeds
         (CLAIM, BASE, BASE * NOISE**40, True, UNDECIDED),  # too much noise
         (CLAIM, BASE, BASE, True, EXCLUDED),  # the same runs
@@ -66,7 +78,10 @@ def test_only_seeds_that_both_cells_have_are_compared():
 
 
 def test_claims_of_an_item_are_wrong_together_in_one_of_twenty_studies():
-    claims, wrong = [CLAIM.model_copy(update={"says": f"{i}", "column": f"{i}"}) for i in range(4)], 0
+    claims, wrong = (
+        [CLAIM.model_copy(update={"says": f"{i}", "column": f"{i}"}) for i in range(4)],
+        0,
+    )
     for _ in range(300):  # no effect
         made = rows(**{f"{i}": np.exp(RNG.normal(size=(2, 10))) for i in range(4)})
         wrong += any(v.outcome in (HOLDS, OPPOSITE) for v in verdicts(claims, made, []))
@@ -74,26 +89,45 @@ def test_claims_of_an_item_are_wrong_together_in_one_of_twenty_studies():
 
 
 def test_holm_asks_less_of_the_next_claim_once_one_is_decided():
-    sure, open_still = (CLAIM.model_copy(update={"says": s, "column": s}) for s in ("sure", "open"))
+    sure, open_still = (
+        CLAIM.model_copy(update={"says": s, "column": s}) for s in ("sure", "open")
+    )
     made = rows(sure=(BASE, 2 * BASE * NOISE), open=(BASE, BASE * NOISE))
     (alone,) = verdicts([open_still], made, [])
     after, decided = verdicts([open_still, sure], made, [])
     assert decided.outcome is HOLDS
     assert after.interval == pytest.approx(alone.interval)
-    both = verdicts([open_still, open_still.model_copy(update={"says": "again"})], made, [])
-    assert both[0].interval[0] < alone.interval[0] < alone.interval[1] < both[0].interval[1]
+    both = verdicts(
+        [open_still, open_still.model_copy(update={"says": "again"})], made, []
+    )
+    assert (
+        both[0].interval[0]
+        < alone.interval[0]
+        < alone.interval[1]
+        < both[0].interval[1]
+    )
 
 
-@pytest.mark.parametrize(("effect", "deviation", "seeds"), [(np.log(0.5), 0.8, 12), (0.0, 0.2, 12)])
-def test_the_power_is_how_often_such_seeds_decide(effect: float, deviation: float, seeds: int):
+@pytest.mark.parametrize(
+    ("effect", "deviation", "seeds"), [(np.log(0.5), 0.8, 12), (0.0, 0.2, 12)]
+)
+def test_the_power_is_how_often_such_seeds_decide(
+    effect: float, deviation: float, seeds: int
+):
     claim, found = CLAIM if effect else EQUAL, 0
     for _ in range(400):
         a = np.exp(RNG.normal(effect, deviation, seeds))
-        found += verdicts([claim], rows(error=(a, np.ones(seeds))), [])[0].outcome is HOLDS
+        found += (
+            verdicts([claim], rows(error=(a, np.ones(seeds))), [])[0].outcome is HOLDS
+        )
     assert power(effect, deviation, seeds, 0.05) == pytest.approx(found / 400, abs=0.08)
 
 
 def test_a_search_has_converged_when_a_twentieth_of_the_descent_is_left():
     history = [[1, 6, None], [2, 9, 11.0], [3, 12, 1.6], [4, 15, 1.5], [5, 18, 1.0]]
-    assert course(history) == {"generations": 4, "objective at half": 1.6, "history": "nan 11 1.6 1.5 1"}
+    assert course(history) == {
+        "generations": 4,
+        "objective at half": 1.6,
+        "history": "nan 11 1.6 1.5 1",
+    }
     assert course([[1, 6, 2.0]])["generations"] == 1

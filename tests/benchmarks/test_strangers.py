@@ -6,16 +6,28 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))  # last: its coverage.py is no package
+# last: its coverage.py is no package
+sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
 
 from exact_fit import exact_fit, moved, numbers, respond
-from stranger import STEP, Machine, Recording, errors, floor, read_recording, rms_deg, stick, write_machine
+from stranger import (
+    STEP,
+    Machine,
+    Recording,
+    errors,
+    floor,
+    read_recording,
+    rms_deg,
+    stick,
+    write_machine,
+)
 
 SEED = 5
 
 
 def made(number: int) -> tuple[Machine, Recording]:
-    """A machine with what it does in ten seconds, without noise, at every step of its integration."""
+    """A machine with what it does in ten seconds, without noise, at every step of its
+    integration."""
     rng = np.random.default_rng([SEED, number])
     machine = Machine(rng, number)
     command, angle = stick(rng, machine, 10.0)
@@ -35,7 +47,9 @@ def test_the_floor_of_a_machine_that_stands_is_its_noise():
     still = Recording(log.time, np.zeros_like(log.command), log.angle[0] + noise)
     still.command[len(noise) // 2 :] = 1e-9  # below every dead band
     expected = np.full(machine.joints, np.degrees(0.01))
-    assert floor(machine, still, still.time, still.angle) == pytest.approx(expected, rel=0.1)
+    assert floor(machine, still, still.time, still.angle) == pytest.approx(
+        expected, rel=0.1
+    )
 
 
 def test_commands_between_two_samples_are_lost_to_the_floor():
@@ -49,9 +63,12 @@ def test_an_exact_estimator_finds_back_to_the_truth():
     truth, log = made(3)
     rng, places = np.random.default_rng(1), numbers(truth)
     away = moved(truth, places, rng.normal(0, 0.3, len(places)))
-    noisy = Recording(log.time, log.command, log.angle + rng.normal(0, 1e-4, log.angle.shape))
+    noisy = Recording(
+        log.time, log.command, log.angle + rng.normal(0, 1e-4, log.angle.shape)
+    )
     before, after = (
-        rms_deg(errors(respond(one, log), log.time, log.angle)) for one in (away, exact_fit(away, [noisy]))
+        rms_deg(errors(respond(one, log), log.time, log.angle))
+        for one in (away, exact_fit(away, [noisy]))
     )
     moves = np.ptp(log.angle, axis=0) > 0
     assert np.all(after[moves] < 0.1 * before[moves])

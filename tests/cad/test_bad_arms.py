@@ -1,4 +1,5 @@
-"""Robots' files that are damaged or hostile: each is refused in one line that names the place, or said."""
+"""Robots' files that are damaged or hostile: each is refused in one line that names the
+place, or said."""
 
 import time
 from pathlib import Path
@@ -83,7 +84,9 @@ def test_files_that_include_each_other_twice_are_refused_at_once(tmp_path):
         (tmp_path / f"w{k}.xml").write_text(f"<mujoco>{twice}</mujoco>")
     (tmp_path / "w25.xml").write_text("<mujoco/>")
     start = time.perf_counter()
-    with pytest.raises(ModelError, match=r"includes w\d+\.xml again; MuJoCo takes a file once"):
+    with pytest.raises(
+        ModelError, match=r"includes w\d+\.xml again; MuJoCo takes a file once"
+    ):
         import_arm(tmp_path / "w0.xml")
     assert time.perf_counter() - start < 5
 
@@ -101,28 +104,48 @@ def test_what_is_no_file_is_not_waited_for(tmp_path):
             ("<worldbody>", '<worldbody><body name="x" pos="nan 0 0"/>'),
             "body 'x': pos=\"nan 0 0\" must be finite",
         ),
-        (("<worldbody>", '<worldbody><body name="x" gravcomp="1"/>'), "'x' has gravcomp"),
-        (("<worldbody>", '<option density="1.2"/><worldbody>'), "density or viscosity of the air"),
+        (
+            ("<worldbody>", '<worldbody><body name="x" gravcomp="1"/>'),
+            "'x' has gravcomp",
+        ),
+        (
+            ("<worldbody>", '<option density="1.2"/><worldbody>'),
+            "density or viscosity of the air",
+        ),
     ],
 )
 def test_an_arms_own_mjcf_is_held_to_the_same(tmp_path, change, message):
-    """MuJoCo takes NaN for what it likes, and hydroid simulates no gravity compensation."""
+    """MuJoCo takes NaN for what it likes, and hydroid simulates no gravity
+    compensation."""
     assert change[0] in BOOM
     with pytest.raises(HydroidError, match=message):
         _ = write_arm(tmp_path, BOOM.replace(*change)).joints
 
 
-def limits(low: object, high: object, kind: str = "revolute", turn: str = "0 -1 0") -> str:
+def limits(
+    low: object, high: object, kind: str = "revolute", turn: str = "0 -1 0"
+) -> str:
     limit = LIMIT.format(low, high)
-    return joint("boom_joint", "house", "boom", at="0.5 0 0.3", kind=kind, axis=turn, limit=limit)
+    return joint(
+        "boom_joint", "house", "boom", at="0.5 0 0.3", kind=kind, axis=turn, limit=limit
+    )
 
 
 @pytest.mark.parametrize(
     ("boom", "note"),
     [
-        (limits(-34, 68), "boom_joint: turns by 102 rad within its limits. Are they in deg?"),
-        (limits(-0.01, 0.02), "boom_joint: turns by only 1.7 deg within its limits. Are they in rad?"),
-        (limits(0, 1400, "prismatic"), "boom_joint: moves by 1400 m within its limits. Are they in mm?"),
+        (
+            limits(-34, 68),
+            "boom_joint: turns by 102 rad within its limits. Are they in deg?",
+        ),
+        (
+            limits(-0.01, 0.02),
+            "boom_joint: turns by only 1.7 deg within its limits. Are they in rad?",
+        ),
+        (
+            limits(0, 1400, "prismatic"),
+            "boom_joint: moves by 1400 m within its limits. Are they in mm?",
+        ),
         (limits("-inf", "inf"), "boom_joint: without limits"),
         (limits(-1e16, 1e16), "boom_joint: without limits"),
     ],
@@ -153,16 +176,20 @@ def machine(folder: Path, **changes: str) -> Path:
 
 
 @pytest.mark.parametrize(
-    "option", ["", '<option gravity="0 0 0"/>', '<option><flag gravity="disable"/></option>']
+    "option",
+    ["", '<option gravity="0 0 0"/>', '<option><flag gravity="disable"/></option>'],
 )
 def test_nothing_carries_the_arm_but_its_actuators(tmp_path, option):
     arm = import_arm(machine(tmp_path, option=option))
-    assert any("gravity compensation of the file is left out" in note for note in arm.notes)
+    assert any(
+        "gravity compensation of the file is left out" in note for note in arm.notes
+    )
     assert any("switches gravity off" in note for note in arm.notes) == bool(option)
     model, data = compiled(arm)
     mujoco.mj_forward(model, data)
     assert not data.qfrc_gravcomp.any()
-    moments = [9.81 * (60 * 1 + 150 * 2.4), 9.81 * 150 * 0.4]  # stretched out, of what lifts it
+    # stretched out, of what lifts it
+    moments = [9.81 * (60 * 1 + 150 * 2.4), 9.81 * 150 * 0.4]
     assert data.qfrc_bias == pytest.approx(moments, rel=1e-6)
 
 
@@ -176,7 +203,10 @@ def test_sites_of_the_file_give_a_cylinders_pivots(tmp_path):
     # beyond a dead centre no cylinder moves its joint
     arm = import_arm(machine(tmp_path, most="3"))
     assert arm.cylinders == {}
-    assert any(note.startswith("boom_joint: the file's cylinder is not taken: ") for note in arm.notes)
+    assert any(
+        note.startswith("boom_joint: the file's cylinder is not taken: ")
+        for note in arm.notes
+    )
 
 
 @pytest.mark.parametrize("kind", ["weld", "connect"])
@@ -189,15 +219,22 @@ def test_a_constraint_that_is_left_out_is_said(tmp_path, kind):
 
 
 def test_a_box_around_a_bucket_is_mostly_empty(tmp_path):
-    """MuJoCo fills it with water where the file says nothing; 60 kg of boom in 0.08 m³ are 750 kg/m³."""
+    """MuJoCo fills it with water where the file says nothing; 60 kg of boom in 0.08 m³
+    are 750 kg/m³."""
     arm = import_arm(machine(tmp_path, mass=""))
-    assert compiled(arm)[0].body("bucket").mass[0] == pytest.approx(500 * 0.8 * 0.8 * 0.6)
+    assert compiled(arm)[0].body("bucket").mass[0] == pytest.approx(
+        500 * 0.8 * 0.8 * 0.6
+    )
 
 
 def test_a_link_without_a_mass_has_the_density_of_the_files_others(tmp_path):
     boom, stick = link("boom", mass=0.12 * 300), link("stick", mass=0.0)
     model, _ = compiled(
-        import_arm(write_robot(tmp_path, house=link("house", mass=0.48 * 300), boom=boom, stick=stick))
+        import_arm(
+            write_robot(
+                tmp_path, house=link("house", mass=0.48 * 300), boom=boom, stick=stick
+            )
+        )
     )
     assert model.body("stick").mass[0] == pytest.approx(0.045 * 300)
 
@@ -209,9 +246,15 @@ def test_one_mesh_in_cm_leaves_the_others_in_m(tmp_path):
     solid = trimesh.creation.box(extents=(250, 150, 50))
     (tmp_path / "digger/meshes/track.stl").write_bytes(solid.export(file_type="stl"))
     arm = import_arm(path)
-    assert "mesh track.stl (250 m long): taken to be in cm, by the distances of the joints" in arm.notes
+    assert (
+        "mesh track.stl (250 m long): taken to be in cm, by the distances of the joints"
+        in arm.notes
+    )
     model, _ = compiled(arm)
-    longest = {model.geom(g).bodyid[0]: 2 * model.geom_aabb[g, 3:].max() for g in range(1, model.ngeom)}
+    longest = {
+        model.geom(g).bodyid[0]: 2 * model.geom_aabb[g, 3:].max()
+        for g in range(1, model.ngeom)
+    }
     assert longest == {
         0: pytest.approx(2.5),
         1: pytest.approx(1.0),
@@ -228,16 +271,24 @@ def test_a_mesh_larger_than_any_machine_is_not_shown(tmp_path, recwarn):
     assert "mesh boom.stl: larger than any machine: not shown" in arm.notes
     assert not any("taken to be" in note for note in arm.notes)
     assert not [
-        one for one in recwarn if "numpy" in str(one.filename) or issubclass(one.category, RuntimeWarning)
+        one
+        for one in recwarn
+        if "numpy" in str(one.filename) or issubclass(one.category, RuntimeWarning)
     ]
 
 
 @pytest.mark.parametrize(
-    "place", ["file:///home/other/ws/digger/meshes/boom.stl", "file://{folder}/digger/me%73hes/boom.stl"]
+    "place",
+    [
+        "file:///home/other/ws/digger/meshes/boom.stl",
+        "file://{folder}/digger/me%73hes/boom.stl",
+    ],
 )
 def test_meshes_of_another_machine_are_found_by_the_end_of_their_path(tmp_path, place):
     mesh = place.format(folder=tmp_path)
-    assert len(import_arm(write_robot(tmp_path, boom=link("boom", mesh=mesh))).meshes) == 3
+    assert (
+        len(import_arm(write_robot(tmp_path, boom=link("boom", mesh=mesh))).meshes) == 3
+    )
 
 
 def finger(side: str) -> str:
@@ -247,7 +298,9 @@ def finger(side: str) -> str:
     )
 
 
-@pytest.mark.parametrize("pair", [("finger_a", "finger_b"), ("grip_left", "grip_right"), ("pad_1", "pad_2")])
+@pytest.mark.parametrize(
+    "pair", [("finger_a", "finger_b"), ("grip_left", "grip_right"), ("pad_1", "pad_2")]
+)
 def test_an_arm_does_not_end_at_a_finger_that_the_log_does_not_name(tmp_path, pair):
     path = write_robot(tmp_path, more="".join(map(finger, pair)))
     assert compiled(import_arm(path))[0].njnt == 3
@@ -265,7 +318,9 @@ def test_the_anchor_of_a_cylinder_is_no_joint_of_the_arm(tmp_path):
     more += joint("boom_anchor_joint", "stick", "boom_anchor", at="1.5 0 0")
     arm = import_arm(write_robot(tmp_path, more=more))
     assert compiled(arm)[0].njnt == 3
-    assert any(note.startswith("boom_anchor_joint: part of a cylinder") for note in arm.notes)
+    assert any(
+        note.startswith("boom_anchor_joint: part of a cylinder") for note in arm.notes
+    )
 
 
 def test_a_good_file_reads_as_before(tmp_path):

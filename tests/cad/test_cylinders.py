@@ -1,4 +1,5 @@
-"""Cylinders that an MJCF models as loops of links: pivots, linkages and limits against stated truth."""
+"""Cylinders that an MJCF models as loops of links: pivots, linkages and limits against
+stated truth."""
 
 import numpy as np
 import pytest
@@ -11,18 +12,24 @@ from hydroid.settings.cylinder import LinearActuator, make_cylinder
 from hydroid.settings.linkage import Cylinder
 
 FOOT, EYE = np.array([0.5, -0.3]), np.array([1.4, 0.35])
-"""of the boom's cylinder, on the house and on the boom, seen from the boom's joint [m]"""
+"""of the boom's cylinder, on the house and on the boom, seen from the boom's joint
+[m]"""
 GROUND, PIN, CHILD = np.array([1.6, 0.15]), np.array([1.75, 0.5]), np.array([2.12, 0.3])
-"""of the bucket's rocker on the stick, of rocker and coupler, of coupler and bucket, in the stick's frame"""
+"""of the bucket's rocker on the stick, of rocker and coupler, of coupler and bucket, in
+the stick's frame"""
 TAIL, BUCKET = np.array([0.3, 0.45]), np.array([2.0, 0.0])
 """of the bucket's cylinder on the stick; the bucket's joint"""
 
 
 def written(folder):
-    """The file: rods point from their feet to their eyes, pinned to rocker and coupler in one point."""
+    """The file: rods point from their feet to their eyes, pinned to rocker and coupler
+    in one point."""
     way, rod = EYE - FOOT, PIN - TAIL
     path = folder / "loops.xml"
-    angles = {"boom": -np.arctan2(way[1], way[0]), "bucket": -np.arctan2(rod[1], rod[0])}
+    angles = {
+        "boom": -np.arctan2(way[1], way[0]),
+        "bucket": -np.arctan2(rod[1], rod[0]),
+    }
     text = (MODELS / "loops.xml").read_text()
     path.write_text(text.format(**angles, eye=np.hypot(*way) - 0.3, rod=np.hypot(*rod)))
     return path
@@ -41,7 +48,9 @@ def actuator(arm, name) -> LinearActuator:
 
 def test_angles_count_from_the_joints_own_zero(arm, tmp_path):
     path = written(tmp_path)
-    text = path.read_text().replace('name="bucket" axis', 'name="bucket" ref="0.3" axis')
+    text = path.read_text().replace(
+        'name="bucket" axis', 'name="bucket" ref="0.3" axis'
+    )
     path.write_text(text.replace('name="boom" axis', 'name="boom" ref="-0.2" axis'))
     other = import_arm(path)
     here, there = (actuator(one, "bucket") for one in (arm, other))
@@ -50,12 +59,20 @@ def test_angles_count_from_the_joints_own_zero(arm, tmp_path):
 
 
 def turned(point, angle):
-    return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]) @ point
+    return (
+        np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        @ point
+    )
 
 
 def test_rods_are_no_end_of_the_arm_and_weigh_on_their_links(arm):
     model, _ = compiled(arm)
-    assert [model.joint(j).name for j in range(model.njnt)] == ["swing", "boom", "stick", "bucket"]
+    assert [model.joint(j).name for j in range(model.njnt)] == [
+        "swing",
+        "boom",
+        "stick",
+        "bucket",
+    ]
     assert model.body_mass[-4:] == pytest.approx([4080, 800, 450, 310])
     assert set(arm.cylinders) == {"boom", "bucket"}
 
@@ -72,7 +89,10 @@ def test_the_cylinder_of_a_joint_without_limits_is_not_taken(tmp_path):
     path.write_text(path.read_text().replace(' range="-.3 .5"', ""))
     arm = import_arm(path)
     assert set(arm.cylinders) == {"bucket"}
-    assert "boom: without limits: the file's cylinder that moves it is not taken" in arm.notes
+    assert (
+        "boom: without limits: the file's cylinder that moves it is not taken"
+        in arm.notes
+    )
 
 
 def test_a_buckets_linkage_moves_as_its_bars_do(arm):
@@ -80,10 +100,15 @@ def test_a_buckets_linkage_moves_as_its_bars_do(arm):
 
     def rod_length(angle: float, near: float = 0.0) -> float:
         """Length of the cylinder where rocker and coupler meet, solved numerically."""
-        child, coupler = BUCKET + turned(CHILD - BUCKET, angle), np.linalg.norm(PIN - CHILD)
+        child, coupler = (
+            BUCKET + turned(CHILD - BUCKET, angle),
+            np.linalg.norm(PIN - CHILD),
+        )
 
         def open_by(turn):
-            return np.linalg.norm(GROUND + turned(PIN - GROUND, turn[0]) - child) - coupler
+            return (
+                np.linalg.norm(GROUND + turned(PIN - GROUND, turn[0]) - child) - coupler
+            )
 
         turn = least_squares(open_by, [angle], xtol=1e-14, ftol=1e-14, gtol=1e-14).x[0]
         return float(np.linalg.norm(GROUND + turned(PIN - GROUND, turn) - TAIL))

@@ -1,4 +1,5 @@
-"""An arm out of a URDF or MJCF: it moves as MuJoCo's own import does, and every trap is said in one line."""
+"""An arm out of a URDF or MJCF: it moves as MuJoCo's own import does, and every trap is
+said in one line."""
 
 import mujoco
 import numpy as np
@@ -25,7 +26,9 @@ def joints(model):
 
 def extents(model, body):
     """Size of what is seen of a body [m], ascending."""
-    geoms = np.flatnonzero((model.geom_bodyid == model.body(body).id) & (model.geom_group == SHOWN))
+    geoms = np.flatnonzero(
+        (model.geom_bodyid == model.body(body).id) & (model.geom_group == SHOWN)
+    )
     return np.sort(2 * model.geom_aabb[geoms.item(), 3:])
 
 
@@ -47,15 +50,20 @@ def test_links_joints_and_inertias_are_those_of_the_file(tmp_path):
     assert joints(model) == ["swing_joint", "boom_joint", "stick_joint"]
     for name, size in robots.SIZES.items():
         assert model.body(name).mass[0] == robots.MASSES[name]
-        np.testing.assert_allclose(model.body(name).ipos, [size[0] / 2, 0, 0], atol=1e-12)
-        np.testing.assert_allclose(tensor(model, name), of_box(name, robots.MASSES[name]), atol=1e-9)
+        np.testing.assert_allclose(
+            model.body(name).ipos, [size[0] / 2, 0, 0], atol=1e-12
+        )
+        np.testing.assert_allclose(
+            tensor(model, name), of_box(name, robots.MASSES[name]), atol=1e-9
+        )
         np.testing.assert_allclose(extents(model, name), np.sort(size), rtol=1e-6)
     assert model.jnt_range[1] == pytest.approx([-0.5, 1.2])
     assert model.key("home").qpos == pytest.approx([0, 0, -0.2])
 
 
 def test_turned_frames_move_as_mujocos_own_import_does(tmp_path):
-    """Links whose frames are turned, with a tool fixed to the last one, in every pose."""
+    """Links whose frames are turned, with a tool fixed to the last one, in every
+    pose."""
     inertia = '<inertia ixx="2" iyy="3" izz="4" ixy="0.1" ixz="0" iyz="0.2"/>'
     tool = f'<link name="tool"><inertial><origin xyz="0 0.1 0"/><mass value="30"/>{inertia}</inertial></link>'
     boom = {"at": "0.5 0.1 0.3", "turn": "0.3 -0.2 0.5", "axis": "0.1 -1 0.2"}
@@ -68,13 +76,19 @@ def test_turned_frames_move_as_mujocos_own_import_does(tmp_path):
     path = write_robot(tmp_path, **changes)
     found, _ = compiled(import_arm(path))
     assert found.body("stick").mass[0] == 120.0
-    text = path.read_text().replace("package://digger/meshes/", str(tmp_path / "digger/meshes") + "/")
-    text = text.replace("</robot>", '<mujoco><compiler strippath="false"/></mujoco></robot>')
+    text = path.read_text().replace(
+        "package://digger/meshes/", str(tmp_path / "digger/meshes") + "/"
+    )
+    text = text.replace(
+        "</robot>", '<mujoco><compiler strippath="false"/></mujoco></robot>'
+    )
     model = mujoco.MjSpec.from_string(text).compile()
     for angles in np.random.default_rng(1).uniform(-1, 1, (5, 3)):
         here, there = posed(found, angles), posed(model, angles)
         for name in ("xanchor", "xaxis", "qfrc_bias", "M"):
-            np.testing.assert_allclose(getattr(here, name), getattr(there, name), atol=1e-6)
+            np.testing.assert_allclose(
+                getattr(here, name), getattr(there, name), atol=1e-6
+            )
 
 
 FORK = (
@@ -85,12 +99,18 @@ FORK = (
 )
 MIMIC = LIMIT.format(-1, 1) + '<mimic joint="boom_joint" multiplier="-1"/>'
 NO_LIMITS = "swing_joint: without limits: moving without stops"
-TUBE = link("stick", mass=5.0).replace('"stick"', '"boom_tube"') + joint("tube", "house", "boom_tube")
+TUBE = link("stick", mass=5.0).replace('"stick"', '"boom_tube"') + joint(
+    "tube", "house", "boom_tube"
+)
 ROD = link("stick", mass=5.0).replace('"stick"', '"boom_rod"')
 
 
 def swing(kind, limit):
-    return {"swing_joint": joint("swing_joint", "track", "house", kind=kind, axis="0 0 1", limit=limit)}
+    return {
+        "swing_joint": joint(
+            "swing_joint", "track", "house", kind=kind, axis="0 0 1", limit=limit
+        )
+    }
 
 
 def stick(**changes):
@@ -103,10 +123,18 @@ def light(name):
 
 TRAPS = [
     ({}, "track: root link, the fixed base: its mass does not matter", [800, 200, 90]),
-    (stick(limit=MIMIC), "stick_joint: following another joint, which hydroid does not model", [800, 290]),
+    (
+        stick(limit=MIMIC),
+        "stick_joint: following another joint, which hydroid does not model",
+        [800, 290],
+    ),
     (stick(kind="prismatic"), "track: root link", [800, 200, 90]),
     (stick(kind="floating"), "stick: free to float in the file: fixed", [800, 290]),
-    (stick(kind="planar"), "stick_joint: moving in a plane, which hydroid does not model", [800, 290]),
+    (
+        stick(kind="planar"),
+        "stick_joint: moving in a plane, which hydroid does not model",
+        [800, 290],
+    ),
     (swing("continuous", ""), NO_LIMITS, [800, 200, 90]),
     (swing("revolute", LIMIT.format(0, 0)), NO_LIMITS, [800, 200, 90]),
     (
@@ -121,7 +149,11 @@ TRAPS = [
         [800, 290, 90, 90],
     ),
     (
-        {"more": TUBE + ROD + joint("boom_rod_joint", "boom_tube", "boom_rod", kind="prismatic")},
+        {
+            "more": TUBE
+            + ROD
+            + joint("boom_rod_joint", "boom_tube", "boom_rod", kind="prismatic")
+        },
         "tube and boom_rod_joint: part of a cylinder that the file pins at one end: held. Give both pivots",
         [810, 200, 90],
     ),
@@ -137,10 +169,13 @@ TRAPS = [
         [800, 144, 90],
     ),
 ]
-"""changes of a URDF, the beginning of the note on them, and the masses of the moving bodies [kg]"""
+"""changes of a URDF, the beginning of the note on them, and the masses of the moving
+bodies [kg]"""
 
 
-@pytest.mark.parametrize(("changes", "note", "masses"), TRAPS, ids=[note[:30] for _, note, _ in TRAPS])
+@pytest.mark.parametrize(
+    ("changes", "note", "masses"), TRAPS, ids=[note[:30] for _, note, _ in TRAPS]
+)
 def test_a_trap_is_said_in_one_line(tmp_path, changes, note, masses):
     arm = import_arm(write_robot(tmp_path, **changes))
     said(arm, note.replace("FOLDER", str(tmp_path)))
@@ -150,17 +185,28 @@ def test_a_trap_is_said_in_one_line(tmp_path, changes, note, masses):
 
 
 def test_a_total_mass_scales_all_that_moves(tmp_path):
-    model, _ = compiled(import_arm(write_robot(tmp_path, **light("boom")), total_mass=5170.0))
+    model, _ = compiled(
+        import_arm(write_robot(tmp_path, **light("boom")), total_mass=5170.0)
+    )
     assert model.body_mass[1:] == pytest.approx(np.array([800, 144, 90]) * 5)
-    np.testing.assert_allclose(tensor(model, "stick"), of_box("stick", 5 * 90), atol=1e-9)
+    np.testing.assert_allclose(
+        tensor(model, "stick"), of_box("stick", 5 * 90), atol=1e-9
+    )
 
 
 @pytest.mark.parametrize(
-    "mesh", ["package://digger/meshes/boom.stl", "../meshes/BOOM.stl", "package://x/meshes/boom.stl"]
+    "mesh",
+    [
+        "package://digger/meshes/boom.stl",
+        "../meshes/BOOM.stl",
+        "package://x/meshes/boom.stl",
+    ],
 )
 def test_meshes_are_found_from_the_urdfs_folder_and_its_parents(tmp_path, mesh):
     path = write_robot(tmp_path, boom=link("boom", mesh=mesh))
-    (path.parent / "boom.stl").write_bytes((path.parents[1] / "meshes/boom.stl").read_bytes())
+    (path.parent / "boom.stl").write_bytes(
+        (path.parents[1] / "meshes/boom.stl").read_bytes()
+    )
     assert any(name.lower() == "links/boom.stl" for name in import_arm(path).meshes)
 
 
@@ -172,11 +218,19 @@ FAULTS = {
         "MASSES THAT NO MACHINE HAS [kg]: boom none -> 144",
         144.0,
     ),
-    "no mass": (link("boom", mass=0.0, ixx=1, iyy=1, izz=1), "MASSES THAT NO MACHINE HAS", 144.0),
+    "no mass": (
+        link("boom", mass=0.0, ixx=1, iyy=1, izz=1),
+        "MASSES THAT NO MACHINE HAS",
+        144.0,
+    ),
     "A + B < C": (link("boom", ixx=1, iyy=1, izz=9), NOBODY, 200.0),
     "no inertia": (link("boom", ixx=0, iyy=0, izz=0), NOBODY, 200.0),
     "negative": (link("boom", ixx=-1, iyy=5, izz=5), NOBODY, 200.0),
-    "in kg mm²": (link("boom", ixx=2e6, iyy=7e7, izz=7e7), "link boom: an inertia of a far larger", 200.0),
+    "in kg mm²": (
+        link("boom", ixx=2e6, iyy=7e7, izz=7e7),
+        "link boom: an inertia of a far larger",
+        200.0,
+    ),
 }
 
 
@@ -187,7 +241,9 @@ def test_an_impossible_inertia_is_that_of_the_mesh(tmp_path, fault):
     said(arm, message)
     model, _ = compiled(arm)
     assert model.body("boom").mass[0] == pytest.approx(mass)
-    np.testing.assert_allclose(tensor(model, "boom"), of_box("boom", mass), rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(
+        tensor(model, "boom"), of_box("boom", mass), rtol=1e-6, atol=1e-6
+    )
     np.testing.assert_allclose(model.body("boom").ipos, [1, 0, 0], atol=1e-9)
 
 
@@ -201,7 +257,9 @@ def test_meshes_in_millimetres_are_scaled(tmp_path):
     arm = import_arm(write_robot(tmp_path, scale=1000.0))
     said(arm, "meshes up to 2000 m long: all are taken to be in mm")
     model, _ = compiled(arm)
-    assert [extents(model, name).max() for name in robots.SIZES] == pytest.approx([1, 2, 1.5])
+    assert [extents(model, name).max() for name in robots.SIZES] == pytest.approx(
+        [1, 2, 1.5]
+    )
 
     # the file's own scale is used
     boom = robots.PARTS["boom"].replace('.stl"', '.stl" scale="0.5 0.5 0.5"')
@@ -211,17 +269,23 @@ def test_meshes_in_millimetres_are_scaled(tmp_path):
 
 @pytest.mark.parametrize("kind", ["obj", "stl_ascii", "ply"])
 def test_other_mesh_files_are_converted(tmp_path, kind):
-    box = trimesh.load(write_robot(tmp_path).parents[1] / "meshes/boom.stl", force="mesh")
+    box = trimesh.load(
+        write_robot(tmp_path).parents[1] / "meshes/boom.stl", force="mesh"
+    )
     name = f"boom.{kind.removesuffix('_ascii')}"
     content = box.export(file_type=kind)
     target = tmp_path / "digger/meshes" / name
     target.write_bytes(content if isinstance(content, bytes) else content.encode())
     arm = import_arm(write_robot(tmp_path, boom=link("boom", mesh=f"../meshes/{name}")))
-    np.testing.assert_allclose(extents(compiled(arm)[0], "boom"), np.sort(robots.SIZES["boom"]), rtol=1e-6)
+    np.testing.assert_allclose(
+        extents(compiled(arm)[0], "boom"), np.sort(robots.SIZES["boom"]), rtol=1e-6
+    )
 
 
 def test_a_mesh_that_cannot_be_read_is_said(tmp_path):
-    arm = import_arm(write_robot(tmp_path, boom=link("boom", mesh="../meshes/boom.dae")))
+    arm = import_arm(
+        write_robot(tmp_path, boom=link("boom", mesh="../meshes/boom.dae"))
+    )
     said(arm, "mesh ../meshes/boom.dae: not found")
     (tmp_path / "digger/meshes/boom.dae").write_text("<COLLADA/>")
     arm = import_arm(tmp_path / "digger/urdf/digger.urdf")
@@ -236,7 +300,9 @@ def test_the_branch_that_the_log_names_or_that_is_asked_for_is_taken(tmp_path):
     said(arm, f"the arm is {taken}; held at 0")
     assert joints(compiled(arm)[0]) == ["swing_joint", "boom_joint", "stick_joint"]
     assert compiled(import_arm(path, tip="boom"))[0].njnt == 2
-    with pytest.raises(ModelError, match=r"no joint moves a link 'bom'; tips: stick, chisel"):
+    with pytest.raises(
+        ModelError, match=r"no joint moves a link 'bom'; tips: stick, chisel"
+    ):
         import_arm(path, tip="bom")
 
 
@@ -252,7 +318,9 @@ def test_an_mjcf_is_read_too(tmp_path):
     assert model.body("stick").mass[0] == pytest.approx(50)
     assert model.jnt_type.tolist() == [3, 3, 2]
     np.testing.assert_allclose(data.body("boom").xipos, [0.5, 1, 1.6], atol=1e-6)
-    np.testing.assert_allclose(data.xanchor[:2], [[0.5, 0, 1.6], [0.5, 2, 1.6]], atol=1e-9)
+    np.testing.assert_allclose(
+        data.xanchor[:2], [[0.5, 0, 1.6], [0.5, 2, 1.6]], atol=1e-9
+    )
     assert np.degrees(model.jnt_range[1]) == pytest.approx([-90, 0])
 
 

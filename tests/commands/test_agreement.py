@@ -1,4 +1,5 @@
-"""`check` compares logs: one of another speed is named, with its time of day and load; equal ones are not."""
+"""`check` compares logs: one of another speed is named, with its time of day and load;
+equal ones are not."""
 
 import json
 from pathlib import Path
@@ -13,7 +14,8 @@ NAMES = "time_s,u2_pct,q2_deg"
 
 @pytest.fixture
 def logs(tmp_path: Path) -> list[Path]:
-    """Four logs of a rig, with noise of their own; the third begins at half past twelve."""
+    """Four logs of a rig, with noise of their own; the third begins at half past
+    twelve."""
     lines = (RIG / "rig_shoulder_1.csv").read_text().splitlines()
     names = lines[0].split(",")
     cells = np.array([line.split(",") for line in lines[1:]], float)
@@ -24,7 +26,9 @@ def logs(tmp_path: Path) -> list[Path]:
         noise = np.random.default_rng(k).normal(0, 0.05, len(time))
         columns = [time.astype(str), command.astype(str), (angle + noise).astype(str)]
         if k == 2:
-            stamps = np.datetime64("2026-03-01T12:30:00") + np.round(1e3 * time).astype("m8[ms]")
+            stamps = np.datetime64("2026-03-01T12:30:00") + np.round(1e3 * time).astype(
+                "m8[ms]"
+            )
             columns[0] = stamps.astype(str)
             columns[2] = (angle[0] + 0.8 * (angle - angle[0]) + noise).astype(str)
         rows = [",".join(row) for row in zip(*columns, strict=True)]
@@ -33,7 +37,9 @@ def logs(tmp_path: Path) -> list[Path]:
     return paths
 
 
-def test_the_log_that_stands_out_is_named_with_its_conditions(logs: list[Path], hydroid_cli: Run) -> None:
+def test_the_log_that_stands_out_is_named_with_its_conditions(
+    logs: list[Path], hydroid_cli: Run
+) -> None:
     payload = "--set=payloads={day_2.csv: 250}"
     ended = hydroid_cli("check", *logs, payload)
     assert "joint shoulder moves at 0.8" in ended.out
@@ -46,5 +52,8 @@ def test_the_log_that_stands_out_is_named_with_its_conditions(logs: list[Path], 
 
 def test_equal_logs_are_said_to_agree(logs: list[Path], hydroid_cli: Run) -> None:
     equal = [logs[k] for k in (0, 1, 3)]
-    assert "No log stands out in speed, dead bands or delay of shoulder" in hydroid_cli("check", *equal).out
+    assert (
+        "No log stands out in speed, dead bands or delay of shoulder"
+        in hydroid_cli("check", *equal).out
+    )
     assert "Do the logs agree?" in hydroid_cli("check", *equal, "-v").out

@@ -1,4 +1,5 @@
-"""Runs that were made apart come together, and those that do not belong together are warnings."""
+"""Runs that were made apart come together, and those that do not belong together are
+warnings."""
 
 import csv
 import json
@@ -28,10 +29,14 @@ def runs(array, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[Path]:
 
 def change(file: Path, **values: object) -> None:
     content = yaml.safe_load(file.read_text()) | values
-    file.write_text(json.dumps(content) if file.suffix == ".json" else yaml.safe_dump(content))
+    file.write_text(
+        json.dumps(content) if file.suffix == ".json" else yaml.safe_dump(content)
+    )
 
 
-def collected(caplog: pytest.LogCaptureFixture, *names: object) -> tuple[list[int], list[str]]:
+def collected(
+    caplog: pytest.LogCaptureFixture, *names: object
+) -> tuple[list[int], list[str]]:
     caplog.clear()
     study = hydroid.report([str(name) for name in names], merge=True, out="out")
     return [run.seed for run in study.result], caplog.messages
@@ -59,7 +64,12 @@ def test_runs_that_cannot_be_used_are_named_and_left_out(runs, caplog, tmp_path:
     seeds, warnings = collected(caplog, "seed-*", "nowhere")
     assert seeds == [3]
     named = [line.split(":")[1].split(",")[0].strip() for line in warnings]
-    assert named == ["nowhere/run.json", "seed-1", "seed-2/estimate.yaml", "seed-4/run.json"]
+    assert named == [
+        "nowhere/run.json",
+        "seed-1",
+        "seed-2/estimate.yaml",
+        "seed-4/run.json",
+    ]
     with pytest.raises(RunError, match="no finished run is there"):
         collected(caplog, "seed-1", "seed-2", "seed-4")
     with pytest.raises(RunError, match="is a run itself"):
@@ -72,7 +82,9 @@ def test_a_seed_counts_once(runs):
         hydroid.report(["seed-*", "again"], merge=True)
 
 
-def test_runs_of_other_settings_logs_and_versions_are_not_mixed(runs, caplog, array, tmp_path: Path):
+def test_runs_of_other_settings_logs_and_versions_are_not_mixed(
+    runs, caplog, array, tmp_path: Path
+):
     from hydroid.run.folder import RunFolder
 
     plain = array[1][3].problem.settings
@@ -81,7 +93,9 @@ def test_runs_of_other_settings_logs_and_versions_are_not_mixed(runs, caplog, ar
         """The run of seed 3 with the same estimate under other settings."""
         settings = plain.changed(changes)
         shutil.rmtree("seed-3")
-        RunFolder(tmp_path / "seed-3").begin(settings, read_logs([array[0] / name], settings))
+        RunFolder(tmp_path / "seed-3").begin(
+            settings, read_logs([array[0] / name], settings)
+        )
         for file in ("estimate.yaml", "result.npz"):
             shutil.copy(array[0] / "seed-3" / file, Path("seed-3") / file)
         RunFolder(tmp_path / "seed-3").status("done")
@@ -108,9 +122,16 @@ def test_runs_of_other_settings_logs_and_versions_are_not_mixed(runs, caplog, ar
 
 def test_the_command_names_the_best_run_and_warns_on_the_side(runs):
     change(Path("seed-3/run.json"), status="running")
-    done = CliRunner().invoke(app, ["report", "--merge", *map(str, runs), "--out", "out", "--json"])
+    done = CliRunner().invoke(
+        app, ["report", "--merge", *map(str, runs), "--out", "out", "--json"]
+    )
     assert done.exit_code == 0
     found = json.loads(done.stdout)
     assert set(found["runs"]) == {"seed-1", "seed-2"}
-    assert found["best"] == min(found["runs"], key=lambda run: found["runs"][run]["fitted_deg"]["shoulder"])
-    assert done.stderr == "hydroid: left out: seed-3: is not finished (running); resume it\n"
+    assert found["best"] == min(
+        found["runs"], key=lambda run: found["runs"][run]["fitted_deg"]["shoulder"]
+    )
+    assert (
+        done.stderr
+        == "hydroid: left out: seed-3: is not finished (running); resume it\n"
+    )

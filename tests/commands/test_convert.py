@@ -1,4 +1,5 @@
-"""`convert`: what is written reads back to the same bits, with settings or by guesses."""
+"""`convert`: what is written reads back to the same bits, with settings or by
+guesses."""
 
 import json
 from pathlib import Path
@@ -17,15 +18,22 @@ SHOULDER, EXCAVATOR = RIG / "rig_shoulder_1.csv", RIG.parent / "excavator"
 
 
 @pytest.mark.parametrize("name", ["fit_01", "check_04"])
-def test_a_jittering_log_with_signs_reads_back_to_the_same_bits(name: str, tmp_path: Path) -> None:
+def test_a_jittering_log_with_signs_reads_back_to_the_same_bits(
+    name: str, tmp_path: Path
+) -> None:
     settings = hydroid.load_settings(EXCAVATOR / "fit.yaml")
-    done = hydroid.convert(EXCAVATOR / f"{name}.csv", out=tmp_path / "plain.csv", config=settings)
+    done = hydroid.convert(
+        EXCAVATOR / f"{name}.csv", out=tmp_path / "plain.csv", config=settings
+    )
     (log,) = hydroid.read_logs(EXCAVATOR / f"{name}.csv", settings)
-    plain = settings.model_copy(update={"log": LogSettings(period_s=settings.log.period_s)})
+    plain = settings.model_copy(
+        update={"log": LogSettings(period_s=settings.log.period_s)}
+    )
     (back,) = hydroid.read_logs(tmp_path / "plain.csv", plain)
     np.testing.assert_array_equal(back.time, log.time)
     np.testing.assert_array_equal(back.command, log.command)
-    # degrees that were interpolated in rad: no cell may exist that is read as these very bits
+    # degrees that were interpolated in rad: no cell may exist that is read as these
+    # very bits
     np.testing.assert_allclose(back.angle, log.angle, rtol=4e-16, atol=0)
     np.testing.assert_array_equal(done.result.log.command, log.command)
     assert done.result.guess is None
@@ -34,7 +42,9 @@ def test_a_jittering_log_with_signs_reads_back_to_the_same_bits(name: str, tmp_p
 def test_a_guessed_log_reads_back_to_the_same_bits(tmp_path: Path) -> None:
     done = hydroid.convert(SHOULDER, out=tmp_path / "plain.csv")
     settings = hydroid.load_settings("fit-mech")
-    (log,), (back,) = (hydroid.read_logs(path, settings) for path in (SHOULDER, tmp_path / "plain.csv"))
+    (log,), (back,) = (
+        hydroid.read_logs(path, settings) for path in (SHOULDER, tmp_path / "plain.csv")
+    )
     np.testing.assert_array_equal(back.command, log.command)
     np.testing.assert_array_equal(back.angle, log.angle)
     assert done.result.guess is not None

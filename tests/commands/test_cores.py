@@ -13,12 +13,16 @@ LOG = Path(__file__).parents[2] / "examples" / "logs" / "rig_shoulder_1.csv"
 
 
 @pytest.mark.skipif((os.cpu_count() or 1) < 2, reason="has one core")
-@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="cores cannot be chosen")
+@pytest.mark.skipif(
+    not hasattr(os, "sched_setaffinity"), reason="cores cannot be chosen"
+)
 def test_uncertainties_are_the_same_on_one_core_and_on_all(tmp_path: Path):
     (tmp_path / "values.yaml").write_text(yaml.safe_dump(TRUTH))
     words = ["analyse", str(LOG), "--fit", "values.yaml", "--json"]
     code = f"import os, sys; {{}}; sys.argv[1:] = {words!r}; from hydroid.__main__ import main; main()"
-    environment = {key: value for key, value in os.environ.items() if not key.endswith("_THREADS")}
+    environment = {
+        key: value for key, value in os.environ.items() if not key.endswith("_THREADS")
+    }
     printed = [
         subprocess.run(
             [sys.executable, "-c", code.format(cores)],

@@ -1,4 +1,5 @@
-"""What the user can correct is one line and exit status 2, and nothing is half-written."""
+"""What the user can correct is one line and exit status 2, and nothing is
+half-written."""
 
 import json
 from pathlib import Path
@@ -19,22 +20,58 @@ FILES = {
 }
 WRONG = [
     ("fit-mech nowhere.csv", "log", "nowhere.csv"),
-    ("fit-mech", "usage", "hydroid: missing argument 'LOG'; see hydroid fit-mech --help"),
+    (
+        "fit-mech",
+        "usage",
+        "hydroid: missing argument 'LOG'; see hydroid fit-mech --help",
+    ),
     ("fit-mech {log} --config nonsense", "settings", "nonsense"),
     ("fit-mech {log} --set search.seed=x", "settings", "--set search.seed"),
-    ("fit-mech {log} --algorithm pso", "settings", "hydroid: --algorithm: must be 'ga', 'nsga2'"),
-    ("fit-mech {log} --budget soon", "settings", "--budget: is no time: 'soon'; such as 90s, 5min or 2h"),
+    (
+        "fit-mech {log} --algorithm pso",
+        "settings",
+        "hydroid: --algorithm: must be 'ga', 'nsga2'",
+    ),
+    (
+        "fit-mech {log} --budget soon",
+        "settings",
+        "--budget: is no time: 'soon'; such as 90s, 5min or 2h",
+    ),
     ("fit-mech {log} --out .", "run", "holds no run"),
-    ("fit-mech {log} --set outputs=[9]", "log", "no joint 9; the arm has joints 1 to 7"),
+    (
+        "fit-mech {log} --set outputs=[9]",
+        "log",
+        "no joint 9; the arm has joints 1 to 7",
+    ),
     ("fit-mech {log} --config fit-hyd", "settings", "use hydroid fit-hyd"),
     ("fit-mech {log} --sed 1", "usage", "--sed"),
     ("fit-hyd {log} --mech nowhere", "settings", "nowhere"),
-    ("fit-hyd {log} --set log.command=null", "log", "no log drives a joint that is compared (shoulder)"),
-    ("fit-hyd {log} --set parameters.D.start=null", "settings", "give the run of stage 1 with --mech RUN"),
+    (
+        "fit-hyd {log} --set log.command=null",
+        "log",
+        "no log drives a joint that is compared (shoulder)",
+    ),
+    (
+        "fit-hyd {log} --set parameters.D.start=null",
+        "settings",
+        "give the run of stage 1 with --mech RUN",
+    ),
     ("fit-hyd {log} --mech d.yaml", "settings", "M6"),
-    ("fit-hyd {log} --mech hyd.yaml", "settings", "hyd.yaml: is a fit of stage 2, but --mech takes one of"),
-    ("fit-mech {log} --config two.yaml", "settings", "did you mean 'search'?; also line 3: unknown setting"),
-    ("fit-mech {root}/README.md", "log", "(command of joint azimuth) and 13 more; unused: "),
+    (
+        "fit-hyd {log} --mech hyd.yaml",
+        "settings",
+        "hyd.yaml: is a fit of stage 2, but --mech takes one of",
+    ),
+    (
+        "fit-mech {log} --config two.yaml",
+        "settings",
+        "did you mean 'search'?; also line 3: unknown setting",
+    ),
+    (
+        "fit-mech {root}/README.md",
+        "log",
+        "(command of joint azimuth) and 13 more; unused: ",
+    ),
     ("validate {log}", "usage", "--fit"),
     ("validate {log} --fit nowhere", "settings", "nowhere"),
     ("validate {log} --fit {root}/README.md", "settings", "README.md"),
@@ -50,7 +87,11 @@ WRONG = [
     ("follow {log} --fit one.yaml", "settings", "a fit of stage 1 has no valves"),
     ("follow {log} --fit no.yaml", "settings", "no.yaml"),
     ("follow {log} --fit one.yaml --out {log}", "settings", "overwrite"),
-    ("export one.yaml --to simulink", "settings", "'simulink' is no kind of export; choose parameters, "),
+    (
+        "export one.yaml --to simulink",
+        "settings",
+        "'simulink' is no kind of export; choose parameters, ",
+    ),
     ("export one.yaml --to table", "settings", "a gain gives torques, not speeds"),
     ("export one.yaml --to urdf", "settings", "name it: --robot robot.urdf"),
     ("export one.yaml --to parameters", "run", "holds no covariance"),
@@ -62,7 +103,11 @@ WRONG = [
     ("study nowhere.yaml", "settings", "nowhere.yaml"),
     ("view --pose asleep", "settings", "no pose 'asleep'"),
     ("view --arm both", "settings", "needs a log"),
-    ("simulate {log} --fit one.yaml --arm middle", "settings", "'middle' is no arm of a pair"),
+    (
+        "simulate {log} --fit one.yaml --arm middle",
+        "settings",
+        "'middle' is no arm of a pair",
+    ),
     ("view --collisions", "settings", "needs a log"),
     ("view {log} -o a.avi", "settings", "is no film or picture"),
     ("view {log} -o a.mp4 --span now", "settings", "'now' is no span"),
@@ -80,8 +125,12 @@ WRONG = [
 """a command, the kind of its error, and what it says"""
 
 
-@pytest.mark.parametrize(("command", "kind", "says"), WRONG, ids=[command for command, *_ in WRONG])
-def test_what_the_user_can_correct_is_one_line_and_exit_2(hydroid_cli, tmp_path, command, kind, says):
+@pytest.mark.parametrize(
+    ("command", "kind", "says"), WRONG, ids=[command for command, *_ in WRONG]
+)
+def test_what_the_user_can_correct_is_one_line_and_exit_2(
+    hydroid_cli, tmp_path, command, kind, says
+):
     for name, text in FILES.items():
         (tmp_path / name).write_text(text)
     words = command.format(log=LOG, root=ROOT, long="x" * 300).split()
@@ -93,4 +142,5 @@ def test_what_the_user_can_correct_is_one_line_and_exit_2(hydroid_cli, tmp_path,
     error = json.loads(hydroid_cli(*words, "--json", code=2).out)["error"]
     assert set(error) == {"kind", "what", "where", "hint"}
     assert error["kind"] == kind
-    assert {path.name for path in tmp_path.iterdir()} == set(FILES)  # nothing half-written
+    # nothing half-written
+    assert {path.name for path in tmp_path.iterdir()} == set(FILES)

@@ -1,4 +1,5 @@
-"""The command line and the public names are the same functions, answer at once, and explain themselves."""
+"""The command line and the public names are the same functions, answer at once, and
+explain themselves."""
 
 import inspect
 import subprocess
@@ -13,7 +14,16 @@ import hydroid
 from hydroid.commands.app import COMMANDS, GROUPS, app, click_command
 
 LOG = RIG / "rig_shoulder_1.csv"
-HEAVY = ("numba", "scipy", "matplotlib", "trimesh", "rich", "jinja2", "PIL", "distributed")
+HEAVY = (
+    "numba",
+    "scipy",
+    "matplotlib",
+    "trimesh",
+    "rich",
+    "jinja2",
+    "PIL",
+    "distributed",
+)
 PRINTED = {"json", "quiet", "verbose"}
 """options of the command line alone"""
 
@@ -28,9 +38,14 @@ def test_a_command_is_a_function_whose_parameters_are_its_options(name: str):
         if parameter.name in own:
             default = own[parameter.name].default
             assert parameter.required == (default is inspect.Parameter.empty)
-            assert parameter.required or parameter.default in (default, None if default == () else default)
+            assert parameter.required or parameter.default in (
+                default,
+                None if default == () else default,
+            )
             assert f"    {parameter.name}: " in function.__doc__
-            positional = own[parameter.name].kind is inspect.Parameter.POSITIONAL_OR_KEYWORD
+            positional = (
+                own[parameter.name].kind is inspect.Parameter.POSITIONAL_OR_KEYWORD
+            )
             assert (parameter.param_type_name == "argument") == positional
 
 
@@ -38,7 +53,9 @@ def test_a_command_is_a_function_whose_parameters_are_its_options(name: str):
 def test_help_has_an_example_whose_options_exist(name: str):
     text = " ".join(CliRunner().invoke(app, [name, "--help"]).output.split())
     _, example = text.split(f"Example: hydroid {name} ")
-    known = {option for parameter in click_command(name).params for option in parameter.opts}
+    known = {
+        option for parameter in click_command(name).params for option in parameter.opts
+    }
     assert {word for word in example.split() if word.startswith("-")} <= known
     assert "hydroid." not in text  # no Python
 
@@ -88,12 +105,16 @@ for arguments in {[[str(word) for word in call] for call in calls]}:
     heavy = [m for m in {HEAVY} if m in sys.modules]
     assert not heavy, (arguments, heavy)
 """
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60
+    )
     assert done.returncode == 0, done.stderr[-2000:]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX only")
 def test_a_closed_pipe_is_no_traceback(tmp_path: Path):
     command = f"{sys.executable} -m hydroid check {LOG} {LOG} | head -c 1"
-    done = subprocess.run(command, shell=True, cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    done = subprocess.run(
+        command, shell=True, cwd=tmp_path, capture_output=True, text=True, timeout=60
+    )
     assert "Traceback" not in done.stderr

@@ -1,4 +1,5 @@
-"""What commands read: angles that are not measured stay so, and parts of a log between its gaps."""
+"""What commands read: angles that are not measured stay so, and parts of a log between
+its gaps."""
 
 import json
 from pathlib import Path
@@ -24,9 +25,16 @@ UNMEASURED = {"log.joints.3.angle": None}
 
 def settings(**changes: object) -> FitSettings:
     own = {
-        f"parameters.own_{j}": {"quantity": "overlap", "joints": [j], "bounds": [0.0, 0.8]} for j in (2, 4)
+        f"parameters.own_{j}": {
+            "quantity": "overlap",
+            "joints": [j],
+            "bounds": [0.0, 0.8],
+        }
+        for j in (2, 4)
     }
-    return load_settings("fit-hyd", {"outputs": [2, 4], "start_pose": "study", **own, **changes})
+    return load_settings(
+        "fit-hyd", {"outputs": [2, 4], "start_pose": "study", **own, **changes}
+    )
 
 
 def read(**changes: object) -> tuple[Log, FitSettings]:
@@ -49,12 +57,15 @@ def test_an_unmeasured_joint_is_unmeasured_and_starts_in_the_start_pose() -> Non
 
 def test_a_log_that_was_read_elsewhere_has_a_start_pose_too() -> None:
     log, fit = read(**UNMEASURED)
-    (again,) = read_logs(Log(log.source, log.time, log.command, log.angle, log.period), fit)
+    (again,) = read_logs(
+        Log(log.source, log.time, log.command, log.angle, log.period), fit
+    )
     np.testing.assert_array_equal(again.start, log.start)
 
 
 def test_what_needs_the_motion_of_driven_joints_leaves_out_logs_that_lack_it() -> None:
-    """A start is open, joints are fitted alone and columns compared only where joints are measured."""
+    """A start is open, joints are fitted alone and columns compared only where joints
+    are measured."""
     log, fit = read(**UNMEASURED)
     problem, whole = Problem(fit, [log]), Problem(settings(), [read()[0]])
     assert 3 in whole.started(whole.logs[0])
@@ -66,18 +77,29 @@ def test_what_needs_the_motion_of_driven_joints_leaves_out_logs_that_lack_it() -
 
 @pytest.mark.parametrize("others", ["measured", "locked", "passive"])
 def test_a_log_without_an_angle_is_simulated(others: str, tmp_path: Path) -> None:
-    """A joint that is neither driven nor measured stands in its pose where others follow the log."""
-    changes = {**UNMEASURED, "log.joints.3.command": None, "simulation.other_joints": others}
+    """A joint that is neither driven nor measured stands in its pose where others
+    follow the log."""
+    changes = {
+        **UNMEASURED,
+        "log.joints.3.command": None,
+        "simulation.other_joints": others,
+    }
     log, fit = read(**changes)
     response = Problem(fit, [log]).responses(fit.parameter_set().start[None])[0].angle
     assert np.isfinite(response).all()
 
 
-def test_a_simulation_from_a_named_pose_starts_there_and_writes_all_angles(tmp_path: Path) -> None:
+def test_a_simulation_from_a_named_pose_starts_there_and_writes_all_angles(
+    tmp_path: Path,
+) -> None:
     truth = RIG.parent / "article" / "truth.yaml"
-    log = simulate(RIG / "rig_shoulder_1.csv", fit=truth, pose="study", out=tmp_path / "log.csv").log
+    log = simulate(
+        RIG / "rig_shoulder_1.csv", fit=truth, pose="study", out=tmp_path / "log.csv"
+    ).log
     assert log.measured.all()
-    np.testing.assert_allclose(log.start, load_settings("fit-hyd").arm.pose("study"), atol=1e-3)
+    np.testing.assert_allclose(
+        log.start, load_settings("fit-hyd").arm.pose("study"), atol=1e-3
+    )
 
 
 def gapped(folder: Path) -> Path:
@@ -88,9 +110,13 @@ def gapped(folder: Path) -> Path:
     return path
 
 
-def test_a_gap_gives_two_logs_that_share_the_files_payload_and_group(tmp_path: Path) -> None:
+def test_a_gap_gives_two_logs_that_share_the_files_payload_and_group(
+    tmp_path: Path,
+) -> None:
     path = gapped(tmp_path)
-    fit = settings(**{"payloads": {"log.csv": 50.0}, "log.groups": {"monday": "log.csv"}})
+    fit = settings(
+        **{"payloads": {"log.csv": 50.0}, "log.groups": {"monday": "log.csv"}}
+    )
     one, two = read_logs(path, fit)
     assert (one.source, two.source) == (f"{path}[1]", f"{path}[2]")
     assert fit.log.group_of(two.source) == "monday"
@@ -99,7 +125,9 @@ def test_a_gap_gives_two_logs_that_share_the_files_payload_and_group(tmp_path: P
     assert not np.array_equal(loaded.output_errors(theta), plain.output_errors(theta))
 
 
-def test_a_log_with_a_hole_gives_the_likelihoods_rows_of_its_two_parts(tmp_path: Path) -> None:
+def test_a_log_with_a_hole_gives_the_likelihoods_rows_of_its_two_parts(
+    tmp_path: Path,
+) -> None:
     path = gapped(tmp_path)
     name, *rows = path.read_text().splitlines()
     halves = [tmp_path / "before.csv", tmp_path / "after.csv"]
@@ -107,16 +135,23 @@ def test_a_log_with_a_hole_gives_the_likelihoods_rows_of_its_two_parts(tmp_path:
         half.write_text("\n".join([name, *own]))
     fit = settings()
     holed, apart = (Problem(fit, read_logs(logs, fit)) for logs in (path, halves))
-    assert apart.logs[1].first_command == 0  # of a later one the start is a mean, with the gap or without
+    # of a later one the start is a mean, with the gap or without
+    assert apart.logs[1].first_command == 0
     theta = fit.parameter_set().start
-    rows_of = [likelihood_at(problem, theta).rows(theta[None]) for problem in (holed, apart)]
+    rows_of = [
+        likelihood_at(problem, theta).rows(theta[None]) for problem in (holed, apart)
+    ]
     np.testing.assert_array_equal(*rows_of)
-    np.testing.assert_array_equal(holed.evaluate(theta[None]), apart.evaluate(theta[None]))
+    np.testing.assert_array_equal(
+        holed.evaluate(theta[None]), apart.evaluate(theta[None])
+    )
 
 
 def test_what_needs_one_log_refuses_parts(tmp_path: Path) -> None:
     truth = RIG.parent / "article" / "truth.yaml"
-    with pytest.raises(LogError, match="gaps split it into 2 parts, and one log is needed"):
+    with pytest.raises(
+        LogError, match="gaps split it into 2 parts, and one log is needed"
+    ):
         simulate(gapped(tmp_path), fit=truth, out=tmp_path / "out.csv")
     assert not (tmp_path / "out.csv").exists()
 
@@ -132,8 +167,12 @@ def test_convert_keeps_gaps(tmp_path: Path) -> None:
     path, out = gapped(tmp_path), tmp_path / "out.csv"
     convert(path, out=out)
     ranges = load_settings("fit-hyd").arm.ranges
-    (before, after) = (check_parts(one, LogSettings(), ranges)[0] for one in (path, out))
-    assert [part.begin for part in after] == pytest.approx([part.begin for part in before])
+    (before, after) = (
+        check_parts(one, LogSettings(), ranges)[0] for one in (path, out)
+    )
+    assert [part.begin for part in after] == pytest.approx(
+        [part.begin for part in before]
+    )
     for one, other in zip(before, after, strict=True):
         assert_same(one, other)
 
@@ -142,5 +181,7 @@ def test_a_run_of_parts_finds_its_file_again(tmp_path: Path) -> None:
     folder = tmp_path / "run"
     folder.mkdir()
     path = gapped(tmp_path)
-    (folder / "run.json").write_text(json.dumps({"logs": {f"{path}[1]": "a", f"{path}[2]": "b"}}))
+    (folder / "run.json").write_text(
+        json.dumps({"logs": {f"{path}[1]": "a", f"{path}[2]": "b"}})
+    )
     assert run_logs(folder) == [path]

@@ -1,4 +1,5 @@
-"""Finished runs that were damaged, forged or edited: nothing is believed, and a line says what is wrong."""
+"""Finished runs that were damaged, forged or edited: nothing is believed, and a line
+says what is wrong."""
 
 import hashlib
 import io
@@ -45,10 +46,18 @@ def npz(words: bytes) -> bytes:
 
 def huge() -> bytes:
     """An array that says it has 150 GB."""
-    header = b"{'descr': '<f8', 'fortran_order': False, 'shape': (20000000000,), }".ljust(117) + b"\n"
+    header = (
+        b"{'descr': '<f8', 'fortran_order': False, 'shape': (20000000000,), }".ljust(
+            117
+        )
+        + b"\n"
+    )
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as file:
-        file.writestr("content.npy", b"\x93NUMPY\x01\x00" + struct.pack("<H", 118) + header + b"\0" * 1000)
+        file.writestr(
+            "content.npy",
+            b"\x93NUMPY\x01\x00" + struct.pack("<H", 118) + header + b"\0" * 1000,
+        )
     return buffer.getvalue()
 
 
@@ -64,18 +73,34 @@ FORGED = {
 
 
 @pytest.mark.parametrize("content", FORGED.values(), ids=FORGED)
-def test_a_forged_result_or_checkpoint_is_one_line(run: Path, content: bytes, hydroid_cli: Run):
+def test_a_forged_result_or_checkpoint_is_one_line(
+    run: Path, content: bytes, hydroid_cli: Run
+):
     (run / RESULT).write_bytes(sealed(content))
     assert f"{RESULT}: cannot be read" in hydroid_cli("report", "run", code=2).err
     (run / "checkpoint.npz").write_bytes(sealed(content))
     (run / "checkpoint.previous.npz").unlink(missing_ok=True)
-    again = ["fit-mech", "a.csv", "--config", "run/config.yaml", "--out", "run", "--resume"]
+    again = [
+        "fit-mech",
+        "a.csv",
+        "--config",
+        "run/config.yaml",
+        "--out",
+        "run",
+        "--resume",
+    ]
     assert "checkpoint.npz: is damaged" in hydroid_cli(*again, code=2).err
 
 
 def test_what_is_packed_comes_back_to_the_bit(tmp_path: Path):
     rng = np.random.default_rng(0)
-    arrays = [rng.random((3, 4)).T, np.zeros((0, 5)), np.array(2.5), np.arange(6)[::2], rng.random(4) > 0.5]
+    arrays = [
+        rng.random((3, 4)).T,
+        np.zeros((0, 5)),
+        np.array(2.5),
+        np.arange(6)[::2],
+        rng.random(4) > 0.5,
+    ]
     (tmp_path / "x").write_bytes(pack({"parts": arrays, "more": [1, None, "ä"]}))
     back = unpack(tmp_path / "x")
     assert back["more"] == [1, None, "ä"]
@@ -84,11 +109,23 @@ def test_what_is_packed_comes_back_to_the_bit(tmp_path: Path):
         np.testing.assert_array_equal(one, other)
 
 
-@pytest.mark.parametrize("content", ["[1, 2]", '{"files": [1, 2]}', '{"logs": {"a": 1}}', "[" * 10**5])
-def test_a_description_that_is_none_is_one_line(run: Path, content: str, hydroid_cli: Run):
+@pytest.mark.parametrize(
+    "content", ["[1, 2]", '{"files": [1, 2]}', '{"logs": {"a": 1}}', "[" * 10**5]
+)
+def test_a_description_that_is_none_is_one_line(
+    run: Path, content: str, hydroid_cli: Run
+):
     (run / "run.json").write_text(content)
     hydroid_cli("report", "run", code=2)
-    again = ["fit-mech", "a.csv", "--config", "run/config.yaml", "--out", "run", "--resume"]
+    again = [
+        "fit-mech",
+        "a.csv",
+        "--config",
+        "run/config.yaml",
+        "--out",
+        "run",
+        "--resume",
+    ]
     assert "run.json: " in hydroid_cli(*again, code=2).err
 
 
@@ -96,15 +133,24 @@ def test_a_damaged_validation_is_left_out(run: Path, hydroid_cli: Run):
     (run / VALIDATIONS / "x").mkdir(parents=True)
     (run / VALIDATIONS / "x" / RESULT).write_bytes(b"junk")
     done = hydroid_cli("report", "run")
-    assert f"left out: run/{VALIDATIONS}/x/{RESULT}: cannot be read (ValueError); validate again" in done.err
+    assert (
+        f"left out: run/{VALIDATIONS}/x/{RESULT}: cannot be read (ValueError); validate again"
+        in done.err
+    )
     assert load_record(run).validations == {}
 
 
-COMMANDS = [["simulate", "a.csv", "--fit", "run"], ["validate", "a.csv", "--fit", "run"], ["report", "run"]]
+COMMANDS = [
+    ["simulate", "a.csv", "--fit", "run"],
+    ["validate", "a.csv", "--fit", "run"],
+    ["report", "run"],
+]
 
 
 @pytest.mark.parametrize("command", COMMANDS, ids=[command[0] for command in COMMANDS])
-def test_a_run_without_its_settings_is_refused(run: Path, command: list[str], hydroid_cli: Run):
+def test_a_run_without_its_settings_is_refused(
+    run: Path, command: list[str], hydroid_cli: Run
+):
     (run / "config.yaml").unlink()
     assert "run/config.yaml: is missing" in hydroid_cli(*command, code=2).err
 
@@ -113,15 +159,22 @@ def moved(text: str) -> str:
     return text.replace("period_s: 0.01", "period_s: 0.02")
 
 
-EDITS: dict[str, Callable[[str], str]] = {"config.yaml": moved, "estimate.yaml": lambda text: f"{text}\n"}
+EDITS: dict[str, Callable[[str], str]] = {
+    "config.yaml": moved,
+    "estimate.yaml": lambda text: f"{text}\n",
+}
 
 
 @pytest.mark.parametrize("command", COMMANDS, ids=[command[0] for command in COMMANDS])
 @pytest.mark.parametrize("name", EDITS)
-def test_an_edited_run_is_said_once(run: Path, command: list[str], name: str, hydroid_cli: Run):
+def test_an_edited_run_is_said_once(
+    run: Path, command: list[str], name: str, hydroid_cli: Run
+):
     assert "is not as the fit left it" not in hydroid_cli(*command).err
     (run / name).write_text(EDITS[name]((run / name).read_text()))
-    assert hydroid_cli(*command).err.count(f"run/{name}: is not as the fit left it") == 1
+    assert (
+        hydroid_cli(*command).err.count(f"run/{name}: is not as the fit left it") == 1
+    )
 
 
 def test_a_log_of_the_run_that_has_changed_is_said(run: Path, hydroid_cli: Run):
@@ -132,23 +185,37 @@ def test_a_log_of_the_run_that_has_changed_is_said(run: Path, hydroid_cli: Run):
     assert "was fitted to" not in hydroid_cli("analyse", "--fit", "run").err
     text = Path("a.csv").read_text().splitlines()
     Path("a.csv").write_text("\n".join(text[:-20]) + "\n")
-    assert "a.csv: is not what run was fitted to" in hydroid_cli("analyse", "--fit", "run").err
+    assert (
+        "a.csv: is not what run was fitted to"
+        in hydroid_cli("analyse", "--fit", "run").err
+    )
 
 
 def test_samples_decide_whether_a_log_is_unseen(run: Path):
     rows = Path(run.parent / "a.csv").read_text().splitlines()
-    (again := run.parent / "again.csv").write_text("\n".join(["# saved again", *rows]) + "\n")
-    (part := run.parent / "part.csv").write_text("\n".join([rows[0], *rows[150:]]) + "\n")
+    (again := run.parent / "again.csv").write_text(
+        "\n".join(["# saved again", *rows]) + "\n"
+    )
+    (part := run.parent / "part.csv").write_text(
+        "\n".join([rows[0], *rows[150:]]) + "\n"
+    )
     other = RIG / "rig_shoulder_2.csv"
     converted = run.parent / "converted.csv"
     hydroid.convert(again, out=converted, config="fit-mech", set={"log.period_s": 0.02})
-    for log, unseen in ((again, False), (part, False), (converted, False), (other, True)):
+    for log, unseen in (
+        (again, False),
+        (part, False),
+        (converted, False),
+        (other, True),
+    ):
         validated = validate(log, fit=run, out=run.parent / "page")
         assert [one.unseen for one in validated.result] == [unseen]
     assert len(load_record(run).validations) == 1
 
 
-def test_validations_of_one_name_are_kept_and_a_copy_counts_once(run: Path, monkeypatch: pytest.MonkeyPatch):
+def test_validations_of_one_name_are_kept_and_a_copy_counts_once(
+    run: Path, monkeypatch: pytest.MonkeyPatch
+):
     rows = (RIG / "rig_shoulder_2.csv").read_text().splitlines()
     days = {"day1": rows[1:1200], "day2": rows[1300:2400], "copy": rows[1:1200]}
     for day, samples in days.items():
@@ -168,7 +235,9 @@ def test_a_validation_stays_below_its_folder_whatever_the_log_is_called(
 ):
     def name(source: object) -> str:
         time = np.arange(3) * 0.01
-        return validation_name(Log(str(source), time, np.zeros((3, 1)), np.zeros((3, 1)), 0.01))
+        return validation_name(
+            Log(str(source), time, np.zeros((3, 1)), np.zeros((3, 1)), 0.01)
+        )
 
     (tmp_path / "bag" / "sub").mkdir(parents=True)
     monkeypatch.chdir(tmp_path / "bag" / "sub")
@@ -187,7 +256,9 @@ def test_a_validation_stays_below_its_folder_whatever_the_log_is_called(
 
 
 def test_whatever_decides_a_result_is_in_the_hash_of_its_log():
-    settings = hydroid.load_settings("article-mech", {"log.groups": {"monday": "mon_*"}})
+    settings = hydroid.load_settings(
+        "article-mech", {"log.groups": {"monday": "mon_*"}}
+    )
     time, zeros = np.arange(5) * 0.01, np.zeros((5, 2))
     pressure = np.zeros((5, 2, 2))
     log = Log("a.csv", time, zeros, zeros, 0.01, pressure)
@@ -209,6 +280,6 @@ def test_whatever_decides_a_result_is_in_the_hash_of_its_log():
 def test_a_simulated_log_is_none_of_the_commands(run: Path):
     simulated = hydroid.simulate(run.parent / "a.csv", fit=run).log
     assert simulated.source == "simulated a.csv"
-    assert hydroid.simulate(run.parent / "a.csv", fit=run, out=run.parent / "s.csv").log.source.endswith(
-        "s.csv"
-    )
+    assert hydroid.simulate(
+        run.parent / "a.csv", fit=run, out=run.parent / "s.csv"
+    ).log.source.endswith("s.csv")

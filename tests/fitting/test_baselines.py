@@ -1,4 +1,5 @@
-"""The models that anybody would try first: they recover their own equations, and nothing moves by itself."""
+"""The models that anybody would try first: they recover their own equations, and
+nothing moves by itself."""
 
 from dataclasses import replace
 
@@ -13,8 +14,11 @@ NUMBERS = np.array([[20.0, 35.0], [1.4, 2.0], [0.5, -0.3], [0.08, 0.15]])
 TRUE = Baseline(1, LIMITS, delay=0.13, numbers=NUMBERS)
 
 
-def recorded(seed: int, model: Baseline = TRUE, noise: float = 0.0, joints: int = 1) -> Log:
-    """Steps of random size and length, 60 s at 50 Hz, and how the model follows them from rest."""
+def recorded(
+    seed: int, model: Baseline = TRUE, noise: float = 0.0, joints: int = 1
+) -> Log:
+    """Steps of random size and length, 60 s at 50 Hz, and how the model follows them
+    from rest."""
     rng = np.random.default_rng(seed)
     held = np.repeat(rng.uniform(-100, 100, 60) * (rng.random(60) < 0.7), 50)
     held[:50] = 0
@@ -24,7 +28,9 @@ def recorded(seed: int, model: Baseline = TRUE, noise: float = 0.0, joints: int 
     return replace(silent, angle=np.tile(angle[:, None], (1, joints)))
 
 
-@pytest.mark.parametrize("limits", [LIMITS, np.array([-np.inf, np.inf])], ids=["limited", "unlimited"])
+@pytest.mark.parametrize(
+    "limits", [LIMITS, np.array([-np.inf, np.inf])], ids=["limited", "unlimited"]
+)
 def test_nine_numbers_recover_their_own_equations(limits: np.ndarray) -> None:
     logs = [recorded(seed, replace(TRUE, limits=limits)) for seed in (1, 2)]
     fitted = fit_baselines(logs, 1, limits)["nine numbers"]
@@ -34,7 +40,10 @@ def test_nine_numbers_recover_their_own_equations(limits: np.ndarray) -> None:
 
 def test_each_baseline_predicts_better_than_the_simpler_ones() -> None:
     logs, unseen = [recorded(seed, noise=0.001) for seed in (1, 2)], [recorded(3)]
-    errors = [np.std(model.errors(unseen)) for model in fit_baselines(logs, 1, LIMITS).values()]
+    errors = [
+        np.std(model.errors(unseen))
+        for model in fit_baselines(logs, 1, LIMITS).values()
+    ]
     assert len(errors) == len(NAMES)
     assert errors == sorted(errors, reverse=True)
     assert errors[-1] < 0.002
@@ -57,7 +66,10 @@ def test_a_joint_stops_at_its_range_and_comes_back_at_once() -> None:
 
 
 def test_delays_between_samples_act_in_between() -> None:
-    log, free = recorded(1), replace(TRUE, numbers=NUMBERS * [[1], [1], [1], [0]], limits=10 * LIMITS)
+    log, free = (
+        recorded(1),
+        replace(TRUE, numbers=NUMBERS * [[1], [1], [1], [0]], limits=10 * LIMITS),
+    )
     ends = [replace(free, delay=d).predict(log) for d in (0.10, 0.12)]
     middle = replace(free, delay=0.11).predict(log)
     assert middle == pytest.approx(np.mean(ends, axis=0), abs=1e-9)

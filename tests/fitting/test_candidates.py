@@ -17,7 +17,8 @@ STEPS = 2**16 - 1
 
 
 class Fragile(Problem):
-    """Every set with much damping diverges; so do all that no chromosome can write, where `grid` is on."""
+    """Every set with much damping diverges; so do all that no chromosome can write,
+    where `grid` is on."""
 
     grid = False
 
@@ -34,7 +35,10 @@ class Fragile(Problem):
 
 
 def make(kind=Fragile, **changes) -> Problem:
-    small = {f"search.{algorithm}": {"population": 10, "generations": 5} for algorithm in ("ga", "nsga2")}
+    small = {
+        f"search.{algorithm}": {"population": 10, "generations": 5}
+        for algorithm in ("ga", "nsga2")
+    }
     small |= {"objective.segments": 3}
     settings = load_settings("article-mech", small | changes)
     return kind(settings, [stepped(settings, TRUTH, [60.0, -80.0, 30.0])])
@@ -55,12 +59,15 @@ def test_what_diverged_is_counted_and_told_and_never_an_estimate(algorithm, refi
     front, objectives = result.front
     assert not problem.bad(front).any()
     assert np.isfinite(objectives).all()
-    np.testing.assert_array_equal(Memo(problem, stored["search"]).evaluate(theta)[:, -1], values[:, -1])
+    np.testing.assert_array_equal(
+        Memo(problem, stored["search"]).evaluate(theta)[:, -1], values[:, -1]
+    )
     assert np.isfinite(result.history[:, 4:]).all()
 
 
 def test_a_compromise_that_diverges_gives_way_to_one_that_does_not():
-    """The mean of the best sets is none of the sets, and need not be one that can be simulated."""
+    """The mean of the best sets is none of the sets, and need not be one that can be
+    simulated."""
     problem = make(**{"search.algorithm": "nsga2", "refinement": None})
     problem.grid = True
     result = fit(problem)
@@ -76,5 +83,7 @@ def test_where_everything_diverges_the_run_says_so():
             return np.ones(len(theta), bool)
 
     for algorithm in ("ga", "nsga2"):
-        with pytest.raises(HydroidError, match="no candidate of the population could be simulated"):
+        with pytest.raises(
+            HydroidError, match="no candidate of the population could be simulated"
+        ):
             fit(make(Hopeless, **{"search.algorithm": algorithm}))

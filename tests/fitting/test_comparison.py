@@ -1,4 +1,5 @@
-"""Errors compared in pairs: what differs is told, what does not is not, however many starts overlap."""
+"""Errors compared in pairs: what differs is told, what does not is not, however many
+starts overlap."""
 
 import numpy as np
 import pytest
@@ -9,27 +10,38 @@ from hydroid.joint_verdict import Outcome
 BETWEEN = 2.0
 
 
-def starts(seed: int, size: float = 1.0, seconds: float = 75.0, ahead: float = 5.0) -> np.ndarray:
-    """How far a random walk gets in some time, from starts all along a log: what an integrator errs by."""
+def starts(
+    seed: int, size: float = 1.0, seconds: float = 75.0, ahead: float = 5.0
+) -> np.ndarray:
+    """How far a random walk gets in some time, from starts all along a log: what an
+    integrator errs by."""
     period = 0.1
-    walk = size * np.cumsum(np.random.default_rng(seed).normal(0, 0.01, round(seconds / period)))
+    walk = size * np.cumsum(
+        np.random.default_rng(seed).normal(0, 0.01, round(seconds / period))
+    )
     first = np.arange(0, len(walk) - round(ahead / period), round(BETWEEN / period))
     return walk[first + round(ahead / period)] - walk[first]
 
 
 def compared(ours: list[np.ndarray], theirs: list[np.ndarray]):
-    blocks = [[block for log in logs for block in in_blocks(log, BETWEEN)] for logs in (ours, theirs)]
+    blocks = [
+        [block for log in logs for block in in_blocks(log, BETWEEN)]
+        for logs in (ours, theirs)
+    ]
     return compare(*blocks)
 
 
 @pytest.mark.parametrize("logs", [[75.0], [22.0] * 6, [60.0] * 3])
-def test_of_equal_models_one_in_ten_at_most_is_called_better_or_worse(logs: list[float]):
+def test_of_equal_models_one_in_ten_at_most_is_called_better_or_worse(
+    logs: list[float],
+):
     told = 0
     for trial in range(300):
         ours = [starts(100 * trial + i, seconds=s) for i, s in enumerate(logs)]
         theirs = [starts(100 * trial + 50 + i, seconds=s) for i, s in enumerate(logs)]
         told += compared(ours, theirs).outcome is not Outcome.UNTOLD
-    assert told / 300 < 0.15  # two standard deviations, and somewhat more for blocks that touch
+    # two standard deviations, and somewhat more for blocks that touch
+    assert told / 300 < 0.15
 
 
 def test_what_errs_half_as_much_at_the_same_starts_is_better_and_the_other_way_round_worse():

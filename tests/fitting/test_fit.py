@@ -15,7 +15,9 @@ from hydroid.problem.problem import Problem
 def test_truth_has_no_error_and_evaluation_does_not_depend_on_the_chunk(monkeypatch):
     problem = study()
     truth = problem.parameters.vector(TRUTH, "truth")
-    theta = np.vstack([truth, problem.parameters.from_unit(np.random.default_rng(0).random((9, 9)))])
+    theta = np.vstack(
+        [truth, problem.parameters.from_unit(np.random.default_rng(0).random((9, 9)))]
+    )
     values = problem.evaluate(theta)
     assert values[0, -1] == 0
     assert (values[1:, -1] > 0).all()
@@ -42,7 +44,11 @@ def test_several_logs_and_outputs_are_one_long_error():
 
 def test_identical_sets_are_simulated_once():
     memo = Memo(study())
-    theta = np.repeat(memo.problem.parameters.from_unit(np.random.default_rng(0).random((2, 9))), 3, axis=0)
+    theta = np.repeat(
+        memo.problem.parameters.from_unit(np.random.default_rng(0).random((2, 9))),
+        3,
+        axis=0,
+    )
     result = memo.evaluate(theta)
     assert memo.simulated == 2
     np.testing.assert_array_equal(result[:3], result[[0, 0, 0]])
@@ -63,8 +69,13 @@ def test_a_fit_recovers_what_the_data_tell_and_names_what_they_do_not(algorithm)
     ratio = (result.best.theta / truth)[:3]
     np.testing.assert_allclose(ratio / ratio[0], 1, rtol=0.01)
     searched = next(iter(result.estimates.values()))
-    assert np.sum(np.abs(searched.theta / truth - 1)) > 0.1  # the search alone does not find them
-    expected = {"best", "refined"} if algorithm == "ga" else {"average", "utopia", "best", "refined"}
+    # the search alone does not find them
+    assert np.sum(np.abs(searched.theta / truth - 1)) > 0.1
+    expected = (
+        {"best", "refined"}
+        if algorithm == "ga"
+        else {"average", "utopia", "best", "refined"}
+    )
     assert set(result.estimates) == expected
     assert set(result.seconds) == {"search", "refinement", "uncertainty"}
     assert min(result.seconds.values()) > 0
@@ -90,18 +101,26 @@ def test_a_resumed_fit_ends_as_the_uninterrupted_one():
     with pytest.raises(KeyboardInterrupt):
         fit(problem, Watcher(stop_at=7), stored)
     parts = fit(problem, Watcher(), stored)
-    assert whole.estimates.keys() == parts.estimates.keys() == {"average", "utopia", "best", "refined"}
+    assert (
+        whole.estimates.keys()
+        == parts.estimates.keys()
+        == {"average", "utopia", "best", "refined"}
+    )
     for name, one in whole.estimates.items():
         np.testing.assert_array_equal(parts.estimates[name].theta, one.theta)
-    assert whole.estimates["best"].overall == whole.history[-1, 4]  # the best of all that was simulated
+    # the best of all that was simulated
+    assert whole.estimates["best"].overall == whole.history[-1, 4]
 
 
 def test_a_search_that_does_not_repeat_itself_is_found_out():
     problem, stored = study(refinement=None), {}
     with pytest.raises(KeyboardInterrupt):
         fit(problem, Watcher(stop_at=4), stored)
-    # another version would ask for candidates that are not stored: here, because one is lost
-    stored["search"] = {n: np.delete(a, 20, axis=0) for n, a in stored["search"].items()}
+    # another version would ask for candidates that are not stored: here, because one is
+    # lost
+    stored["search"] = {
+        n: np.delete(a, 20, axis=0) for n, a in stored["search"].items()
+    }
     before = dict(stored)
     with pytest.raises(RunError, match="does not repeat"):
         fit(problem, checkpoints=stored)
@@ -133,5 +152,7 @@ def test_error_indices_against_their_definitions():
     assert indices.largest == pytest.approx(np.abs(error).max())
     assert indices.mean_absolute <= indices.rms <= indices.largest
     assert error_indices(measured, 0 * measured).fit == 100
-    assert error_indices(measured, measured - measured.mean()).fit == pytest.approx(0, abs=1e-9)
+    assert error_indices(measured, measured - measured.mean()).fit == pytest.approx(
+        0, abs=1e-9
+    )
     assert np.isnan(error_indices(np.ones(5), np.ones(5)).fit)

@@ -11,18 +11,35 @@ from hydroid.fitting.fit import fit
 from hydroid.fitting.multistart import alone, by_numbers, lone_joints
 from hydroid.problem.problem import Problem
 
-TRUTH = {"open_2": 0.35, "open_3": 0.5, "overlap_2": 0.4, "overlap_3": 0.3, "M3": 20.0, "D": 100.0}
+TRUTH = {
+    "open_2": 0.35,
+    "open_3": 0.5,
+    "overlap_2": 0.4,
+    "overlap_3": 0.3,
+    "M3": 20.0,
+    "D": 100.0,
+}
 LEVELS = {2: [60.0, -80.0, 70.0, 0.0], 3: [-70.0, 80.0, 0.0, -60.0, 90.0]}
 
 
 def make(noise_deg: float = 0.0, **changes) -> Problem:
     rows = {
         f"{name}_{j}": {"quantity": quantity, "joints": [j], "bounds": bounds}
-        for name, quantity, bounds in (("open", "opening", [0.1, 1.0]), ("overlap", "overlap", [0.0, 0.8]))
+        for name, quantity, bounds in (
+            ("open", "opening", [0.1, 1.0]),
+            ("overlap", "overlap", [0.0, 0.8]),
+        )
         for j in (2, 3)
     }
     rows |= {"D": {"quantity": "damping", "fixed": 100.0}}
-    rows |= {"M3": {"quantity": "mass", "link": "link3", "bounds": [10.0, 40.0], "start": 22.0}}
+    rows |= {
+        "M3": {
+            "quantity": "mass",
+            "link": "link3",
+            "bounds": [10.0, 40.0],
+            "start": 22.0,
+        }
+    }
     small = {"parameters": rows, "outputs": [2, 3], "joint_refinement": False}
     small |= {"objective.segments": 1, "search.algorithm": "multistart"}
     small |= {"search.multistart": {"starts": 1, "horizons": [1.0]}}
@@ -47,22 +64,31 @@ def test_a_lone_joint_feels_no_valve_but_its_own(problem):
         alone(problem, 2, problem.parameters.vector(values | more, ""))
         for more in ({}, {"open_3": 0.9, "overlap_3": 0.7})
     )
-    free = [n for n, free in zip(one.parameters.names, one.parameters.free, strict=True) if free]
+    free = [
+        n
+        for n, free in zip(one.parameters.names, one.parameters.free, strict=True)
+        if free
+    ]
     assert free == ["open_2", "overlap_2"]
     unit = np.full((1, 2), 0.3)
-    np.testing.assert_array_equal(*(p.output_errors(p.parameters.from_unit(unit)) for p in (one, other)))
+    np.testing.assert_array_equal(
+        *(p.output_errors(p.parameters.from_unit(unit)) for p in (one, other))
+    )
 
 
 def test_a_lone_joint_moves_as_with_all_others(problem, truth):
     for joint in lone_joints(problem):
         error = alone(problem, joint, truth).output_errors(truth[None])
-        assert np.rad2deg(np.sqrt(np.mean(error**2))) < 0.1  # the logged motion passes a low-pass
+        # the logged motion passes a low-pass
+        assert np.rad2deg(np.sqrt(np.mean(error**2))) < 0.1
 
 
 def test_joints_that_follow_the_log_take_their_part_of_the_pump(problem, truth):
-    """Two joints share a pump that cannot serve both: each alone is as slow as beside the other.
+    """Two joints share a pump that cannot serve both: each alone is as slow as beside
+    the other.
 
-    What is left is the low-pass of the motion that is followed, less than half of the pump's effect.
+    What is left is the low-pass of the motion that is followed, less than half of the
+    pump's effect.
     """
     shared = make(**{"hydraulics.pump_flow": 1.2, "hydraulics.line_volume": 20.0})
     for joint in lone_joints(shared):
@@ -73,11 +99,23 @@ def test_joints_that_follow_the_log_take_their_part_of_the_pump(problem, truth):
 
 
 def test_the_start_pose_is_the_recordings_not_the_joints():
-    """Joint 3 rests for longer than joint 2: its lone log must not start amid joint 2's motion."""
+    """Joint 3 rests for longer than joint 2: its lone log must not start amid joint 2's
+    motion."""
     (log,) = make(noise_deg=0.1).logs
-    log = replace(log, command=log.command * (np.arange(450) >= 120)[:, None] ** (np.arange(7) == 2))
+    log = replace(
+        log,
+        command=log.command * (np.arange(450) >= 120)[:, None] ** (np.arange(7) == 2),
+    )
     np.testing.assert_array_equal(log.driving(3).start, log.start)
-    assert log.driving(3).driven.tolist() == [False, False, True, False, False, False, False]
+    assert log.driving(3).driven.tolist() == [
+        False,
+        False,
+        True,
+        False,
+        False,
+        False,
+        False,
+    ]
 
 
 def test_joint_by_joint_then_together_finds_the_truth(problem, truth):
@@ -86,14 +124,21 @@ def test_joint_by_joint_then_together_finds_the_truth(problem, truth):
     assert [row[0] for row in watcher.rows] == [1]
     own = [n[:4] in ("open", "over") for n in problem.parameters.names]
     assert np.rad2deg(result.estimates["best"].rms) < 0.5
-    np.testing.assert_allclose(result.estimates["best"].theta[own], truth[own], rtol=0.2)
+    np.testing.assert_allclose(
+        result.estimates["best"].theta[own], truth[own], rtol=0.2
+    )
     np.testing.assert_allclose(result.best.theta, truth, rtol=1e-3)
     assert result.refinement is not None
     assert result.refinement.ending.converged
 
 
 def test_a_single_joint_is_fitted_with_the_others_as_the_settings_say(problem):
-    assert lone_joints(Problem(problem.settings.model_copy(update={"outputs": (2,)}), problem.logs)) == ()
+    assert (
+        lone_joints(
+            Problem(problem.settings.model_copy(update={"outputs": (2,)}), problem.logs)
+        )
+        == ()
+    )
 
 
 def test_a_start_takes_a_valve_that_no_load_slows_from_nine_numbers():
@@ -104,14 +149,27 @@ def test_a_start_takes_a_valve_that_no_load_slows_from_nine_numbers():
         for name in true
         for j in (2, 3)
     }
-    coil = {"hydraulics.current_min": 0.8, "hydraulics.slot_width": 0.33, "hydraulics.onset": 0.0}
-    changes = {"parameters": rows, "outputs": [2, 3], "simulation.model": "quasi-static"}
+    coil = {
+        "hydraulics.current_min": 0.8,
+        "hydraulics.slot_width": 0.33,
+        "hydraulics.onset": 0.0,
+    }
+    changes = {
+        "parameters": rows,
+        "outputs": [2, 3],
+        "simulation.model": "quasi-static",
+    }
     settings = load_settings("fit-hyd", changes | coil)
     levels = [100.0, -90.0, 60.0, -50.0, 80.0, -70.0, 40.0, -100.0]
     values = {f"{name}_{j}": value for name, value in true.items() for j in (2, 3)}
     problem = Problem(settings, [steps_of(settings, values, {2: levels, 3: levels})])
     lowest = problem.parameters.lower
     start = problem.parameters.mapping(by_numbers(alone(problem, 2, lowest), 2, lowest))
-    for name, near in {"delay": 0.03, "dead_band": 5.0, "compensation": 0.0, "opening_lag": 0.03}.items():
+    for name, near in {
+        "delay": 0.03,
+        "dead_band": 5.0,
+        "compensation": 0.0,
+        "opening_lag": 0.03,
+    }.items():
         assert start[f"{name}_2"] == pytest.approx(true[name], abs=near)
         assert start[f"{name}_3"] == 0.0

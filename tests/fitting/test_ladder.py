@@ -1,4 +1,5 @@
-"""A fit climbs: it keeps the dynamic model, and a term, where the logs ask for them, and nowhere else."""
+"""A fit climbs: it keeps the dynamic model, and a term, where the logs ask for them,
+and nowhere else."""
 
 import numpy as np
 import pytest
@@ -19,14 +20,21 @@ CONFIG = {
     "open_A": {"quantity": "opening_a", "nominal": 0.3, "within": 2},
     "open_B": {"quantity": "opening_b", "nominal": 0.3, "within": 2},
     "P_flow": {"quantity": "pump_flow", "fixed": 3.0, "term": "pump"},
-    "P_droop": {"quantity": "pump_droop", "bounds": [0, 140], "start": 20, "term": "pump"},
+    "P_droop": {
+        "quantity": "pump_droop",
+        "bounds": [0, 140],
+        "start": 20,
+        "term": "pump",
+    },
 }
 JOINT = {"simulation.model": "quasi-static", "joint_refinement": True}
 
 
 def _problem(name, term="pump", **more):
     """The fit of a simulated log whose machine is what an estimate of this name has."""
-    rows = {n: row | {"term": term} if "term" in row else row for n, row in CONFIG.items()}
+    rows = {
+        n: row | {"term": term} if "term" in row else row for n, row in CONFIG.items()
+    }
     changes = {
         "outputs": (2, 3),
         "simulation.model": "ladder",
@@ -37,7 +45,9 @@ def _problem(name, term="pump", **more):
     ladder = settings_of(rows, bulk_modulus=20.0).changed(changes | more)
     machine = ladder.of_estimate(name)
     log = step_log(machine.arm.pose("study"), {2: SHOULDER, 3: ELBOW})
-    exact = simulate_log(machine, log, {n: TRUTH[n] for n in CONFIG if n in machine.parameters})
+    exact = simulate_log(
+        machine, log, {n: TRUTH[n] for n in CONFIG if n in machine.parameters}
+    )
     return Problem(ladder, [noisy(exact, 0.02, 1, exact_start=False)])
 
 
@@ -45,7 +55,9 @@ def _rms_of_the_truth(problem, name):
     """What the machine itself leaves of its log, noise and start included [deg]."""
     own = problem.varied(problem.settings.of_estimate(name))
     values = own.parameters.mapping(own.parameters.start)
-    theta = own.parameters.vector(values | {n: TRUTH[n] for n in TRUTH if n in values}, "truth")
+    theta = own.parameters.vector(
+        values | {n: TRUTH[n] for n in TRUTH if n in values}, "truth"
+    )
     return float(np.degrees(own.rms(own.output_errors(theta[None]))[0]))
 
 
@@ -65,7 +77,8 @@ def test_a_fit_keeps_what_the_logs_ask_for(name, monkeypatch):
     if found.best.gained:
         rise, error = found.best.gained
         assert rise > 1.64 * error
-    if name == "dynamic+pump":  # a study measures the estimate as it is, though its search has another model
+    # a study measures the estimate as it is, though its search has another model
+    if name == "dynamic+pump":
         measures = perform(Task(name, 1, ladder, (log,)))["measures"]
         assert measures["rms error"] == pytest.approx(np.degrees(found.best.rms))
 
@@ -105,7 +118,9 @@ def test_a_fit_without_time_says_so_and_goes_on_to_the_bits_of_one_with_time():
     problem, stored, calls = _problem("refined+pump"), {}, Hurried(10_000)
     whole = fit(problem, calls)
     used = 10_000 - calls.calls
-    early = [fit(problem, Hurried(round(part * used)), stored) for part in (0.02, 0.2, 0.3)]
+    early = [
+        fit(problem, Hurried(round(part * used)), stored) for part in (0.02, 0.2, 0.3)
+    ]
     assert early[0].refinement.ending is Ending.TIME
     assert not early[0].refinement.ending.converged
     late = fit(problem, checkpoints=stored)

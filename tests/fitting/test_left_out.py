@@ -1,4 +1,5 @@
-"""Parts left out: fits predict what they have not seen, and what is missing gains by more than its error."""
+"""Parts left out: fits predict what they have not seen, and what is missing gains by
+more than its error."""
 
 from dataclasses import replace
 
@@ -39,11 +40,14 @@ def log_of(seed: int, stiffness: float = 1.0) -> Log:
 def predicted(settings: FitSettings, logs: list[Log]) -> LeftOut:
     problem = Problem(settings, logs)
     truth = problem.parameters.vector(FAST, "truth")
-    return predict_parts(problem, np.tile(truth, (len(np.unique(parts(problem))), 1)), refitted)
+    return predict_parts(
+        problem, np.tile(truth, (len(np.unique(parts(problem))), 1)), refitted
+    )
 
 
 def test_a_part_is_predicted_by_a_fit_that_has_not_seen_it():
-    """A log that is another one changes its own prediction, and all fits but the one without it."""
+    """A log that is another one changes its own prediction, and all fits but the one
+    without it."""
     logs = [log_of(seed) for seed in range(3)]
     before = predicted(MORE, logs)
     after = predicted(MORE, [*logs[:2], replace(log_of(5, 1.3), source="log_2.csv")])
@@ -61,7 +65,8 @@ def test_of_one_log_the_halves_are_parts():
     log = log_of(0)
     before = predicted(MORE, [log])
     half, angle = len(log.time) // 2, log.angle.copy()
-    angle[half + 20 :, 1] += 0.1  # beyond what the way of the first half is measured from
+    # beyond what the way of the first half is measured from
+    angle[half + 20 :, 1] += 0.1
     after = predicted(MORE, [replace(log, angle=angle)])
     np.testing.assert_allclose(after.thetas[1], before.thetas[1], rtol=1e-9)
     assert np.abs(after.thetas[0] / before.thetas[0] - 1).max() > 0.01
@@ -102,7 +107,10 @@ def test_a_block_is_predicted_as_by_a_fit_without_it():
         rest = replace(likelihood, shown=likelihood.shown.without(out))
         alone = problem.parameters.from_unit(refitted(rest, truth, 1).point)
         change = np.log(alone / all_of_it)
-        assert np.linalg.norm(np.log(found.thetas[block] / alone)) < 0.2 * np.linalg.norm(change) + 1e-5
+        assert (
+            np.linalg.norm(np.log(found.thetas[block] / alone))
+            < 0.2 * np.linalg.norm(change) + 1e-5
+        )
         errors = problem.output_errors(found.thetas[block][None])[0]
         np.testing.assert_allclose(found.errors[out], errors[out], atol=1e-4)
 
@@ -118,7 +126,9 @@ def test_a_term_that_is_missing_gains_by_more_than_its_uncertainty(stiffness: fl
     assert gain(without, with_it)[0] < 0
 
 
-@pytest.mark.parametrize(("fits", "most"), [(2, 1), pytest.param(20, 4, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("fits", "most"), [(2, 1), pytest.param(20, 4, marks=pytest.mark.slow)]
+)
 def test_a_term_that_is_not_there_gains_nothing_that_is_certain(fits: int, most: int):
     """It is named in 5 % of the cases, and three standard deviations of that many."""
     named = 0

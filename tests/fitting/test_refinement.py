@@ -26,9 +26,16 @@ class Counted(Problem):
 
 @pytest.fixture(scope="module", params=["no prior", "a prior"])
 def problem(request):
-    priors = {} if request.param == "no prior" else {"link 3": {"of": "M3", "value": 22.0, "sd": 0.5}}
+    priors = (
+        {}
+        if request.param == "no prior"
+        else {"link 3": {"of": "M3", "value": 22.0, "sd": 0.5}}
+    )
     settings = load_settings("article-mech", {"priors": priors})
-    return Counted(settings, [noisy(stepped(settings, TRUTH, [60.0, -80.0]), 0.06, exact_start=False)])
+    return Counted(
+        settings,
+        [noisy(stepped(settings, TRUTH, [60.0, -80.0]), 0.06, exact_start=False)],
+    )
 
 
 ONE, OTHER = Step("refined"), Step("refined", without=1)
@@ -54,21 +61,39 @@ def stop_after(limit: int):
 def test_an_interrupted_refinement_goes_on_without_loss(problem, tmp_path, limit):
     file = tmp_path / "refinement.npz"
     problem.simulated = 0
-    whole = refine(make_likelihood(problem), begin(problem), SHORT, lambda *_: None, {}, ONE)
+    whole = refine(
+        make_likelihood(problem), begin(problem), SHORT, lambda *_: None, {}, ONE
+    )
     assert whole.evaluations == problem.simulated
     problem.simulated = 0
     with pytest.raises(KeyboardInterrupt):
         refine(
-            make_likelihood(problem), begin(problem), SHORT, stop_after(limit), CheckpointFile(file, "a"), ONE
+            make_likelihood(problem),
+            begin(problem),
+            SHORT,
+            stop_after(limit),
+            CheckpointFile(file, "a"),
+            ONE,
         )
     parts = refine(
-        make_likelihood(problem), begin(problem), SHORT, lambda *_: None, CheckpointFile(file, "a"), ONE
+        make_likelihood(problem),
+        begin(problem),
+        SHORT,
+        lambda *_: None,
+        CheckpointFile(file, "a"),
+        ONE,
     )
     assert equal(parts, whole)
     simulated = problem.simulated
-    assert simulated < whole.evaluations + limit + 12  # the steps since the last Jacobian are repeated
+    # the steps since the last Jacobian are repeated
+    assert simulated < whole.evaluations + limit + 12
     again = refine(
-        make_likelihood(problem), begin(problem), SHORT, lambda *_: None, CheckpointFile(file, "a"), ONE
+        make_likelihood(problem),
+        begin(problem),
+        SHORT,
+        lambda *_: None,
+        CheckpointFile(file, "a"),
+        ONE,
     )
     assert equal(again, whole)
     assert problem.simulated == simulated  # the result itself is kept
@@ -76,8 +101,30 @@ def test_an_interrupted_refinement_goes_on_without_loss(problem, tmp_path, limit
 
 def test_another_refinement_has_a_checkpoint_of_its_own(problem, tmp_path):
     checkpoints = CheckpointFile(tmp_path / "refinement.npz", "a")
-    refine(make_likelihood(problem), begin(problem), SHORT, lambda *_: None, checkpoints, ONE)
-    other = refine(make_likelihood(problem), 1.1 * begin(problem), SHORT, lambda *_: None, checkpoints, OTHER)
+    refine(
+        make_likelihood(problem),
+        begin(problem),
+        SHORT,
+        lambda *_: None,
+        checkpoints,
+        ONE,
+    )
+    other = refine(
+        make_likelihood(problem),
+        1.1 * begin(problem),
+        SHORT,
+        lambda *_: None,
+        checkpoints,
+        OTHER,
+    )
     assert equal(
-        other, refine(make_likelihood(problem), 1.1 * begin(problem), SHORT, lambda *_: None, {}, ONE)
+        other,
+        refine(
+            make_likelihood(problem),
+            1.1 * begin(problem),
+            SHORT,
+            lambda *_: None,
+            {},
+            ONE,
+        ),
     )

@@ -31,9 +31,14 @@ def table(commands: Sequence[float], speeds_deg: Sequence[float]) -> Speed:
 
 
 def driven(
-    speed: Speed, delay: float = 0.2, levels: Sequence[float] | None = None, seed: int = 0, noise_deg=0.03
+    speed: Speed,
+    delay: float = 0.2,
+    levels: Sequence[float] | None = None,
+    seed: int = 0,
+    noise_deg=0.03,
 ) -> Log:
-    """A log of one joint for 100 s, by commands held for 0.4 to 2 s, of random size or of `levels` [%]."""
+    """A log of one joint for 100 s, by commands held for 0.4 to 2 s, of random size or
+    of `levels` [%]."""
     rng = np.random.default_rng(seed)
     steps = round(100 / PERIOD)
     command, angle = np.zeros(steps), np.zeros(steps)
@@ -43,13 +48,21 @@ def driven(
         command[k] = command[k - 1]
         if left <= 0:
             left = round(rng.uniform(0.4, 2.0) / PERIOD)
-            way = -np.sign(angle[k - 1]) if abs(angle[k - 1]) > 0.7 * RANGE[1] else rng.choice([-1, 1])
-            command[k] = way * (rng.uniform(5, 100) if levels is None else rng.choice(levels))
+            way = (
+                -np.sign(angle[k - 1])
+                if abs(angle[k - 1]) > 0.7 * RANGE[1]
+                else rng.choice([-1, 1])
+            )
+            command[k] = way * (
+                rng.uniform(5, 100) if levels is None else rng.choice(levels)
+            )
         target = speed(command[k - late]) if k >= late else 0.0
         now += (target - now) * PERIOD / LAG
         angle[k] = np.clip(angle[k - 1] + PERIOD * now, *RANGE)
     angle += np.radians(noise_deg) * rng.normal(size=steps)
-    return Log("driven", np.arange(steps) * PERIOD, command[:, None], angle[:, None], PERIOD)
+    return Log(
+        "driven", np.arange(steps) * PERIOD, command[:, None], angle[:, None], PERIOD
+    )
 
 
 def sides(log: Log) -> tuple[SpeedCurve, SpeedCurve]:
@@ -64,7 +77,9 @@ def predicted(side: SpeedCurve, commands: np.ndarray) -> np.ndarray:
     assert start is not None
     share = np.maximum(commands - start.dead_band, 0.0) / (100.0 - start.dead_band)
     ends = tuple(knot**start.exponent for knot in KNOTS)
-    return np.degrees(start.speed) * bent_opening(share**start.exponent, start.factors, ends)
+    return np.degrees(start.speed) * bent_opening(
+        share**start.exponent, start.factors, ends
+    )
 
 
 def test_a_curve_never_falls_and_has_the_delay_with_the_lag():
@@ -110,13 +125,22 @@ def test_commands_of_one_size_tell_a_speed_and_no_curve():
 
 
 def test_what_stands_at_an_end_is_no_speed():
-    """A sensor that ends before the joint does, as a draw wire, reads its end while the joint is driven."""
+    """A sensor that ends before the joint does, as a draw wire, reads its end while the
+    joint is driven."""
     speed = power((20, 20), 1.2, 40)
     log = driven(speed, levels=[60, 100], noise_deg=0.0)
-    clipped = Log("clipped", log.time, log.command, np.maximum(log.angle, np.radians(-15.0)), PERIOD)
+    clipped = Log(
+        "clipped",
+        log.time,
+        log.command,
+        np.maximum(log.angle, np.radians(-15.0)),
+        PERIOD,
+    )
     for log_side, own in zip(sides(log), sides(clipped), strict=True):
         at = np.array([60.0, 100.0])
-        np.testing.assert_allclose(predicted(own, at), predicted(log_side, at), rtol=0.08)
+        np.testing.assert_allclose(
+            predicted(own, at), predicted(log_side, at), rtol=0.08
+        )
 
 
 def test_a_turned_command_turns_the_valve():
@@ -128,19 +152,28 @@ def test_a_turned_command_turns_the_valve():
     assert [s.dead_band for s in other.turned.sides] == pytest.approx(
         [s.dead_band for s in one.sides], abs=0.1
     )
-    assert [s.speed for s in other.turned.sides] == pytest.approx([s.speed for s in one.sides], rel=0.01)
+    assert [s.speed for s in other.turned.sides] == pytest.approx(
+        [s.speed for s in one.sides], rel=0.01
+    )
 
 
 def test_a_joint_that_follows_its_valve_shows_delay_lag_and_dead_bands():
     valve = fitted_valve(
-        [driven(power((17, 60), 1.3, 30), delay=0.3), driven(power((17, 60), 1.3, 30), 0.3)], 1
+        [
+            driven(power((17, 60), 1.3, 30), delay=0.3),
+            driven(power((17, 60), 1.3, 30), 0.3),
+        ],
+        1,
     )
     assert valve is not None
-    # a command moves the joint from its own sample on, and a step leaves 1 - PERIOD / LAG of the error
+    # a command moves the joint from its own sample on, and a step leaves 1 - PERIOD /
+    # LAG of the error
     lag = -PERIOD / np.log(1.0 - PERIOD / LAG)
     assert (valve.delay, valve.lag) == pytest.approx((0.3 - PERIOD, lag), abs=0.01)
     assert [side.dead_band for side in valve.sides] == pytest.approx([17, 60], abs=1.0)
-    assert [np.degrees(side.speed) for side in valve.sides] == pytest.approx([30, 30], rel=0.02)
+    assert [np.degrees(side.speed) for side in valve.sides] == pytest.approx(
+        [30, 30], rel=0.02
+    )
 
 
 def test_a_valve_predicts_a_log_that_it_has_not_seen():
@@ -148,7 +181,9 @@ def test_a_valve_predicts_a_log_that_it_has_not_seen():
     valve = fitted_valve([driven(speed)], 1)
     assert valve is not None
     other = driven(speed, seed=1, noise_deg=0.0)
-    assert np.degrees(np.abs(valve.baseline(1, tuple(RANGE)).errors([other])).max()) < 1.5
+    assert (
+        np.degrees(np.abs(valve.baseline(1, tuple(RANGE)).errors([other])).max()) < 1.5
+    )
 
 
 def test_a_joint_that_no_log_drives_has_no_curve():

@@ -1,4 +1,5 @@
-"""Steps of a fit: each has a name of its own, for its checkpoint, and leads to an estimate by name."""
+"""Steps of a fit: each has a name of its own, for its checkpoint, and leads to an
+estimate by name."""
 
 from itertools import product
 
@@ -13,7 +14,9 @@ def every_step() -> list[Step]:
     phases = "", "from afar", "at first", "on the way"
     rungs = [
         Step(model, names, phase, without=part)
-        for model, names, phase, part in product(("refined", "dynamic", "joint"), terms, phases, (0, 1, 2, 3))
+        for model, names, phase, part in product(
+            ("refined", "dynamic", "joint"), terms, phases, (0, 1, 2, 3)
+        )
     ]
     starts = [
         Step("start", (), phase, start, joint, bool(joint) and numbers, horizon)
@@ -29,7 +32,9 @@ def test_no_two_steps_have_the_same_name():
     assert len({step.name for step in steps}) == len(steps)
 
 
-@pytest.mark.parametrize("estimate", ["refined", "dynamic+pump+oil", "joint+refined", "refined+start"])
+@pytest.mark.parametrize(
+    "estimate", ["refined", "dynamic+pump+oil", "joint+refined", "refined+start"]
+)
 def test_a_step_leads_to_the_estimate_that_it_is_named_by(estimate: str):
     step = step_of(estimate)
     assert step.estimate == estimate

@@ -1,4 +1,5 @@
-"""A prediction in Python: by the names of joints, in degrees, as a table, and in three lines."""
+"""A prediction in Python: by the names of joints, in degrees, as a table, and in three
+lines."""
 
 from dataclasses import replace
 
@@ -40,16 +41,21 @@ def test_a_frame_has_the_time_and_all_that_is_known_of_each_joint():
     assert frame.index.name == "time [s]"
     assert len(frame) == len(FITTED.log.time)
     assert [*frame["elbow"].columns] == ["measured", "response", "error", "half"]
-    assert frame["elbow", "error"].to_numpy() == pytest.approx(np.degrees(FITTED.error(3)))
+    assert frame["elbow", "error"].to_numpy() == pytest.approx(
+        np.degrees(FITTED.error(3))
+    )
     bare = make_prediction(PROBLEM.logs[0], band=False).to_frame()
-    assert [*bare["2"].columns] == ["measured", "response", "error"]  # its joints have no names
+    # its joints have no names
+    assert [*bare["2"].columns] == ["measured", "response", "error"]
 
 
 def test_a_prediction_prints_itself_in_three_lines():
     lines = repr(replace(FITTED, fit="hyd", unseen=True)).splitlines()
     assert len(lines) == 3
     assert lines[0] == f"hyd on a.csv: {FITTED.log.duration:.0f} s, unseen"
-    assert lines[1].startswith(f"rms error: shoulder {FITTED['shoulder'].rms:.3g} deg and elbow ")
+    assert lines[1].startswith(
+        f"rms error: shoulder {FITTED['shoulder'].rms:.3g} deg and elbow "
+    )
     assert lines[2] == 'more: prediction["shoulder"].error, prediction.to_frame()'
 
 

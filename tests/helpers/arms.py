@@ -1,4 +1,5 @@
-"""Small arms of a few lines of MJCF and YAML, and what plain MuJoCo makes of any arm."""
+"""Small arms of a few lines of MJCF and YAML, and what plain MuJoCo makes of any
+arm."""
 
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,14 @@ MODELS = Path(__file__).parents[1] / "models"
 BOOM = (MODELS / "boom.xml").read_text()
 """two joints, a hook that is fixed to the boom, no cylinders"""
 CYLINDER = {"kind": "linear", "area_a": 5000, "area_b": 3000, "max_opening": 20}
-FOUR_BAR = {"ground": 0.35, "rocker": 0.45, "coupler": 0.4, "child": 0.35, "phase_deg": 69.0, "side": "right"}
+FOUR_BAR = {
+    "ground": 0.35,
+    "rocker": 0.45,
+    "coupler": 0.4,
+    "child": 0.35,
+    "phase_deg": 69.0,
+    "side": "right",
+}
 """a bucket's linkage; ours"""
 PARENT, CHILD = [4.2, 0.05, 2.4], [6.5, 0.05, 2.5]
 """pivots of a cylinder of the tilt in the world, all joints at 0"""

@@ -1,4 +1,5 @@
-"""The command line in this process: exit status, what it prints, and what it refuses."""
+"""The command line in this process: exit status, what it prints, and what it
+refuses."""
 
 import sys
 from collections.abc import Callable
@@ -18,7 +19,9 @@ class Ended(NamedTuple):
 Run = Callable[..., Ended]
 
 
-def run(arguments: tuple[object, ...], capsys: pytest.CaptureFixture[str], code: int = 0) -> Ended:
+def run(
+    arguments: tuple[object, ...], capsys: pytest.CaptureFixture[str], code: int = 0
+) -> Ended:
     """Run a command; it must end with this exit status and without a traceback."""
     capsys.readouterr()
     with pytest.MonkeyPatch.context() as patch:

@@ -1,6 +1,8 @@
-"""Logs as machines record them, of which the truth is known: are they read rightly, or is it said?
+"""Logs as machines record them, of which the truth is known: are they read rightly, or
+is it said?
 
-All are of the template's arm, a boom and a stick, so that `hydroid init DIR --log LOG` takes them alone.
+All are of the template's arm, a boom and a stick, so that `hydroid init DIR --log LOG`
+takes them alone.
 """
 
 from collections.abc import Callable, Mapping
@@ -38,7 +40,8 @@ class Truth:
 
 @dataclass(frozen=True)
 class FieldLog:
-    """A log of one kind: what writes it of the truth; `said`: words of the line that must be printed.
+    """A log of one kind: what writes it of the truth; `said`: words of the line that
+    must be printed.
 
     Without these it must be read rightly, though `lost` [s] of it may be missing.
     """
@@ -56,7 +59,10 @@ def make_truth(steps: tuple[float, ...]) -> Truth:
     for k, step in enumerate(steps * 2):
         driven = JOINTS[k // len(steps)]
         for name in JOINTS:
-            commands[name] += [np.full(100, step if name == driven else 0.0), np.zeros(50)]
+            commands[name] += [
+                np.full(100, step if name == driven else 0.0),
+                np.zeros(50),
+            ]
     command = {name: np.concatenate(parts) for name, parts in commands.items()}
     angle = {name: _moved(command[name], name) for name in JOINTS}
     return Truth(PERIOD * np.arange(len(command["boom"])), command, angle)
@@ -76,10 +82,17 @@ def _moved(command: np.ndarray, name: str) -> np.ndarray:
 def text(columns: Mapping[str, np.ndarray]) -> str:
     """Return a CSV of columns; of numbers with nine digits."""
     cells = [
-        values.tolist() if values.dtype.kind in "UO" else [f"{value:.9g}" for value in values]
+        values.tolist()
+        if values.dtype.kind in "UO"
+        else [f"{value:.9g}" for value in values]
         for values in columns.values()
     ]
-    return "\n".join([",".join(columns), *(",".join(row) for row in zip(*cells, strict=True))]) + "\n"
+    return (
+        "\n".join(
+            [",".join(columns), *(",".join(row) for row in zip(*cells, strict=True))]
+        )
+        + "\n"
+    )
 
 
 def table(truth: Truth) -> Columns:
@@ -89,21 +102,33 @@ def table(truth: Truth) -> Columns:
     return columns | {f"{name}_angle_deg": truth.angle[name] for name in JOINTS}
 
 
-def commands(label: str, change: Callable[[np.ndarray], np.ndarray]) -> Callable[[Truth, Arm], str]:
-    """Return what writes commands as they are sent, under the joint's name and a label."""
+def commands(
+    label: str, change: Callable[[np.ndarray], np.ndarray]
+) -> Callable[[Truth, Arm], str]:
+    """Return what writes commands as they are sent, under the joint's name and a
+    label."""
 
     def write(truth: Truth, arm: Arm) -> str:
-        columns = {"time_s": truth.time} | {f"{n}_{label}": change(truth.command[n]) for n in JOINTS}
-        return text(columns | {f"{name}_angle_deg": truth.angle[name] for name in JOINTS})
+        columns = {"time_s": truth.time} | {
+            f"{n}_{label}": change(truth.command[n]) for n in JOINTS
+        }
+        return text(
+            columns | {f"{name}_angle_deg": truth.angle[name] for name in JOINTS}
+        )
 
     return write
 
 
-def lengths(label: str, factor: float, *, travel: bool = False) -> Callable[[Truth, Arm], str]:
-    """Return what writes the lengths of cylinders in place of angles, or the travel of their rods."""
+def lengths(
+    label: str, factor: float, *, travel: bool = False
+) -> Callable[[Truth, Arm], str]:
+    """Return what writes the lengths of cylinders in place of angles, or the travel of
+    their rods."""
 
     def write(truth: Truth, arm: Arm) -> str:
-        columns = {"time_s": truth.time} | {f"{n}_cmd_pct": truth.command[n] for n in JOINTS}
+        columns = {"time_s": truth.time} | {
+            f"{n}_cmd_pct": truth.command[n] for n in JOINTS
+        }
         for joint in arm.joints:
             assert isinstance(joint.actuator, LinearActuator)
             length = joint.actuator.length(np.radians(truth.angle[joint.name]))
@@ -114,14 +139,19 @@ def lengths(label: str, factor: float, *, travel: bool = False) -> Callable[[Tru
     return write
 
 
-def wires(label: str, low: float, high: float, *, clip: float = 1.0) -> Callable[[Truth, Arm], str]:
-    """Return what writes draw wires along the cylinders, whose signal goes from low to high over the stroke.
+def wires(
+    label: str, low: float, high: float, *, clip: float = 1.0
+) -> Callable[[Truth, Arm], str]:
+    """Return what writes draw wires along the cylinders, whose signal goes from low to
+    high over the stroke.
 
     A wire that is too short stays at a part of it, `clip`.
     """
 
     def write(truth: Truth, arm: Arm) -> str:
-        columns = {"time_s": truth.time} | {f"{n}_cmd_pct": truth.command[n] for n in JOINTS}
+        columns = {"time_s": truth.time} | {
+            f"{n}_cmd_pct": truth.command[n] for n in JOINTS
+        }
         for joint in arm.joints:
             assert isinstance(joint.actuator, LinearActuator)
             length = joint.actuator.length(np.radians(truth.angle[joint.name]))
@@ -146,7 +176,9 @@ def lines(change: Callable[[list[str]], list[str]]) -> Callable[[Truth, Arm], st
 def _stamps(columns: Columns) -> Columns:
     start = np.datetime64("2026-03-01T23:59:50.000")
     stamps = start + np.round(1e3 * columns["time_s"]).astype("m8[ms]")
-    return {"stamp": stamps.astype(str)} | {name: own for name, own in columns.items() if name != "time_s"}
+    return {"stamp": stamps.astype(str)} | {
+        name: own for name, own in columns.items() if name != "time_s"
+    }
 
 
 def _renamed(columns: Columns, factor: float, name: str) -> Columns:
@@ -166,13 +198,18 @@ def _half(columns: Columns) -> Columns:
 
 
 def _targets(columns: Columns) -> Columns:
-    ahead = {n: np.r_[v[10:], np.full(10, v[-1])] for n, v in columns.items() if "angle" in n}
+    ahead = {
+        n: np.r_[v[10:], np.full(10, v[-1])] for n, v in columns.items() if "angle" in n
+    }
     kept = {name: own for name, own in columns.items() if "cmd" not in name}
     return kept | {name.replace("angle", "target"): own for name, own in ahead.items()}
 
 
 def _counts(columns: Columns) -> Columns:
-    turned = {n.replace("deg", "counts"): np.round(2048 + v * 4096 / 360) for n, v in columns.items()}
+    turned = {
+        n.replace("deg", "counts"): np.round(2048 + v * 4096 / 360)
+        for n, v in columns.items()
+    }
     return {n: v for n, v in columns.items() if "angle" not in n} | {
         n: v for n, v in turned.items() if "angle" in n
     }
@@ -180,7 +217,9 @@ def _counts(columns: Columns) -> Columns:
 
 def _pots(columns: Columns) -> Columns:
     others = {name: own for name, own in columns.items() if "angle" not in name}
-    return others | {f"{name}_pot_V": 2.5 + columns[f"{name}_angle_deg"] / 60 for name in JOINTS}
+    return others | {
+        f"{name}_pot_V": 2.5 + columns[f"{name}_angle_deg"] / 60 for name in JOINTS
+    }
 
 
 def _jump(columns: Columns) -> Columns:
@@ -196,9 +235,17 @@ FIELD_LOGS = (
     FieldLog("pulses of 1000 to 2000 µs", commands("us", lambda u: 1500 + 5 * u)),
     FieldLog("duty of 0 to 100 % around 50", commands("duty", lambda u: 50 + 0.5 * u)),
     FieldLog("4 to 20 mA", commands("valve_mA", lambda u: 12 + 0.08 * u)),
-    FieldLog("3 to 9 V of a supply of 12 V", commands("joystick_V", lambda u: 6 + 0.03 * u)),
-    FieldLog("0.25 to 0.75 of a supply", commands("joystick", lambda u: 0.5 + 0.0025 * u)),
-    FieldLog("-1, 0 and 1 of switched valves", commands("cmd", lambda u: u / 100), steps=(100, -100, 100)),
+    FieldLog(
+        "3 to 9 V of a supply of 12 V", commands("joystick_V", lambda u: 6 + 0.03 * u)
+    ),
+    FieldLog(
+        "0.25 to 0.75 of a supply", commands("joystick", lambda u: 0.5 + 0.0025 * u)
+    ),
+    FieldLog(
+        "-1, 0 and 1 of switched valves",
+        commands("cmd", lambda u: u / 100),
+        steps=(100, -100, 100),
+    ),
     FieldLog("bytes around 127", commands("joy", lambda u: np.round(127 + 1.27 * u))),
     FieldLog("permille on a bus", commands("cmd", lambda u: 10 * u)),
     FieldLog("cylinder lengths in mm", lengths("cyl_mm", 1e3)),
@@ -207,17 +254,32 @@ FIELD_LOGS = (
     FieldLog("a hole of 2 s", lines(lambda rows: rows[:600] + rows[700:]), lost=2.1),
     FieldLog("a last line cut off", lines(lambda rows: [*rows[:-1], rows[-1][:7]])),
     FieldLog("a cell without a number, a row twice, names again", lines(_dirty)),
-    FieldLog("more names than cells", lines(lambda rows: [rows[0] + ",note,operator", *rows[1:]])),
+    FieldLog(
+        "more names than cells",
+        lines(lambda rows: [rows[0] + ",note,operator", *rows[1:]]),
+    ),
     FieldLog("dates and times past midnight", changed(_stamps)),
     FieldLog("time in ns", changed(lambda columns: _renamed(columns, 1e9, "time_ns"))),
-    FieldLog("a joystick without its lowering half", changed(_half), "lacks half of the command"),
+    FieldLog(
+        "a joystick without its lowering half",
+        changed(_half),
+        "lacks half of the command",
+    ),
     FieldLog("targets in place of commands", changed(_targets), "targets of positions"),
     FieldLog("encoder counts", changed(_counts), "taken for the whole range"),
     FieldLog("draw wires in mA", wires("wire_mA", 4, 20), "taken for the whole stroke"),
     FieldLog("draw wires in V", wires("wire_V", 0, 10), "taken for the whole stroke"),
-    FieldLog("draw wires in counts", wires("wire_counts", 0, 4095), "taken for the whole stroke"),
+    FieldLog(
+        "draw wires in counts",
+        wires("wire_counts", 0, 4095),
+        "taken for the whole stroke",
+    ),
     FieldLog("potentiometers in V", changed(_pots), "taken for the whole range"),
-    FieldLog("a draw wire that is too short", wires("wire_mm", 0, 400, clip=0.6), "stands to the last digit"),
+    FieldLog(
+        "a draw wire that is too short",
+        wires("wire_mm", 0, 400, clip=0.6),
+        "stands to the last digit",
+    ),
     FieldLog("an encoder that slips", changed(_jump), "jumps by"),
     FieldLog(
         "a counter of samples for the time",
@@ -235,9 +297,11 @@ FIELD_LOGS = (
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a log: "right", "said" in one line, "refused", or "wrong" in silence.
+    """What became of a log: "right", "said" in one line, "refused", or "wrong" in
+    silence.
 
-    Where commands were followed also "named": the verdict says that the fit predicts badly.
+    Where commands were followed also "named": the verdict says that the fit predicts
+    badly.
     """
 
     verdict: str
@@ -251,9 +315,15 @@ def outcome(log: FieldLog, folder: Path, arm: Arm) -> Outcome:
     try:
         result = hydroid.init(folder / "mine", log=path)
         printed = [str(line) for line in result.lines]
-        told = next((line.strip() for line in printed if log.said and log.said in line), "")
+        told = next(
+            (line.strip() for line in printed if log.said and log.said in line), ""
+        )
         if log.said and not told and not result.result.missing:
-            printed = [*map(str, hydroid.check(path, config=folder / "mine" / "fit.yaml").lines)]
+            printed = [
+                *map(
+                    str, hydroid.check(path, config=folder / "mine" / "fit.yaml").lines
+                )
+            ]
             told = next((line for line in printed if log.said in line), "")
         if told:
             return Outcome("said", told)
@@ -262,12 +332,15 @@ def outcome(log: FieldLog, folder: Path, arm: Arm) -> Outcome:
         settings = hydroid.load_settings(folder / "mine" / "fit.yaml")
         parts = hydroid.read_logs(path, settings)
     except HydroidError as error:
-        return Outcome("said" if log.said and log.said in str(error) else "refused", str(error))
+        return Outcome(
+            "said" if log.said and log.said in str(error) else "refused", str(error)
+        )
     return Outcome("right" if is_right(parts, truth, log.lost) else "wrong")
 
 
 def followed(log: FieldLog, folder: Path, arm: Arm, budget: str) -> Outcome:
-    """Write two logs, and follow the commands that `init` prints for the first, validated on the second.
+    """Write two logs, and follow the commands that `init` prints for the first,
+    validated on the second.
 
     Right: it is read rightly, and the fit predicts the second.
     """
@@ -281,14 +354,19 @@ def followed(log: FieldLog, folder: Path, arm: Arm, budget: str) -> Outcome:
 
 
 def is_right(parts: list[Log], truth: Truth, lost: float) -> bool:
-    """Return whether logs hold commands and angles of the truth, but for a part of its time [s]."""
+    """Return whether logs hold commands and angles of the truth, but for a part of its
+    time [s]."""
     read = 0.0
     for part in parts:
         begin = getattr(part, "begin", 0.0)
-        rows = np.minimum(np.rint((begin + part.time) / PERIOD).astype(int), len(truth.time) - 1)
+        rows = np.minimum(
+            np.rint((begin + part.time) / PERIOD).astype(int), len(truth.time) - 1
+        )
         read += part.duration
         for number, name in enumerate(JOINTS):
-            size = np.abs(np.abs(part.command[:, number]) - np.abs(truth.command[name][rows]))
+            size = np.abs(
+                np.abs(part.command[:, number]) - np.abs(truth.command[name][rows])
+            )
             off = np.abs(np.degrees(part.angle[:, number]) - truth.angle[name][rows])
             # a command averaged over a lost or doubled row may differ for a sample
             if np.quantile(size, 0.99) > CLOSE_COMMAND or not off.max() <= CLOSE_ANGLE:

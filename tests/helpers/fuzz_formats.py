@@ -1,4 +1,5 @@
-"""Files of arrays and bags for `fuzz`: intact ones of every format, with odd columns, and what reads them."""
+"""Files of arrays and bags for `fuzz`: intact ones of every format, with odd columns,
+and what reads them."""
 
 import datetime
 import signal
@@ -8,6 +9,7 @@ from functools import cache
 from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import h5py
 import numpy as np
@@ -18,7 +20,8 @@ from pyarrow import parquet
 from scipy.io import savemat
 
 LONGEST = 20  # [s], for a file of some kB
-SPARE = 150_000_000  # [bytes], of libraries and their arenas, beside four times the file
+# [bytes], of libraries and their arenas, beside four times the file
+SPARE = 150_000_000
 BAG = (
     "--set=log.command.column=/valves.data[{joint}]",
     "--set=log.angle.column=/joints.position[{joint}]",
@@ -28,7 +31,8 @@ BAG = (
 
 @contextmanager
 def bounded(size: int) -> Generator[None]:
-    """Refuse a body that takes too long, or more memory than four times `size` [bytes] and a spare."""
+    """Refuse a body that takes too long, or more memory than four times `size` [bytes]
+    and a spare."""
 
     def late(*_: object) -> None:
         raise AssertionError(f"is not read after {LONGEST} s")
@@ -46,7 +50,8 @@ def bounded(size: int) -> Generator[None]:
 
 
 def _peak(*, anew: bool = False) -> int:
-    """Return the most memory that this process has held [bytes]; `anew`: from now on."""
+    """Return the most memory that this process has held [bytes]; `anew`: from now
+    on."""
     if anew:
         Path("/proc/self/clear_refs").write_text("5")
     status = Path("/proc/self/status").read_text()
@@ -80,24 +85,42 @@ def odd_columns() -> Iterator[dict[str, np.ndarray]]:
 
 @cache
 def mats() -> tuple[bytes, ...]:
-    """Files of MATLAB 4 to 7: plain, compressed, with structs, cells, text, complex and sparse numbers."""
+    """Files of MATLAB 4 to 7: plain, compressed, with structs, cells, text, complex and
+    sparse numbers."""
     plain = columns()
     files = [_written(write_mat, one) for one in odd_columns()]
     odd = [
         {"rec": plain},
         {"rec": {"inner": list(plain.values())}},
-        plain | {"note": "a rig", "more": np.array(["a", "b"], object), "z": 1j * plain["q2_deg"]},
-        plain | {"grid": np.zeros((3, 4, 5)), "none": np.zeros((0, 3)), "q2_deg": 1j * plain["q2_deg"]},
+        plain
+        | {
+            "note": "a rig",
+            "more": np.array(["a", "b"], object),
+            "z": 1j * plain["q2_deg"],
+        },
+        plain
+        | {
+            "grid": np.zeros((3, 4, 5)),
+            "none": np.zeros((0, 3)),
+            "q2_deg": 1j * plain["q2_deg"],
+        },
     ]
     files += [_written(write_mat, one) for one in odd]
     for options in ({"do_compression": True}, {"format": "4"}):
-        files.append(_written(lambda path, one, options=options: savemat(path, one, **options), plain))
+        files.append(
+            _written(
+                lambda path, one, options=options: savemat(path, one, **options), plain
+            )
+        )
     return tuple(files)
 
 
 @cache
 def mats73() -> tuple[bytes, ...]:
-    return (*(_written(write_mat73, one) for one in odd_columns()), _written(_write_struct73, columns()))
+    return (
+        *(_written(write_mat73, one) for one in odd_columns()),
+        _written(_write_struct73, columns()),
+    )
 
 
 def _write_struct73(path: Path, content: dict[str, np.ndarray]) -> None:
@@ -109,7 +132,8 @@ def _write_struct73(path: Path, content: dict[str, np.ndarray]) -> None:
 
 @cache
 def parquets() -> tuple[bytes, ...]:
-    """Parquet files: plain, compressed, with text, times, lengths of time, decimals, lists and structs."""
+    """Parquet files: plain, compressed, with text, times, lengths of time, decimals,
+    lists and structs."""
     plain = columns()
     rows = len(plain["time_s"])
     now = datetime.datetime(2026, 3, 1, 23, 59)
@@ -126,16 +150,30 @@ def parquets() -> tuple[bytes, ...]:
         "dates": [now.date()] * rows,
         "choices": pyarrow.array((["a", "b"] * rows)[:rows]).dictionary_encode(),
     }
-    tables = [pyarrow.table(plain | odd), pyarrow.table(plain).slice(0, 0), pyarrow.table({})]
+    tables = [
+        pyarrow.table(plain | odd),
+        pyarrow.table(plain).slice(0, 0),
+        pyarrow.table({}),
+    ]
     for name in ("time_s", "q2_deg", "u2_pct"):
         tables += [pyarrow.table(plain | {name: values}) for values in odd.values()]
         tables += [pyarrow.table(plain).append_column(name, pyarrow.array(plain[name]))]
     for one in odd_columns():
         if len({len(values) for values in one.values()}) == 1:
             tables.append(pyarrow.table(one))
-    files = [_written(lambda path, one: parquet.write_table(one, path), one) for one in tables]
-    for options in ({"compression": "none"}, {"compression": "zstd"}, {"use_dictionary": False}):
-        write: Callable = lambda path, one, options=options: parquet.write_table(one, path, **options)  # noqa: E731
+    files = [
+        _written(lambda path, one: parquet.write_table(one, path), one)
+        for one in tables
+    ]
+    for options in (
+        {"compression": "none"},
+        {"compression": "zstd"},
+        {"use_dictionary": False},
+    ):
+
+        def write(path: Path, one: object, options: Any = options) -> None:
+            parquet.write_table(one, path, **options)
+
         files.append(_written(write, tables[0]))
     return tuple(files)
 
@@ -150,7 +188,8 @@ def _written(write: Callable[[Path, object], object], content: object) -> bytes:
 
 @cache
 def bag(kind: str) -> dict[str, bytes]:
-    """Return the files of a bag of a second, by ending: of a folder, its database and metadata."""
+    """Return the files of a bag of a second, by ending: of a folder, its database and
+    metadata."""
     plain = columns()
     angles = np.stack([plain[f"q{joint}_deg"] for joint in range(1, 8)], axis=1)
     commands = np.stack([plain[f"u{joint}_pct"] for joint in range(1, 8)], axis=1)
@@ -158,22 +197,29 @@ def bag(kind: str) -> dict[str, bytes]:
         path = Path(folder) / ("log.bag" if kind == "ros1" else "log")
         with BagWriter(path, kind) as writer:
             for k, at in enumerate(1e9 + plain["time_s"]):
-                writer.write("/joints", at, writer.joints(at, [], np.radians(angles[k])))
+                writer.write(
+                    "/joints", at, writer.joints(at, [], np.radians(angles[k]))
+                )
                 writer.write("/valves", at, writer.array(commands[k].copy()))
         files = [path] if path.is_file() else path.iterdir()
         return {file.suffix: file.read_bytes() for file in files}
 
 
 def overwritten(rng: Random, data: bytes) -> bytes:
-    """Damage bytes where they stand, so that offsets stay right; one time in four in any way."""
+    """Damage bytes where they stand, so that offsets stay right; one time in four in
+    any way."""
     if rng.random() < 0.25:
         return damage(rng, data)
     out = bytearray(data)
     for _ in range(rng.choice((1, 1, 2, 8))):
         width = rng.choice((1, 1, 2, 4, 8))
-        value = rng.choice((b"\0" * width, b"\xff" * width, b"\x7f" * width, rng.randbytes(width)))
+        value = rng.choice(
+            (b"\0" * width, b"\xff" * width, b"\x7f" * width, rng.randbytes(width))
+        )
         # lengths and names stand at both ends
-        near = rng.choice((len(data), len(data), min(len(data), 1000), -min(len(data), 3000)))
+        near = rng.choice(
+            (len(data), len(data), min(len(data), 1000), -min(len(data), 3000))
+        )
         at = rng.randrange(near) if near > 0 else len(data) - rng.randrange(-near)
         out[at : at + width] = value[: len(data) - at]
     return bytes(out)
@@ -185,7 +231,10 @@ def _check(place: str, *more: str) -> Callable[[Path, bytes], Sequence[str]]:
 
 def _ros2(room: Path, data: bytes) -> Sequence[str]:
     """Complete the folder of a bag by the file that is not damaged."""
-    for name, content in {"log.db3": bag("ros2")[".db3"], "metadata.yaml": bag("ros2")[".yaml"]}.items():
+    for name, content in {
+        "log.db3": bag("ros2")[".db3"],
+        "metadata.yaml": bag("ros2")[".yaml"],
+    }.items():
         if not (room / "log" / name).exists():
             (room / "log" / name).write_bytes(content)
     return ("check", str(room / "log"), *BAG)
@@ -196,10 +245,36 @@ FORMATS = {
     for kind in (
         Kind("mat", mats, "log.mat", _check("log.mat"), damaged=overwritten),
         Kind("mat73", mats73, "log.mat", _check("log.mat"), damaged=overwritten),
-        Kind("parquet", parquets, "log.parquet", _check("log.parquet"), damaged=overwritten),
-        Kind("ros1", lambda: (bag("ros1")[".bag"],), "log.bag", _check("log.bag", *BAG), damaged=overwritten),
-        Kind("ros2", lambda: (bag("ros2")[".db3"],), "log/log.db3", _ros2, damaged=overwritten),
-        Kind("ros2 metadata", lambda: (bag("ros2")[".yaml"],), "log/metadata.yaml", _ros2),
-        Kind("mcap", lambda: (bag("mcap")[".mcap"],), "a.mcap", _check("a.mcap", *BAG), damaged=overwritten),
+        Kind(
+            "parquet",
+            parquets,
+            "log.parquet",
+            _check("log.parquet"),
+            damaged=overwritten,
+        ),
+        Kind(
+            "ros1",
+            lambda: (bag("ros1")[".bag"],),
+            "log.bag",
+            _check("log.bag", *BAG),
+            damaged=overwritten,
+        ),
+        Kind(
+            "ros2",
+            lambda: (bag("ros2")[".db3"],),
+            "log/log.db3",
+            _ros2,
+            damaged=overwritten,
+        ),
+        Kind(
+            "ros2 metadata", lambda: (bag("ros2")[".yaml"],), "log/metadata.yaml", _ros2
+        ),
+        Kind(
+            "mcap",
+            lambda: (bag("mcap")[".mcap"],),
+            "a.mcap",
+            _check("a.mcap", *BAG),
+            damaged=overwritten,
+        ),
     )
 }

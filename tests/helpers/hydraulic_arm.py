@@ -20,9 +20,12 @@ def nominal(arm: Arm, settings: HydraulicSettings, n: int = 1) -> Records:
 
 
 class DrivenArm:
-    """n candidates of the seven-joint arm under commands [%], (T, J), with hydraulics on every joint."""
+    """n candidates of the seven-joint arm under commands [%], (T, J), with hydraulics
+    on every joint."""
 
-    def __init__(self, arm: Arm, joints: Records, command: np.ndarray, settings, steps: int = 1) -> None:
+    def __init__(
+        self, arm: Arm, joints: Records, command: np.ndarray, settings, steps: int = 1
+    ) -> None:
         pose = arm.pose("study")
         log = at_rest(pose, np.concatenate([command, np.zeros((1, command.shape[1]))]))
         chosen = SimulationSettings(steps_per_sample=steps)
@@ -32,7 +35,9 @@ class DrivenArm:
 
     def run(self) -> np.ndarray:
         """Angles [rad], (n, T + 1, J); NaN of a candidate that diverged."""
-        return Simulation(self._scenario, self._substeps).simulate(self._candidates).angle
+        return (
+            Simulation(self._scenario, self._substeps).simulate(self._candidates).angle
+        )
 
     def trace(self) -> Observation:
         """What the actuators of the only candidate did, (T + 1, J)."""

@@ -1,7 +1,8 @@
-"""The shoulder as a pendulum, twice: on MuJoCo under the actuator plugin, and in plain equations under Radau.
+"""The shoulder as a pendulum, twice: on MuJoCo under the actuator plugin, and in plain
+equations under Radau.
 
-The plain side shares no code with hydroid: it integrates plungers, oil and arm together, (4) to (9), with
-rtol 1e-7 or less, restarted at every change of the command.
+The plain side shares no code with hydroid: it integrates plungers, oil and arm
+together, (4) to (9), with rtol 1e-7 or less, restarted at every change of the command.
 """
 
 from dataclasses import fields as fields_of
@@ -22,7 +23,14 @@ from hydroid.quantity_table import QUANTITIES, TARGETS
 from hydroid.settings.hydraulics import HydraulicSettings, actuator_values
 from hydroid.simulation.rollout import Course, Record, SteppedArm
 
-INERTIA, DAMPING, STIFFNESS, MASS, CENTRE, TILT = 23.6, 231.8, 53.4, 45.0, 0.6, radians(-15.0)
+INERTIA, DAMPING, STIFFNESS, MASS, CENTRE, TILT = (
+    23.6,
+    231.8,
+    53.4,
+    45.0,
+    0.6,
+    radians(-15.0),
+)
 START, PERIOD, GRAVITY = radians(10.0), 0.01, 9.81
 A, B, THETA0, STROKE = 0.30, 0.08, radians(70.0), 0.135
 SHORTEST = sqrt(A * A + B * B - 2 * A * B * cos(radians(40.0)))
@@ -35,7 +43,8 @@ TEN = {
 
 
 def changed(joints: Records, **values: ArrayLike) -> Records:
-    """Joints, (n, V), with some quantities replaced, in drawing units; n may grow from 1."""
+    """Joints, (n, V), with some quantities replaced, in drawing units; n may grow from
+    1."""
     shape = np.broadcast_shapes(joints.shape, *(np.shape(v) for v in values.values()))
     replaced = np.broadcast_to(joints, shape).copy().view(np.recarray)
     for name, value in values.items():
@@ -45,11 +54,27 @@ def changed(joints: Records, **values: ArrayLike) -> Records:
 
 
 def parameters(settings: HydraulicSettings, **values: ArrayLike) -> Records:
-    """The shoulder alone, once a candidate; `values` in drawing units, scalars or (n,)."""
-    stated = {k: inf if v is None else v for k, v in actuator_values(None, settings).items() if k != "mass"}
-    one = changed(np.zeros((1, 1), JOINT).view(np.recarray), **stated | TRUTH | PIVOTS | {"damping": DAMPING})
-    one.kind, one.half, one.sense, one.retracted, one.stroke = LINEAR, 1.0, 1.0, radians(-30.0), STROKE
-    return changed(one, **{k: np.reshape(np.asarray(v), (-1, 1)) for k, v in values.items()})
+    """The shoulder alone, once a candidate; `values` in drawing units, scalars or
+    (n,)."""
+    stated = {
+        k: inf if v is None else v
+        for k, v in actuator_values(None, settings).items()
+        if k != "mass"
+    }
+    one = changed(
+        np.zeros((1, 1), JOINT).view(np.recarray),
+        **stated | TRUTH | PIVOTS | {"damping": DAMPING},
+    )
+    one.kind, one.half, one.sense, one.retracted, one.stroke = (
+        LINEAR,
+        1.0,
+        1.0,
+        radians(-30.0),
+        STROKE,
+    )
+    return changed(
+        one, **{k: np.reshape(np.asarray(v), (-1, 1)) for k, v in values.items()}
+    )
 
 
 def rotary(joints: Records) -> Records:
@@ -59,7 +84,8 @@ def rotary(joints: Records) -> Records:
 
 
 def draw(rng: np.random.Generator, count: int) -> dict[str, np.ndarray]:
-    """Feasible sets from the whole search space, 0.25 to 2.5 times the article's ten, (count,) each."""
+    """Feasible sets from the whole search space, 0.25 to 2.5 times the article's ten,
+    (count,) each."""
     rows: list[np.ndarray] = []
     while len(rows) < count:
         row = np.array(list(TEN.values())) * rng.uniform(0.25, 2.5, len(TEN))
@@ -70,18 +96,22 @@ def draw(rng: np.random.Generator, count: int) -> dict[str, np.ndarray]:
 
 
 def pulses(rng: np.random.Generator, samples: int) -> np.ndarray:
-    """Pseudo-random commands [%], (samples,): pulses of random size and length, a third of them rests."""
+    """Pseudo-random commands [%], (samples,): pulses of random size and length, a third
+    of them rests."""
     command = np.zeros(samples)
     at = 0
     while at < samples:
         length = int(rng.integers(20, 120))
-        command[at : at + length] = rng.choice([-1.0, 1.0, 0.0], p=[0.35, 0.35, 0.3]) * rng.uniform(20, 100)
+        command[at : at + length] = rng.choice(
+            [-1.0, 1.0, 0.0], p=[0.35, 0.35, 0.3]
+        ) * rng.uniform(20, 100)
         at += length
     return command
 
 
 def pendulum() -> mujoco.MjModel:
-    """The shoulder with all that hangs on it, as one rigid body without joint limits."""
+    """The shoulder with all that hangs on it, as one rigid body without joint
+    limits."""
     own = INERTIA - MASS * CENTRE**2
     at = f"{CENTRE * cos(TILT)} 0 {CENTRE * sin(TILT)}"
     return mujoco.MjModel.from_xml_string(
@@ -94,7 +124,8 @@ def pendulum() -> mujoco.MjModel:
 def wheel(inertia: float) -> mujoco.MjModel:
     """An inertia [kg·m²] that nothing but its actuator moves.
 
-    It is turned, lest MuJoCo take the short cut for aligned inertias, which ignores a changed armature.
+    It is turned, lest MuJoCo take the short cut for aligned inertias, which ignores a
+    changed armature.
     """
     tensor = f"{inertia} {inertia} {inertia}"
     return mujoco.MjModel.from_xml_string(
@@ -103,18 +134,24 @@ def wheel(inertia: float) -> mujoco.MjModel:
     )
 
 
-def simulate(p, command, settings, steps=1, observe=None, start=START, model=None, velocity=0.0):
-    """Angles [rad], (n, T + 1), of one joint under commands (T,), with `steps` MuJoCo steps a sample.
+def simulate(
+    p, command, settings, steps=1, observe=None, start=START, model=None, velocity=0.0
+):
+    """Angles [rad], (n, T + 1), of one joint under commands (T,), with `steps` MuJoCo
+    steps a sample.
 
-    It is the pendulum on its cylinder, or another. `observe` receives an Observation, shapes (n, 1), and the
-    velocity [rad/s], (n, 1), after each sample.
+    It is the pendulum on its cylinder, or another. `observe` receives an Observation,
+    shapes (n, 1), and the velocity [rad/s], (n, 1), after each sample.
     """
     model, n, samples = pendulum() if model is None else model, len(p), len(command)
     model.opt.timestep = PERIOD / steps
     entries = np.zeros((1, 1), np.intp)
     plugin = make_plugin(p, entries, model.opt.timestep, settings.substeps)
     arm, pose = SteppedArm(model, np.zeros(1, np.intp), steps=steps), np.array([start])
-    angle, states = np.full((n, samples + 1, 1), start), np.zeros((n, samples, 1), JOINT_STATE)
+    angle, states = (
+        np.full((n, samples + 1, 1), start),
+        np.zeros((n, samples, 1), JOINT_STATE),
+    )
     with quiet_mujoco():
         balance = np.tile(arm.start({}, [0], pose), (n, 1))
         state = at_rest(plugin, np.full((n, 1), start), balance)
@@ -122,7 +159,9 @@ def simulate(p, command, settings, steps=1, observe=None, start=START, model=Non
             arm.start({}, [0], pose)
             arm.data.qvel[:] = velocity
             one = plugin.of(i)
-            held = np.concatenate([np.zeros(one.past), np.repeat(command, steps)])[:, None]
+            held = np.concatenate([np.zeros(one.past), np.repeat(command, steps)])[
+                :, None
+            ]
             course = Course(held, np.empty((samples * steps, 0)))
             arm.roll(one, state[i], course, Record(angle[i, 1:], states[i]))
     if observe is not None:
@@ -133,19 +172,27 @@ def simulate(p, command, settings, steps=1, observe=None, start=START, model=Non
 
 
 def watched(p: Records, command: np.ndarray, settings: HydraulicSettings, **how):
-    """The first candidate of `simulate`: angles [rad], (T + 1,), and after each sample what it did."""
+    """The first candidate of `simulate`: angles [rad], (T + 1,), and after each sample
+    what it did."""
     seen: list = []
     angle = simulate(p, command, settings, observe=seen, **how)[0]
-    fields = {f.name: np.array([getattr(o, f.name)[0, 0] for o, _ in seen]) for f in fields_of(Observation)}
+    fields = {
+        f.name: np.array([getattr(o, f.name)[0, 0] for o, _ in seen])
+        for f in fields_of(Observation)
+    }
     return angle, Observation(**fields), np.array([v[0, 0] for _, v in seen])
 
 
 def valve_curve(share: float, exponent: float, factors: list[float]) -> float:
-    """Part of the full opening at a part of the travel: increments of a power law, each times its factor."""
+    """Part of the full opening at a part of the travel: increments of a power law, each
+    times its factor."""
     ends = [0.0, 0.04, 0.15, 0.4, 0.7, 1.0]
 
     def height(end: float) -> float:
-        steps = [min(high, end) ** exponent - min(low, end) ** exponent for low, high in pairwise(ends)]
+        steps = [
+            min(high, end) ** exponent - min(low, end) ** exponent
+            for low, high in pairwise(ends)
+        ]
         return sum(factor * step for factor, step in zip(factors, steps, strict=True))
 
     return height(share) / height(1.0)
@@ -156,8 +203,11 @@ def cylinder(angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return triangle(angle, A, B, THETA0, SHORTEST)[:2]
 
 
-def reference(p: Records, command: np.ndarray, rtol: float = 1e-7) -> tuple[np.ndarray, np.ndarray]:
-    """One candidate in plain equations: angles [rad], (T + 1,), and chamber pressures [Pa], (T + 1, 2)."""
+def reference(
+    p: Records, command: np.ndarray, rtol: float = 1e-7
+) -> tuple[np.ndarray, np.ndarray]:
+    """One candidate in plain equations: angles [rad], (T + 1,), and chamber pressures
+    [Pa], (T + 1, 2)."""
     v = {name: float(p[name][0, 0]) for name in JOINT.names or ()}
     ratio = sqrt(v["force_1"] / v["force_2"])
     gap = (v["stroke_2"] - ratio * v["stroke_1"]) / (ratio - 1)
@@ -172,13 +222,17 @@ def reference(p: Records, command: np.ndarray, rtol: float = 1e-7) -> tuple[np.n
 
     def volumes(x: float) -> tuple[float, float]:
         dead = v["dead_volume"]
-        return max(dead + v["area_a"] * x, 0.1 * dead), max(dead + v["area_b"] * (STROKE - x), 0.1 * dead)
+        return max(dead + v["area_a"] * x, 0.1 * dead), max(
+            dead + v["area_b"] * (STROKE - x), 0.1 * dead
+        )
 
     def flow(area: float, drop: float) -> float:
         return gain * area * drop / (drop**2 + v["transition_pressure"] ** 2) ** 0.25
 
     def current(voltage: float) -> float:
-        return v["current_min"] + min(voltage, 10.0) / 10.0 * (v["current_max"] - v["current_min"])
+        return v["current_min"] + min(voltage, 10.0) / 10.0 * (
+            v["current_max"] - v["current_min"]
+        )
 
     def pressures(z: np.ndarray, x: float) -> tuple[float, float]:
         va, vb = volumes(x)
@@ -195,22 +249,32 @@ def reference(p: Records, command: np.ndarray, rtol: float = 1e-7) -> tuple[np.n
             pa, pb = pressures(z, x)
             spool = xa - xb
             side = "a" if spool > 0 else "b"
-            share = min(max(abs(spool) - v[f"overlap_{side}"], 0) / v[f"slot_width_{side}"], 1)
+            share = min(
+                max(abs(spool) - v[f"overlap_{side}"], 0) / v[f"slot_width_{side}"], 1
+            )
             exponent = v[f"opening_exponent_{side}"]
             factors = [v[f"curve_{k}_{side}"] for k in (1, 2, 3, 4)]
             area = v[f"opening_{side}"] * valve_curve(share, exponent, [*factors, 1.0])
             ahead, back = (area, 0.0) if spool > 0 else (0.0, area)
-            in_a, in_b = (max(flow(v["leakage"] + a, ps - p), backflow) for a, p in ((ahead, pa), (back, pb)))
+            in_a, in_b = (
+                max(flow(v["leakage"] + a, ps - p), backflow)
+                for a, p in ((ahead, pa), (back, pb))
+            )
             fill_a, fill_b = (v["anticavitation"] if p < pt else 0.0 for p in (pa, pb))
             qa = in_a - flow(v["leakage"] + back * v["return_a"] + fill_a, pa - pt)
             qb = in_b - flow(v["leakage"] + ahead * v["return_b"] + fill_b, pb - pt)
             rise = 0.0
             if pump < inf:
                 left = v["supply_pressure"] - ps
-                given = pump * min(1.0, max(left, 0.0) / v["pump_droop"]) if v["pump_droop"] > 0 else pump
+                given = (
+                    pump * min(1.0, max(left, 0.0) / v["pump_droop"])
+                    if v["pump_droop"] > 0
+                    else pump
+                )
                 relieved = pump * max(-left, 0.0) / 1e3  # all of it at 0.01 bar above
                 if left > v["pump_limit"]:
-                    given += 10 * pump * (left - v["pump_limit"]) / 1e3  # whatever is taken at 0.01 bar below
+                    # whatever is taken at 0.01 bar below
+                    given += 10 * pump * (left - v["pump_limit"]) / 1e3
                 rise = (given - relieved - in_a - in_b) / v["line_volume"]
             speed = r * w
             force = v["area_a"] * pa - v["area_b"] * pb
@@ -220,20 +284,36 @@ def reference(p: Records, command: np.ndarray, rtol: float = 1e-7) -> tuple[np.n
                 force -= v["stop_penetration"] * -x * speed
             force -= v["dry_friction"] * speed / sqrt(speed**2 + 1e-6)
             weight = MASS * GRAVITY * CENTRE * cos(q + TILT)
-            turn = (r * force - weight - DAMPING * w - STIFFNESS * (q - START)) / INERTIA
-            push_a = drive_a / (xa + gap) ** 2 - v["plunger_damping_a"] * ua - v["plunger_stiffness"] * xa
-            push_b = drive_b / (xb + gap) ** 2 - v["plunger_damping_b"] * ub - v["plunger_stiffness"] * xb
+            turn = (
+                r * force - weight - DAMPING * w - STIFFNESS * (q - START)
+            ) / INERTIA
+            push_a = (
+                drive_a / (xa + gap) ** 2
+                - v["plunger_damping_a"] * ua
+                - v["plunger_stiffness"] * xa
+            )
+            push_b = (
+                drive_b / (xb + gap) ** 2
+                - v["plunger_damping_b"] * ub
+                - v["plunger_stiffness"] * xb
+            )
             return [ua, push_a / m, ub, push_b / m, qa / va, qb / vb, w, turn, rise]
 
         return f
 
     x0, r0 = geometry(START)
     force = MASS * GRAVITY * CENTRE * cos(START + TILT) / r0
-    low = max(v["tank_pressure"], (v["area_a"] * v["tank_pressure"] - force) / v["area_b"])
-    high = min(v["supply_pressure"], (v["area_a"] * v["supply_pressure"] - force) / v["area_b"])
+    low = max(
+        v["tank_pressure"], (v["area_a"] * v["tank_pressure"] - force) / v["area_b"]
+    )
+    high = min(
+        v["supply_pressure"], (v["area_a"] * v["supply_pressure"] - force) / v["area_b"]
+    )
     pb = max(low, min(high, 50e5))
     pa = (force + v["area_b"] * pb) / v["area_a"]
-    at_rest = np.roots([1, 2 * gap, gap**2, -coil * v["current_min"] ** 2 / v["plunger_stiffness"]])
+    at_rest = np.roots(
+        [1, 2 * gap, gap**2, -coil * v["current_min"] ** 2 / v["plunger_stiffness"]]
+    )
     rest = float(max(at_rest[abs(at_rest.imag) < 1e-9].real))
     va, vb = volumes(x0)
     oil = [pa / beta + log(va), pb / beta + log(vb)]

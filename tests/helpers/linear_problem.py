@@ -1,4 +1,5 @@
-"""Problems whose errors are linear in their parameters: other libraries say what is right."""
+"""Problems whose errors are linear in their parameters: other libraries say what is
+right."""
 
 import itertools
 
@@ -9,7 +10,12 @@ from scipy.signal import lfilter
 
 from hydroid.log import Log
 from hydroid.parameters import Parameter, ParameterSet
-from hydroid.posterior.error_model import SHORTEST, likelihood_at, make_error_model, make_likelihood
+from hydroid.posterior.error_model import (
+    SHORTEST,
+    likelihood_at,
+    make_error_model,
+    make_likelihood,
+)
 from hydroid.problem.channels import Channel
 from hydroid.problem.priors import Priors
 from hydroid.settings.fit import FitSettings
@@ -20,19 +26,36 @@ AR1 = np.exp(-0.01 / 0.15)  # correlation time 0.15 s at 100 Hz
 
 
 class Linear:
-    """A problem whose errors are linear in its parameters: y - X theta, log after log, 100 Hz.
+    """A problem whose errors are linear in its parameters: y - X theta, log after log,
+    100 Hz.
 
     The joint rests, as its error model sees it: it travels no way, and is at no stop.
     """
 
     def __init__(
-        self, columns, measured, theta, *, fixed=(), known=None, unit=1.0, logs=1, stage="hyd", **more
+        self,
+        columns,
+        measured,
+        theta,
+        *,
+        fixed=(),
+        known=None,
+        unit=1.0,
+        logs=1,
+        stage="hyd",
+        **more,
     ):
         self.columns, self.measured, self.simulated = columns, measured, 0
         names = "abcdefgh"[: len(theta)]
         self.parameters = ParameterSet(
             tuple(
-                Parameter(n, "kg", -9 * abs(t) * unit, 11 * abs(t) * unit, t * unit if n in fixed else None)
+                Parameter(
+                    n,
+                    "kg",
+                    -9 * abs(t) * unit,
+                    11 * abs(t) * unit,
+                    t * unit if n in fixed else None,
+                )
                 for n, t in zip(names, theta, strict=True)
             )
         )
@@ -40,7 +63,10 @@ class Linear:
         one = ParameterSettings(quantity="damping", bounds=(0.1, 1.0))
         how = {"segments": 1} | more
         self.settings = FitSettings(
-            stage=stage, parameters=dict.fromkeys(names, one), objective=how, free_start=False
+            stage=stage,
+            parameters=dict.fromkeys(names, one),
+            objective=how,
+            free_start=False,
         )
         statements = {k: PriorSettings(**v) for k, v in (known or {}).items()}
         self.priors = Priors(statements, self.parameters)
@@ -48,7 +74,8 @@ class Linear:
         ends = list(itertools.pairwise(edges))
         self.logs = tuple(resting(b - a) for a, b in ends)
         self.channels = tuple(
-            Channel(i, 2, "angle", 0, np.zeros(b - a), 1.0, slice(a, b)) for i, (a, b) in enumerate(ends)
+            Channel(i, 2, "angle", 0, np.zeros(b - a), 1.0, slice(a, b))
+            for i, (a, b) in enumerate(ends)
         )
 
     def started(self, log):
@@ -83,7 +110,8 @@ THETA = np.array([1.0, -2.0, 3.0])
 
 
 def white(deg):
-    """NUMBERS of an error that is known to be white noise of so many degrees, (1, 5)."""
+    """NUMBERS of an error that is known to be white noise of so many degrees, (1,
+    5)."""
     return np.array([[(deg * DEG) ** 2, 0.0, 0.0, 0.0, SHORTEST]])
 
 
@@ -94,13 +122,15 @@ def dense_covariance(problem, numbers):
 
 
 def most_likely(problem, rounds=4):
-    """The estimate by generalised least squares, with the error model of its errors, again and again."""
+    """The estimate by generalised least squares, with the error model of its errors,
+    again and again."""
     theta = least_squares(problem.columns, problem.measured)
     likelihood = make_likelihood(problem)
     for _ in range(rounds):
         likelihood = likelihood_at(problem, theta)
         weighing = likelihood.errors
         theta = least_squares(
-            weighing.innovations(problem.columns), weighing.innovations(problem.measured[None])[0]
+            weighing.innovations(problem.columns),
+            weighing.innovations(problem.measured[None])[0],
         )
     return theta, likelihood.shown.numbers

@@ -10,17 +10,31 @@ from hydroid.log.read import Ranges
 from hydroid.settings.log import LogSettings
 
 RIG = Path(__file__).parents[2] / "examples" / "logs"
-DEGREES = (-50, 50), (-30, 90), (-120, 0), (-90, 90), (-50, 50), (-np.inf, np.inf), (0, 60)
-RIG_RANGES = {f"{joint}": tuple(np.deg2rad(ends)) for joint, ends in enumerate(DEGREES, 1)}
+DEGREES = (
+    (-50, 50),
+    (-30, 90),
+    (-120, 0),
+    (-90, 90),
+    (-50, 50),
+    (-np.inf, np.inf),
+    (0, 60),
+)
+RIG_RANGES = {
+    f"{joint}": tuple(np.deg2rad(ends)) for joint, ends in enumerate(DEGREES, 1)
+}
 RANGES = {"1": (-0.5, 1.5), "2": (-np.inf, np.inf)}
 NAMES = ("time_s", "u1_pct", "u2_pct", "q1_deg", "q2_deg")
 SETTINGS = LogSettings()
 
 
 def cells(rows: int = 80, period: float = 0.01) -> np.ndarray:
-    """A valid log as the file holds it: time [s], two commands [%], two angles [deg], shape (rows, 5)."""
+    """A valid log as the file holds it: time [s], two commands [%], two angles [deg],
+    shape (rows, 5)."""
     time = np.arange(rows) * period
-    u = [np.round(60 * np.sign(np.sin(20 * time + 0.3)), 2), np.round(30 * np.cos(9 * time), 2)]
+    u = [
+        np.round(60 * np.sign(np.sin(20 * time + 0.3)), 2),
+        np.round(30 * np.cos(9 * time), 2),
+    ]
     q = [10 + 9 * np.sin(3 * time), 200 * np.sin(2 * time)]
     return np.round(np.stack([time, *u, *q], axis=1), 4)
 
@@ -30,7 +44,9 @@ def lines(values: np.ndarray) -> list[list[str]]:
 
 
 def save(path: Path, rows: list[list[str]], separator: str = ",") -> Path:
-    path.write_text("\n".join(separator.join(row) for row in rows) + "\n", encoding="utf-8")
+    path.write_text(
+        "\n".join(separator.join(row) for row in rows) + "\n", encoding="utf-8"
+    )
     return path
 
 
@@ -41,7 +57,10 @@ def head(path: Path, samples: int) -> Path:
 
 
 def read(
-    path: Path, settings: LogSettings = SETTINGS, ranges: Ranges = RANGES, **options: Any
+    path: Path,
+    settings: LogSettings = SETTINGS,
+    ranges: Ranges = RANGES,
+    **options: Any,
 ) -> tuple[Log, list[LogFinding]]:
     """A log that can be used, and its findings; else the first error is raised."""
     log, findings = check_log(path, settings, ranges, **options)
@@ -57,7 +76,10 @@ def assert_same(log: Log, other: Log) -> None:
 
 
 def faults(
-    path: Path, settings: LogSettings = SETTINGS, ranges: Ranges = RANGES, **options: Any
+    path: Path,
+    settings: LogSettings = SETTINGS,
+    ranges: Ranges = RANGES,
+    **options: Any,
 ) -> list[LogFinding]:
     log, findings = check_log(path, settings, ranges, **options)
     errors = [finding for finding in findings if finding.level == "error"]

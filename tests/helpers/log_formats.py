@@ -16,7 +16,8 @@ def write_mat(path: Path, columns: Columns) -> Path:
 
 
 def write_mat73(path: Path, columns: Columns) -> Path:
-    """A file as MATLAB's `save -v7.3` writes it: HDF5 behind a header of 512 bytes, arrays transposed."""
+    """A file as MATLAB's `save -v7.3` writes it: HDF5 behind a header of 512 bytes,
+    arrays transposed."""
     import h5py
 
     with h5py.File(path, "w", userblock_size=512) as file:
@@ -47,17 +48,26 @@ def write_parquet(path: Path, columns: Columns) -> Path:
 
 
 class BagWriter:
-    """Writes JointState and Float64MultiArray messages into a bag: "ros1", "ros2" or "mcap"."""
+    """Writes JointState and Float64MultiArray messages into a bag: "ros1", "ros2" or
+    "mcap"."""
 
     def __init__(self, path: Path, kind: str) -> None:
         from rosbags import rosbag1, rosbag2
         from rosbags.typesys import Stores, get_typestore
 
         self.one = kind == "ros1"
-        self.store = get_typestore(Stores.ROS1_NOETIC if self.one else Stores.ROS2_HUMBLE)
-        plugin = rosbag2.StoragePlugin.MCAP if kind == "mcap" else rosbag2.StoragePlugin.SQLITE3
+        self.store = get_typestore(
+            Stores.ROS1_NOETIC if self.one else Stores.ROS2_HUMBLE
+        )
+        plugin = (
+            rosbag2.StoragePlugin.MCAP
+            if kind == "mcap"
+            else rosbag2.StoragePlugin.SQLITE3
+        )
         self.writer = (
-            rosbag1.Writer(path) if self.one else rosbag2.Writer(path, version=8, storage_plugin=plugin)
+            rosbag1.Writer(path)
+            if self.one
+            else rosbag2.Writer(path, version=8, storage_plugin=plugin)
         )
         self.topics: dict = {}
 
@@ -70,9 +80,13 @@ class BagWriter:
 
     def write(self, topic: str, at: float, message) -> None:
         if topic not in self.topics:
-            self.topics[topic] = self.writer.add_connection(topic, message.__msgtype__, typestore=self.store)
+            self.topics[topic] = self.writer.add_connection(
+                topic, message.__msgtype__, typestore=self.store
+            )
         pack = self.store.serialize_ros1 if self.one else self.store.serialize_cdr
-        self.writer.write(self.topics[topic], round(at * 1e9), pack(message, message.__msgtype__))
+        self.writer.write(
+            self.topics[topic], round(at * 1e9), pack(message, message.__msgtype__)
+        )
 
     def joints(self, stamp: float, names: list[str], position: np.ndarray):
         types = self.store.types
@@ -81,7 +95,13 @@ class BagWriter:
         header = types["std_msgs/msg/Header"](stamp=time, frame_id="", **more)
         nothing = np.zeros(0)
         kind = types["sensor_msgs/msg/JointState"]
-        return kind(header=header, name=names, position=position, velocity=nothing, effort=nothing)
+        return kind(
+            header=header,
+            name=names,
+            position=position,
+            velocity=nothing,
+            effort=nothing,
+        )
 
     def array(self, values: np.ndarray):
         types = self.store.types

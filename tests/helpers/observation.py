@@ -18,9 +18,10 @@ from hydroid.simulation.scenario import Chain, Scenario
 class Observation:
     """Flows are means over the last step. Joints without an actuator have zeros.
 
-    pressure [Pa], shape (n, J, 2): chambers A and B. flow [m³/s], shape (n, J, 2): into A and out of B.
-    spool [m], shape (n, J). force [N], shape (n, J): A_A p_A − A_B p_B; of a rotary actuator a torque [N·m].
-    line [Pa], shape (n, J): pressure of the pump's line, the same at all joints.
+    pressure [Pa], shape (n, J, 2): chambers A and B. flow [m³/s], shape (n, J, 2): into
+    A and out of B. spool [m], shape (n, J). force [N], shape (n, J): A_A p_A − A_B p_B;
+    of a rotary actuator a torque [N·m]. line [Pa], shape (n, J): pressure of the pump's
+    line, the same at all joints.
     """
 
     pressure: Array
@@ -31,7 +32,8 @@ class Observation:
 
 
 def observe(coefficients: Structs, state: Structs, angle: Array) -> Observation:
-    """Observe COEFFICIENTS and states at `angle` [rad], shape (n, J), as `pressures` does."""
+    """Observe COEFFICIENTS and states at `angle` [rad], shape (n, J), as `pressures`
+    does."""
     c: Records = coefficients.view(np.recarray)
     z: Records = state.view(np.recarray)
     pressure = pressures(coefficients, state, angle)
@@ -41,8 +43,15 @@ def observe(coefficients: Structs, state: Structs, angle: Array) -> Observation:
 
 
 def trace(scenario: Scenario, substeps: int, candidates: Candidates) -> Observation:
-    """Simulate one candidate; what its actuators did at T samples, shape (T, J) or (T, J, 2)."""
-    chain = Chain(scenario.machine, scenario.arm, scenario.active, substeps, scenario.prescribed.columns)
+    """Simulate one candidate; what its actuators did at T samples, shape (T, J) or (T,
+    J, 2)."""
+    chain = Chain(
+        scenario.machine,
+        scenario.arm,
+        scenario.active,
+        substeps,
+        scenario.prescribed.columns,
+    )
     steps, pose = scenario.settings.steps, scenario.arm.pose
     rollout = roll if scenario.settings.model == "dynamic" else roll_quasi_static
     arm = SteppedArm(scenario.arm.model, chain.columns, steps, rollout)
@@ -52,7 +61,9 @@ def trace(scenario: Scenario, substeps: int, candidates: Candidates) -> Observat
         one, samples = plugin.of(0), 1 + len(scenario.command) // steps
         record = np.zeros((samples, len(states[0])), JOINT_STATE)
         angle, record[0] = np.tile(pose, (len(record), 1)), states[0]
-        commands = np.concatenate([np.zeros((one.past, len(states[0]))), scenario.command[:, chain.columns]])
+        commands = np.concatenate(
+            [np.zeros((one.past, len(states[0]))), scenario.command[:, chain.columns]]
+        )
         course = Course(commands, np.empty((len(scenario.command), 0)))
         arm.roll(one, states[0], course, Record(angle[1:], record[1:]))
     return observe(one.coefficients, record, angle[:, chain.columns])

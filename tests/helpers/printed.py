@@ -1,4 +1,5 @@
-"""Follows what `hydroid init` prints: check, fit and validate, as a user pastes them, in a folder."""
+"""Follows what `hydroid init` prints: check, fit and validate, as a user pastes them,
+in a folder."""
 
 import contextlib
 import io
@@ -21,7 +22,8 @@ STEPS = ("check", "fit-hyd", "validate")
 OTHER = "OTHER.csv"
 """stands in what is printed for a log that the fit has not seen"""
 PREDICTED = 1 / 3
-"""of what standing still errs by: an unseen error up to this shows that the log was understood"""
+"""of what standing still errs by: an unseen error up to this shows that the log was
+understood"""
 
 
 @dataclass(frozen=True)
@@ -42,23 +44,33 @@ class Followed:
 
     @property
     def verdict(self) -> str:
-        """Right, refused, named (the verdict says what is predicted badly), or wrong."""
+        """Right, refused, named (the verdict says what is predicted badly), or
+        wrong."""
         if self.refused:
             return "refused"
-        missed = {name for name, (unseen, still) in self.errors.items() if not unseen <= PREDICTED * still}
+        missed = {
+            name
+            for name, (unseen, still) in self.errors.items()
+            if not unseen <= PREDICTED * still
+        }
         if not missed and self.errors:
             return "right"
         return "named" if missed and missed <= {*self.blamed} else "wrong"
 
     @property
     def line(self) -> str:
-        """Why it was refused, or the errors, and those of standing still in brackets."""
-        pairs = [f"{name} {unseen:.2g} ({still:.2g})" for name, (unseen, still) in self.errors.items()]
+        """Why it was refused, or the errors, and those of standing still in
+        brackets."""
+        pairs = [
+            f"{name} {unseen:.2g} ({still:.2g})"
+            for name, (unseen, still) in self.errors.items()
+        ]
         return self.refused or ", ".join(pairs)
 
 
 def follow(folder: Path, init: Sequence[str], unseen: str, budget: str) -> Followed:
-    """Run `hydroid init` in a folder, and then the commands that it prints, validated on an unseen log.
+    """Run `hydroid init` in a folder, and then the commands that it prints, validated
+    on an unseen log.
 
     The fit has a budget, as `init` proposes: it ends at its best model so far.
     """
@@ -76,7 +88,9 @@ def follow(folder: Path, init: Sequence[str], unseen: str, budget: str) -> Follo
                 if command[0] == "validate":
                     verdict = json.loads(printed[-1])["verdict"]
                     errors = _errors(verdict)
-                    blamed = [one["name"] for one in verdict if Verdict(one["verdict"]).fails]
+                    blamed = [
+                        one["name"] for one in verdict if Verdict(one["verdict"]).fails
+                    ]
                 else:
                     lines += printed
         except HydroidError as error:
@@ -102,7 +116,9 @@ def _run(arguments: Sequence[str]) -> list[str]:
             status = end.exit_code
     lines = [*err.getvalue().splitlines(), *out.getvalue().splitlines()]
     if status:
-        raise HydroidError(lines[0] if lines else f"{arguments[0]} ends with status {status}")
+        raise HydroidError(
+            lines[0] if lines else f"{arguments[0]} ends with status {status}"
+        )
     return lines
 
 

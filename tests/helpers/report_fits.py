@@ -35,19 +35,30 @@ def make_problem(
     samples: int = 120,
     **objective: Any,
 ) -> Problem:
-    """A problem of noise and waves that no model explains; nothing of it is simulated."""
+    """A problem of noise and waves that no model explains; nothing of it is
+    simulated."""
     fixed, own = fixed or {}, dict[str, ParameterSettings]()
     for name, ends in parameters.items():
-        what = {"quantity": "mass", "link": f"link{name[1]}"} if name[0] == "M" else {"quantity": WHAT[name]}
+        what = (
+            {"quantity": "mass", "link": f"link{name[1]}"}
+            if name[0] == "M"
+            else {"quantity": WHAT[name]}
+        )
         bounds = ends if ends[0] < ends[1] else None
         own[name] = ParameterSettings(bounds=bounds, fixed=fixed.get(name), **what)
     how = {"segments": segments} | objective
-    settings = FitSettings(parameters=own, outputs=list(outputs), objective=how, scale="linear")
+    settings = FitSettings(
+        parameters=own, outputs=list(outputs), objective=how, scale="linear"
+    )
     rng, logs = np.random.default_rng(3), list[Log]()
     for number, source in enumerate(sources):
         time = np.arange(samples + 10 * number) * 0.01
-        command = np.repeat(rng.uniform(-90, 90, (len(time) // 10 + 1, 7)), 10, axis=0)[: len(time)]
-        angle = np.cumsum(command, axis=0) * 1e-4 + 0.3 + 0.05 * np.sin(20 * time)[:, None]
+        command = np.repeat(rng.uniform(-90, 90, (len(time) // 10 + 1, 7)), 10, axis=0)[
+            : len(time)
+        ]
+        angle = (
+            np.cumsum(command, axis=0) * 1e-4 + 0.3 + 0.05 * np.sin(20 * time)[:, None]
+        )
         logs.append(Log(source, time, command, angle, 0.01))
     return Problem(settings, logs)
 
@@ -59,7 +70,8 @@ def make_fit(
     effects: tuple[float, ...] | None = None,
     front: int = 6,
 ) -> Fit:
-    """A fit whose estimates are the measured angles with a smooth error, or NaN where diverged."""
+    """A fit whose estimates are the measured angles with a smooth error, or NaN where
+    diverged."""
     rng = np.random.default_rng(0)
     parameters = problem.parameters
     free = int(parameters.free.sum())
@@ -67,7 +79,9 @@ def make_fit(
     for name in names:
         size = np.nan if name in diverged else rng.uniform(0.002, 0.03)
         waves = [
-            size * np.sin(log.time * rng.uniform(2, 9))[:, None] * np.ones(len(problem.outputs))
+            size
+            * np.sin(log.time * rng.uniform(2, 9))[:, None]
+            * np.ones(len(problem.outputs))
             for log in problem.logs
         ]
         pairs = zip(problem.logs, waves, strict=True)
@@ -87,9 +101,13 @@ def make_fit(
     segments = rng.uniform(0.005, 0.2, (front, len(problem.bounds)))
     evaluations = np.arange(1, 8) * 20.0
     best = np.minimum.accumulate(rng.uniform(0.02, 0.3, 7))
-    history = np.column_stack([np.arange(1, 8), evaluations, evaluations - 3, [2.0] * 7, best, best * 1.5])
+    history = np.column_stack(
+        [np.arange(1, 8), evaluations, evaluations - 3, [2.0] * 7, best, best * 1.5]
+    )
     ended: dict[str, Any] = {"evaluations": 40, "iterations": 5, "ending": Ending.GAIN}
-    refined = Descent(np.full(free, 0.5), np.empty(0), 0.1, 1.0, np.empty((0, free)), **ended)
+    refined = Descent(
+        np.full(free, 0.5), np.empty(0), 0.1, 1.0, np.empty((0, free)), **ended
+    )
     sets = parameters.from_unit(rng.uniform(0, 1, (front, free)))
     return Fit(
         problem,
@@ -106,14 +124,19 @@ def make_fit(
 
 
 def make_quantities(problem: Problem) -> Quantities:
-    """Of each joint a speed that is known, one that is not, and a curve of speed that ends without limits."""
+    """Of each joint a speed that is known, one that is not, and a curve of speed that
+    ends without limits."""
     scalars, curves = {}, {}
     for joint in problem.settings.outputs:
         joint_name = problem.settings.arm.joint_names[joint - 1]
         name = f"{joint_name}_speed"
         one = {"joint": joint, "unit": "deg/s"}
-        known = QuantityEstimate(label="speed at 50 %", value=12.0, sd=0.3, interval=(11.4, 12.6), **one)
-        lost = QuantityEstimate(label="dead band", value=3.0, interval=(0.0, None), joint=joint, unit="%")
+        known = QuantityEstimate(
+            label="speed at 50 %", value=12.0, sd=0.3, interval=(11.4, 12.6), **one
+        )
+        lost = QuantityEstimate(
+            label="dead band", value=3.0, interval=(0.0, None), joint=joint, unit="%"
+        )
         scalars |= {f"{name}_50": known, f"{joint_name}_dead_band": lost}
         curves[name] = CurveEstimate(
             label="speed",
@@ -127,28 +150,48 @@ def make_quantities(problem: Problem) -> Quantities:
 
 
 def make_record(
-    problem: Problem, fit: Fit, unseen: Mapping[str, Prediction] | None = None, folder: str = "RUN"
+    problem: Problem,
+    fit: Fit,
+    unseen: Mapping[str, Prediction] | None = None,
+    folder: str = "RUN",
 ) -> Record:
     logs = {log.source: "f" * 64 for log in problem.logs}
     identity = {"hydroid": "0", "mujoco": "4", "logs": logs}
     predictions, baselines = fitted(fit), baselines_of(problem.settings, problem.logs)
     result = fit_record(fit, predictions, baselines)
-    return Record(folder, identity, problem.settings, summarise(problem, fit), result, unseen or {})
+    return Record(
+        folder,
+        identity,
+        problem.settings,
+        summarise(problem, fit),
+        result,
+        unseen or {},
+    )
 
 
 def make_prediction(
-    log: Log, joints: tuple[int, ...] = (2,), fit: str = "hyd", error: float = 0.01, band: bool = True
+    log: Log,
+    joints: tuple[int, ...] = (2,),
+    fit: str = "hyd",
+    error: float = 0.01,
+    band: bool = True,
 ) -> Prediction:
-    """An unseen log that is predicted with a constant error [rad], as the fit leads to expect."""
+    """An unseen log that is predicted with a constant error [rad], as the fit leads to
+    expect."""
     response = log.angle[:, [joint - 1 for joint in joints]] - error
-    bands = {j: Band(0.01, np.full(len(log.time), 0.02), 1.0, error, 0.01) for j in joints if band}
+    bands = {
+        j: Band(0.01, np.full(len(log.time), 0.02), 1.0, error, 0.01)
+        for j in joints
+        if band
+    }
     return Prediction(fit, log, joints, response, bands, unseen=True)
 
 
 def make_uncertainty(
     problem: Problem, theta: np.ndarray, effects: tuple[float, ...] | None = None
 ) -> Uncertainty:
-    """What a problem with independent parameters of these effects [rad] would say, its noise 0.1 deg."""
+    """What a problem with independent parameters of these effects [rad] would say, its
+    noise 0.1 deg."""
     rng = np.random.default_rng(1)
     size = np.array(effects) if effects else np.linspace(1e-3, 2e-3, len(theta))
     waves = np.linalg.qr(rng.normal(size=(len(problem.measured), len(theta))))[0].T

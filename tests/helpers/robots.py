@@ -1,4 +1,5 @@
-"""URDFs of boxes, as CAD exports them; and a small one with STL meshes: swing, boom and stick."""
+"""URDFs of boxes, as CAD exports them; and a small one with STL meshes: swing, boom and
+stick."""
 
 from pathlib import Path
 
@@ -24,25 +25,42 @@ MASSES = {"house": 800.0, "boom": 200.0, "stick": 90.0}
 
 
 def body(
-    name: str, size: tuple[float, float, float], mass: float | None, shape: str, **changes: object
+    name: str,
+    size: tuple[float, float, float],
+    mass: float | None,
+    shape: str,
+    **changes: object,
 ) -> str:
-    """A link whose box of a size [m] and mass [kg] begins at its joint; without a mass: no inertia."""
+    """A link whose box of a size [m] and mass [kg] begins at its joint; without a mass:
+    no inertia."""
     m, (x, y, z) = mass or 0.0, (length**2 / 12 for length in size)
     values = {"mass": m, "centre": f"{size[0] / 2} 0 0", "seen": "0 0 0"}
     values |= {"ixx": m * (y + z), "iyy": m * (x + z), "izz": m * (x + y)} | changes
     inertial = "" if mass is None else INERTIAL.format_map(values)
-    visual = f'<visual><origin xyz="{values["seen"]}"/><geometry>{shape}</geometry></visual>'
+    visual = (
+        f'<visual><origin xyz="{values["seen"]}"/><geometry>{shape}</geometry></visual>'
+    )
     return f'\n  <link name="{name}">{inertial}\n    {visual}\n  </link>'
 
 
-def link(name: str, mass: float | None = None, mesh: str = "", **changes: object) -> str:
+def link(
+    name: str, mass: float | None = None, mesh: str = "", **changes: object
+) -> str:
     shape = f'<mesh filename="{mesh or f"package://digger/meshes/{name}.stl"}"/>'
-    return body(name, SIZES[name], MASSES[name] if mass is None else mass, shape, **changes)
+    return body(
+        name, SIZES[name], MASSES[name] if mass is None else mass, shape, **changes
+    )
 
 
 def joint(name: str, parent: str, child: str, **changes: str) -> str:
     """A hinge about -y, 1 rad to both sides."""
-    values = {"name": name, "parent": parent, "child": child, "kind": "revolute", "at": "0 0 0"}
+    values = {
+        "name": name,
+        "parent": parent,
+        "child": child,
+        "kind": "revolute",
+        "at": "0 0 0",
+    }
     values |= {"turn": "0 0 0", "axis": "0 -1 0", "limit": LIMIT.format(-1, 1)}
     return JOINT.format_map(values | changes)
 
@@ -61,7 +79,8 @@ PARTS = {
 
 
 def write_robot(folder: Path, scale: float = 1.0, **parts: str) -> Path:
-    """Write digger/urdf/digger.urdf and its meshes, `scale` times as large; return the URDF."""
+    """Write digger/urdf/digger.urdf and its meshes, `scale` times as large; return the
+    URDF."""
     meshes = folder / "digger" / "meshes"
     meshes.mkdir(parents=True, exist_ok=True)
     for name, size in SIZES.items():
@@ -71,7 +90,9 @@ def write_robot(folder: Path, scale: float = 1.0, **parts: str) -> Path:
         (meshes / f"{name}.stl").write_bytes(solid.export(file_type="stl"))
     path = folder / "digger" / "urdf" / "digger.urdf"
     path.parent.mkdir(exist_ok=True)
-    path.write_text(f'<robot name="digger">{"".join((PARTS | parts).values())}\n</robot>\n')
+    path.write_text(
+        f'<robot name="digger">{"".join((PARTS | parts).values())}\n</robot>\n'
+    )
     return path
 
 

@@ -12,8 +12,11 @@ from hydroid.problem.problem import Problem
 from hydroid.settings.fit import FitSettings
 
 
-def steps_of(settings: FitSettings, truth: Mapping, levels: Mapping, noise_deg: float = 0.0) -> Log:
-    """Steps [%] of some joints that fill four seconds after half a second at rest; an exact first sample."""
+def steps_of(
+    settings: FitSettings, truth: Mapping, levels: Mapping, noise_deg: float = 0.0
+) -> Log:
+    """Steps [%] of some joints that fill four seconds after half a second at rest; an
+    exact first sample."""
     command = np.zeros((450, 7))
     for joint, duties in levels.items():
         command[50:, joint - 1] = np.repeat(duties, 400 // len(duties))
@@ -22,9 +25,12 @@ def steps_of(settings: FitSettings, truth: Mapping, levels: Mapping, noise_deg: 
 
 
 class Watcher:
-    """Keeps the rows; interrupts a fit after so many, or in the refinement after them."""
+    """Keeps the rows; interrupts a fit after so many, or in the refinement after
+    them."""
 
-    def __init__(self, stop_at: int | None = None, simulations: int | None = None) -> None:
+    def __init__(
+        self, stop_at: int | None = None, simulations: int | None = None
+    ) -> None:
         self.rows, self.stop_at, self.simulations = [], stop_at, simulations
 
     def generation(self, row) -> None:
@@ -33,13 +39,24 @@ class Watcher:
             raise KeyboardInterrupt
 
     def refining(self, step: Step, simulated: int, rms: float) -> None:
-        if self.simulations is not None and len(self.rows) == self.stop_at and simulated > self.simulations:
+        if (
+            self.simulations is not None
+            and len(self.rows) == self.stop_at
+            and simulated > self.simulations
+        ):
             raise KeyboardInterrupt
 
 
 def study(**changes) -> Problem:
-    """The article's stage 1 on five simulated seconds, three segments, and small populations."""
+    """The article's stage 1 on five simulated seconds, three segments, and small
+    populations."""
     sizes = {"ga": 10, "nsga2": 8}
-    small = {f"search.{a}": {"population": n, "generations": 6} for a, n in sizes.items()}
-    settings = load_settings("article-mech", small | {"objective.segments": 3} | changes)
-    return Problem(settings, [stepped(settings, TRUTH, [60.0, -80.0, 30.0, 0.0, -40.0])])
+    small = {
+        f"search.{a}": {"population": n, "generations": 6} for a, n in sizes.items()
+    }
+    settings = load_settings(
+        "article-mech", small | {"objective.segments": 3} | changes
+    )
+    return Problem(
+        settings, [stepped(settings, TRUTH, [60.0, -80.0, 30.0, 0.0, -40.0])]
+    )

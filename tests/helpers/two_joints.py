@@ -1,4 +1,5 @@
-"""A boom and a bar against gravity with one pump, simulated without oil: fits take seconds."""
+"""A boom and a bar against gravity with one pump, simulated without oil: fits take
+seconds."""
 
 from pathlib import Path
 
@@ -14,13 +15,21 @@ from hydroid.settings.fit import FitSettings
 PERIOD = 0.05
 FIT = yaml.safe_load((MODELS / "two_joints.yaml").read_text())
 PARAMETERS = FIT["parameters"]
-OPENINGS = {"open_A_lift": 24.0, "open_A_tilt": 3.0, "open_B_lift": 16.0, "open_B_tilt": 4.0}
+OPENINGS = {
+    "open_A_lift": 24.0,
+    "open_A_tilt": 3.0,
+    "open_B_lift": 16.0,
+    "open_B_tilt": 4.0,
+}
 TRUTH = OPENINGS | {"M_boom": 1300.0, "M_bar": 110.0, "flow": 120.0, "droop": 60.0}
 
 
 def two_joints(folder: Path, model: str = BOOM, **settings) -> FitSettings:
     sizes = {"lift": (8000, 20), "tilt": (400, 3)}
-    actuators = {n: {"kind": "rotary", "displacement": d, "max_opening": a} for n, (d, a) in sizes.items()}
+    actuators = {
+        n: {"kind": "rotary", "displacement": d, "max_opening": a}
+        for n, (d, a) in sizes.items()
+    }
     write_arm(folder, model, actuators=actuators)
     (folder / "fit.yaml").write_text(yaml.safe_dump(FIT | settings))
     return hydroid.load_settings(folder / "fit.yaml")
@@ -36,5 +45,7 @@ def drive(settings: FitSettings, seed: int = 0, truth: dict[str, float] = TRUTH)
     for start in range(10, samples, 30):  # each level lasts 1.5 s
         levels = rng.uniform(40, 100, 2)
         now = simulate_log(settings, log, truth).angle[start]
-        command[start : start + 20] = np.where(now > np.array([0.3, 0.2]), -levels, levels)
+        command[start : start + 20] = np.where(
+            now > np.array([0.3, 0.2]), -levels, levels
+        )
     return noisy(simulate_log(settings, log, truth), 0.02, rng, exact_start=False)

@@ -29,7 +29,8 @@ class Rows:
 
 
 class Deadly:
-    """Passes a method on, but a DEADLY candidate kills the worker, at most `times`; each death is counted."""
+    """Passes a method on, but a DEADLY candidate kills the worker, at most `times`;
+    each death is counted."""
 
     def __init__(self, target: Any, deaths: Path, times: int = 99) -> None:
         self.target, self.deaths, self.times = target, deaths, times

@@ -1,4 +1,5 @@
-"""Twelve arms as the world has them, each with a log: URDFs and MJCFs that `hydroid init` must take."""
+"""Twelve arms as the world has them, each with a log: URDFs and MJCFs that `hydroid
+init` must take."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -15,10 +16,37 @@ Joint = tuple[str, str, str, str, tuple[float, float, float], str]
 SWING: Joint = ("swing", "base", "house", "revolute", (0, 0, 1), "-3 3")
 BOOM: Joint = ("boom", "house", "boom_link", "revolute", (0.5, 0, 0.3), "-0.5 1.2")
 STICK: Joint = ("stick", "boom_link", "stick_link", "revolute", (3, 0, 0), "-2.2 -0.2")
-BUCKET: Joint = ("bucket", "stick_link", "bucket_link", "revolute", (1.8, 0, 0), "-2 0.6")
-TELESCOPE: Joint = ("telescope", "stick_link", "telescope_link", "prismatic", (0.4, 0, 0), "0 1.4")
-TOOL: Joint = ("bucket", "telescope_link", "bucket_link", "revolute", (1.8, 0, 0), "-2 0.6")
-SIZES = {"house": 1.5, "boom_link": 3.0, "stick_link": 1.8, "telescope_link": 1.8, "bucket_link": 0.9}
+BUCKET: Joint = (
+    "bucket",
+    "stick_link",
+    "bucket_link",
+    "revolute",
+    (1.8, 0, 0),
+    "-2 0.6",
+)
+TELESCOPE: Joint = (
+    "telescope",
+    "stick_link",
+    "telescope_link",
+    "prismatic",
+    (0.4, 0, 0),
+    "0 1.4",
+)
+TOOL: Joint = (
+    "bucket",
+    "telescope_link",
+    "bucket_link",
+    "revolute",
+    (1.8, 0, 0),
+    "-2 0.6",
+)
+SIZES = {
+    "house": 1.5,
+    "boom_link": 3.0,
+    "stick_link": 1.8,
+    "telescope_link": 1.8,
+    "bucket_link": 0.9,
+}
 SIZES |= {"turret": 0.6, "mast": 2.0, "jib": 1.5}
 """length of the links [m]; they are a fifth as wide and high"""
 EXCAVATOR = (SWING, BOOM, STICK, BUCKET)
@@ -31,9 +59,10 @@ AXES = {"house": "0 0 1", "turret": "0 0 1", "telescope_link": "1 0 0"}
 class World:
     """One arm and its log.
 
-    joints: that the import must find, in order. columns: of commands and positions in the log, by joint.
-    density: of the links in the file [kg/m³]; None: they have no masses. shape: of a link's geometry.
-    more: of the URDF. said: beginnings of lines that must be printed.
+    joints: that the import must find, in order. columns: of commands and positions in
+    the log, by joint. density: of the links in the file [kg/m³]; None: they have no
+    masses. shape: of a link's geometry. more: of the URDF. said: beginnings of lines
+    that must be printed.
     """
 
     joints: Sequence[str]
@@ -43,13 +72,18 @@ class World:
     shape: str = '<box size="{0} {1} {1}"/>'
     more: str = ""
     said: Sequence[str] = ()
-    write: Callable[["World", Path], Path] = field(default=lambda world, folder: urdf(world, folder))
+    write: Callable[["World", Path], Path] = field(
+        default=lambda world, folder: urdf(world, folder)
+    )
 
 
 def named(*joints: str, pattern: str = "{}_cmd_V {}_deg") -> dict[str, tuple[str, str]]:
     command, angle = pattern.split()
     units = {"telescope": angle.replace("deg", "m")}
-    return {joint: (command.format(joint), units.get(joint, angle).format(joint)) for joint in joints}
+    return {
+        joint: (command.format(joint), units.get(joint, angle).format(joint))
+        for joint in joints
+    }
 
 
 def urdf(world: World, folder: Path) -> Path:
@@ -58,8 +92,18 @@ def urdf(world: World, folder: Path) -> Path:
         length = SIZES.get(child, 0.6)
         mass = None if world.density is None else world.density * length**3 / 25
         shape = world.shape.format(length, length / 5, child)
-        text += body(child, (length, length / 5, length / 5), mass, shape, seen=f"{length / 2} 0 0")
-        how = {"kind": kind, "at": " ".join(map(str, at)), "axis": AXES.get(child, "0 -1 0")}
+        text += body(
+            child,
+            (length, length / 5, length / 5),
+            mass,
+            shape,
+            seen=f"{length / 2} 0 0",
+        )
+        how = {
+            "kind": kind,
+            "at": " ".join(map(str, at)),
+            "axis": AXES.get(child, "0 -1 0"),
+        }
         limit = LIMIT.format(*limits.split()) if limits else ""
         text += joint(name, parent, child, limit=limit, **how)
         solid = trimesh.creation.box((1e3 * length, 200 * length, 200 * length))
@@ -71,7 +115,8 @@ def urdf(world: World, folder: Path) -> Path:
 
 
 def mjcf(world: World, folder: Path) -> Path:
-    """Copy an MJCF of the crane with an include, a missing texture, a plugin and a sensor."""
+    """Copy an MJCF of the crane with an include, a missing texture, a plugin and a
+    sensor."""
     for name in ("looks.xml", "machine.xml"):
         (folder / name).write_bytes((MODELS / name).read_bytes())
     return folder / "machine.xml"
@@ -82,20 +127,49 @@ def _legs() -> tuple[Joint, ...]:
     for side in ("fl", "fr"):
         above = "base"
         for name in ("swivel", "stabilizer", "steering", "wheel", "hub"):
-            parts.append((f"{name}_{side}", above, f"{name}_{side}_link", "revolute", (0.4, 0, 0), "-1 1"))
+            parts.append(
+                (
+                    f"{name}_{side}",
+                    above,
+                    f"{name}_{side}_link",
+                    "revolute",
+                    (0.4, 0, 0),
+                    "-1 1",
+                )
+            )
             above = f"{name}_{side}_link"
     return tuple(parts)
 
 
-TUBE: Joint = ("boom_tube", "house", "boom_tube_link", "revolute", (0.6, 0, -0.2), "-1 1")
-ROD: Joint = ("boom_rod", "boom_tube_link", "boom_rod_link", "prismatic", (0.3, 0, 0), "0 0.8")
-NAMES, LONG = ("swing", "boom", "stick", "bucket"), ("swing", "boom", "stick", "telescope", "bucket")
+TUBE: Joint = (
+    "boom_tube",
+    "house",
+    "boom_tube_link",
+    "revolute",
+    (0.6, 0, -0.2),
+    "-1 1",
+)
+ROD: Joint = (
+    "boom_rod",
+    "boom_tube_link",
+    "boom_rod_link",
+    "prismatic",
+    (0.3, 0, 0),
+    "0 0.8",
+)
+NAMES, LONG = (
+    ("swing", "boom", "stick", "bucket"),
+    ("swing", "boom", "stick", "telescope", "bucket"),
+)
 MIMIC = (
     '<link name="lever"/><joint name="lever_joint" type="revolute"><parent link="stick_link"/>'
     '<child link="lever"/><limit lower="-1" upper="1" effort="1" velocity="1"/><mimic joint="bucket"/>'
     "</joint>"
 )
-HEAVY, NONE = "MASSES THAT NO MACHINE HAS [kg]: house", "no masses in the file [kg]: house"
+HEAVY, NONE = (
+    "MASSES THAT NO MACHINE HAS [kg]: house",
+    "no masses in the file [kg]: house",
+)
 WORLDS = {
     "as CAD should be": World(NAMES, EXCAVATOR, named(*NAMES)),
     "a simulator's default masses": World(NAMES, EXCAVATOR, named(*NAMES), density=0.05, said=[HEAVY]),
@@ -145,15 +219,19 @@ NOISE_DEG, NOISE_M = 0.05, 0.001
 
 
 def write_log(world: World, path: Path, seconds: float = 30.0, number: int = 0) -> Path:
-    """Write a log of the world's columns, in the order of `columns`, as a person drives the machine.
+    """Write a log of the world's columns, in the order of `columns`, as a person drives
+    the machine.
 
-    Its valves are of their own equations: each joint has a dead band, an exponent and a full speed in each
-    direction, a lag behind the valve, a delay, and no load that slows it. `number` is that of the log.
+    Its valves are of their own equations: each joint has a dead band, an exponent and a
+    full speed in each direction, a lag behind the valve, a delay, and no load that
+    slows it. `number` is that of the log.
     """
     machine, drive = np.random.default_rng(3), np.random.default_rng([3, number])
     joints, step, every = list(world.columns), 0.005, 4
     limits = {name: limits for name, *_, limits in world.parts}
-    low, high = np.array([[float(end) for end in (limits[joint] or "-1 1").split()] for joint in joints]).T
+    low, high = np.array(
+        [[float(end) for end in (limits[joint] or "-1 1").split()] for joint in joints]
+    ).T
     both = len(joints), 2
     dead, exponent = machine.uniform(5, 35, both), machine.uniform(1, 2.2, both)
     full = (high - low)[:, None] / machine.uniform(5, 12, both)
@@ -165,7 +243,8 @@ def write_log(world: World, path: Path, seconds: float = 30.0, number: int = 0) 
     opening, until = np.zeros(both[0]), np.ones(both[0])
     for k in range(steps):
         command[k] = command[k - 1]
-        for j in np.flatnonzero(until <= k * step) if k % every == 0 else ():  # a sample shows each change
+        # a sample shows each change
+        for j in np.flatnonzero(until <= k * step) if k % every == 0 else ():
             until[j] += drive.uniform(0.5, 3)
             part = (now[j] - low[j]) / (high[j] - low[j])
             way = -1 if part > 0.7 else 1 if part < 0.3 else drive.choice([-1, 1])
@@ -173,27 +252,49 @@ def write_log(world: World, path: Path, seconds: float = 30.0, number: int = 0) 
         u = command[k - late, each] * (k >= late)
         side = (u < 0).astype(int)
         beyond = np.maximum(np.abs(u) - dead[each, side], 0) / (100 - dead[each, side])
-        opening += step / lag * (np.sign(u) * beyond ** exponent[each, side] * full[each, side] - opening)
+        opening += (
+            step
+            / lag
+            * (np.sign(u) * beyond ** exponent[each, side] * full[each, side] - opening)
+        )
         now = np.clip(now + step * opening, low, high)
         place[k] = now
     columns = {"time_s": np.arange(0, seconds, every * step)[: len(place[::every])]}
     names = world.columns.values()
-    columns |= {c: u / 10 if "V" in c else u for (c, _), u in zip(names, command[::every].T, strict=True)}
+    columns |= {
+        c: u / 10 if "V" in c else u
+        for (c, _), u in zip(names, command[::every].T, strict=True)
+    }
     for (_, angle), q in zip(names, place[::every].T, strict=True):
         noise = drive.normal(size=len(q))
-        columns[angle] = q + NOISE_M * noise if angle.endswith("_m") else np.degrees(q) + NOISE_DEG * noise
+        columns[angle] = (
+            q + NOISE_M * noise
+            if angle.endswith("_m")
+            else np.degrees(q) + NOISE_DEG * noise
+        )
     text = ",".join(columns)
-    np.savetxt(path, np.stack([*columns.values()], axis=1), "%.6g", ",", header=text, comments="")
+    np.savetxt(
+        path,
+        np.stack([*columns.values()], axis=1),
+        "%.6g",
+        ",",
+        header=text,
+        comments="",
+    )
     return path
 
 
 def followed(world: World, folder: Path, budget: str) -> tuple[str, str]:
-    """Write an arm and two logs, and follow the commands that `init` prints, validated on the second log.
+    """Write an arm and two logs, and follow the commands that `init` prints, validated
+    on the second log.
 
-    Returns the outcome, and unseen errors (and those of standing still) [deg], or why it was refused.
+    Returns the outcome, and unseen errors (and those of standing still) [deg], or why
+    it was refused.
     """
     robot = world.write(world, folder)
     write_log(world, folder / "log.csv", 60.0, 1)
     write_log(world, folder / "other.csv", 60.0, 2)
-    found = follow(folder, ["mine", "--arm", robot.name, "--log", "log.csv"], "other.csv", budget)
+    found = follow(
+        folder, ["mine", "--arm", robot.name, "--log", "log.csv"], "other.csv", budget
+    )
     return found.verdict, found.line

@@ -34,15 +34,19 @@ def weight(angle: float) -> float:
 
 
 def test_shut_chambers_keep_their_oil_through_any_motion_and_cavitation():
-    """A wheel far too heavy for them swings on its spring; pressures are never below vapour pressure."""
+    """A wheel far too heavy for them swings on its spring; pressures are never below
+    vapour pressure."""
     heavy = wheel(1e5)
     heavy.jnt_stiffness[:], heavy.qpos_spring[:] = 1e6, START
-    angle, seen, _ = watched(parameters(TIGHT), np.zeros(400), TIGHT, model=heavy, velocity=0.5)
+    angle, seen, _ = watched(
+        parameters(TIGHT), np.zeros(400), TIGHT, model=heavy, velocity=0.5
+    )
     pressure = seen.pressure
     assert np.ptp(angle) > 0.3
     assert pressure.min() == 0.0
     assert pressure.max() > 100e5
-    # where it is back at an angle, so are the pressures: p + β ln V is the oil, which no motion changes
+    # where it is back at an angle, so are the pressures: p + β ln V is the oil, which
+    # no motion changes
     volume = 30e-6 + 1e-3 * cylinder(angle[1:])[0]
     filled = pressure[:, 0] > 0
     oil = pressure[filled, 0] + 8e8 * np.log(volume[filled])
@@ -50,14 +54,17 @@ def test_shut_chambers_keep_their_oil_through_any_motion_and_cavitation():
 
 
 def test_oil_volume_is_conserved_under_flow():
-    """What flows in is swept volume plus compression: mass ρ V with ρ ~ exp(p/β) grows by ρ Q."""
+    """What flows in is swept volume plus compression: mass ρ V with ρ ~ exp(p/β) grows
+    by ρ Q."""
     command = pulses(np.random.default_rng(4), 400)
     fine = HydraulicSettings(substeps=20)
     angle, seen, _ = watched(parameters(fine), command, fine)
     beta = 8e8
     for chamber, sign in ((0, 1.0), (1, -1.0)):
         travel = cylinder(angle)[0]
-        volume = 30e-6 + (1e-3 * travel if chamber == 0 else 0.75e-3 * (STROKE - travel))
+        volume = 30e-6 + (
+            1e-3 * travel if chamber == 0 else 0.75e-3 * (STROKE - travel)
+        )
         pressure, flow = seen.pressure[:, chamber], sign * seen.flow[:, chamber]
         density = np.exp(pressure / beta)
         gained = density[-1] * volume[-1] - density[0] * volume[1]
@@ -67,7 +74,9 @@ def test_oil_volume_is_conserved_under_flow():
 
 
 def test_a_flow_limit_caps_speed():
-    flow = watched(parameters(SETTINGS, flow_limit=0.6), np.full(80, 100.0), SETTINGS)[1].flow[:, 0]
+    flow = watched(parameters(SETTINGS, flow_limit=0.6), np.full(80, 100.0), SETTINGS)[
+        1
+    ].flow[:, 0]
     assert flow.max() <= 0.6e-3 / 60 * (1 + 1e-9)
     assert flow[-1] == pytest.approx(0.6e-3 / 60, rel=0.02)
 
@@ -88,7 +97,8 @@ def test_the_end_stop_obeys_equation_9_and_does_not_chatter():
 
 
 def test_a_load_sinks_on_the_oil_that_leaves():
-    """With a wide A→T edge the pump cannot fill B: a check valve does, and only A carries the load."""
+    """With a wide A→T edge the pump cannot fill B: a check valve does, and only A
+    carries the load."""
     ends, fine = [], HydraulicSettings(substeps=10)
     for edges in ({}, {"return_a": 6.0, "anticavitation": 5.0}, {"return_a": 6.0}):
         ends.append(watched(parameters(fine, **edges), np.full(60, -50.0), fine)[1])
@@ -117,7 +127,11 @@ NULL = {
 
 @pytest.mark.parametrize("name", NULL)
 def test_a_null_direction_gives_the_same_motion(name: str):
-    angle = simulate(parameters(SETTINGS, **NULL[name]), pulses(np.random.default_rng(5), 300), SETTINGS)
+    angle = simulate(
+        parameters(SETTINGS, **NULL[name]),
+        pulses(np.random.default_rng(5), 300),
+        SETTINGS,
+    )
     np.testing.assert_allclose(angle[1], angle[0], atol=1e-11)
     assert np.ptp(angle[0]) > 0.05
 
@@ -136,7 +150,9 @@ def test_delay_shifts_the_response():
 
 
 def test_a_rotary_actuator_turns_by_flow_over_displacement():
-    p = rotary(parameters(TIGHT, area_a=10.0, area_b=10.0, dead_volume=50.0, damping=5.0))
+    p = rotary(
+        parameters(TIGHT, area_a=10.0, area_b=10.0, dead_volume=50.0, damping=5.0)
+    )
     command = np.repeat([60.0, 0.0], 100)
     angle, seen, speed = watched(p, command, TIGHT, start=0.0, model=wheel(0.05))
     assert angle[-1] > 1.0

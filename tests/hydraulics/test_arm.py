@@ -1,4 +1,5 @@
-"""All joints of the arm under the plugin: stable, still, and the same in any company."""
+"""All joints of the arm under the plugin: stable, still, and the same in any
+company."""
 
 import numpy as np
 from hydraulic_arm import DrivenArm, nominal
@@ -16,7 +17,8 @@ def commands(samples: int, seed: int) -> np.ndarray:
 
 
 def test_seven_joints_at_once_are_stable_for_random_parameters(arm: Arm):
-    """100 candidates of the whole search space, 0.25 to 2.5 times nominal; joint stops included."""
+    """100 candidates of the whole search space, 0.25 to 2.5 times nominal; joint stops
+    included."""
     joints, command = nominal(arm, SETTINGS, 100), commands(500, 1)
     for name, values in draw(np.random.default_rng(0), joints.size).items():
         joints[name] *= np.reshape(values / TEN[name], joints.shape)
@@ -34,6 +36,9 @@ def test_seven_joints_at_once_are_stable_for_random_parameters(arm: Arm):
 def test_seven_joints_converge_with_mujocos_step(arm: Arm):
     p, command = nominal(arm, SETTINGS), commands(200, 3)
     exact = DrivenArm(arm, p, command, SETTINGS, steps=16).run()
-    error = [abs(DrivenArm(arm, p, command, SETTINGS, k).run() - exact).max() for k in (1, 2, 4)]
+    error = [
+        abs(DrivenArm(arm, p, command, SETTINGS, k).run() - exact).max()
+        for k in (1, 2, 4)
+    ]
     assert np.degrees(error[0]) < 0.5
     assert error[2] < 0.6 * error[1] < 0.36 * error[0]

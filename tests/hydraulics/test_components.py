@@ -32,23 +32,33 @@ def plunger(gap: float, mass: float = 0.05) -> SimpleNamespace:
 def test_nothing_passes_the_dead_band_and_the_full_command_stays_full():
     commands = (-50.0, 39.9, 40.0, 40.0 + 1e-9, 70.0, 100.0)
     passed = np.array([beyond_dead_band(u, u, 0.0, 0.0, 40.0) for u in commands])
-    np.testing.assert_allclose(side_voltage(*passed.T, 1.4, 40.0), [0, 0, 0, 1.4, 5.7, 10], atol=1e-9)
+    np.testing.assert_allclose(
+        side_voltage(*passed.T, 1.4, 40.0), [0, 0, 0, 1.4, 5.7, 10], atol=1e-9
+    )
 
 
 @pytest.mark.parametrize("start", [-80.0, 0.0, 25.0, 60.0])
 @pytest.mark.parametrize("asked", [-60.0, 30.0, 40.0, 50.0])
-def test_what_a_lag_passes_beyond_the_dead_band_is_its_mean_over_the_step(start: float, asked: float):
+def test_what_a_lag_passes_beyond_the_dead_band_is_its_mean_over_the_step(
+    start: float, asked: float
+):
     for steps in (0.05, 0.7, 4.0):
         keep = float(kept(steps))
-        stage = asked + (start - asked) * np.exp(-(np.arange(100_000) + 0.5) / 100_000 / steps)
+        stage = asked + (start - asked) * np.exp(
+            -(np.arange(100_000) + 0.5) / 100_000 / steps
+        )
         beyond, part = beyond_dead_band(start, asked, steps, keep, 40.0)
         assert beyond == pytest.approx(np.maximum(stage - 40.0, 0.0).mean(), abs=1e-3)
         assert part == pytest.approx(np.mean(stage > 40.0), abs=1e-4)
     assert beyond_dead_band(start, 40.0, 0.0, 0.0, 40.0) == (0.0, 0.0)
 
 
-@pytest.mark.parametrize("broken", [(0.5, 0.7, 0.8, 12), (8, 0.7, 12, 0.8), (8, 0.7, 5, 12), (8, 0.7, 0, 12)])
-def test_impossible_curves_are_marked_and_have_no_force(broken: tuple[float, float, float, float]):
+@pytest.mark.parametrize(
+    "broken", [(0.5, 0.7, 0.8, 12), (8, 0.7, 12, 0.8), (8, 0.7, 5, 12), (8, 0.7, 0, 12)]
+)
+def test_impossible_curves_are_marked_and_have_no_force(
+    broken: tuple[float, float, float, float],
+):
     assert not curve_exists(*broken)
     coil, gap = force_curve(*broken, 0.9)
     assert coil == 0.0
@@ -59,7 +69,9 @@ def test_plunger_rests_where_spring_and_coil_balance():
     rng = np.random.default_rng(0)
     drive, gap = 10 ** rng.uniform(-9, -3, 500), 10 ** rng.uniform(-6, -2, 500)
     stroke = resting_stroke(drive, gap, 2000.0)
-    np.testing.assert_allclose(coil_force(drive, stroke, gap), 2000.0 * stroke, rtol=1e-9)
+    np.testing.assert_allclose(
+        coil_force(drive, stroke, gap), 2000.0 * stroke, rtol=1e-9
+    )
     assert resting_stroke(0.0, 1e-3, 2000.0) == pytest.approx(0.0, abs=1e-12)
 
 
@@ -94,7 +106,9 @@ def test_plunger_converges_at_second_order():
 def test_a_curve_changes_the_power_laws_increments_between_its_knots():
     def side(*factors: float) -> SimpleNamespace:
         named = {f"curve_{k}": factor for k, factor in enumerate(factors, start=1)}
-        return SimpleNamespace(**named, **{f"knot_{k}": knot**1.6 for k, knot in enumerate(KNOTS, start=1)})
+        return SimpleNamespace(
+            **named, **{f"knot_{k}": knot**1.6 for k, knot in enumerate(KNOTS, start=1)}
+        )
 
     travel = np.linspace(0.0, 1.0, 1001)
     power = travel**1.6
@@ -110,7 +124,9 @@ def test_a_curve_changes_the_power_laws_increments_between_its_knots():
 
 @pytest.mark.parametrize("compensation", [0.0, 0.4, 1.0])
 @pytest.mark.parametrize("pressure", [20e5, 100e5, 130e5, 170e5])
-def test_the_flow_into_a_chamber_has_the_slopes_that_it_states(compensation: float, pressure: float):
+def test_the_flow_into_a_chamber_has_the_slopes_that_it_states(
+    compensation: float, pressure: float
+):
     c = SimpleNamespace(
         transition_pressure=0.2e5, conductance=0.03, flow_limit=np.inf, backflow=-np.inf, tank_pressure=5e5,
         anticavitation=0.0, compensation=compensation,
@@ -157,4 +173,6 @@ def test_nominal_joints_are_the_settings_in_si(arm: Arm):
     assert np.isinf(p.flow_limit).all()
     assert has_force_curve(p).all()
     np.testing.assert_allclose(p.onset_b, 1.2)
-    assert not any(p[name].any() for name in ("gain", "damping", "stiffness", "friction"))
+    assert not any(
+        p[name].any() for name in ("gain", "damping", "stiffness", "friction")
+    )

@@ -12,8 +12,11 @@ SETTINGS = HydraulicSettings(substeps=10)
 LITRES = 6e4
 
 
-def observe(arm: Arm, command: list[float], samples: int, **pump: float) -> tuple[np.ndarray, ...]:
-    """The arm, commands constant: line [bar], (T,), inflow [L/min], (T, J), chambers [bar], (T, J, 2)."""
+def observe(
+    arm: Arm, command: list[float], samples: int, **pump: float
+) -> tuple[np.ndarray, ...]:
+    """The arm, commands constant: line [bar], (T,), inflow [L/min], (T, J), chambers
+    [bar], (T, J, 2)."""
     joints = changed(nominal(arm, SETTINGS), leakage=0.0, **pump)
     seen = DrivenArm(arm, joints, np.tile(command, (samples, 1)), SETTINGS).trace()
     into = np.where(np.array(command) > 0, seen.flow[1:, :, 0], -seen.flow[1:, :, 1])
@@ -25,14 +28,18 @@ def test_a_pump_that_suffices_changes_nothing():
     both, seen = parameters(SETTINGS, pump_flow=np.array([np.inf, 500.0])), []
     angle = simulate(both, command, SETTINGS, observe=seen)
     assert np.ptp(angle[0]) > 0.1
-    assert max(o.pressure.max() for o, _ in seen) < 150e5  # above it, the check valve changes something
+    # above it, the check valve changes something
+    assert max(o.pressure.max() for o, _ in seen) < 150e5
     np.testing.assert_allclose(angle[1], angle[0], atol=1e-9)
 
 
 @pytest.mark.parametrize(("droop", "draw"), [(0.0, 1.0), (60.0, 1.0), (60.0, 0.4)])
 def test_joints_that_move_together_share_the_flow(arm: Arm, droop: float, draw: float):
     command = [0.0, 70.0, 0.0, -90.0, 0.0, 60.0, 0.0]
-    alone = [observe(arm, [u if j == k else 0.0 for k, u in enumerate(command)], 60)[1] for j in (1, 3, 5)]
+    alone = [
+        observe(arm, [u if j == k else 0.0 for k, u in enumerate(command)], 60)[1]
+        for j in (1, 3, 5)
+    ]
     wanted = sum(flow[-1].sum() for flow in alone)
     most = 0.6 * draw * wanted
     pump = {"pump_flow": most, "pump_droop": droop, "draw_a": draw, "draw_b": draw}
@@ -50,11 +57,14 @@ def test_joints_that_move_together_share_the_flow(arm: Arm, droop: float, draw: 
 
 
 def test_the_valves_lose_power_and_never_make_any(arm: Arm):
-    """Pump and tank give at least what the chambers get, at every step once the start has passed."""
+    """Pump and tank give at least what the chambers get, at every step once the start
+    has passed."""
     command = [0.0, 70.0, 50.0, -90.0, 0.0, 60.0, 0.0]
     line, flow, pressure = observe(arm, command, 100, pump_flow=4.0)
     driven = [1, 2, 3, 5]
-    feeding = np.where(np.array(command) > 0, pressure[:, :, 0], pressure[:, :, 1])[:, driven]
+    feeding = np.where(np.array(command) > 0, pressure[:, :, 0], pressure[:, :, 1])[
+        :, driven
+    ]
     lost = flow[:, driven] * (line[:, None] - feeding)
     assert lost.sum(axis=1)[5:].min() >= 0
     assert lost.min() > -1.0  # L/min bar: 1.7 mW
@@ -73,7 +83,13 @@ def test_no_load_sinks_while_another_joint_takes_the_pressure(arm: Arm):
 @pytest.mark.parametrize(("delay", "rise"), [(0.5, 0.0), (0.0, 0.3), (0.4, 0.2)])
 def test_a_pump_comes_up_after_the_demand(arm: Arm, delay: float, rise: float):
     command = [0.0, -60.0, 0.0, 0.0, 0.0, 0.0, 0.0]
-    pump = {"pump_flow": 0.5, "pump_idle": 0.4, "pump_delay": delay, "pump_rise": rise, "line_volume": 5.0}
+    pump = {
+        "pump_flow": 0.5,
+        "pump_idle": 0.4,
+        "pump_delay": delay,
+        "pump_rise": rise,
+        "line_volume": 5.0,
+    }
     flow = observe(arm, command, 150, **pump)[1][:, 1]
     time = 0.01 * np.arange(150) + 0.005
     since = np.maximum(time - delay, 0.0)
@@ -83,9 +99,16 @@ def test_a_pump_comes_up_after_the_demand(arm: Arm, delay: float, rise: float):
 
 
 def test_at_rest_the_pump_stands_by_again():
-    """After the last command φ falls with the same time constant, and the delay counts from the next one."""
+    """After the last command φ falls with the same time constant, and the delay counts
+    from the next one."""
     command = np.repeat([100.0, 0.0, 100.0], 100)
-    values = {"pump_flow": 0.5, "pump_idle": 0.3, "pump_delay": 0.5, "pump_rise": 0.01, "line_volume": 5.0}
+    values = {
+        "pump_flow": 0.5,
+        "pump_idle": 0.3,
+        "pump_delay": 0.5,
+        "pump_rise": 0.01,
+        "line_volume": 5.0,
+    }
     angle = simulate(parameters(SETTINGS, **values), command, SETTINGS)[0]
     speed = np.diff(angle) / 0.01
     slow, fast, again = speed[20:45].mean(), speed[70:95].mean(), speed[225:245].mean()

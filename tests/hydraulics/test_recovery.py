@@ -15,7 +15,8 @@ NOTHING: Mapping[str, float] = {}
 
 
 class Case(NamedTuple):
-    """Quantities with (lowest, highest, truth, start), what else the chain has, and commands [%] by joint."""
+    """Quantities with (lowest, highest, truth, start), what else the chain has, and
+    commands [%] by joint."""
 
     rows: Mapping[str, tuple[float, float, float, float]]
     hydraulics: Mapping[str, float] = NOTHING
@@ -25,8 +26,9 @@ class Case(NamedTuple):
     model: str = "dynamic"
 
 
-# A limit of the flow, or of the droop, starts where it is felt: above what the log reaches it has no effect.
-# The effect of the start pressure fades with the first movement, and a log of several has a second optimum.
+# A limit of the flow, or of the droop, starts where it is felt: above what the log
+# reaches it has no effect. The effect of the start pressure fades with the first
+# movement, and a log of several has a second optimum.
 CASES = {
     "lag of a pilot stage": Case(
         {"pilot_lag": (0.005, 1, 0.15, 0.05), "delay": (0, 0.5, 0.05, 0.1)}, {"dead_band": 20.0}
@@ -112,7 +114,11 @@ def test_a_term_is_recovered(name):
     settings = settings_of(
         {
             q: {"quantity": q, "bounds": [low, high]}
-            | ({} if q.startswith("pump_") or q == "line_volume" else {"joints": list(joints)})
+            | (
+                {}
+                if q.startswith("pump_") or q == "line_volume"
+                else {"joints": list(joints)}
+            )
             for q, (low, high, _, _) in case.rows.items()
         },
         **case.hydraulics,

@@ -21,7 +21,11 @@ UNLIKE = {
 
 
 def wheel(arm: Arm, values: dict[str, float], command: np.ndarray) -> np.ndarray:
-    p = changed(nominal_joints(arm, SETTINGS)[None, [3]].view(np.recarray), damping=5.0, **values)
+    p = changed(
+        nominal_joints(arm, SETTINGS)[None, [3]].view(np.recarray),
+        damping=5.0,
+        **values,
+    )
     return simulate(rotary(p), command, SETTINGS, start=0.0, model=lone_wheel(0.05))[0]
 
 
@@ -35,7 +39,9 @@ def test_swapped_sides_mirror_the_motion(arm: Arm):
     assert abs(wheel(arm, UNLIKE, -command) + here).max() > 0.05
 
 
-@pytest.mark.parametrize("name", ["delay", "plunger_damping", "opening_exponent", "slot_width", "overlap"])
+@pytest.mark.parametrize(
+    "name", ["delay", "plunger_damping", "opening_exponent", "slot_width", "overlap"]
+)
 def test_a_name_without_side_sets_both(name: str):
     one, both = (
         validate(values, HydraulicSettings, "here")

@@ -22,9 +22,24 @@ from hydroid.settings.fit import FitSettings
 
 TRUTH = {"area_A": 3400.0, "area_B": 1650.0, "delay": 0.12, "M_telescope": 310.0}
 PARAMETERS = {
-    "area_A": {"quantity": "area_a", "joints": ["telescope"], "bounds": [1500, 6000], "start": 3100},
-    "area_B": {"quantity": "area_b", "joints": ["telescope"], "bounds": [800, 3500], "start": 1750},
-    "delay": {"quantity": "delay", "joints": ["telescope"], "bounds": [0, 0.5], "start": 0.05},
+    "area_A": {
+        "quantity": "area_a",
+        "joints": ["telescope"],
+        "bounds": [1500, 6000],
+        "start": 3100,
+    },
+    "area_B": {
+        "quantity": "area_b",
+        "joints": ["telescope"],
+        "bounds": [800, 3500],
+        "start": 1750,
+    },
+    "delay": {
+        "quantity": "delay",
+        "joints": ["telescope"],
+        "bounds": [0, 0.5],
+        "start": 0.05,
+    },
     "M_telescope": {"quantity": "mass", "link": "telescope", "within": 2},
     "D": {"quantity": "damping", "joints": ["telescope"], "fixed": 2000},
 }
@@ -32,8 +47,16 @@ PARAMETERS = {
 
 @pytest.fixture(scope="module")
 def settings() -> FitSettings:
-    changes = {"arm": str(MODELS / "crane.yaml"), "outputs": [2], "parameters": PARAMETERS}
-    changes |= {"start_pose": "up", "simulation.threads": 1, "hydraulics.supply_pressure": 150}
+    changes = {
+        "arm": str(MODELS / "crane.yaml"),
+        "outputs": [2],
+        "parameters": PARAMETERS,
+    }
+    changes |= {
+        "start_pose": "up",
+        "simulation.threads": 1,
+        "hydraulics.supply_pressure": 150,
+    }
     return hydroid.load_settings("fit-hyd", changes)
 
 
@@ -42,24 +65,33 @@ def test_its_cylinder_lies_along_it(settings: FitSettings) -> None:
     assert (joint.slides, joint.range, joint.limits) == (True, (0.0, 1.8), (0.0, 1.8))
     assert joint.actuator.stroke == pytest.approx(1800)
     assert joint.actuator.length(1.3) - joint.actuator.length(0.2) == pytest.approx(1.1)
-    np.testing.assert_array_equal(joint.actuator.moment_arm(np.linspace(0, 1.8, 5)), 1.0)
+    np.testing.assert_array_equal(
+        joint.actuator.moment_arm(np.linspace(0, 1.8, 5)), 1.0
+    )
 
 
 def test_locking_the_boom_leaves_a_mass_on_a_slope(settings: FitSettings) -> None:
-    """Free of its cylinder it slides down at g sin: the reduced model is the whole one."""
+    """Free of its cylinder it slides down at g sin: the reduced model is the whole
+    one."""
     moving = np.array(settings.arm.joint_names) == "telescope"
-    locked = lock(load_model(settings.arm), settings.arm, moving, settings.arm.pose("up"))
+    locked = lock(
+        load_model(settings.arm), settings.arm, moving, settings.arm.pose("up")
+    )
     data = posed(locked.model, 0.9)
     assert data.qacc[0] == pytest.approx(-9.81 * np.sin(0.9), rel=1e-9)
     assert data.M[0] == pytest.approx(250)
 
 
 def test_a_reader_meets_millimetres_and_newtons(settings: FitSettings) -> None:
-    assert [p.unit for p in settings.parameter_set().parameters if p.name == "D"] == ["N·s/m"]
+    assert [p.unit for p in settings.parameter_set().parameters if p.name == "D"] == [
+        "N·s/m"
+    ]
     time, place = np.arange(300) * 0.01, np.zeros((300, 2))
     log = Log("a.csv", time, np.tile([0.0, 50.0], (300, 1)), place, 0.01)
     one = Prediction("fit", log, (2,), place[:, [1]] - 0.02, {}, None)
-    errors = validation_page([one], {"fit": judge(settings, [], {}, [one])}, settings.arm).tables["errors"]
+    errors = validation_page(
+        [one], {"fit": judge(settings, [], {}, [one])}, settings.arm
+    ).tables["errors"]
     row = dict(zip(errors.header, errors.rows[0], strict=True))
     assert (row["rms"], row["unit"]) == (pytest.approx(20), "mm")
 
@@ -73,15 +105,26 @@ def test_areas_delay_and_mass_are_recovered(settings: FitSettings) -> None:
 
 
 @pytest.mark.parametrize(
-    ("quantity", "unit"), [("area", "mm²"), ("area_a", "mm²"), ("dry_friction", "N"), ("damping", "N·s/m")]
+    ("quantity", "unit"),
+    [("area", "mm²"), ("area_a", "mm²"), ("dry_friction", "N"), ("damping", "N·s/m")],
 )
 def test_a_rotary_actuator_on_a_slide_has_the_units_of_a_slide(
     tmp_path: Path, quantity: str, unit: str
 ) -> None:
-    text = (MODELS / "crane.yaml").read_text().replace("model: crane.xml", f"model: {MODELS / 'crane.xml'}")
-    lines = [line for line in text.splitlines() if not line.startswith("  telescope: {kind: linear")]
+    text = (
+        (MODELS / "crane.yaml")
+        .read_text()
+        .replace("model: crane.xml", f"model: {MODELS / 'crane.xml'}")
+    )
+    lines = [
+        line
+        for line in text.splitlines()
+        if not line.startswith("  telescope: {kind: linear")
+    ]
     place = next(i for i, line in enumerate(lines) if line.startswith("actuators:")) + 1
-    lines.insert(place, "  telescope: {kind: rotary, displacement: 3000, max_opening: 6}")
+    lines.insert(
+        place, "  telescope: {kind: rotary, displacement: 3000, max_opening: 6}"
+    )
     (tmp_path / "crane.yaml").write_text("\n".join(lines))
     one = {"quantity": quantity, "joints": ["telescope"], "nominal": 10.0, "within": 2}
     changes = {
@@ -95,13 +138,22 @@ def test_a_rotary_actuator_on_a_slide_has_the_units_of_a_slide(
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_its_flow_is_area_times_speed_and_its_pose_is_said_in_mm(settings: FitSettings, sign: float) -> None:
+def test_its_flow_is_area_times_speed_and_its_pose_is_said_in_mm(
+    settings: FitSettings, sign: float
+) -> None:
     log = step_log(settings.arm.pose("up"), {2: [50.0, 100.0]})
     log.angle[-1, 1] += 0.5
     bench = make_bench(settings, [log], 2)
-    assert bench.angle == pytest.approx(1e-3 * float(bench.pose.removesuffix(" mm")), abs=1e-12)
-    estimate = Bindings(settings).candidates(settings.parameter_set().vector(TRUTH, "truth")[None])
-    found = {column.label: float(value[0]) for column, value in joint_measure(bench, estimate)(estimate)}
+    assert bench.angle == pytest.approx(
+        1e-3 * float(bench.pose.removesuffix(" mm")), abs=1e-12
+    )
+    estimate = Bindings(settings).candidates(
+        settings.parameter_set().vector(TRUTH, "truth")[None]
+    )
+    found = {
+        column.label: float(value[0])
+        for column, value in joint_measure(bench, estimate)(estimate)
+    }
     area = TRUTH["area_A" if sign > 0 else "area_B"] * 1e-6
     word = "raising" if sign > 0 else "lowering"
     speed = found[f"speed at 100 % command and {bench.pose}, {word}"] * 1e-3

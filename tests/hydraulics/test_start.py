@@ -1,4 +1,5 @@
-"""How a machine stood: oil trapped in the chambers, a stop that carries the rest, pressures from the log."""
+"""How a machine stood: oil trapped in the chambers, a stop that carries the rest,
+pressures from the log."""
 
 from dataclasses import replace
 
@@ -14,7 +15,9 @@ from hydroid.problem.problem import make_simulation
 from hydroid.settings.hydraulics import HydraulicSettings
 
 TIGHT = HydraulicSettings(leakage=0.0, substeps=10)
-TRAPPED = {"trapped": {"quantity": "trapped_pressure", "joints": [2], "bounds": [0.0, 150.0]}}
+TRAPPED = {
+    "trapped": {"quantity": "trapped_pressure", "joints": [2], "bounds": [0.0, 150.0]}
+}
 
 
 @pytest.mark.parametrize("trapped", [0.0, 5.0, 30.0])
@@ -24,8 +27,11 @@ def test_a_joint_stands_on_its_stop_whatever_is_trapped(trapped: float):
 
 
 def test_the_oil_must_first_be_pressed():
-    """The flow of the valve compresses the trapped oil until it carries the load: V Δp / β."""
-    angle, seen, _ = watched(parameters(TIGHT, trapped_pressure=5.0), np.full(200, 30.0), TIGHT)
+    """The flow of the valve compresses the trapped oil until it carries the load: V Δp
+    / β."""
+    angle, seen, _ = watched(
+        parameters(TIGHT, trapped_pressure=5.0), np.full(200, 30.0), TIGHT
+    )
     moved = int(np.argmax(angle - START > np.radians(0.1)))
     pressure, flow = seen.pressure[:moved, 0], seen.flow[:moved, 0]
     ends = cylinder(angle[[0, moved]])[0]
@@ -61,14 +67,23 @@ def test_a_log_says_in_which_pressures_it_rested():
     pressure[:, 1] = 12e5, 3e5
     spec, bindings = load_model(settings.arm), Bindings(settings)
     for measured, wanted in ((None, (40e5, 50e5)), (pressure, (12e5, 3e5))):
-        simulation = make_simulation(spec, replace(log, pressure=measured), [1], settings, [1])
-        response = simulation.simulate(bindings.candidates(np.array([[231.8, 53.4, 40.0]])))
+        simulation = make_simulation(
+            spec, replace(log, pressure=measured), [1], settings, [1]
+        )
+        response = simulation.simulate(
+            bindings.candidates(np.array([[231.8, 53.4, 40.0]]))
+        )
         np.testing.assert_allclose(response.pressure[0, 0, 0], wanted)
 
 
 def test_a_joint_away_from_its_stops_is_held_by_its_oil():
     settings = settings_of(TRAPPED)
-    log, bindings = step_log(settings.arm.pose("study"), {2: [50, -50]}), Bindings(settings)
+    log, bindings = (
+        step_log(settings.arm.pose("study"), {2: [50, -50]}),
+        Bindings(settings),
+    )
     simulation = make_simulation(load_model(settings.arm), log, [1], settings)
-    angle = simulation.simulate(bindings.candidates(np.array([[231.8, 53.4, p] for p in (0.0, 40.0)]))).angle
+    angle = simulation.simulate(
+        bindings.candidates(np.array([[231.8, 53.4, p] for p in (0.0, 40.0)]))
+    ).angle
     np.testing.assert_array_equal(angle[0], angle[1])

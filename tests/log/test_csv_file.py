@@ -15,7 +15,9 @@ def text(separator: str = ",", decimal: str = ".", end: str = "\n") -> str:
 
 def with_degree_sign(data: str) -> str:
     head, *rest = data.split("\n")
-    return "\n".join([head + ",temp °C", *(row + ",warm" if row else "" for row in rest)])
+    return "\n".join(
+        [head + ",temp °C", *(row + ",warm" if row else "" for row in rest)]
+    )
 
 
 DIALECTS: dict[str, Callable[[], bytes]] = {
@@ -29,11 +31,19 @@ DIALECTS: dict[str, Callable[[], bytes]] = {
     "old mac": lambda: text(end="\r").encode(),
     "no last line end": lambda: text().rstrip().encode(),
     "blank lines": lambda: ("\n\n" + text() + "\n  \n\n").encode(),
-    "comments": lambda: ("# rig\n" + text().replace("\n", "\n# note, with comma\n", 9)).encode(),
+    "comments": lambda: (
+        "# rig\n" + text().replace("\n", "\n# note, with comma\n", 9)
+    ).encode(),
     "sep=": lambda: ("sep=;\r\n" + text(";", ",", "\r\n")).encode(),
-    "quoted header": lambda: (",".join(f'"{n}"' for n in ROWS[0]) + "\n" + text().split("\n", 1)[1]).encode(),
-    "quoted cells": lambda: "\n".join(",".join(f'" {c} "' for c in row) for row in ROWS).encode(),
-    "columns of spaces": lambda: "\n".join(" ".join(f"{c:>12}" for c in row) for row in ROWS).encode(),
+    "quoted header": lambda: (
+        ",".join(f'"{n}"' for n in ROWS[0]) + "\n" + text().split("\n", 1)[1]
+    ).encode(),
+    "quoted cells": lambda: "\n".join(
+        ",".join(f'" {c} "' for c in row) for row in ROWS
+    ).encode(),
+    "columns of spaces": lambda: "\n".join(
+        " ".join(f"{c:>12}" for c in row) for row in ROWS
+    ).encode(),
     "spaces": lambda: "\n".join(" , ".join(row) for row in ROWS).encode(),
     "trailing separators": lambda: text(";").replace("\n", ";;\n").encode(),
     "trailing separators below": lambda: "\n".join(
@@ -75,7 +85,12 @@ def test_a_file_that_is_no_log(data: bytes, said: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "said"), [("none.csv", "No such file"), (".", "directory"), ("null\0byte.csv", "cannot be read")]
+    ("name", "said"),
+    [
+        ("none.csv", "No such file"),
+        (".", "directory"),
+        ("null\0byte.csv", "cannot be read"),
+    ],
 )
 def test_a_file_that_cannot_be_read(name: str, said: str, tmp_path: Path) -> None:
     with pytest.raises(LogError, match=said):
@@ -90,7 +105,10 @@ def rows(*above: list[str], below: list[list[str]] | None = None) -> list[list[s
 
 
 def blank_first(table: list[list[str]], labels: list[str]) -> list[list[str]]:
-    return [[label, *row] for label, row in zip([*labels, *[""] * len(table)], table, strict=False)]
+    return [
+        [label, *row]
+        for label, row in zip([*labels, *[""] * len(table)], table, strict=False)
+    ]
 
 
 LAYOUTS: dict[str, tuple[Callable[[], list[list[str]]], str]] = {
@@ -120,7 +138,9 @@ LAYOUTS: dict[str, tuple[Callable[[], list[list[str]]], str]] = {
 
 @pytest.mark.parametrize("layout", LAYOUTS)
 @pytest.mark.parametrize("separator", [",", ";", "\t"])
-def test_the_table_is_found_in_any_layout(layout: str, separator: str, tmp_path: Path) -> None:
+def test_the_table_is_found_in_any_layout(
+    layout: str, separator: str, tmp_path: Path
+) -> None:
     table, remark = LAYOUTS[layout]
     reference, _ = read(save(tmp_path / "plain.csv", ROWS))
     log, findings = read(save(tmp_path / "log.csv", table(), separator))
@@ -129,8 +149,12 @@ def test_the_table_is_found_in_any_layout(layout: str, separator: str, tmp_path:
     assert_same(log, reference)
 
 
-@pytest.mark.parametrize(("line", "cell", "text"), [(1, 0, "x"), (1, 3, "?"), (2, 2, ""), (40, 1, "3 V")])
-def test_a_faulty_cell_below_comments_and_a_preamble_has_its_place(line, cell, text, tmp_path) -> None:
+@pytest.mark.parametrize(
+    ("line", "cell", "text"), [(1, 0, "x"), (1, 3, "?"), (2, 2, ""), (40, 1, "3 V")]
+)
+def test_a_faulty_cell_below_comments_and_a_preamble_has_its_place(
+    line, cell, text, tmp_path
+) -> None:
     table = rows(["# one"], [], ["Rate", "100"], below=[["s", "%", "%", "deg", "deg"]])
     table[4 + line][cell] = text
     _, (left_out, *_) = read(save(tmp_path / "log.csv", table))

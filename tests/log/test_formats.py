@@ -1,4 +1,5 @@
-"""Binary formats: the same bits as the CSV they were made from, and one clear line for a bad file."""
+"""Binary formats: the same bits as the CSV they were made from, and one clear line for
+a bad file."""
 
 import sys
 import tracemalloc
@@ -32,13 +33,17 @@ def test_the_same_bits_as_the_csv(kind: str, tmp_path: Path) -> None:
 
 def settings(time: str, command: str, angle: str) -> LogSettings:
     names = {"time": time, "command": command, "angle": angle}
-    return LogSettings.model_validate({what: {"column": name} for what, name in names.items()})
+    return LogSettings.model_validate(
+        {what: {"column": name} for what, name in names.items()}
+    )
 
 
 def test_help_and_page_name_every_format() -> None:
     page, text = Path(__file__).parents[2] / "docs" / "logs.md", hydroid.check.__doc__
     assert FORMATS in str(text)
-    assert all(name in page.read_text() for name in FORMATS.replace(" and ", ", ").split(", "))
+    assert all(
+        name in page.read_text() for name in FORMATS.replace(" and ", ", ").split(", ")
+    )
 
 
 MATRIX = settings("t", "u[{joint}]", "q[{joint}]")
@@ -73,7 +78,10 @@ def test_elements_of_cells_count_from_one(tmp_path: Path) -> None:
     """As in Simulink's structure with time, of two signals."""
     from scipy.io import savemat
 
-    savemat(tmp_path / "log.mat", {"log": {"time": T[:, None], "signals": [{"values": U}, {"values": Q}]}})
+    savemat(
+        tmp_path / "log.mat",
+        {"log": {"time": T[:, None], "signals": [{"values": U}, {"values": Q}]}},
+    )
     columns = ("log.signals[1].values[{joint}]", "log.signals[2].values[{joint}]")
     log, _ = read(tmp_path / "log.mat", settings("log.time", *columns))
     same(log, tmp_path)
@@ -84,17 +92,23 @@ def test_timestamps_in_parquet(tmp_path: Path) -> None:
 
     nanoseconds = (1e9 * T).round().astype(np.int64) + 1_700_000_000 * 10**9
     stamps = pyarrow.array(nanoseconds, pyarrow.timestamp("ns", "UTC"))
-    log, _ = read(write_parquet(tmp_path / "log.parquet", {**COLUMNS, "time_s": stamps}))
+    log, _ = read(
+        write_parquet(tmp_path / "log.parquet", {**COLUMNS, "time_s": stamps})
+    )
     same(log, tmp_path)
 
 
 def test_lengths_of_time_in_parquet_are_seconds(tmp_path: Path) -> None:
     lengths = (1e6 * T).round().astype("m8[us]")
-    log, _ = read(write_parquet(tmp_path / "log.parquet", {**COLUMNS, "time_s": lengths}))
+    log, _ = read(
+        write_parquet(tmp_path / "log.parquet", {**COLUMNS, "time_s": lengths})
+    )
     same(log, tmp_path)
 
 
-def test_links_to_nothing_and_arrays_without_a_shape_are_left_alone(tmp_path: Path) -> None:
+def test_links_to_nothing_and_arrays_without_a_shape_are_left_alone(
+    tmp_path: Path,
+) -> None:
     from h5py import Empty, ExternalLink, File, SoftLink
 
     path = write_mat73(tmp_path / "log.mat", COLUMNS)
@@ -111,7 +125,8 @@ def truncated(path: Path) -> Path:
 
 
 def with_kind(path: Path, kind: int) -> Path:
-    """A file whose first element of doubles is marked as one of another kind, at which scipy crashes."""
+    """A file whose first element of doubles is marked as one of another kind, at which
+    scipy crashes."""
     data = write_mat(path, COLUMNS).read_bytes()
     doubles = b"\x09\0\0\0" + np.uint32(8 * len(T)).tobytes()
     assert doubles in data
@@ -130,17 +145,27 @@ BAD = {
         f"{MATLAB} (damaged: an element is of kind 14",
     ),
     "truncated mat": (lambda p: truncated(write_mat(p / "log.mat", COLUMNS)), MATLAB),
-    "truncated v7.3": (lambda p: truncated(write_mat73(p / "log.mat", COLUMNS)), MATLAB),
-    "truncated parquet": (lambda p: truncated(write_parquet(p / "a", COLUMNS)), "cannot be read as Parquet"),
+    "truncated v7.3": (
+        lambda p: truncated(write_mat73(p / "log.mat", COLUMNS)),
+        MATLAB,
+    ),
+    "truncated parquet": (
+        lambda p: truncated(write_parquet(p / "a", COLUMNS)),
+        "cannot be read as Parquet",
+    ),
     "text for .mat": (lambda p: save(p / "log.mat", lines(VALUES)), MATLAB),
-    "empty mat": (lambda p: write_mat(p / "log.mat", {"note": np.array("x")}), "holds no array of numbers"),
+    "empty mat": (
+        lambda p: write_mat(p / "log.mat", {"note": np.array("x")}),
+        "holds no array of numbers",
+    ),
     "text in parquet": (
         lambda p: write_parquet(p / "a.parquet", {**COLUMNS, "u1_pct": ["up"] * 80}),
         "row 1, column u1_pct: 'up' is not a number (and 79 more",
     ),
     "no values in parquet": (
         lambda p: write_parquet(
-            p / "a.parquet", {**COLUMNS, "u1_pct": [*[None] * 9, *COLUMNS["u1_pct"][9:]]}
+            p / "a.parquet",
+            {**COLUMNS, "u1_pct": [*[None] * 9, *COLUMNS["u1_pct"][9:]]},
         ),
         "row 1, column u1_pct: no value is there",
     ),
@@ -149,7 +174,10 @@ BAD = {
         "column q2_deg: holds 40 values, but column time_s holds 80",
     ),
     "empty": (lambda p: save(p / "a.csv", []), FORMATS),
-    "workbook": (lambda p: save(p / "a.xlsx", [["PK\3\4\0\0"]]), "save the sheet as CSV"),
+    "workbook": (
+        lambda p: save(p / "a.xlsx", [["PK\3\4\0\0"]]),
+        "save the sheet as CSV",
+    ),
 }
 
 
@@ -173,7 +201,9 @@ def test_a_large_variable_that_is_not_used_is_not_unpacked(
 
 def test_columns_of_parquet_that_are_not_used_are_not_unpacked(tmp_path: Path) -> None:
     """Of 80 rows with a text of 100,000 letters each, which takes the file a few kB."""
-    path = write_parquet(tmp_path / "log.parquet", {**COLUMNS, "film": ["x" * 100_000] * 80})
+    path = write_parquet(
+        tmp_path / "log.parquet", {**COLUMNS, "film": ["x" * 100_000] * 80}
+    )
     read(path)
     tracemalloc.start()
     try:
@@ -206,9 +236,14 @@ def test_a_bad_file_is_refused_in_one_line(kind: str, tmp_path: Path) -> None:
         (empty_bag, "rosbags", "ros"),
     ],
 )
-def test_a_missing_package_names_its_extra(write, package, extra, tmp_path, monkeypatch) -> None:
+def test_a_missing_package_names_its_extra(
+    write, package, extra, tmp_path, monkeypatch
+) -> None:
     path = write(tmp_path / "log.bag")
     for name in [name for name in sys.modules if name.partition(".")[0] == package]:
         monkeypatch.setitem(sys.modules, name, None)
-    with pytest.raises(LogError, match=rf"needs the package {package}.*pip install 'hydroid\[{extra}\]'"):
+    with pytest.raises(
+        LogError,
+        match=rf"needs the package {package}.*pip install 'hydroid\[{extra}\]'",
+    ):
         open_table(path)

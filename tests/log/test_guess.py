@@ -17,9 +17,17 @@ STEPS = np.repeat(np.random.default_rng(1).choice([-80.0, -40, 0, 0, 40, 80], 40
 SWEEP = 20 * np.sin(0.4 * T)
 
 
-def guess(folder: Path, names: list[str], *columns: np.ndarray, above: str = "") -> ColumnGuess:
+def guess(
+    folder: Path, names: list[str], *columns: np.ndarray, above: str = ""
+) -> ColumnGuess:
     path = folder / "log.csv"
-    np.savetxt(path, np.stack(columns, axis=1), delimiter=",", header=above + ",".join(names), comments="")
+    np.savetxt(
+        path,
+        np.stack(columns, axis=1),
+        delimiter=",",
+        header=above + ",".join(names),
+        comments="",
+    )
     return guess_columns(open_table(path), JOINTS)
 
 
@@ -35,7 +43,9 @@ def guess(folder: Path, names: list[str], *columns: np.ndarray, above: str = "")
         (0.05, 5, "V", {"scale": 20.0, "offset": -100.0}),
     ],
 )
-def test_the_range_of_a_command(scale: float, offset: float, unit: str, entry: dict, tmp_path: Path) -> None:
+def test_the_range_of_a_command(
+    scale: float, offset: float, unit: str, entry: dict, tmp_path: Path
+) -> None:
     names = ["Time [ms]", f"boomCmd [{unit}]", "boomAngle"]
     found = guess(tmp_path, names, 1000 * T, offset + scale * STEPS, np.deg2rad(SWEEP))
     assert found.log["time"] == {"column": "Time [ms]", "unit": "ms"}
@@ -48,8 +58,17 @@ def test_the_range_of_a_command(scale: float, offset: float, unit: str, entry: d
     np.testing.assert_allclose(np.rad2deg(log.angle[:, 1]), SWEEP, atol=1e-9)
 
 
-def test_names_without_a_joint_go_by_their_order_and_that_is_said(tmp_path: Path) -> None:
-    found = guess(tmp_path, ["t", "up", "down", "pot (deg)"], T, STEPS.clip(0), (-STEPS).clip(0), SWEEP)
+def test_names_without_a_joint_go_by_their_order_and_that_is_said(
+    tmp_path: Path,
+) -> None:
+    found = guess(
+        tmp_path,
+        ["t", "up", "down", "pot (deg)"],
+        T,
+        STEPS.clip(0),
+        (-STEPS).clip(0),
+        SWEEP,
+    )
     assert found.log["joints"][1]["command"]["column"] == ["up", "down"]
     assert found.log["joints"][1]["angle"]["column"] == "pot (deg)"
     assert any("by its place in the log: check" in reason for reason in found.reasons)
@@ -57,30 +76,60 @@ def test_names_without_a_joint_go_by_their_order_and_that_is_said(tmp_path: Path
 
 def test_a_current_loop_for_each_direction_is_its_range(tmp_path: Path) -> None:
     up, down = (4 + 0.16 * part.clip(0) for part in (STEPS, -STEPS))
-    found = guess(tmp_path, ["t", "u2_up_mA", "u2_down_mA", "q2_deg"], T, up, down, SWEEP)
+    found = guess(
+        tmp_path, ["t", "u2_up_mA", "u2_down_mA", "q2_deg"], T, up, down, SWEEP
+    )
     command = found.log["joints"][2]["command"]
-    assert command == {"column": ["u2_up_mA", "u2_down_mA"], "scale": 6.25, "offset": -25.0}
+    assert command == {
+        "column": ["u2_up_mA", "u2_down_mA"],
+        "scale": 6.25,
+        "offset": -25.0,
+    }
     settings = LogSettings.model_validate(found.log)
     log, _ = read(tmp_path / "log.csv", settings, dict.fromkeys("12", (-9.0, 9.0)))
     np.testing.assert_allclose(log.command[:, 1], STEPS, atol=1e-9)
 
 
-def test_numbers_from_zero_other_words_for_joints_and_derived_signals(tmp_path: Path) -> None:
-    names = ["stamp", "valve0", "pos0", "valve1", "pos1", "dipper_angle", "vel1_rad", "p1_bar"]
-    found = guess(tmp_path, names, T, STEPS, SWEEP, -STEPS, -SWEEP, SWEEP, SWEEP, SWEEP + 50)
+def test_numbers_from_zero_other_words_for_joints_and_derived_signals(
+    tmp_path: Path,
+) -> None:
+    names = [
+        "stamp",
+        "valve0",
+        "pos0",
+        "valve1",
+        "pos1",
+        "dipper_angle",
+        "vel1_rad",
+        "p1_bar",
+    ]
+    found = guess(
+        tmp_path, names, T, STEPS, SWEEP, -STEPS, -SWEEP, SWEEP, SWEEP, SWEEP + 50
+    )
     mapped = found.log["joints"]
     assert mapped[1]["command"]["column"] == "valve0"
     assert mapped[2]["angle"]["column"] == "pos1"
-    assert mapped[3] == {"command": None, "angle": {"column": "dipper_angle", "unit": "deg"}}
+    assert mapped[3] == {
+        "command": None,
+        "angle": {"column": "dipper_angle", "unit": "deg"},
+    }
     assert found.unused == ("vel1_rad", "p1_bar")
     assert any("count from 0" in reason for reason in found.reasons)
 
 
-def test_the_bare_name_of_a_joint_or_of_what_a_command_moves_is_an_angle(tmp_path: Path) -> None:
-    for names in ["t", "valve_lift", "lift", "lift_speed"], ["t", "u2", "Boom_joint", "flow"]:
+def test_the_bare_name_of_a_joint_or_of_what_a_command_moves_is_an_angle(
+    tmp_path: Path,
+) -> None:
+    for names in (
+        ["t", "valve_lift", "lift", "lift_speed"],
+        ["t", "u2", "Boom_joint", "flow"],
+    ):
         found = guess(tmp_path, names, T, STEPS, SWEEP, SWEEP)
         (mapped,) = found.log["joints"].values()
-        assert mapped == {"command": {"column": names[1]}, "angle": {"column": names[2], "unit": "deg"}}
+        assert mapped == {
+            "command": {"column": names[1]},
+            "angle": {"column": names[2], "unit": "deg"},
+        }
         assert found.unused == (names[3],)
 
 
@@ -90,7 +139,8 @@ def test_no_time_is_an_error_that_lists_the_columns(tmp_path: Path) -> None:
 
 
 def test_digits_in_a_topics_name_number_no_joint():
-    """`/CalibratedJointVals3.position[Boom]` is the boom's, and no column of a topic 3 is joint 3's."""
+    """`/CalibratedJointVals3.position[Boom]` is the boom's, and no column of a topic 3
+    is joint 3's."""
     joints = ["swing", "boom", "stick", "bucket"]
     for name, joint in (("Boom", 2), ("Stick", 3), ("2", None)):
         assert joint_of(f"/CalibratedJointVals3.position[{name}]", joints) == joint
@@ -112,8 +162,18 @@ def test_a_command_that_rests_beside_the_middle_rests_at_zero_and_is_in_the_rang
     names, columns = ["t"], [0.02 * np.arange(len(DUTY))]
     for joint, rest in rests.items():
         names += [f"{joint}_cmd", f"{joint}_deg"]
-        columns += [rest + (0.75 if joint == "stick" else 1.03) * DUTY, 3 * np.sin(columns[0])]
-    np.savetxt(tmp_path / "log.csv", np.stack(columns, 1), "%.6g", ",", header=",".join(names), comments="")
+        columns += [
+            rest + (0.75 if joint == "stick" else 1.03) * DUTY,
+            3 * np.sin(columns[0]),
+        ]
+    np.savetxt(
+        tmp_path / "log.csv",
+        np.stack(columns, 1),
+        "%.6g",
+        ",",
+        header=",".join(names),
+        comments="",
+    )
     found = guess_columns(open_table(tmp_path / "log.csv"), list(rests))
     settings = LogSettings.model_validate(found.log)
     for number, (joint, rest) in enumerate(rests.items(), 1):
@@ -121,11 +181,12 @@ def test_a_command_that_rests_beside_the_middle_rests_at_zero_and_is_in_the_rang
         assert command is not None
         assert command.scale * rest + command.offset == pytest.approx(0, abs=1e-3)
         share = 75 if joint == "stick" else 100
-        assert np.abs(command.scale * columns[2 * number - 1] + command.offset).max() == pytest.approx(
-            share, abs=0.1
-        )
-        assert f"{joint}_cmd: command in pulses of 5 to 10 % duty, at rest at {rest:.6g}" in str(
-            found.reasons
+        assert np.abs(
+            command.scale * columns[2 * number - 1] + command.offset
+        ).max() == pytest.approx(share, abs=0.1)
+        assert (
+            f"{joint}_cmd: command in pulses of 5 to 10 % duty, at rest at {rest:.6g}"
+            in str(found.reasons)
         )
 
 
@@ -139,13 +200,26 @@ def test_what_is_called_ms_and_is_no_time_is_measured(tmp_path: Path) -> None:
     assert found.log["joints"][1]["command"]["column"] == "Boom Cmd"
 
 
-@pytest.mark.parametrize(("name", "ends"), [("boom_pot_V", (0.6, 4.1)), ("boom_encoder_counts", (150, 3900))])
-def test_a_sensors_signal_is_taken_for_the_whole_range(name: str, ends: tuple, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("name", "ends"), [("boom_pot_V", (0.6, 4.1)), ("boom_encoder_counts", (150, 3900))]
+)
+def test_a_sensors_signal_is_taken_for_the_whole_range(
+    name: str, ends: tuple, tmp_path: Path
+) -> None:
     time = 0.02 * np.arange(800)
     cells = np.interp(np.sin(time), [-1, 1], ends)
     columns = np.stack([time, 60 * np.cos(time), cells], axis=1)
-    np.savetxt(tmp_path / "log.csv", columns, "%.9g", ",", header=f"time_s,boom_cmd,{name}", comments="")
-    found = guess_columns(open_table(tmp_path / "log.csv"), ["boom"], ranges={1: (-0.5, 1.0)})
+    np.savetxt(
+        tmp_path / "log.csv",
+        columns,
+        "%.9g",
+        ",",
+        header=f"time_s,boom_cmd,{name}",
+        comments="",
+    )
+    found = guess_columns(
+        open_table(tmp_path / "log.csv"), ["boom"], ranges={1: (-0.5, 1.0)}
+    )
     angle = LogSettings.model_validate(found.log).columns("angle", 1)
     assert angle is not None
     reached = angle.scale * np.array([cells.min(), cells.max()]) + angle.offset

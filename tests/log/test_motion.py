@@ -12,7 +12,8 @@ PERIOD = 0.02
 
 
 def joint_log(dead=0.0, lag=0.0, speed=0.5):
-    """A joint whose speed [rad/s] follows its command above a dead band [%], after a lag [s]."""
+    """A joint whose speed [rad/s] follows its command above a dead band [%], after a
+    lag [s]."""
     rng = np.random.default_rng(0)
     command = np.repeat(rng.uniform(-100, 100, 100), 40)
     command[:50] = 0
@@ -36,7 +37,8 @@ def test_the_speed_is_that_of_fast_motion():
 
 
 def test_half_a_second_of_slow_motion_makes_no_dead_band():
-    """Nothing is commanded between rest and 30 %, and the joint barely has time to start there."""
+    """Nothing is commanded between rest and 30 %, and the joint barely has time to
+    start there."""
     log = joint_log()
     command = np.where(np.abs(log.command) > 45, log.command, 0.0)
     speed = 0.005 * command
@@ -48,7 +50,9 @@ def test_half_a_second_of_slow_motion_makes_no_dead_band():
 @pytest.mark.parametrize("early", [0.1, 0.3])
 def test_a_motion_before_its_command_is_told(early):
     log = joint_log(dead=10, lag=0.06)
-    moved = replace(log, command=np.roll(log.command, round((0.06 + early) / PERIOD), axis=0))
+    moved = replace(
+        log, command=np.roll(log.command, round((0.06 + early) / PERIOD), axis=0)
+    )
     assert JointMotion(moved, 1).ahead == pytest.approx(early, abs=0.021)
     assert JointMotion(log, 1).ahead == 0
 
@@ -71,7 +75,9 @@ def test_a_log_that_begins_with_a_command_starts_at_its_first_sample():
 
 
 @pytest.mark.parametrize(("levels", "moves"), [([0.0, 50.0], 101), ([0.0] * 5, 300)])
-def test_rest_ends_with_the_first_command_or_after_two_seconds(levels: list[float], moves: int):
+def test_rest_ends_with_the_first_command_or_after_two_seconds(
+    levels: list[float], moves: int
+):
     log = step_log(POSE, levels)
     moving = log.angle.copy()
     moving[moves:, 1] += 1.0

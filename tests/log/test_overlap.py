@@ -1,4 +1,5 @@
-"""Copies and parts of a recording are found by their samples; other recordings are not."""
+"""Copies and parts of a recording are found by their samples; other recordings are
+not."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -26,13 +27,23 @@ def resampled(log: Log, period: float, shift: float = 0.0) -> Log:
     time = np.arange(0.0, log.duration - shift, period)
 
     def on_time(signal: np.ndarray) -> np.ndarray:
-        return np.column_stack([np.interp(time + shift, log.time, column) for column in signal.T])
+        return np.column_stack(
+            [np.interp(time + shift, log.time, column) for column in signal.T]
+        )
 
-    return replace(log, time=time, period=period, angle=on_time(log.angle), command=on_time(log.command))
+    return replace(
+        log,
+        time=time,
+        period=period,
+        angle=on_time(log.angle),
+        command=on_time(log.command),
+    )
 
 
 def rounded(log: Log, step_deg: float) -> Log:
-    return replace(log, angle=np.radians(step_deg * np.round(np.degrees(log.angle) / step_deg)))
+    return replace(
+        log, angle=np.radians(step_deg * np.round(np.degrees(log.angle) / step_deg))
+    )
 
 
 COPIES: dict[str, Callable[[Log], Log]] = {
@@ -41,7 +52,9 @@ COPIES: dict[str, Callable[[Log], Log]] = {
     "fewer digits": lambda log: rounded(log, 0.1),
     "between the samples": lambda log: resampled(log, log.period, 0.4 * log.period),
     "half the rate": lambda log: resampled(log, 2 * log.period),
-    "half the rate and back": lambda log: resampled(resampled(log, 2 * log.period), log.period),
+    "half the rate and back": lambda log: resampled(
+        resampled(log, 2 * log.period), log.period
+    ),
     "no commands": lambda log: replace(log, command=0 * log.command),
 }
 
@@ -66,7 +79,9 @@ def test_another_recording_is_not_known(logs: list[Log]):
 
 def test_what_part_of_a_log_is_known_is_told(logs: list[Log]):
     one, _ = logs
-    assert overlap(one, [one.part(0, len(one.time) // 2)]) == pytest.approx(0.5, abs=0.15)
+    assert overlap(one, [one.part(0, len(one.time) // 2)]) == pytest.approx(
+        0.5, abs=0.15
+    )
 
 
 def test_the_same_commands_with_noise_of_their_own_are_another_recording():

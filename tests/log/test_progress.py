@@ -23,7 +23,9 @@ def test_a_long_csv_reports_megabytes(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", ["ros1", "ros2"])
-def test_a_bag_reports_messages(kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_bag_reports_messages(
+    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("hydroid.log.bags.WATCHED", 100)
     path = tmp_path / ("log.bag" if kind == "ros1" else "log")
     with BagWriter(path, kind) as bag:

@@ -4,14 +4,28 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from log_files import NAMES, RANGES, RIG, RIG_RANGES, SETTINGS, cells, faults, lines, place, read, save
+from log_files import (
+    NAMES,
+    RANGES,
+    RIG,
+    RIG_RANGES,
+    SETTINGS,
+    cells,
+    faults,
+    lines,
+    place,
+    read,
+    save,
+)
 
 from hydroid.errors import LogError
 from hydroid.log import check_log
 from hydroid.settings.log import LogSettings
 
 
-@pytest.mark.parametrize("name", ["rig_shoulder_1", "rig_shoulder_2", "rig_all_joints_1"])
+@pytest.mark.parametrize(
+    "name", ["rig_shoulder_1", "rig_shoulder_2", "rig_all_joints_1"]
+)
 def test_a_shipped_log_reads_fast_and_without_a_finding(name: str) -> None:
     start = time.process_time()
     log, findings = read(RIG / f"{name}.csv", ranges=RIG_RANGES, outputs=[2])
@@ -19,7 +33,9 @@ def test_a_shipped_log_reads_fast_and_without_a_finding(name: str) -> None:
     assert time.process_time() - start < 0.5
     raw = np.loadtxt(RIG / f"{name}.csv", delimiter=",", skiprows=1)
     np.testing.assert_array_equal(log.command, raw[:, 1:8])
-    np.testing.assert_allclose(log.angle, np.deg2rad(raw[:, 8:]), rtol=1e-15, atol=1e-300)
+    np.testing.assert_allclose(
+        log.angle, np.deg2rad(raw[:, 8:]), rtol=1e-15, atol=1e-300
+    )
     np.testing.assert_allclose(log.time, raw[:, 0], atol=1e-12)
     assert (log.driven == raw[:, 1:8].any(axis=0)).all()
     assert log.measured.all()
@@ -71,7 +87,8 @@ LEFT_OUT = {
     "names again": (lambda rows: rows.insert(40, rows[0]), "line 41", "does not hold 5 cells with numbers"),
     "a row twice": (lambda rows: rows.insert(41, rows[40]), "line 42, column time_s", "does not increase"),
 }  # fmt: skip
-"""change of one row of a file that costs this row only, and the place and words of the warning"""
+"""change of one row of a file that costs this row only, and the place and words of the
+warning"""
 
 
 @pytest.mark.parametrize("case", FAULTS)
@@ -98,12 +115,16 @@ def test_no_log_is_refused_for_one_row(case: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("column", "text"), FINE)
-def test_the_edge_of_what_a_cell_may_hold(column: int, text: str, tmp_path: Path) -> None:
+def test_the_edge_of_what_a_cell_may_hold(
+    column: int, text: str, tmp_path: Path
+) -> None:
     assert faults(edited(tmp_path, cell(40, column, text))) == []
 
 
 def test_one_column_is_one_signal(tmp_path: Path) -> None:
-    copied = LogSettings.model_validate({"joints": {2: {"angle": {"column": "q1_deg"}}}})
+    copied = LogSettings.model_validate(
+        {"joints": {2: {"angle": {"column": "q1_deg"}}}}
+    )
     (fault,) = faults(edited(tmp_path, lambda rows: None), copied)
     assert "angle of joint 1 and angle of joint 2" in fault.what
 
@@ -124,8 +145,15 @@ def test_every_fault_of_a_file_is_reported_at_once(tmp_path: Path) -> None:
         rows[30][4] = "-"
 
     path = edited(tmp_path, spoil)
-    assert {place(fault) for fault in faults(path)} == {"line 11, column u1_pct", "line 15, column q1_deg"}
-    left_out = next(one for one in check_log(path, SETTINGS, RANGES)[1] if one.kind == "row left out")
+    assert {place(fault) for fault in faults(path)} == {
+        "line 11, column u1_pct",
+        "line 15, column q1_deg",
+    }
+    left_out = next(
+        one
+        for one in check_log(path, SETTINGS, RANGES)[1]
+        if one.kind == "row left out"
+    )
     assert str(left_out).endswith(
         "line 13, column u2_pct: no value is there (and 3 more, to line 31): left out"
     )
@@ -143,7 +171,11 @@ def test_every_fault_of_a_file_is_reported_at_once(tmp_path: Path) -> None:
         lambda k: f"5/1/2024 12:00:00.{k:02d} PM",
         lambda k: f"12:00:00.{k:02d}0000000",
         lambda k: f"23:59:59.{k + 60:02d}" if k < 40 else f"00:00:00.{k - 40:02d}",
-        lambda k: f"2024-02-29 23:59:59.{k + 60:02d}" if k < 40 else f"2024-03-01 00:00:00.{k - 40:02d}",
+        lambda k: (
+            f"2024-02-29 23:59:59.{k + 60:02d}"
+            if k < 40
+            else f"2024-03-01 00:00:00.{k - 40:02d}"
+        ),
     ],
 )
 def test_dates_and_times_of_day_count_from_the_first(stamp, tmp_path: Path) -> None:
@@ -156,7 +188,9 @@ def test_dates_and_times_of_day_count_from_the_first(stamp, tmp_path: Path) -> N
         np.testing.assert_array_equal(log.angle, plain.angle)
 
 
-def test_a_joint_is_undriven_or_unmeasured_only_if_the_config_says_so(tmp_path: Path) -> None:
+def test_a_joint_is_undriven_or_unmeasured_only_if_the_config_says_so(
+    tmp_path: Path,
+) -> None:
     path = edited(tmp_path, lambda rows: [row.__delitem__(slice(2, 4)) for row in rows])
     assert len(faults(path)) == 1
     mapping = {"joints": {1: {"angle": None}, 2: {"command": None}}}
@@ -166,13 +200,18 @@ def test_a_joint_is_undriven_or_unmeasured_only_if_the_config_says_so(tmp_path: 
     assert log.measured.tolist() == [False, True]
     with pytest.raises(LogError, match="output joint 1 has no angle column"):
         read(path, LogSettings.model_validate(mapping), outputs=[1])
-    log, _ = read(edited(tmp_path, lambda rows: [row.__delitem__(slice(3, 5)) for row in rows]), outputs=None)
+    log, _ = read(
+        edited(tmp_path, lambda rows: [row.__delitem__(slice(3, 5)) for row in rows]),
+        outputs=None,
+    )
     assert log.driven.all()
     assert not log.measured.any()
 
 
 @pytest.mark.parametrize("unused", [0, 5])
-def test_reading_takes_no_more_memory_than_four_times_the_file(unused: int, tmp_path: Path) -> None:
+def test_reading_takes_no_more_memory_than_four_times_the_file(
+    unused: int, tmp_path: Path
+) -> None:
     values = cells(20_000)
     values = np.column_stack([values, np.repeat(values[:, 3:4], unused, axis=1)])
     header = ",".join([*NAMES, *(f"spare{k}" for k in range(unused))])
@@ -196,7 +235,9 @@ def test_a_joint_that_the_arm_lacks_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_joint_that_is_not_compared_may_be_absent(tmp_path: Path) -> None:
-    path = edited(tmp_path, lambda rows: [row.__delitem__(slice(2, 5, 2)) for row in rows])
+    path = edited(
+        tmp_path, lambda rows: [row.__delitem__(slice(2, 5, 2)) for row in rows]
+    )
     log, (note,) = read(path, outputs=[1])
     assert (note.level, note.what) == ("note", "has no column of joint 2")
     assert log.driven.tolist() == log.measured.tolist() == [True, False]
@@ -207,15 +248,20 @@ def test_a_joint_that_is_not_compared_may_be_absent(tmp_path: Path) -> None:
 
 
 def test_a_jittering_clock_needs_no_repair_and_shifts_nothing(tmp_path: Path) -> None:
-    """At 20 Hz, steps of 0.02 to 0.08 s: an integrating joint goes where the held commands take it."""
+    """At 20 Hz, steps of 0.02 to 0.08 s: an integrating joint goes where the held
+    commands take it."""
     rng = np.random.default_rng(0)
     time = 0.05 * np.arange(200) + rng.uniform(-0.016, 0.016, 200) - 0.0001
     command, angle = 60 * np.sign(np.sin(time)), 10 + 9 * np.sin(time)
-    values = np.round(np.stack([time - time[0], command, command, angle, angle], axis=1), 4)
+    values = np.round(
+        np.stack([time - time[0], command, command, angle, angle], axis=1), 4
+    )
     path = save(tmp_path / "log.csv", lines(values))
     assert np.diff(values[:, 0]).max() > 1.5 * 0.05
     log, _ = read(path, LogSettings(period_s=0.05))
-    np.testing.assert_allclose(np.rad2deg(log.angle[:, 0]), 10 + 9 * np.sin(log.time + time[0]), atol=0.01)
+    np.testing.assert_allclose(
+        np.rad2deg(log.angle[:, 0]), 10 + 9 * np.sin(log.time + time[0]), atol=0.01
+    )
     travel = np.append(0, np.cumsum(np.diff(values[:, 0]) * values[:-1, 1]))
     there = np.interp(log.time + 0.05, values[:, 0], travel)[:-2]
     np.testing.assert_allclose(0.05 * np.cumsum(log.command[:-2, 0]), there, atol=1e-9)
@@ -226,23 +272,30 @@ def test_a_jittering_clock_needs_no_repair_and_shifts_nothing(tmp_path: Path) ->
 
 
 def test_a_faster_log_gives_the_means_of_its_commands(tmp_path: Path) -> None:
-    """An integrating joint ends where the whole log takes it, wherever the steps fall."""
+    """An integrating joint ends where the whole log takes it, wherever the steps
+    fall."""
     values = cells(400)
     values[:, 1] = np.where((values[:, 0] > 0.4) & (values[:, 0] < 1.33), 80, 0)
     path = save(tmp_path / "log.csv", lines(values))
     for delay in (0.0, 0.03):
         exact, _ = read(path, LogSettings(delay_s=delay))
         coarse, _ = read(path, LogSettings(period_s=0.05, delay_s=delay))
-        travel, found = (np.cumsum(x.command * x.period, axis=0) for x in (exact, coarse))
+        travel, found = (
+            np.cumsum(x.command * x.period, axis=0) for x in (exact, coarse)
+        )
         np.testing.assert_allclose(found[:-1], travel[4::5][:79], atol=1e-9)
         np.testing.assert_array_equal(coarse.command[0, 0], 0)
 
 
-def test_a_slower_log_gives_commands_on_a_line_between_its_samples(tmp_path: Path) -> None:
+def test_a_slower_log_gives_commands_on_a_line_between_its_samples(
+    tmp_path: Path,
+) -> None:
     values = cells(400)[::5]
     slower, _ = read(save(tmp_path / "slow.csv", lines(values)))
     means = slower.command[:395].reshape(79, 5, 2).mean(axis=1)
-    np.testing.assert_allclose(means, 0.5 * (values[:-1, 1:3] + values[1:, 1:3]), atol=1e-9)
+    np.testing.assert_allclose(
+        means, 0.5 * (values[:-1, 1:3] + values[1:, 1:3]), atol=1e-9
+    )
 
 
 def test_the_delay_setting_moves_the_command_only(tmp_path: Path) -> None:

@@ -1,4 +1,5 @@
-"""Which samples of a log stand for a row of the file: a slower log says nothing new between its rows."""
+"""Which samples of a log stand for a row of the file: a slower log says nothing new
+between its rows."""
 
 from pathlib import Path
 
@@ -16,7 +17,9 @@ def test_a_log_on_its_own_grid_is_recorded_throughout(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("times", [2, 5, 8])
-def test_of_a_slower_log_only_the_samples_at_its_rows_are_recorded(tmp_path: Path, times: int) -> None:
+def test_of_a_slower_log_only_the_samples_at_its_rows_are_recorded(
+    tmp_path: Path, times: int
+) -> None:
     file = save(tmp_path / "log.csv", lines(cells(40, 0.01 * times)))
     log, _ = read(file, LogSettings(period_s=0.01))
     assert len(log.time) == 39 * times + 1
@@ -46,4 +49,6 @@ def test_a_row_beside_the_grid_is_the_nearest_sample(tmp_path: Path) -> None:
     log, _ = read(save(tmp_path / "log.csv", lines(values)), LogSettings(period_s=0.01))
     assert log.recorded is not None
     nearest = np.rint(np.round(values[:, 0], 10) / 0.01).astype(int)
-    assert {*np.flatnonzero(log.recorded).tolist()} == {*np.minimum(nearest, len(log.time) - 1).tolist()}
+    assert {*np.flatnonzero(log.recorded).tolist()} == {
+        *np.minimum(nearest, len(log.time) - 1).tolist()
+    }

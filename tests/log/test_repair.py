@@ -3,7 +3,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
-from log_files import RANGES, SETTINGS, assert_same, cells, faults, lines, place, read, save
+from log_files import (
+    RANGES,
+    SETTINGS,
+    assert_same,
+    cells,
+    faults,
+    lines,
+    place,
+    read,
+    save,
+)
 
 from hydroid.log import check_parts, write_log
 
@@ -12,7 +22,9 @@ holes = st.lists(st.tuples(st.integers(2, 75), st.integers(1, 3)), max_size=4)
 
 @settings(max_examples=60, deadline=None)
 @given(holes, st.lists(st.tuples(st.integers(1, 78), st.integers(1, 4)), max_size=6))
-def test_repair_restores_length_and_leaves_the_rest_alone(tmp_path_factory, dropped, blanked) -> None:
+def test_repair_restores_length_and_leaves_the_rest_alone(
+    tmp_path_factory, dropped, blanked
+) -> None:
     values = cells()
     folder = tmp_path_factory.getbasetemp()
     whole, _ = read(save(folder / "whole.csv", lines(values)))
@@ -27,19 +39,28 @@ def test_repair_restores_length_and_leaves_the_rest_alone(tmp_path_factory, drop
     log, findings = read(save(folder / "holed.csv", kept), repair=True)
     assert len(log.time) == len(values)
     for column in range(4):
-        mine, true = (np.concatenate([x.command, x.angle], axis=1)[:, column] for x in (log, whole))
+        mine, true = (
+            np.concatenate([x.command, x.angle], axis=1)[:, column]
+            for x in (log, whole)
+        )
         there = ~holes[:, column + 1]
         np.testing.assert_array_equal(mine[there], true[there])
         at = np.flatnonzero(there)
         if column < 2:
-            expected = true[at[np.searchsorted(at, np.arange(len(true)), side="right") - 1]]
+            expected = true[
+                at[np.searchsorted(at, np.arange(len(true)), side="right") - 1]
+            ]
             np.testing.assert_array_equal(mine, expected)
         else:
-            np.testing.assert_allclose(mine, np.interp(whole.time, whole.time[at], true[at]), atol=1e-12)
+            np.testing.assert_allclose(
+                mine, np.interp(whole.time, whole.time[at], true[at]), atol=1e-12
+            )
     cell_count = sum(1 for row, column in set(blanked) if row not in gone)
     said = [finding.what for finding in findings if finding.what.startswith("repaired")]
     if gone or cell_count:
-        assert said[0].startswith(f"repaired: cells filled: {cell_count}, samples inserted: {len(gone)}")
+        assert said[0].startswith(
+            f"repaired: cells filled: {cell_count}, samples inserted: {len(gone)}"
+        )
     else:
         assert said == []
 
@@ -75,15 +96,20 @@ def test_torn_rows_and_rows_without_a_time_are_put_back(tmp_path: Path) -> None:
     assert "rows left out: 3" in findings[0].what
 
 
-def dropped(folder: Path, *gaps: tuple[int, int], rows: int = 400) -> tuple[Path, np.ndarray]:
-    """A log without the samples from the first to before the last of each gap; and the whole log."""
+def dropped(
+    folder: Path, *gaps: tuple[int, int], rows: int = 400
+) -> tuple[Path, np.ndarray]:
+    """A log without the samples from the first to before the last of each gap; and the
+    whole log."""
     values = cells(rows)
     gone = [row for first, end in gaps for row in range(first, end)]
     return save(folder / "log.csv", lines(np.delete(values, gone, axis=0))), values
 
 
 @pytest.mark.parametrize("count", [1, 2])
-def test_up_to_two_lost_samples_are_bridged_with_a_warning(count: int, tmp_path: Path) -> None:
+def test_up_to_two_lost_samples_are_bridged_with_a_warning(
+    count: int, tmp_path: Path
+) -> None:
     path, values = dropped(tmp_path, (100, 100 + count), (300, 301))
     whole, _ = read(save(tmp_path / "whole.csv", lines(values)))
     log, (lost,) = read(path)
@@ -101,19 +127,28 @@ def test_a_gap_splits_a_log_and_only_what_is_lost_is_left_out(tmp_path: Path) ->
     path, values = dropped(tmp_path, (100, 103), (250, 300))
     whole, _ = read(save(tmp_path / "whole.csv", lines(values)))
     parts, (gap, *_) = check_parts(path, SETTINGS, RANGES)
-    assert (gap.level, gap.kind, place(gap)) == ("warning", "gap", "line 102, column time_s")
+    assert (gap.level, gap.kind, place(gap)) == (
+        "warning",
+        "gap",
+        "line 102, column time_s",
+    )
     assert "0.04 s without a sample" in gap.what
     assert "parts read: 3" in gap.what
     assert [part.source for part in parts] == [f"{path}[{k}]" for k in (1, 2, 3)]
-    for part, (first, end) in zip(parts, [(0, 100), (103, 250), (300, 400)], strict=True):
+    for part, (first, end) in zip(
+        parts, [(0, 100), (103, 250), (300, 400)], strict=True
+    ):
         assert part.begin == pytest.approx(0.01 * first)
         np.testing.assert_allclose(part.time, 0.01 * np.arange(end - first), atol=1e-12)
         np.testing.assert_array_equal(part.command, whole.command[first:end])
         np.testing.assert_array_equal(part.angle, whole.angle[first:end])
-    np.testing.assert_array_equal(parts[1].start, whole.angle[103])  # the arm may be moving there
+    # the arm may be moving there
+    np.testing.assert_array_equal(parts[1].start, whole.angle[103])
 
 
-def test_parts_shorter_than_half_a_second_are_left_out_and_counted(tmp_path: Path) -> None:
+def test_parts_shorter_than_half_a_second_are_left_out_and_counted(
+    tmp_path: Path,
+) -> None:
     path, _ = dropped(tmp_path, (100, 110), (130, 140))
     parts, (gap,) = check_parts(path, SETTINGS, RANGES)
     assert [len(part.time) for part in parts] == [100, 260]
@@ -123,7 +158,9 @@ def test_parts_shorter_than_half_a_second_are_left_out_and_counted(tmp_path: Pat
     assert "no part of 0.5 s without a gap" in fault.what
 
 
-def test_a_gap_that_is_short_against_the_new_period_does_not_split(tmp_path: Path) -> None:
+def test_a_gap_that_is_short_against_the_new_period_does_not_split(
+    tmp_path: Path,
+) -> None:
     path, _ = dropped(tmp_path, (100, 110))
     coarse = SETTINGS.changed({"period_s": 0.05})
     assert len(check_parts(path, coarse, RANGES)[0]) == 1
@@ -145,7 +182,10 @@ def test_a_last_line_that_is_cut_off_is_left_out(cut: str, tmp_path: Path) -> No
     *rows, last = path.read_text().splitlines()
     path.write_text("\n".join([*rows, CUTS[cut](last)]))
     log, (finding,) = read(path)
-    assert (finding.level, finding.what) == ("warning", "the last line is cut off and left out")
+    assert (finding.level, finding.what) == (
+        "warning",
+        "the last line is cut off and left out",
+    )
     assert place(finding) == "line 81"
     assert_same(log, read(save(tmp_path / "short.csv", lines(cells(79))))[0])
 
@@ -154,7 +194,11 @@ def test_a_line_that_is_cut_off_elsewhere_is_left_out(tmp_path: Path) -> None:
     table = lines(cells())
     table[40] = table[40][:2]
     _, (finding, _) = read(save(tmp_path / "log.csv", table))
-    assert (finding.level, finding.kind, place(finding)) == ("warning", "row left out", "line 41")
+    assert (finding.level, finding.kind, place(finding)) == (
+        "warning",
+        "row left out",
+        "line 41",
+    )
 
 
 def test_where_many_rows_hold_no_numbers_none_is_left_out(tmp_path: Path) -> None:

@@ -11,7 +11,16 @@ import hydroid
 from hydroid.log import JointMotion, Log
 from hydroid.log.sensors import leaps, resolution
 
-KINDS = {"leap", "coarse", "frozen", "straight", "turned", "range of one", "lost", "split"}
+KINDS = {
+    "leap",
+    "coarse",
+    "frozen",
+    "straight",
+    "turned",
+    "range of one",
+    "lost",
+    "split",
+}
 EXAMPLES = Path(__file__).parents[2] / "examples"
 GOOD = {"fit-mech": "logs/*.csv", EXAMPLES / "excavator/fit.yaml": "excavator/*.csv"}
 GOOD |= {EXAMPLES / "boom/fit.yaml": "boom/*.csv"}
@@ -21,7 +30,9 @@ GOOD |= {EXAMPLES / "boom/fit.yaml": "boom/*.csv"}
 def test_good_logs_have_none_of_these_findings(config: str | Path) -> None:
     logs = sorted(EXAMPLES.glob(GOOD[config]))
     assert logs
-    findings = [one for log in hydroid.check(logs, config=config).result for one in log.findings]
+    findings = [
+        one for log in hydroid.check(logs, config=config).result for one in log.findings
+    ]
     assert not [str(one) for one in findings if one.kind in KINDS]
 
 
@@ -29,9 +40,14 @@ TIME = 0.02 * np.arange(1000)
 
 
 def motion(speed: float, noise: float = 0.02) -> np.ndarray:
-    """A joint that turns to and fro at a speed [deg/s], starting and stopping within one sample: [rad]."""
-    turning = np.select([TIME % 4 < 1, (TIME % 4 > 2) & (TIME % 4 < 3)], [speed, -speed], 0.0)
-    angle = np.cumsum(turning) * 0.02 + np.random.default_rng(2).normal(0, noise, len(TIME))
+    """A joint that turns to and fro at a speed [deg/s], starting and stopping within
+    one sample: [rad]."""
+    turning = np.select(
+        [TIME % 4 < 1, (TIME % 4 > 2) & (TIME % 4 < 3)], [speed, -speed], 0.0
+    )
+    angle = np.cumsum(turning) * 0.02 + np.random.default_rng(2).normal(
+        0, noise, len(TIME)
+    )
     return np.deg2rad(angle)
 
 
@@ -45,7 +61,9 @@ def test_a_start_within_one_sample_is_no_leap(speed: float) -> None:
 def test_a_leap_is_found_however_long_it_lasts(size: float, length: int) -> None:
     angle = motion(20.0)
     angle[400 : 400 + length] += np.deg2rad(size)
-    assert leaps(TIME, angle).tolist() == [row for row in (400, 400 + length) if row < 1000]
+    assert leaps(TIME, angle).tolist() == [
+        row for row in (400, 400 + length) if row < 1000
+    ]
 
 
 def test_a_gap_in_the_time_is_no_leap() -> None:
@@ -80,8 +98,11 @@ def test_an_angle_that_stands_while_driven_is_frozen() -> None:
 
 def test_an_angle_at_a_stop_or_of_a_quiet_sensor_is_not_frozen() -> None:
     angle, command = pushed()
-    stopped = np.minimum(angle, np.quantile(angle, 0.7))  # held there by commands that all push up
-    assert driven(stopped, np.where(stopped == stopped.max(), 60, command)).frozen is None
+    # held there by commands that all push up
+    stopped = np.minimum(angle, np.quantile(angle, 0.7))
+    assert (
+        driven(stopped, np.where(stopped == stopped.max(), 60, command)).frozen is None
+    )
     rough = np.deg2rad(20) * np.round(np.rad2deg(angle) / 20)
     assert driven(rough, command).frozen is None
 

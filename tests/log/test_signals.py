@@ -20,14 +20,23 @@ def cells(signal: Signal) -> np.ndarray:
 
 
 @pytest.mark.parametrize("signal", SIGNALS, ids=lambda signal: signal.name)
-def test_each_signal_is_recognised_and_brought_to_percent(signal: Signal, tmp_path: Path) -> None:
+def test_each_signal_is_recognised_and_brought_to_percent(
+    signal: Signal, tmp_path: Path
+) -> None:
     likely = likely_range(cells(signal), unit=signal.unit)
     assert isinstance(likely, CommandRange)
     assert likely.name == signal.name
-    np.testing.assert_allclose(likely.scale * cells(signal) + likely.offset, STEPS, atol=1e-9)
+    np.testing.assert_allclose(
+        likely.scale * cells(signal) + likely.offset, STEPS, atol=1e-9
+    )
 
 
-UNITS = {"pulses of 1 to 2 ms": "ms", "1000 to 2000 µs": "us", "6 to 18 V": "V", "4 to 20 mA": "mA"}
+UNITS = {
+    "pulses of 1 to 2 ms": "ms",
+    "1000 to 2000 µs": "us",
+    "6 to 18 V": "V",
+    "4 to 20 mA": "mA",
+}
 
 
 @pytest.mark.parametrize("signal", SIGNALS, ids=lambda signal: signal.name)
@@ -36,10 +45,16 @@ def test_init_writes_its_scale_and_offset(signal: Signal, tmp_path: Path) -> Non
     name = f"cmd_boom_{unit}" if unit else "cmd_boom"
     path = tmp_path / "log.csv"
     table = np.stack([T, cells(signal), 20 * np.sin(0.4 * T)], axis=1)
-    np.savetxt(path, table, delimiter=",", header=f"time_s,{name},angle_boom", comments="")
-    command = LogSettings.model_validate(guess_columns(open_table(path), ["boom"]).log).columns("command", 1)
+    np.savetxt(
+        path, table, delimiter=",", header=f"time_s,{name},angle_boom", comments=""
+    )
+    command = LogSettings.model_validate(
+        guess_columns(open_table(path), ["boom"]).log
+    ).columns("command", 1)
     assert command is not None
-    np.testing.assert_allclose(command.scale * cells(signal) + command.offset, STEPS, atol=1e-9)
+    np.testing.assert_allclose(
+        command.scale * cells(signal) + command.offset, STEPS, atol=1e-9
+    )
 
 
 def test_the_page_has_each_signal() -> None:
@@ -54,7 +69,9 @@ def row(signal: Signal) -> str:
     return f"| {signal.name}{rest} | {scale:.6g} | {f'{offset:.6g}'.replace('-', '−') if offset else ''} |\n"
 
 
-@pytest.mark.parametrize("steps", [STEPS.clip(0), STEPS / 2, np.zeros(2000)], ids=["one way", "half", "none"])
+@pytest.mark.parametrize(
+    "steps", [STEPS.clip(0), STEPS / 2, np.zeros(2000)], ids=["one way", "half", "none"]
+)
 def test_a_command_in_percent_stays_one(steps: np.ndarray) -> None:
     likely = likely_range(steps)
     assert likely is None or likely.name == "%"

@@ -24,7 +24,9 @@ logs = st.builds(
 )
 layouts = st.fixed_dictionaries(
     {
-        "time": st.fixed_dictionaries({"unit": st.sampled_from(["s", "ms"]), "column": st.just("t")}),
+        "time": st.fixed_dictionaries(
+            {"unit": st.sampled_from(["s", "ms"]), "column": st.just("t")}
+        ),
         "command": st.fixed_dictionaries(
             {"column": signed | pairs, "scale": scales, "offset": st.integers(-5, 5)}
         ),
@@ -42,9 +44,13 @@ layouts = st.fixed_dictionaries(
 
 @settings(max_examples=80, deadline=None)
 @given(logs, layouts, st.integers(-20, 20))
-def test_what_is_written_reads_back(tmp_path_factory, log: Log, layout: dict, delay: int) -> None:
+def test_what_is_written_reads_back(
+    tmp_path_factory, log: Log, layout: dict, delay: int
+) -> None:
     path = tmp_path_factory.getbasetemp() / "written.csv"
-    mapping = LogSettings.model_validate({**layout, "period_s": log.period, "delay_s": delay * log.period})
+    mapping = LogSettings.model_validate(
+        {**layout, "period_s": log.period, "delay_s": delay * log.period}
+    )
     if delay > 0:
         log.command[:delay] = 0
     elif delay < 0:
@@ -56,13 +62,17 @@ def test_what_is_written_reads_back(tmp_path_factory, log: Log, layout: dict, de
     np.testing.assert_allclose(back.angle, log.angle, atol=1e-8)
 
 
-LOG = Log("x", np.arange(T, dtype=float) * 0.01, np.ones((T, 2)), np.zeros((T, 2)), 0.01)
+LOG = Log(
+    "x", np.arange(T, dtype=float) * 0.01, np.ones((T, 2)), np.zeros((T, 2)), 0.01
+)
 
 
 def test_nothing_is_lost_silently(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     with pytest.raises(LogError, match="joint 2 is driven but no column"):
-        write_log(path, LOG, LogSettings.model_validate({"joints": {2: {"command": None}}}))
+        write_log(
+            path, LOG, LogSettings.model_validate({"joints": {2: {"command": None}}})
+        )
     unmeasured = replace(LOG, angle=np.full((T, 2), np.nan))
     with pytest.raises(LogError, match="joint 1 has no angle"):
         write_log(path, unmeasured, LogSettings())

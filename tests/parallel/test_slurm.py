@@ -1,4 +1,5 @@
-"""The examples for a cluster on a real Slurm, which `.ci/slurm` starts around this file's tests."""
+"""The examples for a cluster on a real Slurm, which `.ci/slurm` starts around this
+file's tests."""
 
 import csv
 import json
@@ -24,7 +25,12 @@ pytestmark = [
     ),
 ]
 EXAMPLES = Path(__file__).parents[2] / "examples" / "cluster"
-QUICK = ["--algorithm=ga", "--set=search.ga.population=6", "--set=refinement.iterations=2", "--quiet"]
+QUICK = [
+    "--algorithm=ga",
+    "--set=search.ga.population=6",
+    "--set=refinement.iterations=2",
+    "--quiet",
+]
 OFTEN = f"""#!{sys.executable}
 from hydroid.commands.app import main
 from hydroid.fitting import checkpoints
@@ -36,7 +42,8 @@ ENDED = ("COMPLETED", "FAILED", "TIMEOUT", "CANCELLED", "NODE_FAIL", "OUT_OF_MEM
 
 @pytest.fixture
 def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder with four seconds of a virtual rig's log; hydroid and dask are found as in an active .venv."""
+    """A folder with four seconds of a virtual rig's log; hydroid and dask are found as
+    in an active .venv."""
     head(tmp_path / "log.csv", 400)
     monkeypatch.setenv("PATH", str(Path(sys.executable).parent), prepend=os.pathsep)
     monkeypatch.chdir(tmp_path)
@@ -44,7 +51,9 @@ def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def run(*command: object) -> str:
-    done = subprocess.run([*map(str, command)], capture_output=True, text=True, timeout=120)
+    done = subprocess.run(
+        [*map(str, command)], capture_output=True, text=True, timeout=120
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
@@ -55,7 +64,10 @@ def submit(script: str, *arguments: object, options: tuple[str, ...] = ()) -> st
 
 def jobs(job: str) -> list[dict[str, str]]:
     lines = run("scontrol", "--oneliner", "show", "job", job).splitlines()
-    return [dict(word.split("=", 1) for word in line.split() if "=" in word) for line in lines]
+    return [
+        dict(word.split("=", 1) for word in line.split() if "=" in word)
+        for line in lines
+    ]
 
 
 def wait_for(condition: Callable[[], object], seconds: float = 150) -> None:
@@ -66,7 +78,10 @@ def wait_for(condition: Callable[[], object], seconds: float = 150) -> None:
 
 
 def told() -> str:
-    return "\n".join(f"{file.name}: {file.read_text()}" for file in sorted(Path().glob("slurm-*.out")))
+    return "\n".join(
+        f"{file.name}: {file.read_text()}"
+        for file in sorted(Path().glob("slurm-*.out"))
+    )
 
 
 def end_of(job: str) -> None:
@@ -77,7 +92,13 @@ def end_of(job: str) -> None:
 
 def results(folder: str) -> dict[str, bytes]:
     """What two runs have in common that are the same."""
-    names = ("estimate.yaml", "history.csv", "pareto.csv", "checkpoint.npz", "tables/parameters.csv")
+    names = (
+        "estimate.yaml",
+        "history.csv",
+        "pareto.csv",
+        "checkpoint.npz",
+        "tables/parameters.csv",
+    )
     return {name: (Path(folder) / name).read_bytes() for name in names}
 
 
@@ -85,17 +106,30 @@ def test_an_array_of_ten_seeds_is_collected(site: Path):
     job = submit("array.sbatch", "log.csv", *QUICK, "--set", "search.ga.generations=2")
     end_of(job)
     assert len(jobs(job)) == 10
-    out = run("hydroid", "report", "runs/array/seed-*", "--merge", "--out", "runs/array/merged", "--json")
+    out = run(
+        "hydroid",
+        "report",
+        "runs/array/seed-*",
+        "--merge",
+        "--out",
+        "runs/array/merged",
+        "--json",
+    )
     found = json.loads(out)
     assert [run["seed"] for run in found["runs"].values()] == list(range(1, 11))
     with Path("runs/array/merged/tables/runs.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert rows[0]["run"] == found["best"]
-    assert {row["run"] for row in rows} == {f"runs/array/seed-{seed}" for seed in range(1, 11)}
+    assert {row["run"] for row in rows} == {
+        f"runs/array/seed-{seed}" for seed in range(1, 11)
+    }
 
 
-def test_a_requeued_run_ends_as_one_that_was_not_stopped(site: Path, monkeypatch: pytest.MonkeyPatch):
-    """The run is frozen until its notice comes: a long run that costs no processor time."""
+def test_a_requeued_run_ends_as_one_that_was_not_stopped(
+    site: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """The run is frozen until its notice comes: a long run that costs no processor
+    time."""
     (site / "bin").mkdir()
     (site / "bin" / "hydroid").write_text(OFTEN)
     (site / "bin" / "hydroid").chmod(0o755)
@@ -108,9 +142,16 @@ def test_a_requeued_run_ends_as_one_that_was_not_stopped(site: Path, monkeypatch
     deadline = time.monotonic() + 170
     while (state := jobs(job)[0])["JobState"] not in ENDED:
         assert time.monotonic() < deadline, told()
-        notices = printed.read_text().count("time is nearly up") if printed.exists() else 0
+        notices = (
+            printed.read_text().count("time is nearly up") if printed.exists() else 0
+        )
         noticed = notices > int(state["Restarts"])
-        if not met and not frozen and not noticed and (folder / "checkpoint.npz").exists():
+        if (
+            not met
+            and not frozen
+            and not noticed
+            and (folder / "checkpoint.npz").exists()
+        ):
             with suppress(ProcessLookupError):  # that of the time before
                 process = int((folder / ".lock").read_text().split()[1])
                 os.kill(process, signal.SIGSTOP)

@@ -62,7 +62,9 @@ def test_errors_come_through(two: DaskWorkers):
     np.testing.assert_array_equal(two(Rows(), "squares", NINE, 2), NINE**2)
 
 
-def test_workers_of_another_version_are_refused(two: DaskWorkers, monkeypatch: pytest.MonkeyPatch):
+def test_workers_of_another_version_are_refused(
+    two: DaskWorkers, monkeypatch: pytest.MonkeyPatch
+):
     monkeypatch.setattr(workers, "VERSIONS", workers.VERSIONS | {"mujoco": "0.0"})
     with pytest.raises(RunError, match=r"a Dask worker has mujoco .*, here is 0.0"):
         two(Rows(), "squares", NINE, 2)
@@ -73,7 +75,11 @@ def test_only_the_loopback_listens_with_tls_and_no_page_is_served(two: DaskWorke
     for address in (info["address"], *info["workers"]):
         assert address.startswith("tls://127.0.0.1:")
     this = psutil.Process()
-    sockets = [s for p in (this, *this.children(recursive=True)) for s in p.net_connections("inet")]
+    sockets = [
+        s
+        for p in (this, *this.children(recursive=True))
+        for s in p.net_connections("inet")
+    ]
     assert {s.laddr.ip for s in sockets if s.status == "LISTEN"} == {"127.0.0.1"}
     for page in ("info/main/workers.html", "json/counts.json", "status"):
         with pytest.raises(HTTPError, match="404"):
@@ -88,7 +94,10 @@ def test_a_foreign_client_is_refused(two: DaskWorkers, monkeypatch: pytest.Monke
         opened(address)
     with pytest.raises(RunError, match="no Dask scheduler answers"):
         opened(address.replace("tls", "tcp"))
-    for other in (distributed.Security.temporary(), distributed.Security(require_encryption=True)):
+    for other in (
+        distributed.Security.temporary(),
+        distributed.Security(require_encryption=True),
+    ):
         with pytest.raises((OSError, TypeError)):
             distributed.Client(address, security=other, timeout=2.0)
         gc.collect()  # it closes here, and not in the thread of the next one
@@ -103,12 +112,20 @@ SILENT = (RunError, "no Dask scheduler answers")
 @pytest.mark.parametrize(
     ("address", "refusal"),
     [
-        *((a, NO_TLS) for a in ("tcp://10.0.0.1:8786", "node7:8786", "ws://node7:80", "file.json")),
-        *((a, NONE) for a in ("local:0", "local:many", "carrier-pigeon://somewhere", "log.csv")),
+        *(
+            (a, NO_TLS)
+            for a in ("tcp://10.0.0.1:8786", "node7:8786", "ws://node7:80", "file.json")
+        ),
+        *(
+            (a, NONE)
+            for a in ("local:0", "local:many", "carrier-pigeon://somewhere", "log.csv")
+        ),
         *((a, SILENT) for a in ("tcp://127.0.0.1:1", "localhost:1", "tcp://[::1]:1")),
     ],
 )
-def test_an_address_that_is_none_or_that_others_reach_is_refused(address, refusal, tmp_path, monkeypatch):
+def test_an_address_that_is_none_or_that_others_reach_is_refused(
+    address, refusal, tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(cluster, "CONNECT", 0.5)
     Path("file.json").write_text('{"address": "tcp://10.0.0.1:8786"}')

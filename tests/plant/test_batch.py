@@ -1,4 +1,5 @@
-"""Plants in one call, and states saved and restored: the same bits as plants by themselves."""
+"""Plants in one call, and states saved and restored: the same bits as plants by
+themselves."""
 
 import pickle
 
@@ -11,7 +12,9 @@ from hydroid.errors import SettingsError
 from hydroid.identified_model import identified
 from hydroid.plant import Plant, PlantBatch
 
-VALUES = TRUTH | HYDRAULIC | {"open_A": 0.4, "open_B": 0.4, "delay": 0.03, "friction": 100.0}
+VALUES = (
+    TRUTH | HYDRAULIC | {"open_A": 0.4, "open_B": 0.4, "delay": 0.03, "friction": 100.0}
+)
 KINDS = ["mech", "dynamic", "quasi-static"]
 JOINTS = [2, 5]
 
@@ -19,19 +22,29 @@ JOINTS = [2, 5]
 def plant(kind: str, **values: float) -> Plant:
     stage = "mech" if kind == "mech" else "hyd"
     settings = load_settings(f"fit-{stage}", {"start_pose": "study"} | made(kind))
-    named = {name: value for name, value in (VALUES | values).items() if name in settings.parameters}
+    named = {
+        name: value
+        for name, value in (VALUES | values).items()
+        if name in settings.parameters
+    }
     return Plant(identified(settings, named, "test"), joints=JOINTS)
 
 
 def made(kind: str) -> dict:
     if kind == "mech":
         return {}
-    return {"simulation.model": kind, "hydraulics.pump_flow": 6.0, "hydraulics.opening_lag": 0.05}
+    return {
+        "simulation.model": kind,
+        "hydraulics.pump_flow": 6.0,
+        "hydraulics.opening_lag": 0.05,
+    }
 
 
 def commands(steps: int, n: int = 1, seed: int = 0) -> np.ndarray:
     given = np.zeros((steps, n, 7))
-    given[:, :, [1, 4]] = np.random.default_rng(seed).uniform(-130.0, 130.0, (steps, n, 2))
+    given[:, :, [1, 4]] = np.random.default_rng(seed).uniform(
+        -130.0, 130.0, (steps, n, 2)
+    )
     return given
 
 
@@ -42,11 +55,15 @@ def test_a_batch_steps_to_the_bits_of_its_plants(kind, threads):
     alone = [plant(kind, **values) for values in several]
     batch = PlantBatch([plant(kind, **values) for values in several], threads=threads)
     assert len(batch) == 5
-    np.testing.assert_array_equal(batch.reset("rig"), [one.reset("rig") for one in alone])
+    np.testing.assert_array_equal(
+        batch.reset("rig"), [one.reset("rig") for one in alone]
+    )
     found = batch.angle
     for given in commands(40, 5):
         found = batch.step(given)
-        np.testing.assert_array_equal(found, [one.step(row) for one, row in zip(alone, given, strict=True)])
+        np.testing.assert_array_equal(
+            found, [one.step(row) for one, row in zip(alone, given, strict=True)]
+        )
     assert len({row.tobytes() for row in found}) == 5  # each its own parameters
     np.testing.assert_allclose(batch.time, alone[0].time)
     pose = np.tile(alone[0].angle, (2, 1))
@@ -56,7 +73,9 @@ def test_a_batch_steps_to_the_bits_of_its_plants(kind, threads):
     alone[1].reset(pose[1])
     for given in commands(20, 5, seed=1):
         found = batch.step(given)
-        np.testing.assert_array_equal(found, [one.step(row) for one, row in zip(alone, given, strict=True)])
+        np.testing.assert_array_equal(
+            found, [one.step(row) for one, row in zip(alone, given, strict=True)]
+        )
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -71,7 +90,9 @@ def test_a_restored_plant_steps_to_the_same_bits(kind):
     for again in (first, other):
         np.testing.assert_array_equal(again.restore(state), seen)
         assert again.time == pytest.approx(15 * again.period)
-        np.testing.assert_array_equal([again.step(given) for given in commands(15, seed=1)[:, 0]], after)
+        np.testing.assert_array_equal(
+            [again.step(given) for given in commands(15, seed=1)[:, 0]], after
+        )
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -91,7 +112,10 @@ def test_a_restored_row_of_a_batch_steps_to_the_same_bits(kind):
 
 
 def test_one_that_diverges_leaves_the_others_alone():
-    batch, alone = PlantBatch([plant("dynamic"), plant("dynamic")], threads=1), plant("dynamic")
+    batch, alone = (
+        PlantBatch([plant("dynamic"), plant("dynamic")], threads=1),
+        plant("dynamic"),
+    )
     batch.plants[0].data.qvel[:] = np.nan
     found, expected = batch.angle, alone.angle
     for given in commands(5)[:, 0]:
@@ -108,7 +132,10 @@ def test_one_that_diverges_leaves_the_others_alone():
     [
         (lambda: PlantBatch([]), "same joints"),
         (lambda: PlantBatch([plant("mech"), plant("dynamic")]), "same joints"),
-        (lambda: PlantBatch([plant("mech")]).step([1.0, 0, 0, 0, 0, 0, 0]), "take none"),
+        (
+            lambda: PlantBatch([plant("mech")]).step([1.0, 0, 0, 0, 0, 0, 0]),
+            "take none",
+        ),
         (lambda: PlantBatch([plant("mech")]).step(np.full(7, np.nan)), "finite"),
         (lambda: PlantBatch([plant("mech")]).step([1.0, 0.0]), "broadcast"),
     ],

@@ -1,4 +1,5 @@
-"""The plant is the simulation of a fit, one command at a time, bit for bit; it can be saved and exported."""
+"""The plant is the simulation of a fit, one command at a time, bit for bit; it can be
+saved and exported."""
 
 import re
 from pathlib import Path
@@ -20,12 +21,18 @@ from hydroid.problem.problem import make_simulation
 from hydroid.settings.fit import FitSettings
 from hydroid.simulation import Response
 
-VALUES = TRUTH | HYDRAULIC | {"A_A": 900.0, "open_A": 0.4, "open_B": 0.4, "delay": 0.0, "friction": 100.0}
+VALUES = (
+    TRUTH
+    | HYDRAULIC
+    | {"A_A": 900.0, "open_A": 0.4, "open_B": 0.4, "delay": 0.0, "friction": 100.0}
+)
 
 
 def model(stage: str = "mech", **changes: object) -> IdentifiedModel:
     settings = load_settings(f"fit-{stage}", {"start_pose": "study"} | changes)
-    values = {name: value for name, value in VALUES.items() if name in settings.parameters}
+    values = {
+        name: value for name, value in VALUES.items() if name in settings.parameters
+    }
     return identified(settings, values, "test")
 
 
@@ -44,7 +51,9 @@ def log_of(settings: FitSettings, joints: list[int], seconds: float = 4.0) -> Lo
 def response(fitted: IdentifiedModel, log: Log, joints: list[int]) -> Response:
     settings, columns = fitted.settings, [j - 1 for j in joints]
     pressures = columns if settings.stage == "hyd" else []
-    simulation = make_simulation(load_model(settings.arm), log, columns, settings, pressures)
+    simulation = make_simulation(
+        load_model(settings.arm), log, columns, settings, pressures
+    )
     return simulation.simulate(Bindings(settings).candidates(fitted.theta[None]))
 
 
@@ -53,10 +62,23 @@ def response(fitted: IdentifiedModel, log: Log, joints: list[int]) -> Response:
     ("stage", "changes"),
     [
         ("mech", {}),
-        ("mech", {"simulation.other_joints": "passive", "simulation.steps_per_sample": 3}),
+        (
+            "mech",
+            {"simulation.other_joints": "passive", "simulation.steps_per_sample": 3},
+        ),
         ("hyd", {"hydraulics.delay": 0.033}),
-        ("hyd", {"simulation.other_joints": "passive", "simulation.steps_per_sample": 2}),
-        ("hyd", {"hydraulics.pump_flow": 2.0, "hydraulics.pump_idle": 0.5, "hydraulics.pump_rise": 0.2}),
+        (
+            "hyd",
+            {"simulation.other_joints": "passive", "simulation.steps_per_sample": 2},
+        ),
+        (
+            "hyd",
+            {
+                "hydraulics.pump_flow": 2.0,
+                "hydraulics.pump_idle": 0.5,
+                "hydraulics.pump_rise": 0.2,
+            },
+        ),
     ],
 )
 def test_steps_are_the_simulation_of_the_fit_bit_for_bit(stage, changes, joints):
@@ -73,8 +95,12 @@ def test_steps_are_the_simulation_of_the_fit_bit_for_bit(stage, changes, joints)
             pressure.append(plant.pressure)
         np.testing.assert_array_equal(np.array(angle)[:, columns], expected)
         if found.pressure.size:
-            np.testing.assert_array_equal(np.array(pressure)[:, columns], found.pressure[0])
-        assert np.isnan(np.delete(pressure[-1], columns if stage == "hyd" else [], axis=0)).all()
+            np.testing.assert_array_equal(
+                np.array(pressure)[:, columns], found.pressure[0]
+            )
+        assert np.isnan(
+            np.delete(pressure[-1], columns if stage == "hyd" else [], axis=0)
+        ).all()
     assert plant.time == pytest.approx(log.time[-1])
     assert np.ptp(expected, axis=0).min() > np.deg2rad(0.2)
     if changes.get("simulation.other_joints") != "passive":
@@ -86,8 +112,12 @@ def test_steps_are_the_simulation_of_the_fit_bit_for_bit(stage, changes, joints)
 def test_a_slower_control_period_holds_the_command(stage):
     fitted = model(stage)
     by_name, by_number = Plant(fitted, joints=["shoulder"]), Plant(fitted, joints=[2])
-    np.testing.assert_array_equal(by_name.step({"shoulder": 50}), by_number.step([0, 50, 0, 0, 0, 0, 0]))
-    np.testing.assert_array_equal(by_name.step({"shoulder": 500}), by_number.step([0, 100, 0, 0, 0, 0, 0]))
+    np.testing.assert_array_equal(
+        by_name.step({"shoulder": 50}), by_number.step([0, 50, 0, 0, 0, 0, 0])
+    )
+    np.testing.assert_array_equal(
+        by_name.step({"shoulder": 500}), by_number.step([0, 100, 0, 0, 0, 0, 0])
+    )
     assert repr(by_name) == "<Plant: shoulder; steps of 0.01 s; test>"
     fast, slow = Plant(fitted), Plant(fitted, period=0.05)
     command = np.zeros(7)
@@ -150,12 +180,15 @@ def test_a_saved_plant_is_the_same_plant(stage, tmp_path):
     np.testing.assert_allclose(there.body_mass, here.body_mass)
     assert there.nmesh == here.nmesh
     meshes = {path.name for path in (arm.model.parent.parent / "meshes").glob("*.stl")}
-    assert {mesh.name for mesh in (tmp_path / "moved" / "model" / "meshes").iterdir()} == meshes
+    assert {
+        mesh.name for mesh in (tmp_path / "moved" / "model" / "meshes").iterdir()
+    } == meshes
 
 
 @pytest.mark.parametrize("joints", [[2], [2, 5]])
 def test_plain_mujoco_steps_the_exported_mjcf_to_the_fits_response(joints, tmp_path):
-    """Stage 1 on the demo's log: from the XML, with the commands as controls and nothing else."""
+    """Stage 1 on the demo's log: from the XML, with the commands as controls and
+    nothing else."""
     fitted = model()
     (log,) = read_logs([RIG / "rig_shoulder_1.csv"], fitted.settings)
     log.command[:, 4] = 0.3 * log.command[:, 1] if 5 in joints else 0.0
@@ -177,20 +210,34 @@ def test_stage_2_exports_no_motors_and_says_that_mujoco_alone_is_not_enough(tmp_
     plant = Plant(model("hyd"))
     plant.save(tmp_path)
     names = {path.name for path in (tmp_path / "model").iterdir()}
-    assert names == {"arm.xml", "pair.xml", "meshes", "mechanics.xml", "actuators.yaml", "README.txt"}
-    assert "MuJoCo alone cannot step this arm" in (tmp_path / "model" / "README.txt").read_text()
+    assert names == {
+        "arm.xml",
+        "pair.xml",
+        "meshes",
+        "mechanics.xml",
+        "actuators.yaml",
+        "README.txt",
+    }
+    assert (
+        "MuJoCo alone cannot step this arm"
+        in (tmp_path / "model" / "README.txt").read_text()
+    )
     bare = mujoco.MjModel.from_xml_path(str(tmp_path / "model" / "mechanics.xml"))
     assert bare.nu == 0
     np.testing.assert_allclose(bare.body_mass, plant.model.body_mass)
     assert bare.dof_damping[0] == VALUES["D"]
     text = (tmp_path / "model" / "actuators.yaml").read_text()
-    assert 900.0 in [round(float(area), 9) for area in re.findall(r"area_a: ([\d.]+)", text)]
+    assert 900.0 in [
+        round(float(area), 9) for area in re.findall(r"area_a: ([\d.]+)", text)
+    ]
 
 
 def test_a_plant_of_a_run_takes_commands_for_the_joints_that_the_fit_drove(tmp_path):
     """The fit compares the shoulder alone, and one of its logs drives the elbow too."""
     small = {"start_pose": "study", "search.algorithm": "ga", "refinement": None}
-    settings = load_settings("fit-mech", small | {"search.ga": {"generations": 1, "population": 6}})
+    settings = load_settings(
+        "fit-mech", small | {"search.ga": {"generations": 1, "population": 6}}
+    )
     logs = [log_of(settings, joints, 1.0) for joints in ([2], [2, 3])]
     result = fit(settings, logs, tmp_path / "run")
     assert load_plant(tmp_path / "run").joints == Plant(result.model).joints == (2, 3)
@@ -218,13 +265,19 @@ def test_a_plant_that_diverges_says_when(stage, capfd, tmp_path, monkeypatch):
         (lambda: Plant(model(), period=0.015), r"multiple of 0\.01 s"),
         (lambda: Plant(model()).reset([0.0, 0.1]), "7 finite angles"),
         (lambda: Plant(model()).reset("nowhere"), "no pose 'nowhere'"),
-        (lambda: load_plant("fit-hyd", overrides={"parameters.F1.fixed": 500}), "force-stroke curve"),
+        (
+            lambda: load_plant("fit-hyd", overrides={"parameters.F1.fixed": 500}),
+            "force-stroke curve",
+        ),
         (lambda: load_plant("fit-mech"), "no nominal gain"),
         (lambda: Plant(model()).step([0, 1]), "command"),
         (lambda: Plant(model()).step(5.0), "command"),
         (lambda: Plant(model()).step([0, np.nan, 0, 0, 0, 0, 0]), "command"),
         (lambda: Plant(model()).step([1, 0, 0, 0, 0, 0, 0]), "only shoulder take"),
-        (lambda: Plant(model()).step({"boom": 1.0}), "no joint boom; the arm has azimuth"),
+        (
+            lambda: Plant(model()).step({"boom": 1.0}),
+            "no joint boom; the arm has azimuth",
+        ),
         (lambda: Plant(model(), joints=["boom"]), "joints 1 to 7: azimuth, shoulder"),
     ],
 )

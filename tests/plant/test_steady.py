@@ -1,4 +1,5 @@
-"""Speeds and commands of a plant by name: what it settles to, in any pose, and why a wish cannot be had."""
+"""Speeds and commands of a plant by name: what it settles to, in any pose, and why a
+wish cannot be had."""
 
 import numpy as np
 import pytest
@@ -12,23 +13,38 @@ from hydroid.plant import Limit, Plant
 VALUES = (
     TRUTH
     | HYDRAULIC
-    | {"open_A": 0.3, "open_B": 0.3, "delay": 0.02, "friction": 20.0, "S": 0.0, "A": 0.05, "C": 0.05}
+    | {
+        "open_A": 0.3,
+        "open_B": 0.3,
+        "delay": 0.02,
+        "friction": 20.0,
+        "S": 0.0,
+        "A": 0.05,
+        "C": 0.05,
+    }
 )
 MODELS = ["dynamic", "quasi-static"]
 CLOSE = {"dynamic": 0.05, "quasi-static": 0.01}
-"""part of a speed; the dynamic model's oil also yields to a load that changes on the way"""
+"""part of a speed; the dynamic model's oil also yields to a load that changes on the
+way"""
 
 
 def made(model="quasi-static", joints=(2, 3), **hydraulics) -> Plant:
     values = {"onset_a": 0.05, "onset_b": 0.05, "leakage": 0.0} | hydraulics
     more = {f"hydraulics.{name}": value for name, value in values.items()}
-    settings = load_settings("fit-hyd", {"start_pose": "study", "simulation.model": model} | more)
-    values = {name: value for name, value in VALUES.items() if name in settings.parameters}
+    settings = load_settings(
+        "fit-hyd", {"start_pose": "study", "simulation.model": model} | more
+    )
+    values = {
+        name: value for name, value in VALUES.items() if name in settings.parameters
+    }
     return Plant(identified(settings, values, "test"), joints=joints)
 
 
 @pytest.mark.parametrize("model", MODELS)
-@pytest.mark.parametrize("wish", [{"shoulder": 0.06}, {"shoulder": -0.04, "elbow": 0.05}])
+@pytest.mark.parametrize(
+    "wish", [{"shoulder": 0.06}, {"shoulder": -0.04, "elbow": 0.05}]
+)
 def test_the_plant_moves_as_wished_under_the_commands_for_it(model, wish):
     plant = made(model)
     middle = plant.angle
@@ -45,7 +61,9 @@ def test_the_plant_moves_as_wished_under_the_commands_for_it(model, wish):
     for name, speed in wish.items():
         joint = plant.names.index(name)
         assert found.speed[joint] == pytest.approx(speed, rel=1e-4)
-        assert (after - before)[joint] / plant.period == pytest.approx(speed, rel=CLOSE[model])
+        assert (after - before)[joint] / plant.period == pytest.approx(
+            speed, rel=CLOSE[model]
+        )
 
 
 @pytest.mark.parametrize("model", MODELS)
@@ -53,7 +71,9 @@ def test_speeds_and_commands_are_inverse_wherever_the_plant_stands(model):
     plant, wish = made(model), {"shoulder": 0.05, "elbow": -0.08}
     for pose in ("rig", "study", None):
         found = plant.commands(wish, at=pose)
-        np.testing.assert_allclose(plant.speeds(found.command, at=pose), found.speed, rtol=1e-5, atol=1e-12)
+        np.testing.assert_allclose(
+            plant.speeds(found.command, at=pose), found.speed, rtol=1e-5, atol=1e-12
+        )
     start = plant.angle
     assert np.array_equal(plant.reset(), start)  # asking moves nothing
 
@@ -63,8 +83,12 @@ def test_a_heavier_load_takes_more_command_to_lift():
     heavy = Plant(light.identified, joints=[2, 3], payload=20.0)
     up = light.speeds({"shoulder": 60})[1]
     lifts = np.sign(up) * 0.05
-    commands = [abs(plant.commands({"shoulder": lifts}).command[1]) for plant in (light, heavy)]
-    lowers = [abs(plant.commands({"shoulder": -lifts}).command[1]) for plant in (light, heavy)]
+    commands = [
+        abs(plant.commands({"shoulder": lifts}).command[1]) for plant in (light, heavy)
+    ]
+    lowers = [
+        abs(plant.commands({"shoulder": -lifts}).command[1]) for plant in (light, heavy)
+    ]
     gravity = commands[1] - commands[0], lowers[1] - lowers[0]
     assert max(gravity) > 0.1 > -0.1 > min(gravity)
 
@@ -88,7 +112,8 @@ def test_each_reason_why_a_wish_cannot_be_had_has_a_name():
 def test_two_joints_want_more_than_the_pump_gives():
     alone = made()
     fastest = {
-        name: 0.8 * alone.speeds({name: 100})[joint] for name, joint in (("shoulder", 1), ("elbow", 2))
+        name: 0.8 * alone.speeds({name: 100})[joint]
+        for name, joint in (("shoulder", 1), ("elbow", 2))
     }
     assert not alone.commands(fastest).limits
     shared = made(pump_flow=0.8, pump_droop=20.0)
@@ -104,7 +129,10 @@ def test_two_joints_want_more_than_the_pump_gives():
     [
         (lambda: made().commands({"boom": 0.1}), "no joint boom"),
         (lambda: made().commands([0.1, 0.1]), "7 finite numbers"),
-        (lambda: made().commands({"azimuth": 0.1}), "only shoulder, elbow take commands"),
+        (
+            lambda: made().commands({"azimuth": 0.1}),
+            "only shoulder, elbow take commands",
+        ),
         (lambda: made().commands({"shoulder": 0.1}, at="nowhere"), "no pose 'nowhere'"),
         (lambda: made().speeds({"shoulder": np.nan}), "finite"),
         (lambda: made().speeds({"shoulder": 1.0}, at=[0.0]), "7 finite angles"),
@@ -117,6 +145,8 @@ def test_what_cannot_be_asked_is_refused(refused, says):
 
 def test_stage_1_has_no_speeds():
     settings = load_settings("fit-mech", {"start_pose": "study"})
-    values = {name: value for name, value in VALUES.items() if name in settings.parameters}
+    values = {
+        name: value for name, value in VALUES.items() if name in settings.parameters
+    }
     with pytest.raises(SettingsError, match="stage 2"):
         Plant(identified(settings, values, "test")).commands({"shoulder": 0.1})

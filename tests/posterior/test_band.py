@@ -1,4 +1,5 @@
-"""The prediction band: it holds its share of a log where the model is right, and says where it is wrong."""
+"""The prediction band: it holds its share of a log where the model is right, and says
+where it is wrong."""
 
 from dataclasses import replace
 
@@ -20,8 +21,11 @@ DRIFT = np.array([np.radians(0.1) ** 2, 0.0, 2e-4, 0.0, SHORTEST])
 
 
 def driven(settings, levels, seed: int, values=FAST) -> Log:
-    """A log of steps of the shoulder with white noise of 0.1 deg, but for its first sample."""
-    return noisy(replace(stepped(settings, values, levels), source=f"steps{seed}.csv"), 0.1, seed)
+    """A log of steps of the shoulder with white noise of 0.1 deg, but for its first
+    sample."""
+    return noisy(
+        replace(stepped(settings, values, levels), source=f"steps{seed}.csv"), 0.1, seed
+    )
 
 
 def drifting(settings, log: Log, seed: int) -> Log:
@@ -36,13 +40,17 @@ def drifting(settings, log: Log, seed: int) -> Log:
 def fitted():
     quick = {"search.algorithm": "ga", "search.ga.generations": 4}
     settings = fast_arm([2], "K", "D", "S", **quick)
-    return settings, hydroid.fit(settings, [driven(settings, [60.0, -80.0, 30.0, 0.0, -40.0], 1)]).model
+    return settings, hydroid.fit(
+        settings, [driven(settings, [60.0, -80.0, 30.0, 0.0, -40.0], 1)]
+    ).model
 
 
 @pytest.mark.parametrize(("factor", "limits"), [(1.0, False), (1.5, True)])
 def test_a_band_holds_what_the_model_explains(fitted, factor, limits):
     settings, model = fitted
-    log = driven(settings, [-30.0, 50.0, 20.0, -70.0], 2, FAST | {"S": factor * FAST["S"]})
+    log = driven(
+        settings, [-30.0, 50.0, 20.0, -70.0], 2, FAST | {"S": factor * FAST["S"]}
+    )
     band = bands_in(model, log)[2]
     assert np.degrees(band.noise) == pytest.approx(0.1, rel=0.15)
     assert (band.inside > 0.9, band.inside < 0.8) == (not limits, limits)
@@ -51,17 +59,29 @@ def test_a_band_holds_what_the_model_explains(fitted, factor, limits):
 
 
 def test_a_band_carries_the_drift_and_holds_its_share_of_unseen_samples():
-    """Of thirty unseen logs whose errors are drifts by the way: 95 %, of which few logs are independent."""
+    """Of thirty unseen logs whose errors are drifts by the way: 95 %, of which few logs
+    are independent."""
     settings = fast_arm([2], "K", "D", "S")
     levels = [60.0, -80.0, 30.0, 0.0, -40.0, 70.0]
-    logs = [drifting(settings, driven(settings, levels[i:] + levels[:i], i), i) for i in range(4)]
+    logs = [
+        drifting(settings, driven(settings, levels[i:] + levels[:i], i), i)
+        for i in range(4)
+    ]
     problem = Problem(settings, logs)
-    theta = refined(problem, problem.parameters.vector(FAST, "truth"), RefinementSettings())
+    theta = refined(
+        problem, problem.parameters.vector(FAST, "truth"), RefinementSettings()
+    )
     model = model_of(problem, theta)
-    unseen = [drifting(settings, driven(settings, levels[::-1], 10 + i), 10 + i) for i in range(30)]
+    unseen = [
+        drifting(settings, driven(settings, levels[::-1], 10 + i), 10 + i)
+        for i in range(30)
+    ]
     bands = [bands_in(model, log)[2] for log in unseen]
     assert 0.9 < np.mean([band.inside for band in bands]) <= 1.0
-    ratio = np.sqrt(np.mean([band.error**2 for band in bands]) / np.mean([b.expected**2 for b in bands]))
+    ratio = np.sqrt(
+        np.mean([band.error**2 for band in bands])
+        / np.mean([b.expected**2 for b in bands])
+    )
     assert 0.6 < ratio < 1.2
     # wider the further the joint has travelled
     assert (bands[0].half[-1] > 1.1 * bands[0].half[0]).all()

@@ -1,4 +1,5 @@
-"""Uncertainty by laws: closed forms of linear problems, and how often intervals cover the truth."""
+"""Uncertainty by laws: closed forms of linear problems, and how often intervals cover
+the truth."""
 
 import numpy as np
 import pytest
@@ -33,17 +34,24 @@ def test_a_given_white_noise_gives_the_textbook_covariance():
     problem, theta = white_problem()
     found = uncertainty(problem, theta, numbers=white(0.2))
     expected = (0.2 * DEG) ** 2 * np.linalg.inv(problem.columns @ problem.columns.T)
-    np.testing.assert_allclose(found.standard_deviation, np.sqrt(np.diag(expected)), rtol=1e-7)
+    np.testing.assert_allclose(
+        found.standard_deviation, np.sqrt(np.diag(expected)), rtol=1e-7
+    )
     outer = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
-    sign = np.sign(np.outer(theta, theta))  # relative changes of a negative parameter count the other way
+    # relative changes of a negative parameter count the other way
+    sign = np.sign(np.outer(theta, theta))
     relative = found.posterior.covariance / np.outer(found.relative, found.relative)
     np.testing.assert_allclose(relative * np.abs(sign), expected / outer, atol=1e-6)
-    assert problem.simulated == 1 + 3 + 2 * 3  # by each parameter, and one round along the axes
+    # by each parameter, and one round along the axes
+    assert problem.simulated == 1 + 3 + 2 * 3
 
 
 @pytest.mark.parametrize("stage", ["mech", "hyd"])
-def test_the_covariance_is_that_of_least_squares_so_weighed_by_the_errors_as_they_are(stage):
-    """The sandwich (H. White, 1980), by matrices; stage 1 weighs errors as white noise."""
+def test_the_covariance_is_that_of_least_squares_so_weighed_by_the_errors_as_they_are(
+    stage,
+):
+    """The sandwich (H. White, 1980), by matrices; stage 1 weighs errors as white
+    noise."""
     columns, rng = slow(3, 400), np.random.default_rng(2)
     drift = np.cumsum(rng.normal(0, 0.02 * DEG, 400))
     measured = THETA @ columns + drift + ar1(rng, 400, AR1, 0.1 * DEG)
@@ -56,7 +64,9 @@ def test_the_covariance_is_that_of_least_squares_so_weighed_by_the_errors_as_the
         weights = filtered @ filtered.T
     bread = np.linalg.inv(columns @ weights @ columns.T)
     expected = bread @ columns @ weights @ errors @ weights @ columns.T @ bread
-    np.testing.assert_allclose(found.standard_deviation, np.sqrt(np.diag(expected)), rtol=1e-5)
+    np.testing.assert_allclose(
+        found.standard_deviation, np.sqrt(np.diag(expected)), rtol=1e-5
+    )
 
 
 def test_an_exact_null_direction_has_no_interval_and_leaves_the_others_theirs():
@@ -66,7 +76,12 @@ def test_an_exact_null_direction_has_no_interval_and_leaves_the_others_theirs():
     rng = np.random.default_rng(3)
     problem = Linear(columns, theta @ columns + rng.normal(0, 0.1 * DEG, 1000), theta)
     found = uncertainty(problem, theta, numbers=white(0.1))
-    assert flags(found) == [Flag.UNIDENTIFIABLE, Flag.UNIDENTIFIABLE, Flag.NO_EFFECT, Flag.IDENTIFIABLE]
+    assert flags(found) == [
+        Flag.UNIDENTIFIABLE,
+        Flag.UNIDENTIFIABLE,
+        Flag.NO_EFFECT,
+        Flag.IDENTIFIABLE,
+    ]
     assert np.isinf(found.interval[:3]).all()
     assert profile(problem, found, "a").interval == (-np.inf, np.inf)
     pair = columns[[0, 3]]
@@ -88,10 +103,13 @@ def test_a_prior_is_one_more_measurement():
     prior = np.array([[1.0, 0.0, 1.0]]) / 0.05
     information = columns @ columns.T / (0.1 * DEG) ** 2 + prior.T @ prior
     expected = np.sqrt(np.diag(np.linalg.inv(information)))
-    np.testing.assert_allclose(found.standard_deviation, expected, rtol=1e-4)  # and a weak one
+    # and a weak one
+    np.testing.assert_allclose(found.standard_deviation, expected, rtol=1e-4)
     assert flags(found) == [Flag.IDENTIFIABLE] * 3
     assert (
-        flags(uncertainty(Linear(columns, measured, theta), theta, numbers=white(0.1)))[0]
+        flags(uncertainty(Linear(columns, measured, theta), theta, numbers=white(0.1)))[
+            0
+        ]
         is Flag.UNIDENTIFIABLE
     )
 
@@ -103,8 +121,13 @@ def test_a_bound_takes_the_interval():
     found = uncertainty(problem, at, numbers=white(0.1))
     status = found.status[2]
     assert (status.flag, status.at_bound) == (Flag.IDENTIFIABLE, "upper")
-    held = uncertainty(Linear(problem.columns, problem.measured, THETA, fixed="c"), at, numbers=white(0.1))
-    np.testing.assert_allclose(found.relative[:2], held.relative[:2], rtol=1e-6)  # it is held there
+    held = uncertainty(
+        Linear(problem.columns, problem.measured, THETA, fixed="c"),
+        at,
+        numbers=white(0.1),
+    )
+    # it is held there
+    np.testing.assert_allclose(found.relative[:2], held.relative[:2], rtol=1e-6)
     assert np.isnan(found.interval[2]).all()
     assert np.isfinite(found.interval[:2]).all()
     # a tenth of a standard deviation off, it is free
@@ -116,7 +139,8 @@ def test_a_bound_takes_the_interval():
 
 
 def test_parameters_that_trade_have_their_interval_though_the_response_is_rough():
-    """Two nearly equal effects, and a response in steps of 1e-5 rad, as where oil cavitates."""
+    """Two nearly equal effects, and a response in steps of 1e-5 rad, as where oil
+    cavitates."""
     columns, rng = slow(3), np.random.default_rng(4)
     columns[1] = columns[0] + 1e-2 * slow(1, seed=9)[0]
     measured = THETA @ columns + rng.normal(0, 0.05 * DEG, columns.shape[1])
@@ -125,7 +149,9 @@ def test_parameters_that_trade_have_their_interval_though_the_response_is_rough(
     smooth = problem.output_errors
     problem.output_errors = lambda t: np.round(smooth(t) / 1e-5) * 1e-5
     np.testing.assert_allclose(
-        uncertainty(problem, theta, numbers=white(0.1)).standard_deviation, expected, rtol=0.05
+        uncertainty(problem, theta, numbers=white(0.1)).standard_deviation,
+        expected,
+        rtol=0.05,
     )
 
 
@@ -148,7 +174,8 @@ TOO_WIDE = pytest.mark.xfail(
     ids=["white", "0.15 s", "1 s", "stage 1"],
 )
 def test_intervals_cover_the_truth_as_often_as_they_say(stage, phi):
-    """400 linear fits, errors estimated from the residual each time; a binomial 95 % is 0.93 to 0.97."""
+    """400 linear fits, errors estimated from the residual each time; a binomial 95 % is
+    0.93 to 0.97."""
     samples = 800 if phi <= AR1 else 2000
     columns, hits, rng = slow(3, samples, seed=7), [], np.random.default_rng(8)
     deviations, estimates = [], []
@@ -163,7 +190,9 @@ def test_intervals_cover_the_truth_as_often_as_they_say(stage, phi):
     cover = np.mean(hits, axis=0)
     assert (cover > 0.92).all(), cover
     assert (cover < 0.985).all(), cover
-    np.testing.assert_allclose(np.mean(deviations, axis=0), np.std(estimates, axis=0), rtol=0.1)
+    np.testing.assert_allclose(
+        np.mean(deviations, axis=0), np.std(estimates, axis=0), rtol=0.1
+    )
 
 
 def test_the_profile_of_a_linear_problem_is_its_interval_and_one_from_no_optimum_says_so():
@@ -172,10 +201,17 @@ def test_the_profile_of_a_linear_problem_is_its_interval_and_one_from_no_optimum
     one, deviation = profile(problem, found, "b"), found.standard_deviation[1]
     assert not one.better_optimum
     half = np.sqrt(THRESHOLD) * deviation
-    np.testing.assert_allclose(one.interval, [theta[1] - half, theta[1] + half], rtol=1e-4)
-    off = profile(
-        problem, uncertainty(problem, theta + np.array([0.0, 2 * deviation, 0.0]), numbers=white(0.1)), "b"
+    np.testing.assert_allclose(
+        one.interval, [theta[1] - half, theta[1] + half], rtol=1e-4
     )
-    # two standard deviations of the parameter by itself, or a little less of it with the others
+    off = profile(
+        problem,
+        uncertainty(
+            problem, theta + np.array([0.0, 2 * deviation, 0.0]), numbers=white(0.1)
+        ),
+        "b",
+    )
+    # two standard deviations of the parameter by itself, or a little less of it with
+    # the others
     assert off.better_optimum
     assert off.lowest < -3.0

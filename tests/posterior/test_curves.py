@@ -1,4 +1,5 @@
-"""Curves of a joint by laws: a valve from shut to open, a lag whose frequency response is known."""
+"""Curves of a joint by laws: a valve from shut to open, a lag whose frequency response
+is known."""
 
 import numpy as np
 import pytest
@@ -7,7 +8,12 @@ from made_logs import HYDRAULIC, step_log
 from hydroid import load_settings
 from hydroid.identified_model import identified
 from hydroid.posterior.bench import actuator, make_bench
-from hydroid.posterior.curves import OPENING_COMMANDS, frequency_response, opening_curve, step_curves
+from hydroid.posterior.curves import (
+    OPENING_COMMANDS,
+    frequency_response,
+    opening_curve,
+    step_curves,
+)
 from hydroid.problem.bindings import Bindings
 
 OVERLAPS = {"hydraulics.overlap_a": 0.4, "hydraulics.overlap_b": 0.3}
@@ -15,13 +21,17 @@ OVERLAPS = {"hydraulics.overlap_a": 0.4, "hydraulics.overlap_b": 0.3}
 
 def shoulder(**changes: object):
     """The article's shoulder on the bench, and its true values."""
-    values = {name: value for name, value in HYDRAULIC.items() if name not in ("F1", "x1")}
+    values = {
+        name: value for name, value in HYDRAULIC.items() if name not in ("F1", "x1")
+    }
     settings = load_settings("article-hyd", {"parameters.S.fixed": 0.0} | changes)
     model = identified(settings, values, "test")
     # two sizes a direction: commands that are on or off would tell of no others
     log = step_log(settings.arm.pose("study"), {2: [50.0, 100.0, -50.0, -100.0]})
     log.angle[-1, 1] += 0.6  # the travel
-    return make_bench(settings, [log], 2), Bindings(settings).candidates(model.theta[None])
+    return make_bench(settings, [log], 2), Bindings(settings).candidates(
+        model.theta[None]
+    )
 
 
 @pytest.mark.parametrize("late", [0.0, 0.137])
@@ -42,7 +52,10 @@ def test_the_frequency_response_of_a_late_lag_is_the_analytic_one(late: float):
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_valve_with_an_overlap_is_shut_then_opens_to_its_largest_opening(sign: float):
     bench, estimate = shoulder(**OVERLAPS)
-    points = [(column.at, float(area[0])) for column, area in opening_curve(bench, estimate, sign)]
+    points = [
+        (column.at, float(area[0]))
+        for column, area in opening_curve(bench, estimate, sign)
+    ]
     at, areas = np.array(points).T
     assert at == pytest.approx(sign * np.array(OPENING_COMMANDS))
     c, *_ = actuator(bench, estimate)
@@ -58,11 +71,17 @@ def test_a_step_is_shown_up_to_the_end_of_the_range_and_slow_commands_are_follow
     speeds = step.speeds(estimate)
     curves = step_curves(step, estimate, "positive", "raising")(speeds)
     points = [(column, float(value[0])) for column, value in curves]
-    times = np.array([column.at for column, _ in points if column.name == "step_positive"])
+    times = np.array(
+        [column.at for column, _ in points if column.name == "step_positive"]
+    )
     angles = step.angles(estimate)[0]
     upper = [*bench.settings.arm.ranges.values()][1][1]
-    assert np.all(np.interp(times, bench.period * np.arange(len(angles)), angles) < upper)
-    amplitudes = [value for column, value in points if column.name == "amplitude_positive"]
+    assert np.all(
+        np.interp(times, bench.period * np.arange(len(angles)), angles) < upper
+    )
+    amplitudes = [
+        value for column, value in points if column.name == "amplitude_positive"
+    ]
     phases = [value for column, value in points if column.name == "phase_positive"]
     settled = np.interp(1.0, bench.period * np.arange(speeds.shape[1]), speeds[0])
     assert amplitudes[0] == pytest.approx(settled / 50.0, rel=0.05)

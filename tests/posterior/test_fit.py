@@ -25,7 +25,11 @@ def fitted(tmp_path_factory: pytest.TempPathFactory) -> FitResult:
     held = {f"parameters.{name}.fixed": HYDRAULIC[name] for name in HELD}
     settings = load_settings("article-hyd", SMALL | held)
     truth = {name: HYDRAULIC[name] for name in settings.parameters if name in HYDRAULIC}
-    log = noisy(stepped(settings, truth, [0.0, 60.0, -40.0, 90.0, -80.0, 30.0]), 0.05, exact_start=False)
+    log = noisy(
+        stepped(settings, truth, [0.0, 60.0, -40.0, 90.0, -80.0, 30.0]),
+        0.05,
+        exact_start=False,
+    )
     return hydroid.fit(settings, log, tmp_path_factory.mktemp("fit") / "run")
 
 
@@ -43,7 +47,9 @@ def test_the_summary_holds_quantities_curves_and_covariance_as_the_file_does(fit
     speed = summary.curves["shoulder_speed"]
     assert len(speed.at) == len(speed.value) == len(speed.interval)
     at_50 = dict(zip(speed.at, speed.value, strict=True))[50.0]
-    assert summary.quantities["shoulder_speed_50_positive"].value == pytest.approx(at_50, rel=1e-5)
+    assert summary.quantities["shoulder_speed_50_positive"].value == pytest.approx(
+        at_50, rel=1e-5
+    )
 
 
 def test_the_record_in_memory_is_that_of_the_run_folder(fitted):
@@ -55,7 +61,9 @@ def test_the_record_in_memory_is_that_of_the_run_folder(fitted):
     np.testing.assert_array_equal(ours.history, stored.history)
     for array, read in zip(ours.front, stored.front, strict=True):
         np.testing.assert_array_equal(array, read)
-    assert [vars(effort) for effort in ours.refinements] == [vars(e) for e in stored.refinements]
+    assert [vars(effort) for effort in ours.refinements] == [
+        vars(e) for e in stored.refinements
+    ]
     assert ours.segments.keys() == stored.segments.keys()
     assert {j: [*models] for j, models in ours.baselines.items()} == {
         j: [*models] for j, models in stored.baselines.items()
@@ -72,7 +80,9 @@ def test_the_kept_precision_gives_the_intervals_of_the_fit(fitted):
 
 
 def test_other_values_or_free_parameters_are_not_the_fits(fitted):
-    changed = hydroid.load_identified(fitted.folder, overrides={"parameters.A_A.fixed": 900})
+    changed = hydroid.load_identified(
+        fitted.folder, overrides={"parameters.A_A.fixed": 900}
+    )
     assert stored_posterior(changed) is None
     with pytest.raises(RunError, match="holds no covariance of these parameters"):
         hydroid.quantity(changed, lambda plant: plant.time)
@@ -89,7 +99,9 @@ def test_a_quantity_of_ones_own_has_the_shape_of_its_function(fitted, tmp_path):
     found = hydroid.quantity(fitted.folder, speeds, unit="deg")
     assert found.value.shape == found.sd.shape == (2, 1)
     assert found.interval.shape == (2, 1, 2)
-    assert np.all((found.interval[..., 0] < found.value) & (found.value < found.interval[..., 1]))
+    assert np.all(
+        (found.interval[..., 0] < found.value) & (found.value < found.interval[..., 1])
+    )
     hydroid.load_plant(fitted.folder).save(tmp_path / "plant")
     saved = hydroid.quantity(tmp_path / "plant", speeds)
     np.testing.assert_array_equal(saved.interval, found.interval)

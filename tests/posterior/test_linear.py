@@ -27,10 +27,14 @@ def effects(problem: Problem) -> Linear:
     return linearised(likelihood_at(problem, THETA, WHITE), THETA)
 
 
-def test_a_slope_is_what_simulate_shows_for_one_percent(problem: Problem, effects: Linear, study_log: Log):
+def test_a_slope_is_what_simulate_shows_for_one_percent(
+    problem: Problem, effects: Linear, study_log: Log
+):
     for name in ("K", "M3"):
         up, down = (
-            simulate_log(problem.settings, study_log, TRUTH | {name: f * TRUTH[name]}).angle[:, 1]
+            simulate_log(
+                problem.settings, study_log, TRUTH | {name: f * TRUTH[name]}
+            ).angle[:, 1]
             for f in (1.005, 0.995)
         )
         slope = -0.01 * NOISE * effects.slopes[list(TRUTH).index(name)]
@@ -41,12 +45,16 @@ def test_a_wrong_start_counts_for_little_where_it_is_open():
     """An error of the start by twenty standard deviations of a reading."""
     settings = load_settings("article-hyd")
     truth = {name: HYDRAULIC[name] for name in settings.parameters if name in HYDRAULIC}
-    log = noisy(stepped(settings, truth, [60.0, -40.0, 80.0]), 0.1, 2, exact_start=False)
+    log = noisy(
+        stepped(settings, truth, [60.0, -40.0, 80.0]), 0.1, 2, exact_start=False
+    )
     angle = log.angle.copy()
     angle[0, 1] += 2 * NOISE
     squares = []
     for free in (False, True):
-        problem = Problem(settings.changed({"free_start": free}), [replace(log, angle=angle)])
+        problem = Problem(
+            settings.changed({"free_start": free}), [replace(log, angle=angle)]
+        )
         theta = problem.parameters.vector(truth, "truth")
         innovations = likelihood_at(problem, theta, WHITE).innovations(theta[None])[0]
         squares.append(np.sum(innovations**2) - len(innovations))

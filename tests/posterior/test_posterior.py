@@ -1,4 +1,5 @@
-"""The posterior against closed forms: linear quantities, ratios, directions that nothing measures."""
+"""The posterior against closed forms: linear quantities, ratios, directions that
+nothing measures."""
 
 import numpy as np
 import pytest
@@ -9,7 +10,8 @@ from hydroid.posterior.uncertainty import Flag, ParameterStatus, Source, flag_of
 from hydroid.search.axes import Box
 
 THETA = np.array([2.0, 5.0, 0.1])
-COVARIANCE = np.array([[0.04, 0.03, 0.0], [0.03, 0.09, -0.01], [0.0, -0.01, 0.01]])  # of relative changes
+# of relative changes
+COVARIANCE = np.array([[0.04, 0.03, 0.0], [0.03, 0.09, -0.01], [0.0, -0.01, 0.01]])
 Z = float(norm.ppf(0.975))
 
 
@@ -39,12 +41,17 @@ def test_a_ratio_has_a_multiplicative_interval_that_its_inverse_shares():
 
     found = known().propagate(ratios, positive=True)
     sd = np.sqrt(COVARIANCE[0, 0] + COVARIANCE[1, 1] - 2 * COVARIANCE[0, 1])
-    np.testing.assert_allclose(found.interval[0], 0.4 * np.exp([-Z * sd, Z * sd]), rtol=1e-3)
-    np.testing.assert_allclose(found.interval[0], 1 / found.interval[1, ::-1], rtol=1e-3)
+    np.testing.assert_allclose(
+        found.interval[0], 0.4 * np.exp([-Z * sd, Z * sd]), rtol=1e-3
+    )
+    np.testing.assert_allclose(
+        found.interval[0], 1 / found.interval[1, ::-1], rtol=1e-3
+    )
 
 
 def test_only_the_direction_that_nothing_measures_makes_a_quantity_unknown():
-    root = np.array([[20.0, -20.0, 0.0], [0.0, 0.0, 10.0], [0.0, 0.0, 0.0]])  # a and b may grow together
+    # a and b may grow together
+    root = np.array([[20.0, -20.0, 0.0], [0.0, 0.0, 10.0], [0.0, 0.0, 0.0]])
 
     def quantities(theta: np.ndarray) -> np.ndarray:
         a, b, c = theta.T
@@ -59,7 +66,9 @@ def test_only_the_direction_that_nothing_measures_makes_a_quantity_unknown():
 
 
 def test_a_first_order_interval_wider_than_the_value_says_nothing():
-    wide = known(np.diag([1.1, 0.9, 0.01]) ** 2).propagate(lambda theta: theta, positive=True)
+    wide = known(np.diag([1.1, 0.9, 0.01]) ** 2).propagate(
+        lambda theta: theta, positive=True
+    )
     assert np.isfinite(wide.sd).tolist() == [False, True, True]
     assert wide.interval[0].tolist() == [0.0, np.inf]
 

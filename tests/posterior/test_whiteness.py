@@ -7,7 +7,12 @@ from linear_problem import ar1
 from made_errors import DRIFTING, course_of, model_of_errors
 
 from hydroid.log import Log
-from hydroid.posterior.whiteness import autocorrelation, cross_correlation, lasting, residual_tests
+from hydroid.posterior.whiteness import (
+    autocorrelation,
+    cross_correlation,
+    lasting,
+    residual_tests,
+)
 
 SAMPLES, PERIOD = 2000, 0.05
 LOGS = model_of_errors([course_of(SAMPLES), course_of(SAMPLES, SAMPLES)], DRIFTING)
@@ -61,7 +66,13 @@ def test_the_autocorrelation_is_that_of_statsmodels_and_logs_do_not_touch():
 def driven_log(command: np.ndarray) -> Log:
     """A log that drives the second joint; what it measures plays no role here."""
     commands = np.column_stack([np.zeros(len(command)), command])
-    return Log("made", PERIOD * np.arange(len(command)), commands, np.zeros_like(commands), PERIOD)
+    return Log(
+        "made",
+        PERIOD * np.arange(len(command)),
+        commands,
+        np.zeros_like(commands),
+        PERIOD,
+    )
 
 
 def test_what_answers_to_a_command_later_is_found_at_its_delay_and_nowhere_else():
@@ -71,7 +82,9 @@ def test_what_answers_to_a_command_later_is_found_at_its_delay_and_nowhere_else(
     rows = [rng.normal(size=SAMPLES) for _ in range(2)]
     for row, command in zip(rows, commands, strict=True):
         row[late:] += 0.5 * command[:-late]
-    test = residual_tests(LOGS, np.concatenate(rows), [driven_log(command) for command in commands])[2]
+    test = residual_tests(
+        LOGS, np.concatenate(rows), [driven_log(command) for command in commands]
+    )[2]
     found = test.command_lags[np.argmax(test.with_command)]
     assert found == pytest.approx(late * PERIOD)
     assert test.with_command.max() == pytest.approx(0.5 / np.sqrt(1.25), abs=0.05)
@@ -84,11 +97,17 @@ def test_of_white_innovations_five_percent_lie_outside_either_bound():
     rng = np.random.default_rng(6)
     outside = []
     for _ in range(40):
-        logs = [driven_log(np.repeat(rng.normal(size=SAMPLES // 20), 20)) for _ in range(2)]
-        outside.append(residual_tests(LOGS, rng.normal(size=2 * SAMPLES), logs)[2].outside)
+        logs = [
+            driven_log(np.repeat(rng.normal(size=SAMPLES // 20), 20)) for _ in range(2)
+        ]
+        outside.append(
+            residual_tests(LOGS, rng.normal(size=2 * SAMPLES), logs)[2].outside
+        )
     assert np.mean(outside, axis=0) == pytest.approx([0.05, 0.05], abs=0.02)
 
 
 def test_a_command_that_never_changes_correlates_with_nothing():
     row = np.random.default_rng(7).normal(size=SAMPLES)
-    np.testing.assert_array_equal(cross_correlation([row], [np.full(SAMPLES, 30.0)], 5), 0.0)
+    np.testing.assert_array_equal(
+        cross_correlation([row], [np.full(SAMPLES, 30.0)], 5), 0.0
+    )

@@ -22,7 +22,9 @@ PRESSURE = {"log.pressure": {"column": ["pA{joint}", "pB{joint}"], "unit": "MPa"
 
 @pytest.fixture(scope="module")
 def hydraulic():
-    changes = FIXED | PRESSURE | {"objective.pressure_weight": 0.1, "objective.segments": 3}
+    changes = (
+        FIXED | PRESSURE | {"objective.pressure_weight": 0.1, "objective.segments": 3}
+    )
     settings = load_settings("article-hyd", changes)
     log = step_log(settings.arm.pose("rig"), [50.0, -60.0, 40.0])
     return settings, simulate_log(settings, log, TRUTH_2)
@@ -31,7 +33,11 @@ def hydraulic():
 def test_the_truth_leaves_no_error_in_any_channel(hydraulic):
     settings, log = hydraulic
     problem = Problem(settings, [log])
-    assert [c.quantity for c in problem.channels] == ["angle", "pressure_a", "pressure_b"]
+    assert [c.quantity for c in problem.channels] == [
+        "angle",
+        "pressure_a",
+        "pressure_b",
+    ]
     truth = problem.parameters.vector(TRUTH_2, "truth")
     rows = problem.output_errors(truth[None])
     assert rows.shape == (1, 3 * len(log.time))
@@ -52,7 +58,9 @@ def test_a_pressure_error_counts_its_weight(hydraulic):
 def test_pressures_do_not_change_the_angles(hydraulic):
     settings, log = hydraulic
     without = settings.changed({"objective.pressure_weight": 0})
-    sets = Problem(settings, [log]).parameters.from_unit(np.random.default_rng(0).random((5, 10)))
+    sets = Problem(settings, [log]).parameters.from_unit(
+        np.random.default_rng(0).random((5, 10))
+    )
     with_, bare = (Problem(s, [log]).responses(sets)[0] for s in (settings, without))
     assert np.array_equal(with_.angle, bare.angle, equal_nan=True)
     assert not bare.pressure.size
@@ -88,7 +96,8 @@ def test_weights_scale_the_errors_of_their_joint():
 
 
 def test_a_payload_pulls_on_the_shoulder_with_its_weight_times_its_lever(arm, spec):
-    """Stretched forward the payload's place is 0.5 + 0.4 + 0.15 + 0.12 + 0.23 m before the shoulder."""
+    """Stretched forward the payload's place is 0.5 + 0.4 + 0.15 + 0.12 + 0.23 m before
+    the shoulder."""
     models = (spec.compile(), add_payload(spec, arm, 5.0).compile())
     empty, loaded = (posed(model, 0.0).qfrc_bias[1] for model in models)
     assert loaded - empty == pytest.approx(5.0 * 9.81 * 1.40, rel=1e-12)
@@ -97,7 +106,9 @@ def test_a_payload_pulls_on_the_shoulder_with_its_weight_times_its_lever(arm, sp
 def test_a_payload_slows_the_arm_of_its_log_alone():
     settings, log, truth = mechanical(payloads={"steps": 5.0})
     other = replace(log, source="elsewhere/other.csv")
-    loaded, empty = (simulate_log(settings, x, truth).angle[50, 1] for x in (log, other))
+    loaded, empty = (
+        simulate_log(settings, x, truth).angle[50, 1] for x in (log, other)
+    )
     assert abs(loaded - log.angle[0, 1]) < abs(empty - log.angle[0, 1])
     with pytest.raises(SettingsError, match="no place for a payload"):
         simulate_log(settings.changed({"arm.payload": None}), log, truth)

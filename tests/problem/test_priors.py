@@ -25,7 +25,9 @@ PARAMETERS = ParameterSet(
 
 
 def priors(**settings) -> Priors:
-    return Priors({n: PriorSettings.model_validate(s) for n, s in settings.items()}, PARAMETERS)
+    return Priors(
+        {n: PriorSettings.model_validate(s) for n, s in settings.items()}, PARAMETERS
+    )
 
 
 def random_candidates(n: int) -> np.ndarray:
@@ -44,11 +46,15 @@ def test_scores_are_distances_in_standard_deviations():
 
 
 def test_heavy_tails_are_students_distribution():
-    known = priors(tie={"of": {"a": 1.0, "b": -1.0}, "value": 0.0, "sd": 0.5, "tails": "heavy"})
+    known = priors(
+        tie={"of": {"a": 1.0, "b": -1.0}, "value": 0.0, "sd": 0.5, "tails": "heavy"}
+    )
     apart = np.array([0.0, 0.1, 0.5, 4.0])
     theta = np.array([[5.0 + one, 5.0, 2.0, 500.0] for one in apart])
     logs = t.logpdf(apart / 0.5, df=2)
-    assert 0.5 * known.scores(theta)[:, 0] ** 2 == pytest.approx(logs[0] - logs, abs=1e-9)
+    assert 0.5 * known.scores(theta)[:, 0] ** 2 == pytest.approx(
+        logs[0] - logs, abs=1e-9
+    )
 
 
 def test_the_bends_of_a_curve_share_one_scatter():
@@ -64,7 +70,9 @@ def test_the_bends_of_a_curve_share_one_scatter():
 def test_weighed_scores_have_the_slopes_of_the_density():
     tie = {"of": {"a": 1.0, "b": -1.0}, "value": 0.0, "sd": 0.5, "tails": "heavy"}
     known = priors(
-        tie=tie, curve={"smooth": ["a", "b", "d"], "sd": 0.3}, d={"of": "d", "value": 400, "sd": 50}
+        tie=tie,
+        curve={"smooth": ["a", "b", "d"], "sd": 0.3},
+        d={"of": "d", "value": 400, "sd": 50},
     )
     theta, step = np.array([4.0, 2.0, 2.0, 300.0]), 1e-5
     weighed = known.weighed_at(theta)
@@ -72,9 +80,9 @@ def test_weighed_scores_have_the_slopes_of_the_density():
         near = np.tile(theta, (2, 1))
         near[:, column] += (-step, step)
         slope = np.diff(0.5 * (known.scores(near) ** 2).sum(axis=1))
-        assert weighed(theta[None])[0] @ np.diff(weighed(near), axis=0)[0] == pytest.approx(
-            slope[0], rel=1e-4
-        )
+        assert weighed(theta[None])[0] @ np.diff(weighed(near), axis=0)[
+            0
+        ] == pytest.approx(slope[0], rel=1e-4)
 
 
 def test_heavy_tails_confine_no_search():
@@ -101,7 +109,10 @@ def test_a_search_stays_where_every_prior_nearly_holds():
 
 
 def test_projection_is_idempotent_and_row_by_row():
-    known = priors(sum={"of": ["a", "b"], "value": 8.0, "sd": 0.1}, d={"of": "d", "value": 300, "sd": 1})
+    known = priors(
+        sum={"of": ["a", "b"], "value": 8.0, "sd": 0.1},
+        d={"of": "d", "value": 300, "sd": 1},
+    )
     candidates = random_candidates(50)
     moved = known.project(candidates)
     assert known.project(moved) == pytest.approx(moved, rel=1e-12)
@@ -117,7 +128,8 @@ def test_priors_that_cannot_hold_are_refused():
         priors(wrong={"of": ["a", "b"], "value": 50.0, "sd": 0.5})
     with pytest.raises(SettingsError, match="no parameter 'x'"):
         priors(wrong={"smooth": ["a", "x"], "sd": 1.0})
-    assert len(priors(c={"of": "c", "value": 1.0, "sd": 0.1})) == 0  # about a fixed parameter only
+    # about a fixed parameter only
+    assert len(priors(c={"of": "c", "value": 1.0, "sd": 0.1})) == 0
     assert len(priors(ratio={"ratio": ["a", "c"], "value": 1.0, "sd": 0.1})) == 1
 
 
@@ -143,10 +155,15 @@ def test_an_incomplete_prior_is_refused(prior):
 
 
 def test_a_refinement_weighs_priors_against_the_logs():
-    """K, D, S and the masses but for the jaws have a common scale, which only the prior decides."""
-    known = {"total": {"of": ["M1", "M2", "M3", "M4", "M5", "M6"], "value": 30.0, "sd": 0.3}}
+    """K, D, S and the masses but for the jaws have a common scale, which only the prior
+    decides."""
+    known = {
+        "total": {"of": ["M1", "M2", "M3", "M4", "M5", "M6"], "value": 30.0, "sd": 0.3}
+    }
     settings = load_settings("article-mech", {"priors": known, "objective.segments": 2})
-    problem = Problem(settings, [noisy(stepped(settings, TRUTH, [60.0, -80.0, 30.0, 0.0]), 0.1)])
+    problem = Problem(
+        settings, [noisy(stepped(settings, TRUTH, [60.0, -80.0, 30.0, 0.0]), 0.1)]
+    )
     truth = problem.parameters.vector(TRUTH, "truth")
     theta = refined(problem, 0.9 * truth, RefinementSettings(iterations=30))[None]
     assert theta[0, 3:].sum() == pytest.approx(30.0, abs=0.3)

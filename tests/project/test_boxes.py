@@ -44,7 +44,9 @@ def test_with_a_log_it_can_be_checked_and_fitted_from(tmp_path: Path) -> None:
 
 
 def columns(truth: Truth) -> dict[str, np.ndarray]:
-    own = {"time_s": truth.time} | {f"{name}_cmd_pct": u for name, u in truth.command.items()}
+    own = {"time_s": truth.time} | {
+        f"{name}_cmd_pct": u for name, u in truth.command.items()
+    }
     return own | {f"{name}_angle_deg": q for name, q in truth.angle.items()}
 
 
@@ -62,7 +64,9 @@ def columns(truth: Truth) -> dict[str, np.ndarray]:
         ({"arm": __file__}, "leave it out, or --arm"),
     ],
 )
-def test_what_is_no_arm_is_refused_and_nothing_is_written(more: dict, said: str, tmp_path: Path) -> None:
+def test_what_is_no_arm_is_refused_and_nothing_is_written(
+    more: dict, said: str, tmp_path: Path
+) -> None:
     with pytest.raises(SettingsError, match=said):
         hydroid.init(tmp_path / "mine", **(EXCAVATOR | more))
     assert not (tmp_path / "mine").exists()

@@ -1,4 +1,5 @@
-"""Logs as machines record them are read rightly by what `init` writes, or a line says what is wrong."""
+"""Logs as machines record them are read rightly by what `init` writes, or a line says
+what is wrong."""
 
 from pathlib import Path
 
@@ -18,6 +19,8 @@ def arm(tmp_path_factory: pytest.TempPathFactory) -> Arm:
 
 
 @pytest.mark.parametrize("log", FIELD_LOGS, ids=lambda log: log.name)
-def test_a_log_is_read_rightly_or_its_fault_is_said(log: FieldLog, arm: Arm, tmp_path: Path) -> None:
+def test_a_log_is_read_rightly_or_its_fault_is_said(
+    log: FieldLog, arm: Arm, tmp_path: Path
+) -> None:
     found = outcome(log, tmp_path, arm)
     assert found.verdict == ("said" if log.said else "right"), found.line

@@ -1,4 +1,5 @@
-"""A project out of an arm's CAD and a log: it runs, says what it assumed, and overwrites nothing."""
+"""A project out of an arm's CAD and a log: it runs, says what it assumed, and
+overwrites nothing."""
 
 import json
 import re
@@ -26,16 +27,20 @@ from hydroid.settings.fit import FitSettings
 
 URDF = Path(__file__).parents[2] / "examples" / "urdf"
 EXAMPLE = runpy.run_path(str(URDF / "make_example.py"))
-"""how it simulates a machine like a project's, its boom's valve wired the other way round"""
+"""how it simulates a machine like a project's, its boom's valve wired the other way
+round"""
 
 
-def init(folder: Path, arm: Path | None = None, logs: list[Path] | None = None, **more: Any) -> Project:
+def init(
+    folder: Path, arm: Path | None = None, logs: list[Path] | None = None, **more: Any
+) -> Project:
     return hydroid.init(folder, arm=arm, log=logs, **more).result
 
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with a URDF, three logs of a machine like it, and a project `mine` of all."""
+    """A folder with a URDF, three logs of a machine like it, and a project `mine` of
+    all."""
     folder = tmp_path_factory.mktemp("lab")
     robot = write_robot(folder)
     init(folder / "machine", robot)
@@ -57,17 +62,22 @@ def test_columns_units_and_scales_are_those_of_the_log(place: Path):
 
 
 def test_a_fit_starts_near_the_log(place: Path):
-    """Valves sized by the arm's weight and the log's speeds are within a factor of 2.5 of the truth's."""
+    """Valves sized by the arm's weight and the log's speeds are within a factor of 2.5
+    of the truth's."""
     first = hydroid.load_settings(place / "machine" / "fit.yaml").parameters
     second = hydroid.load_settings(place / "mine" / "fit.yaml")
     assert set(first) == set(second.parameters)
     openings = [joint.actuator.max_opening for joint in second.arm.joints]
-    true = [joint.actuator.max_opening for joint in load_arm(place / "machine" / "arm.yaml").joints]
+    true = [
+        joint.actuator.max_opening
+        for joint in load_arm(place / "machine" / "arm.yaml").joints
+    ]
     assert np.all(np.abs(np.log(np.array(openings) / true)) < np.log(2.5))
 
 
 def test_each_side_of_a_valve_starts_where_the_logs_show_it(place: Path):
-    """The machine's valves have dead bands of 20 and 30 %; the boom's is wired the other way round."""
+    """The machine's valves have dead bands of 20 and 30 %; the boom's is wired the
+    other way round."""
     settings = hydroid.load_settings(place / "mine" / "fit.yaml")
     for joint in ("swing", "boom", "stick"):
         a, b = (settings.parameters[f"dead_{side}_{joint}"].nominal for side in "AB")
@@ -78,23 +88,31 @@ def test_each_side_of_a_valve_starts_where_the_logs_show_it(place: Path):
 
 
 def test_a_valve_that_is_open_or_shut_gets_no_curve(place: Path, tmp_path: Path):
-    table = np.genfromtxt(place / "move_0.csv", delimiter=",", names=True, deletechars="")
+    table = np.genfromtxt(
+        place / "move_0.csv", delimiter=",", names=True, deletechars=""
+    )
     names = (place / "move_0.csv").read_text().splitlines()[0]
     rows = np.array([list(row) for row in table])
     for column, name in enumerate(names.split(",")):
         if "valve" in name or "command" in name:
-            rows[:, column] = np.sign(rows[:, column]) * (np.abs(rows[:, column]) > 0) * 10
+            rows[:, column] = (
+                np.sign(rows[:, column]) * (np.abs(rows[:, column]) > 0) * 10
+            )
     np.savetxt(tmp_path / "switched.csv", rows, "%.8g", ",", header=names, comments="")
     init(tmp_path / "mine", write_robot(tmp_path), [tmp_path / "switched.csv"])
     settings = hydroid.load_settings(tmp_path / "mine" / "fit.yaml")
     named = set(settings.parameters)
     assert {"open_A_boom", "open_B_boom", "dead_A_boom"} <= named
-    assert not {name for name in named if name.startswith(("curve_A_boom", "exponent_A_boom"))}
+    assert not {
+        name for name in named if name.startswith(("curve_A_boom", "exponent_A_boom"))
+    }
     assert "exponent_boom" not in settings.priors
 
 
 @pytest.mark.slow
-def test_from_cad_and_log_to_a_validated_fit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_from_cad_and_log_to_a_validated_fit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
     """Every command of the next steps, as they stand; the last log was not fitted."""
     shutil.copytree(URDF, tmp_path / "urdf")
     monkeypatch.chdir(tmp_path / "urdf")
@@ -103,7 +121,12 @@ def test_from_cad_and_log_to_a_validated_fit(tmp_path: Path, monkeypatch: pytest
         command += ["--log", str(name)]
     done = CliRunner().invoke(app, command)
     steps = json.loads(done.stdout)["commands"]
-    assert [step.split()[1] for step in steps] == ["check", "fit-hyd", "validate", "suggest"]
+    assert [step.split()[1] for step in steps] == [
+        "check",
+        "fit-hyd",
+        "validate",
+        "suggest",
+    ]
     for step in steps[:3]:
         done = CliRunner().invoke(app, [*step.split()[1:], "--json"])
         assert done.exit_code == 0, done.output
@@ -115,7 +138,9 @@ def test_from_cad_and_log_to_a_validated_fit(tmp_path: Path, monkeypatch: pytest
 
 def test_nothing_is_overwritten(place: Path):
     before = {path: path.read_bytes() for path in (place / "mine").glob("*.*")}
-    with pytest.raises(SettingsError, match=r"mine: holds arm\.yaml already; name another folder, or"):
+    with pytest.raises(
+        SettingsError, match=r"mine: holds arm\.yaml already; name another folder, or"
+    ):
         init(place / "mine")
     assert before == {path: path.read_bytes() for path in (place / "mine").glob("*.*")}
     expected = {"digger", "machine", "mine", *(f"move_{k}.csv" for k in range(3))}
@@ -128,27 +153,53 @@ def test_a_project_is_replaced_if_that_is_asked_for(tmp_path: Path):
     (tmp_path / "mine" / "notes.txt").write_text("mine")
     again = init(tmp_path / "mine", robot, force=True, total_mass=2180.0)
     assert load_arm(tmp_path / "mine" / "arm.yaml").masses.sum() == pytest.approx(2180)
-    assert {path.name for path in (tmp_path / "mine").iterdir()} == {*again.files, "notes.txt"}
+    assert {path.name for path in (tmp_path / "mine").iterdir()} == {
+        *again.files,
+        "notes.txt",
+    }
 
 
 def test_a_telescopes_column_is_its_own(tmp_path: Path):
-    """Columns in m go to the joint that slides; a bucket that nothing names is asked for."""
-    telescope = {"kind": "prismatic", "at": "2 0 0", "axis": "1 0 0", "limit": LIMIT.format(0, 1.5)}
-    robot = write_robot(tmp_path, stick_joint=robots.joint("telescope", "boom", "stick", **telescope))
+    """Columns in m go to the joint that slides; a bucket that nothing names is asked
+    for."""
+    telescope = {
+        "kind": "prismatic",
+        "at": "2 0 0",
+        "axis": "1 0 0",
+        "limit": LIMIT.format(0, 1.5),
+    }
+    robot = write_robot(
+        tmp_path, stick_joint=robots.joint("telescope", "boom", "stick", **telescope)
+    )
     time = np.arange(0, 20, 0.02)
     drive = 60 * np.sign(np.sin(time)) * (time > 1)
     way = np.cumsum(0.02 * np.roll(drive, 5)) / 100
-    columns = {"t": time, "slew_V": drive / 10, "boom_V": drive / 10, "tele_V": drive / 10, "u9": drive}
-    columns |= {"slew_deg": 30 * way, "boom_deg": 20 * way, "tele_length_m": 0.3 + 0.4 * way}
+    columns = {
+        "t": time,
+        "slew_V": drive / 10,
+        "boom_V": drive / 10,
+        "tele_V": drive / 10,
+        "u9": drive,
+    }
+    columns |= {
+        "slew_deg": 30 * way,
+        "boom_deg": 20 * way,
+        "tele_length_m": 0.3 + 0.4 * way,
+    }
     rows = np.stack([*columns.values()], 1)
-    np.savetxt(tmp_path / "a.csv", rows, "%.6g", ",", header=",".join(columns), comments="")
+    np.savetxt(
+        tmp_path / "a.csv", rows, "%.6g", ",", header=",".join(columns), comments=""
+    )
     made = init(tmp_path / "mine", robot, [tmp_path / "a.csv"])
     settings = hydroid.load_settings(tmp_path / "mine" / "fit.yaml")
     assert settings.log.columns("angle", 3).column == ("tele_length_m",)
     assert settings.log.columns("angle", 3).unit == "m"
     assert settings.log.columns("command", 3).column == ("tele_V",)
     assert "tele_length_m: position in m of telescope, by its name" in made.columns
-    assert any(line.startswith("left out, though like a joint's command: u9") for line in made.columns)
+    assert any(
+        line.startswith("left out, though like a joint's command: u9")
+        for line in made.columns
+    )
     (log,) = hydroid.read_logs(tmp_path / "a.csv", settings)
     assert np.ptp(log.angle[:, 2]) == pytest.approx(0.4 * np.ptp(way), rel=1e-3)
     actuator = settings.arm.joints[2].actuator
@@ -171,7 +222,9 @@ def test_an_error_leaves_nothing_behind(tmp_path: Path):
 COLUMNS = dict(zip("abcdefg", ("time", *["command"] * 3, *["angle"] * 3), strict=True))
 
 
-def renamed(place: Path, log: Path, change: Callable[[list[list[str]]], object]) -> Path:
+def renamed(
+    place: Path, log: Path, change: Callable[[list[list[str]]], object]
+) -> Path:
     """Write a log of the machine with cells changed."""
     rows = [line.split(",") for line in (place / "move_0.csv").read_text().splitlines()]
     change(rows)
@@ -188,10 +241,13 @@ def without_commands(rows: list[list[str]]) -> None:
 
 
 def fill_in(path: Path, joints: Sequence[str]) -> None:
-    """Complete the skeleton as a person does who knows that b to d are valves [V], e to g angles [rad]."""
+    """Complete the skeleton as a person does who knows that b to d are valves [V], e to
+    g angles [rad]."""
     before, mark, rest = path.read_text().partition("# log:")
     section, end, after = rest.partition("\n\n")
-    section = "\n".join(line.removeprefix("# ") for line in (mark + section).splitlines())
+    section = "\n".join(
+        line.removeprefix("# ") for line in (mark + section).splitlines()
+    )
     section = section.replace("TIME, unit: s", "a, unit: ms")
     for joint, command, angle in zip(joints, "bcd", "efg", strict=True):
         entry = f"{{command: {{column: {command}, scale: 10}}, angle: {{column: {angle}, unit: rad}}}}"
@@ -199,20 +255,29 @@ def fill_in(path: Path, joints: Sequence[str]) -> None:
     path.write_text(before + section + end + after)
 
 
-def test_a_log_of_unknown_columns_gets_a_skeleton_and_goes_on_from_there(place: Path, tmp_path: Path):
-    """The settings are then those of a log whose columns `init` knows, from start to start."""
+def test_a_log_of_unknown_columns_gets_a_skeleton_and_goes_on_from_there(
+    place: Path, tmp_path: Path
+):
+    """The settings are then those of a log whose columns `init` knows, from start to
+    start."""
     log = renamed(place, tmp_path / "log.csv", named_by_letters)
     mine, robot = tmp_path / "mine", place / "digger/urdf/digger.urdf"
-    done = CliRunner().invoke(app, ["init", str(mine), "--arm", str(robot), "--log", str(log)])
+    done = CliRunner().invoke(
+        app, ["init", str(mine), "--arm", str(robot), "--log", str(log)]
+    )
     assert done.exit_code == 2
     assert (
-        "The log cannot be fitted yet: no column looks like a time. Complete the log section" in done.output
+        "The log cannot be fitted yet: no column looks like a time. Complete the log section"
+        in done.output
     )
     (again,) = re.findall(r"^  hydroid (init --config .*)$", done.output, re.MULTILINE)
     text = (mine / "fit.yaml").read_text()
     for name, kind in COLUMNS.items():
         assert re.search(rf"^#   {name}: .* to .*; .*{kind} in", text, re.MULTILINE)
-    with pytest.raises(SettingsError, match=r"fit\.yaml: has no log section; name the log's columns there"):
+    with pytest.raises(
+        SettingsError,
+        match=r"fit\.yaml: has no log section; name the log's columns there",
+    ):
         hydroid.init(config=mine / "fit.yaml", log=log)
     fill_in(mine / "fit.yaml", load_arm(mine / "arm.yaml").joint_names)
     filled, arm = (mine / "fit.yaml").read_text(), (mine / "arm.yaml").read_bytes()
@@ -221,12 +286,21 @@ def test_a_log_of_unknown_columns_gets_a_skeleton_and_goes_on_from_there(place: 
     assert (mine / "fit.old.yaml").read_text() == filled
     assert (mine / "arm.yaml").read_bytes() == arm
     init(tmp_path / "known", robot, [place / "move_0.csv"])
-    found, known = (hydroid.load_settings(tmp_path / name / "fit.yaml") for name in ("mine", "known"))
+    found, known = (
+        hydroid.load_settings(tmp_path / name / "fit.yaml")
+        for name in ("mine", "known")
+    )
     assert found.outputs == known.outputs
     for joint in found.outputs:
-        assert found.log.columns("command", joint).scale == known.log.columns("command", joint).scale
+        assert (
+            found.log.columns("command", joint).scale
+            == known.log.columns("command", joint).scale
+        )
     starts = [
-        {one.name: (one.lower, one.upper) for one in settings.parameter_set().parameters}
+        {
+            one.name: (one.lower, one.upper)
+            for one in settings.parameter_set().parameters
+        }
         for settings in (found, known)
     ]
     assert {*starts[0]} == {*starts[1]}
@@ -236,13 +310,16 @@ def test_a_log_of_unknown_columns_gets_a_skeleton_and_goes_on_from_there(place: 
 
 def test_a_log_without_commands_is_no_log_to_fit(place: Path, tmp_path: Path):
     log = renamed(place, tmp_path / "log.csv", without_commands)
-    done = hydroid.init(tmp_path / "mine", arm=place / "digger/urdf/digger.urdf", log=log)
+    done = hydroid.init(
+        tmp_path / "mine", arm=place / "digger/urdf/digger.urdf", log=log
+    )
     assert done.exit_status == 2
     assert done.result.missing == "no column looks like a command"
     assert [step.split()[1] for step in done.result.commands] == ["init"]
     text = (tmp_path / "mine/fit.yaml").read_text()
     assert (
-        "#     boom_joint: {command: {column: COMMAND, scale: 1}, angle: {column: 'boom angle [rad]'" in text
+        "#     boom_joint: {command: {column: COMMAND, scale: 1}, angle: {column: 'boom angle [rad]'"
+        in text
     )
 
 
@@ -256,7 +333,9 @@ def test_a_log_without_commands_is_no_log_to_fit(place: Path, tmp_path: Path):
         ),
     ],
 )
-def test_a_log_in_which_nothing_is_driven_and_moves_is_refused(place, tmp_path, columns, message):
+def test_a_log_in_which_nothing_is_driven_and_moves_is_refused(
+    place, tmp_path, columns, message
+):
     def still(rows: list[list[str]]) -> None:
         for row in rows[2:]:
             row[columns] = rows[1][columns] if columns.start == 4 else ["0"] * 3
@@ -282,14 +361,19 @@ def test_a_joint_that_no_fitted_log_drives_is_not_compared(place: Path, tmp_path
     arm = place / "mine" / "arm.yaml"
     made = init(tmp_path / "one", arm, [boom])
     assert hydroid.load_settings(tmp_path / "one/fit.yaml").outputs == (2,)
-    assert "swing_joint and stick_joint: no command in the logs, so not compared" in made.columns
+    assert (
+        "swing_joint and stick_joint: no command in the logs, so not compared"
+        in made.columns
+    )
     init(tmp_path / "two", arm, [boom, both, place / "move_1.csv"])
     assert hydroid.load_settings(tmp_path / "two/fit.yaml").outputs == (2, 3)
 
 
 def test_an_error_names_no_file_that_is_gone(tmp_path: Path):
     robot = MODELS / "bad_arms/inf_origin.urdf"
-    done = CliRunner().invoke(app, ["init", str(tmp_path / "mine"), "--arm", str(robot)])
+    done = CliRunner().invoke(
+        app, ["init", str(tmp_path / "mine"), "--arm", str(robot)]
+    )
     assert isinstance(done.exception, ModelError)
     assert ".hydroid-init-" not in str(done.exception)
     assert list(tmp_path.iterdir()) == []
@@ -308,7 +392,9 @@ def test_without_cad_there_is_a_template_that_runs(tmp_path: Path):
 
 def project(place: Path, folder: Path, text: str) -> tuple[Project, FitSettings]:
     (folder / "log.csv").write_text(text)
-    made = init(folder / "mine", place / "digger/urdf/digger.urdf", [folder / "log.csv"])
+    made = init(
+        folder / "mine", place / "digger/urdf/digger.urdf", [folder / "log.csv"]
+    )
     return made, hydroid.load_settings(folder / "mine" / "fit.yaml")
 
 
@@ -325,20 +411,42 @@ ROWS = count(-99)
             r"stick_joint moves against its command \(on \d+% of its way\): the command's sign",
             -10,
         ),
-        (5, lambda q: q + 2, r"boom_joint: angles .*allows -28\.6479 to 68\.7549: give them an offset", 10),
-        (5, lambda q: q if next(ROWS) else np.nan, r".*line 101, column boom angle.*is not a number", 10),
+        (
+            5,
+            lambda q: q + 2,
+            r"boom_joint: angles .*allows -28\.6479 to 68\.7549: give them an offset",
+            10,
+        ),
+        (
+            5,
+            lambda q: q if next(ROWS) else np.nan,
+            r".*line 101, column boom angle.*is not a number",
+            10,
+        ),
     ],
 )
-def test_what_the_numbers_of_a_log_tell_is_said(place, tmp_path, column, change, note, scale):
-    header, *rows = [line.split(",") for line in (place / "move_0.csv").read_text().splitlines()]
+def test_what_the_numbers_of_a_log_tell_is_said(
+    place, tmp_path, column, change, note, scale
+):
+    header, *rows = [
+        line.split(",") for line in (place / "move_0.csv").read_text().splitlines()
+    ]
     for row in rows:
         row[column] = f"{change(float(row[column])):.6g}"
-    made, settings = project(place, tmp_path, "\n".join(",".join(row) for row in (header, *rows)))
+    made, settings = project(
+        place, tmp_path, "\n".join(",".join(row) for row in (header, *rows))
+    )
     assert len([line for line in made.columns if re.match(note, line)]) == 1
-    assert [settings.log.columns("command", j).scale for j in (1, 2, 3)] == [10, -10, scale]
+    assert [settings.log.columns("command", j).scale for j in (1, 2, 3)] == [
+        10,
+        -10,
+        scale,
+    ]
 
 
-def test_a_joint_that_moves_without_a_command_follows_the_log(place: Path, tmp_path: Path):
+def test_a_joint_that_moves_without_a_command_follows_the_log(
+    place: Path, tmp_path: Path
+):
     text = (place / "move_0.csv").read_text().replace("stick valve [V]", "torque")
     made, settings = project(place, tmp_path, text)
     assert made.unused == ("torque",)
@@ -346,11 +454,18 @@ def test_a_joint_that_moves_without_a_command_follows_the_log(place: Path, tmp_p
     assert settings.simulation.other_joints == "measured"
 
 
-def test_the_command_prints_what_it_assumed_and_what_is_next(place: Path, tmp_path: Path):
+def test_the_command_prints_what_it_assumed_and_what_is_next(
+    place: Path, tmp_path: Path
+):
     robot = write_robot(tmp_path, boom=link("boom", ixx=0, iyy=0, izz=0))
-    done = CliRunner().invoke(app, ["init", str(tmp_path / "mine"), "--arm", str(robot)])
+    done = CliRunner().invoke(
+        app, ["init", str(tmp_path / "mine"), "--arm", str(robot)]
+    )
     assert done.exit_code == 0
-    assert "  link boom: an inertia that no rigid body has: that of its hull is taken\n" in done.output
+    assert (
+        "  link boom: an inertia that no rigid body has: that of its hull is taken\n"
+        in done.output
+    )
     assert f"  hydroid fit-hyd LOG.csv --config {tmp_path}/mine/fit.yaml" in done.output
     page = (tmp_path / "mine" / "next-steps.md").read_text()
     assert "- link boom: an inertia" in page
@@ -358,19 +473,36 @@ def test_the_command_prints_what_it_assumed_and_what_is_next(place: Path, tmp_pa
 
 
 def test_a_log_may_count_joints_in_its_own_order(place: Path, tmp_path: Path):
-    """The log's joint 1 is the arm's boom; an arm's file that one has is used as it is."""
+    """The log's joint 1 is the arm's boom; an arm's file that one has is used as it
+    is."""
     lines = (place / "move_0.csv").read_text().splitlines()
     order = ["boom", "stick", "swing"]
     columns = lines[0].split(",")
-    wanted = [f"{name} {what}" for what in ("valve [V]", "angle [rad]") for name in order]
+    wanted = [
+        f"{name} {what}" for what in ("valve [V]", "angle [rad]") for name in order
+    ]
     at = [0, *(columns.index(name) for name in wanted)]
     rows = [",".join(line.split(",")[k] for k in at) for line in lines[1:]]
-    (tmp_path / "log.csv").write_text("\n".join(["t_ms,u1_V,u2_V,u3_V,q1_rad,q2_rad,q3_rad", *rows]))
+    (tmp_path / "log.csv").write_text(
+        "\n".join(["t_ms,u1_V,u2_V,u3_V,q1_rad,q2_rad,q3_rad", *rows])
+    )
     arm = place / "mine" / "arm.yaml"
-    made = init(tmp_path / "second", arm, [tmp_path / "log.csv"], joints=[f"{name}_joint" for name in order])
+    made = init(
+        tmp_path / "second",
+        arm,
+        [tmp_path / "log.csv"],
+        joints=[f"{name}_joint" for name in order],
+    )
     assert made.files == ("arm.png", "fit.yaml", "next-steps.md")
     settings = hydroid.load_settings(tmp_path / "second" / "fit.yaml")
     assert settings.arm == load_arm(arm)
-    assert [settings.log.columns("command", j).column for j in (1, 2, 3)] == [("u3_V",), ("u1_V",), ("u2_V",)]
-    with pytest.raises(SettingsError, match=r"--joints: no joint 'bom'; the arm's joints: swing_joint, boom"):
+    assert [settings.log.columns("command", j).column for j in (1, 2, 3)] == [
+        ("u3_V",),
+        ("u1_V",),
+        ("u2_V",),
+    ]
+    with pytest.raises(
+        SettingsError,
+        match=r"--joints: no joint 'bom'; the arm's joints: swing_joint, boom",
+    ):
         init(tmp_path / "fourth", arm, [tmp_path / "log.csv"], joints=["bom"])

@@ -1,4 +1,5 @@
-"""Pages in a real browser: no error, no request, nothing cut off, at the width of a phone and of a screen."""
+"""Pages in a real browser: no error, no request, nothing cut off, at the width of a
+phone and of a screen."""
 
 import json
 import re
@@ -15,7 +16,10 @@ from hydroid.fitting.verdict import judge
 from hydroid.reporting.page_file import write_page
 from hydroid.reporting.predictions import fit_page, validation_page
 
-BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+BROWSER = next(
+    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))),
+    None,
+)
 pytestmark = pytest.mark.skipif(BROWSER is None, reason="no Chromium is installed")
 
 PROBE = f"<script>{Path(__file__).with_name('probe.js').read_text()}</script>"
@@ -23,9 +27,22 @@ PROBE = f"<script>{Path(__file__).with_name('probe.js').read_text()}</script>"
 
 def browse(page: Path, *how: str) -> str:
     assert BROWSER is not None
-    how = ("--headless", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=60000", *how)
-    command = [BROWSER, *how, f"--user-data-dir={page.parent / 'profile'}", page.as_uri()]
-    return subprocess.run(command, capture_output=True, text=True, timeout=240, check=True).stdout
+    how = (
+        "--headless",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--virtual-time-budget=60000",
+        *how,
+    )
+    command = [
+        BROWSER,
+        *how,
+        f"--user-data-dir={page.parent / 'profile'}",
+        page.as_uri(),
+    ]
+    return subprocess.run(
+        command, capture_output=True, text=True, timeout=240, check=True
+    ).stdout
 
 
 def seen(page: Path, width: int, *options: str) -> dict:
@@ -36,7 +53,9 @@ def seen(page: Path, width: int, *options: str) -> dict:
     text = browse(probed, f"--window-size={width},900", "--dump-dom", *options)
     found = re.search(r"FOUND(.*)END", text)
     assert found, text[-2000:]
-    return json.loads(found[1].replace("&amp;", "&").replace("&lt;", "<").replace("&gt;", ">"))
+    return json.loads(
+        found[1].replace("&amp;", "&").replace("&lt;", "<").replace("&gt;", ">")
+    )
 
 
 @pytest.fixture(scope="module")
@@ -46,8 +65,14 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folder = tmp_path_factory.mktemp("pages")
     log = replace(problem.logs[0], source="unseen.csv")
     results = [make_prediction(log, (2, 3), fit=name) for name in ("a", "b")]
-    arm, fits = problem.settings.arm, {p.fit: judge(problem.settings, [], {}, [p]) for p in results}
-    for page in (fit_page(make_record(problem, fit)), validation_page(results, fits, arm)):
+    arm, fits = (
+        problem.settings.arm,
+        {p.fit: judge(problem.settings, [], {}, [p]) for p in results},
+    )
+    for page in (
+        fit_page(make_record(problem, fit)),
+        validation_page(results, fits, arm),
+    ):
         write_page(page, folder)
     return {name: folder / f"{name}.html" for name in ("report", "validation")}
 
@@ -55,7 +80,11 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 @pytest.mark.parametrize("name", ["report", "validation"])
 @pytest.mark.parametrize(
     "how",
-    [(400,), (1400,), (1400, "--force-dark-mode", "--blink-settings=preferredColorScheme=0")],
+    [
+        (400,),
+        (1400,),
+        (1400, "--force-dark-mode", "--blink-settings=preferredColorScheme=0"),
+    ],
     ids=["phone", "screen", "dark"],
 )
 def test_a_page_is_whole_in_a_browser(pages: dict[str, Path], name: str, how: tuple):
@@ -88,8 +117,14 @@ SCRIPT = "<script>ran='a script'</script>"
 def hostile(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A validation whose fits and logs are called as HTML that runs a script."""
     problem = make_problem(outputs=(2, 3))
-    logs = [replace(problem.logs[0], source=name) for name in (INJECTED, f"{INJECTED}.csv")]
-    results = [make_prediction(log, (2, 3), fit=name) for name in (INJECTED, SCRIPT) for log in logs]
+    logs = [
+        replace(problem.logs[0], source=name) for name in (INJECTED, f"{INJECTED}.csv")
+    ]
+    results = [
+        make_prediction(log, (2, 3), fit=name)
+        for name in (INJECTED, SCRIPT)
+        for log in logs
+    ]
     fits = {p.fit: judge(problem.settings, [], {}, [p]) for p in results}
     page = validation_page(results, fits, problem.settings.arm)
     return write_page(page, tmp_path_factory.mktemp("hostile"))
@@ -104,17 +139,25 @@ def test_names_are_text_in_a_browser_in_tooltips_too(hostile: Path):
     assert labels, found["tooltips"]
 
 
-def test_a_script_that_got_into_a_page_is_not_run(pages: dict[str, Path], tmp_path: Path):
+def test_a_script_that_got_into_a_page_is_not_run(
+    pages: dict[str, Path], tmp_path: Path
+):
     """The second line of defence: the policy names the page's own scripts."""
     page = tmp_path / "page.html"
     source = pages["report"].read_text(encoding="utf-8")
     page.write_text(
-        source.replace("<main>", f"<main>{INJECTED}{SCRIPT}<base href='https://a.org'>"), encoding="utf-8"
+        source.replace(
+            "<main>", f"<main>{INJECTED}{SCRIPT}<base href='https://a.org'>"
+        ),
+        encoding="utf-8",
     )
     found = seen(page, 1400)
     assert found["ran"] == "nothing"
     assert found["images"] == 1
-    assert len([problem for problem in found["problems"] if problem.startswith("refused")]) >= 3
+    assert (
+        len([problem for problem in found["problems"] if problem.startswith("refused")])
+        >= 3
+    )
 
 
 def test_a_page_is_printed_on_paper(pages: dict[str, Path], tmp_path: Path):

@@ -1,4 +1,5 @@
-"""What a control engineer looks for: each plot holds what it claims, whatever a fit looks like."""
+"""What a control engineer looks for: each plot holds what it claims, whatever a fit
+looks like."""
 
 from dataclasses import replace
 
@@ -12,10 +13,18 @@ from hydroid.fitting.validation import fitted
 from hydroid.log import Log
 from hydroid.parameters import Prior
 from hydroid.posterior.identifiability import Profile
-from hydroid.reporting.actuator_report import measured_speeds, speed_section, step_section
+from hydroid.reporting.actuator_report import (
+    measured_speeds,
+    speed_section,
+    step_section,
+)
 from hydroid.reporting.analysis import analysis_page
 from hydroid.reporting.chart import Chart
-from hydroid.reporting.correlation_report import correlation_section, correlations, strongest
+from hydroid.reporting.correlation_report import (
+    correlation_section,
+    correlations,
+    strongest,
+)
 from hydroid.reporting.figure import figure, saved, style
 from hydroid.reporting.parameters_report import prior_chart, short_table
 from hydroid.reporting.residual_report import residual_section
@@ -38,9 +47,16 @@ def test_a_step_of_the_command_gives_its_speed_and_what_is_late_is_not_mixed_up(
     command = np.where(time % 4.0 < 2.0, 40.0, -20.0)
     late = np.roll(command, 20)
     late[:20] = 0.0
-    angle = 1e-4 * np.append(0.0, np.cumsum(late)[:-1])  # a command acts until the next sample
+    # a command acts until the next sample
+    angle = 1e-4 * np.append(0.0, np.cumsum(late)[:-1])
     columns = [np.zeros_like(time), command]
-    log = Log("a", time, np.column_stack(columns), np.column_stack([np.zeros_like(time), angle]), 0.01)
+    log = Log(
+        "a",
+        time,
+        np.column_stack(columns),
+        np.column_stack([np.zeros_like(time), angle]),
+        0.01,
+    )
     commands, speeds = measured_speeds(log, 2, 0.2)
     assert {*commands} == {40.0, -20.0}
     assert speeds == pytest.approx(1e-2 * commands, abs=1e-9)
@@ -57,7 +73,9 @@ def test_speeds_have_a_tab_for_each_joint_with_what_was_measured():
     labels = {mark.label for panel in chart.panels for mark in panel.marks}
     assert labels >= {"measured", "model, positive command", "model, negative command"}
     drawn(chart)
-    assert speed_section(SETTINGS, SUMMARY.changed({"curves": {}}), PROBLEM.logs) is None
+    assert (
+        speed_section(SETTINGS, SUMMARY.changed({"curves": {}}), PROBLEM.logs) is None
+    )
 
 
 def test_step_and_frequency_response_stand_where_a_fit_states_them():
@@ -69,7 +87,11 @@ def test_step_and_frequency_response_stand_where_a_fit_states_them():
         "interval": ((2.0, 4.0), (None, None), (0.5, 2.0)),
     }
     step = speed.changed(
-        {"label": "speed after a step to 50 % command, raising", "along": "time [s]", **points}
+        {
+            "label": "speed after a step to 50 % command, raising",
+            "along": "time [s]",
+            **points,
+        }
     )
     turned = step.changed({"along": "frequency [Hz]"})
     kinds = {"step": step, "amplitude": turned, "phase": turned}
@@ -83,7 +105,9 @@ def test_step_and_frequency_response_stand_where_a_fit_states_them():
         (True, True),
         (True, False),
     ]
-    assert {mark.label for panel in chart.panels for mark in panel.marks} == {"50 % command, raising"}
+    assert {mark.label for panel in chart.panels for mark in panel.marks} == {
+        "50 % command, raising"
+    }
     drawn(chart)
 
 
@@ -94,26 +118,38 @@ def test_residuals_are_tested_of_each_joint_and_of_none_that_diverged():
     assert [tab.button for tab in section.tabs] == ["shoulder", "elbow"]
     assert [row[0] for row in section.tables["residuals"].rows] == ["shoulder", "elbow"]
     drawn(section.tabs[0].draw())
-    lost = [replace(one, response=np.full_like(one.response, np.nan)) for one in predictions]
+    lost = [
+        replace(one, response=np.full_like(one.response, np.nan)) for one in predictions
+    ]
     assert residual_section(SETTINGS, SUMMARY, lost) is None
-    assert residual_section(SETTINGS, SUMMARY.changed({"errors": {}}), predictions) is None
+    assert (
+        residual_section(SETTINGS, SUMMARY.changed({"errors": {}}), predictions) is None
+    )
 
 
 def test_a_prior_and_what_the_logs_made_of_it_are_in_its_standard_deviations():
     free = {"K": {"nominal": 0.25, "sd": 0.05}, "D": {"nominal": 100.0, "within": 3.0}}
-    parameters = {name: SETTINGS.parameters[name].changed(stated) for name, stated in free.items()}
+    parameters = {
+        name: SETTINGS.parameters[name].changed(stated) for name, stated in free.items()
+    }
     settings = SETTINGS.with_parameters(parameters)
     estimate = dict(SUMMARY.estimate)
-    estimate["K"] = estimate["K"].changed({"value": 0.3, "sd": 0.01, "interval": (0.28, None)})
-    estimate["D"] = estimate["D"].changed({"value": 300.0, "sd": 9.0, "interval": (100.0, 300.0)})
+    estimate["K"] = estimate["K"].changed(
+        {"value": 0.3, "sd": 0.01, "interval": (0.28, None)}
+    )
+    estimate["D"] = estimate["D"].changed(
+        {"value": 300.0, "sd": 9.0, "interval": (100.0, 300.0)}
+    )
     chart = prior_chart(settings, SUMMARY.changed({"estimate": estimate}))
     beside = chart.panels[0]
     assert beside.rows == ("K", "D")
     bars = next(mark for mark in beside.marks if mark.kind == "bars")
     points = next(mark for mark in beside.marks if mark.kind == "points")
-    assert points.x == pytest.approx([1.0, 1.96], rel=1e-2)  # the factor 3 is 1.96 standard deviations
+    # the factor 3 is 1.96 standard deviations
+    assert points.x == pytest.approx([1.0, 1.96], rel=1e-2)
     assert bars.x == pytest.approx([0.6, 0.0], abs=1e-6)
-    assert bars.end == pytest.approx([5.0, 1.96], rel=1e-2)  # without an end, as far as is drawn
+    # without an end, as far as is drawn
+    assert bars.end == pytest.approx([5.0, 1.96], rel=1e-2)
     assert set(chart.panels[1].rows) <= {"M1", "M2"}
     assert Prior(0.25, 0.05).score(np.array(0.3)) == pytest.approx(1.0)
     drawn(chart)
@@ -126,7 +162,10 @@ def test_correlations_are_those_of_the_covariance_and_the_strongest_pair_is_name
     root = np.linalg.qr(rows, mode="r")
     names = ("K", "D", "M1")
     known = Covariance(
-        parameters=names, scale=(1.0,) * 3, root=tuple(map(tuple, root.tolist())), quantile=2.0
+        parameters=names,
+        scale=(1.0,) * 3,
+        root=tuple(map(tuple, root.tolist())),
+        quantile=2.0,
     )
     expected = np.linalg.inv(rows.T @ rows)
     deviations = np.sqrt(np.diag(expected))
@@ -145,7 +184,9 @@ def test_correlations_are_those_of_the_covariance_and_the_strongest_pair_is_name
 
 def test_a_parameter_is_one_line_of_words_with_its_interval():
     estimate = dict(SUMMARY.estimate)
-    estimate["K"] = estimate["K"].changed({"value": 0.25, "interval": (0.2, 0.31), "source": "data"})
+    estimate["K"] = estimate["K"].changed(
+        {"value": 0.25, "interval": (0.2, 0.31), "source": "data"}
+    )
     table = short_table(SETTINGS, SUMMARY.changed({"estimate": estimate}))
     row = dict(zip(table.header, table.shown[0], strict=True))
     expected = {
@@ -168,9 +209,16 @@ def test_where_starts_ended_is_above_the_best_of_each_joint():
 
 def test_only_a_search_over_generations_has_curves_of_it():
     record = make_record(PROBLEM, FIT)
-    assert {plot.name for plot in search_section(record).plots} == {"learning", "pareto"}
-    once = replace(record.result, history=record.result.history[-1:], starts={0: (1.0, 2.0)})
-    assert {plot.name for plot in search_section(replace(record, result=once)).plots} == {"starts"}
+    assert {plot.name for plot in search_section(record).plots} == {
+        "learning",
+        "pareto",
+    }
+    once = replace(
+        record.result, history=record.result.history[-1:], starts={0: (1.0, 2.0)}
+    )
+    assert {
+        plot.name for plot in search_section(replace(record, result=once)).plots
+    } == {"starts"}
 
 
 def test_a_profile_is_a_curve_with_the_line_that_ends_its_interval():
@@ -178,7 +226,9 @@ def test_a_profile_is_a_curve_with_the_line_that_ends_its_interval():
     points = np.column_stack([values, 25.0 * (values - 0.25) ** 2 * 100])
     page = analysis_page(SETTINGS, SUMMARY, {"K": Profile((0.2, 0.3), 0.0, points)})
     assert {"parameters", "correlations"} <= set(page.tables)
-    (tab,) = next(section for section in page.sections if section.title == "Profiles").tabs
+    (tab,) = next(
+        section for section in page.sections if section.title == "Profiles"
+    ).tabs
     assert tab.caption == "torque per command (K)"
     rule, line, _ = tab.draw().panels[0].marks
     assert rule.y == pytest.approx([1.96**2], rel=1e-3)

@@ -26,7 +26,9 @@ def with_theta(fit, problem, effects=None, **values: float):
     for name, value in values.items():
         theta[problem.parameters.names.index(name)] = value
     estimates = fit.estimates | {fit.final: replace(fit.best, theta=theta)}
-    return replace(fit, estimates=estimates, uncertainty=make_uncertainty(problem, theta, effects))
+    return replace(
+        fit, estimates=estimates, uncertainty=make_uncertainty(problem, theta, effects)
+    )
 
 
 def test_every_parameter_is_in_the_table():
@@ -54,41 +56,78 @@ def test_flags_and_findings_name_what_the_data_cannot_tell():
     assert Finding("no effect", "note", ("M1",)) in summary.findings
     at = with_theta(fit, problem, effects, K=MODEL["K"][0], M2=MODEL["M2"][1])
     expected = ["at lower bound", "fixed", "no effect", "at upper bound"]
-    assert column(parameter_table(problem.settings, summarise(problem, at)), "source") == expected
-    assert Finding("at bound", "warning", ("M2",), {"side": "upper"}) in summarise(problem, at).findings
+    assert (
+        column(parameter_table(problem.settings, summarise(problem, at)), "source")
+        == expected
+    )
+    assert (
+        Finding("at bound", "warning", ("M2",), {"side": "upper"})
+        in summarise(problem, at).findings
+    )
 
 
 def test_nobody_is_asked_to_widen_what_has_no_larger_value():
-    """A share of 1 is the largest there is; a share of 0.5 is a bound that somebody has set."""
+    """A share of 1 is the largest there is; a share of 0.5 is a bound that somebody has
+    set."""
     problem = make_problem()
     share = {"quantity": "compensation", "joints": (2,), "link": None}
     for upper, kind in ((1.0, "at limit"), (0.5, "at bound")):
-        changed = problem.settings.parameters["M1"].changed(share | {"bounds": (0.0, upper)})
+        changed = problem.settings.parameters["M1"].changed(
+            share | {"bounds": (0.0, upper)}
+        )
         other = problem.varied(problem.settings.with_parameters({"M1": changed}))
-        fit = with_theta(make_fit(other, effects=(1e-3,) * 4), other, (1e-3,) * 4, M1=upper)
-        kinds = {one.kind for one in summarise(other, fit).findings if "M1" in one.subjects}
+        fit = with_theta(
+            make_fit(other, effects=(1e-3,) * 4), other, (1e-3,) * 4, M1=upper
+        )
+        kinds = {
+            one.kind for one in summarise(other, fit).findings if "M1" in one.subjects
+        }
         assert kinds & {"at limit", "at bound"} == {kind}
 
 
 def test_what_the_logs_move_far_from_its_prior_is_one_finding():
-    own, stated = make_problem().settings, {"K": (0.25, 0.05), "D": (100.0, 50.0), "M1": (5.0, 1.0)}
-    free = {n: own.parameters[n].changed({"nominal": v, "sd": sd}) for n, (v, sd) in stated.items()}
-    problem, effects = make_problem().varied(own.with_parameters(free)), (1e-2, 1e-2, 1e-9, 1e-3)
-    fit = with_theta(make_fit(problem, effects=effects), problem, effects, K=0.1, D=300.0, M1=9.0)
-    (finding,) = [one for one in summarise(problem, fit).findings if one.kind == "strained prior"]
-    assert finding.what.endswith("in standard deviations: D (4.0 above) and K (3.0 below).")
+    own, stated = (
+        make_problem().settings,
+        {"K": (0.25, 0.05), "D": (100.0, 50.0), "M1": (5.0, 1.0)},
+    )
+    free = {
+        n: own.parameters[n].changed({"nominal": v, "sd": sd})
+        for n, (v, sd) in stated.items()
+    }
+    problem, effects = (
+        make_problem().varied(own.with_parameters(free)),
+        (1e-2, 1e-2, 1e-9, 1e-3),
+    )
+    fit = with_theta(
+        make_fit(problem, effects=effects), problem, effects, K=0.1, D=300.0, M1=9.0
+    )
+    (finding,) = [
+        one for one in summarise(problem, fit).findings if one.kind == "strained prior"
+    ]
+    assert finding.what.endswith(
+        "in standard deviations: D (4.0 above) and K (3.0 below)."
+    )
 
 
 def test_how_sure_a_prediction_can_be_is_said_of_each_joint():
     problem = make_problem(outputs=(2, 3))
     summary = summarise(problem, make_fit(problem))
-    one = summary.errors["q2"].changed({"sensor_deg": 0.05, "after_10_s_deg": 1.234, "lasts_s": 0.0})
+    one = summary.errors["q2"].changed(
+        {"sensor_deg": 0.05, "after_10_s_deg": 1.234, "lasts_s": 0.0}
+    )
     two = one.changed({"after_10_s_deg": 0.5, "lasts_s": 1.4})
-    section = error_section(problem.settings, summary.changed({"errors": {"q2": one, "q3": two}}))
+    section = error_section(
+        problem.settings, summary.changed({"errors": {"q2": one, "q3": two}})
+    )
     assert section is not None
-    assert "uncertain by 1.2 deg (shoulder) and 0.5 deg (elbow) after 10 s" in section.text
+    assert (
+        "uncertain by 1.2 deg (shoulder) and 0.5 deg (elbow) after 10 s" in section.text
+    )
     table = section.tables["prediction_errors"]
-    assert table.rows == (("shoulder", "deg", 0.05, 1.234, None), ("elbow", "deg", 0.05, 0.5, 1.4))
+    assert table.rows == (
+        ("shoulder", "deg", 0.05, 1.234, None),
+        ("elbow", "deg", 0.05, 0.5, 1.4),
+    )
     assert error_section(problem.settings, summary.changed({"errors": {}})) is None
 
 
@@ -111,10 +150,17 @@ def test_what_is_left_of_an_error_and_lasts_is_a_finding():
 def test_runs_of_several_seeds_have_no_value_where_there_is_none():
     """One seed has led to a further term, and in another the joint diverged."""
     problem, more = make_problem(parameters=FEWER), make_problem()
-    first, second = make_record(problem, make_fit(problem)), make_record(more, make_fit(more), folder="TWO")
+    first, second = (
+        make_record(problem, make_fit(problem)),
+        make_record(more, make_fit(more), folder="TWO"),
+    )
     verdict = [one.changed({"fitted_deg": None}) for one in second.verdict]
-    good = replace(first, summary=first.summary.changed({"verdict": first.verdict, "rms_deg": 0.1}))
-    bad = replace(second, summary=second.summary.changed({"verdict": verdict, "rms_deg": 0.2}))
+    good = replace(
+        first, summary=first.summary.changed({"verdict": first.verdict, "rms_deg": 0.1})
+    )
+    bad = replace(
+        second, summary=second.summary.changed({"verdict": verdict, "rms_deg": 0.2})
+    )
     tables = merged_tables([bad, good])
     assert [column(tables["runs"], name) for name in ("run", "M2 [kg]")] == [
         ["RUN", "TWO"],
@@ -131,7 +177,12 @@ def test_runs_of_several_seeds_have_no_value_where_there_is_none():
 
 @pytest.mark.parametrize(
     "sources",
-    [["x/a.csv", "y/a.csv", "a.csv"], ["a.csv (2)", "b/a.csv", "a.csv"], ["n\n\x01.csv"], ["W" * 300]],
+    [
+        ["x/a.csv", "y/a.csv", "a.csv"],
+        ["a.csv (2)", "b/a.csv", "a.csv"],
+        ["n\n\x01.csv"],
+        ["W" * 300],
+    ],
 )
 def test_names_of_logs_are_different_short_and_printable(sources: list[str]):
     names = log_names(sources)

@@ -25,26 +25,38 @@ def model() -> mujoco.MjModel:
     return load_model(ARM).compile()
 
 
-def predicted(response: np.ndarray, joints: tuple[int, ...] = (2, 3), log: Log = LOG) -> Prediction:
+def predicted(
+    response: np.ndarray, joints: tuple[int, ...] = (2, 3), log: Log = LOG
+) -> Prediction:
     return Prediction("fit", log, joints, response, {}, None)
 
 
 def moved(model: mujoco.MjModel, error=ERROR, most: int = MOST) -> MovingArm:
-    return moving_arm(model, ARM.joint_names, predicted(LOG.angle[:, [1, 2]] - error), most)
+    return moving_arm(
+        model, ARM.joint_names, predicted(LOG.angle[:, [1, 2]] - error), most
+    )
 
 
-def picture(arm: MovingArm, name: str, part: int, moment: int, point: np.ndarray) -> np.ndarray:
+def picture(
+    arm: MovingArm, name: str, part: int, moment: int, point: np.ndarray
+) -> np.ndarray:
     """Where a point of a rigid part is drawn, as the page's script works it out."""
     view = arm.views[name]
     pose = arm.poses["measured"][part].reshape(-1, 3, 4)
     pose = pose[min(moment, len(pose) - 1)]
     axes = view.axes.reshape(-1, 2, 3)
-    return axes[min(moment, len(axes) - 1)] @ (pose[:, :3] @ point + pose[:, 3]) + view.corner
+    return (
+        axes[min(moment, len(axes) - 1)] @ (pose[:, :3] @ point + pose[:, 3])
+        + view.corner
+    )
 
 
 def test_the_last_link_is_drawn_where_mujoco_puts_it(model):
     arm = moved(model)
-    root, tip = int(model.joint(ARM.joint_names[2]).bodyid[0]), model.body(ARM.link_names[-1]).id
+    root, tip = (
+        int(model.joint(ARM.joint_names[2]).bodyid[0]),
+        model.body(ARM.link_names[-1]).id,
+    )
     moments = (0, len(arm.time) - 1)
     world, drawn = [], []
     for moment in moments:
@@ -61,14 +73,21 @@ def test_the_last_link_is_drawn_where_mujoco_puts_it(model):
     assert [*arm.views] == ["side"]
 
 
-def test_the_view_from_the_side_turns_with_the_machine_and_from_above_it_stands_still(model):
+def test_the_view_from_the_side_turns_with_the_machine_and_from_above_it_stands_still(
+    model,
+):
     """A slew of 150 degrees: the arm stays as long in the picture as it was."""
     slew = np.radians(np.linspace(0.0, 150.0, len(LOG.time)))
     turned = replace(LOG, angle=LOG.angle * 0.0 + slew[:, None] * [1, 0, 0, 0, 0, 0, 0])
-    arm = moving_arm(model, ARM.joint_names, predicted(turned.angle[:, [0]], (1,), turned))
+    arm = moving_arm(
+        model, ARM.joint_names, predicted(turned.angle[:, [0]], (1,), turned)
+    )
     last = len(arm.time) - 1
     part = len(arm.poses["measured"]) - 1
-    tip = max((one for one in arm.shapes if one.body == part), key=lambda one: np.abs(one.corners).max())
+    tip = max(
+        (one for one in arm.shapes if one.body == part),
+        key=lambda one: np.abs(one.corners).max(),
+    )
     corner = tip.corners[np.abs(tip.corners).sum(axis=1).argmax()]
     begun, ended = (picture(arm, "side", part, moment, corner) for moment in (0, last))
     assert ended == pytest.approx(begun, abs=1.0)
@@ -94,7 +113,9 @@ def test_a_long_log_has_few_moments_and_begins_at_the_largest_difference(model):
     arm = moved(model, most=20)
     assert len(arm.time) == 20
     assert (arm.time[0], arm.time[-1]) == (LOG.time[0], LOG.time[-1])
-    assert abs(arm.errors["shoulder"][arm.start]) == np.abs(arm.errors["shoulder"]).max()
+    assert (
+        abs(arm.errors["shoulder"][arm.start]) == np.abs(arm.errors["shoulder"]).max()
+    )
 
 
 def test_the_worst_logs_are_shown_and_one_that_diverged_never():
@@ -105,7 +126,9 @@ def test_the_worst_logs_are_shown_and_one_that_diverged_never():
     assert motions(ARM, {"b.csv": lost}) == ()
     many = motions(ARM, {str(i): good for i in range(MOTIONS + 3)})
     assert len(many) == MOTIONS
-    alone = motion_section(ARM, {"a.csv": good, "b.csv": lost, "c.csv": bad}, "Orange: wished.")
+    alone = motion_section(
+        ARM, {"a.csv": good, "b.csv": lost, "c.csv": bad}, "Orange: wished."
+    )
     assert alone is not None
     assert [tab.button for tab in alone.tabs] == ["c.csv", "a.csv"]
     assert motion_section(ARM, {"b.csv": lost}) is None

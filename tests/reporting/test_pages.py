@@ -1,4 +1,5 @@
-"""Pages: complete, the same every time, self-contained, and safe whatever a log is called."""
+"""Pages: complete, the same every time, self-contained, and safe whatever a log is
+called."""
 
 import base64
 import csv
@@ -49,22 +50,35 @@ class Reader(HTMLParser):
         found = dict(attrs)
         if found.get("http-equiv") == "Content-Security-Policy":
             self.policies.append(found["content"] or "")
-        self.links += [v or "" for name, v in attrs if name in ("src", "href", "action", "data", "srcset")]
+        self.links += [
+            v or ""
+            for name, v in attrs
+            if name in ("src", "href", "action", "data", "srcset")
+        ]
 
     def handle_data(self, data: str) -> None:
         self.text += data
 
 
 def hashes(source: str) -> list[str]:
-    """Of the scripts of a page that are run: its own, and the library that it unpacks."""
+    """Of the scripts of a page that are run: its own, and the library that it
+    unpacks."""
     (own,) = re.findall(r"<script>(.*?)</script>", source, re.DOTALL)
-    (packed,) = re.findall(r'<script type="text/plain" id="library">(.*?)</script>', source)
+    (packed,) = re.findall(
+        r'<script type="text/plain" id="library">(.*?)</script>', source
+    )
     scripts = own.encode(), gzip.decompress(base64.b64decode(packed))
-    return [base64.b64encode(hashlib.sha256(script).digest()).decode() for script in scripts]
+    return [
+        base64.b64encode(hashlib.sha256(script).digest()).decode() for script in scripts
+    ]
 
 
 def files(path: Path) -> dict[str, bytes]:
-    return {str(p.relative_to(path)): p.read_bytes() for p in sorted(path.rglob("*")) if p.is_file()}
+    return {
+        str(p.relative_to(path)): p.read_bytes()
+        for p in sorted(path.rglob("*"))
+        if p.is_file()
+    }
 
 
 @pytest.fixture(scope="module")
@@ -82,7 +96,12 @@ def test_writing_again_changes_no_byte(written):
     before = files(path)
     write_page(fit_page(record), path)
     assert files(path) == before
-    assert {"report.html", "tables/parameters.csv", "tables/verdict.csv", "history.csv"} <= set(before)
+    assert {
+        "report.html",
+        "tables/parameters.csv",
+        "tables/verdict.csv",
+        "history.csv",
+    } <= set(before)
 
 
 def test_every_chart_becomes_a_figure_well_formed_and_undated(written, tmp_path: Path):
@@ -101,7 +120,11 @@ def test_history_and_front_come_back_to_the_last_bit(written):
     assert tuple(header) == HISTORY
     assert np.array_equal(np.array(rows, dtype=float), fit.history)
     header, *rows = csv.reader((path / "pareto.csv").read_text().splitlines())
-    assert header == [*problem.parameters.names, *(f"segment_{s}_rad" for s in range(1, 5)), "overall_rad"]
+    assert header == [
+        *problem.parameters.names,
+        *(f"segment_{s}_rad" for s in range(1, 5)),
+        "overall_rad",
+    ]
     expected = np.column_stack(fit.front)
     assert np.array_equal(np.array(rows, dtype=float), expected)
 
@@ -110,7 +133,8 @@ def test_the_page_loads_nothing_from_elsewhere_and_a_name_is_text(written):
     source = (written[0] / "report.html").read_text(encoding="utf-8")
     page = Reader(source)
     assert not page.links
-    (policy,) = page.policies  # what would load or run all the same is refused by the browser
+    # what would load or run all the same is refused by the browser
+    (policy,) = page.policies
     allowed = dict(rule.split(" ", 1) for rule in policy.split("; "))
     assert allowed == {
         "default-src": "'none'",
@@ -121,7 +145,9 @@ def test_the_page_loads_nothing_from_elsewhere_and_a_name_is_text(written):
         "form-action": "'none'",
     }
     own = re.sub(r'<script type="text/plain".*?</script>', "", source, flags=re.DOTALL)
-    assert not re.search(r"https?://(?!www\.w3\.org/2000/svg)|@import|url\(|fetch\(", own)
+    assert not re.search(
+        r"https?://(?!www\.w3\.org/2000/svg)|@import|url\(|fetch\(", own
+    )
     assert not {"link", "iframe", "object"} & set(page.tags)
     assert len(source) < 2e6
     assert HOSTILE in page.text  # a name is text
@@ -141,9 +167,13 @@ def test_the_verdict_comes_first_and_is_not_tested_until_a_log_is_unseen():
     page = fit_page(make_record(problem, fit))
     assert [row[1] for row in page.tables["verdict"].rows] == ["? not tested"]
     assert page.lead == "shoulder: not tested."
-    page = fit_page(make_record(problem, fit, {"b.csv": make_prediction(log, error=0.001)}))
+    page = fit_page(
+        make_record(problem, fit, {"b.csv": make_prediction(log, error=0.001)})
+    )
     assert page.tables["verdict"].rows[0][1] == "✓ predicts"
-    errors = next(section for section in page.sections if section.title == "Errors by log")
+    errors = next(
+        section for section in page.sections if section.title == "Errors by log"
+    )
     assert [(tab.row, tab.column, tab.state) for tab in errors.tabs] == [
         ("b.csv unseen", "shoulder", "good"),
         ("a.csv fitted", "shoulder", "fair"),
@@ -152,12 +182,16 @@ def test_the_verdict_comes_first_and_is_not_tested_until_a_log_is_unseen():
 
 def test_errors_of_a_joint_that_slides_are_in_millimetres():
     problem = make_problem()
-    (one,) = judge(problem.settings, [], {}, [make_prediction(problem.logs[0], error=0.02)])
+    (one,) = judge(
+        problem.settings, [], {}, [make_prediction(problem.logs[0], error=0.02)]
+    )
     slid = one.changed(
         {
             "slides": True,
             "baselines_deg": {"standing still": 2.0},
-            "compared_whole": {"standing still": Comparison(outcome=Outcome.BETTER, blocks=4)},
+            "compared_whole": {
+                "standing still": Comparison(outcome=Outcome.BETTER, blocks=4)
+            },
             "horizons_deg": {"the fit": (1.0, None, 1.0, 1.0, 1.0)},
         }
     )
@@ -168,8 +202,20 @@ def test_errors_of_a_joint_that_slides_are_in_millimetres():
 
 def test_the_verdict_shows_each_time_beside_the_best_simple_model_and_digits_that_tell():
     outcomes = {
-        "speed tables": (Outcome.BETTER, Outcome.BETTER, Outcome.BETTER, Outcome.BETTER, Outcome.WORSE),
-        "nine numbers": (Outcome.UNTOLD, Outcome.UNTOLD, Outcome.UNTOLD, Outcome.UNTOLD, Outcome.BETTER),
+        "speed tables": (
+            Outcome.BETTER,
+            Outcome.BETTER,
+            Outcome.BETTER,
+            Outcome.BETTER,
+            Outcome.WORSE,
+        ),
+        "nine numbers": (
+            Outcome.UNTOLD,
+            Outcome.UNTOLD,
+            Outcome.UNTOLD,
+            Outcome.UNTOLD,
+            Outcome.BETTER,
+        ),
     }
     one = JointVerdict(
         joint=1,
@@ -186,7 +232,10 @@ def test_the_verdict_shows_each_time_beside_the_best_simple_model_and_digits_tha
             "speed tables": (0.2, 0.9, 1.0, 4.0, 5.0),
             "nine numbers": (0.2, 0.6, 1.0, 2.88, 6.0),
         },
-        compared={name: tuple(Comparison(outcome=o) for o in some) for name, some in outcomes.items()},
+        compared={
+            name: tuple(Comparison(outcome=o) for o in some)
+            for name, some in outcomes.items()
+        },
         compared_whole={name: Comparison(outcome=Outcome.UNTOLD) for name in outcomes},
     )
     table = verdict_table({"a": [one]})
@@ -200,14 +249,20 @@ def test_the_verdict_shows_each_time_beside_the_best_simple_model_and_digits_tha
         "whole logs": "3.0 (2.0)",  # two logs tell nothing
         "fitted": "1",
     }
-    assert lead({"a": [one]}).startswith("boom: cannot be told from nine numbers, over 2 unseen logs")
+    assert lead({"a": [one]}).startswith(
+        "boom: cannot be told from nine numbers, over 2 unseen logs"
+    )
 
 
 @pytest.mark.parametrize(
     ("about", "words", "command"),
     [
         ({"stage": "mech"}, ("predicts",), "fit-hyd a.csv --mech 'a b'"),
-        ({"ending": "its time was up"}, (), "fit-hyd a.csv --config 'a b'/config.yaml --out 'a b' --resume"),
+        (
+            {"ending": "its time was up"},
+            (),
+            "fit-hyd a.csv --config 'a b'/config.yaml --out 'a b' --resume",
+        ),
         ({}, ("predicts", "not tested"), "validate OTHER.csv --fit 'a b'"),
         ({}, ("predicts", "predicts"), "simulate COMMANDS.csv --fit 'a b'"),
         ({}, ("predicts", "does not fit"), "suggest --fit 'a b'"),
@@ -216,8 +271,14 @@ def test_the_verdict_shows_each_time_beside_the_best_simple_model_and_digits_tha
     ],
 )
 def test_what_to_do_next_follows_from_the_verdicts(about, words, command):
-    verdicts = [JointVerdict(joint=1, name="boom", verdict=Verdict(word), tolerance_deg=1) for word in words]
-    summary, (log,) = FitSummary(**{"stage": "hyd", "estimate": {}} | about), make_problem().logs
+    verdicts = [
+        JointVerdict(joint=1, name="boom", verdict=Verdict(word), tolerance_deg=1)
+        for word in words
+    ]
+    summary, (log,) = (
+        FitSummary(**{"stage": "hyd", "estimate": {}} | about),
+        make_problem().logs,
+    )
     step = next_step(summary, verdicts, "a b", [make_prediction(log)])
     assert step.numbers == {"command": f"hydroid {command}"}
 
@@ -241,29 +302,42 @@ def test_the_worst_joint_is_that_which_errs_most_for_its_tolerance():
     assert not worst([boom])
     diverged = boom.changed({"unseen_deg": None, "fitted_deg": 0.1})
     assert worst([swing, diverged]) == "Worst: boom, whose simulation diverges."
-    assert worst([swing, diverged.changed({"unseen_logs": 0})]).startswith("Worst: swing")
+    assert worst([swing, diverged.changed({"unseen_logs": 0})]).startswith(
+        "Worst: swing"
+    )
 
 
 def test_a_fit_that_fails_says_so_in_every_place():
     problem = make_problem()
     log, fit = problem.logs[0], make_fit(problem)
-    unseen = {name: make_prediction(replace(log, source=name), error=1.0) for name in ("b", "c", "d", "e")}
+    unseen = {
+        name: make_prediction(replace(log, source=name), error=1.0)
+        for name in ("b", "c", "d", "e")
+    }
     page = fit_page(make_record(problem, fit, unseen))
     text = Reader(html(page)).text
     assert "✗ predicts no better than standing still" in text
     assert "✓" not in text
-    assert page.lead == "shoulder: predicts no better than standing still, over 4 unseen logs."
+    assert (
+        page.lead
+        == "shoulder: predicts no better than standing still, over 4 unseen logs."
+    )
 
 
 def test_a_validation_of_several_fits_shows_the_best_first_in_shared_charts():
     problem = make_problem()
     settings, log = problem.settings, problem.logs[0]
-    predictions = [make_prediction(log, fit=name, error=e) for name, e in (("bad", 0.2), ("good", 0.001))]
+    predictions = [
+        make_prediction(log, fit=name, error=e)
+        for name, e in (("bad", 0.2), ("good", 0.001))
+    ]
     fits = ordered({p.fit: judge(settings, [], {}, [p]) for p in predictions})
     assert list(fits) == ["good", "bad"]
     page = validation_page(predictions, fits, settings.arm)
     assert page.lead == "good is best. shoulder: predicts, over 1 unseen log."
-    (tab,) = next(section for section in page.sections if section.title == "Response").tabs
+    (tab,) = next(
+        section for section in page.sections if section.title == "Response"
+    ).tabs
     labels = {mark.label for panel in tab.draw().panels for mark in panel.marks}
     assert {label.partition(" (")[0] for label in labels} >= {"good", "bad", "measured"}
 
@@ -278,14 +352,20 @@ def test_a_joint_that_only_a_later_fit_compares_is_shown():
         "two": judge(settings, [], {}, [of_two]),
     }
     page = validation_page([of_one, of_two], ordered(judged), settings.arm)
-    (tabs,) = [section.tabs for section in page.sections if section.title == "Errors by log"]
+    (tabs,) = [
+        section.tabs for section in page.sections if section.title == "Errors by log"
+    ]
     size = f"{np.degrees(0.2):.2g}°"
     assert [(tab.column, tab.button, tab.state) for tab in tabs] == [
         ("shoulder", f"{np.degrees(0.001):.2g}°", "good"),
         ("elbow", size, "bad"),
         ("joints", "all", "bad"),
     ]
-    labels = {mark.label.partition(" (")[0] for panel in tabs[1].draw().panels for mark in panel.marks}
+    labels = {
+        mark.label.partition(" (")[0]
+        for panel in tabs[1].draw().panels
+        for mark in panel.marks
+    }
     assert "two" in labels
     assert "one" not in labels
 
@@ -293,13 +373,22 @@ def test_a_joint_that_only_a_later_fit_compares_is_shown():
 def test_the_best_fit_is_found_by_the_joints_that_all_compare():
     boom, swing = (
         JointVerdict(
-            joint=j, name=str(j), verdict=Verdict.ROUGHLY, unseen_deg=e, unseen_logs=1, tolerance_deg=1.0
+            joint=j,
+            name=str(j),
+            verdict=Verdict.ROUGHLY,
+            unseen_deg=e,
+            unseen_logs=1,
+            tolerance_deg=1.0,
         )
         for j, e in ((1, 2.0), (2, 3.0))
     )
     better = boom.changed({"unseen_deg": 1.0})
-    assert [*ordered({"only boom": [boom], "both": [better, swing]})] == ["both", "only boom"]
-    assert [*ordered({"swing": [swing], "boom": [boom]})] == ["boom", "swing"]  # none is shared
+    assert [*ordered({"only boom": [boom], "both": [better, swing]})] == [
+        "both",
+        "only boom",
+    ]
+    # none is shared
+    assert [*ordered({"swing": [swing], "boom": [boom]})] == ["boom", "swing"]
 
 
 def test_a_joint_may_be_called_as_a_column():
@@ -321,6 +410,8 @@ def test_a_table_of_any_name_stays_in_its_folder(tmp_path: Path):
 
 def test_a_folder_that_cannot_be_written_is_said(tmp_path: Path):
     (tmp_path / "tables").write_text("in the way")
-    page = Page("p", "t", "l", (Section("s", tables={"t": Table("t", ("a",), ((1,),))}),), ())
+    page = Page(
+        "p", "t", "l", (Section("s", tables={"t": Table("t", ("a",), ((1,),))}),), ()
+    )
     with pytest.raises(RunError, match="cannot be written"):
         write_page(page, tmp_path)

@@ -14,7 +14,8 @@ from hydroid.reporting.page_file import plain
 from hydroid.reporting.response_report import draw_joints, draw_response
 from hydroid.reporting.search_report import learning, pareto
 
-pytestmark = pytest.mark.filterwarnings("error")  # a warning of matplotlib's is a figure gone wrong
+# a warning of matplotlib's is a figure gone wrong
+pytestmark = pytest.mark.filterwarnings("error")
 
 
 @pytest.fixture(autouse=True)
@@ -24,14 +25,20 @@ def _styled():
 
 
 def drawn_front(problem, fit) -> Chart:
-    segments = {name: fit.estimates[name].segments for name in (fit.final, *fit.estimates)}
+    segments = {
+        name: fit.estimates[name].segments for name in (fit.final, *fit.estimates)
+    }
     return pareto(fit.front[1], segments, problem.settings.objective)
 
 
 def draw_all(problem, fit) -> list[Chart]:
     objective = problem.settings.objective
     return [
-        *(draw_response("one", joint, [p], 1000) for p in fitted(fit) for joint in p.joints),
+        *(
+            draw_response("one", joint, [p], 1000)
+            for p in fitted(fit)
+            for joint in p.joints
+        ),
         learning(fit.history, objective),
         drawn_front(problem, fit),
     ]
@@ -55,16 +62,27 @@ SHAPES = {
         {"segments": 1, "parameters": TWO, "fixed": {"D": 80.0}},
         {"names": ("best", "refined")},
     ),
-    "several logs and outputs": ({"sources": ("a.csv", "b.csv"), "outputs": (1, 2)}, {"names": ("best",)}),
+    "several logs and outputs": (
+        {"sources": ("a.csv", "b.csv"), "outputs": (1, 2)},
+        {"names": ("best",)},
+    ),
     "no refinement, one estimate diverged": (
         {},
         {"names": ("average", "utopia", "best"), "diverged": ("average",)},
     ),
     "nothing but diverged": (
         {},
-        {"names": ("best", "refined"), "diverged": ("best", "refined"), "front": 0, "effects": (np.nan,) * 4},
+        {
+            "names": ("best", "refined"),
+            "diverged": ("best", "refined"),
+            "front": 0,
+            "effects": (np.nan,) * 4,
+        },
     ),
-    "fixed without bounds, relative": ({"parameters": TWO, "fixed": {"D": 80.0}, "relative": True}, {}),
+    "fixed without bounds, relative": (
+        {"parameters": TWO, "fixed": {"D": 80.0}, "relative": True},
+        {},
+    ),
     "names that are markup": ({"sources": ("<b>&_%$a$.csv",)}, {}),
     "names without glyphs": ({"sources": ("日志🦾.csv",)}, {}),
 }
@@ -98,12 +116,19 @@ def test_a_response_shows_measured_and_simulated_angle_residual_pressures_and_co
     (one,) = fitted(fit)
     log = one.log
     pressed = replace(log, pressure=np.tile([5e6, 2e6], (*log.angle.shape, 1)))
-    upper, middle, pressure, lower = draw_response("one", 2, [replace(one, log=pressed)], 1000).panels
-    assert labelled(pressure)["chamber A, measured"].y == pytest.approx(np.full(len(log.time), 50.0))
+    upper, middle, pressure, lower = draw_response(
+        "one", 2, [replace(one, log=pressed)], 1000
+    ).panels
+    assert labelled(pressure)["chamber A, measured"].y == pytest.approx(
+        np.full(len(log.time), 50.0)
+    )
     assert len(draw_response("one", 2, [one], 1000).panels) == 3  # there are none
     simulated = replace(one, pressure=np.full((len(one.log.time), 1, 2), 50e5))
     *_, drawn, _ = draw_response("one", 2, [simulated], 1000).panels
-    assert [mark.label for mark in drawn.marks] == ["chamber A, simulated", "chamber B, simulated"]
+    assert [mark.label for mark in drawn.marks] == [
+        "chamber A, simulated",
+        "chamber B, simulated",
+    ]
     assert drawn.marks[0].y == pytest.approx(50.0)
     measured = np.degrees(log.angle[:, 1])
     assert labelled(upper)["measured"].y == pytest.approx(measured)
@@ -138,7 +163,12 @@ def test_a_thinned_curve_keeps_its_ends_extremes_and_gaps(samples: int):
     kept = thin.y
     assert len(kept) <= 2002
     assert np.array_equal(curve[np.searchsorted(time, thin.x)], kept)
-    assert (kept[0], kept[-1], kept.min(), kept.max()) == (curve[0], curve[-1], curve.min(), curve.max())
+    assert (kept[0], kept[-1], kept.min(), kept.max()) == (
+        curve[0],
+        curve[-1],
+        curve.min(),
+        curve.max(),
+    )
     band = Mark("band", time, -np.abs(curve), np.abs(curve)).thinned(1000)
     assert (band.y.min(), band.end.min()) == (-np.abs(curve).max(), np.abs(curve).min())
     gap = np.where(np.arange(samples) > samples // 2, np.nan, curve)
@@ -151,7 +181,11 @@ def test_all_joints_of_a_log_share_one_axis_of_time():
     (one,) = fitted(make_fit(problem))
     chart = draw_joints("all", problem.settings.arm, [one], 300)
     assert chart.linked
-    assert [panel.y for panel in chart.panels] == ["shoulder [deg]", "elbow [deg]", "command [%]"]
+    assert [panel.y for panel in chart.panels] == [
+        "shoulder [deg]",
+        "elbow [deg]",
+        "command [%]",
+    ]
     labels = {mark.label for mark in chart.panels[-1].marks}
     assert labels == {"command of shoulder", "command of elbow"}
     measured, simulated = chart.panels[0].marks

@@ -1,4 +1,5 @@
-"""What suggestions propose: findings that change something, and commands that can be pasted."""
+"""What suggestions propose: findings that change something, and commands that can be
+pasted."""
 
 import pytest
 from report_fits import make_problem
@@ -13,10 +14,17 @@ from hydroid.settings.load import parse_override
 
 
 @pytest.mark.parametrize(
-    ("after", "expected"), [(11.0, "Then C is known to 11 % instead of 15 %."), (15.0, "")]
+    ("after", "expected"),
+    [(11.0, "Then C is known to 11 % instead of 15 %."), (15.0, "")],
 )
 def test_an_action_that_changes_nothing_is_not_shown(after: float, expected: str):
-    action = {"action": "state", "of": "D", "parameter": "C", "before_percent": 15.0, "after_percent": after}
+    action = {
+        "action": "state",
+        "of": "D",
+        "parameter": "C",
+        "before_percent": 15.0,
+        "after_percent": after,
+    }
     found = action_findings({"actions": [action]}, make_problem().settings)
     assert " ".join(finding.hint for finding in found) == expected
 
@@ -28,7 +36,10 @@ def test_the_command_that_frees_a_held_mass_gives_settings_that_need_no_stage_1(
     entries = proposed(Candidate(term, 25.0, 9.0, 0.0, 0.1), 25.0)
     assert entries["M3"]["start"] == 21.17
     command = freeing_command(make_problem(("a b.csv",)), entries, "runs/my fit")
-    assert "'a b.csv' --config 'runs/my fit/config.yaml' --start 'runs/my fit' --set 'param" in command
+    assert (
+        "'a b.csv' --config 'runs/my fit/config.yaml' --start 'runs/my fit' --set 'param"
+        in command
+    )
     assert command.endswith(" --out 'runs/my fit-M3'")
     key, value = parse_override(command.split("--set '")[1].split("'")[0])
     assert (key, value) == ("parameters.M3", entries["M3"])
@@ -37,7 +48,13 @@ def test_the_command_that_frees_a_held_mass_gives_settings_that_need_no_stage_1(
 
 def test_what_to_state_is_named_in_words_with_its_symbol_behind():
     problem = make_problem()
-    action = {"action": "state", "of": "D", "parameter": "M1", "before_percent": 15.0, "after_percent": 3.0}
+    action = {
+        "action": "state",
+        "of": "D",
+        "parameter": "M1",
+        "before_percent": 15.0,
+        "after_percent": 3.0,
+    }
     (found,) = action_findings({"actions": [action]}, problem.settings)
     assert found.what.startswith("State damping of the joint (D) to ±")
     assert found.hint == "Then mass (link1: M1) is known to 3 % instead of 15 %."
@@ -45,7 +62,12 @@ def test_what_to_state_is_named_in_words_with_its_symbol_behind():
 
 def test_parameters_of_the_same_words_are_named_together():
     settings = make_problem().settings
-    some = Finding("strained prior", "warning", ("M1", "K", "M2"), details={"K": "2.9 above"})
-    assert in_words(some, settings).subjects == ("mass (M1 and M2)", "torque per command (K; 2.9 above)")
+    some = Finding(
+        "strained prior", "warning", ("M1", "K", "M2"), details={"K": "2.9 above"}
+    )
+    assert in_words(some, settings).subjects == (
+        "mass (M1 and M2)",
+        "torque per command (K; 2.9 above)",
+    )
     other = Finding("log stands out", "warning", ("a.csv",), {"run": "R"})
     assert in_words(other, settings).subjects == ("a.csv",)

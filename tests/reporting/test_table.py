@@ -25,7 +25,9 @@ def test_csv_gives_back_every_bit_and_letter(values: list[float | str]):
         if isinstance(value, str):
             assert text == value
         else:
-            assert float(text) == value or (math.isnan(value) and math.isnan(float(text)))
+            assert float(text) == value or (
+                math.isnan(value) and math.isnan(float(text))
+            )
 
 
 def test_bounds_keep_their_bits_in_csv_and_their_digits_elsewhere():
@@ -36,7 +38,9 @@ def test_bounds_keep_their_bits_in_csv_and_their_digits_elsewhere():
 
 @given(st.floats(allow_nan=False, allow_infinity=False))
 def test_a_shown_number_is_right_to_three_digits(value: float):
-    assert abs(Decimal(three_digits(value)) - Decimal(value)) <= abs(Decimal(value)) * Decimal("5.01e-3")
+    assert abs(Decimal(three_digits(value)) - Decimal(value)) <= abs(
+        Decimal(value)
+    ) * Decimal("5.01e-3")
 
 
 def test_without_a_terminal_no_line_is_cut(capsys, monkeypatch):
@@ -48,7 +52,9 @@ def test_without_a_terminal_no_line_is_cut(capsys, monkeypatch):
 
 
 @pytest.mark.parametrize("width", [60, 100, 200])
-def test_a_table_fits_the_terminal_and_names_the_columns_left_out(width: int, capsys, monkeypatch):
+def test_a_table_fits_the_terminal_and_names_the_columns_left_out(
+    width: int, capsys, monkeypatch
+):
     monkeypatch.setenv("COLUMNS", str(width))
     names = tuple(f"value {i}" for i in range(14))
     values = tuple(0.001234 * 1.7**i for i in range(14))
@@ -60,8 +66,11 @@ def test_a_table_fits_the_terminal_and_names_the_columns_left_out(width: int, ca
     assert all(word in shown for word in words.split())
     left_out = shown.split("Left out for width: ")[1] if "Left out" in shown else ""
     for name, value in zip(names, values, strict=True):
-        assert (three_digits(value) in shown) != (name in " ".join(left_out.split()).rstrip(".").split(", "))
+        assert (three_digits(value) in shown) != (
+            name in " ".join(left_out.split()).rstrip(".").split(", ")
+        )
     assert ("Left out" in shown) == (width < 150)
-    Table("narrow", names, (values,)).show()  # without optional columns numbers are whole all the same
+    # without optional columns numbers are whole all the same
+    Table("narrow", names, (values,)).show()
     whole = capsys.readouterr().out
     assert all(three_digits(value) in whole for value in values)

@@ -1,4 +1,5 @@
-"""Bad input: files that were once misread or crashed hydroid, and some damaged ones of every kind.
+"""Bad input: files that were once misread or crashed hydroid, and some damaged ones of
+every kind.
 
 FUZZ=50 in the environment reads fifty times as many.
 """
@@ -29,7 +30,9 @@ HEADER = logs()[0].split(b"\n", 1)[0]
 
 
 @pytest.mark.parametrize("name", COUNTS)
-def test_damaged_files_are_read_rightly_or_refused_in_one_line(name: str, tmp_path, monkeypatch) -> None:
+def test_damaged_files_are_read_rightly_or_refused_in_one_line(
+    name: str, tmp_path, monkeypatch
+) -> None:
     files, work = tmp_path / "files", tmp_path / "work"
     files.mkdir()
     work.mkdir()
@@ -49,7 +52,9 @@ def test_intact_files_are_accepted(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", FORMATS)
-def test_a_format_is_read_or_refused_in_one_line_whatever_its_columns(name: str, tmp_path: Path) -> None:
+def test_a_format_is_read_or_refused_in_one_line_whatever_its_columns(
+    name: str, tmp_path: Path
+) -> None:
     plain, *odd = FORMATS[name].seeds()
     assert FORMATS[name].read(tmp_path, plain)
     for data in {*odd}:
@@ -57,7 +62,9 @@ def test_a_format_is_read_or_refused_in_one_line_whatever_its_columns(name: str,
 
 
 @pytest.mark.slow
-def test_damaged_runs_are_refused_in_one_line(tmp_path_factory: pytest.TempPathFactory) -> None:
+def test_damaged_runs_are_refused_in_one_line(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> None:
     kept = tmp_path_factory.mktemp("kept")
     for kind in run_kinds(kept):
         room = tmp_path_factory.mktemp("room")
@@ -94,7 +101,14 @@ def test_hostile_logs_are_refused_at_once(tmp_path: Path, data: bytes) -> None:
 
 @pytest.mark.parametrize(
     ("text", "value"),
-    [("010", 10), ("1e3", 1000.0), ("-1.5e-3", -0.0015), ("yes", "yes"), ("1:30", "1:30"), ("0x10", "0x10")],
+    [
+        ("010", 10),
+        ("1e3", 1000.0),
+        ("-1.5e-3", -0.0015),
+        ("yes", "yes"),
+        ("1:30", "1:30"),
+        ("0x10", "0x10"),
+    ],
 )
 def test_numbers_are_read_as_they_are_meant(text: str, value: object) -> None:
     found = read_document(f"a: {text}", "f")[0]["a"]
@@ -102,14 +116,30 @@ def test_numbers_are_read_as_they_are_meant(text: str, value: object) -> None:
     assert type(found) is type(value)
 
 
-LAUGHS = "a0: &a0 [x]\n" + "".join(f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]\n" for i in range(1, 12))
+LAUGHS = "a0: &a0 [x]\n" + "".join(
+    f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]\n" for i in range(1, 12)
+)
 
 
 @pytest.mark.parametrize(
     "text",
     [
-        *(LAUGHS, "a: &a [*a]", "[" * 5000, "1: a\n01: b", "? [a]\n: b", "a: !!set {b}"),
-        *("a: !!python/name:os.system", 'a: "\\ud800"', 'a: "\\0"', "a: \0", "a: b: c", "a: !!int x"),
+        *(
+            LAUGHS,
+            "a: &a [*a]",
+            "[" * 5000,
+            "1: a\n01: b",
+            "? [a]\n: b",
+            "a: !!set {b}",
+        ),
+        *(
+            "a: !!python/name:os.system",
+            'a: "\\ud800"',
+            'a: "\\0"',
+            "a: \0",
+            "a: b: c",
+            "a: !!int x",
+        ),
     ],
 )
 def test_yaml_that_is_no_data_is_refused(text: str) -> None:

@@ -1,4 +1,5 @@
-"""Files appear completely or not at all, and nothing that is no file is replaced by one."""
+"""Files appear completely or not at all, and nothing that is no file is replaced by
+one."""
 
 import os
 import resource
@@ -36,7 +37,13 @@ def test_a_link_stays_and_what_it_leads_to_is_written(tmp_path: Path):
         write_atomic(tmp_path / name, name * 2)
         assert (tmp_path / name).is_symlink()
         assert (tmp_path / "there" / name).read_text() == name * 2
-    assert sorted(path.name for path in tmp_path.rglob("*")) == ["new", "new", "old", "old", "there"]
+    assert sorted(path.name for path in tmp_path.rglob("*")) == [
+        "new",
+        "new",
+        "old",
+        "old",
+        "there",
+    ]
 
 
 def test_a_log_on_a_full_disk_falls_silent(tmp_path: Path):
@@ -53,13 +60,17 @@ def test_a_log_on_a_full_disk_falls_silent(tmp_path: Path):
 
 
 def test_a_notice_that_is_ignored_from_the_start_stays_ignored():
-    """As `nohup` has it; otherwise a closed terminal stops a run as a cluster's notice does."""
-    code = (
-        "import signal; signal.signal(signal.SIGHUP, signal.SIG_{}); from hydroid.commands import progress; "
+    """As `nohup` has it; otherwise a closed terminal stops a run as a cluster's notice
+    does."""
+    code = "import signal; signal.signal(signal.SIGHUP, signal.SIG_{}); "
+    code += "from hydroid.commands import progress; "
+    code += (
+        "progress.listen(); print(signal.getsignal(signal.SIGHUP) is signal.SIG_IGN)"
     )
-    code += "progress.listen(); print(signal.getsignal(signal.SIGHUP) is signal.SIG_IGN)"
     for before, says in (("IGN", "True\n"), ("DFL", "False\n")):
-        done = subprocess.run([sys.executable, "-c", code.format(before)], capture_output=True, text=True)
+        done = subprocess.run(
+            [sys.executable, "-c", code.format(before)], capture_output=True, text=True
+        )
         assert done.stdout == says
 
 
@@ -79,6 +90,11 @@ builtins.__import__ = new
 """
     first, rest = code.split("; import sys", 1)
     done = subprocess.run(
-        [sys.executable, "-c", f"{first}\n{stop}\nimport sys{rest}"], capture_output=True, text=True
+        [sys.executable, "-c", f"{first}\n{stop}\nimport sys{rest}"],
+        capture_output=True,
+        text=True,
     )
-    assert (done.returncode, done.stderr) == (130, "hydroid: stopped; nothing was written\n")
+    assert (done.returncode, done.stderr) == (
+        130,
+        "hydroid: stopped; nothing was written\n",
+    )

@@ -1,4 +1,5 @@
-"""Faults of the run folder: what was good stays good, and the user is told in a line."""
+"""Faults of the run folder: what was good stays good, and the user is told in a
+line."""
 
 import errno
 import os
@@ -48,7 +49,9 @@ def stored(number: int) -> dict[str, np.ndarray]:
 
 def same(folder: RunFolder, number: int) -> bool:
     found, arrays = folder.checkpoints()["search"], stored(number)
-    return found.keys() == arrays.keys() and all(np.array_equal(found[n], arrays[n]) for n in arrays)
+    return found.keys() == arrays.keys() and all(
+        np.array_equal(found[n], arrays[n]) for n in arrays
+    )
 
 
 @contextmanager
@@ -63,12 +66,20 @@ def files_up_to(size: int):
 
 
 def content(folder: Path) -> dict[str, bytes]:
-    return {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+    return {
+        p.relative_to(folder).as_posix(): p.read_bytes()
+        for p in folder.rglob("*")
+        if p.is_file()
+    }
 
 
 def test_flipped_bits_never_change_a_checkpoint(folder):
-    """Wherever a bit flips: the newest to its last bit, where the zip does not care, or the one before it."""
-    file, previous = folder.path / "checkpoint.npz", folder.path / "checkpoint.previous.npz"
+    """Wherever a bit flips: the newest to its last bit, where the zip does not care, or
+    the one before it."""
+    file, previous = (
+        folder.path / "checkpoint.npz",
+        folder.path / "checkpoint.previous.npz",
+    )
     whole, before = file.read_bytes(), previous.read_bytes()
     rng = np.random.default_rng(0)
     fallen = 0
@@ -85,7 +96,9 @@ def test_flipped_bits_never_change_a_checkpoint(folder):
 
 
 @pytest.mark.parametrize("share", [0, 0.01, 0.5, 0.999])
-def test_a_truncated_checkpoint_gives_way_to_the_one_before_it(folder, path, share, caplog):
+def test_a_truncated_checkpoint_gives_way_to_the_one_before_it(
+    folder, path, share, caplog
+):
     file = folder.path / "checkpoint.npz"
     whole = file.read_bytes()
     file.write_bytes(whole[: int(share * len(whole))])
@@ -93,9 +106,11 @@ def test_a_truncated_checkpoint_gives_way_to_the_one_before_it(folder, path, sha
     assert "damaged" in caplog.text
     assert "before it" in caplog.text
     assert (folder.path / "checkpoint.damaged.npz").exists()
-    folder.checkpoints()["search"] = stored(3)  # the damaged one must not take the good one's place
+    # the damaged one must not take the good one's place
+    folder.checkpoints()["search"] = stored(3)
     assert same(folder, 3)
-    (folder.path / "checkpoint.npz").unlink()  # as a crash between the two renamings leaves it
+    # as a crash between the two renamings leaves it
+    (folder.path / "checkpoint.npz").unlink()
     assert same(folder, 1)
 
 
@@ -104,7 +119,8 @@ def test_where_none_is_whole_the_run_says_so(folder):
         (folder.path / name).write_bytes(b"PK")
     with pytest.raises(RunError, match=r"is damaged .* remove the run's checkpoints"):
         folder.checkpoints()
-    assert (folder.path / "checkpoint.npz").read_bytes() == b"PK"  # left for whoever can mend it
+    # left for whoever can mend it
+    assert (folder.path / "checkpoint.npz").read_bytes() == b"PK"
 
 
 def test_the_checkpoint_of_another_run_is_refused(folder, path, tmp_path):
@@ -136,9 +152,16 @@ def test_a_full_disk_ends_a_fit_with_a_line_and_it_goes_on_afterwards(path, tmp_
     with files_up_to(4000), pytest.raises(RunError, match="cannot be written"):
         fit(SETTINGS, path, tmp_path / "run", resume=True, progress=Watcher())
     assert "search" in RunFolder(tmp_path / "run").checkpoints()
-    fit(load_settings(tmp_path / "run" / "config.yaml"), path, tmp_path / "run", resume=True)
+    fit(
+        load_settings(tmp_path / "run" / "config.yaml"),
+        path,
+        tmp_path / "run",
+        resume=True,
+    )
     for name in ("checkpoint.npz", "estimate.yaml", "model/fitted.xml"):
-        assert (tmp_path / "run" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+        assert (tmp_path / "run" / name).read_bytes() == (
+            tmp_path / "whole" / name
+        ).read_bytes()
 
 
 def test_a_folder_of_something_else_stays_as_it_is(path, tmp_path):
@@ -173,7 +196,9 @@ def test_a_run_of_another_arm_or_model_is_refused(folder, path, tmp_path):
     arm = SETTINGS.arm
 
     def other(**changes):
-        return SETTINGS.changed({"arm": arm.changed(changes)}), read_logs([path], SETTINGS)
+        return SETTINGS.changed({"arm": arm.changed(changes)}), read_logs(
+            [path], SETTINGS
+        )
 
     with pytest.raises(RunError, match=r"has arm\.actuators.* = "):
         folder.begin(*other(actuators={}))
@@ -184,18 +209,27 @@ def test_a_run_of_another_arm_or_model_is_refused(folder, path, tmp_path):
         folder.begin(*other(model=model))
 
 
-def test_a_log_that_has_moved_is_the_same_log_and_another_is_named(folder, path, tmp_path):
+def test_a_log_that_has_moved_is_the_same_log_and_another_is_named(
+    folder, path, tmp_path
+):
     moved = tmp_path / "moved.csv"
     moved.write_bytes(path.read_bytes())
     folder.begin(SETTINGS, read_logs(moved, SETTINGS))
-    with pytest.raises(RunError, match=r"other logs, .*log.csv, not .*moved.csv, .*log.csv"):
+    with pytest.raises(
+        RunError, match=r"other logs, .*log.csv, not .*moved.csv, .*log.csv"
+    ):
         folder.begin(SETTINGS, read_logs([moved, path], SETTINGS))
     moved.write_text("\n".join(path.read_text().splitlines()[:-1]) + "\n")
-    with pytest.raises(RunError, match=r"other logs, or others' contents: .*log.csv, not .*moved.csv"):
+    with pytest.raises(
+        RunError, match=r"other logs, or others' contents: .*log.csv, not .*moved.csv"
+    ):
         folder.begin(SETTINGS, read_logs(moved, SETTINGS))
 
 
 def test_two_in_one_folder_the_second_is_refused(path, tmp_path):
-    with locked(tmp_path / "run"), pytest.raises(RunError, match=f"in use by process {os.getpid()} on "):
+    with (
+        locked(tmp_path / "run"),
+        pytest.raises(RunError, match=f"in use by process {os.getpid()} on "),
+    ):
         fit(SETTINGS, path, tmp_path / "run", progress=Watcher())
     fit(SETTINGS, path, tmp_path / "run", progress=Watcher())

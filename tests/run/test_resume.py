@@ -19,13 +19,16 @@ OWN = {".lock", "run.log", "checkpoint.previous.npz"}
 
 
 def start(cwd: Path, *options: object, out: str) -> "subprocess.Popen[str]":
-    """Begin or resume a run of six seconds of a virtual rig's log; checkpoints after every generation."""
+    """Begin or resume a run of six seconds of a virtual rig's log; checkpoints after
+    every generation."""
     if not (cwd / "log.csv").exists():
         head(cwd / "log.csv", 600)
     code = "import hydroid.commands.app as a, hydroid.fitting.checkpoints as s; s.SAVE_EVERY = 0; a.main()"
     command = ["fit-mech", "log.csv", *map(str, options), "--out", out, "--resume"]
     command = [sys.executable, "-c", code, *command]
-    return subprocess.Popen(command, cwd=cwd, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    return subprocess.Popen(
+        command, cwd=cwd, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
 
 
 def finish(process: "subprocess.Popen[str]", code: int = 0) -> str:
@@ -41,9 +44,13 @@ def wait_for(process: "subprocess.Popen[str]", run: Path, pattern: str) -> None:
 
 def content(folder: Path) -> dict[str, object]:
     """Files by name; of run.json what it says besides how long the run took."""
-    found = {p.relative_to(folder).as_posix(): p for p in folder.rglob("*") if p.is_file()}
+    found = {
+        p.relative_to(folder).as_posix(): p for p in folder.rglob("*") if p.is_file()
+    }
     return {
-        name: json.loads(p.read_bytes()) | {"seconds": 0} if p.name == "run.json" else p.read_bytes()
+        name: json.loads(p.read_bytes()) | {"seconds": 0}
+        if p.name == "run.json"
+        else p.read_bytes()
         for name, p in found.items()
         if p.name not in OWN
     }
@@ -51,20 +58,40 @@ def content(folder: Path) -> dict[str, object]:
 
 PYMOO = ["-q", "--algorithm=pymoo", "--no-refinement"]
 SEARCHES = {
-    "ga": [*SHORT, "--set", "search.ga.generations=20", "--set", "refinement.iterations=20"],
-    "nsga2": ["-q", "--set", "search.nsga2={population: 10, generations: 20}", "--no-refinement"],
-    "multistart": ["-q", "--algorithm=multistart", "--set=search.multistart={starts: 3, iterations: 5}"],
+    "ga": [
+        *SHORT,
+        "--set",
+        "search.ga.generations=20",
+        "--set",
+        "refinement.iterations=20",
+    ],
+    "nsga2": [
+        "-q",
+        "--set",
+        "search.nsga2={population: 10, generations: 20}",
+        "--no-refinement",
+    ],
+    "multistart": [
+        "-q",
+        "--algorithm=multistart",
+        "--set=search.multistart={starts: 3, iterations: 5}",
+    ],
     "moead": [*PYMOO, "--set", "search.pymoo={population: 10, generations: 20}"],
-    "mopso-cd": [*PYMOO, "--set=search.pymoo={algorithm: mopso-cd, population: 10, generations: 20}"],
+    "mopso-cd": [
+        *PYMOO,
+        "--set=search.pymoo={algorithm: mopso-cd, population: 10, generations: 20}",
+    ],
 }
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", SEARCHES)
 def test_killed_runs_end_the_same(tmp_path: Path, kind: str):
-    """Every run is killed at moments drawn at random, and resumed; KILLS in the environment asks for more."""
+    """Every run is killed at moments drawn at random, and resumed; KILLS in the
+    environment asks for more."""
     rng = random.Random(kind)
-    whole, killed = tmp_path / "whole", tmp_path / "killed"  # the report's commands name the run's folder
+    # the report's commands name the run's folder
+    whole, killed = tmp_path / "whole", tmp_path / "killed"
     whole.mkdir()
     killed.mkdir()
     hits, began = 0, time.monotonic()
@@ -75,7 +102,11 @@ def test_killed_runs_end_the_same(tmp_path: Path, kind: str):
         if rng.random() < 0.5:
             time.sleep(took * rng.random())
         else:  # while a file is written
-            wait_for(process, killed / "run", rng.choice((".checkpoint.npz.*.part", ".*.part")))
+            wait_for(
+                process,
+                killed / "run",
+                rng.choice((".checkpoint.npz.*.part", ".*.part")),
+            )
         process.kill()
         process.communicate()
         if process.returncode == 0:  # it was faster
@@ -88,7 +119,9 @@ def test_killed_runs_end_the_same(tmp_path: Path, kind: str):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("notice", ["SIGUSR1", "SIGHUP"])
-def test_a_notice_ends_a_run_with_its_checkpoint_and_a_second_run_is_refused(tmp_path: Path, notice: str):
+def test_a_notice_ends_a_run_with_its_checkpoint_and_a_second_run_is_refused(
+    tmp_path: Path, notice: str
+):
     options = [*SHORT, "--set", "search.ga.generations=4000"]
     process = start(tmp_path, *options, out="run")
     wait_for(process, tmp_path / "run", "checkpoint.npz")
@@ -99,7 +132,10 @@ def test_a_notice_ends_a_run_with_its_checkpoint_and_a_second_run_is_refused(tmp
         process.send_signal(getattr(signal, notice))
         time.sleep(0.01)
     assert "--resume" in finish(process, 130)
-    assert json.loads((tmp_path / "run" / "run.json").read_text())["status"] == "interrupted"
+    assert (
+        json.loads((tmp_path / "run" / "run.json").read_text())["status"]
+        == "interrupted"
+    )
     lines = (tmp_path / "run" / "run.log").read_text().splitlines()
     assert "checkpoint: generation" in lines[-2]
     assert "interrupted" in lines[-1]

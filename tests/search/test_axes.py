@@ -1,4 +1,5 @@
-"""Derivatives along the axes of a covariance: by laws of functions whose derivatives are known."""
+"""Derivatives along the axes of a covariance: by laws of functions whose derivatives
+are known."""
 
 import numpy as np
 import pytest
@@ -18,7 +19,9 @@ def linear(points):
     return points @ SLOPES
 
 
-@pytest.mark.parametrize("at", [(1.0, 2.0, 3.0), (0.0, 2.0, 4.0), (0.0, 0.0, 4.0), (1e-4, 2.0, 3.9999)])
+@pytest.mark.parametrize(
+    "at", [(1.0, 2.0, 3.0), (0.0, 2.0, 4.0), (0.0, 0.0, 4.0), (1e-4, 2.0, 3.9999)]
+)
 @pytest.mark.parametrize("sided", [lambda axes: axes, lambda axes: axes.one_sided])
 def test_a_linear_function_is_differentiated_exactly_inside_and_at_bounds(at, sided):
     here, visited = box(at), []
@@ -28,7 +31,9 @@ def test_a_linear_function_is_differentiated_exactly_inside_and_at_bounds(at, si
         return linear(points)
 
     for axes in (single_axes(here, 1e-3), covariance_axes(here, ROOT, 1.0)):
-        np.testing.assert_allclose(differentiate(function, here, sided(axes)), SLOPES, rtol=1e-8, atol=1e-8)
+        np.testing.assert_allclose(
+            differentiate(function, here, sided(axes)), SLOPES, rtol=1e-8, atol=1e-8
+        )
     points = np.vstack(visited)
     assert (points >= here.lower).all()
     assert (points <= here.upper).all()
@@ -43,11 +48,15 @@ def test_held_coordinates_stay():
 def test_curvature_is_no_slope():
     def function(points):
         change = points - np.array([1.0, 2.0, 3.0])
-        return points @ SLOPES + 1e4 * (change[:, :1] ** 3 + change[:, :1] ** 2) * SLOPES[0]
+        return (
+            points @ SLOPES
+            + 1e4 * (change[:, :1] ** 3 + change[:, :1] ** 2) * SLOPES[0]
+        )
 
     axes = Axes(np.eye(3), np.tile([0.1, -0.1], (3, 1)))
     found = differentiate(function, box(), axes)
-    assert np.linalg.norm(found - SLOPES) < 2 * np.linalg.norm(SLOPES)  # 100 times without shorter steps
+    # 100 times without shorter steps
+    assert np.linalg.norm(found - SLOPES) < 2 * np.linalg.norm(SLOPES)
 
 
 def test_an_axis_that_fails_keeps_its_former_slope():
@@ -59,4 +68,6 @@ def test_an_axis_that_fails_keeps_its_former_slope():
     here, axes = box(), single_axes(box(), 1e-3)
     alone = differentiate(function, here, axes)
     assert np.isnan(alone[1]).all()
-    np.testing.assert_allclose(differentiate(function, here, axes, former=SLOPES), SLOPES, rtol=1e-8)
+    np.testing.assert_allclose(
+        differentiate(function, here, axes, former=SLOPES), SLOPES, rtol=1e-8
+    )

@@ -40,7 +40,8 @@ def test_random_points_are_uniform(kind):
     counts = np.histogram(points, bins=50, range=(0, 1))[0]
     expected = points.size / 50
     chi2 = ((counts - expected) ** 2 / expected).sum()
-    assert chi2 < 49 + 5 * np.sqrt(2 * 49)  # five standard deviations of chi-square with 49 degrees
+    # five standard deviations of chi-square with 49 degrees
+    assert chi2 < 49 + 5 * np.sqrt(2 * 49)
 
 
 INF, NAN = np.inf, np.nan
@@ -58,11 +59,14 @@ INF, NAN = np.inf, np.nan
     ],
 )
 def test_candidates_are_drawn_in_proportion_to_their_fitness(objective, fitness):
-    index = roulette(np.array(objective, dtype=float)[:, None], 50_000, np.random.default_rng(11))
+    index = roulette(
+        np.array(objective, dtype=float)[:, None], 50_000, np.random.default_rng(11)
+    )
     counts, drawn = np.bincount(index, minlength=len(objective)), np.array(fitness) > 0
     assert counts[~drawn].sum() == 0
     expected = (np.array(fitness) / np.sum(fitness) * counts.sum())[drawn]
-    assert ((counts[drawn] - expected) ** 2 / expected).sum() < 16.3  # chi-square, 3 degrees, p = 0.001
+    # chi-square, 3 degrees, p = 0.001
+    assert ((counts[drawn] - expected) ** 2 / expected).sum() < 16.3
 
 
 @given(st.integers(1, 6), st.integers(1, 40), st.integers(1, 50), st.integers(0, 999))
@@ -80,7 +84,9 @@ def test_crossover_only_exchanges_the_genes_of_a_pair(kind, cross, rate, seed):
     rng = np.random.default_rng(seed)
     parents = kind(4).random(10, rng)
     parents.flags.writeable = False
-    children = crossover(parents, GeneticSettings(crossover=cross, crossover_rate=rate), rng)
+    children = crossover(
+        parents, GeneticSettings(crossover=cross, crossover_rate=rate), rng
+    )
     assert children.dtype == parents.dtype
     pair = np.sort(parents.reshape(5, 2, -1), axis=1)
     assert (np.sort(children.reshape(5, 2, -1), axis=1) == pair).all()
@@ -90,7 +96,9 @@ def test_the_crossover_rate_is_the_share_of_pairs_that_cross():
     coding = IntegerCoding(200)
     rng = np.random.default_rng(0)
     parents = coding.random(4000, rng)
-    children = crossover(parents, GeneticSettings(crossover="uniform", crossover_rate=0.8), rng)
+    children = crossover(
+        parents, GeneticSettings(crossover="uniform", crossover_rate=0.8), rng
+    )
     crossed = (children != parents).any(axis=1).reshape(-1, 2)
     assert (crossed[:, 0] == crossed[:, 1]).all()
     assert abs(crossed.mean() - 0.8) < 5 * np.sqrt(0.16 / 2000)

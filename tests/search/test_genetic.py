@@ -5,7 +5,13 @@ from pymoo.indicators.hv import HV
 from pymoo.optimize import minimize
 from pymoo.problems import get_problem
 
-from hydroid.search.genetic import Nsga2, Population, SimpleGa, crowded_order, tournament
+from hydroid.search.genetic import (
+    Nsga2,
+    Population,
+    SimpleGa,
+    crowded_order,
+    tournament,
+)
 from hydroid.search.pareto import feasible
 from hydroid.settings.search import GeneticSettings
 
@@ -19,7 +25,9 @@ def evaluate(algorithm, chromosomes, function):
 
 def advance(algorithm, function, population, rng, generations):
     if population is None:
-        population = algorithm.tell(None, evaluate(algorithm, algorithm.ask(None, rng), function))
+        population = algorithm.tell(
+            None, evaluate(algorithm, algorithm.ask(None, rng), function)
+        )
     for _ in range(generations):
         offspring = evaluate(algorithm, algorithm.ask(population, rng), function)
         population = algorithm.tell(population, offspring)
@@ -27,7 +35,11 @@ def advance(algorithm, function, population, rng, generations):
 
 
 def bits(population):
-    return population.chromosomes.dtype, population.chromosomes.tobytes(), population.objectives.tobytes()
+    return (
+        population.chromosomes.dtype,
+        population.chromosomes.tobytes(),
+        population.objectives.tobytes(),
+    )
 
 
 def two_goals(points):
@@ -42,24 +54,37 @@ def with_failures(points):
 
 @pytest.mark.parametrize(
     ("name", "size", "reference"),
-    [("zdt1", {"n_var": 10}, [1.1, 1.1]), ("dtlz2", {"n_var": 7, "n_obj": 3}, [1.1, 1.1, 1.1])],
+    [
+        ("zdt1", {"n_var": 10}, [1.1, 1.1]),
+        ("dtlz2", {"n_var": 7, "n_obj": 3}, [1.1, 1.1, 1.1]),
+    ],
 )
 def test_reaches_what_pymoo_reaches_with_the_same_budget(name, size, reference):
     problem, volume = get_problem(name, **size), HV(ref_point=np.array(reference))
-    settings = GeneticSettings(population=40, crossover_rate=0.9, mutation_rate=1 / problem.n_var)
+    settings = GeneticSettings(
+        population=40, crossover_rate=0.9, mutation_rate=1 / problem.n_var
+    )
     search, ours, theirs, start = Nsga2(settings, problem.n_var), [], [], []
     for seed in range(3):
         rng = np.random.default_rng(seed)
         first = advance(search, problem.evaluate, None, rng, 0)
         start.append(volume(first.objectives))
-        ours.append(volume(advance(search, problem.evaluate, first, rng, 99).objectives))
-        theirs.append(volume(minimize(problem, NSGA2(pop_size=40), ("n_gen", 100), seed=seed).F))
-    assert np.median(start) < 0.5 * np.median(theirs)  # otherwise the problem could not tell
-    assert np.median(ours) > 0.93 * np.median(theirs)  # theirs crosses real numbers, ours strings of bits
+        ours.append(
+            volume(advance(search, problem.evaluate, first, rng, 99).objectives)
+        )
+        theirs.append(
+            volume(minimize(problem, NSGA2(pop_size=40), ("n_gen", 100), seed=seed).F)
+        )
+    # otherwise the problem could not tell
+    assert np.median(start) < 0.5 * np.median(theirs)
+    # theirs crosses real numbers, ours strings of bits
+    assert np.median(ours) > 0.93 * np.median(theirs)
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
-def test_the_infeasible_neither_survive_nor_win_while_a_feasible_candidate_is_there(bad):
+def test_the_infeasible_neither_survive_nor_win_while_a_feasible_candidate_is_there(
+    bad,
+):
     search = Nsga2(GeneticSettings(population=20), 2)
     rng = np.random.default_rng(0)
     chromosomes = search.ask(None, rng)
@@ -106,7 +131,8 @@ def test_finds_the_bottom_of_a_sphere(coding, cross):
     ga = SimpleGa(GeneticSettings(coding=coding, crossover=cross), 9)
     population = advance(ga, sphere, None, np.random.default_rng(0), 200)
     random = sphere(np.random.default_rng(0).random((201 * 70, 9))).min()
-    assert population.objectives.min() < random / 5  # random search with the same number of evaluations
+    # random search with the same number of evaluations
+    assert population.objectives.min() < random / 5
 
 
 def test_the_best_one_is_kept_and_not_evaluated_again():

@@ -19,12 +19,14 @@ def linear(singular, truth, rows=400, offset=0.0, seed=0):
     left = np.linalg.qr(rng.normal(size=(rows, len(singular))))[0]
     right = np.linalg.qr(rng.normal(size=(len(singular), len(singular))))[0]
     matrix = left * singular @ right.T
-    # einsum sums each row by itself, so that a batch is the same as its candidates, as it is for a simulation
+    # einsum sums each row by itself, so that a batch is the same as its candidates, as
+    # it is for a simulation
     return (lambda x: np.einsum("np,rp->nr", x - truth, matrix) + offset), matrix
 
 
 def oscillator(points):
-    """A response that depends on its parameters over several decades, and not on the last one at all."""
+    """A response that depends on its parameters over several decades, and not on the
+    last one at all."""
     t = np.linspace(0, 10, 300)
     gain, damping, stiffness, tail, _ = points.T[:, :, None]
     wave = np.exp(-(0.1 + damping) * t) * np.sin((1 + stiffness) * t)
@@ -48,7 +50,9 @@ def test_a_curved_problem_over_six_decades_is_solved_too(seed):
     def curved(x):
         return residuals(x + 0.5 * (x - truth) ** 2)
 
-    result = least_squares(np.clip(truth + rng.uniform(-0.3, 0.3, 6), 0, 1), curved, SETTINGS)
+    result = least_squares(
+        np.clip(truth + rng.uniform(-0.3, 0.3, 6), 0, 1), curved, SETTINGS
+    )
     np.testing.assert_allclose(result.point, truth, atol=1e-8)
 
 
@@ -68,7 +72,8 @@ def test_an_effect_that_is_only_rounding_is_none():
     strong, _ = linear([3.0, 1.0], truth[:2])
 
     def residuals(x):
-        # (r + a) - a rounds to multiples of 2^-46, and where it does so depends on the third parameter
+        # (r + a) - a rounds to multiples of 2^-46, and where it does so depends on the
+        # third parameter
         noise = 64 + np.pi * x[:, 2:]
         return (strong(x[:, :2]) + noise) - noise
 
@@ -88,7 +93,9 @@ def test_never_worse_than_the_start_and_always_inside(seed, failing):
     mix = rng.normal(size=(3, 20))
 
     def residuals(x):
-        rows = np.sin(3 * (x - truth)) @ mix + 0.01 * np.sin(40 * x.sum(axis=1, keepdims=True))
+        rows = np.sin(3 * (x - truth)) @ mix + 0.01 * np.sin(
+            40 * x.sum(axis=1, keepdims=True)
+        )
         # scattered regions that cannot be simulated
         rows[np.cos(12 * x).sum(axis=1) > 3 - 2 * failing] = np.nan
         return rows
@@ -113,7 +120,9 @@ def fails_beside_its_start(x):
 
 def test_a_state_that_was_stored_goes_on_to_the_same_bits():
     truth = np.array([0.4, 0.3, 0.7, 0.6, 0.5])
-    measured = oscillator(truth[None]) + 0.01 * np.random.default_rng(1).normal(size=300)
+    measured = oscillator(truth[None]) + 0.01 * np.random.default_rng(1).normal(
+        size=300
+    )
 
     def residuals(points):
         return measured - oscillator(points)
@@ -144,7 +153,9 @@ def test_a_box_is_never_left_and_its_optimum_found(seed):
         seen.append(x)
         return residuals(x)
 
-    result = least_squares(rng.random(5), watched, RefinementSettings(gain_tolerance=1e-14))
+    result = least_squares(
+        rng.random(5), watched, RefinementSettings(gain_tolerance=1e-14)
+    )
     points = np.vstack(seen)
     assert ((points >= 0) & (points <= 1)).all()
     assert result.evaluations == len(points)
@@ -164,7 +175,9 @@ def test_a_box_is_never_left_and_its_optimum_found(seed):
         (lambda x: np.ones((len(x), 5)), [0.3, 0.8], Ending.GAIN),
     ],
 )
-def test_what_cannot_go_on_stays_at_its_start_and_says_why(function, begin, ending, capfd):
+def test_what_cannot_go_on_stays_at_its_start_and_says_why(
+    function, begin, ending, capfd
+):
     result = least_squares(np.array(begin), function, SETTINGS)
     assert result.ending is ending
     assert (result.point == begin).all()
@@ -172,6 +185,8 @@ def test_what_cannot_go_on_stays_at_its_start_and_says_why(function, begin, endi
 
 
 def test_iterations_run_out():
-    result = least_squares(np.array([0.1, 0.9]), rosenbrock, RefinementSettings(iterations=2))
+    result = least_squares(
+        np.array([0.1, 0.9]), rosenbrock, RefinementSettings(iterations=2)
+    )
     assert (result.ending, result.iterations) == (Ending.ITERATIONS, 2)
     assert result.cost < result.cost_before

@@ -22,14 +22,18 @@ FRONT_AT = np.array([0.7, 0.2, 0.4])
 
 
 def two_valleys(points: Array) -> Array:
-    """Objectives of points, (n, 4): f1 = x1, f2 = 1 - sqrt(x1) on the front, above it elsewhere."""
+    """Objectives of points, (n, 4): f1 = x1, f2 = 1 - sqrt(x1) on the front, above it
+    elsewhere."""
     away = np.sum((points[:, 1:] - FRONT_AT) ** 2, axis=1)
     first = points[:, 0]
-    return np.stack([first, (1 + 9 * away) * (1 - np.sqrt(first / (1 + 9 * away)))], axis=1)
+    return np.stack(
+        [first, (1 + 9 * away) * (1 - np.sqrt(first / (1 + 9 * away)))], axis=1
+    )
 
 
 def run(search: BoxSearch, rng: Generator, objectives=two_valleys) -> list[Population]:
-    """Return the population of every generation, as `hydroid.fitting.search` drives a search."""
+    """Return the population of every generation, as `hydroid.fitting.search` drives a
+    search."""
     population = None
     populations = list[Population]()
     for _ in range(1 + search.generations):
@@ -40,13 +44,16 @@ def run(search: BoxSearch, rng: Generator, objectives=two_valleys) -> list[Popul
     return populations
 
 
-def searched(name: str, start: Array | None = None, objectives=two_valleys, seed: int = 1):
+def searched(
+    name: str, start: Array | None = None, objectives=two_valleys, seed: int = 1
+):
     search = PymooSearch(PymooSettings(algorithm=name, **SIZE), 4, 2, start)
     return run(search, np.random.default_rng(seed), objectives)
 
 
 def above_front(population: Population) -> Array:
-    """How far the non-dominated candidates lie above the front, in the second objective."""
+    """How far the non-dominated candidates lie above the front, in the second
+    objective."""
     first, second = population.objectives[non_dominated(population.objectives)].T
     return second - (1 - np.sqrt(first))
 
@@ -76,7 +83,9 @@ def test_stays_in_the_box_and_begins_at_the_start(name: str):
     start = np.array([0.25, *FRONT_AT])
     populations = searched(name, start)
     assert np.any(np.all(populations[0].chromosomes == start, axis=1))
-    assert all((p.chromosomes >= 0).all() and (p.chromosomes <= 1).all() for p in populations)
+    assert all(
+        (p.chromosomes >= 0).all() and (p.chromosomes <= 1).all() for p in populations
+    )
     # nothing dominates a point of the front, so that none of the last ones is beyond it
     assert above_front(populations[-1]).min() > -1e-9
 

@@ -6,11 +6,20 @@ from pymoo.operators.survival.rank_and_crowding.metrics import calc_crowding_dis
 from pymoo.problems import get_problem
 from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
 
-from hydroid.search.pareto import average, crowding, non_dominated, ranks, segment_best, utopia
+from hydroid.search.pareto import (
+    average,
+    crowding,
+    non_dominated,
+    ranks,
+    segment_best,
+    utopia,
+)
 
 PROBLEMS = [("zdt1", {}), ("zdt4", {}), ("dtlz7", {"n_var": 10, "n_obj": 8})]
 
-values = st.one_of(st.integers(0, 4).map(float), st.sampled_from([np.nan, np.inf, -np.inf]))
+values = st.one_of(
+    st.integers(0, 4).map(float), st.sampled_from([np.nan, np.inf, -np.inf])
+)
 shapes = st.tuples(st.integers(1, 14), st.integers(1, 4))
 populations = shapes.flatmap(lambda s: arrays(float, s, elements=values))
 
@@ -18,7 +27,9 @@ populations = shapes.flatmap(lambda s: arrays(float, s, elements=values))
 @pytest.mark.parametrize(("name", "size"), PROBLEMS)
 def test_ranks_and_crowding_agree_with_pymoo(name, size):
     problem = get_problem(name, **size)
-    objectives = problem.evaluate(np.random.default_rng(0).random((70, problem.n_var)) * problem.xu)
+    objectives = problem.evaluate(
+        np.random.default_rng(0).random((70, problem.n_var)) * problem.xu
+    )
     rank = ranks(objectives)
     theirs = NonDominatedSorting().do(objectives, return_rank=True)[1]
     assert rank.tolist() == theirs.tolist()
@@ -27,7 +38,9 @@ def test_ranks_and_crowding_agree_with_pymoo(name, size):
     for front in range(rank.max() + 1):
         candidates = rank == front
         if candidates.sum() > 2:
-            expected = calc_crowding_distance(objectives[candidates]) * objectives.shape[1]
+            expected = (
+                calc_crowding_distance(objectives[candidates]) * objectives.shape[1]
+            )
             np.testing.assert_allclose(room[candidates], expected, rtol=1e-12)
             compared += 1
     assert compared

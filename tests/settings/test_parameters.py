@@ -1,4 +1,5 @@
-"""Settings of parameters: nominal values, priors, the bounds that follow, one parameter per joint."""
+"""Settings of parameters: nominal values, priors, the bounds that follow, one parameter
+per joint."""
 
 import math
 
@@ -24,7 +25,9 @@ def test_nominal_values_come_from_the_arm_and_the_hydraulics():
     assert parameter(name="A", quantity="onset_a", joints=[2], sd=0.2).start == 1.4
     # joints 2 and 3 agree, joint 1 does not
     assert parameter(quantity="area_a", joints=[2, 3], within=2).start == 1000
-    with pytest.raises(SettingsError, match=r"parameters.A_A: within: needs a nominal value"):
+    with pytest.raises(
+        SettingsError, match=r"parameters.A_A: within: needs a nominal value"
+    ):
         parameter(quantity="area_a", joints=[1, 2], within=2)
     own = parameter(quantity="area_a", joints=[1, 2], nominal=700, within=2)
     assert own.start == 700
@@ -35,7 +38,9 @@ def test_within_holds_95_percent_of_a_log_normal_prior():
     assert prior is not None
     assert prior.value(1.96) == pytest.approx(2000)
     assert prior.value(-1.96) == pytest.approx(500)
-    assert prior.score(np.array([1000.0, 2000.0, 500.0])) == pytest.approx([0.0, 1.96, -1.96])
+    assert prior.score(np.array([1000.0, 2000.0, 500.0])) == pytest.approx(
+        [0.0, 1.96, -1.96]
+    )
 
 
 def test_bounds_follow_from_the_prior():
@@ -59,14 +64,20 @@ def test_bounds_follow_from_the_prior():
         ({"nominal": 3.0}, "needs bounds"),
         ({"bounds": [10, 20], "nominal": 30}, "nominal 30 lies outside the bounds"),
         ({"bounds": [10, 20], "start": 30}, "start 30 lies outside the bounds"),
-        ({"bounds": [10, 20], "within": 2}, "nominal value 1000 mm² lies outside the bounds"),
+        (
+            {"bounds": [10, 20], "within": 2},
+            "nominal value 1000 mm² lies outside the bounds",
+        ),
         ({"nominal": 0.0, "within": 2}, "nominal value above 0"),
         ({"nominal": -1.0, "sd": 2}, "cannot be negative"),
         ({"each": True, "within": 2}, "not both"),
         ({"quantity": "pump_flow", "bounds": [1, 2]}, "all joints share the pump"),
         ({"quantity": "curve_a", "start": 2.0}, "a list of 4 factors"),
         ({"quantity": "curve_a", "start": [1, 1, 1]}, "a list of 4 factors"),
-        ({"quantity": "curve_a", "start": [1, 1, 1, 0]}, "start 0 lies outside the bounds"),
+        (
+            {"quantity": "curve_a", "start": [1, 1, 1, 0]},
+            "start 0 lies outside the bounds",
+        ),
     ],
 )
 def test_settings_that_make_no_sense_are_refused(entry, words):
@@ -83,7 +94,10 @@ def test_each_writes_one_parameter_per_joint_with_its_own_nominal_value():
     }
     settings = load_settings("fit-hyd", changes)
     parameters = {p.name: p for p in settings.parameter_set().parameters}
-    assert (parameters["A_A_azimuth"].start, parameters["A_A_shoulder"].start) == (800, 1000)
+    assert (parameters["A_A_azimuth"].start, parameters["A_A_shoulder"].start) == (
+        800,
+        1000,
+    )
     assert parameters["A_A_shoulder"].prior.sd == pytest.approx(math.log(1.5) / 1.96)
     assert settings.parameters["A_A_azimuth"].joints == (1,)
     assert settings.parameters["C"].joints == (2,)
@@ -105,13 +119,17 @@ def test_a_curve_stands_for_its_factors_and_their_smoothness():
     assert settings.priors["C_shoulder"].smooth == tuple(p.name for p in own)
     assert parameters["F_4"].fixed == 1
     assert "F" not in settings.priors
-    again = load_settings("fit-hyd", settings.model_dump(mode="json", include={"parameters", "priors"}))
+    again = load_settings(
+        "fit-hyd", settings.model_dump(mode="json", include={"parameters", "priors"})
+    )
     assert again.parameters == settings.parameters
     assert again.priors == settings.priors
 
 
 def test_a_log_scale_maps_the_unit_box_by_ratios_and_back():
-    parameters = ParameterSet((Parameter("a", "", 0.1, 1000.0, log=True), Parameter("b", "", 0.0, 4.0)))
+    parameters = ParameterSet(
+        (Parameter("a", "", 0.1, 1000.0, log=True), Parameter("b", "", 0.0, 4.0))
+    )
     theta = parameters.from_unit(np.array([[0.0, 0.0], [0.25, 0.25], [1.0, 1.0]]))
     assert theta[:, 0] == pytest.approx([0.1, 1.0, 1000.0])
     assert theta[-1, 0] == 1000.0
@@ -122,7 +140,10 @@ def test_a_log_scale_maps_the_unit_box_by_ratios_and_back():
 def test_a_start_is_stated_clipped_or_in_the_middle_of_the_scale():
     entry = {"quantity": "area_a", "joints": [2], "bounds": [250.0, 4000.0]}
     assert parameter(**entry, start=300.0).start == 300
-    assert parameter(**entry | {"bounds": [1500.0, 4000.0], "nominal": 2000.0}).start == 2000
+    assert (
+        parameter(**entry | {"bounds": [1500.0, 4000.0], "nominal": 2000.0}).start
+        == 2000
+    )
     plain = load_settings("article-hyd").parameter_set()
     assert plain.start[plain.names.index("A_A")] == 0.5 * (250 + 2500)
 
@@ -131,4 +152,6 @@ def test_a_start_is_stated_clipped_or_in_the_middle_of_the_scale():
 def test_stage_1_takes_its_steps_per_sample_whatever_the_model_of_stage_2(model: str):
     changes = {"simulation.model": model, "simulation.steps_per_sample": 4}
     assert load_settings("fit-mech", changes).simulation.steps == 4
-    assert load_settings("fit-hyd", changes).simulation.steps == (4 if model == "dynamic" else 1)
+    assert load_settings("fit-hyd", changes).simulation.steps == (
+        4 if model == "dynamic" else 1
+    )

@@ -1,4 +1,5 @@
-"""A population: no neighbour, no thread and no candidate that fails changes a bit of another."""
+"""A population: no neighbour, no thread and no candidate that fails changes a bit of
+another."""
 
 from functools import partial
 from pathlib import Path
@@ -22,18 +23,26 @@ def test_threads_and_neighbours_change_no_bit(arm, make, kind, other):
     together = make(kind=kind, other_joints=other, threads=1).simulate(everyone).angle
     assert np.ptp(together, axis=1).min() > np.deg2rad(0.2)
     for threads in (2, 5):
-        again = make(kind=kind, other_joints=other, threads=threads).simulate(everyone).angle
+        again = (
+            make(kind=kind, other_joints=other, threads=threads)
+            .simulate(everyone)
+            .angle
+        )
         np.testing.assert_array_equal(again, together)
     alone = make(kind=kind, other_joints=other)
-    # large after small and small after large: the buffers of one call leave nothing to the next
+    # large after small and small after large: the buffers of one call leave nothing to
+    # the next
     for rows in (slice(3, 5), slice(0, 7), slice(6, 7)):
-        np.testing.assert_array_equal(alone.simulate(everyone[rows]).angle, together[rows])
+        np.testing.assert_array_equal(
+            alone.simulate(everyone[rows]).angle, together[rows]
+        )
 
 
 @pytest.mark.parametrize(
     ("kind", "other", "spoiled"),
     [
-        ("mech", "passive", {"damping": 0.0, "stiffness": 1e9}),  # explicit at 0.01 s: blows up
+        # explicit at 0.01 s: blows up
+        ("mech", "passive", {"damping": 0.0, "stiffness": 1e9}),
         ("hyd", "passive", {"stiffness": 1e9}),
         ("hyd", "locked", {"force_2": 100.0}),  # the force would grow with the stroke
     ],
@@ -50,10 +59,13 @@ def test_a_set_that_cannot_be_simulated_is_marked_and_harms_nobody(
         column[2] = spoiled[name]
     capfd.readouterr()
     response = run(replaced(everyone, **columns))
-    np.testing.assert_array_equal(np.isfinite(response.angle).all(axis=(1, 2)), [True, True, False, True])
+    np.testing.assert_array_equal(
+        np.isfinite(response.angle).all(axis=(1, 2)), [True, True, False, True]
+    )
     assert np.isnan(response.angle[2]).all()
     np.testing.assert_array_equal(response.angle[[0, 1, 3]], healthy[[0, 1, 3]])
     assert np.isnan(run(replaced(everyone, **spoiled)).angle).all()
-    np.testing.assert_array_equal(run(everyone).angle, healthy)  # and nothing is left of it
+    # and nothing is left of it
+    np.testing.assert_array_equal(run(everyone).angle, healthy)
     assert capfd.readouterr() == ("", "")
     assert not Path("MUJOCO_LOG.TXT").exists()

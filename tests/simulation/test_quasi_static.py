@@ -1,4 +1,5 @@
-"""The quasi-static rollout: closed forms, its limit of the dynamic one, the pump's balance, static loads."""
+"""The quasi-static rollout: closed forms, its limit of the dynamic one, the pump's
+balance, static loads."""
 
 from types import SimpleNamespace
 
@@ -27,7 +28,8 @@ PUMP = {"pump_flow": 6e-5, "pump_droop": 60e5}
 
 @pytest.fixture
 def simulated(spec, arm):
-    """Simulate constant commands [%] of some joints, 0-based; angles [rad] and what the actuators did."""
+    """Simulate constant commands [%] of some joints, 0-based; angles [rad] and what the
+    actuators did."""
 
     def run(commands, seconds=2.0, model="quasi-static", period=0.01, **values):
         command = np.zeros((round(seconds / period) + 1, len(arm.joints)))
@@ -40,7 +42,11 @@ def simulated(spec, arm):
             (one.mass if name == "mass" else one.joints[name])[:] = value
         settings = SimulationSettings(model=model)
         scenario = Scenario(spec, arm, log, sorted(commands), settings)
-        return Simulation(scenario, 10).simulate(one).angle[0], trace(scenario, 10, one), one.joints[0]
+        return (
+            Simulation(scenario, 10).simulate(one).angle[0],
+            trace(scenario, 10, one),
+            one.joints[0],
+        )
 
     return run
 
@@ -52,10 +58,14 @@ def test_without_load_the_speed_is_opening_times_root_of_the_pressure(simulated)
     half = (roll.supply_pressure - roll.tank_pressure) / 2  # both edges lose the same
     flow = roll.flow_coefficient * roll.opening_a * share * np.sqrt(2 * half / DENSITY)
     assert 0.1 < share < 0.9
-    np.testing.assert_allclose(np.diff(angle[-20:, 0]) / 0.01, flow / roll.area_a, rtol=0.01)
+    np.testing.assert_allclose(
+        np.diff(angle[-20:, 0]) / 0.01, flow / roll.area_a, rtol=0.01
+    )
 
 
-@pytest.mark.parametrize("commands", [{SHOULDER: 50}, {SHOULDER: -50}, {SHOULDER: 60, 2: -40}])
+@pytest.mark.parametrize(
+    "commands", [{SHOULDER: 50}, {SHOULDER: -50}, {SHOULDER: 60, 2: -40}]
+)
 @pytest.mark.parametrize(
     "pump",
     [
@@ -67,13 +77,24 @@ def test_without_load_the_speed_is_opening_times_root_of_the_pressure(simulated)
         PUMP | {"compensation": 0.5},
     ],
 )
-def test_the_dynamic_model_converges_to_it_as_oil_stiffens_and_motion_slows(simulated, commands, pump):
+def test_the_dynamic_model_converges_to_it_as_oil_stiffens_and_motion_slows(
+    simulated, commands, pump
+):
     def apart(slower, stiffer):
-        each = {"opening_a": 3e-7 / slower, "opening_b": 3e-7 / slower, "leakage": 1e-14, "damping": 0.0}
-        each |= pump | ({"pump_flow": pump["pump_flow"] / slower} if "pump_flow" in pump else {})
+        each = {
+            "opening_a": 3e-7 / slower,
+            "opening_b": 3e-7 / slower,
+            "leakage": 1e-14,
+            "damping": 0.0,
+        }
+        each |= pump | (
+            {"pump_flow": pump["pump_flow"] / slower} if "pump_flow" in pump else {}
+        )
         each |= {"bulk_modulus": 8e8 * stiffer, "line_volume": 1e-6}
         models = "quasi-static", "dynamic"
-        quasi, full = (simulated(commands, 1.0 * slower, model, **each)[0] for model in models)
+        quasi, full = (
+            simulated(commands, 1.0 * slower, model, **each)[0] for model in models
+        )
         return np.abs(quasi - full).max() / np.ptp(full, axis=0).max()
 
     near, far = apart(4.0, 20.0), apart(1.0, 1.0)
@@ -83,13 +104,23 @@ def test_the_dynamic_model_converges_to_it_as_oil_stiffens_and_motion_slows(simu
 
 @pytest.mark.parametrize(("lag", "exponent"), [(0.0, 1.0), (0.02, 1.0), (0.02, 1.9)])
 def test_what_comes_later_moves_the_joint_by_as_much_less(simulated, lag, exponent):
-    each = {"plunger_mass": 0.008, "damping": 0.0, "dead_band_a": 25.0, "dead_band_b": 20.0}
+    each = {
+        "plunger_mass": 0.008,
+        "damping": 0.0,
+        "dead_band_a": 25.0,
+        "dead_band_b": 20.0,
+    }
     for end in "ab":
         own = {"plunger_damping": 8.0, "pilot_lag": lag, "opening_exponent": exponent}
         each |= {f"{name}_{end}": value for name, value in own.items()}
-    delays, to_and_fro = 0.1 + np.arange(0, 0.01, 0.0005), np.repeat([80.0, -60.0], [12, 13])
+    delays, to_and_fro = (
+        0.1 + np.arange(0, 0.01, 0.0005),
+        np.repeat([80.0, -60.0], [12, 13]),
+    )
     ends = [
-        simulated({ROLL: to_and_fro}, 0.6, period=0.025, delay_a=delay, delay_b=delay, **each)[0][-2:, 0]
+        simulated(
+            {ROLL: to_and_fro}, 0.6, period=0.025, delay_a=delay, delay_b=delay, **each
+        )[0][-2:, 0]
         for delay in delays  # over four sub-steps
     ]
     speed = np.ptp(ends[0]) / 0.025
@@ -100,7 +131,9 @@ def test_what_comes_later_moves_the_joint_by_as_much_less(simulated, lag, expone
 def test_what_a_short_pilot_lag_costs_is_in_proportion_to_it(simulated):
     own = {"plunger_mass": 0.008, "dead_band_a": 25.0, "plunger_damping_a": 8.0}
     lags = [0, 1e-8, 1e-6, 1e-4, 1e-3]
-    ends = [simulated({ROLL: 80.0}, 0.6, pilot_lag_a=lag, **own)[0][-1, 0] for lag in lags]
+    ends = [
+        simulated({ROLL: 80.0}, 0.6, pilot_lag_a=lag, **own)[0][-1, 0] for lag in lags
+    ]
     lost = (ends[0] - np.array(ends[1:])) / lags[1:]
     np.testing.assert_allclose(lost, lost[-1], rtol=0.1)  # 6 % is left by the sub-steps
 
@@ -108,11 +141,22 @@ def test_what_a_short_pilot_lag_costs_is_in_proportion_to_it(simulated):
 @pytest.mark.parametrize("model", ["quasi-static", "dynamic"])
 @pytest.mark.parametrize("command", [50, -50])
 def test_a_load_does_not_slow_a_compensated_valve(simulated, arm, model, command):
-    stiff = {"bulk_modulus": 1.6e10, "leakage": 1e-14, "damping": 0.0, "opening_a": 1e-7, "opening_b": 1e-7}
+    stiff = {
+        "bulk_modulus": 1.6e10,
+        "leakage": 1e-14,
+        "damping": 0.0,
+        "opening_a": 1e-7,
+        "opening_b": 1e-7,
+    }
 
     def way(compensation, part):
         angle = simulated(
-            {SHOULDER: command}, 2.0, model, **stiff, compensation=compensation, mass=part * arm.masses
+            {SHOULDER: command},
+            2.0,
+            model,
+            **stiff,
+            compensation=compensation,
+            mass=part * arm.masses,
         )[0]
         return float(angle[-1, 0] - angle[0, 0])
 
@@ -123,7 +167,9 @@ def test_a_load_does_not_slow_a_compensated_valve(simulated, arm, model, command
 
 def cylinder(**values):
     """A cylinder's COEFFICIENTS for `rod_speed`, with 1000 and 750 mm² [SI]."""
-    a, b = (SimpleNamespace(area=area, return_=1.5, draw=1.0) for area in (1000e-6, 750e-6))
+    a, b = (
+        SimpleNamespace(area=area, return_=1.5, draw=1.0) for area in (1000e-6, 750e-6)
+    )
     each = {"conductance": 0.7 * np.sqrt(2 / DENSITY), "tank_pressure": 5e5}
     return SimpleNamespace(a=a, b=b, **each, **values)
 
@@ -132,16 +178,23 @@ def cylinder(**values):
 @pytest.mark.parametrize("drag", [0.0, 2e4])
 @pytest.mark.parametrize("limit", [np.inf, 1e-5, 2e-6])
 @pytest.mark.parametrize("compensation", [0.0, 0.6, 1.0])
-def test_speed_flow_and_pressures_are_continuous_in_the_load(opening, drag, limit, compensation):
+def test_speed_flow_and_pressures_are_continuous_in_the_load(
+    opening, drag, limit, compensation
+):
     """From a load beyond the supply to one that overruns what the pump gives."""
     c, supply = cylinder(flow_limit=limit, compensation=compensation), 150e5
     inner, outer = (c.a, c.b) if opening > 0 else (c.b, c.a)
 
     def under(load):
-        """Speed, flow from the pump, pressures of the chamber that fills and of the other."""
-        w = SimpleNamespace(travel=opening, push=np.sign(opening) * load, thrust=200.0, drag=drag)
+        """Speed, flow from the pump, pressures of the chamber that fills and of the
+        other."""
+        w = SimpleNamespace(
+            travel=opening, push=np.sign(opening) * load, thrust=200.0, drag=drag
+        )
         speed, flow, _ = rod_speed(c, w, supply)
-        leaving = c.tank_pressure + (speed * outer.area / (c.conductance * 4e-7 * 1.5)) ** 2
+        leaving = (
+            c.tank_pressure + (speed * outer.area / (c.conductance * 4e-7 * 1.5)) ** 2
+        )
         entering = (leaving * outer.area + load + 200.0 + drag * speed) / inner.area
         return speed, flow, entering if speed > 0.0 else supply, leaving
 
@@ -157,33 +210,47 @@ def test_speed_flow_and_pressures_are_continuous_in_the_load(opening, drag, limi
     assert not fed[-1]
     for i, values in enumerate((speed, flow, entering, leaving)):
         steps = np.abs(np.diff(values))
-        k = int(steps.argmax())  # a jump would stay as large between nearer loads; a root falls to 3 %
+        # a jump would stay as large between nearer loads; a root falls to 3 %
+        k = int(steps.argmax())
         near = [under(load)[i] for load in np.linspace(loads[k], loads[k + 1], 1001)]
         assert np.abs(np.diff(near)).max() < 0.1 * steps[k] + 1e-9 * np.ptp(values)
 
 
 @pytest.mark.parametrize("mass", [0.3, 1.0, 2.0])
 @pytest.mark.parametrize("limit", [1e-6, 4e-6])
-def test_both_models_agree_where_a_load_overruns_a_limited_flow(simulated, arm, mass, limit):
-    values = {"flow_limit": limit, "mass": mass * arm.masses, "return_a": 2.0, "opening_b": 2e-7}
+def test_both_models_agree_where_a_load_overruns_a_limited_flow(
+    simulated, arm, mass, limit
+):
+    values = {
+        "flow_limit": limit,
+        "mass": mass * arm.masses,
+        "return_a": 2.0,
+        "opening_b": 2e-7,
+    }
     values |= {"bulk_modulus": 1.6e10, "leakage": 1e-14, "damping": 0.0}
     (quasi, slow, joints), (full, fast, _) = (
-        simulated({SHOULDER: -50}, 2.0, model, **values) for model in ("quasi-static", "dynamic")
+        simulated({SHOULDER: -50}, 2.0, model, **values)
+        for model in ("quasi-static", "dynamic")
     )
     speeds = [np.diff(angle[:, 0])[50:150].mean() for angle in (quasi, full)]
     assert speeds[0] < 0.0
     assert speeds[0] == pytest.approx(speeds[1], rel=0.01)
     assert slow.pressure[50:150].min() >= 0.0
-    np.testing.assert_allclose(slow.pressure[100:150], fast.pressure[100:150], rtol=0.02, atol=1e5)
+    np.testing.assert_allclose(
+        slow.pressure[100:150], fast.pressure[100:150], rtol=0.02, atol=1e5
+    )
     taken = -slow.flow[100, 0, 1]
-    assert taken >= limit * (1 - 1e-9)  # the load draws more than the pump gives, or as much
+    # the load draws more than the pump gives, or as much
+    assert taken >= limit * (1 - 1e-9)
     assert joints.area_b[SHOULDER] > 0
 
 
 @pytest.mark.parametrize("draw", [1.0, 0.6])
 def test_what_the_actuators_take_is_what_the_pump_gives(simulated, draw):
     _, trace, joints = simulated({SHOULDER: 70, 2: -60}, **PUMP, draw_a=draw)
-    taken = np.where(trace.flow[..., 0] > 0, draw * trace.flow[..., 0], -trace.flow[..., 1]).sum(axis=1)
+    taken = np.where(
+        trace.flow[..., 0] > 0, draw * trace.flow[..., 0], -trace.flow[..., 1]
+    ).sum(axis=1)
     left = (joints.supply_pressure[SHOULDER] - trace.line[:, 0]) / PUMP["pump_droop"]
     given = PUMP["pump_flow"] * np.minimum(left, 1.0)
     moving = trace.line[:, 0] < joints.supply_pressure[SHOULDER]
@@ -193,16 +260,21 @@ def test_what_the_actuators_take_is_what_the_pump_gives(simulated, draw):
 
 @pytest.mark.parametrize("model", ["quasi-static", "dynamic"])
 def test_the_pressure_falls_by_no_more_than_its_limit(simulated, model):
-    """Up to there it is that without a limit, and below a pump that gives whatever is taken."""
+    """Up to there it is that without a limit, and below a pump that gives whatever is
+    taken."""
     pump = PUMP | {"line_volume": 1e-6, "pump_limit": 8e5}
     _, limited, joints = simulated({SHOULDER: 70, 2: -60}, 1.0, model, **pump)
-    _, without, _ = simulated({SHOULDER: 70, 2: -60}, 1.0, model, **pump | {"pump_limit": np.inf})
+    _, without, _ = simulated(
+        {SHOULDER: 70, 2: -60}, 1.0, model, **pump | {"pump_limit": np.inf}
+    )
     low = joints.supply_pressure[SHOULDER] - pump["pump_limit"]
     assert without.line[:, 0].min() < low - 5e5
     assert limited.line[:, 0].min() == pytest.approx(low)
     beyond = np.flatnonzero(without.line[:, 0] < low)[0]
     np.testing.assert_allclose(limited.line[:beyond], without.line[:beyond])
-    taken = np.where(limited.flow[..., 0] > 0, limited.flow[..., 0], -limited.flow[..., 1]).sum(axis=1)
+    taken = np.where(
+        limited.flow[..., 0] > 0, limited.flow[..., 0], -limited.flow[..., 1]
+    ).sum(axis=1)
     given = PUMP["pump_flow"] * pump["pump_limit"] / PUMP["pump_droop"]
     assert taken.max() > 1.2 * given
 
@@ -215,8 +287,11 @@ def test_what_is_not_drawn_from_the_pump_does_not_load_it(simulated, model):
     weak = {"pump_flow": 8e-6, "line_volume": 1e-6}
     free = simulated(both, 1.0, model, **weak, draw_a=0.0, draw_b=0.0)[0]
     np.testing.assert_allclose(free, constant, atol=2e-3 * np.ptp(constant))
-    full, less = (simulated(one, 1.0, model, **weak, draw_a=draw)[0] for draw in (1.0, 0.5))
-    assert np.ptp(less) == pytest.approx(2 * np.ptp(full), rel=0.05)  # all that the pump gives
+    full, less = (
+        simulated(one, 1.0, model, **weak, draw_a=draw)[0] for draw in (1.0, 0.5)
+    )
+    # all that the pump gives
+    assert np.ptp(less) == pytest.approx(2 * np.ptp(full), rel=0.05)
 
 
 def test_pressures_carry_the_load_and_a_closed_valve_holds_it(simulated, arm, spec):
@@ -239,15 +314,21 @@ def test_a_joint_rings_on_its_oil_as_the_exact_solution_whatever_the_step(ratio)
     pace, wanted, ends = 2 * np.pi * 1.7, 0.6, []
     for steps in (1, 40):
         cosine, sine = ringing(np.array(1.7), np.array(ratio), 0.8 / steps)
-        c = SimpleNamespace(oil_frequency=1.7, oil_damping=ratio, ring_cosine=cosine, ring_sine=sine)
+        c = SimpleNamespace(
+            oil_frequency=1.7, oil_damping=ratio, ring_cosine=cosine, ring_sine=sine
+        )
         z = SimpleNamespace(turning=0.0, surge=0.0)
-        ends.append((sum(overshoot(c, z, wanted) for _ in range(steps)), z.turning, z.surge))
+        ends.append(
+            (sum(overshoot(c, z, wanted) for _ in range(steps)), z.turning, z.surge)
+        )
     np.testing.assert_allclose(ends[0], ends[1], rtol=1e-9)
     _, response = signal.step(([pace**2], [1, 2 * ratio * pace, pace**2]), T=[0, 0.8])
     assert ends[0][1] == pytest.approx(wanted * response[-1], rel=1e-9)
 
 
-def test_the_dynamic_model_rings_as_frequency_and_damping_ratio_say(simulated, arm, spec):
+def test_the_dynamic_model_rings_as_frequency_and_damping_ratio_say(
+    simulated, arm, spec
+):
     """A rotary actuator with soft oil: ω² = 2 β D²/(V M)."""
     soft = {"bulk_modulus": 2e6, "leakage": 1e-14, "damping": 0.0, "period": 0.005}
     angle, _, joints = simulated({ROLL: 50}, 0.8, "dynamic", **soft)
@@ -257,26 +338,40 @@ def test_the_dynamic_model_rings_as_frequency_and_damping_ratio_say(simulated, a
     stiffness = 2 * roll.bulk_modulus * roll.area_a**2 / roll.dead_volume
     frequency = np.sqrt(stiffness / inertia[ROLL, ROLL]) / (2 * np.pi)
     rigid, rings = (
-        simulated({ROLL: 50}, 0.8, **soft, oil_frequency=f, oil_damping=0.0)[0] for f in (np.inf, frequency)
+        simulated({ROLL: 50}, 0.8, **soft, oil_frequency=f, oil_damping=0.0)[0]
+        for f in (np.inf, frequency)
     )
     assert np.abs(rings - angle).max() < 0.3 * np.abs(rigid - angle).max()
 
 
 def test_valves_that_open_once_for_all_open_as_each_alone(spec, arm):
-    """Of candidates that differ in one quantity each, none gets the opening of another's valve."""
+    """Of candidates that differ in one quantity each, none gets the opening of
+    another's valve."""
     command = np.zeros((60, len(arm.joints)))
-    command[5:30, [SHOULDER, ROLL]], command[30:, [SHOULDER, ROLL]] = (70, -55), (-40, 80)
+    command[5:30, [SHOULDER, ROLL]], command[30:, [SHOULDER, ROLL]] = (
+        (70, -55),
+        (-40, 80),
+    )
     log = at_rest(arm.pose("study"), command, 0.02)
-    names = [n for n in JOINT.names or () if JOINT[n].kind == "f" and n not in ("sense", "stroke")]
+    names = [
+        n
+        for n in JOINT.names or ()
+        if JOINT[n].kind == "f" and n not in ("sense", "stroke")
+    ]
     everyone = candidates(arm, len(names))
     everyone.mass[:] = arm.masses
-    everyone.joints[:] = nominal_joints(arm, HydraulicSettings(pump_flow=4.0, dead_band_a=10, dead_band_b=10))
+    everyone.joints[:] = nominal_joints(
+        arm, HydraulicSettings(pump_flow=4.0, dead_band_a=10, dead_band_b=10)
+    )
     for row, name in enumerate(names):
         value = everyone.joints[name][row]
         everyone.joints[name][row] = np.where(np.isfinite(value), 1.01 * value, value)
     settings = SimulationSettings(model="quasi-static")
     simulation = Simulation(Scenario(spec, arm, log, [SHOULDER, ROLL], settings), 10)
     together = simulation.simulate(everyone).angle
-    alone = [simulation.simulate(everyone[row : row + 1]).angle[0] for row in range(len(names))]
+    alone = [
+        simulation.simulate(everyone[row : row + 1]).angle[0]
+        for row in range(len(names))
+    ]
     np.testing.assert_array_equal(together, alone)
     assert len(np.unique(together[:, -1, 0])) > 25

@@ -1,4 +1,5 @@
-"""The compiled rollout in a process that is not its own: callbacks of MuJoCo, Numba's cache."""
+"""The compiled rollout in a process that is not its own: callbacks of MuJoCo, Numba's
+cache."""
 
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -43,15 +44,20 @@ def names(code: CodeType) -> Iterator[str]:
 
 
 def inlined(function: FunctionType, seen: set[FunctionType]) -> Iterator[Path]:
-    """Files of hydroid that a compiled function takes code in from, its own among them."""
+    """Files of hydroid that a compiled function takes code in from, its own among
+    them."""
     if function in seen:
         return
     seen.add(function)
     yield Path(function.__code__.co_filename)
     for name in names(function.__code__):
         used: Any = function.__globals__.get(name)
-        of_a_module = isinstance(used, ModuleType) and used.__name__.startswith("hydroid")
-        assert not of_a_module, f"{function.__name__} calls functions of {name}: follow them here"
+        of_a_module = isinstance(used, ModuleType) and used.__name__.startswith(
+            "hydroid"
+        )
+        assert not of_a_module, (
+            f"{function.__name__} calls functions of {name}: follow them here"
+        )
         if isinstance(used, FunctionType) and used.__module__.startswith("hydroid"):
             yield from inlined(used, seen)
 
@@ -65,13 +71,18 @@ def inlined(function: FunctionType, seen: set[FunctionType]) -> Iterator[Path]:
         (steady._steady, [rollout, quasi_static]),  # pyright: ignore[reportPrivateUsage]
     ],
 )
-def test_numbas_cache_is_keyed_by_every_file_that_a_function_takes_code_in_from(compiled, more):
+def test_numbas_cache_is_keyed_by_every_file_that_a_function_takes_code_in_from(
+    compiled, more
+):
     function = compiled.py_func
     own = Path(function.__code__.co_filename)
     keyed = {*Path(kernel.__file__).parent.glob("*.py"), Path(linkage.__file__), own}
     keyed |= {Path(module.__file__) for module in more}
     assert set(inlined(function, set())) <= keyed
-    assert kernel.source_key(*(module.__file__ for module in more)) in function.__defaults__
+    assert (
+        kernel.source_key(*(module.__file__ for module in more))
+        in function.__defaults__
+    )
 
 
 def test_the_key_changes_with_a_files_text(tmp_path: Path):

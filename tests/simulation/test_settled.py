@@ -1,4 +1,5 @@
-"""Settled speeds of joints that share a pump, and the commands for wished ones: laws of both models."""
+"""Settled speeds of joints that share a pump, and the commands for wished ones: laws of
+both models."""
 
 import numpy as np
 import pytest
@@ -26,10 +27,18 @@ LAWS = [
     STRAIGHT,
     STRAIGHT | SLOPING,
     STRAIGHT | {"compensation": 0.8, "dry_friction": 5.0},
-    STRAIGHT | {"dead_band_a": 20.0, "dead_band_b": 25.0, "opening_exponent_a": 1.8, "friction": 20.0},
+    STRAIGHT
+    | {
+        "dead_band_a": 20.0,
+        "dead_band_b": 25.0,
+        "opening_exponent_a": 1.8,
+        "friction": 20.0,
+    },
     STRAIGHT | SLOPING | {"draw_a": 0.5, "return_b": 0.6, "damping": 300.0},
 ]
-both_models = pytest.mark.parametrize("quasi_static", [False, True], ids=["dynamic", "quasi-static"])
+both_models = pytest.mark.parametrize(
+    "quasi_static", [False, True], ids=["dynamic", "quasi-static"]
+)
 
 
 def actuators(arm, **values):
@@ -44,21 +53,28 @@ def actuators(arm, **values):
 
 @pytest.fixture
 def poses(arm):
-    angle = np.tile(arm.pose("study")[JOINTS], (20, 1)) + np.linspace(-0.1, 0.1, 20)[:, None]
+    angle = (
+        np.tile(arm.pose("study")[JOINTS], (20, 1))
+        + np.linspace(-0.1, 0.1, 20)[:, None]
+    )
     load = np.random.default_rng(0).uniform(-200.0, 400.0, (20, 3)) * [1.0, 0.5, 0.05]
     return angle, load
 
 
 @both_models
 @pytest.mark.parametrize("values", LAWS)
-def test_commands_for_the_speeds_of_commands_are_these_commands(arm, poses, values, quasi_static):
+def test_commands_for_the_speeds_of_commands_are_these_commands(
+    arm, poses, values, quasi_static
+):
     plugin, _ = actuators(arm, **values)
     angle, load = poses
     command = np.random.default_rng(1).uniform(30.0, 90.0, angle.shape)
     command *= np.where(np.arange(60).reshape(20, 3) % 2, -1.0, 1.0)
     speed = settled_speeds(plugin, angle, load, command, quasi_static=quasi_static)
     assert np.abs(speed).min() > 0.0
-    found, reached = settled_commands(plugin, angle, load, speed, quasi_static=quasi_static)
+    found, reached = settled_commands(
+        plugin, angle, load, speed, quasi_static=quasi_static
+    )
     np.testing.assert_allclose(reached, speed, rtol=1e-5)
     np.testing.assert_allclose(found, command, rtol=1e-4)
 
@@ -73,22 +89,33 @@ def test_without_a_pump_each_joint_is_alone(arm, poses, values, quasi_static):
     for k, j in np.ndindex(3, 3):
         loads = np.full((1, 3), load[k, j])
         alone = steady_velocity(
-            joints[:, j], angle[k, j], loads, command[k, j : j + 1], quasi_static=quasi_static
+            joints[:, j],
+            angle[k, j],
+            loads,
+            command[k, j : j + 1],
+            quasi_static=quasi_static,
         )
         assert speed[k, j] == pytest.approx(alone[0, 0], rel=1e-6)
 
 
 @both_models
 def test_the_pump_gives_what_joints_draw(arm, poses, quasi_static):
-    """Oil is conserved: at the line's pressure, which the flows imply, both are equal."""
+    """Oil is conserved: at the line's pressure, which the flows imply, both are
+    equal."""
     plugin, joints = actuators(arm, **STRAIGHT | PUMP | {"draw_b": 0.7})
     angle, load = poses
     command = np.tile([90.0, -80.0, 100.0], (20, 1))
     speed = settled_speeds(plugin, angle, load, command, quasi_static=quasi_static)
     table = coefficients(joints)[0]
-    drawn = np.array([swallowed(table, one, v).sum() for one, v in zip(angle, speed, strict=True)])
-    free = settled_speeds(actuators(arm, **STRAIGHT)[0], angle, load, command, quasi_static=quasi_static)
-    wanted = np.array([swallowed(table, one, v).sum() for one, v in zip(angle, free, strict=True)])
+    drawn = np.array(
+        [swallowed(table, one, v).sum() for one, v in zip(angle, speed, strict=True)]
+    )
+    free = settled_speeds(
+        actuators(arm, **STRAIGHT)[0], angle, load, command, quasi_static=quasi_static
+    )
+    wanted = np.array(
+        [swallowed(table, one, v).sum() for one, v in zip(angle, free, strict=True)]
+    )
     limit = delivery(0.0, 1.0, table[0])[0]
     assert (wanted > limit).all()
     assert (drawn <= limit * (1.0 + 1e-6)).all()
@@ -102,9 +129,15 @@ def test_what_cannot_be_had_is_met_by_the_nearest(arm, poses, quasi_static):
     angle, load = poses
     for sign in (1.0, -1.0):
         wish = np.full(angle.shape, sign * 50.0)
-        command, reached = settled_commands(plugin, angle, load, wish, quasi_static=quasi_static)
-        full = settled_speeds(plugin, angle, load, np.full(angle.shape, 100.0), quasi_static=quasi_static)
-        other = settled_speeds(plugin, angle, load, np.full(angle.shape, -100.0), quasi_static=quasi_static)
+        command, reached = settled_commands(
+            plugin, angle, load, wish, quasi_static=quasi_static
+        )
+        full = settled_speeds(
+            plugin, angle, load, np.full(angle.shape, 100.0), quasi_static=quasi_static
+        )
+        other = settled_speeds(
+            plugin, angle, load, np.full(angle.shape, -100.0), quasi_static=quasi_static
+        )
         assert (np.abs(command) == 100.0).all()
         fastest = np.maximum(full, other) if sign > 0 else np.minimum(full, other)
         np.testing.assert_allclose(reached, fastest, rtol=1e-9)
@@ -115,16 +148,22 @@ def test_a_valve_that_opens_with_a_jump_has_a_slowest_speed(arm, poses, quasi_st
     """Below half of it the nearest is to stand, above it is that speed."""
     plugin, _ = actuators(arm, **STRAIGHT | {"onset_a": 4.0, "onset_b": 4.0})
     angle, load = poses
-    least = settled_speeds(plugin, angle, load, np.full(angle.shape, 1e-6), quasi_static=quasi_static)
+    least = settled_speeds(
+        plugin, angle, load, np.full(angle.shape, 1e-6), quasi_static=quasi_static
+    )
     assert np.abs(least).min() > 1e-4
     for part, wanted in ((0.4, 0.0), (0.6, 1.0)):
-        _, reached = settled_commands(plugin, angle, load, part * least, quasi_static=quasi_static)
+        _, reached = settled_commands(
+            plugin, angle, load, part * least, quasi_static=quasi_static
+        )
         np.testing.assert_allclose(reached, wanted * least, rtol=1e-4)
 
 
 @both_models
 def test_no_wish_needs_no_command(arm, poses, quasi_static):
     plugin, _ = actuators(arm, **STRAIGHT | PUMP)
-    command, reached = settled_commands(plugin, *poses, np.zeros((20, 3)), quasi_static=quasi_static)
+    command, reached = settled_commands(
+        plugin, *poses, np.zeros((20, 3)), quasi_static=quasi_static
+    )
     assert not command.any()
     assert not reached.any()

@@ -1,4 +1,5 @@
-"""The simulation against plain MuJoCo and Radau, and what both stages have in common."""
+"""The simulation against plain MuJoCo and Radau, and what both stages have in
+common."""
 
 import os
 import subprocess
@@ -21,18 +22,25 @@ from hydroid.simulation.simulation import reading
     ("kind", "other", "drift"),
     [("mech", "locked", 1e-9), ("mech", "passive", 1e-9), ("hyd", "passive", 1e-6)],
 )
-def test_without_commands_and_leakage_the_arm_stands_for_a_minute(spec, arm, kind, other, drift):
+def test_without_commands_and_leakage_the_arm_stands_for_a_minute(
+    spec, arm, kind, other, drift
+):
     log = step_log(arm.pose("study"), [0.0], dwell=60.0)
     everyone = scattered(arm, 3, leakage=0.0)
-    response = simulation(spec, arm, log, range(7), kind, other_joints=other).simulate(everyone)
+    response = simulation(spec, arm, log, range(7), kind, other_joints=other).simulate(
+        everyone
+    )
     assert np.isfinite(response.angle).all()
-    # gravity's gradient is a spring that may be unstable; rounding must not have grown to anything
+    # gravity's gradient is a spring that may be unstable; rounding must not have grown
+    # to anything
     assert np.abs(response.angle - arm.pose("study")).max() < drift
 
 
 def test_passive_arm_equals_a_plain_mujoco_loop(spec, arm, study_log):
     parameters = candidates(arm, 1)
-    response = simulation(spec, arm, study_log, range(7), other_joints="passive").simulate(parameters)
+    response = simulation(
+        spec, arm, study_log, range(7), other_joints="passive"
+    ).simulate(parameters)
     model = with_masses(arm, parameters.mass[0])
     model.dof_damping[:] = parameters.joints.damping[0]
     model.jnt_stiffness[:] = parameters.joints.stiffness[0]
@@ -50,7 +58,8 @@ def test_passive_arm_equals_a_plain_mujoco_loop(spec, arm, study_log):
 
 
 def test_locked_arm_converges_to_the_equation_of_motion(spec, arm, study_log):
-    """Against Radau on I q'' = K u + tau0 - g(q) - D q' - S (q - q0), with first order in the step."""
+    """Against Radau on I q'' = K u + tau0 - g(q) - D q' - S (q - q0), with first order
+    in the step."""
     parameters = candidates(arm, 1)
     model = with_masses(arm, parameters.mass[0])
     pose = study_log.angle[0]
@@ -62,23 +71,33 @@ def test_locked_arm_converges_to_the_equation_of_motion(spec, arm, study_log):
         return data.qfrc_bias[1], mass_matrix[1, 1]
 
     balance, _ = gravity_and_inertia(pose[1])
-    gain, damping, stiffness = (parameters.joints[name][0, 1] for name in ("gain", "damping", "stiffness"))
+    gain, damping, stiffness = (
+        parameters.joints[name][0, 1] for name in ("gain", "damping", "stiffness")
+    )
 
     def motion(t, y, u):
         bias, inertia = gravity_and_inertia(y[0])
-        torque = gain * u + balance - bias - damping * y[1] - stiffness * (y[0] - pose[1])
+        torque = (
+            gain * u + balance - bias - damping * y[1] - stiffness * (y[0] - pose[1])
+        )
         return [y[1], torque / inertia]
 
     state, reference = [pose[1], 0.0], [pose[1]]
     for k in range(5):  # one interval of constant command after the other
         u = study_log.command[100 * k, 1]
         times = np.linspace(0, 1, 101)
-        solution = solve_ivp(motion, (0, 1), state, "Radau", times, args=(u,), rtol=1e-10, atol=1e-12)
+        solution = solve_ivp(
+            motion, (0, 1), state, "Radau", times, args=(u,), rtol=1e-10, atol=1e-12
+        )
         reference.extend(solution.y[0, 1:])
         state = solution.y[:, -1]
     errors = []
     for steps in (1, 2, 4, 8):
-        angle = simulation(spec, arm, study_log, steps_per_sample=steps).simulate(parameters).angle[0, :, 0]
+        angle = (
+            simulation(spec, arm, study_log, steps_per_sample=steps)
+            .simulate(parameters)
+            .angle[0, :, 0]
+        )
         errors.append(np.abs(angle - reference[:-1]).max())
     assert errors[0] < np.deg2rad(0.1)
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
@@ -86,30 +105,42 @@ def test_locked_arm_converges_to_the_equation_of_motion(spec, arm, study_log):
 
 
 @pytest.mark.parametrize("other", ["locked", "passive"])
-def test_a_common_factor_of_all_forces_and_masses_changes_nothing(spec, arm, study_log, other):
+def test_a_common_factor_of_all_forces_and_masses_changes_nothing(
+    spec, arm, study_log, other
+):
     one = candidates(arm, 3)
-    forces = {name: 1.7 * one.joints[name] for name in ("gain", "damping", "stiffness", "friction")}
+    forces = {
+        name: 1.7 * one.joints[name]
+        for name in ("gain", "damping", "stiffness", "friction")
+    }
     scaled = Candidates(replaced(one, **forces).joints, 1.7 * one.mass)
     run = simulation(spec, arm, study_log, other_joints=other).simulate
     np.testing.assert_allclose(run(scaled).angle, run(one).angle, atol=1e-9)
 
 
 def test_prescribed_joints_give_the_shoulder_the_motion_they_had(spec, arm):
-    """Move every joint, then prescribe all but the shoulder: it must move as it did, coupling included."""
+    """Move every joint, then prescribe all but the shoulder: it must move as it did,
+    coupling included."""
     log = step_log(arm.pose("study"), [60.0, -80.0, 30.0, 0.0, -40.0])
     command = log.command.copy()
     command[:, 2] = -command[:, 1]
     command[:, 3] = 0.5 * command[:, 1]
     moved = replace(log, command=command)
     parameters = candidates(arm, 1)
-    free = simulation(spec, arm, moved, range(7), other_joints="passive").simulate(parameters).angle[0]
+    free = (
+        simulation(spec, arm, moved, range(7), other_joints="passive")
+        .simulate(parameters)
+        .angle[0]
+    )
     assert np.ptp(free[:, 2]) > np.deg2rad(2)
     only_shoulder = replace(log, angle=free)  # its commands drive the shoulder alone
     errors = []
     for steps in (1, 8):
         settings = {"measured_cutoff_hz": 50.0, "steps_per_sample": steps}
         run = simulation(spec, arm, only_shoulder, other_joints="measured", **settings)
-        errors.append(np.abs(run.simulate(parameters).angle[0, :, 0] - free[:, 1]).max())
+        errors.append(
+            np.abs(run.simulate(parameters).angle[0, :, 0] - free[:, 1]).max()
+        )
     locked = simulation(spec, arm, only_shoulder).simulate(parameters).angle[0, :, 0]
     assert errors[0] < 0.02 * np.abs(locked - free[:, 1]).max()
     assert errors[0] < np.deg2rad(0.01)
@@ -126,7 +157,9 @@ def test_dry_friction_holds_the_arm_against_small_commands(spec, arm):
 
 
 @pytest.mark.parametrize("other", ["locked", "passive"])
-def test_candidates_at_their_stops_or_diverging_change_no_bit_of_others(spec, arm, study_log, other):
+def test_candidates_at_their_stops_or_diverging_change_no_bit_of_others(
+    spec, arm, study_log, other
+):
     some = candidates(arm, 8)
     gain, friction = some.joints["gain"], some.joints["friction"]
     gain[2:6] *= 40.0
@@ -141,14 +174,22 @@ def test_candidates_at_their_stops_or_diverging_change_no_bit_of_others(spec, ar
     np.testing.assert_array_equal(together.angle, np.concatenate(alone))
 
 
-def test_passive_joints_that_hardly_move_leave_the_shoulder_as_locked_ones(spec, arm, study_log):
+def test_passive_joints_that_hardly_move_leave_the_shoulder_as_locked_ones(
+    spec, arm, study_log
+):
     everyone, shoulder = scattered(arm, 2), np.arange(7) == 1
     held = {"stiffness": 1e5, "damping": 1e4}
-    stiff = {k: np.where(shoulder, everyone.joints[k], value) for k, value in held.items()}
+    stiff = {
+        k: np.where(shoulder, everyone.joints[k], value) for k, value in held.items()
+    }
     others = ("locked", "passive")
-    locked, passive = (simulation(spec, arm, study_log, kind="hyd", other_joints=o) for o in others)
+    locked, passive = (
+        simulation(spec, arm, study_log, kind="hyd", other_joints=o) for o in others
+    )
     found = passive.simulate(replaced(everyone, **stiff)).angle
-    np.testing.assert_allclose(found, locked.simulate(everyone).angle, atol=np.deg2rad(0.1))
+    np.testing.assert_allclose(
+        found, locked.simulate(everyone).angle, atol=np.deg2rad(0.1)
+    )
 
 
 TIME = 0.01 * np.arange(300)
@@ -166,21 +207,30 @@ def test_a_plain_sensor_reads_the_angle_to_the_bit():
 def test_a_lagging_sensor_follows_a_ramp_late():
     angle = 0.3 + 0.2 * TIME[:, None]
     seen = reading(angle, sensors(1.0, 0.15), 0.01)[:, 0]
-    np.testing.assert_allclose(seen, 0.3 + 0.2 * (TIME - 0.15 * (1 - np.exp(-TIME / 0.15))), atol=1e-12)
+    np.testing.assert_allclose(
+        seen, 0.3 + 0.2 * (TIME - 0.15 * (1 - np.exp(-TIME / 0.15))), atol=1e-12
+    )
 
 
 def test_a_scale_acts_on_the_turn_since_the_start():
     angle = 0.3 + 0.2 * np.sin(TIME)[:, None]
-    np.testing.assert_allclose(reading(angle, sensors(1.1, 0.0), 0.01), 0.3 + 1.1 * (angle - 0.3))
+    np.testing.assert_allclose(
+        reading(angle, sensors(1.1, 0.0), 0.01), 0.3 + 1.1 * (angle - 0.3)
+    )
 
 
 @pytest.mark.slow
 def test_compiling_is_announced_only_where_the_cache_is_empty(tmp_path):
     """The message follows numba's cache, not the time that reading it takes."""
-    program = "from hydroid.simulation.rollout import compile_rollout; compile_rollout()"
+    program = (
+        "from hydroid.simulation.rollout import compile_rollout; compile_rollout()"
+    )
     environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
     command = [sys.executable, "-c", program]
-    runs = [subprocess.run(command, env=environment, capture_output=True, text=True) for _ in range(2)]
+    runs = [
+        subprocess.run(command, env=environment, capture_output=True, text=True)
+        for _ in range(2)
+    ]
     said = [run.stderr for run in runs]
     assert said[0].count("compiling the simulation") == 1
     assert said[1] == ""

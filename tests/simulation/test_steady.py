@@ -1,4 +1,5 @@
-"""The steady speed in a pose against motions that have settled, of both models, and its laws."""
+"""The steady speed in a pose against motions that have settled, of both models, and its
+laws."""
 
 import numpy as np
 import pytest
@@ -18,7 +19,8 @@ PUMP = {"pump_flow": 2e-5, "pump_droop": 60e5}
 
 @pytest.fixture
 def both(spec, arm):
-    """The speed of a settled motion [rad/s], and the steady one in the pose that the joint then passes."""
+    """The speed of a settled motion [rad/s], and the steady one in the pose that the
+    joint then passes."""
 
     def compare(joint, command, model, seconds=1.5, back=0.0, **values):
         pose = arm.pose("study")
@@ -29,7 +31,9 @@ def both(spec, arm):
         one.mass[:], one.joints.stiffness[:] = arm.masses, 0.0
         for name, value in values.items():
             (one.mass if name == "mass" else one.joints[name])[:] = value
-        scenario = Scenario(spec, arm, at_rest(pose, commands), [joint], SimulationSettings(model=model))
+        scenario = Scenario(
+            spec, arm, at_rest(pose, commands), [joint], SimulationSettings(model=model)
+        )
         angle = Simulation(scenario, 10).simulate(one).angle[0, :, 0]
         settled = (angle[-1] - angle[-3]) / 0.02
         stepped = SteppedArm(scenario.arm.model)
@@ -75,7 +79,12 @@ def test_it_is_the_speed_of_a_motion_that_has_settled(both, values, model, comma
 
 @pytest.mark.parametrize("command", [0.0, 8.0, 60.0])
 @pytest.mark.parametrize(
-    "values", [{"leakage": 3e-8}, {"leakage": 1e-8, "anticavitation": 2e-6}, PUMP | {"leakage": 1e-8}]
+    "values",
+    [
+        {"leakage": 3e-8},
+        {"leakage": 1e-8, "anticavitation": 2e-6},
+        PUMP | {"leakage": 1e-8},
+    ],
 )
 def test_leaking_edges_let_the_dynamic_model_sag(both, command, values):
     slow = {"opening_a": 1e-7, "opening_b": 1e-7, "bulk_modulus": 8e9}
@@ -94,7 +103,8 @@ def test_a_rotary_actuator_turns_steadily_too(both, model):
 
 @pytest.fixture
 def shoulder(arm):
-    """Steady velocities [rad/s] of the shoulder in a pose, (n, m), under loads [N·m], (n,)."""
+    """Steady velocities [rad/s] of the shoulder in a pose, (n, m), under loads [N·m],
+    (n,)."""
 
     def velocity(load, commands, quasi_static=False, **values):
         one = candidates(arm, len(load))
@@ -103,7 +113,9 @@ def shoulder(arm):
             one.joints[name][:] = value
         loads = np.repeat(np.array(load)[:, None], 3, axis=1)  # the same on the way
         how = {"quasi_static": quasi_static}
-        return steady_velocity(one.joints[:, SHOULDER], 0.2, loads, np.array(commands), **how)
+        return steady_velocity(
+            one.joints[:, SHOULDER], 0.2, loads, np.array(commands), **how
+        )
 
     return velocity
 
@@ -117,14 +129,21 @@ def test_without_leakage_the_models_have_one_law(shoulder, pump):
         "friction": 20.0,
         "damping": 300.0,
     } | pump
-    load, commands = np.linspace(-400.0, 600.0, 11), [-100.0, -40.0, -5.0, 5.0, 40.0, 100.0]
-    dynamic, quasi = (shoulder(load, commands, quasi_static=q, **values) for q in (False, True))
+    load, commands = (
+        np.linspace(-400.0, 600.0, 11),
+        [-100.0, -40.0, -5.0, 5.0, 40.0, 100.0],
+    )
+    dynamic, quasi = (
+        shoulder(load, commands, quasi_static=q, **values) for q in (False, True)
+    )
     np.testing.assert_allclose(dynamic, quasi, rtol=1e-4, atol=1e-9)
 
 
 def test_a_load_within_the_joints_friction_stands(shoulder):
     values = {"leakage": 1e-8, "friction": 50.0}
-    (free, held) = shoulder([0.0, 0.0], [0.0], leakage=1e-8, friction=np.array([[0.0], [1e9]]))[:, 0]
+    (free, held) = shoulder(
+        [0.0, 0.0], [0.0], leakage=1e-8, friction=np.array([[0.0], [1e9]])
+    )[:, 0]
     assert free != 0.0
     assert held == 0.0
     speeds = shoulder(np.linspace(-2000.0, 2000.0, 201), [0.0], **values)[:, 0]

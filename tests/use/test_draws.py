@@ -1,4 +1,5 @@
-"""Draws have the posterior's mean and covariance, keep within bounds, and are as likely as they should be."""
+"""Draws have the posterior's mean and covariance, keep within bounds, and are as likely
+as they should be."""
 
 import numpy as np
 import pytest
@@ -14,11 +15,18 @@ from hydroid.use.draws import DriftingAngles, draw, on_their_level, within
 
 
 def posterior(room: float, p: int = 4, quantile: float = NORMAL) -> Posterior:
-    """With correlated parameters whose bounds are `room` relative changes away, to both sides."""
-    covariance = 0.01 * (0.7 + 0.3 * np.eye(p)) * np.outer(np.arange(1, p + 1), np.arange(1, p + 1))
+    """With correlated parameters whose bounds are `room` relative changes away, to both
+    sides."""
+    covariance = (
+        0.01
+        * (0.7 + 0.3 * np.eye(p))
+        * np.outer(np.arange(1, p + 1), np.arange(1, p + 1))
+    )
     root = np.linalg.cholesky(np.linalg.inv(covariance)).T
     at = np.full(p, 2.0)
-    box = Box(at, at - 2.0 * room, at + 2.0 * room, np.full(p, 2.0), np.ones(p, dtype=bool))
+    box = Box(
+        at, at - 2.0 * room, at + 2.0 * room, np.full(p, 2.0), np.ones(p, dtype=bool)
+    )
     return Posterior(box, root, quantile)
 
 
@@ -29,7 +37,9 @@ def test_without_bounds_draws_have_the_mean_and_the_covariance():
     np.testing.assert_allclose(drawn.mean(axis=0) / sd, 0.0, atol=5 / np.sqrt(4000))
     scaled = np.cov(drawn.T) / np.outer(sd, sd)
     np.testing.assert_allclose(scaled, known.covariance / np.outer(sd, sd), atol=0.08)
-    wider = within(posterior(room=1e3, quantile=2 * NORMAL), 4000, np.random.default_rng(0))
+    wider = within(
+        posterior(room=1e3, quantile=2 * NORMAL), 4000, np.random.default_rng(0)
+    )
     np.testing.assert_allclose(wider, 2.0 * drawn)  # as the intervals are
 
 
@@ -68,7 +78,8 @@ def test_what_is_no_fit_has_no_draws():
 
 
 def test_angles_drift_as_the_error_model_says():
-    """Variance: growth with time and with the way, and that of the lasting error once it is there."""
+    """Variance: growth with time and with the way, and that of the lasting error once
+    it is there."""
     numbers = np.array([[1e-6, 2e-6, 3e-5, 4e-6, 0.1], [0.0, 0.0, 0.0, 0.0, 0.0]])
     drifting, rng = DriftingAngles(numbers, 20_000, 0.1), np.random.default_rng(0)
     way = np.tile([0.02, 0.02], (20_000, 1))

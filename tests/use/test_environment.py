@@ -1,4 +1,5 @@
-"""The environments keep gymnasium's contract, repeat themselves, and are the plant underneath."""
+"""The environments keep gymnasium's contract, repeat themselves, and are the plant
+underneath."""
 
 import warnings
 
@@ -14,14 +15,22 @@ from hydroid.identified_model import IdentifiedModel, identified
 from hydroid.plant import Plant
 from hydroid.use.environment import Env, VectorEnv
 
-VALUES = TRUTH | HYDRAULIC | {"open_A": 0.4, "open_B": 0.4, "delay": 0.03, "friction": 20.0}
+VALUES = (
+    TRUTH | HYDRAULIC | {"open_A": 0.4, "open_B": 0.4, "delay": 0.03, "friction": 20.0}
+)
 
 
 @pytest.fixture(scope="module")
 def model() -> IdentifiedModel:
-    changes = {"start_pose": "study", "simulation.model": "quasi-static", "outputs": [2, 3]}
+    changes = {
+        "start_pose": "study",
+        "simulation.model": "quasi-static",
+        "outputs": [2, 3],
+    }
     settings = load_settings("fit-hyd", changes)
-    return identified(settings, {n: v for n, v in VALUES.items() if n in settings.parameters}, "test")
+    return identified(
+        settings, {n: v for n, v in VALUES.items() if n in settings.parameters}, "test"
+    )
 
 
 def test_gymnasium_finds_nothing_wrong(model):
@@ -38,7 +47,9 @@ def test_an_action_is_a_command_of_the_plant(model):
     plant = Plant(model, joints=[2, 3])
     plant.reset(pose)
     for _ in range(10):
-        _, reward, terminated, truncated, _ = env.step(np.array([0.5, -0.7], np.float32))
+        _, reward, terminated, truncated, _ = env.step(
+            np.array([0.5, -0.7], np.float32)
+        )
         assert (reward < 0.0, terminated, truncated) == (True, False, False)
         for _ in range(4):
             plant.step({"shoulder": 50, "elbow": -70})
@@ -75,7 +86,8 @@ def test_a_vector_of_machines_is_one_call(model):
         assert reward.shape == (5,)
         assert not terminated.any()
         ends.append(truncated.copy())
-    assert ends[9].all()  # after half a second all are over, and begin anew with the next step
+    # after half a second all are over, and begin anew with the next step
+    assert ends[9].all()
     assert not ends[10].any()
     assert not np.array_equal(first, several.reset()[0])
     np.testing.assert_array_equal(several.reset(seed=3)[0], first)

@@ -1,4 +1,5 @@
-"""What is exported is the plant: each file, read by what it is for, moves as `load_plant` does."""
+"""What is exported is the plant: each file, read by what it is for, moves as
+`load_plant` does."""
 
 import csv
 import subprocess
@@ -16,15 +17,25 @@ from hydroid.errors import HydroidError
 from hydroid.identified_model import IdentifiedModel, identified
 from hydroid.plant import Plant, load_plant
 
-VALUES = TRUTH | HYDRAULIC | {"open_A": 0.3, "open_B": 0.3, "delay": 0.05, "friction": 20.0, "S": 0.0}
+VALUES = (
+    TRUTH
+    | HYDRAULIC
+    | {"open_A": 0.3, "open_B": 0.3, "delay": 0.05, "friction": 20.0, "S": 0.0}
+)
 URDF = Path(__file__).parents[2] / "examples" / "urdf"
 
 
 @pytest.fixture(scope="module")
 def model() -> IdentifiedModel:
-    changes = {"start_pose": "study", "simulation.model": "quasi-static", "outputs": [2, 3]}
+    changes = {
+        "start_pose": "study",
+        "simulation.model": "quasi-static",
+        "outputs": [2, 3],
+    }
     settings = load_settings("fit-hyd", changes)
-    return identified(settings, {n: v for n, v in VALUES.items() if n in settings.parameters}, "test")
+    return identified(
+        settings, {n: v for n, v in VALUES.items() if n in settings.parameters}, "test"
+    )
 
 
 def rows(path: Path) -> list[dict[str, str]]:
@@ -34,22 +45,38 @@ def rows(path: Path) -> list[dict[str, str]]:
 
 def test_a_table_holds_the_settled_speeds(model, tmp_path):
     result = hydroid.export(model, to="table", out=tmp_path)
-    assert [Path(file).name for file in result.result] == ["speeds_shoulder.csv", "speeds_elbow.csv"]
+    assert [Path(file).name for file in result.result] == [
+        "speeds_shoulder.csv",
+        "speeds_elbow.csv",
+    ]
     plant, table = Plant(model), rows(tmp_path / "speeds_shoulder.csv")
     pose = plant.angle
     for row in (table[0], table[7], table[-1]):
         for name, cell in row.items():
             if name != "command_pct":
-                pose[1] = np.radians(float(name.removeprefix("deg_per_s_at_").removesuffix("_deg")))
-                speed = np.degrees(plant.speeds({"shoulder": float(row["command_pct"])}, at=pose)[1])
+                pose[1] = np.radians(
+                    float(name.removeprefix("deg_per_s_at_").removesuffix("_deg"))
+                )
+                speed = np.degrees(
+                    plant.speeds({"shoulder": float(row["command_pct"])}, at=pose)[1]
+                )
                 assert float(cell) == pytest.approx(speed, rel=2e-3)
 
 
 def test_draws_of_a_fit_are_written_with_ranges_and_errors(tmp_path):
-    small = {"search.algorithm": "ga", "search.ga": {"generations": 3, "population": 12}}
-    settings = load_settings("fit-mech", {"start_pose": "study", "refinement.iterations": 3} | small)
-    truth = identified(settings, {n: v for n, v in VALUES.items() if n in settings.parameters}, "test")
-    log = hydroid.simulate(step_log(settings.arm.pose("study"), [60.0, -80.0]), fit=truth, noise_deg=0.1).log
+    small = {
+        "search.algorithm": "ga",
+        "search.ga": {"generations": 3, "population": 12},
+    }
+    settings = load_settings(
+        "fit-mech", {"start_pose": "study", "refinement.iterations": 3} | small
+    )
+    truth = identified(
+        settings, {n: v for n, v in VALUES.items() if n in settings.parameters}, "test"
+    )
+    log = hydroid.simulate(
+        step_log(settings.arm.pose("study"), [60.0, -80.0]), fit=truth, noise_deg=0.1
+    ).log
     fitted = hydroid.fit(settings, log)
     drawn = fitted.draw(8, seed=1)
     hydroid.export(fitted, to="parameters", draws=8, seed=1, out=tmp_path)
@@ -66,17 +93,30 @@ def test_draws_of_a_fit_are_written_with_ranges_and_errors(tmp_path):
     assert drawn.apart > 1.0
     for plant in drawn.plants():
         assert np.isfinite(plant.step({"shoulder": 30})).all()
-    np.testing.assert_allclose(hydroid.Env(fitted, draws=3).reset(options={"draw": 3})[1]["draw"], 3)
+    np.testing.assert_allclose(
+        hydroid.Env(fitted, draws=3).reset(options={"draw": 3})[1]["draw"], 3
+    )
 
 
 def test_a_urdf_comes_back_with_the_masses_and_no_other_change(tmp_path):
     hydroid.init(tmp_path / "mine", arm=URDF / "robot.urdf", log=[URDF / "log_1.csv"])
-    plant = load_plant(tmp_path / "mine" / "fit.yaml", overrides={"parameters.M_boom.fixed": 150.0})
+    plant = load_plant(
+        tmp_path / "mine" / "fit.yaml", overrides={"parameters.M_boom.fixed": 150.0}
+    )
     names = plant.identified.settings.arm.link_names
     assert plant.masses[names.index("boom")] == 150.0
-    hydroid.export(plant.identified, to="urdf", robot=URDF / "robot.urdf", out=tmp_path / "out")
-    written, own = (tmp_path / "out" / "robot.urdf").read_text(), (URDF / "robot.urdf").read_text()
-    changed = [pair for pair in zip(own.split("\n"), written.split("\n"), strict=True) if pair[0] != pair[1]]
+    hydroid.export(
+        plant.identified, to="urdf", robot=URDF / "robot.urdf", out=tmp_path / "out"
+    )
+    written, own = (
+        (tmp_path / "out" / "robot.urdf").read_text(),
+        (URDF / "robot.urdf").read_text(),
+    )
+    changed = [
+        pair
+        for pair in zip(own.split("\n"), written.split("\n"), strict=True)
+        if pair[0] != pair[1]
+    ]
     assert all("mass" in before or "i" in before for before, _ in changed)
     spec = mujoco.MjSpec.from_string(own.replace("package://demo_arm", str(URDF)))
     again = mujoco.MjSpec.from_string(written.replace("package://demo_arm", str(URDF)))
@@ -84,10 +124,15 @@ def test_a_urdf_comes_back_with_the_masses_and_no_other_change(tmp_path):
         before, after = spec.body(name), again.body(name)
         assert after.mass == pytest.approx(mass)
         np.testing.assert_allclose(
-            np.array(after.fullinertia)[:3] / after.mass, np.array(before.fullinertia)[:3] / before.mass
+            np.array(after.fullinertia)[:3] / after.mass,
+            np.array(before.fullinertia)[:3] / before.mass,
         )
     (tmp_path / "out" / "meshes").symlink_to(URDF / "meshes")
-    hydroid.init(tmp_path / "again", arm=tmp_path / "out" / "robot.urdf", log=[URDF / "log_1.csv"])
+    hydroid.init(
+        tmp_path / "again",
+        arm=tmp_path / "out" / "robot.urdf",
+        log=[URDF / "log_1.csv"],
+    )
     back = load_plant(tmp_path / "again" / "fit.yaml")
     np.testing.assert_allclose(back.masses, plant.masses)
 
@@ -102,7 +147,9 @@ def test_plain_mujoco_moves_the_mjcf_as_the_plant_moves(model, tmp_path):
     lines = "".join(f"{t:.4f},{c:.4f}\n" for t, c in zip(time, command, strict=True))
     given.write_text("time_s,shoulder\n" + lines)
     drive = [sys.executable, str(tmp_path / "model" / "drive.py"), str(given)]
-    done = subprocess.run(drive, capture_output=True, text=True, check=True, cwd=tmp_path)
+    done = subprocess.run(
+        drive, capture_output=True, text=True, check=True, cwd=tmp_path
+    )
     found = [float(row["shoulder"]) for row in csv.DictReader(done.stdout.splitlines())]
     plant = Plant(model)
     expected = [plant.angle[1], *(plant.step({"shoulder": one})[1] for one in command)]
@@ -116,17 +163,26 @@ def test_an_fmu_steps_as_the_plant_does(model, tmp_path):
     fmpy = pytest.importorskip("fmpy")
     (file,) = hydroid.export(model, to="fmu", out=tmp_path).result
     time = np.arange(0, 1.0, 0.01)
-    inputs = np.zeros(len(time), dtype=[("time", float), ("u_shoulder", float), ("u_elbow", float)])
+    inputs = np.zeros(
+        len(time), dtype=[("time", float), ("u_shoulder", float), ("u_elbow", float)]
+    )
     inputs["time"], inputs["u_shoulder"] = time, 50.0 * np.sin(3.0 * time)
     inputs["u_elbow"] = -40.0
     outputs = ["q_shoulder", "q_elbow"]
     found = fmpy.simulate_fmu(
-        file, input=inputs, output=outputs, stop_time=0.9, step_size=0.01, output_interval=0.01
+        file,
+        input=inputs,
+        output=outputs,
+        stop_time=0.9,
+        step_size=0.01,
+        output_interval=0.01,
     )
     plant = Plant(model)
     expected = [plant.angle[[1, 2]]]
     for row in inputs[: len(found) - 1]:
-        expected.append(plant.step({"shoulder": row["u_shoulder"], "elbow": row["u_elbow"]})[[1, 2]])
+        expected.append(
+            plant.step({"shoulder": row["u_shoulder"], "elbow": row["u_elbow"]})[[1, 2]]
+        )
     read = np.array([[row[name] for name in outputs] for row in found])
     np.testing.assert_allclose(np.degrees(read), np.degrees(expected), atol=1e-6)
 
@@ -145,7 +201,9 @@ def test_an_fmu_steps_as_the_plant_does(model, tmp_path):
         ({"to": "parameters"}, "no covariance"),
     ],
 )
-def test_what_cannot_be_exported_is_one_line(model, options, says, tmp_path, monkeypatch):
+def test_what_cannot_be_exported_is_one_line(
+    model, options, says, tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     Path("other.urdf").write_text("<robot name='x'><link name='y'/></robot>")
     with pytest.raises(HydroidError, match=says):

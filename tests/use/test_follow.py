@@ -1,4 +1,5 @@
-"""Commands along a path: played on the model they lead it there, and what cannot be had is said by name."""
+"""Commands along a path: played on the model they lead it there, and what cannot be had
+is said by name."""
 
 from pathlib import Path
 
@@ -18,7 +19,15 @@ from hydroid.use.follow import follow, joint_lags
 VALUES = (
     TRUTH
     | HYDRAULIC
-    | {"open_A": 0.3, "open_B": 0.3, "delay": 0.05, "friction": 20.0, "S": 0.0, "A": 0.05, "C": 0.05}
+    | {
+        "open_A": 0.3,
+        "open_B": 0.3,
+        "delay": 0.05,
+        "friction": 20.0,
+        "S": 0.0,
+        "A": 0.05,
+        "C": 0.05,
+    }
 )
 JOINTS = {"shoulder": 1, "elbow": 2}
 
@@ -28,7 +37,9 @@ def model(kind="quasi-static", **hydraulics) -> IdentifiedModel:
     changes = {f"hydraulics.{name}": value for name, value in values.items()}
     changes |= {"start_pose": "study", "simulation.model": kind, "outputs": [2, 3]}
     settings = load_settings("fit-hyd", changes)
-    return identified(settings, {n: v for n, v in VALUES.items() if n in settings.parameters}, "test")
+    return identified(
+        settings, {n: v for n, v in VALUES.items() if n in settings.parameters}, "test"
+    )
 
 
 def path(one: IdentifiedModel, speed=0.05, seconds=6.0, rest=0.5, joints=JOINTS) -> Log:
@@ -38,7 +49,9 @@ def path(one: IdentifiedModel, speed=0.05, seconds=6.0, rest=0.5, joints=JOINTS)
     angle = np.tile(one.settings.arm.pose(one.settings.start_pose), (len(time), 1))
     turn = 2 * np.pi / (seconds - rest) * np.maximum(time - rest, 0.0)
     for joint in joints.values():
-        angle[:, joint] += 0.5 * speed * (seconds - rest) / (2 * np.pi) * (1 - np.cos(turn))
+        angle[:, joint] += (
+            0.5 * speed * (seconds - rest) / (2 * np.pi) * (1 - np.cos(turn))
+        )
     return Log("path", time, np.zeros_like(angle), angle, period)
 
 
@@ -47,7 +60,12 @@ def path(one: IdentifiedModel, speed=0.05, seconds=6.0, rest=0.5, joints=JOINTS)
     "values",
     [
         {},
-        {"dead_band_a": 20.0, "dead_band_b": 15.0, "pilot_lag_a": 0.1, "pilot_lag_b": 0.1},
+        {
+            "dead_band_a": 20.0,
+            "dead_band_b": 15.0,
+            "pilot_lag_a": 0.1,
+            "pilot_lag_b": 0.1,
+        },
         {"opening_lag": 0.15, "opening_exponent_a": 1.7, "pump_flow": 5.0},
     ],
 )
@@ -68,7 +86,8 @@ def test_the_commands_lead_the_model_along_the_path(kind, values):
 
 
 def test_commands_come_before_the_motion_by_delay_and_lags():
-    """A path that begins at once begins later than its commands, by what the joints are late."""
+    """A path that begins at once begins later than its commands, by what the joints are
+    late."""
     early = path(one := model(), rest=0.0)
     late_model = model(opening_lag=0.2)
     first, second = follow(one, early), follow(late_model, early)
@@ -109,9 +128,15 @@ def test_the_command_line_writes_a_log_that_simulates_to_the_path(tmp_path: Path
     write_log(tmp_path / "path.csv", wished, settings.log)
     out = tmp_path / "out" / "commands.csv"
     result = hydroid.follow(tmp_path / "path.csv", fit=one, out=out)
-    assert {file.name for file in out.parent.iterdir()} == {"commands.csv", "commands.html", "tables"}
+    assert {file.name for file in out.parent.iterdir()} == {
+        "commands.csv",
+        "commands.html",
+        "tables",
+    }
     again = hydroid.simulate(out, fit=one).log
-    np.testing.assert_allclose(again.angle[:, [1, 2]], wished.angle[:, [1, 2]], atol=np.radians(0.1))
+    np.testing.assert_allclose(
+        again.angle[:, [1, 2]], wished.angle[:, [1, 2]], atol=np.radians(0.1)
+    )
     rows = result.plain()["joints"]
     assert [row["name"] for row in rows] == ["shoulder", "elbow"]
     assert max(row["rms_deg"] for row in rows) < 0.1
@@ -119,7 +144,8 @@ def test_the_command_line_writes_a_log_that_simulates_to_the_path(tmp_path: Path
 
 
 def test_a_joint_without_a_column_rests_and_a_misspelt_one_is_named(tmp_path: Path):
-    """Also where the settings map each joint to a column of its own, as those of `hydroid init` do."""
+    """Also where the settings map each joint to a column of its own, as those of
+    `hydroid init` do."""
     urdf = Path(__file__).parents[2] / "examples" / "urdf"
     hydroid.init(tmp_path / "mine", arm=urdf / "robot.urdf", log=[urdf / "log_1.csv"])
     one = hydroid.load_plant(tmp_path / "mine" / "fit.yaml").identified
@@ -155,6 +181,8 @@ def test_a_path_that_is_none_is_refused(refused, says):
 
 def test_a_fit_of_stage_1_is_refused():
     settings = load_settings("fit-mech", {"start_pose": "study"})
-    mech = identified(settings, {n: v for n, v in VALUES.items() if n in settings.parameters}, "test")
+    mech = identified(
+        settings, {n: v for n, v in VALUES.items() if n in settings.parameters}, "test"
+    )
     with pytest.raises(HydroidError, match="stage 2"):
         hydroid.follow(path(model()), fit=mech)

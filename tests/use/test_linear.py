@@ -13,7 +13,11 @@ from hydroid.identified_model import identified
 from hydroid.plant import Plant
 from hydroid.use.linear import linearise
 
-VALUES = TRUTH | HYDRAULIC | {"open_A": 0.3, "open_B": 0.3, "delay": 0.05, "friction": 20.0, "S": 0.0}
+VALUES = (
+    TRUTH
+    | HYDRAULIC
+    | {"open_A": 0.3, "open_B": 0.3, "delay": 0.05, "friction": 20.0, "S": 0.0}
+)
 HELD = {"shoulder": 40.0, "elbow": -50.0}
 
 
@@ -22,19 +26,26 @@ def made(model: str, **hydraulics: float) -> Plant:
     changes = {f"hydraulics.{name}": value for name, value in values.items()}
     changes |= {"start_pose": "study", "simulation.model": model, "log.period_s": 0.002}
     settings = load_settings("fit-hyd", changes)
-    values = {name: value for name, value in VALUES.items() if name in settings.parameters}
+    values = {
+        name: value for name, value in VALUES.items() if name in settings.parameters
+    }
     return Plant(identified(settings, values, "test"), joints=[2, 3])
 
 
 def response(plant: Plant, change: dict[str, float], seconds: float) -> np.ndarray:
-    """Angles of both joints under held commands that change after a second, (T, 2), from then on."""
+    """Angles of both joints under held commands that change after a second, (T, 2),
+    from then on."""
     plant.reset("study")
     held = dict(HELD)
     while plant.time < 1.0 - 1e-9:
         plant.step(held)
     angle = [plant.angle[[1, 2]]]
     for _ in range(round(seconds / plant.period)):
-        angle.append(plant.step({name: one + change.get(name, 0.0) for name, one in held.items()})[[1, 2]])
+        angle.append(
+            plant.step(
+                {name: one + change.get(name, 0.0) for name, one in held.items()}
+            )[[1, 2]]
+        )
     return np.array(angle)
 
 
@@ -42,17 +53,28 @@ def response(plant: Plant, change: dict[str, float], seconds: float) -> np.ndarr
     ("model", "values", "close"),
     [
         ("quasi-static", {}, 0.03),
-        ("quasi-static", {"opening_lag": 0.1, "pilot_lag_a": 0.05, "pilot_lag_b": 0.05}, 0.03),
         (
             "quasi-static",
-            {"oil_frequency": 3.0, "oil_damping": 0.3, "pump_flow": 5.0, "pump_droop": 100.0},
+            {"opening_lag": 0.1, "pilot_lag_a": 0.05, "pilot_lag_b": 0.05},
+            0.03,
+        ),
+        (
+            "quasi-static",
+            {
+                "oil_frequency": 3.0,
+                "oil_damping": 0.3,
+                "pump_flow": 5.0,
+                "pump_droop": 100.0,
+            },
             0.05,
         ),
         ("dynamic", {}, 0.1),
     ],
 )
 @pytest.mark.parametrize("name", ["shoulder", "elbow"])
-def test_a_small_step_moves_the_plant_as_the_linear_system_says(model, values, close, name):
+def test_a_small_step_moves_the_plant_as_the_linear_system_says(
+    model, values, close, name
+):
     plant, seconds = made(model, **values), 0.8
     before = response(plant, {}, seconds)
     after = response(plant, {name: 2.0}, seconds)

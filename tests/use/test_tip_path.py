@@ -17,11 +17,21 @@ from hydroid.use.tip_path import Tip
 def model() -> IdentifiedModel:
     """Shoulder and elbow with hydraulics, and little friction."""
     values = TRUTH | HYDRAULIC
-    values |= {"open_A": 0.3, "open_B": 0.3, "delay": 0.05, "friction": 20.0, "S": 0.0, "A": 0.05, "C": 0.05}
+    values |= {
+        "open_A": 0.3,
+        "open_B": 0.3,
+        "delay": 0.05,
+        "friction": 20.0,
+        "S": 0.0,
+        "A": 0.05,
+        "C": 0.05,
+    }
     changes = {"start_pose": "study", "outputs": [2, 3]}
     changes |= {f"hydraulics.{name}": 0.05 for name in ("onset_a", "onset_b")}
     settings = load_settings("fit-hyd", changes | {"hydraulics.leakage": 0.0})
-    return identified(settings, {n: v for n, v in values.items() if n in settings.parameters}, "test")
+    return identified(
+        settings, {n: v for n, v in values.items() if n in settings.parameters}, "test"
+    )
 
 
 def forward(arm, angle):
@@ -51,17 +61,21 @@ def test_the_tip_is_where_the_path_is(by):
     arm, start = one.settings.arm, one.settings.arm.pose("study")
     points = line(forward(arm, start), by)[:, 1:]
     angle, off = Tip(arm, [2, 3]).angles(points, start)
-    np.testing.assert_allclose([forward(arm, pose) for pose in angle], points, atol=1e-5)
+    np.testing.assert_allclose(
+        [forward(arm, pose) for pose in angle], points, atol=1e-5
+    )
     assert off.max() < 1e-5
     assert np.all((angle >= arm.lower) & (angle <= arm.upper))
     np.testing.assert_array_equal(
         np.delete(angle, [1, 2], axis=1), np.delete(np.tile(start, (101, 1)), [1, 2], 1)
     )
-    assert np.abs(np.diff(angle, axis=0)).max() < np.radians(5.0)  # no jump between two samples
+    # no jump between two samples
+    assert np.abs(np.diff(angle, axis=0)).max() < np.radians(5.0)
 
 
 def test_with_more_joints_than_needed_angles_return_to_where_they_began():
-    """A still path keeps the pose: of many poses that reach a point, the one before is taken."""
+    """A still path keeps the pose: of many poses that reach a point, the one before is
+    taken."""
     one = model()
     arm, start = one.settings.arm, one.settings.arm.pose("study")
     points = np.tile(forward(arm, start), (5, 1))
@@ -99,14 +113,24 @@ def without_number(place):
 @pytest.mark.parametrize(
     ("rows", "header", "says"),
     [
-        (beyond, "time_s,x_m,y_m,z_m", r"cannot reach x .* at 4 s: it stays 4\.\d+ m off"),
-        (backwards, "time_s,x_m,y_m,z_m", "line 5, column time_s: times do not increase"),
+        (
+            beyond,
+            "time_s,x_m,y_m,z_m",
+            r"cannot reach x .* at 4 s: it stays 4\.\d+ m off",
+        ),
+        (
+            backwards,
+            "time_s,x_m,y_m,z_m",
+            "line 5, column time_s: times do not increase",
+        ),
         (without_number, "time_s,x_m,y_m,z_m", "line 6, column y_m: holds no number"),
         (beyond, "time_s,x_m,y_m,height", "column z_m is missing"),
         (beyond, "seconds,x_m,y_m,z_m", "column time_s is missing"),
     ],
 )
-def test_a_path_that_cannot_be_followed_is_refused_in_one_line(tmp_path: Path, rows, header, says):
+def test_a_path_that_cannot_be_followed_is_refused_in_one_line(
+    tmp_path: Path, rows, header, says
+):
     one = model()
     place = forward(one.settings.arm, one.settings.arm.pose("study"))
     file = write(tmp_path / "tip.csv", rows(place), header)

@@ -56,10 +56,13 @@ class FakeViewer:
 
 
 def played(playback: Any, pictures: int, cost: float = 0.0) -> FakeViewer:
-    """Some pictures of a playback; time passes in sleep, and in `cost` seconds of work a look."""
+    """Some pictures of a playback; time passes in sleep, and in `cost` seconds of work
+    a look."""
     viewer, looks, slept = FakeViewer(playback, pictures), count(), list[float]()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(time, "perf_counter", lambda: 100.0 + cost * next(looks) + sum(slept))
+        patch.setattr(
+            time, "perf_counter", lambda: 100.0 + cost * next(looks) + sum(slept)
+        )
         patch.setattr(time, "sleep", slept.append)
         play(playback, viewer)
     return viewer
@@ -67,7 +70,9 @@ def played(playback: Any, pictures: int, cost: float = 0.0) -> FakeViewer:
 
 def test_a_log_is_shown_as_the_plant_steps(nominal: IdentifiedModel, study_log: Log):
     plant = Plant(nominal)
-    expected = [plant.reset(study_log.start)] + [plant.step(u) for u in study_log.command[:-1]]
+    expected = [plant.reset(study_log.start)] + [
+        plant.step(u) for u in study_log.command[:-1]
+    ]
     shown = Replay(simulated_motion(nominal, {"alone": study_log}))
     for moment in (0.013, 0.5, 0.5, 1.23, 99.0):  # whatever the pace
         shown.advance(moment)
@@ -100,7 +105,8 @@ def test_a_slow_machine_shows_slow_motion_without_jumps(slide: Sliders):
 
 
 def pictures(motion: Motion, *times: float) -> list[Any]:
-    """Small ones where this machine has OpenGL without a display; otherwise the test is skipped."""
+    """Small ones where this machine has OpenGL without a display; otherwise the test is
+    skipped."""
     try:
         return [*rendered(motion, (480, 270), ((time, "2.0 s") for time in times))]
     except RunError as error:
@@ -109,7 +115,9 @@ def pictures(motion: Motion, *times: float) -> list[Any]:
         pytest.skip(str(error))
 
 
-def test_the_picture_shows_arm_and_ghost_in_full_and_moves(nominal: IdentifiedModel, study_log: Log):
+def test_the_picture_shows_arm_and_ghost_in_full_and_moves(
+    nominal: IdentifiedModel, study_log: Log
+):
     bent = study_log.angle.copy()
     bent[:, SHOULDER] += np.radians(30) * study_log.time / study_log.time[-1]
     motion = simulated_motion(nominal, {"alone": replace(study_log, angle=bent)})
@@ -127,7 +135,9 @@ def test_the_picture_shows_arm_and_ghost_in_full_and_moves(nominal: IdentifiedMo
 
 
 @pytest.mark.parametrize("kind", [".gif", ".mp4", ".png"])
-def test_every_kind_of_file_is_written(nominal: IdentifiedModel, study_log: Log, kind, monkeypatch):
+def test_every_kind_of_file_is_written(
+    nominal: IdentifiedModel, study_log: Log, kind, monkeypatch
+):
     av: Any = pytest.importorskip("av") if kind == ".mp4" else None
     motion = simulated_motion(nominal, {"alone": study_log})
     pictures(motion)
@@ -145,14 +155,19 @@ def test_every_kind_of_file_is_written(nominal: IdentifiedModel, study_log: Log,
 
 def test_what_cannot_be_shown_is_refused(nominal: IdentifiedModel, study_log: Log):
     motion = simulated_motion(nominal, {"alone": study_log})
-    with pytest.raises(SettingsError, match=r"9:12 s holds nothing of a motion of 4\.99 s"):
+    with pytest.raises(
+        SettingsError, match=r"9:12 s holds nothing of a motion of 4\.99 s"
+    ):
         film.render_motion(motion, ".png", (9.0, 12.0))
     with pytest.raises(SettingsError, match="commands nothing"):
         simulated_motion(nominal, {"alone": step_log(study_log.start, [0.0])})
 
 
-def test_the_machine_stays_in_the_frame_wherever_it_slews(nominal: IdentifiedModel, study_log: Log):
-    """By the camera's law: what is seen lies within half its angle of its axis, from where it stands."""
+def test_the_machine_stays_in_the_frame_wherever_it_slews(
+    nominal: IdentifiedModel, study_log: Log
+):
+    """By the camera's law: what is seen lies within half its angle of its axis, from
+    where it stands."""
     turned = study_log.angle.copy()
     turned[:, 0] += np.radians(160) * study_log.time / study_log.time[-1]
     motion = simulated_motion(nominal, {"alone": replace(study_log, angle=turned)})

@@ -41,14 +41,21 @@ import numpy as np
 
 from hydroid.hydraulics.elementwise import compilable
 from hydroid.hydraulics.joint import begin, coast, command, load, net_opening, settle
-from hydroid.hydraulics.pump import begin_line, close_line, draw, fill, open_line
+from hydroid.hydraulics.pump import (
+    begin_line,
+    close_line,
+    draw_from_line,
+    fill,
+    open_line,
+)
 from hydroid.hydraulics.records import LINE, SCRATCH
 from hydroid.hydraulics.valve import meter
 from hydroid.settings import linkage
 
-RAMP_TORQUE, RAMP_WAY = 1.0 / 6.0, 1.0 / 2.0
-"""means of t²/2 and t over a unit step: what a velocity error growing from 0 to 1 does
-to oil and way"""
+# means of t²/2 and t over a unit step: what a velocity error that grows from 0 to 1
+# does to the oil's torque and to the way
+RAMP_TORQUE = 1.0 / 6.0
+RAMP_WAY = 1.0 / 2.0
 
 
 def source_key(*more: str | None) -> int:
@@ -106,8 +113,11 @@ def substitute(matrix, vector) -> None:
 
 
 class Plugin(NamedTuple):
-    """What stays the same during a run, of one candidate's J joints; `of` takes one of
-    n."""
+    """What stays the same during a run: the actuators of J joints, of one candidate or
+    of n.
+
+    Compiled code takes that of one candidate, which `candidate` picks.
+    """
 
     coefficients: Any  # (J,), of COEFFICIENTS, or (n, J)
     order: Any  # the joints, those without actuator first, (J,)
@@ -121,15 +131,18 @@ class Plugin(NamedTuple):
         """Number of steps that the longest delay reaches back."""
         return max(self.coefficients[side]["late"].max(initial=0) for side in "ab")
 
-    def of(self, candidate: int) -> "Plugin":
-        """Return one candidate's."""
-        return self._replace(coefficients=self.coefficients[candidate])
+    def candidate(self, row: int) -> "Plugin":
+        """Return the actuators of one of n candidates."""
+        return self._replace(coefficients=self.coefficients[row])
 
 
 class Pad(NamedTuple):
-    """Scratch space of one look-ahead: (J,) of SCRATCH, (1,) of LINE; what the matrices
-    of all sub-steps share, and one of them, (J, J); the right side, then the gain in
-    velocity, (J,)."""
+    """Scratch space of the look-ahead over J joints.
+
+    joints: (J,) of SCRATCH. line: of the pump, (1,) of LINE. common: what the matrices
+    of all sub-steps share, (J, J). matrix: of the present sub-step, (J, J). gain: first
+    the right side of its system, then the joints' gains in velocity [rad/s], (J,).
+    """
 
     joints: Any
     line: Any
@@ -142,8 +155,19 @@ class Pad(NamedTuple):
 def make_pad(joints: int) -> Pad:
     """Return scratch space for so many joints."""
     square = (joints, joints)
-    work, line = np.zeros(joints, SCRATCH), np.zeros(1, LINE)
-    return Pad(work, line, np.empty(square), np.empty(square), np.empty(joints))
+    return Pad(
+        joints=np.zeros(joints, SCRATCH),
+        line=np.zeros(1, LINE),
+        common=np.empty(square),
+        matrix=np.empty(square),
+        gain=np.empty(joints),
+    )
+
+
+@compilable
+def substep_length(plugin: Plugin) -> float:
+    """Length of a sub-step [s]."""
+    return 1.0 / plugin.substeps * plugin.period
 
 
 @compilable
@@ -155,116 +179,160 @@ def look_ahead(plugin: Plugin, state, commands, now: int, arm, pad: Pad) -> None
     at `now` holds. The joints are the `columns` of the arm's angle, velocity, applied
     torque and armature, and `own` is their armature without oil.
     """
-    coefficients, order, entries, idle, period, substeps = plugin
-    work, lines, common, matrix, gain = pad
-    line = lines[0]
     joints = state.shape[0]
-    # all joints with an actuator have the same pump: read it at one of them
-    some, last = coefficients[order[joints - 1]], state[order[joints - 1]]
-    shared = idle < joints and some.pump_flow < np.inf
-    part = 1.0 / substeps
-    step, demanded = part * period, False
+    idle = plugin.idle
+    line = pad.line[0]
+    # all joints with an actuator have the same pump: read it at the last of them
+    last = plugin.order[joints - 1]
+    pump = plugin.coefficients[last]
+    shared = idle < joints and pump.pump_flow < np.inf
+    step = substep_length(plugin)
+    demanded = _begin_joints(plugin, state, commands, now, arm, pad)
+    if shared:
+        begin_line(line, pump, state[last], demanded, step)
+    # joints without actuator bring the same to all sub-steps: they are eliminated once
+    eliminate(pad.matrix, 0, idle)
+    for a in range(idle, joints):
+        for b in range(a, joints):
+            pad.common[a, b] = pad.matrix[a, b]
+    for substep in range(plugin.substeps):
+        _set_up(plugin, state, substep, shared, pad)
+        if shared:
+            open_line(line, pump, step)
+            _couple_by_line(plugin, pad, step)
+        eliminate(pad.matrix, idle, joints)
+        substitute(pad.matrix, pad.gain)
+        if shared:
+            _take_line_pressure(plugin, pad, step)
+        for a in range(joints):
+            j = plugin.order[a]
+            settle(plugin.coefficients[j], state[j], pad.joints[j], pad.gain[a], step)
+    for j in range(joints):
+        _hand_over(plugin, state[j], pad.joints[j])
+        arm.applied[arm.columns[j]] = state[j].torque
+        arm.armature[arm.columns[j]] = arm.own[j] + state[j].armature
+        if shared:
+            state[j].line = line.pressure
+            state[j].share = line.share
+            state[j].demand = line.demand
+
+
+@compilable
+def _begin_joints(plugin: Plugin, state, commands, now: int, arm, pad: Pad) -> bool:
+    """Begin the step of all joints, and write the inertias to the matrix; whether a
+    joint has a command."""
+    joints = plugin.order.size
+    step = substep_length(plugin)
+    demanded = False
     for a in range(joints):
-        j = order[a]
-        c, z, w = coefficients[j], state[j], work[j]
+        j = plugin.order[a]
+        c = plugin.coefficients[j]
+        z = state[j]
+        w = pad.joints[j]
         begin(c, z, w, arm.angle[arm.columns[j]], arm.velocity[arm.columns[j]])
-        w.inertia = arm.mass[entries[a, a]] - z.armature
-        matrix[a, a] = w.inertia
-        if a < idle:
+        # MuJoCo's mass matrix still has the armature h κ of the last step
+        w.inertia = arm.mass[plugin.entries[a, a]] - z.armature
+        pad.matrix[a, a] = w.inertia
+        if a < plugin.idle:
             coast(c, z, w, step)
-            matrix[a, a] += w.weight * step * w.drag
+            pad.matrix[a, a] += w.weight * step * w.drag
         else:
             command(c, z, w, commands[:, j], now)
             demanded |= commands[now, j] != 0.0
         for b in range(a + 1, joints):
-            matrix[a, b] = arm.mass[entries[a, b]]
-    if shared:
-        begin_line(line, some, last, demanded, step)
-    # joints without actuator bring the same to all sub-steps: they are eliminated once
-    eliminate(matrix, 0, idle)
-    for a in range(idle, joints):
-        for b in range(a, joints):
-            common[a, b] = matrix[a, b]
-    for i in range(substeps):
-        for a in range(joints):
-            j = order[a]
-            c, z, w = coefficients[j], state[j], work[j]
-            if a >= idle:
-                supply = (
-                    min(line.pressure, c.supply_pressure)
-                    if shared
-                    else c.supply_pressure
-                )
-                meter(c, w, net_opening(c, z, w, i, step), supply)
-                load(c, z, w, step)
-                if shared:
-                    draw(line, c, w)
-            resistance = w.weight * w.stiffness + w.drag
-            gain[a] = step * (w.push + z.external - resistance * w.speed)
-            if a >= idle:
-                matrix[a, a] = common[a, a] + w.weight * step * resistance
-                for b in range(a + 1, joints):
-                    matrix[a, b] = common[a, b]
-        if shared:
-            open_line(line, some, step)
-            for a in range(idle, joints):  # the line joins the system of the velocities
-                u = work[order[a]]
-                gain[a] += step * u.weight * u.thrust * line.change
-                for b in range(a, joints):
-                    w = work[order[b]]
-                    matrix[a, b] += (
-                        step * line.softness * u.weight * u.pull * w.weight * w.pull
-                    )
-        eliminate(matrix, idle, joints)
-        substitute(matrix, gain)
-        if shared:
-            for a in range(idle, joints):  # its pressure follows from them
-                w = work[order[a]]
-                line.change -= line.softness * w.sweep * w.weight * gain[a]
-            for a in range(idle, joints):
-                fill(line, work[order[a]], step)
-            close_line(line, some)
-        for a in range(joints):
-            j = order[a]
-            settle(coefficients[j], state[j], work[j], gain[a], step)
-    for j in range(joints):
-        z, w = state[j], work[j]
-        z.way, z.predicted = w.way, w.speed
-        z.a.flow, z.b.flow = part * w.a.flow, part * w.b.flow
-        kappa = part * (
-            RAMP_TORQUE * period * w.oil_stiffness + RAMP_WAY * w.resistance
-        )
-        z.armature = period * kappa
-        z.torque = part * w.torque + kappa * (w.speed - z.velocity)
-        arm.applied[arm.columns[j]], arm.armature[arm.columns[j]] = (
-            z.torque,
-            arm.own[j] + z.armature,
-        )
-        if shared:
-            z.line, z.share, z.demand = line.pressure, line.share, line.demand
+            pad.matrix[a, b] = arm.mass[plugin.entries[a, b]]
+    return demanded
+
+
+@compilable
+def _set_up(plugin: Plugin, state, substep: int, shared: bool, pad: Pad) -> None:
+    """Write the system of a sub-step's velocities, with the chambers eliminated."""
+    joints = plugin.order.size
+    step = substep_length(plugin)
+    line = pad.line[0]
+    for a in range(joints):
+        j = plugin.order[a]
+        c = plugin.coefficients[j]
+        z = state[j]
+        w = pad.joints[j]
+        driven = a >= plugin.idle
+        if driven:
+            supply = c.supply_pressure
+            if shared:
+                supply = min(line.pressure, supply)
+            meter(c, w, net_opening(c, z, w, substep, step), supply)
+            load(c, z, w, step)
+            if shared:
+                draw_from_line(line, c, w)
+        resistance = w.weight * w.stiffness + w.drag
+        pad.gain[a] = step * (w.push + z.external - resistance * w.speed)
+        if driven:
+            pad.matrix[a, a] = pad.common[a, a] + w.weight * step * resistance
+            for b in range(a + 1, joints):
+                pad.matrix[a, b] = pad.common[a, b]
+
+
+@compilable
+def _couple_by_line(plugin: Plugin, pad: Pad, step: float) -> None:
+    """Add to the system of the velocities that the joints share the pump's line."""
+    line = pad.line[0]
+    for a in range(plugin.idle, plugin.order.size):
+        u = pad.joints[plugin.order[a]]
+        pad.gain[a] += step * u.weight * u.thrust * line.change
+        for b in range(a, plugin.order.size):
+            w = pad.joints[plugin.order[b]]
+            pad.matrix[a, b] += (
+                step * line.softness * u.weight * u.pull * w.weight * w.pull
+            )
+
+
+@compilable
+def _take_line_pressure(plugin: Plugin, pad: Pad, step: float) -> None:
+    """Take over the line's change of pressure, which follows from the velocities."""
+    line = pad.line[0]
+    for a in range(plugin.idle, plugin.order.size):
+        w = pad.joints[plugin.order[a]]
+        line.change -= line.softness * w.sweep * w.weight * pad.gain[a]
+    # the change is known only after all joints: each takes the whole of it
+    for a in range(plugin.idle, plugin.order.size):
+        fill(line, pad.joints[plugin.order[a]], step)
+    close_line(line, plugin.coefficients[plugin.order[plugin.order.size - 1]])
+
+
+@compilable
+def _hand_over(plugin: Plugin, z, w) -> None:
+    """Turn a joint's sums over the sub-steps into what MuJoCo's step takes."""
+    part = 1.0 / plugin.substeps
+    period = plugin.period
+    z.way = w.way
+    z.predicted = w.speed
+    z.a.flow = part * w.a.flow
+    z.b.flow = part * w.b.flow
+    kappa = part * (RAMP_TORQUE * period * w.oil_stiffness + RAMP_WAY * w.resistance)
+    z.armature = period * kappa
+    z.torque = part * w.torque + kappa * (w.speed - z.velocity)
 
 
 @compilable
 def take_over(plugin: Plugin, state, arm, pad: Pad) -> None:
     """Take over one candidate's true new velocities from MuJoCo, and give it the new
     angles."""
-    order, entries, period, change = (
-        plugin.order,
-        plugin.entries,
-        plugin.period,
-        pad.gain,
-    )
+    order = plugin.order
+    period = plugin.period
+    # the gains of the look-ahead are no longer needed
+    change = pad.gain
     for a in range(order.size):
-        z, place = state[order[a]], arm.columns[order[a]]
-        velocity = arm.velocity[place]
-        arm.angle[place] = (
-            z.angle + z.way + RAMP_WAY * period * (velocity - z.predicted)
-        )
-        change[a], z.velocity = velocity - z.velocity, velocity
+        z = state[order[a]]
+        column = arm.columns[order[a]]
+        velocity = arm.velocity[column]
+        unforeseen = RAMP_WAY * period * (velocity - z.predicted)
+        arm.angle[column] = z.angle + z.way + unforeseen
+        change[a] = velocity - z.velocity
+        z.velocity = velocity
     for a in range(order.size):
         # (M + h κ) q̈ − torque is what neither oil nor damping did; the bound M
         # contains h κ
         momentum = 0.0
         for b in range(order.size):
-            momentum += arm.mass[entries[a, b]] * change[b]
+            momentum += arm.mass[plugin.entries[a, b]] * change[b]
         state[order[a]].external = momentum / period - state[order[a]].torque

@@ -5,7 +5,7 @@ one, the line has a pressure P of its own. Its oil is compressible, as in the ch
 
     Ṗ = β/V_line (Q_P(P) − Σ Q_i),   P ≤ supply pressure, where the relief valve opens,
 
-with Q_i the flow that actuator i takes from it: `draw` times what enters its chamber.
+with Q_i the flow that actuator i takes from it: its `draw` times what enters its chamber.
 The rest comes from the other chamber, through a regeneration valve, or from the tank.
 So P falls until the flows, opening times root of what the load leaves of P, add up to
 what the pump gives, and no equation has to be solved for it. The pump gives
@@ -49,9 +49,9 @@ def delivery(pressure: float, share: float, c) -> Any:
     """Flow Q_P [m³/s] of the pump at a line pressure [Pa], and -dQ_P/dP; `share` is
     φ."""
     full = share * c.pump_flow
-    left = c.relief - pressure
-    if left < c.pump_droop:
-        return full * max(left, 0.0) / c.pump_droop, full / c.pump_droop
+    below_relief = c.relief - pressure
+    if below_relief < c.pump_droop:
+        return full * max(below_relief, 0.0) / c.pump_droop, full / c.pump_droop
     return full, 0.0
 
 
@@ -64,10 +64,12 @@ def lowest(c) -> float:
 @compilable
 def come_up(line, c, step: float) -> float:
     """Advance φ and the time of the demand by a sub-step [s]; the mean of φ."""
-    before, target = line.share, c.pump_idle
+    before = line.share
+    target = c.pump_idle
     if line.demanded > 0.0:
         line.demand += step
-        late = (line.demand - c.pump_delay) / step  # part of this sub-step
+        # part of this sub-step that lies after the delay
+        late = (line.demand - c.pump_delay) / step
         target += (1.0 - c.pump_idle) * min(max(late, 0.0), 1.0)
     else:
         line.demand = 0.0
@@ -77,22 +79,31 @@ def come_up(line, c, step: float) -> float:
 
 @compilable
 def begin_line(line, c, z, demanded: bool, step: float) -> None:
-    """The line at the start of a step, from the state of a joint; `demanded`: whether a
+    """Begin a step with the line as the state of a joint has it; `demanded`: whether a
     command is not 0."""
-    line.pressure, line.share, line.demand = z.line, z.share, z.demand
+    line.pressure = z.line
+    line.share = z.share
+    line.demand = z.demand
     line.demanded = 1.0 if demanded else 0.0
-    line.decay = np.exp(-step / c.pump_rise) if c.pump_rise > 0.0 else 0.0
+    line.decay = 0.0
+    if c.pump_rise > 0.0:
+        line.decay = np.exp(-step / c.pump_rise)
     line.drawn = line.taken
 
 
 @compilable
-def draw(line, c, w) -> None:
+def draw_from_line(line, c, w) -> None:
     """Add what one actuator takes from the line in a sub-step, and how that answers to
     pressure and speed."""
     if line.pressure > c.supply_pressure:
-        w.a.give, w.b.give = 0.0, 0.0
-    back_a, back_b = w.a.filled * w.a.give * w.a.rise, w.b.filled * w.b.give * w.b.rise
-    a, b = c.a.draw, c.b.draw
+        # behind a reducing valve that works, the line's pressure is not felt
+        w.a.give = 0.0
+        w.b.give = 0.0
+    # k r of either chamber: it fills, so its pressure rises and slows the flow
+    back_a = w.a.filled * w.a.give * w.a.rise
+    back_b = w.b.filled * w.b.give * w.b.rise
+    a = c.a.draw
+    b = c.b.draw
     line.drawn += (
         a * w.a.pumped
         - a * back_a * w.a.inflow
@@ -108,19 +119,20 @@ def draw(line, c, w) -> None:
 
 @compilable
 def open_line(line, c, step: float) -> None:
-    """Make the sums of `draw` ready for the sub-step: δ at the present speeds, and
-    1/D."""
+    """Turn the sums of `draw_from_line` into δ at the present speeds, and 1/D."""
     flow, fall = delivery(line.pressure, come_up(line, c, step), c)
-    line.softness = 1.0 / (
-        c.line_volume / (c.bulk_modulus * step) + fall + line.softness
-    )
+    stored = c.line_volume / (c.bulk_modulus * step)
+    line.softness = 1.0 / (stored + fall + line.softness)
     line.change = line.softness * (flow - line.drawn - line.swept)
-    missing = c.relief - line.pressure
+    most = c.relief - line.pressure
     least = lowest(c) - line.pressure
-    if line.change >= missing:
-        line.change, line.softness = missing, 0.0
+    # at a limit the pressure is given: the speeds no longer change it
+    if line.change >= most:
+        line.change = most
+        line.softness = 0.0
     elif line.change <= least and c.pump_limit < np.inf:
-        line.change, line.softness = least, 0.0
+        line.change = least
+        line.softness = 0.0
 
 
 @compilable
@@ -134,6 +146,8 @@ def fill(line, w, step: float) -> None:
 
 @compilable
 def close_line(line, c) -> None:
-    """Take over the line's change, and be ready for the next sub-step."""
+    """Take over the line's change, and reset its sums for the next sub-step."""
     line.pressure = min(max(line.pressure + line.change, lowest(c)), c.relief)
-    line.drawn, line.softness, line.swept = line.taken, 0.0, 0.0
+    line.drawn = line.taken
+    line.softness = 0.0
+    line.swept = 0.0

@@ -234,7 +234,7 @@ class Plant:
             plugin, states = self._chain.start(
                 self._candidate, start_angle, self._balance[None]
             )
-            self._plugin, self._state = plugin.of(0), states[0]
+            self._plugin, self._state = plugin.candidate(0), states[0]
             commands = np.zeros((self._plugin.past + self._steps, len(self._state)))
             self._course = Course(
                 commands, np.empty((self._steps, len(self._chain.pushed)))

@@ -195,7 +195,7 @@ class Simulation:
                 torque[:, :, served] = (
                     servo.angle if self._quasi_static else servo.torque
                 )[:, None]
-            one, state = plugin.of(row), states[row]
+            one, state = plugin.candidate(row), states[row]
             angle = np.full((1 + samples, start.size), np.nan)
             record = np.zeros((1 + samples if observed else 1, len(state)), JOINT_STATE)
             angle[0], record[0] = start, state

@@ -158,7 +158,7 @@ def simulate(
         for i in range(n):
             arm.start({}, [0], pose)
             arm.data.qvel[:] = velocity
-            one = plugin.of(i)
+            one = plugin.candidate(i)
             held = np.concatenate([np.zeros(one.past), np.repeat(command, steps)])[
                 :, None
             ]

@@ -58,7 +58,7 @@ def trace(scenario: Scenario, substeps: int, candidates: Candidates) -> Observat
     with quiet_mujoco():
         balance = arm.start(scenario.values(candidates), [0], pose)
         plugin, states = chain.start(candidates, pose, balance[None], scenario.pressure)
-        one, samples = plugin.of(0), 1 + len(scenario.command) // steps
+        one, samples = plugin.candidate(0), 1 + len(scenario.command) // steps
         record = np.zeros((samples, len(states[0])), JOINT_STATE)
         angle, record[0] = np.tile(pose, (len(record), 1)), states[0]
         commands = np.concatenate(

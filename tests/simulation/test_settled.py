@@ -48,7 +48,7 @@ def actuators(arm, **values):
     for name, value in values.items():
         one.joints[name][:] = value
     joints = one.joints[:, JOINTS]
-    return make_plugin(joints, np.zeros((3, 3), np.intp), 0.01, 1).of(0), joints
+    return make_plugin(joints, np.zeros((3, 3), np.intp), 0.01, 1).candidate(0), joints
 
 
 @pytest.fixture

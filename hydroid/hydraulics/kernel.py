@@ -165,12 +165,6 @@ def make_pad(joints: int) -> Pad:
 
 
 @compilable
-def substep_length(plugin: Plugin) -> float:
-    """Length of a sub-step [s]."""
-    return 1.0 / plugin.substeps * plugin.period
-
-
-@compilable
 def look_ahead(plugin: Plugin, state, commands, now: int, arm, pad: Pad) -> None:
     """Look ahead over one step of one candidate; writes torques and armatures of its
     `arm` in MuJoCo.
@@ -179,131 +173,133 @@ def look_ahead(plugin: Plugin, state, commands, now: int, arm, pad: Pad) -> None
     at `now` holds. The joints are the `columns` of the arm's angle, velocity, applied
     torque and armature, and `own` is their armature without oil.
     """
+    coefficients, order, entries, idle, period, substeps = plugin
+    work, lines, common, matrix, gain = pad
+    line = lines[0]
     joints = state.shape[0]
-    idle = plugin.idle
-    line = pad.line[0]
+    # what belongs to the joints with an actuator; a function that took `plugin` and
+    # `pad` whole would count references to all of their arrays at every call
+    driven = order[idle:]
+    driven_matrix = matrix[idle:, idle:]
+    driven_gain = gain[idle:]
     # all joints with an actuator have the same pump: read it at the last of them
-    last = plugin.order[joints - 1]
-    pump = plugin.coefficients[last]
+    pump = coefficients[order[joints - 1]]
     shared = idle < joints and pump.pump_flow < np.inf
-    step = substep_length(plugin)
-    demanded = _begin_joints(plugin, state, commands, now, arm, pad)
-    if shared:
-        begin_line(line, pump, state[last], demanded, step)
-    # joints without actuator bring the same to all sub-steps: they are eliminated once
-    eliminate(pad.matrix, 0, idle)
-    for a in range(idle, joints):
-        for b in range(a, joints):
-            pad.common[a, b] = pad.matrix[a, b]
-    for substep in range(plugin.substeps):
-        _set_up(plugin, state, substep, shared, pad)
-        if shared:
-            open_line(line, pump, step)
-            _couple_by_line(plugin, pad, step)
-        eliminate(pad.matrix, idle, joints)
-        substitute(pad.matrix, pad.gain)
-        if shared:
-            _take_line_pressure(plugin, pad, step)
-        for a in range(joints):
-            j = plugin.order[a]
-            settle(plugin.coefficients[j], state[j], pad.joints[j], pad.gain[a], step)
-    for j in range(joints):
-        _hand_over(plugin, state[j], pad.joints[j])
-        arm.applied[arm.columns[j]] = state[j].torque
-        arm.armature[arm.columns[j]] = arm.own[j] + state[j].armature
-        if shared:
-            state[j].line = line.pressure
-            state[j].share = line.share
-            state[j].demand = line.demand
-
-
-@compilable
-def _begin_joints(plugin: Plugin, state, commands, now: int, arm, pad: Pad) -> bool:
-    """Begin the step of all joints, and write the inertias to the matrix; whether a
-    joint has a command."""
-    joints = plugin.order.size
-    step = substep_length(plugin)
+    part = 1.0 / substeps
+    step = part * period
     demanded = False
+    take_masses(arm.mass, entries, matrix)
     for a in range(joints):
-        j = plugin.order[a]
-        c = plugin.coefficients[j]
+        j = order[a]
+        c = coefficients[j]
         z = state[j]
-        w = pad.joints[j]
+        w = work[j]
         begin(c, z, w, arm.angle[arm.columns[j]], arm.velocity[arm.columns[j]])
         # MuJoCo's mass matrix still has the armature h κ of the last step
-        w.inertia = arm.mass[plugin.entries[a, a]] - z.armature
-        pad.matrix[a, a] = w.inertia
-        if a < plugin.idle:
+        matrix[a, a] -= z.armature
+        w.inertia = matrix[a, a]
+        if a < idle:
             coast(c, z, w, step)
-            pad.matrix[a, a] += w.weight * step * w.drag
+            matrix[a, a] += w.weight * step * w.drag
         else:
             command(c, z, w, commands[:, j], now)
             demanded |= commands[now, j] != 0.0
-        for b in range(a + 1, joints):
-            pad.matrix[a, b] = arm.mass[plugin.entries[a, b]]
-    return demanded
-
-
-@compilable
-def _set_up(plugin: Plugin, state, substep: int, shared: bool, pad: Pad) -> None:
-    """Write the system of a sub-step's velocities, with the chambers eliminated."""
-    joints = plugin.order.size
-    step = substep_length(plugin)
-    line = pad.line[0]
-    for a in range(joints):
-        j = plugin.order[a]
-        c = plugin.coefficients[j]
+    line.pressure = np.inf
+    if shared:
+        begin_line(line, pump, state[order[joints - 1]], demanded, step)
+    # joints without actuator bring the same to all sub-steps: they are eliminated once
+    eliminate(matrix, 0, idle)
+    copy_upper(driven_matrix, common)
+    for substep in range(substeps):
+        copy_upper(common, driven_matrix)
+        for a in range(joints):
+            j = order[a]
+            z = state[j]
+            w = work[j]
+            if a >= idle:
+                drive_joint(coefficients[j], z, w, line, substep, step)
+            resistance = w.weight * w.stiffness + w.drag
+            gain[a] = step * (w.push + z.external - resistance * w.speed)
+            if a >= idle:
+                matrix[a, a] += w.weight * step * resistance
+        if shared:
+            open_line(line, pump, step)
+            couple_by_line(line, work, driven, driven_matrix, driven_gain, step)
+        eliminate(matrix, idle, joints)
+        substitute(matrix, gain)
+        if shared:
+            take_line_pressure(line, pump, work, driven, driven_gain, step)
+        for a in range(joints):
+            j = order[a]
+            settle(coefficients[j], state[j], work[j], gain[a], step)
+    for j in range(joints):
         z = state[j]
-        w = pad.joints[j]
-        driven = a >= plugin.idle
-        if driven:
-            supply = c.supply_pressure
-            if shared:
-                supply = min(line.pressure, supply)
-            meter(c, w, net_opening(c, z, w, substep, step), supply)
-            load(c, z, w, step)
-            if shared:
-                draw_from_line(line, c, w)
-        resistance = w.weight * w.stiffness + w.drag
-        pad.gain[a] = step * (w.push + z.external - resistance * w.speed)
-        if driven:
-            pad.matrix[a, a] = pad.common[a, a] + w.weight * step * resistance
-            for b in range(a + 1, joints):
-                pad.matrix[a, b] = pad.common[a, b]
+        hand_over(z, work[j], line, part, period)
+        arm.applied[arm.columns[j]] = z.torque
+        arm.armature[arm.columns[j]] = arm.own[j] + z.armature
 
 
 @compilable
-def _couple_by_line(plugin: Plugin, pad: Pad, step: float) -> None:
-    """Add to the system of the velocities that the joints share the pump's line."""
-    line = pad.line[0]
-    for a in range(plugin.idle, plugin.order.size):
-        u = pad.joints[plugin.order[a]]
-        pad.gain[a] += step * u.weight * u.thrust * line.change
-        for b in range(a, plugin.order.size):
-            w = pad.joints[plugin.order[b]]
-            pad.matrix[a, b] += (
-                step * line.softness * u.weight * u.pull * w.weight * w.pull
-            )
+def take_masses(mass, entries, matrix) -> None:
+    """Write the upper half of M, (J, J), from a row of MuJoCo's masses."""
+    size = matrix.shape[0]
+    for a in range(size):
+        for b in range(a, size):
+            matrix[a, b] = mass[entries[a, b]]
 
 
 @compilable
-def _take_line_pressure(plugin: Plugin, pad: Pad, step: float) -> None:
-    """Take over the line's change of pressure, which follows from the velocities."""
-    line = pad.line[0]
-    for a in range(plugin.idle, plugin.order.size):
-        w = pad.joints[plugin.order[a]]
-        line.change -= line.softness * w.sweep * w.weight * pad.gain[a]
-    # the change is known only after all joints: each takes the whole of it
-    for a in range(plugin.idle, plugin.order.size):
-        fill(line, pad.joints[plugin.order[a]], step)
-    close_line(line, plugin.coefficients[plugin.order[plugin.order.size - 1]])
+def copy_upper(source, target) -> None:
+    """Copy diagonal and upper half of a matrix to the first rows and columns of
+    another."""
+    size = min(source.shape[0], target.shape[0])
+    for a in range(size):
+        for b in range(a, size):
+            target[a, b] = source[a, b]
 
 
 @compilable
-def _hand_over(plugin: Plugin, z, w) -> None:
-    """Turn a joint's sums over the sub-steps into what MuJoCo's step takes."""
-    part = 1.0 / plugin.substeps
-    period = plugin.period
+def drive_joint(c, z, w, line, substep: int, step: float) -> None:
+    """Valve and oil of a joint in a sub-step: its flows, stiffness, torque and
+    resistance.
+
+    The pressure of the pump's line is inf where the pump's flow has no limit.
+    """
+    opening = net_opening(c, z, w, substep, step)
+    meter(c, w, opening, min(line.pressure, c.supply_pressure))
+    load(c, z, w, step)
+    if line.pressure < np.inf:
+        draw_from_line(line, c, w)
+
+
+@compilable
+def couple_by_line(line, work, driven, matrix, gain, step: float) -> None:
+    """Add to the system of the driven joints' velocities that they share the line."""
+    for a in range(driven.size):
+        u = work[driven[a]]
+        gain[a] += step * u.weight * u.thrust * line.change
+        for b in range(a, driven.size):
+            w = work[driven[b]]
+            matrix[a, b] += step * line.softness * u.weight * u.pull * w.weight * w.pull
+
+
+@compilable
+def take_line_pressure(line, pump, work, driven, gain, step: float) -> None:
+    """Take over the line's change of pressure, which follows from the joints' gains in
+    velocity."""
+    for a in range(driven.size):
+        w = work[driven[a]]
+        line.change -= line.softness * w.sweep * w.weight * gain[a]
+    # every joint takes the whole change, so it must be complete before
+    for a in range(driven.size):
+        fill(line, work[driven[a]], step)
+    close_line(line, pump)
+
+
+@compilable
+def hand_over(z, w, line, part: float, period: float) -> None:
+    """Turn a joint's sums over the sub-steps into what MuJoCo's step takes; one
+    sub-step is a `part` of the period [s]."""
     z.way = w.way
     z.predicted = w.speed
     z.a.flow = part * w.a.flow
@@ -311,6 +307,10 @@ def _hand_over(plugin: Plugin, z, w) -> None:
     kappa = part * (RAMP_TORQUE * period * w.oil_stiffness + RAMP_WAY * w.resistance)
     z.armature = period * kappa
     z.torque = part * w.torque + kappa * (w.speed - z.velocity)
+    if line.pressure < np.inf:
+        z.line = line.pressure
+        z.share = line.share
+        z.demand = line.demand
 
 
 @compilable

@@ -33,6 +33,9 @@ RANK = 1e-12
 of its direction"""
 LEVEL = 0.05
 """probability that a gain without a reason counts as one"""
+LEAST_GAIN = 3.0
+"""of the log-likelihood, however certain it is: strong evidence by R. E. Kass and A. E.
+Raftery (1995)"""
 
 COMPARED = RefinementSettings(iterations=60, gain_tolerance=1e-4)
 """of a fit that only serves a comparison"""
@@ -161,7 +164,7 @@ def is_clear(rise: float, error: float, among: int = 1) -> bool:
     is better, one `among` several."""
     # C. E. Bonferroni, 1936
     certain = float(normal.isf(LEVEL / among))
-    return rise > certain * error or rise == np.inf
+    return rise > max(certain * error, LEAST_GAIN) or rise == np.inf
 
 
 def blocks(problem: Problem) -> Ints:

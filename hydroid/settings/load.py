@@ -77,6 +77,10 @@ class Settings(BaseModel):
         return settings
 
 
+MOST_DIGITS = 10
+"""of a joint's number; Python refuses to convert texts of thousands"""
+
+
 def _number_of(key: Any, info: ValidationInfo) -> Any:
     """Take a joint's name, or its number as text, as JSON and `--set` spell it,
     for its number from 1."""
@@ -92,9 +96,9 @@ def _number_of(key: Any, info: ValidationInfo) -> Any:
 
 
 def _is_number(key: str) -> bool:
-    """Return whether a text is a whole number; `isdecimal` alone takes the digits of
-    any script."""
-    return key.isascii() and key.isdecimal()
+    """Return whether a text is a whole number that may be a joint's; `isdecimal` alone
+    takes the digits of any script."""
+    return key.isascii() and key.isdecimal() and len(key) < MOST_DIGITS
 
 
 def _joint_names(info: ValidationInfo) -> tuple[str, ...]:

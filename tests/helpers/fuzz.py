@@ -383,6 +383,18 @@ def run_kinds(folder: Path) -> Iterator[Kind]:
         yield Kind(name, seeds, f"run/{name}", command(name))
 
 
+def renamed(rng: Random, data: bytes) -> bytes:
+    """Damage the names of a log's columns; one time in four anything."""
+    names, end, rows = data.partition(b"\n")
+    if rng.random() < 0.25:
+        return damage(rng, data)
+    return damage(rng, names) + end + rows
+
+
+def guess(room: Path, _: bytes) -> Sequence[str]:
+    return ("convert", str(room / "log.csv"), "--out", str(room / "out.csv"))
+
+
 def check(room: Path, *how: str) -> Sequence[str]:
     (room / "log.csv").write_bytes(logs()[0])
     return ("check", str(room / "log.csv"), *how)
@@ -398,6 +410,7 @@ KINDS = {
             lambda room, _: ("check", str(room / "log.csv")),
             check_log,
         ),
+        Kind("names", logs, "log.csv", guess, damaged=renamed),
         Kind(
             "config",
             configs,

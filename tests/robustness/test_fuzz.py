@@ -19,6 +19,7 @@ TIMES = int(os.environ.get("FUZZ", "1"))
 KINDS = FILES | FORMATS
 COUNTS = dict.fromkeys(FORMATS, 15) | {
     "log": 40,
+    "names": 20,
     "config": 40,
     "set": 40,
     "arm": 25,
@@ -96,6 +97,24 @@ def test_damaged_runs_are_refused_in_one_line(
 def test_hostile_logs_are_refused_at_once(tmp_path: Path, data: bytes) -> None:
     started = time.perf_counter()
     assert not KINDS["log"].read(tmp_path, data)
+    assert time.perf_counter() - started < 10
+
+
+NAMES = {
+    "brackets": b"[" * 1_000_000,
+    "numbers in brackets": b"u[1" * 300_000,
+    "a word": b"A" * 1_000_000,
+    "spaces": b"u1 [V]" + b" " * 300_000 + b"x",
+}
+
+
+@pytest.mark.parametrize("name", NAMES.values(), ids=NAMES)
+@pytest.mark.parametrize("kind", ["log", "names"])
+def test_a_name_without_end_is_refused_at_once(
+    kind: str, name: bytes, tmp_path: Path
+) -> None:
+    started = time.perf_counter()
+    assert not KINDS[kind].read(tmp_path, logs()[0].replace(b"u2_pct", name))
     assert time.perf_counter() - started < 10
 
 

@@ -118,6 +118,14 @@ def test_a_name_without_end_is_refused_at_once(
     assert time.perf_counter() - started < 10
 
 
+@pytest.mark.parametrize("part", ["outputs=[1] ", "outputs=[\0] ", "[" * 30])
+def test_a_setting_without_end_is_refused_at_once(part: str, tmp_path: Path) -> None:
+    data = (part * (20_000_000 // len(part))).encode()
+    started = time.perf_counter()
+    assert not KINDS["set"].read(tmp_path, data)
+    assert time.perf_counter() - started < 2
+
+
 @pytest.mark.parametrize(
     ("text", "value"),
     [

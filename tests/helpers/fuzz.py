@@ -28,7 +28,9 @@ from hydroid.errors import HydroidError
 from hydroid.log import open_table
 
 ROOT = Path(__file__).parents[2]
-LOGS, TRUTH = ROOT / "examples" / "logs", ROOT / "examples" / "article" / "truth.yaml"
+EXAMPLES = ROOT / "examples"
+LOGS = EXAMPLES / "logs"
+TRUTH = EXAMPLES / "article" / "truth.yaml"
 TINY = (
     "--algorithm=ga",
     "--set=search.ga={population: 4, generations: 1}",
@@ -316,6 +318,21 @@ def start(room: Path, data: bytes) -> Sequence[str]:
     return ("init", str(room / "mine"), "--arm", str(room / "arm" / "arm.yaml"))
 
 
+def robot(name: str, log: Path) -> Callable[[Path, bytes], Sequence[str]]:
+    """Return what makes a project of a robot's file and a log."""
+
+    def arguments(room: Path, _: bytes) -> Sequence[str]:
+        mine = str(room / "mine")
+        return ("init", mine, "--arm", str(room / name), "--log", str(log), "--force")
+
+    return arguments
+
+
+def urdf() -> tuple[bytes, ...]:
+    text = (EXAMPLES / "urdf/robot.urdf").read_text()
+    return (text.replace("meshes/", f"{EXAMPLES / 'urdf/meshes'}/").encode(),)
+
+
 def models() -> tuple[bytes, ...]:
     text = (ROOT / "models" / "hydrolek.xml").read_text()
     return (
@@ -430,5 +447,14 @@ KINDS = {
         Kind("mesh", lambda: (rod(),), "arm/rod.stl", start),
         Kind("values", lambda: (TRUTH.read_bytes(),), "values.yaml", simulate),
         Kind("model", models, "model.xml", simulate),
+        Kind(
+            "urdf", urdf, "robot.urdf", robot("robot.urdf", EXAMPLES / "urdf/log_1.csv")
+        ),
+        Kind(
+            "mjcf",
+            lambda: ((EXAMPLES / "boom/boom.xml").read_bytes(),),
+            "boom.xml",
+            robot("boom.xml", EXAMPLES / "boom/fit_up_40.csv"),
+        ),
     )
 }

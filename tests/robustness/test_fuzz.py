@@ -26,6 +26,8 @@ COUNTS = dict.fromkeys(FORMATS, 15) | {
     "mesh": 25,
     "values": 10,
     "model": 8,
+    "urdf": 8,
+    "mjcf": 8,
 }
 HEADER = logs()[0].split(b"\n", 1)[0]
 
@@ -46,7 +48,9 @@ def test_damaged_files_are_read_rightly_or_refused_in_one_line(
     assert not all(accepted)
 
 
-@pytest.mark.parametrize("name", ["log", "config", "arm", "mesh", "values", "model"])
+@pytest.mark.parametrize(
+    "name", ["log", "config", "arm", "mesh", "values", "model", "urdf", "mjcf"]
+)
 def test_intact_files_are_accepted(name: str, tmp_path: Path) -> None:
     for data in KINDS[name].seeds():
         assert KINDS[name].read(tmp_path, data)

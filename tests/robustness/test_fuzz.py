@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
-from fuzz import KINDS as FILES, logs, run_kinds
+from fuzz import KINDS as FILES, logs, run, run_kinds
 from fuzz_formats import FORMATS, bounded
 
 from hydroid.errors import SettingsError
@@ -102,6 +102,27 @@ def test_hostile_logs_are_refused_at_once(tmp_path: Path, data: bytes) -> None:
     started = time.perf_counter()
     assert not KINDS["log"].read(tmp_path, data)
     assert time.perf_counter() - started < 10
+
+
+BEGINNINGS = {
+    "a.csv": HEADER + b"\n",
+    "a.bag": b"#ROSBAG V2.0\n",
+    "a.mcap": b"\x89MCAP0\r\n",
+    "a.parquet": b"PAR1",
+    "v5.mat": b"MATLAB 5.0 MAT-file",
+    "v73.mat": b"\x89HDF\r\n\x1a\n",
+}
+
+
+@pytest.mark.parametrize("name", BEGINNINGS)
+def test_gigabytes_behind_the_first_bytes_of_a_format_are_not_read(
+    name: str, tmp_path: Path
+) -> None:
+    path = tmp_path / name
+    path.write_bytes(BEGINNINGS[name])
+    os.truncate(path, 2**33)  # a sparse file
+    with bounded(0):
+        assert run(("check", str(path))) is not None
 
 
 NAMES = {

@@ -87,8 +87,11 @@ def joint_of(name: str, joints: Sequence[str]) -> int | None:
 
 def number_in(name: str) -> int | None:
     """Return the last number in a column's name; None: it has none."""
-    numbers = [int(word) for word in words(own_part(name)) if word.isdecimal()]
-    return numbers[-1] if numbers and numbers[-1] < 100 else None
+    numbers = [word for word in words(own_part(name)) if word.isdecimal()]
+    # a longer one is no joint's, and Python refuses to convert texts of thousands
+    if not numbers or len(numbers[-1].lstrip("0")) > 2:
+        return None
+    return int(numbers[-1][-2:])
 
 
 def direction(name: str) -> tuple[int, frozenset[str]]:

@@ -29,6 +29,8 @@ SHOWN = {"command": "%", "angle": "deg", "length": "mm", "pressure": "bar"}
 """units in which messages state what is measured"""
 LENGTHS = ("m", "cm", "mm")
 """units of positions, and of the lengths of cylinders"""
+LONGEST_NAME = 1000
+"""letters of a column's name"""
 
 
 Ranges = Mapping[str, tuple[float, float]]
@@ -53,8 +55,19 @@ def open_table(
         raise LogError(f"cannot be read ({reason})", path) from None
     for name, (reader, starts) in BINARY.items():
         if data.startswith(starts) or path.suffix.lower() == name:
-            return reader(path, settings, progress)
-    return open_csv(path, progress)
+            return _of_short_names(reader(path, settings, progress))
+    return _of_short_names(open_csv(path, progress))
+
+
+def _of_short_names(table: Table) -> Table:
+    """Refuse a table with a name that nobody reads, and that takes long to be searched
+    for units and numbers."""
+    for k, name in enumerate(table.names, 1):
+        if len(name) > LONGEST_NAME:
+            what = f"the name of column {k} has {len(name):,} letters"
+            hint = f"at most {LONGEST_NAME:,} are read"
+            raise LogError(what, table.source, hint)
+    return table
 
 
 def _first_bytes(path: Path) -> bytes:

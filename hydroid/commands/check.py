@@ -28,6 +28,7 @@ from hydroid.log import (
     ColumnGuess,
     Log,
     LogFinding,
+    Reading,
     by_level,
     check_parts,
     driven_joints,
@@ -251,7 +252,7 @@ def convert(
             for number in range(1, 1 + max(layout.joints, default=1))
         }
         reasons = [*guess.reasons]
-    parts, findings = check_parts(path, layout, ranges, arm=arm, repair=repair)
+    parts, findings = check_parts(path, layout, ranges, Reading(arm=arm, repair=repair))
     if not parts:
         raise findings[0].error()
     read = _with_gaps(parts)

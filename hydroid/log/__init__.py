@@ -18,10 +18,10 @@ from hydroid.log.motion import (
     motion_of as motion_of,
 )
 from hydroid.log.read import (
+    Reading as Reading,
     check_log as check_log,
     check_parts as check_parts,
     open_table as open_table,
-    write_log as write_log,
-    write_logs as write_logs,
 )
 from hydroid.log.table import Table as Table
+from hydroid.log.write import write_log as write_log, write_logs as write_logs

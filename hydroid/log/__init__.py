@@ -2,7 +2,6 @@
 back."""
 
 from hydroid.log.binary import FORMATS as FORMATS
-from hydroid.log.checks import motion_findings as motion_findings
 from hydroid.log.command_sizes import one_size as one_size, only_command as only_command
 from hydroid.log.guess import ColumnGuess as ColumnGuess, guess_columns as guess_columns
 from hydroid.log.log import (
@@ -17,6 +16,7 @@ from hydroid.log.motion import (
     driven_joints as driven_joints,
     motion_of as motion_of,
 )
+from hydroid.log.motion_checks import motion_findings as motion_findings
 from hydroid.log.read import (
     Reading as Reading,
     check_log as check_log,

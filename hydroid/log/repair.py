@@ -15,7 +15,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from hydroid.arrays import Array, Mask
+from hydroid.arrays import Array
 from hydroid.errors import LogError
 from hydroid.log.log import Log, LogFinding
 from hydroid.log.table import Recording, Signal
@@ -132,9 +132,9 @@ def without_bad_rows(
         recording = fill(unwrap(recording, findings), settings.repair_s, findings)
     else:
         recording = unwrap(without_cut_end(recording, findings), findings)
-    empty: Mask = np.isnan(recording.values)
-    bad: Mask = empty.any(axis=1)
-    if bad.sum() > max(MOST_LEFT_OUT * len(bad), 1):
+    empty = np.isnan(recording.values)
+    bad = empty.any(axis=1)
+    if bad.sum() > max(MOST_LEFT_OUT * len(empty), 1):
         return recording
     if bad.any():
         rows = np.flatnonzero(bad)

@@ -153,7 +153,7 @@ class FitProgress(Progress):
         total = self._rungs
         # the last step, in which what is kept is refined
         number = total
-        if step.phase or step.without or step.start:
+        if step.phase or step.start:
             models = {"start": 1, "refined": 2, "joint": 2, "dynamic": total}
             number = models.get(step.model, 1)
             for rung, term in enumerate(self._terms, 3):
@@ -164,6 +164,4 @@ class FitProgress(Progress):
         words = f"start {step.start}" if step.start else step.estimate
         if step.numbers:
             words += " from nine numbers"
-        if step.without:
-            words += f" without part {step.without} of the logs"
         return f"step {self._number} of {total} ({words})"

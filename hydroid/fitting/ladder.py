@@ -108,6 +108,8 @@ class Ladder:
         self.kept = min(estimates.values(), key=lambda e: e.rms if e.usable else np.inf)
         self._watch, self._checkpoints, self._late = watch, checkpoints, False
         self._step = step_of(self.kept.name)
+        # whether output errors led near the kept estimate, before its innovations
+        self._from_afar = False
 
     def climb(self, whole: Problem) -> None:
         """Refine the estimate with each model and term that the settings of a fit's
@@ -141,11 +143,10 @@ class Ladder:
         if climbs:
             kept = self.kept
             likelihood = make_likelihood(self.problem)
-            # with an error that another model has left, the first error model would
-            # have too much drift
-            last = self._refined(
-                likelihood, kept.theta, refinement, self._step, refine_from_afar
-            )
+            # a term that was added to an estimate began with the drift that its lack
+            # had left
+            how = refine if self._from_afar else refine_from_afar
+            last = self._refined(likelihood, kept.theta, refinement, self._step, how)
             new = self._measured(self.problem, last, self._step)
             self.kept = self.estimates[kept.name] = replace(new, gained=kept.gained)
         if settings.joint_refinement:
@@ -201,7 +202,7 @@ class Ladder:
             if self._explained(own, theta) < 0.0:
                 return
         # what a search, or another model, ended at may be far from an optimum
-        far = not if_better or other_model or _new_curves(own, last)
+        far = not if_better or other_model or bool(_new_curves(own, last))
         how = refine_from_afar if far else refine
         result = self._refined(
             likelihood, theta, settings, step.changed(phase="on the way"), how
@@ -210,14 +211,14 @@ class Ladder:
             return
         new = self._measured(own, result, step)
         if not if_better:
-            self._keep(own, new, step)
+            self._keep(own, new, step, from_afar=far)
             return
         without = self._left_out_of(last, self.refinements[start.name])
         with_it = self._left_out_of(own, result)
         gained = gain(with_it, without)
         self.estimates[step.estimate] = new = replace(new, gained=gained)
         if not self._late and is_clear(*gained):
-            self._keep(own, new, step)
+            self._keep(own, new, step, from_afar=far)
 
     def _lone_terms(self, settings: FitSettings) -> dict[str, int]:
         """Return the terms of one joint that can be fitted alone, and that joint,
@@ -319,8 +320,18 @@ class Ladder:
         errors = self.problem.output_errors(self.kept.theta[None])
         return not any(lasting(shown, shown.innovations(errors)[0]).values())
 
-    def _keep(self, problem: Problem, estimate: Estimate, step: Step) -> None:
-        self.problem, self.kept, self._step = problem, estimate, step
+    def _keep(
+        self,
+        problem: Problem,
+        estimate: Estimate,
+        step: Step,
+        *,
+        from_afar: bool = False,
+    ) -> None:
+        self.problem = problem
+        self.kept = estimate
+        self._step = step
+        self._from_afar = from_afar
 
     def _left_out_of(self, problem: Problem, end: Refinement) -> LeftOut:
         return predict_blocks(make_likelihood(problem), end)

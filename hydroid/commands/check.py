@@ -107,6 +107,7 @@ def check(
             *motion_findings(parts, settings.arm),
         ]
         agreements = _compared(parts, settings, progress)
+    # what stands out is said of the log, as its other findings are
     motion += odd_logs(agreements, parts, settings)
     checks = list[LogCheck]()
     for file in files:
@@ -192,6 +193,7 @@ def _checks(
         yield LogCheck(file.path, None, file.findings, {})
     for part in file.parts:
         findings = [finding for finding in motion if finding.source == part.source]
+        # those of the file are said once
         if part is file.parts[0]:
             findings = [*file.findings, *findings]
         moved = dict[str, float]()
@@ -289,6 +291,7 @@ def convert(
         ranges = {str(number): (-np.inf, np.inf) for number in range(1, last + 1)}
         reasons += guess.reasons
     parts, findings = check_parts(path, layout, ranges, Reading(arm=arm, repair=repair))
+    # errors come first
     if not parts:
         raise findings[0].error()
     read = _with_gaps(parts)
@@ -320,6 +323,7 @@ def _with_gaps(parts: Sequence[Log]) -> Log:
         return first
     times = list[Array]()
     for part in parts:
+        # on the grid of the first part, so that a reader finds one period
         samples = np.ceil((part.begin - first.begin) / first.period - 1e-6)
         times.append(first.period * (samples + np.arange(len(part.time))))
     pressures = [part.pressure for part in parts if part.pressure is not None]

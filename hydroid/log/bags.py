@@ -73,6 +73,7 @@ class Channel:
         times = np.array(self.times, np.int64)
         values = np.array(self.values, np.float64)
         latest = np.maximum.accumulate(times)
+        # networks reorder messages that are sent one soon after the other
         order = np.argsort(times, kind="stable")
         again = np.append(False, np.diff(times[order]) == 0)
         differs = again & np.append(False, np.diff(values[order]) != 0)
@@ -132,6 +133,7 @@ class BagTable(Table):
             at, numbers = messages[signal.name]
             seconds = (at - start) / 1e9
             values = signal.gain * numbers + signal.offset
+            # between the samples of a command nothing is sent: a valve holds it
             if signal.kind == "command" or len(at) == 1:
                 columns[signal.name] = _held(seconds, values, grid, signal.rest)
             else:
@@ -170,12 +172,14 @@ class BagTable(Table):
         for name, at in times.items():
             if len(at) > 1 and not is_held[name]:
                 interpolated.append(at)
+        # a command may begin later, since it is 0 before its first message
         channels = interpolated or [*times.values()]
         start = max(int(at[0]) for at in channels)
         end = min(int(at[-1]) for at in channels)
         if end - start < self.period * 1e9:
             hint = "record them together, with one clock"
             raise LogError("the channels have no common time", self.source, hint)
+        # a last row that is off by rounding counts
         rows = int((end - start) / (1e9 * self.period) + 1e-6) + 1
         refuse_large(self.source, rows, 1)
         return start, self.period * np.arange(rows, dtype=np.float64)
@@ -188,7 +192,8 @@ def topic_of(name: str) -> str:
 
 def _held(seconds: Array, values: Array, grid: Array, rest: float) -> Array:
     """Hold each value until the next one; before the first it is `rest`, 0 or NaN."""
-    column = hold(seconds, values[:, None], grid, grid[1])[:, 0]
+    period = grid[1]
+    column = hold(seconds, values[:, None], grid, period)[:, 0]
     if rest != 0:
         column[grid < seconds[0] - 1e-9] = rest
     return column
@@ -198,9 +203,13 @@ def _in_holes(seconds: Array, grid: Array) -> Mask:
     """Return which rows lie where a channel was silent: for longer than HOLE and than
     three usual steps."""
     steps = np.diff(seconds)
-    after = np.searchsorted(seconds, grid - 1e-9).clip(1, len(seconds) - 1)
+    # a row at the time of a message is in no hole, but for rounding
+    after = np.searchsorted(seconds, grid - 1e-9)
+    after = after.clip(1, len(seconds) - 1)
     far = steps[after - 1] > max(HOLE, 3 * np.median(steps))
-    return far & (grid > seconds[after - 1] + 1e-9) & (grid < seconds[after] - 1e-9)
+    is_later = grid > seconds[after - 1] + 1e-9
+    is_earlier = grid < seconds[after] - 1e-9
+    return far & is_later & is_earlier
 
 
 def open_bag(
@@ -247,6 +256,7 @@ class _Content:
         """Take the numbers of a message that was recorded at a time [ns]."""
         topic = connection.topic
         self._counts[topic] += 1
+        # to unpack it would take long, for nothing
         if len(data) > LARGEST_MESSAGE:
             return
         try:

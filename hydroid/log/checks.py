@@ -166,7 +166,9 @@ def _explained_angle(signal: Signal, values: Array) -> tuple[str, dict[str, str]
 
 
 def _is_within(signal: Signal, values: Array) -> bool:
-    return bool(np.nanmin(values) >= signal.low and np.nanmax(values) <= signal.high)
+    low = np.nanmin(values)
+    high = np.nanmax(values)
+    return bool(low >= signal.low and high <= signal.high)
 
 
 def _units(recording: Recording) -> Iterator[LogFinding]:

@@ -129,4 +129,5 @@ def rises(values: Array) -> bool:
     steps = np.diff(values[np.isfinite(values)])
     if not len(steps):
         return False
-    return bool(np.mean(steps > 0) > 0.99 and np.median(steps) > 0.5 * steps.mean())
+    rising = np.mean(steps > 0)
+    return bool(rising > 0.99 and np.median(steps) > 0.5 * steps.mean())

@@ -55,7 +55,9 @@ class CsvTable(Table):
         """Read a cell anew, for a message; empty where its line has none."""
         assert self.lines is not None
         with Path(self.source).open(encoding=self.encoding) as file:
-            line = next(islice(file, int(self.lines[row]) - 1, None), "")
+            before = int(self.lines[row]) - 1
+            # the file may have been changed since
+            line = next(islice(file, before, None), "")
         cells = self.layout.cells(line.rstrip("\n"))
         return cells[self.names.index(name)]
 
@@ -84,6 +86,7 @@ def _read_table(path: Path, encoding: str, file: Iterable[str]) -> Table:
     sample = _sample(lines)
     if not sample:
         raise LogError("is empty", path, IS_CSV)
+    # what the first lines say holds for all: a file is too long to be read twice
     layout = find_layout(sample, path)
     text_columns = [TextColumn() for _ in layout.names]
     line_numbers = array("q")
@@ -95,7 +98,8 @@ def _read_table(path: Path, encoding: str, file: Iterable[str]) -> Table:
             decimal_commas = decimal_commas or layout.has_decimal_commas(line)
             line_numbers.append(number)
             rows.append(layout.cells(line))
-        for column, cells in zip(text_columns, zip(*rows, strict=True), strict=True):
+        cells_by_column = zip(*rows, strict=True)
+        for column, cells in zip(text_columns, cells_by_column, strict=True):
             column.extend(cells)
 
     columns = dict[str, NDArray[Any]]()

@@ -111,6 +111,7 @@ def find_layout(sample: Mapping[int, str], path: Path) -> Layout:
 def split(line: str, separator: str) -> list[str]:
     """Return the cells of a line. Any number of spaces parts columns of spaces."""
     spaces = separator == " "
+    # the library is slower, and only needed for separators within quotes
     if '"' in line:
         line = line.strip() if spaces else line
         cells = next(csv.reader([line], delimiter=separator, skipinitialspace=spaces))
@@ -147,7 +148,11 @@ def _find_separator(lines: Sequence[str]) -> str:
 
     def merit(separator: str) -> tuple[int, bool, int]:
         rows = [split(line, separator) for line in lines]
-        counts = Counter(len(_number_cells(row)) * (len(row) > 1) for row in rows)
+        counts = Counter[int]()
+        for row in rows:
+            # a line that is not parted at all says nothing for the separator
+            parted = len(row) > 1
+            counts[len(_number_cells(row)) if parted else 0] += 1
         most = max(numbers * times for numbers, times in counts.items())
         # spaces stand in names and around other separators, too
         return most, separator != " ", max(map(len, rows))
@@ -206,6 +211,7 @@ def _usual_width(rows: Sequence[Sequence[str]], names: int) -> int:
 
     Lines that differ from each other are torn ones, but for separators at their ends.
     """
+    # a single line may be a torn one itself
     widths = {len(row) for row in rows}
     if len(rows) < 2 or len(widths) > 1:
         return names

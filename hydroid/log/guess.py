@@ -107,7 +107,13 @@ def guess_columns(
 
 def nearest_period(step: float) -> float:
     """Return the usual period that is most like a log's [s]."""
-    return min(PERIODS, key=lambda p: max(p, step) / max(min(p, step), 1e-9))
+
+    def ratio(period: float) -> float:
+        # a step may be 0 where the clock is coarse
+        smaller = max(min(period, step), 1e-9)
+        return max(period, step) / smaller
+
+    return min(PERIODS, key=ratio)
 
 
 def _time_column(table: Table, columns: Sequence[Column]) -> Column:
@@ -165,7 +171,10 @@ def _usual_angle_unit(angles: Mapping[int, JointColumns], arm: Joints) -> str:
     for joint, ((column,), _) in angles.items():
         if joint not in arm.slides and not column.unit and not column.is_raw:
             largest.append(np.nanmax(np.abs(column.values)))
-    return "rad" if max(largest, default=np.inf) <= LARGEST_RADIANS else "deg"
+    # without any, degrees, in which most loggers write
+    if max(largest, default=np.inf) <= LARGEST_RADIANS:
+        return "rad"
+    return "deg"
 
 
 def _angle(column: Column, joint: int, usual_unit: str, arm: Joints) -> _Entry:
@@ -229,6 +238,7 @@ def _cylinder_length(column: Column, rod: Rod, angle_unit: str) -> _Entry | None
         return None
     unit, offset = reading
     settings: Plain = {"column": column.name, "unit": unit}
+    # without an offset the sensor measures from pin to pin
     if not offset:
         return _Entry(settings, f"{column.name}: length of the cylinder in {unit}")
     settings["offset"] = offset
@@ -249,6 +259,7 @@ def _over_the_range(
     low = float(finite.min())
     high = float(finite.max())
     least, most = ends
+    # a reading that never changes has no span, and tells nothing of its ends
     span = high - low or 1.0
     scale = float(f"{(most - least) / span:.6g}")
     offset = float(f"{least - scale * low:.6g}")
@@ -285,6 +296,7 @@ def _usual_range(commands: Sequence[_Cells]) -> CommandRange | None:
     positive middle."""
     ranges = dict[str, CommandRange]()
     names = list[str]()
+    # one of a middle of 0 needs no offset, and is recognised anyway
     for cells in commands:
         if cells.likely and cells.likely.offset:
             names.append(cells.likely.name)

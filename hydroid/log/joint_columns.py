@@ -36,6 +36,7 @@ class Joints:
 
     def can_have(self, joint: int, column: Column) -> bool:
         """Return whether a joint moves in the unit of a position."""
+        # their meaning is found by their numbers later
         if not column.unit or column.is_raw:
             return True
         is_length = column.unit in LENGTHS
@@ -72,6 +73,7 @@ def by_joint(
             left.append(group)
     if assigned and from_zero:
         reasons.append("the numbers in the names count from 0: joint 1 is number 0")
+    # beside columns that have a joint the order says nothing
     if not assigned:
         left = _given_in_order(left, joints, assigned)
     if left:
@@ -91,6 +93,7 @@ def _groups(columns: Sequence[Column]) -> list[Sequence[Column]]:
         groups.setdefault(key, []).append(column)
     for group in groups.values():
         group.sort(key=lambda column: -direction(column.name)[0])
+    # of more than two it cannot be known which belong together
     return [group[:2] for group in groups.values()]
 
 
@@ -102,7 +105,9 @@ def _joint_in(name: str, joints: Joints, *, from_zero: bool) -> tuple[int, str]:
     number = number_in(name)
     if number is None:
         return 0, "by its number"
-    return number + from_zero, "by its number"
+    if from_zero:
+        number += 1
+    return number, "by its number"
 
 
 def _may_have(

@@ -40,6 +40,7 @@ def map_signals(
     if arm and _has_lengths(settings):
         rods = rods_of(arm)
     time_unit = UNITS[settings.time.unit]
+    # `Table.read` takes the first signal for the time
     signals = [Signal(settings.time.column, "time", gain=time_unit.factor)]
     for kind in get_args(Kind):
         for joint, owner in enumerate(ranges, 1):
@@ -129,7 +130,9 @@ def match_columns(
     Raises LogError: a column is not there, or stands for several signals.
     """
     used = {signal.name for signal in wanted}
-    unused = {name.lower(): name for name in sorted({*table.names} - used)}
+    unused = dict[str, str]()
+    for name in sorted({*table.names} - used):
+        unused[name.lower()] = name
     misspelt = _misspelt(used - {*table.names}, unused)
     absent = _absent_joints({*table.names, *misspelt}, wanted) - {*needed}
     if absent:
@@ -190,6 +193,7 @@ def _lacks_columns(
 ) -> LogError:
     """Return the error about all columns that a file lacks, misspelt ones first."""
     lacking = [signal for signal in wanted if signal.name not in table.names]
+    # only two are named, and those say most
     lacking.sort(key=lambda signal: signal.name not in misspelt)
     descriptions = list[str]()
     for signal in lacking:

@@ -95,7 +95,9 @@ def large_variables(path: Path, names: Sequence[str], most: int) -> list[str]:
             end = file.tell() + size
             data = _Compressed(file, size) if kind == COMPRESSED else _Plain(file)
             if kind == COMPRESSED:
-                kind, size = struct.unpack(f"{order}2I", data.read(8).ljust(8, b"\0"))
+                # a file that was cut off ends within the tag
+                inner = data.read(8).ljust(8, b"\0")
+                kind, size = struct.unpack(f"{order}2I", inner)
             sizes.append(size)
             if kind == MATRIX and size <= most:
                 _look_through(data, size, order, depth=1)
@@ -119,7 +121,8 @@ def _look_through(data: _Bytes, size: int, order: str, depth: int) -> None:
         elif first and used > 8:
             # the first element of a matrix tells its class in its lowest byte
             content = data.read(used - 8)
-            (flags,) = struct.unpack(f"{order}I", content[:4].ljust(4, b"\0"))
+            word = content[:4].ljust(4, b"\0")
+            (flags,) = struct.unpack(f"{order}I", word)
             holds = flags & 0xFF in HOLDERS
         else:
             data.skip(used - 8)

@@ -68,7 +68,8 @@ class JointMotion:
     def push(self) -> float:
         """Time integral of its strong commands, past the dead band of a valve [% s]."""
         size = np.abs(self._logged)
-        return np.where(size > 30, size, 0.0).sum() * self.log.period
+        strong = np.where(size > 30, size, 0.0)
+        return strong.sum() * self.log.period
 
     @cached_property
     def directed(self) -> tuple[float, float]:
@@ -173,16 +174,20 @@ class JointMotion:
         command = self._logged
         period = self.log.period
         steps = np.abs(np.diff(angle))
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], steps == 0, [0]])))
+        # stretches of equal readings begin and end where this changes
+        stands = np.concatenate([[0], steps == 0, [0]])
+        edges = np.flatnonzero(np.diff(stands))
         begins = edges[::2]
         lengths = edges[1::2] - begins
-        moving = np.abs(command[:-1])[steps > MOVING * np.percentile(steps, 95)]
+        moves = steps > MOVING * np.percentile(steps, 95)
+        moving = np.abs(command[:-1])[moves]
         if not len(begins) or not len(moving):
             return None
         longest = int(np.argmax(lengths))
         begin = int(begins[longest])
         end = begin + int(lengths[longest])
         second_longest = np.delete(lengths, longest).max(initial=0)
+        # a coarse sensor gives the same reading for long, too
         if end - begin < 3 * second_longest:
             return None
         enough = max(LEAST_PUSH, np.percentile(moving, 25))
@@ -192,7 +197,9 @@ class JointMotion:
             return None
         part = (angle[begin] - angle.min()) / np.ptp(angle)
         is_at_end = not END < part < 1 - END
-        one_way = np.all(np.sign(pushes) == np.sign(pushes[:1]))
+        # a command back from the end would move it
+        signs = np.sign(pushes)
+        one_way = np.all(signs == signs[:1])
         if is_at_end and one_way:
             return None
         return begin * period, end * period
@@ -214,7 +221,9 @@ class JointMotion:
         speed = self._slow[2]
         moves = np.flatnonzero(idle & (np.abs(speed) > MOVING * self.speed))
         steps = np.rad2deg(speed[moves]) * period
-        return float(steps.clip(0).sum()), float(-steps.clip(None, 0).sum())
+        upwards = steps.clip(0).sum()
+        downwards = -steps.clip(None, 0).sum()
+        return float(upwards), float(downwards)
 
     @cached_property
     def is_target(self) -> bool:
@@ -224,7 +233,8 @@ class JointMotion:
             return False
         if not np.ptp(self._logged):
             return False
-        lags = min(round(TARGET_WITHIN / self.log.period), len(self._logged) // 2)
+        longest = round(TARGET_WITHIN / self.log.period)
+        lags = min(longest, len(self._logged) // 2)
         _, angle, _ = self._slow
         with_angle = _correlations(self._logged, angle, lags).max(initial=0.0)
         with_speed = self._following.max(initial=0.0)

@@ -129,8 +129,9 @@ def _usual_command(log: Log, motions: Mapping[int, JointMotion]) -> float:
     """Return the largest command that a joint in the middle of all gets [%]."""
     if not motions:
         return 0.0
-    largest = [np.abs(log.command[:, joint - 1]).max() for joint in motions]
-    return float(np.median(largest))
+    largest = np.abs(log.command).max(axis=0)
+    joints = [joint - 1 for joint in motions]
+    return float(np.median(largest[joints]))
 
 
 def _range(
@@ -144,6 +145,7 @@ def _range(
     """
     motion = joint.motion
     command = joint.command
+    # one range for all is likelier than one for each
     if common:
         remedy = common.remedy(command.gain, command.offset)
         yield joint.warning("range", command, **remedy)
@@ -152,6 +154,7 @@ def _range(
     if likely is None:
         return
     remedy = likely.remedy(command.gain, command.offset)
+    # a command in two columns has no middle
     if likely.offset and command.low < 0:
         yield joint.warning("range", command, **remedy)
     elif likely.name in SMALL and usual > FULL and motion.travel > MOVES_WELL:
@@ -231,6 +234,7 @@ def _stands(
     for side, sign in (("upper", 1), ("lower", -1)):
         held = motion.held(sign)
         seconds = motion.log.period * held.shape[1]
+        # a joint also stands for a moment where it turns round
         if seconds < LEAST_STAND:
             continue
         angle, command = np.median(held, axis=1)

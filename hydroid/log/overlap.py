@@ -70,7 +70,8 @@ def _moves(log: Log) -> Mask:
     (J,)."""
     time = log.time - log.time.mean()
     off = log.angle - log.angle.mean(axis=0)
-    steady = np.outer(time, time @ off / max(time @ time, log.period**2))
+    slopes = time @ off / max(time @ time, log.period**2)
+    steady = np.outer(time, slopes)
     left = np.sqrt(np.mean((off - steady) ** 2, axis=0))
     # False where the angle is not measured, and NaN
     return left > MOTION
@@ -81,7 +82,10 @@ def _holds(known: Log, log: Log, moves: Mask) -> bool:
     move there."""
     joints = np.flatnonzero(moves & known.measured)
     grid = np.arange(0.0, log.duration + 1e-9, known.period)
-    if not len(joints) or len(grid) > len(known.time) or len(grid) < 3:
+    if not len(joints) or len(grid) > len(known.time):
+        return False
+    # fewer have no second difference, which tells the noise
+    if len(grid) < 3:
         return False
     angles = known.angle[:, joints]
     columns = [np.interp(grid, log.time, log.angle[:, joint]) for joint in joints]
@@ -115,7 +119,8 @@ def _squares(angles: Array, wanted: Array) -> Array:
     spectra = spectra * np.conj(np.fft.rfft(wanted, size, axis=0))
     lags = len(angles) - len(wanted) + 1
     products = np.fft.irfft(spectra.sum(axis=1), size)[:lags]
-    sums = np.concatenate([[0.0], np.cumsum((angles**2).sum(axis=1))])
+    sums = np.zeros(len(angles) + 1)
+    sums[1:] = np.cumsum((angles**2).sum(axis=1))
     # without the squares of `wanted`, which are the same everywhere
     return sums[len(wanted) :] - sums[: -len(wanted)] - 2 * products
 
@@ -135,5 +140,6 @@ def _between(angles: Array, wanted: Array) -> float:
     square = float(np.sum(step**2))
     part = 0.0
     if square:
-        part = min(max(float(np.sum(step * off)) / square, 0.0), 1.0)
+        part = float(np.sum(step * off)) / square
+        part = min(max(part, 0.0), 1.0)
     return float(np.mean((off - part * step) ** 2))

@@ -41,7 +41,11 @@ set back"""
 def sample_period(time: Array) -> float:
     """Return the usual step between samples [s]; NaN where there is none."""
     steps = np.diff(time[~np.isnan(time)])
-    return np.median(steps[steps > 0]) if (steps > 0).any() else np.nan
+    # a row that stands twice has a step of 0
+    rising = steps[steps > 0]
+    if not len(rising):
+        return np.nan
+    return np.median(rising)
 
 
 def unwrap(recording: Recording, findings: list[LogFinding]) -> Recording:
@@ -90,10 +94,13 @@ def fill(recording: Recording, longest: float, findings: list[LogFinding]) -> Re
     empty = np.isnan(values)
     period = sample_period(time)
     reach = longest * ROUNDING + period
-    for signal, column in zip(recording.signals[1:], values.T[1:], strict=True):
+    columns = values.T[1:]
+    for signal, column in zip(recording.signals[1:], columns, strict=True):
         there = ~np.isnan(column)
+        # times of the last cell with a number, and of the next one
         before = np.maximum.accumulate(np.where(there, time, -np.inf))
-        after = np.minimum.accumulate(np.where(there, time, np.inf)[::-1])[::-1]
+        after = np.where(there, time, np.inf)
+        after = np.minimum.accumulate(after[::-1])[::-1]
         holes = ~there & (after - before <= reach)
         if signal.kind == "command":
             last = np.maximum.accumulate(there * np.arange(len(time)))
@@ -211,9 +218,9 @@ def between_gaps(
         bridged = max(bridged, settings.repair_s * ROUNDING + period)
     lost = 1 + np.flatnonzero((steps > GAP * period) & (steps <= bridged))
     if len(lost) and not repair:
-        samples = float(np.rint(steps[lost - 1] / period - 1).sum())
+        samples = np.rint(steps[lost - 1] / period - 1).sum()
         findings.append(
-            recording.finding("warning", "lost", lost, signal, samples=samples)
+            recording.finding("warning", "lost", lost, signal, samples=float(samples))
         )
     gaps = 1 + np.flatnonzero(steps > bridged)
     ends = [0, *gaps.tolist(), len(time)]
@@ -253,7 +260,9 @@ def resample(recording: Recording, settings: LogSettings, joints: int) -> Log:
     """
     period = settings.period_s
     time = recording.time - recording.time[0]
-    grid = period * np.arange(int(time[-1] / period + 0.01) + 1, dtype=np.float64)
+    # the last sample counts where jitter makes it early by a hundredth
+    last = int(time[-1] / period + 0.01)
+    grid = period * np.arange(last + 1, dtype=np.float64)
     exact = on_grid(time, period)
     if exact is not None:
         # values pass unchanged
@@ -275,10 +284,13 @@ def resample(recording: Recording, settings: LogSettings, joints: int) -> Log:
         else:
             commands[joint] = commands.get(joint, 0.0) + values
     command = np.zeros((len(grid), joints))
+    at = grid - settings.delay_s
     for joint, values in commands.items():
-        at = grid - settings.delay_s
-        command[:, joint] = _resampled(time, values.clip(-100, 100), at, period)
-    rows = np.minimum(np.rint(time / period).astype(np.int64), len(grid) - 1)
+        # amplifiers and converters overshoot
+        values = values.clip(-100, 100)
+        command[:, joint] = _resampled(time, values, at, period)
+    rows = np.rint(time / period).astype(np.int64)
+    rows = np.minimum(rows, last)
     recorded = np.zeros(len(grid), dtype=bool)
     recorded[rows] = True
     return Log(
@@ -304,7 +316,10 @@ def on_grid(time: Array, period: float) -> Array | None:
     """Return times as multiples of a period; None if any is off by more than 1 % of the
     period."""
     steps = np.rint(time / period)
-    return period * steps if (np.abs(time / period - steps) <= 0.01).all() else None
+    off = np.abs(time / period - steps)
+    if not (off <= 0.01).all():
+        return None
+    return period * steps
 
 
 def hold(time: Array, command: Array, at: Array, period: float) -> Array:
@@ -328,6 +343,6 @@ def hold(time: Array, command: Array, at: Array, period: float) -> Array:
             return np.where(begun, areas[index] + since * command[index], 0.0)
 
         return (area(at + period) - area(at)) / period
-    # but for rounding
+    # a sample at the time itself counts, but for rounding
     index = np.searchsorted(exact, at + 1e-6 * period, side="right") - 1
     return np.where(index[:, None] >= 0, command[index], 0.0)

@@ -73,7 +73,8 @@ def leaps(time: Array, angle: Array) -> Index:
     large = np.flatnonzero(steps > least)
     # a leap and the one back may be up to three samples apart: the largest step nearby
     # does not count
-    around = np.clip(large[:, None] + [-4, -3, -2, 2, 3, 4], 0, len(steps) - 1)
+    around = large[:, None] + [-4, -3, -2, 2, 3, 4]
+    around = around.clip(0, len(steps) - 1)
     near = np.sort(steps[around], axis=1)[:, -2]
     return 1 + large[steps[large] > ABOVE_NEAR * near]
 

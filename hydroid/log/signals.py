@@ -40,7 +40,8 @@ class CommandRange(NamedTuple):
     def with_overshoot(self, values: Array) -> "CommandRange":
         """Return a range in which no cell is beyond 100 %, for converters that
         overshoot."""
-        most = float(np.nanmax(np.abs(self.scale * values + self.offset))) / 100
+        percent = np.abs(self.scale * values + self.offset)
+        most = float(np.nanmax(percent)) / 100
         if most <= 1 + 1e-8:
             return self
         # six digits, rounded to either side, still hold the largest cell
@@ -87,7 +88,8 @@ def _signals() -> tuple[Signal, ...]:
     signals = list[Signal]()
     for name, row in read_table("log/signals.yaml").items():
         full = row.get("full", False)
-        signals.append(Signal(name, row["from"], row["to"], full, row.get("unit", "")))
+        unit = row.get("unit", "")
+        signals.append(Signal(name, row["from"], row["to"], full, unit))
     return tuple(signals)
 
 

@@ -118,8 +118,9 @@ class Table:
             with np.errstate(all="ignore"):
                 column[:] = numbers * gain + signal.offset
         values[~(np.abs(values) < LARGEST)] = np.nan
+        rows = np.arange(len(values))
         clock = time_of_day(self.columns[first])
-        return Recording(self, tuple(signals), values, np.arange(len(values)), clock)
+        return Recording(self, tuple(signals), values, rows, clock)
 
 
 @record
@@ -251,7 +252,9 @@ class TextColumn:
             return np.frombuffer(self._numbers, np.float64)
         ticks = np.array(self._ticks, np.int64)
         there = ticks != _NO_TIME
-        days = np.cumsum(np.diff(ticks[there], prepend=ticks[there][:1]) < -_DAY // 2)
+        steps = np.diff(ticks[there], prepend=ticks[there][:1])
+        # a smaller step back is a clock that was set, which is a fault
+        days = np.cumsum(steps < -_DAY // 2)
         ticks[there] += _DAY * days
         return ticks.view("M8[ns]")
 

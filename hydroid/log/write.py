@@ -52,16 +52,20 @@ def write_logs(
     as `write_log` does."""
     columns = dict[str, list[str]]()
     for log, settings in logs:
-        unlimited = {str(joint): (np.inf, np.inf) for joint in range(1, 1 + log.joints)}
+        names = map(str, range(1, 1 + log.joints))
+        # ranges are for what is read
+        unlimited = dict.fromkeys(names, (np.inf, np.inf))
         signals = map_signals(settings, unlimited, arm)
         _refuse_incomplete(path, log, signals)
-        command = hold(log.time, log.command, log.time + settings.delay_s, log.period)
+        at = log.time + settings.delay_s
+        command = hold(log.time, log.command, at, log.period)
         for signal in signals:
             if signal.kind == "pressure" and log.pressure is None:
                 continue
             values = _values(signal, log, command)
             columns[signal.name] = _cells(signal, values, exact=exact)
-    write_atomic(path, csv_text([columns, *zip(*columns.values(), strict=True)]))
+    rows = zip(*columns.values(), strict=True)
+    write_atomic(path, csv_text([columns, *rows]))
 
 
 def _refuse_incomplete(path: Path, log: Log, signals: Sequence[Signal]) -> None:

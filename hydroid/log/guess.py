@@ -37,10 +37,13 @@ from hydroid.words import listed
 PERIODS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2)
 
 LENGTHS = ("m", "cm", "mm")
+ANGLES = ("rad", "deg")
 NO_RODS: Mapping[int, Rod] = {}
 NO_RANGES: Mapping[int, tuple[float, float]] = {}
 LARGEST_ANGLE = np.radians(400.0)
 """of an arm's joint [rad]; larger numbers are lengths or counts"""
+USELESS = "left out, lengths of cylinders whose pivots are not known"
+NEEDED = "give both of each in arm.yaml, and lengths stand for angles"
 
 
 class ColumnGuess(NamedTuple):
@@ -238,9 +241,11 @@ def _angles_first(columns: Sequence[_Column], kind: str) -> list[_Column]:
 
 
 def _is_length(column: _Column) -> bool:
-    return column.unit in LENGTHS or not {*words(column.name)}.isdisjoint(
-        CLUES["lengths"]
-    )
+    if column.unit in LENGTHS:
+        return True
+    named = {*words(column.name)}
+    turns = column.unit in ANGLES or not named.isdisjoint(CLUES["turns"])
+    return not turns and not named.isdisjoint(CLUES["lengths"])
 
 
 def _length(column: _Column, rod: Rod | None, unit: str) -> tuple[str, float] | None:
@@ -255,7 +260,11 @@ def _length(column: _Column, rod: Rod | None, unit: str) -> tuple[str, float] | 
     angles = np.nanmax(np.abs(column.values)) * UNITS[unit].factor <= LARGEST_ANGLE
     if not _is_length(column) and angles:
         return None
-    return rod.reading(column.values, column.unit)
+    read = rod.reading(column.values, column.unit)
+    if read is None and _is_length(column):
+        # lengths that its cylinder cannot have: who reads them says which
+        return column.unit or rod.nearest_unit(column.values), 0.0
+    return read
 
 
 def nearest_period(step: float) -> float:
@@ -348,10 +357,9 @@ def _by_joint(
     def give(pair: list[_Column], joint: int, why: str) -> bool:
         """Give columns to a joint that has none yet and moves in their unit; return
         whether it does."""
-        unit = pair[0].unit
-        length = unit in LENGTHS
-        takes = (length and joint in rods) or length == (joint in slides)
-        fits = kind == "command" or not unit or takes or _is_raw(pair[0])
+        fits = kind == "command" or _suits(
+            pair[0], slides=joint in slides, has_rod=joint in rods
+        )
         free = fits and 0 < joint <= len(names) and joint not in given
         if free:
             given[joint] = pair, why
@@ -364,6 +372,15 @@ def _by_joint(
         return 0 if number is None else number + from_zero, "by its number"
 
     left = [pair for pair in pairs if not give(pair, *named(pair[0].name))]
+    useless = list[list[_Column]]()
+    for pair in left if kind == "angle" else ():
+        joint, _ = named(pair[0].name)
+        if _is_length(pair[0]) and joint and joint not in given:
+            useless.append(pair)
+    if useless:
+        of_cylinders = listed([column.name for (column, *_) in useless], 12)
+        reasons.append(f"{USELESS}: {of_cylinders}: {NEEDED}")
+        left = [pair for pair in left if pair not in useless]
     if given and from_zero:
         reasons.append("the numbers in the names count from 0: joint 1 is number 0")
     if left and not given:
@@ -381,6 +398,16 @@ def _by_joint(
         )
         reasons.append(f"left out, though like a joint's {kind}: {spare}; {whose}")
     return given
+
+
+def _suits(column: _Column, *, slides: bool, has_rod: bool) -> bool:
+    """Return whether a column may hold the position of a joint that slides or turns,
+    with a cylinder whose pivots are known or without."""
+    if _is_raw(column):
+        return True
+    if slides:
+        return not column.unit or column.unit in LENGTHS
+    return has_rod or not _is_length(column)
 
 
 class _Cells(NamedTuple):

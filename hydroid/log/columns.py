@@ -13,6 +13,8 @@ from hydroid.log.signals import CommandRange, likely_range
 from hydroid.log.table import Signal, Table
 from hydroid.units import UNITS, Unit, unit_of
 
+ANGLES = ("rad", "deg")
+
 
 class Column(NamedTuple):
     """A column that seems to be a signal.
@@ -36,7 +38,10 @@ class Column(NamedTuple):
     @property
     def is_length(self) -> bool:
         """Whether it holds a length, by its unit or its name."""
-        return self.unit in LENGTHS or self._has_word(CLUES["lengths"])
+        if self.unit in LENGTHS:
+            return True
+        turns = self.unit in ANGLES or self._has_word(CLUES["turns"])
+        return not turns and self._has_word(CLUES["lengths"])
 
     def _has_word(self, of: Sequence[str]) -> bool:
         return not {*words(self.name)}.isdisjoint(of)

@@ -234,9 +234,11 @@ def _cylinder_length(column: Column, rod: Rod, angle_unit: str) -> _Entry | None
     if not column.is_length and _may_be_angles(column, angle_unit):
         return None
     reading = rod.reading(column.values, column.unit)
-    if reading is None:
+    if reading is None and not column.is_length:
         return None
-    unit, offset = reading
+    # lengths that its cylinder cannot have: who reads them says which
+    in_doubt = column.unit or rod.nearest_unit(column.values), 0.0
+    unit, offset = reading or in_doubt
     settings: Plain = {"column": column.name, "unit": unit}
     # without an offset the sensor measures from pin to pin
     if not offset:

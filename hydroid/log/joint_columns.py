@@ -10,6 +10,9 @@ from hydroid.log.mapping import LENGTHS
 from hydroid.log.rods import Rod
 from hydroid.words import listed
 
+USELESS = "left out, lengths of cylinders whose pivots are not known"
+NEEDED = "give both of each in arm.yaml, and lengths stand for angles"
+
 
 @record
 class Joints:
@@ -35,14 +38,14 @@ class Joints:
         return joint_of(column, self.names) or joint_of(column, self.links) or 0
 
     def can_have(self, joint: int, column: Column) -> bool:
-        """Return whether a joint moves in the unit of a position."""
-        # their meaning is found by their numbers later
-        if not column.unit or column.is_raw:
+        """Return whether a column may hold the position of a joint that slides or
+        turns, with a cylinder whose pivots are known or without."""
+        # its meaning is found by its numbers later
+        if column.is_raw:
             return True
-        is_length = column.unit in LENGTHS
-        if is_length and joint in self.rods:
-            return True
-        return is_length == (joint in self.slides)
+        if joint in self.slides:
+            return not column.unit or column.unit in LENGTHS
+        return joint in self.rods or not column.is_length
 
 
 class JointColumns(NamedTuple):
@@ -71,6 +74,7 @@ def by_joint(
             assigned[joint] = JointColumns(group, reason)
         else:
             left.append(group)
+    left = _without_lengths(left, joints, assigned, reasons, from_zero=from_zero)
     if assigned and from_zero:
         reasons.append("the numbers in the names count from 0: joint 1 is number 0")
     # beside columns that have a joint the order says nothing
@@ -139,6 +143,38 @@ def _given_in_order(
         else:
             left.append(group)
     return left
+
+
+def _without_lengths(
+    left: Sequence[Sequence[Column]],
+    joints: Joints,
+    assigned: Mapping[int, JointColumns],
+    reasons: list[str],
+    *,
+    from_zero: bool,
+) -> list[Sequence[Column]]:
+    """Return the columns that are no lengths of the cylinders of joints without other
+    columns; add those that are to the reasons.
+
+    Without the pivots of its cylinder a length tells no angle of a joint.
+    """
+    others = list[Sequence[Column]]()
+    useless = list[str]()
+    for group in left:
+        first = group[0]
+        joint, _ = _joint_in(first.name, joints, from_zero=from_zero)
+        if (
+            first.kind == "angle"
+            and first.is_length
+            and joint
+            and joint not in assigned
+        ):
+            useless.append(first.name)
+        else:
+            others.append(group)
+    if useless:
+        reasons.append(f"{USELESS}: {listed(useless, 12)}: {NEEDED}")
+    return others
 
 
 def _left_out(

@@ -66,6 +66,16 @@ class Rod:
                     reading = name, float(f"{offset / factor:.9g}")
         return reading
 
+    def nearest_unit(self, cells: Array) -> str:
+        """Return the unit in which cells, (R,), are most like the cylinder's mean
+        length."""
+        middle = sum(self.ends) / 2
+        size = max(abs(float(np.nanmedian(cells))), 1e-9)
+        return min(
+            ("mm", "cm", "m"),
+            key=lambda name: abs(np.log(UNITS[name].factor * size / middle)),
+        )
+
     def angle(self, length: Array) -> Array:
         """Return the joint's angle [rad] at lengths [m], (R,); those outside count as
         the nearest end.

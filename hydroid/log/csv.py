@@ -93,11 +93,10 @@ def _read_table(path: Path, encoding: str, file: Iterable[str]) -> Table:
     decimal_commas = False
     data = _data_lines(sample, lines, layout)
     while piece := [*islice(data, PIECE)]:
-        rows = list[list[str]]()
-        for number, line in piece:
-            decimal_commas = decimal_commas or layout.has_decimal_commas(line)
-            line_numbers.append(number)
-            rows.append(layout.cells(line))
+        rows = [layout.cells(line) for _, line in piece]
+        line_numbers.extend(number for number, _ in piece)
+        if not decimal_commas:
+            decimal_commas = any(layout.has_decimal_commas(line) for _, line in piece)
         cells_by_column = zip(*rows, strict=True)
         for column, cells in zip(text_columns, cells_by_column, strict=True):
             column.extend(cells)

@@ -57,7 +57,8 @@ class Layout:
 
         All are empty where the line has fewer or more, as a torn one has.
         """
-        if self.has_decimal_commas(line):
+        # not by has_decimal_commas(): a call takes longer, and every line comes here
+        if self.separator != "," and "," in line:
             line = line.replace(",", ".")
         cells = split(line, self.separator)
         count = len(self.names)

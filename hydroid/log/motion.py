@@ -117,13 +117,16 @@ class JointMotion:
         _, _, speed = self._quick
         leads = round(LONGEST_LEAD / period) + 1
         leading = _correlations(speed, self._logged, leads)
-        best = leading.argmax() * period
+        if leading.max() <= 0.8:
+            return 0.0
         # parts of the variance that the command before and after does not explain
         left = 1 - leading.max() ** 2
         left_following = 1 - self._following.max() ** 2
-        is_clear = leading.max() > 0.8 and left < 0.75 * left_following
+        if left >= 0.75 * left_following:
+            return 0.0
+        best = leading.argmax() * period
         # at the longest lead the correlation may rise on
-        if is_clear and 0.02 < best < LONGEST_LEAD - period / 2:
+        if 0.02 < best < LONGEST_LEAD - period / 2:
             return best
         return 0.0
 
@@ -237,8 +240,11 @@ class JointMotion:
         lags = min(longest, len(self._logged) // 2)
         _, angle, _ = self._slow
         with_angle = _correlations(self._logged, angle, lags).max(initial=0.0)
+        # that with the speed takes as long again, and rarely matters
+        if with_angle <= TARGET:
+            return False
         with_speed = self._following.max(initial=0.0)
-        return with_angle > TARGET and with_speed < VALVE
+        return bool(with_speed < VALVE)
 
     @property
     def _logged(self) -> Array:

@@ -265,11 +265,8 @@ def _numbers(cells: Sequence[str]) -> "array[float]":
     if not any("_" in cell for cell in cells):
         with suppress(ValueError):
             return array("d", map(float, cells))
-    numbers = array("d")
-    for cell in cells:
-        value = number(cell)
-        numbers.append(np.nan if value is None else value)
-    return numbers
+    values = map(number, cells)
+    return array("d", [np.nan if value is None else value for value in values])
 
 
 def _as_numbers(cells: NDArray[Any]) -> tuple[Array, bool]:

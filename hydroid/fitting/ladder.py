@@ -29,8 +29,8 @@ from hydroid.settings.fit import FitSettings
 from hydroid.settings.search import RefinementSettings
 
 FIRST = 10
-"""iterations after which another model must be more likely than the last one: each is
-slow to simulate"""
+"""iterations after which another model must err less than the last one: each is slow to
+simulate"""
 FIRM = 1e-3  # gain below which least squares ends where another rung may follow
 
 
@@ -194,12 +194,8 @@ class Ladder:
             # there is nothing for a model that is slow to simulate
             if self._is_white():
                 return
-            few = settings.changed({"iterations": FIRST})
-            first = self._refined(
-                likelihood, theta, few, step.changed(phase="at first")
-            )
-            theta = own.parameters.from_unit(first.point)
-            if self._explained(own, theta) < 0.0:
+            theta = self._nearer(likelihood, theta, settings, step)
+            if own.rms(own.output_errors(theta[None]))[0] > start.rms:
                 return
         # what a search, or another model, ended at may be far from an optimum
         far = not if_better or other_model or bool(_new_curves(own, last))
@@ -219,6 +215,31 @@ class Ladder:
         self.estimates[step.estimate] = new = replace(new, gained=gained)
         if not self._late and is_clear(*gained):
             self._keep(own, new, step, from_afar=far)
+
+    def _nearer(
+        self,
+        likelihood: Likelihood,
+        theta: Array,
+        settings: RefinementSettings,
+        step: Step,
+    ) -> Array:
+        """Return where another model begins, (P,): near the last model's estimate, or
+        the settings' start.
+
+        What stood for oil and inertia in the last model, a lag or a dead band, may lie
+        behind a hill. Both are refined a little by output errors: innovations still
+        have the drift of the last model's errors.
+        """
+        few = settings.changed({"iterations": FIRST})
+        output_errors = replace(likelihood, memory=np.inf)
+        parameters = likelihood.problem.parameters
+        ends = [
+            self._refined(
+                output_errors, begun, few, step.changed(phase="at first", start=number)
+            )
+            for number, begun in enumerate((theta, parameters.start))
+        ]
+        return parameters.from_unit(min(ends, key=lambda end: end.negative_log).point)
 
     def _lone_terms(self, settings: FitSettings) -> dict[str, int]:
         """Return the terms of one joint that can be fitted alone, and that joint,
@@ -297,20 +318,6 @@ class Ladder:
         without = self._left_out_of(own, result)
         if not self._late and not is_better(with_it, without):
             self._keep(own, self._measured(own, result, step), step)
-
-    def _explained(self, problem: Problem, theta: Array) -> float:
-        """Rise of the log-likelihood from the kept estimate to another, (P,), of a
-        problem of the same logs.
-
-        Both are weighed by the errors of the kept one.
-        """
-        kept = likelihood_at(
-            self.problem, self.kept.theta, self.refinements[self.kept.name].numbers
-        )
-        other = replace(kept, problem=problem)
-        before = kept.rows(self.kept.theta[None])[0]
-        after = other.rows(theta[None])[0]
-        return 0.5 * float(before @ before - after @ after)
 
     def _is_white(self) -> bool:
         """Whether the errors of the estimate that is kept leave innovations that are

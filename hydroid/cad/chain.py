@@ -6,7 +6,7 @@ from pathlib import Path
 
 import mujoco
 
-from hydroid.cad.cylinders import ends_of, is_part_of_cylinder
+from hydroid.cad.pins import ends_of, is_part_of_cylinder
 from hydroid.cad.source import Notes
 from hydroid.errors import ModelError
 from hydroid.log.clues import joint_of, words

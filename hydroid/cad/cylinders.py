@@ -4,11 +4,11 @@ A tube that turns on one link, a rod that slides in it and is pinned to another:
 MJCF by an equality constraint, which closes the loop. Between rod and moved link there
 may be a rocker and a coupler (a bucket's four-bar linkage). Where one is recognised its
 links are held, so that their mass is part of the links that carry them, and the joint
-that it moves gets the cylinder. A URDF cannot close loops: its rods end nowhere.
+that it moves gets the cylinder. A URDF cannot close loops: its rods are closed where
+pins meet (`pins.py`).
 """
 
 import math
-import re
 from collections.abc import Iterator, Sequence
 from itertools import product
 from typing import Any, NamedTuple
@@ -16,39 +16,24 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
-from hydroid.arrays import Array, record
+from hydroid.arrays import record
+from hydroid.cad.pins import (
+    Pin,
+    closed_pins,
+    ends_of,
+    hinged_rods,
+    pins_at,
+    pins_of,
+    sliding_rods,
+)
 from hydroid.cad.repair import bare_model
 from hydroid.cad.source import Notes, word
 from hydroid.files import Plain
 from hydroid.settings.linkage import FourBar, four_bar
 
-PARTS = {
-    "rod",
-    "piston",
-    "cylinder",
-    "cyl",
-    "ram",
-    "tube",
-    "barrel",
-    "anchor",
-    "clevis",
-    "trunnion",
-}
-"""words in the names of a cylinder's links and joints"""
 ENDS = "parent", "child"  # of the sites that show where a cylinder is pinned
-
-
-@record
-class _Pin:
-    """Where two bodies turn on each other [m], shape (3,), in the file's pose; `joint`
-    None: an equality."""
-
-    bodies: tuple[str, str]
-    at: Array
-    joint: Any = None
-
-    def other(self, body: str) -> str:
-        return self.bodies[self.bodies[0] == body]
+LETTERS = ("E", "F", "G", "H")
+"""sites of a bucket's linkage, from the foot of its cylinder to the bucket"""
 
 
 def take_cylinders(spec: mujoco.MjSpec, notes: Notes) -> dict[str, Plain]:
@@ -59,17 +44,19 @@ def take_cylinders(spec: mujoco.MjSpec, notes: Notes) -> dict[str, Plain]:
     dead centre. The constraints that close the loops of what is held are deleted;
     others stay.
     """
-    if not any(
-        equality.type == mujoco.mjtEq.mjEQ_CONNECT for equality in spec.equalities
-    ):
+    cylinder_pairs = [*sliding_rods(spec), *hinged_rods(spec)]
+    if not cylinder_pairs:
         return {}
     _, data = bare_model(spec, notes.path)
-    pins = _pins(spec, data)
+    pins = pins_of(spec, data)
+    pins += closed_pins(spec, pins, cylinder_pairs, data, notes)
     held = set[str]()
     cylinders = dict[str, Plain]()
-    for made in _linkages(spec, pins, data):
+    for made in _linkages(pins, cylinder_pairs, data, notes):
         held |= {made.tube, made.rod, *made.bars}
         joint = made.joint
+        if joint is None:
+            continue
         low, high = joint.range
         if not low < high:
             notes.add(
@@ -92,19 +79,40 @@ def take_cylinders(spec: mujoco.MjSpec, notes: Notes) -> dict[str, Plain]:
 
 
 def _linkages(
-    spec: mujoco.MjSpec, pins: Sequence[_Pin], data: mujoco.MjData
+    pins: Sequence[Pin],
+    cylinder_pairs: Sequence[tuple[str, str]],
+    data: mujoco.MjData,
+    notes: Notes,
 ) -> Iterator["_Linkage"]:
-    """Yield every cylinder: a rod that slides in a tube,
-    both pinned to links that a joint connects."""
-    for slide in spec.joints:
-        if slide.type != mujoco.mjtJoint.mjJNT_SLIDE:
-            continue
-        rod = slide.parent.name
-        tube = slide.parent.parent.name
-        for foot, eye in product(_at(pins, tube, rod), _at(pins, rod, tube)):
-            made = _linkage(pins, foot, eye, (tube, rod), data)
-            if made is not None:
-                yield made
+    """Yield every cylinder, (tube, rod), that is pinned to links which a joint
+    connects, and those of six bars, which move none that is known."""
+    for tube, rod in cylinder_pairs:
+        ends = [*product(pins_at(pins, tube, rod), pins_at(pins, rod, tube))]
+        found = [_linkage(pins, foot, eye, (tube, rod), data) for foot, eye in ends]
+        made = [linkage for linkage in found if linkage is not None]
+        yield from made
+        for foot, eye in () if made else ends:
+            bars = _six_bars(pins, foot.other(tube), eye.other(rod), rod)
+            if bars:
+                what = (
+                    f"a cylinder on {foot.other(tube)} that turns {bars[0]}, which another link "
+                    "carries: a linkage of six bars, which hydroid does not model: held. The joint "
+                    "that it moves has a stand-in"
+                )
+                notes.add(what, tube, rod)
+                yield _Linkage(tube, rod, foot, eye, None, {}, bars)
+                break
+
+
+def _six_bars(pins: Sequence[Pin], base: str, crank: str, rod: str) -> tuple[str, ...]:
+    """Return the crank that a rod turns and what hangs between it and the moved link,
+    if a link beside the cylinder's base carries it; empty: none does."""
+    grounds = [pin.other(crank) for pin in pins_at(pins, crank, rod) if pin.joint]
+    carrier = next((one for one in grounds if _joint(pins, base, one)), "")
+    if not carrier:
+        return ()
+    struts = [pin.other(crank) for pin in pins_at(pins, crank, rod, carrier)]
+    return (crank, *struts)
 
 
 def _show_pivots(spec: mujoco.MjSpec, made: "_Linkage", data: mujoco.MjData) -> None:
@@ -122,11 +130,11 @@ def _show_pivots(spec: mujoco.MjSpec, made: "_Linkage", data: mujoco.MjData) -> 
 
 
 def take_sites(spec: mujoco.MjSpec, notes: Notes) -> dict[str, Plain]:
-    """Return what an arm's file says of the cylinders that pairs of sites show, by
-    joint.
+    """Return what an arm's file says of the cylinders that sites show, by joint.
 
     The sites are called JOINT_pivot_parent and JOINT_pivot_child; the name of the joint
-    may lack its ending `_joint`, or be that of the link, and is completed.
+    may lack its ending `_joint`, or be that of the link, and is completed. Of a four-bar
+    linkage there are JOINT_pivot_rocker and JOINT_pivot_rod, too, or sites E, F, G, H.
     """
     cylinders = dict[str, Plain]()
     sites = {word(site.name): site for site in spec.sites}
@@ -135,57 +143,48 @@ def take_sites(spec: mujoco.MjSpec, notes: Notes) -> dict[str, Plain]:
             site_names = [f"{name}_pivot_{end}" for end in ENDS]
             if not sites.keys() >= {*site_names}:
                 continue
+            if f"{name}_pivot_rocker" in sites:
+                bars = [f"{name}_pivot_{pin}" for pin in ("rod", "rocker")]
+                pins = (site_names[0], *bars, site_names[1])
+                _take_bars(spec, joint, pins, cylinders, notes)
+                break
             for site_name, end in zip(site_names, ENDS, strict=True):
                 sites[site_name].name = f"{joint.name}_pivot_{end}"
             cylinders[joint.name] = {"kind": "linear"}
             notes.add("sites of the file give these joints' pivots", joint.name)
             break
+    if sites.keys() >= {*LETTERS}:
+        for joint in sites["H"].parent.joints:
+            what = "foot of the cylinder, pin of its rod, pivot of the rocker, end of the coupler"
+            notes.add(f"sites E, F, G and H: taken for {what}", joint.name)
+            _take_bars(spec, joint, LETTERS, cylinders, notes)
     return cylinders
 
 
-def ends_of(spec: mujoco.MjSpec, constraint: Any) -> tuple[str, str]:
-    """Return the names of the two bodies, or joints, that a constraint ties to each
-    other."""
-    ends = (constraint.name1, constraint.name2)
-    if constraint.objtype == mujoco.mjtObj.mjOBJ_SITE:
-        ends = tuple(spec.site(name).parent.name for name in ends)
-    return ends[0], ends[1] or "world"
-
-
-def is_part_of_cylinder(joint: mujoco.MjsJoint) -> bool:
-    """Return whether the names of a joint and its link tell a cylinder's tube or rod,
-    which moves no link."""
-    for name in (joint.name, joint.parent.name):
-        if not PARTS.intersection(re.split(r"[\W_\d]+", name.lower())):
-            return False
-    return True
-
-
-def _pins(spec: mujoco.MjSpec, data: mujoco.MjData) -> list[_Pin]:
-    """Return where bodies turn on each other: hinges and points that equalities
-    connect."""
-    pins = list[_Pin]()
-    for joint in spec.joints:
-        if joint.type == mujoco.mjtJoint.mjJNT_HINGE:
-            bodies = (joint.parent.name, joint.parent.parent.name)
-            pins.append(_Pin(bodies, data.joint(joint.name).xanchor, joint))
-    for equality in spec.equalities:
-        if equality.type != mujoco.mjtEq.mjEQ_CONNECT:
-            continue
-        if equality.objtype == mujoco.mjtObj.mjOBJ_SITE:
-            at = data.site(equality.name1).xpos
-        else:
-            body = data.body(equality.name1)
-            at = body.xpos + body.xmat.reshape(3, 3) @ np.array(equality.data[:3])
-        pins.append(_Pin(ends_of(spec, equality), at))
-    return pins
-
-
-def _at(pins: Sequence[_Pin], body: str, *without: str) -> list[_Pin]:
-    """Return the pins of a body, but for those to some other bodies."""
-    return [
-        pin for pin in pins if body in pin.bodies and pin.other(body) not in without
-    ]
+def _take_bars(
+    spec: mujoco.MjSpec,
+    joint: Any,
+    sites: Sequence[str],
+    cylinders: dict[str, Plain],
+    notes: Notes,
+) -> None:
+    """Add the cylinder of a four-bar linkage: the foot, the rod's pin, which is the
+    coupler's, the rocker's pivot and the coupler's end on the moved link."""
+    _, data = bare_model(spec, notes.path)
+    try:
+        foot, pin, rocker, child = [
+            Pin(("", ""), data.site(name).xpos.copy()) for name in sites
+        ]
+    except KeyError:
+        what = f"its four-bar linkage lacks the site {sites[1]}, where rod, rocker and coupler meet"
+        notes.add(f"{what}: left out", joint.name)
+        return
+    settings = _four_bar(data.joint(joint.name), (rocker, pin, child, foot, pin))
+    if settings is None:
+        notes.add("its four-bar linkage does not close: left out", joint.name)
+        return
+    cylinders[joint.name] = settings
+    notes.add("sites of the file give these joints' pivots", joint.name)
 
 
 @record
@@ -194,22 +193,23 @@ class _Linkage:
     so.
 
     `foot` pins the tube to a link, `eye` the rod to another; `bars` are the rocker and
-    the coupler between rod and moved link, if there are any.
+    the coupler between rod and moved link, if there are any. `joint` None: of a linkage
+    that is held.
     """
 
     tube: str
     rod: str
-    foot: _Pin
-    eye: _Pin
+    foot: Pin
+    eye: Pin
     joint: Any
     settings: Plain
     bars: tuple[str, ...] = ()
 
 
 def _linkage(
-    pins: Sequence[_Pin],
-    foot: _Pin,
-    eye: _Pin,
+    pins: Sequence[Pin],
+    foot: Pin,
+    eye: Pin,
     cylinder: tuple[str, str],
     data: mujoco.MjData,
 ) -> _Linkage | None:
@@ -239,25 +239,25 @@ class _FourBarPins(NamedTuple):
     """Where a rocker turns on the link that carries the cylinder, where a coupler turns
     on the rocker, and where the moved link turns on the coupler."""
 
-    rocker: _Pin
-    coupler: _Pin
-    child: _Pin
+    rocker: Pin
+    coupler: Pin
+    child: Pin
 
 
 def _rockers(
-    pins: Sequence[_Pin], base: str, rocker: str, rod: str
+    pins: Sequence[Pin], base: str, rocker: str, rod: str
 ) -> Iterator[_FourBarPins]:
     """Yield the pins of four-bar linkages whose rocker a rod moves and a base
     carries."""
-    for ground in _at(pins, rocker, rod):
+    for ground in pins_at(pins, rocker, rod):
         if ground.other(rocker) != base:
             continue
-        for pin in _at(pins, rocker, rod, base):
-            for end in _at(pins, pin.other(rocker), rocker):
+        for pin in pins_at(pins, rocker, rod, base):
+            for end in pins_at(pins, pin.other(rocker), rocker):
                 yield _FourBarPins(ground, pin, end)
 
 
-def _joint(pins: Sequence[_Pin], first: str, second: str) -> Any:
+def _joint(pins: Sequence[Pin], first: str, second: str) -> Any:
     """Return the joint between two bodies, in either order; None where there is
     none."""
     for pin in pins:
@@ -266,7 +266,7 @@ def _joint(pins: Sequence[_Pin], first: str, second: str) -> Any:
     return None
 
 
-def _four_bar(joint: Any, pins: Sequence[_Pin]) -> Plain | None:
+def _four_bar(joint: Any, pins: Sequence[Pin]) -> Plain | None:
     """Return the settings of a cylinder that turns a joint by a rocker and a coupler,
     as the file stands.
 

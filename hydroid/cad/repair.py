@@ -23,6 +23,8 @@ LEAST = 100.0
 times as large as the boom"""
 MOST = 8000.0
 """no link has more: solid steel"""
+MOST_BOXED = 5000.0
+"""no box that is drawn around a link has more: it stands around hollow parts"""
 BOXED = 500.0
 """the same of a link that is drawn as boxes, cylinders and balls around it: a bucket of
 15 mm plates fills 500 of its box, a bent boom 400"""
@@ -105,13 +107,19 @@ def weigh(
         what = "no masses in the file"
     replaced = list[str]()
     densities = set[float]()
-    for body, likely in _likely(links, model, hull_model(spec, notes.path), lost):
+    every = _likely(links, model, hull_model(spec, notes.path), lost)
+    are_water = _are_water(every)
+    if are_water:
+        what = "MASSES OF SHAPES FULL OF WATER"
+    for body, likely in every:
         usual = likely.usual
-        if likely.least <= USUAL * body.mass / usual.mass <= likely.most:
+        density = USUAL * body.mass / usual.mass
+        if likely.least <= density <= likely.most and not are_water:
             continue
         mass = likely.density / USUAL * usual.mass
-        stated = f"{body.mass:.2g}" if body.mass else "none"
-        replaced.append(f"{body.name} {stated} -> {mass:.3g}")
+        stated = float(f"{body.mass:.2g}")
+        was = f"{stated:g}" if stated else "none"
+        replaced.append(f"{body.name} {was} -> {mass:.3g}")
         set_inertia(body, mass, usual.centre, likely.density / USUAL * usual.tensor)
         densities.add(likely.density)
     if replaced:
@@ -120,8 +128,29 @@ def weigh(
             f"{what} [kg]: {', '.join(replaced)} ({taken} kg/m³ of hull is taken). Say "
             "what you know: --total-mass KG, or masses in arm.xml"
         )
+    else:
+        _doubt_light(links, model, notes)
     if total is not None:
         _scale_masses(links, total, notes)
+
+
+def _doubt_light(
+    links: Sequence[mujoco.MjsBody], model: mujoco.MjModel, notes: Notes
+) -> None:
+    """Say which links weigh less than a link without a shape might, for the way to the
+    next joint."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    for body, after in pairwise(links):
+        ends = [data.joint(one.joints[0].name).xanchor for one in (body, after)]
+        length = float(np.linalg.norm(ends[1] - ends[0]))
+        least = SLIGHT * SLENDER * length**3
+        if body.mass < least:
+            notes.add(
+                f"weighs {body.mass:.3g} kg and is {length:.3g} m long, where machines' links "
+                f"have {least:.3g} kg or more: kept. Say what you know: --total-mass KG",
+                body.name,
+            )
 
 
 class _Likely(NamedTuple):
@@ -152,11 +181,29 @@ def _likely(
     likely = list[tuple[mujoco.MjsBody, _Likely]]()
     for body, (here, there) in zip(links, pairwise(places), strict=True):
         if body.name in filled:
-            shape = _Likely(hull_of[body.name], LEAST, MOST, filled[body.name])
+            most = MOST if _is_meshed(body) else MOST_BOXED
+            shape = _Likely(hull_of[body.name], LEAST, most, filled[body.name])
         else:
             shape = _slender(data.body(body.name), there - here, 0.4 * longest)
         likely.append((body, shape))
     return likely
+
+
+def _is_meshed(body: mujoco.MjsBody) -> bool:
+    """Return whether a link is drawn by a mesh, and not as boxes around it."""
+    return any(geom.meshname for geom in body.geoms if geom.group == SHOWN)
+
+
+def _are_water(likely: Sequence[tuple[mujoco.MjsBody, _Likely]]) -> bool:
+    """Return whether all links are boxes that weigh what water in them would: CAD and
+    simulators fill them with it where nobody names a material."""
+    if len(likely) < 2:
+        return False
+    for body, one in likely:
+        density = USUAL * body.mass / one.usual.mass
+        if _is_meshed(body) or abs(density / WATER - 1) > 0.01:
+            return False
+    return True
 
 
 def _joints_and_end(
@@ -206,8 +253,7 @@ def _filled(
     for body in links:
         if hull[body.name].mass <= MASSLESS:
             continue
-        meshed = any(geom.meshname for geom in body.geoms if geom.group == SHOWN)
-        usual[body.name] = USUAL if meshed else BOXED
+        usual[body.name] = USUAL if _is_meshed(body) else BOXED
         density = USUAL * body.mass / hull[body.name].mass
         if LEAST <= density <= MOST:
             stated[usual[body.name]].append(density)

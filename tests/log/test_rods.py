@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from log_files import read
 
-from hydroid.log import Log, check_log, guess_columns, open_table, write_log
+from hydroid.log import Log, Reading, check_log, guess_columns, open_table, write_log
 from hydroid.log.rods import rods_of
 from hydroid.settings.arm import Arm, load_arm
 from hydroid.settings.log import LogSettings
@@ -97,7 +97,7 @@ def test_lengths_that_the_pins_do_not_allow_are_said(arm: Arm, tmp_path: Path) -
     settings = LogSettings.model_validate(
         {"command": None, "angle": None, "joints": {joint: entry}}
     )
-    log, (fault, *_) = check_log(path, settings, arm.ranges, arm=arm)
+    log, (fault, *_) = check_log(path, settings, arm.ranges, Reading(arm=arm))
     assert log is None
     assert fault.kind == "length outside"
     assert (
@@ -115,8 +115,41 @@ def test_a_length_without_a_cylinder_is_refused(arm: Arm, tmp_path: Path) -> Non
     settings = LogSettings.model_validate(
         {"command": None, "angle": None, "joints": {joint: entry}}
     )
-    _, (fault,) = check_log(path, settings, arm.ranges, arm=arm)
+    _, (fault,) = check_log(path, settings, arm.ranges, Reading(arm=arm))
     assert f"no cylinder of {arm.joint_names[joint - 1]} is known" in str(fault)
+
+
+@pytest.mark.parametrize("unit", ["_mm", "_cm", "_m", ""])
+def test_lengths_are_no_angles_of_a_joint_whose_pivots_nobody_knows(
+    unit: str, arm: Arm, tmp_path: Path
+) -> None:
+    """90 cm without a unit are a possible angle in deg."""
+    joint = next(
+        j for j in range(1, 8) if j not in rods_of(arm) and j not in arm.slides
+    )
+    name = arm.joint_names[joint - 1]
+    columns = {f"{name}_cmd": STEPS, f"{name}_cyl{unit}": 90 + np.sin(T)}
+    path = table(tmp_path, **columns)
+    guess = guess_columns(open_table(path), arm.joint_names, rods=rods_of(arm))
+    assert guess.log["joints"][joint]["angle"] is None
+    what = f"lengths of cylinders whose pivots are not known: {name}_cyl{unit}: give"
+    assert [reason for reason in guess.reasons if what in reason]
+
+
+def test_lengths_without_a_unit_that_the_pins_do_not_allow_are_no_angles(
+    arm: Arm, tmp_path: Path
+) -> None:
+    joint, rod = next(iter(rods_of(arm).items()))
+    name = arm.joint_names[joint - 1]
+    length = 1.5 * rod.ends[1] + 0.01 * np.sin(T)
+    path = table(tmp_path, **{f"{name}_cmd": STEPS, f"{name}_cyl": 1e3 * length})
+    guess = guess_columns(open_table(path), arm.joint_names, rods=rods_of(arm))
+    assert guess.log["joints"][joint]["angle"]["unit"] == "mm"
+    log, (fault, *_) = check_log(
+        path, LogSettings.model_validate(guess.log), arm.ranges, Reading(arm=arm)
+    )
+    assert log is None
+    assert fault.kind == "length outside"
 
 
 def test_lengths_are_written_and_read_back(arm: Arm, tmp_path: Path) -> None:

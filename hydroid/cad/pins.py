@@ -1,0 +1,229 @@
+"""Where bodies of a robot's file turn on each other: by hinges, by constraints, and
+where the ends of open cylinders meet.
+
+A URDF cannot close loops. Its cylinders are open chains: a tube that turns on one link,
+a rod that slides in it, and frames that show where the rod is pinned. Or the tube turns
+on one link, the rod on the other, and nothing says that one slides in the other.
+"""
+
+import re
+from collections.abc import Iterator, Sequence
+from itertools import combinations
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from hydroid.arrays import Array, record
+from hydroid.cad.source import Notes
+
+PARTS = {
+    "rod",
+    "piston",
+    "cylinder",
+    "cyl",
+    "ram",
+    "tube",
+    "barrel",
+    "anchor",
+    "clevis",
+    "trunnion",
+}
+"""words in the names of a cylinder's links and joints"""
+PINS = {"eye", "pin", "end", "mount", "pivot", "link", "joint", "frame"}
+"""words in the names of frames at which rods are pinned"""
+SAME = 0.002
+"""distance up to which two pins are one [m]"""
+
+
+@record
+class Pin:
+    """Where two bodies turn on each other [m], shape (3,), in the file's pose; `joint`
+    None: an equality."""
+
+    bodies: tuple[str, str]
+    at: Array
+    joint: Any = None
+
+    def other(self, body: str) -> str:
+        """Return the body that a body turns on here."""
+        return self.bodies[self.bodies[0] == body]
+
+
+def is_part_of_cylinder(joint: mujoco.MjsJoint) -> bool:
+    """Return whether the names of a joint and its link tell a cylinder's tube or rod,
+    which moves no link."""
+    for name in (joint.name, joint.parent.name):
+        if not PARTS.intersection(re.split(r"[\W_\d]+", name.lower())):
+            return False
+    return True
+
+
+def ends_of(spec: mujoco.MjSpec, constraint: Any) -> tuple[str, str]:
+    """Return the names of the two bodies, or joints, that a constraint ties to each
+    other."""
+    ends = (constraint.name1, constraint.name2)
+    if constraint.objtype == mujoco.mjtObj.mjOBJ_SITE:
+        ends = tuple(spec.site(name).parent.name for name in ends)
+    return ends[0], ends[1] or "world"
+
+
+def pins_of(spec: mujoco.MjSpec, data: mujoco.MjData) -> list[Pin]:
+    """Return where bodies turn on each other: hinges and points that equalities
+    connect."""
+    pins = list[Pin]()
+    for joint in spec.joints:
+        if joint.type == mujoco.mjtJoint.mjJNT_HINGE:
+            bodies = (joint.parent.name, joint.parent.parent.name)
+            pins.append(Pin(bodies, data.joint(joint.name).xanchor, joint))
+    for equality in spec.equalities:
+        if equality.type != mujoco.mjtEq.mjEQ_CONNECT:
+            continue
+        if equality.objtype == mujoco.mjtObj.mjOBJ_SITE:
+            at = data.site(equality.name1).xpos
+        else:
+            body = data.body(equality.name1)
+            at = body.xpos + body.xmat.reshape(3, 3) @ np.array(equality.data[:3])
+        pins.append(Pin(ends_of(spec, equality), at))
+    return pins
+
+
+def pins_at(pins: Sequence[Pin], body: str, *without: str) -> list[Pin]:
+    """Return the pins of a body, but for those to some other bodies."""
+    return [
+        pin for pin in pins if body in pin.bodies and pin.other(body) not in without
+    ]
+
+
+def sliding_rods(spec: mujoco.MjSpec) -> Iterator[tuple[str, str]]:
+    """Yield tubes and the rods that slide in them."""
+    for joint in spec.joints:
+        if joint.type == mujoco.mjtJoint.mjJNT_SLIDE:
+            yield joint.parent.parent.name, joint.parent.name
+
+
+def hinged_rods(spec: mujoco.MjSpec) -> Iterator[tuple[str, str]]:
+    """Yield tubes and rods of one name, such as boom_tube and boom_rod, that turn on two
+    links and carry nothing: one slides in the other."""
+    by_name = dict[frozenset[str], list[Any]]()
+    for joint in spec.joints:
+        is_hinge = joint.type == mujoco.mjtJoint.mjJNT_HINGE
+        carries = len(joint.parent.find_all("joint")) > 1
+        if is_hinge and not carries and is_part_of_cylinder(joint):
+            name = frozenset(_other_words(joint.parent.name))
+            by_name.setdefault(name, []).append(joint.parent)
+    for bodies in by_name.values():
+        if len(bodies) == 2 and bodies[0].parent.name != bodies[1].parent.name:
+            yield bodies[0].name, bodies[1].name
+
+
+def _other_words(name: str) -> set[str]:
+    """Return the words of a name but for those of a cylinder's parts and pins."""
+    return {*re.split(r"[\W_]+", name.lower())} - PARTS - PINS - {""}
+
+
+def closed_pins(
+    spec: mujoco.MjSpec,
+    pins: Sequence[Pin],
+    cylinders: Sequence[tuple[str, str]],
+    data: mujoco.MjData,
+    notes: Notes,
+) -> list[Pin]:
+    """Return where the ends of open chains meet: as drawn, or else at another pose.
+
+    `cylinders` are tubes and rods. A rod whose end meets nothing is pinned to the frame
+    that is named as the rod is, or, without one, where it is drawn.
+    """
+    frames = _frames(spec, data)
+    closed = [*_meeting(frames, pins)]
+    parts = {body for pair in cylinders for body in pair}
+    for tube, rod in cylinders:
+        feet = pins_at(pins, tube, rod)
+        is_loose = len(feet) == 1 and not pins_at([*pins, *closed], rod, tube)
+        # a telescope with a tool is no cylinder
+        if not is_loose or not is_part_of_cylinder(spec.body(rod).joints[0]):
+            continue
+        carrier = feet[0].other(tube)
+        joints = dict[str, Any]()
+        for pin in pins_at(pins, carrier):
+            if pin.joint and pin.other(carrier) not in parts:
+                joints[pin.other(carrier)] = pin.joint
+        ends = [frame for frame in frames if frame.owner == rod]
+        anchors = [
+            frame
+            for frame in frames
+            if frame.owner in joints and _other_words(frame.name) == _other_words(rod)
+        ]
+        if len(anchors) == 1:
+            (anchor,) = anchors
+            joint = data.joint(joints[anchor.owner].name)
+            at = _pose(joint, feet[0], anchor, ends[0]) if ends else ""
+            what = f"its pin and {anchor.name} meet at another pose than drawn{at}"
+            notes.add(what, rod)
+            closed.append(Pin((rod, anchor.owner), anchor.at))
+            continue
+        below = [body for body in joints if spec.body(body).parent.name == carrier]
+        if len(ends) == len(below) == 1 and not anchors:
+            what = f"the rod's end {ends[0].name} meets no other pin: taken to be pinned to"
+            notes.add(f"{what} {below[0]} where it is drawn. Compare arm.png", rod)
+            closed.append(Pin((rod, below[0]), ends[0].at))
+    return closed
+
+
+def _pose(joint: Any, foot: Pin, anchor: "_Frame", end: "_Frame") -> str:
+    """Return at which angle of a joint an anchor is as far from a foot as the rod's end
+    is drawn; empty: at none."""
+    reach = float(np.linalg.norm(end.at - foot.at))
+    angles = np.linspace(-np.pi, np.pi, 3601)
+    axis = joint.xaxis
+    arm = anchor.at - joint.xanchor
+    along = axis * (axis @ arm)
+    sine = np.sin(angles)[:, None]
+    cosine = np.cos(angles)[:, None]
+    turned = along + cosine * (arm - along) + sine * np.cross(axis, arm)
+    lengths = np.linalg.norm(joint.xanchor + turned - foot.at, axis=1)
+    errors = np.abs(lengths - reach)
+    # of the two angles the one nearer to the drawn pose
+    meeting = angles[errors < SAME]
+    if not len(meeting):
+        return ""
+    nearest = meeting[np.argmin(np.abs(meeting))]
+    return f": {np.degrees(nearest):.3g} deg of {joint.name}"
+
+
+@record
+class _Frame:
+    """A body that nothing but a place tells, the moving body that it is fixed to, and
+    where it is [m], shape (3,)."""
+
+    name: str
+    owner: str
+    at: Array
+
+
+def _frames(spec: mujoco.MjSpec, data: mujoco.MjData) -> list[_Frame]:
+    """Return the bodies that no joint moves against their parent and that carry
+    nothing."""
+    frames = list[_Frame]()
+    for body in spec.bodies[1:]:
+        if body.joints or body.bodies:
+            continue
+        owner = body.parent
+        while not owner.joints and owner.name != "world":
+            owner = owner.parent
+        frames.append(_Frame(body.name, owner.name, data.body(body.name).xpos.copy()))
+    return frames
+
+
+def _meeting(frames: Sequence[_Frame], pins: Sequence[Pin]) -> Iterator[Pin]:
+    """Yield where frames of two bodies meet, or a frame and a hinge of two others."""
+    for first, second in combinations(frames, 2):
+        apart = first.owner != second.owner
+        if apart and np.linalg.norm(first.at - second.at) < SAME:
+            yield Pin((first.owner, second.owner), first.at)
+    for frame in frames:
+        for pin in pins:
+            apart = frame.owner not in pin.bodies
+            if apart and np.linalg.norm(frame.at - pin.at) < SAME:
+                for body in pin.bodies:
+                    yield Pin((frame.owner, body), pin.at)

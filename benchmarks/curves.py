@@ -40,9 +40,10 @@ KINDS = ["power law", "bends", "all at once"]
 VALVE = {
     "onset": 0.0,
     "current_min": 0.8,
-    "slot_width": 0.33,
+    "plunger_stiffness": 4.3,
+    "slot_width": 0.208,
     "plunger_mass": 0.008,
-    "plunger_damping": 8.0,
+    "plunger_damping": 14.0,
 }
 """what `init` writes of a coil that moves its spool in proportion to the command"""
 

@@ -412,7 +412,7 @@ def package(path: Path) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n\n")[0])
     parser.add_argument("names", nargs="*", help="packages or files [default: all]")
     parser.add_argument(
         "--packages", action="store_true", help="a line for every package"

@@ -243,7 +243,8 @@ def _docstring(kind: type[BaseModel], name: str) -> str:
             return text
     annotation = kind.model_fields[name].annotation
     own = isinstance(annotation, type) and issubclass(annotation, BaseModel)
-    return (annotation.__doc__ or "").split("\n")[0].rstrip(".") if own else ""
+    summary = inspect.cleandoc(annotation.__doc__ or "").split("\n\n")[0]
+    return " ".join(summary.split()).rstrip(".") if own else ""
 
 
 @cache

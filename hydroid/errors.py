@@ -26,7 +26,8 @@ class HydroidError(Exception):
             text = f"{where}: {text}"
         if hint:
             text = f"{text}; {hint}"
-        super().__init__(_shortened(_visible(text)))
+        # first of what is huge, then of what became long by its control characters
+        super().__init__(_shortened(_visible(_shortened(text))))
 
     def __reduce__(self) -> tuple[object, ...]:
         """Keep the three parts when an error crosses a process boundary."""

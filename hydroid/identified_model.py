@@ -185,15 +185,20 @@ def own_hashes(folder: Path) -> dict[str, str]:
 
 def warn_of_changes(source: Path) -> None:
     """Say which files of a run, given by its folder or its estimate,
-    are not as its fit left them."""
+    are not as its fit left them.
+
+    Raises RunError: one of them is missing.
+    """
     folder = source if os.path.isdir(source) else source.parent
     for name in changed_files(folder):
+        if not is_file(folder / name):
+            raise RunError("is missing", folder / name, "put it back, or fit again")
         text = "warning: %s: is not as the fit left it; put it back, or fit again"
         LOGGER.warning(text, folder / name)
 
 
 def changed_files(folder: Path) -> list[str]:
-    """Return the files of a run folder that are not what its fit wrote;
+    """Return the files of a run folder that are missing or not what its fit wrote;
     none of a folder that is no run's."""
     try:
         run = json.loads(read_file(folder / DESCRIPTION))

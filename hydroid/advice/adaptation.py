@@ -10,13 +10,10 @@ changes.
 
 from collections.abc import Sequence
 
-import numpy as np
-
-from hydroid.advice.suggestions import refitted
 from hydroid.errors import SettingsError
 from hydroid.files import Plain
 from hydroid.findings import Finding
-from hydroid.fitting.left_out import LeftOut, gain, is_better, parts, predict_parts
+from hydroid.fitting.left_out import LeftOut, gain, is_better, refit
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
 from hydroid.problem.problem import Problem
@@ -101,12 +98,12 @@ def steps(
         for trial in pool[:1] if free else pool:
             progress(f"freeing {trial}", len(taken), len(taken) + len(pool))
             freed = problem.varied(adapted(model, [*taken, trial], logs))
-            trials[trial] = predict_parts(freed, last.thetas, refitted)
+            trials[trial] = refit(freed, last.theta)
             rises[trial], _ = gain(trials[trial], last)
         name = max(rises, key=rises.__getitem__, default="")
         if not name:
             return path
-        if not free and not is_better(trials[name], last):
+        if not free and not is_better(trials[name], last, len(trials)):
             return path
         taken.append(name)
         last = trials[name]
@@ -130,8 +127,7 @@ def _candidates(settings: FitSettings, logs: Sequence[Log]) -> list[str]:
 def _as_it_is(problem: Problem, model: IdentifiedModel) -> LeftOut:
     """Return what a model that is not fitted to them makes of the parts of the logs."""
     errors = problem.output_errors(model.theta[None])[0]
-    thetas = np.tile(model.theta, (len(np.unique(parts(problem))), 1))
-    return LeftOut(problem, thetas, errors)
+    return LeftOut(problem, model.theta, model.theta[None], errors)
 
 
 def load_findings(settings: FitSettings) -> tuple[Finding, ...]:

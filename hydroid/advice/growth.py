@@ -3,10 +3,9 @@ the logs left out.
 
 A small change of each term changes the residual. What the free parameters cannot do as
 well tells how clearly the term is missing, and how much freeing it would gain
-(`score`). That is cheap: some simulations a term. The best few are then really freed:
-least squares goes on from the estimate, once with all samples and once without each
-part of them, on which the result is judged. A term that only follows the noise loses
-there.
+(`score`). That is cheap: some simulations a term. The best few are then really freed,
+and judged on parts of the logs left out: there a term that only follows the noise
+loses.
 
 The score test: let r be the innovations at a maximum of the likelihood and d the change
 of them with a quantity that the fit holds. What the free parameters can do as well as

@@ -19,11 +19,8 @@ from hydroid.errors import SettingsError
 from hydroid.estimate import finite
 from hydroid.files import Plain
 from hydroid.findings import Finding
-from hydroid.fitting.left_out import LeftOut, gain, is_better, parts, predict_parts
-from hydroid.fitting.refinement import Refinement, refine_from_afar
-from hydroid.fitting.step import Step
+from hydroid.fitting.left_out import LeftOut, blocks, gain, is_better, refit
 from hydroid.fitting.summary import angle_errors
-from hydroid.posterior.error_model import Likelihood
 from hydroid.posterior.posterior import Posterior
 from hydroid.posterior.uncertainty import Uncertainty
 from hydroid.problem.problem import Problem
@@ -33,14 +30,8 @@ from hydroid.settings.fit import FitSettings
 from hydroid.settings.log import log_file
 from hydroid.settings.naming import named
 from hydroid.settings.problem import ParameterSettings
-from hydroid.settings.search import RefinementSettings
 
 MOST_TRIED = 6  # terms that are really freed, the most promising first
-AHEAD = 10.0
-"""time over which a predicted change of an angle is compared [s]"""
-COMPARED = RefinementSettings(iterations=60, gain_tolerance=1e-4)
-"""of the refinements without a part of the logs"""
-
 STATED_SD = {"weigh": 0.02, "state": 0.05}
 """relative standard deviation of a mass that was weighed,
 and of a value from a data sheet (ours)"""
@@ -62,9 +53,8 @@ def advice(
     """
     tests = score_terms(problem, known, progress)
     candidates = promising(tests)
-    # the model as it is, refined without each part: what a freed term is compared with
-    starts = np.tile(known.theta, (len(np.unique(parts(problem))), 1))
-    without = predict_parts(problem, starts, refitted)
+    # the model as it is: what a freed term is compared with
+    without = refit(problem, known.theta)
     ranked = list[tuple[bool, float, Plain]]()
     most = min(MOST_TRIED, len(candidates))
     for i, candidate in enumerate(candidates):
@@ -79,7 +69,7 @@ def advice(
         rise = -math.inf
         if i < MOST_TRIED:
             progress(f"freeing {candidate.term.name}", i, most)
-            tried, rise = _tried(candidate, without, run)
+            tried, rise = _tried(candidate, without, run, most)
             row |= tried
         ranked.append(("command" not in row, -rise, row))
     # those to be freed first, and of these the one that lowers the error most
@@ -103,19 +93,19 @@ def advice(
     return content, findings
 
 
-def _tried(candidate: Candidate, without: LeftOut, run: str) -> tuple[Plain, float]:
+def _tried(
+    candidate: Candidate, without: LeftOut, run: str, among: int
+) -> tuple[Plain, float]:
     """Free a term and return what that does on parts left out, and its gain there.
 
     `without` is what the model without it does; where the term is better, the command
-    that frees it belongs to the result.
+    that frees it belongs to the result. `among` is the number of terms that are freed.
     """
     problem = without.problem
     term = candidate.term
     larger = term.added_to(problem)
-    starts = [term.theta(problem, theta, candidate.start) for theta in without.thetas]
-    freed = predict_parts(larger, np.array(starts), refitted)
-    values = [larger.parameters.mapping(theta)[term.name] for theta in freed.thetas]
-    value = float(np.mean(values))
+    freed = refit(larger, term.theta(problem, without.theta, candidate.start))
+    value = float(larger.parameters.mapping(freed.theta)[term.name])
     rise, sd = gain(freed, without)
     row: Plain = {
         "freed": value,
@@ -123,7 +113,7 @@ def _tried(candidate: Candidate, without: LeftOut, run: str) -> tuple[Plain, flo
         "left_out_gain": finite(rise),
         "left_out_gain_sd": finite(sd),
     }
-    if is_better(freed, without):
+    if is_better(freed, without, among):
         entries = proposed(candidate, value)
         row["parameters"] = entries
         row["command"] = freeing_command(problem, entries, run)
@@ -131,31 +121,18 @@ def _tried(candidate: Candidate, without: LeftOut, run: str) -> tuple[Plain, flo
     return row, rise
 
 
-def refitted(likelihood: Likelihood, theta: Array, without: int) -> Refinement:
-    """Refine an estimate for a comparison on parts left out; nothing is shown or stored
-    of it."""
-    return refine_from_afar(
-        likelihood,
-        theta,
-        COMPARED,
-        lambda *_: False,
-        {},
-        Step("compared", without=without),
-    )
-
-
 def improvement(after: LeftOut, before: LeftOut) -> dict[str, tuple[float, float]]:
     """Return by how much the rms error on a part left out falls, with a standard error,
     by joint [deg].
 
-    The error is that of the change of an angle over AHEAD. The standard error is by
-    leaving out one block of time after the other (a jackknife).
+    The error is that of the change of an angle over the part. The standard error is by
+    leaving out one part after the other once more (a jackknife).
     """
     settings = after.problem.settings
     improvements = dict[str, tuple[float, float]]()
     for joint in settings.outputs:
         squares = np.array(
-            [squares_ahead(left_out, joint) for left_out in (before, after)]
+            [squared_changes(left_out, joint) for left_out in (before, after)]
         )
         spans = squares.shape[1]
         sums = squares.sum(axis=1)
@@ -171,20 +148,20 @@ def improvement(after: LeftOut, before: LeftOut) -> dict[str, tuple[float, float
     return improvements
 
 
-def squares_ahead(left_out: LeftOut, joint: int) -> Array:
-    """Return squares of the errors of a joint's change over AHEAD,
-    one span after the other in all logs [rad²]."""
+def squared_changes(left_out: LeftOut, joint: int) -> Array:
+    """Return the squared error of a joint's change over each part left out [rad²]."""
     problem = left_out.problem
-    spans = list[Array]()
+    number = blocks(problem)
+    squares = list[Array]()
     for channel in problem.channels:
         if channel.quantity != "angle" or channel.joint != joint:
             continue
         error = left_out.errors[channel.rows] / channel.weight
-        step = max(round(AHEAD / problem.logs[channel.log].period), 1)
-        # a shorter log has one span
-        step = min(step, len(error) - 1)
-        spans.append(np.diff(error[::step]) ** 2)
-    return np.concatenate(spans)
+        ends = np.flatnonzero(np.diff(number[channel.rows]))
+        firsts = np.append(0, ends + 1)
+        lasts = np.append(ends, error.size - 1)
+        squares.append((error[lasts] - error[firsts]) ** 2)
+    return np.concatenate(squares)
 
 
 def next_actions(problem: Problem, known: Uncertainty) -> list[Plain]:

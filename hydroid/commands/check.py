@@ -28,6 +28,7 @@ from hydroid.log import (
     ColumnGuess,
     Log,
     LogFinding,
+    Reading,
     by_level,
     check_parts,
     driven_joints,
@@ -44,6 +45,10 @@ from hydroid.words import listed
 
 if TYPE_CHECKING:
     from hydroid.fitting.agreement import Agreement
+
+
+MOST_JOINTS = 12
+"""whose columns are sought in a log of an unknown arm: more than an arm has"""
 
 
 class LogCheck(NamedTuple):
@@ -92,46 +97,70 @@ def check(
     settings = load_settings(config, set)
     names = settings.arm.joint_names
     with Progress() as progress:
-        files = list[_File]()
-        paths = [Path(log) for log in as_list(logs)]
-        for number, path in enumerate(paths, 1):
-            progress("reading log", number, len(paths), path.name)
-            found = check_file(path, settings, repair=repair, progress=progress)
-            files.append(_File(path, *found))
-        there = [log for file in files for log in file.parts]
-        progress("looking at the motion", len(paths), None)
+        files = _read_files(as_list(logs), settings, progress, repair=repair)
+        parts = list[Log]()
+        for file in files:
+            parts += file.parts
+        progress("looking at the motion", len(files), None)
         motion = [
-            *undriven_findings(there, settings),
-            *motion_findings(there, settings.arm),
+            *undriven_findings(parts, settings),
+            *motion_findings(parts, settings.arm),
         ]
-        agreements = _compared(there, settings, progress)
-    motion += odd_logs(agreements, there, settings)
-    checks = [one for file in files for one in _checks(file, motion, names)]
-    sizes = [_size(one, settings) for one in checks if one.log is not None]
-    lines = [
-        f"{level}: {line}"
-        for level, line in grouped(f for one in checks for f in one.findings)
-    ]
-    summary = list[str]()
-    if agreements and not any(one.odd for one in agreements):
-        joints = listed([names[one.joint - 1] for one in agreements])
-        summary.append(
-            f"No log stands out in speed, dead bands or delay of {joints}; -v shows all logs."
-        )
-    content = {
-        "logs": [_plain(one, names) for one in checks],
-        "agreement": plain(agreements, names),
-    }
-    refused = not all(_is_usable(one) for one in checks)
+        agreements = _compared(parts, settings, progress)
+    # what stands out is said of the log, as its other findings are
+    motion += odd_logs(agreements, parts, settings)
+    checks = list[LogCheck]()
+    for file in files:
+        checks += _checks(file, motion, names)
     shown = tables(agreements, names, every=False)
     details = tables(agreements, names, every=True)
+    content = {
+        "logs": [_plain(log_check, names) for log_check in checks],
+        "agreement": plain(agreements, names),
+    }
     return Result(
-        [*lines, *sizes, *shown, *summary],
+        [
+            *_finding_lines(checks),
+            *_sizes(checks, settings),
+            *shown,
+            *_summary(agreements, names),
+        ],
         content,
         checks,
-        exit_status=2 if refused else 0,
+        exit_status=0 if all(map(_is_usable, checks)) else 2,
         details=[] if shown == details else details,
     )
+
+
+def _read_files(
+    logs: Sequence[str | Path],
+    settings: FitSettings,
+    progress: Progress,
+    *,
+    repair: bool,
+) -> "list[_File]":
+    files = list[_File]()
+    for number, log in enumerate(logs, 1):
+        path = Path(log)
+        progress("reading log", number, len(logs), path.name)
+        parts, findings = check_file(path, settings, repair=repair, progress=progress)
+        files.append(_File(path, parts, findings))
+    return files
+
+
+def _finding_lines(checks: Sequence[LogCheck]) -> list[str]:
+    """Return a line for each finding, those that logs share once."""
+    findings = list[LogFinding]()
+    for log_check in checks:
+        findings += log_check.findings
+    return [f"{level}: {line}" for level, line in grouped(findings)]
+
+
+def _summary(agreements: "Sequence[Agreement]", names: Sequence[str]) -> Iterator[str]:
+    """Yield that logs which were compared are alike, if they are."""
+    if agreements and not any(agreement.odd for agreement in agreements):
+        joints = listed([names[agreement.joint - 1] for agreement in agreements])
+        yield f"No log stands out in speed, dead bands or delay of {joints}; -v shows all logs."
 
 
 def _compared(
@@ -163,44 +192,53 @@ def _checks(
     if not file.parts:
         yield LogCheck(file.path, None, file.findings, {})
     for part in file.parts:
-        own = file.findings if part is file.parts[0] else ()
-        findings = by_level(
-            [*own, *(one for one in motion if one.source == part.source)]
-        )
-        moved = {
-            names[joint - 1]: one.travel for joint, one in driven_joints(part).items()
-        }
-        yield LogCheck(file.path, part, findings, moved)
+        findings = [finding for finding in motion if finding.source == part.source]
+        # those of the file are said once
+        if part is file.parts[0]:
+            findings = [*file.findings, *findings]
+        moved = dict[str, float]()
+        for joint, joint_motion in driven_joints(part).items():
+            moved[names[joint - 1]] = joint_motion.travel
+        yield LogCheck(file.path, part, by_level(findings), moved)
 
 
-def _is_usable(one: LogCheck) -> bool:
-    return all(finding.level != "error" for finding in one.findings)
+def _is_usable(log_check: LogCheck) -> bool:
+    return all(finding.level != "error" for finding in log_check.findings)
 
 
-def _size(one: LogCheck, settings: FitSettings) -> str:
-    """Return a line on a log: how long it is, and what moves in it."""
-    assert one.log is not None
+def _sizes(checks: Sequence[LogCheck], settings: FitSettings) -> Iterator[str]:
+    """Yield a line on each log: how long it is, and what moves in it."""
     slides = {settings.arm.joint_names[joint - 1] for joint in settings.arm.slides}
-    ways = [
-        f"{name} by {way(travel, slides=name in slides)}"
-        for name, travel in one.moved_deg.items()
-    ]
-    size = f"{len(one.log.time)} samples, {one.log.duration:.2f} s"
-    return f"{one.log.source}: {size}; driven and moved: {', '.join(ways) or 'nothing'}"
+    for log_check in checks:
+        log = log_check.log
+        if log is None:
+            continue
+        ways = list[str]()
+        for name, travel in log_check.moved_deg.items():
+            ways.append(f"{name} by {way(travel, slides=name in slides)}")
+        size = f"{len(log.time)} samples, {log.duration:.2f} s"
+        moved = ", ".join(ways) or "nothing"
+        yield f"{log.source}: {size}; driven and moved: {moved}"
 
 
-def _plain(one: LogCheck, names: Sequence[str]) -> Plain:
+def _plain(log_check: LogCheck, names: Sequence[str]) -> Plain:
     """Return a log as JSON holds it."""
-    log = one.log
-    return {
-        "log": str(one.path) if log is None else log.source,
-        "usable": _is_usable(one),
-        "samples": log and len(log.time),
-        "duration_s": log and log.duration,
-        "driven_joints": [] if log is None else np.array(names)[log.driven].tolist(),
-        "moved_deg": one.moved_deg,
-        "findings": plain_findings(one.findings),
+    log = log_check.log
+    content: Plain = {
+        "log": str(log_check.path),
+        "usable": _is_usable(log_check),
+        "samples": None,
+        "duration_s": None,
+        "driven_joints": [],
+        "moved_deg": log_check.moved_deg,
+        "findings": plain_findings(log_check.findings),
     }
+    if log is not None:
+        content["log"] = log.source
+        content["samples"] = len(log.time)
+        content["duration_s"] = log.duration
+        content["driven_joints"] = np.array(names)[log.driven].tolist()
+    return content
 
 
 @command
@@ -235,28 +273,30 @@ def convert(
         SettingsError: `out` would overwrite the log, or a setting that is not allowed.
         RunError: `out` cannot be written.
     """
-    path, guess, reasons = Path(log), None, list[str]()
+    path = Path(log)
     refuse_overwriting(path, out)
+    arm = None
+    guess = None
+    reasons = list[str]()
     if config is not None or set:
         settings = load_settings(config or "fit-mech", set)
-        layout, ranges, arm = settings.log, settings.arm.ranges, settings.arm
+        layout = settings.log
+        arm = settings.arm
+        ranges = arm.ranges
     else:
-        arm = None
-        # more joints than an arm has
-        most = [f"joint {number}" for number in range(1, 13)]
-        guess = guess_columns(open_table(path), most)
+        joints = [f"joint {number}" for number in range(1, MOST_JOINTS + 1)]
+        guess = guess_columns(open_table(path), joints)
         layout = LogSettings.model_validate(guess.log)
-        ranges = {
-            str(number): (-np.inf, np.inf)
-            for number in range(1, 1 + max(layout.joints, default=1))
-        }
-        reasons = [*guess.reasons]
-    parts, findings = check_parts(path, layout, ranges, arm=arm, repair=repair)
+        last = max(layout.joints, default=1)
+        ranges = {str(number): (-np.inf, np.inf) for number in range(1, last + 1)}
+        reasons += guess.reasons
+    parts, findings = check_parts(path, layout, ranges, Reading(arm=arm, repair=repair))
+    # errors come first
     if not parts:
         raise findings[0].error()
     read = _with_gaps(parts)
     write_log(Path(out), read, _plain_layout(read), exact=True)
-    said = (f"{finding.level}: {finding}" for finding in findings)
+    lines = [f"{finding.level}: {finding}" for finding in findings]
     size = f"{out}: {len(read.time)} samples, {read.duration:.2f} s, every {read.period:g} s"
     longest = max(parts, key=lambda part: part.duration)
     content = {
@@ -269,7 +309,7 @@ def convert(
         "reasons": reasons,
     }
     return Result(
-        [*reasons, *said, size],
+        [*reasons, *lines, size],
         content,
         Converted(replace(longest, source=str(out)), guess),
     )
@@ -283,6 +323,7 @@ def _with_gaps(parts: Sequence[Log]) -> Log:
         return first
     times = list[Array]()
     for part in parts:
+        # on the grid of the first part, so that a reader finds one period
         samples = np.ceil((part.begin - first.begin) / first.period - 1e-6)
         times.append(first.period * (samples + np.arange(len(part.time))))
     pressures = [part.pressure for part in parts if part.pressure is not None]

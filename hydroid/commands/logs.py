@@ -15,7 +15,15 @@ from hydroid.errors import LogError, RunError, SettingsError
 from hydroid.estimate import read_estimate
 from hydroid.files import is_file
 from hydroid.identified_model import IdentifiedModel
-from hydroid.log import Log, LogFinding, check_parts, grouped, log_finding, open_table
+from hydroid.log import (
+    Log,
+    LogFinding,
+    Reading,
+    check_parts,
+    grouped,
+    log_finding,
+    open_table,
+)
 from hydroid.progress import LOGGER, NOTE, Progress as WorkProgress, no_progress
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.log import LogSettings, log_file
@@ -106,16 +114,10 @@ def check_file(
     groups find their logs.
     """
     path = path.resolve() if path.name in ("", "..") else path
-    arm, outputs = settings.arm, settings.outputs if angles else None
-    return check_parts(
-        path,
-        settings.log,
-        arm.ranges,
-        outputs=outputs,
-        arm=arm,
-        repair=repair,
-        progress=progress,
-    )
+    arm = settings.arm
+    outputs = settings.outputs if angles else None
+    reading = Reading(outputs=outputs, arm=arm, repair=repair)
+    return check_parts(path, settings.log, arm.ranges, reading, progress)
 
 
 def undriven_findings(logs: Sequence[Log], settings: FitSettings) -> list[LogFinding]:

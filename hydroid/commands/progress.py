@@ -31,21 +31,21 @@ _stopped = False
 
 
 def listen() -> None:
-    """Turn the first of the notices into a KeyboardInterrupt: clusters repeat
+    """Note Ctrl-C, and turn the first of a cluster's notices into it: clusters repeat
     themselves.
 
     One that is ignored from the start, as `nohup` has it, stays ignored.
     """
-    for number in NOTICES:
+    for number in (signal.SIGINT, *NOTICES):
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, _stop)
 
 
 def stopped() -> bool:
-    """Whether a notice has come.
+    """Whether Ctrl-C or a notice has come.
 
-    Python drops an exception that is raised in a finalizer. Who asks here between two
-    pieces of work does not miss the notice.
+    Python drops an exception that is raised in a finalizer, and a library that is
+    being imported may make an ImportError of it. Who asks here does not miss it.
     """
     return _stopped
 
@@ -53,8 +53,10 @@ def stopped() -> bool:
 def _stop(number: int, frame: FrameType | None) -> None:
     global _stopped
     _stopped = True
-    for notice in NOTICES:
-        signal.signal(notice, signal.SIG_IGN)
+    # Ctrl-C may be pressed again
+    if number != signal.SIGINT:
+        for notice in NOTICES:
+            signal.signal(notice, signal.SIG_IGN)
     raise KeyboardInterrupt
 
 
@@ -153,7 +155,7 @@ class FitProgress(Progress):
         total = self._rungs
         # the last step, in which what is kept is refined
         number = total
-        if step.phase or step.without or step.start:
+        if step.phase or step.start:
             models = {"start": 1, "refined": 2, "joint": 2, "dynamic": total}
             number = models.get(step.model, 1)
             for rung, term in enumerate(self._terms, 3):
@@ -164,6 +166,4 @@ class FitProgress(Progress):
         words = f"start {step.start}" if step.start else step.estimate
         if step.numbers:
             words += " from nine numbers"
-        if step.without:
-            words += f" without part {step.without} of the logs"
         return f"step {self._number} of {total} ({words})"

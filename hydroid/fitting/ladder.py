@@ -29,8 +29,8 @@ from hydroid.settings.fit import FitSettings
 from hydroid.settings.search import RefinementSettings
 
 FIRST = 10
-"""iterations after which another model must be more likely than the last one: each is
-slow to simulate"""
+"""iterations after which another model must err less than the last one: each is slow to
+simulate"""
 FIRM = 1e-3  # gain below which least squares ends where another rung may follow
 
 
@@ -108,6 +108,8 @@ class Ladder:
         self.kept = min(estimates.values(), key=lambda e: e.rms if e.usable else np.inf)
         self._watch, self._checkpoints, self._late = watch, checkpoints, False
         self._step = step_of(self.kept.name)
+        # whether output errors led near the kept estimate, before its innovations
+        self._from_afar = False
 
     def climb(self, whole: Problem) -> None:
         """Refine the estimate with each model and term that the settings of a fit's
@@ -141,11 +143,10 @@ class Ladder:
         if climbs:
             kept = self.kept
             likelihood = make_likelihood(self.problem)
-            # with an error that another model has left, the first error model would
-            # have too much drift
-            last = self._refined(
-                likelihood, kept.theta, refinement, self._step, refine_from_afar
-            )
+            # a term that was added to an estimate began with the drift that its lack
+            # had left
+            how = refine if self._from_afar else refine_from_afar
+            last = self._refined(likelihood, kept.theta, refinement, self._step, how)
             new = self._measured(self.problem, last, self._step)
             self.kept = self.estimates[kept.name] = replace(new, gained=kept.gained)
         if settings.joint_refinement:
@@ -193,15 +194,11 @@ class Ladder:
             # there is nothing for a model that is slow to simulate
             if self._is_white():
                 return
-            few = settings.changed({"iterations": FIRST})
-            first = self._refined(
-                likelihood, theta, few, step.changed(phase="at first")
-            )
-            theta = own.parameters.from_unit(first.point)
-            if self._explained(own, theta) < 0.0:
+            theta = self._nearer(likelihood, theta, settings, step)
+            if own.rms(own.output_errors(theta[None]))[0] > start.rms:
                 return
         # what a search, or another model, ended at may be far from an optimum
-        far = not if_better or other_model or _new_curves(own, last)
+        far = not if_better or other_model or bool(_new_curves(own, last))
         how = refine_from_afar if far else refine
         result = self._refined(
             likelihood, theta, settings, step.changed(phase="on the way"), how
@@ -210,14 +207,39 @@ class Ladder:
             return
         new = self._measured(own, result, step)
         if not if_better:
-            self._keep(own, new, step)
+            self._keep(own, new, step, from_afar=far)
             return
         without = self._left_out_of(last, self.refinements[start.name])
         with_it = self._left_out_of(own, result)
         gained = gain(with_it, without)
         self.estimates[step.estimate] = new = replace(new, gained=gained)
         if not self._late and is_clear(*gained):
-            self._keep(own, new, step)
+            self._keep(own, new, step, from_afar=far)
+
+    def _nearer(
+        self,
+        likelihood: Likelihood,
+        theta: Array,
+        settings: RefinementSettings,
+        step: Step,
+    ) -> Array:
+        """Return where another model begins, (P,): near the last model's estimate, or
+        the settings' start.
+
+        What stood for oil and inertia in the last model, a lag or a dead band, may lie
+        behind a hill. Both are refined a little by output errors: innovations still
+        have the drift of the last model's errors.
+        """
+        few = settings.changed({"iterations": FIRST})
+        output_errors = replace(likelihood, memory=np.inf)
+        parameters = likelihood.problem.parameters
+        ends = [
+            self._refined(
+                output_errors, begun, few, step.changed(phase="at first", start=number)
+            )
+            for number, begun in enumerate((theta, parameters.start))
+        ]
+        return parameters.from_unit(min(ends, key=lambda end: end.negative_log).point)
 
     def _lone_terms(self, settings: FitSettings) -> dict[str, int]:
         """Return the terms of one joint that can be fitted alone, and that joint,
@@ -297,20 +319,6 @@ class Ladder:
         if not self._late and not is_better(with_it, without):
             self._keep(own, self._measured(own, result, step), step)
 
-    def _explained(self, problem: Problem, theta: Array) -> float:
-        """Rise of the log-likelihood from the kept estimate to another, (P,), of a
-        problem of the same logs.
-
-        Both are weighed by the errors of the kept one.
-        """
-        kept = likelihood_at(
-            self.problem, self.kept.theta, self.refinements[self.kept.name].numbers
-        )
-        other = replace(kept, problem=problem)
-        before = kept.rows(self.kept.theta[None])[0]
-        after = other.rows(theta[None])[0]
-        return 0.5 * float(before @ before - after @ after)
-
     def _is_white(self) -> bool:
         """Whether the errors of the estimate that is kept leave innovations that are
         white."""
@@ -319,8 +327,18 @@ class Ladder:
         errors = self.problem.output_errors(self.kept.theta[None])
         return not any(lasting(shown, shown.innovations(errors)[0]).values())
 
-    def _keep(self, problem: Problem, estimate: Estimate, step: Step) -> None:
-        self.problem, self.kept, self._step = problem, estimate, step
+    def _keep(
+        self,
+        problem: Problem,
+        estimate: Estimate,
+        step: Step,
+        *,
+        from_afar: bool = False,
+    ) -> None:
+        self.problem = problem
+        self.kept = estimate
+        self._step = step
+        self._from_afar = from_afar
 
     def _left_out_of(self, problem: Problem, end: Refinement) -> LeftOut:
         return predict_blocks(make_likelihood(problem), end)

@@ -1,7 +1,7 @@
 """Parts of the logs left out: each is predicted by a fit that has not seen it.
 
-A fit is repeated without each part (`predict_parts`), or its parameters without each
-block of time follow from its Jacobian (`predict_blocks`), which costs no simulation.
+The parts are blocks of time. The parameters without each block follow from the Jacobian
+of the fit to all of them, which costs no simulation.
 
 Models are compared by the predictive likelihood of these parts, a sum over blocks of
 time whose differences also tell how certain the comparison is. Errors over a whole log
@@ -9,17 +9,19 @@ would be a lottery: the drift of a joint in one log is one draw.
 """
 
 import math
-from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.stats import norm as normal
 
 from hydroid.arrays import Array, Ints, record
 from hydroid.estimate import finite
-from hydroid.fitting.refinement import Refinement
+from hydroid.fitting.refinement import Refinement, refine_from_afar
+from hydroid.fitting.step import Step
 from hydroid.posterior.error_model import Likelihood, make_likelihood
 from hydroid.problem.problem import Problem
 from hydroid.search.descent import derivatives
+from hydroid.settings.search import RefinementSettings
 
 BLOCK = 5.0
 """length of a block [s]: longer than what is left of an error lasts (ours)"""
@@ -29,13 +31,14 @@ error is a guess"""
 RANK = 1e-12
 """relative size of an eigenvalue of the normal equations below which nothing is known
 of its direction"""
-CERTAIN = 1.64
-"""standard errors that a gain must exceed: in 5 % of the cases one without a reason
-does"""
+LEVEL = 0.05
+"""probability that a gain without a reason counts as one"""
+LEAST_GAIN = 3.0
+"""of the log-likelihood, however certain it is: strong evidence by R. E. Kass and A. E.
+Raftery (1995)"""
 
-Refit = Callable[[Likelihood, Array, int], Refinement]
-"""refines an estimate, shape (P,), by a likelihood; takes the number of the part left
-out, from 1"""
+COMPARED = RefinementSettings(iterations=60, gain_tolerance=1e-4)
+"""of a fit that only serves a comparison"""
 
 
 @record
@@ -44,12 +47,14 @@ class LeftOut:
 
     Attributes:
         problem: with all logs.
+        theta: of the fit to all of them, shape (P,).
         thetas: of the fit without each part, shape (G, P).
         errors: weighted output errors of each part in the fit without it [rad], shape
             (R,).
     """
 
     problem: Problem
+    theta: Array
     thetas: Array
     errors: Array
 
@@ -64,28 +69,16 @@ class LeftOut:
         }
 
 
-def predict_parts(problem: Problem, starts: Array, refit: Refit) -> LeftOut:
-    """Fit a problem without each of its G parts, and predict these parts.
+def refit(problem: Problem, theta: Array) -> LeftOut:
+    """Fit a problem from theta, shape (P,), and predict each block of its logs by the
+    fit without it.
 
-    `starts`, shape (G, P), are where each fit starts: estimates that have not seen the
-    part, or one that is far from an optimum.
+    Nothing of the fit is shown or stored.
     """
-    number = parts(problem)
-    several = len(problem.logs) > 1
-    thetas = np.empty((len(np.unique(number)), len(problem.parameters.names)))
-    errors = np.full(number.size, np.nan)
-    for g, start in enumerate(starts):
-        out = number == g
-        rest = _of_logs(problem, ~out) if several else problem
-        likelihood = make_likelihood(rest)
-        if not several:
-            likelihood = replace(likelihood, shown=likelihood.shown.without(out))
-        end = refit(likelihood, start, g + 1)
-        thetas[g] = problem.parameters.from_unit(end.point)
-        unseen = _of_logs(problem, out) if several else problem
-        row = unseen.output_errors(thetas[g][None])[0]
-        errors[out] = row if several else row[out]
-    return LeftOut(problem, thetas, errors)
+    likelihood = make_likelihood(problem)
+    step = Step("compared")
+    end = refine_from_afar(likelihood, theta, COMPARED, lambda *_: False, {}, step)
+    return predict_blocks(likelihood, end)
 
 
 def predict_blocks(likelihood: Likelihood, end: Refinement) -> LeftOut:
@@ -127,19 +120,7 @@ def predict_blocks(likelihood: Likelihood, end: Refinement) -> LeftOut:
         change = np.clip(end.point + change, 0.0, 1.0) - end.point
         thetas[block] = problem.parameters.from_unit(end.point + change)
         predicted[own] += change @ by_error[:, own]
-    return LeftOut(problem, thetas, predicted)
-
-
-def parts(problem: Problem) -> Ints:
-    """Return which part each sample is in, from 0, shape (R,).
-
-    The parts are the logs, in three groups at most, or the halves of one log.
-    """
-    number = np.empty(problem.measured.size, dtype=np.int64)
-    for c in problem.channels:
-        halves = np.arange(len(c.measured)) >= len(c.measured) // 2
-        number[c.rows] = c.log % 3 if len(problem.logs) > 1 else halves
-    return number
+    return LeftOut(problem, theta, thetas, predicted)
 
 
 def gain(after: LeftOut, before: LeftOut) -> tuple[float, float]:
@@ -168,19 +149,22 @@ def gain(after: LeftOut, before: LeftOut) -> tuple[float, float]:
     return float(sums.sum()), float(np.sqrt(len(sums) * np.var(sums, ddof=1)))
 
 
-def is_better(after: LeftOut, before: LeftOut) -> bool:
+def is_better(after: LeftOut, before: LeftOut, among: int = 1) -> bool:
     """Whether one model foretells the parts better than another by more than the
     uncertainty of that.
 
-    So does one that can be simulated where the other cannot.
+    So does one that can be simulated where the other cannot. `among` is the number of
+    models that are tried: the best of many seems better by chance.
     """
-    return is_clear(*gain(after, before))
+    return is_clear(*gain(after, before), among)
 
 
-def is_clear(rise: float, error: float) -> bool:
+def is_clear(rise: float, error: float, among: int = 1) -> bool:
     """Whether a gain and its standard error, as `gain` returns them, say that a model
-    is better."""
-    return rise > CERTAIN * error or rise == np.inf
+    is better, one `among` several."""
+    # C. E. Bonferroni, 1936
+    certain = float(normal.isf(LEVEL / among))
+    return rise > max(certain * error, LEAST_GAIN) or rise == np.inf
 
 
 def blocks(problem: Problem) -> Ints:
@@ -193,10 +177,3 @@ def blocks(problem: Problem) -> Ints:
         own = (problem.logs[c.log].time / length).astype(np.int64)
         number[c.rows] = firsts[c.log] + np.minimum(own, counts[c.log] - 1)
     return number
-
-
-def _of_logs(problem: Problem, samples: Sequence[bool] | Array) -> Problem:
-    """Return the problem of the logs that some samples, (R,), are of; parts are whole
-    logs."""
-    kept = sorted({c.log for c in problem.channels if samples[c.rows.start]})
-    return problem.varied(problem.settings, [problem.logs[i] for i in kept])

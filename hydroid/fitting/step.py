@@ -23,7 +23,6 @@ class Step:
         numbers: whether it begins at the nine numbers of the joint.
         horizon: number of the part of the logs that it is fitted to, from 1; 0: all of
             them.
-        without: number of the part of the logs that is left out, from 1; 0: none.
     """
 
     model: str
@@ -33,7 +32,6 @@ class Step:
     joint: int = 0
     numbers: bool = False
     horizon: int = 0
-    without: int = 0
 
     @property
     def estimate(self) -> str:
@@ -47,7 +45,6 @@ class Step:
         words += [f"joint {self.joint}"] if self.joint else []
         words += ["numbers"] if self.numbers else []
         words += [f"part {self.horizon}"] if self.horizon else []
-        words += [f"without part {self.without}"] if self.without else []
         words += [self.phase] if self.phase else []
         return " ".join(words)
 

@@ -127,14 +127,22 @@ def _move_plunger(c, side, z, w, substep: int, step: float) -> float:
 
 
 @compilable
-def opened(side, travel: float) -> float:
-    """Opening of a side's pump edge [m²] at a spool travel towards it [m], without
+def open_share(side, travel: float) -> float:
+    """Share of a side's full opening at a spool travel towards it [m], without
     leakage."""
     share = slot_share(travel, side)
     if side.opening_exponent != 1.0:
         share = share**side.opening_exponent
     if side.has_curve:
         share = curved(share, side)
+    return share
+
+
+@compilable
+def opened(c, share: float) -> float:
+    """Opening of a pump edge [m²] at a share of the full opening; both are below 0
+    towards B."""
+    side = c.a if share > 0.0 else c.b
     return side.opening * share
 
 
@@ -148,15 +156,15 @@ def net_opening(c, z, w, substep: int, step: float) -> float:
     # else the spool rests, and its power law is not worked out again
     if z.displacement != displacement:
         z.displacement = displacement
-        z.open = (
-            opened(c.a, displacement)
-            if displacement > 0.0
-            else -opened(c.b, -displacement)
-        )
-    net = z.open
-    left = (z.opening - net) * (1.0 - c.opening_keep)
+        if displacement > 0.0:
+            z.open = open_share(c.a, displacement)
+        else:
+            z.open = -open_share(c.b, -displacement)
+    # shares lag, not areas: a spool passes its neutral when it does, however large the
+    # openings of its two sides are
+    left = (z.opening - z.open) * (1.0 - c.opening_keep)
     z.opening -= left
-    return net + left * c.opening_steps
+    return opened(c, z.open + left * c.opening_steps)
 
 
 @compilable

@@ -114,8 +114,8 @@ JOINT_STATE = np.dtype(
             "angle velocity "  # at the start of the step [rad]; at its end [rad/s]
             # on ringing oil: velocity [rad/s], and how it changes [rad/s²]
             "turning surge "
-            "opening "  # of the valve, below 0 towards B [m²]
-            # of the spool [m], NaN before the first; what it opens without a lag [m²]
+            "opening "  # of the valve, as a share of the full one; below 0 towards B
+            # of the spool [m], NaN before the first; the share without a lag
             "displacement open "
             # of the look-ahead: turn [rad], velocity v*, torque, h κ
             "way predicted torque armature "

@@ -2,7 +2,6 @@
 back."""
 
 from hydroid.log.binary import FORMATS as FORMATS
-from hydroid.log.checks import motion_findings as motion_findings
 from hydroid.log.command_sizes import one_size as one_size, only_command as only_command
 from hydroid.log.guess import ColumnGuess as ColumnGuess, guess_columns as guess_columns
 from hydroid.log.log import (
@@ -17,11 +16,12 @@ from hydroid.log.motion import (
     driven_joints as driven_joints,
     motion_of as motion_of,
 )
+from hydroid.log.motion_checks import motion_findings as motion_findings
 from hydroid.log.read import (
+    Reading as Reading,
     check_log as check_log,
     check_parts as check_parts,
     open_table as open_table,
-    write_log as write_log,
-    write_logs as write_logs,
 )
 from hydroid.log.table import Table as Table
+from hydroid.log.write import write_log as write_log, write_logs as write_logs

@@ -32,6 +32,9 @@ from hydroid.words import listed
 TEXTS = ("string", "large_string", "binary", "large_binary")
 """types of columns of text in a Parquet file; others hold numbers or times"""
 TEXTS_AT_ONCE = 1024
+"""cells of a column of text that are held at a time"""
+NUMBERS = "fiub"
+"""numpy's kinds of numbers: floats, integers with and without sign, Booleans"""
 
 
 def open_mat(path: Path, _settings: LogSettings, _progress: Progress) -> Table:
@@ -51,10 +54,8 @@ def open_mat(path: Path, _settings: LogSettings, _progress: Progress) -> Table:
                 str(path), simplify_cells=True, variable_names=wanted
             )
         columns = dict(_columns("", variables))
-    remarks = tuple(
-        f"{name} holds more than {MOST_NUMBERS:,} numbers and is left out"
-        for name in large
-    )
+    too_many = f"holds more than {MOST_NUMBERS:,} numbers and is left out"
+    remarks = tuple(f"{name} {too_many}" for name in large)
     if not columns and large:
         raise LogError(remarks[0], path, "save what is needed of it")
     if not columns:
@@ -88,12 +89,15 @@ class ParquetColumns(Mapping[str, NDArray[Any]]):
         with self._open() as file:
             refuse_large(str(path), file.metadata.num_rows, 1)
             fields = file.schema_arrow
-            nested = {field.name for field in fields if field.type.num_fields}
-            texts = {
-                field.name
-                for field in fields
-                if str(field.type) in TEXTS or "dict" in str(field.type)
-            }
+            nested = set[str]()
+            texts = set[str]()
+            for field in fields:
+                kind = str(field.type)
+                if field.type.num_fields:
+                    nested.add(field.name)
+                # also of dictionaries, which hold equal texts once
+                if kind in TEXTS or "dict" in kind:
+                    texts.add(field.name)
         self._names = [name for name in fields.names if name not in nested]
         self._texts = texts
 
@@ -122,12 +126,8 @@ class ParquetColumns(Mapping[str, NDArray[Any]]):
                 return file.read(columns=[name])[name].to_numpy()
             column = TextColumn()
             for batch in file.iter_batches(TEXTS_AT_ONCE, columns=[name]):
-                column.extend(
-                    [
-                        "" if cell is None else str(cell)
-                        for cell in batch.column(0).to_pylist()
-                    ]
-                )
+                cells = batch.column(0).to_pylist()
+                column.extend(["" if cell is None else str(cell) for cell in cells])
         return column.values()
 
     def cell(self, name: str, row: int) -> object:
@@ -157,16 +157,26 @@ def _columns(name: str, value: Any) -> Iterator[tuple[str, NDArray[Any]]]:
     elif isinstance(value, list) or getattr(value, "dtype", None) == "O":
         for k, inner in enumerate(value, 1):
             yield from _columns(f"{name}[{k}]", inner)
-    elif (
-        isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and value.size > 1
-    ):
-        array = value.squeeze()
-        array = (
-            array.T if array.ndim == 2 and array.shape[0] < array.shape[1] else array
-        )
-        parts = array.reshape(len(array), -1).T
-        for k, values in enumerate(parts, 1):
-            yield (name if len(parts) == 1 else f"{name}[{k}]"), values
+    elif isinstance(value, np.ndarray) and value.dtype.kind in NUMBERS:
+        yield from _array_columns(name, value)
+
+
+def _array_columns(
+    name: str, array: NDArray[Any]
+) -> Iterator[tuple[str, NDArray[Any]]]:
+    """Yield a vector, or the columns of a matrix; a single number is a setting."""
+    if array.size <= 1:
+        return
+    array = array.squeeze()
+    # the longer axis is the time
+    if array.ndim == 2 and array.shape[0] < array.shape[1]:
+        array = array.T
+    columns = array.reshape(len(array), -1).T
+    if len(columns) == 1:
+        yield name, columns[0]
+        return
+    for k, column in enumerate(columns, 1):
+        yield f"{name}[{k}]", column
 
 
 def _without_hdf5(item: Any, large: list[str]) -> Any:
@@ -183,8 +193,11 @@ def _without_hdf5(item: Any, large: list[str]) -> Any:
     if item.size > MOST_NUMBERS:
         large.append(item.name.lstrip("/"))
         return None
-    text = item.attrs.get("MATLAB_class") == b"char" or "MATLAB_empty" in item.attrs
-    return None if text or item.dtype.kind not in "fiub" else np.asarray(item[()]).T
+    is_text = item.attrs.get("MATLAB_class") == b"char"
+    is_empty = "MATLAB_empty" in item.attrs
+    if is_text or is_empty or item.dtype.kind not in NUMBERS:
+        return None
+    return np.asarray(item[()]).T
 
 
 def first_bytes(path: Path) -> bytes:

@@ -1,7 +1,7 @@
 """What the name and the unit of a column say about it."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from hydroid.files import read_table
 from hydroid.units import Unit, unit_of
@@ -9,58 +9,82 @@ from hydroid.units import Unit, unit_of
 CLUES = read_table("log/clues.yaml")
 RAW = ("voltage", "current")
 """quantities in which sensors and amplifiers speak"""
+COMMAND_WORDS = {"cmd", "command", "commands", "joystick", "joy"}
+"""words that say command, whatever others a name holds"""
+GENERIC_WORDS = {"joint", "link"}
+"""words of a joint's name that tell it from no other"""
+SHORTEST_CUT = 3
+"""letters that are left of a word which is cut short"""
+LONGEST_NUMBER = 2
+"""digits of a joint in a column's name"""
 
 
 def words(name: str) -> list[str]:
     """Return the words of a column's name in lower case: "valveCmd_2 [V]" gives valve,
     cmd, 2, v."""
-    return [
-        word.lower()
-        for word in re.findall(r"[A-Z]?[a-zäöüß]+|[A-Z]+(?![a-z])|\d+", name)
-    ]
+    found = re.findall(r"[A-Z]?[a-zäöüß]+|[A-Z]+(?![a-z])|\d+", name)
+    return [word.lower() for word in found]
 
 
 def column_unit(name: str, given: str) -> Unit | None:
     """Return the unit that the file gives, or the one in or at the end of the name;
     None: there is none."""
     inside = re.search(r"[\[(<]([^\])>]*)[\])>]\s*$", name)
-    units = map(
-        unit_of, (given, inside[1] if inside else "", re.split(r"[_ .]", name)[-1])
-    )
-    return next((unit for unit in units if unit and unit.quantity != "ambiguous"), None)
+    in_brackets = inside[1] if inside else ""
+    last_word = re.split(r"[_ .]", name)[-1]
+    for text in (given, in_brackets, last_word):
+        unit = unit_of(text)
+        if unit and unit.quantity != "ambiguous":
+            return unit
+    return None
 
 
 def kind_of(name: str, unit: Unit | None) -> str:
-    """Return time, command, angle or other: what the unit, or else the words of a name
-    say of a column."""
-    there = words(name)
-    if {*there} & {*CLUES["derived"]}:
+    """Return time, command, angle, target or other: what the unit, or else the words of
+    a name say of a column."""
+    in_name = {*words(name)}
+    if not in_name.isdisjoint(CLUES["derived"]):
         return "other"
-    if {*there} & {*CLUES["targets"]} and unit and unit.quantity in ("angle", "length"):
-        return "target"
-    if unit and unit.quantity in RAW and {*there} & {*CLUES["sensors"]}:
-        return "angle"
     if unit:
-        return CLUES["units"].get(unit.quantity, "other")
-    if {*there} & {"cmd", "command", "commands", "joystick", "joy"}:
-        return "command"  # also in /joint_commands.position[boom]
-    named = (
-        kind
-        for word in reversed(there)
-        for kind, those in CLUES["kinds"].items()
-        if word in those
-    )
-    return next(named, "command" if direction(name)[0] else "other")
+        return _kind_by_unit(in_name, unit)
+    # also in /joint_commands.position[boom]
+    if in_name & COMMAND_WORDS:
+        return "command"
+    return _kind_by_words(name)
 
 
-def own_part(name: str) -> str:
+def _kind_by_unit(in_name: Collection[str], unit: Unit) -> str:
+    """Return the kind of a column with a unit; its words say more of two
+    quantities."""
+    is_position = unit.quantity in ("angle", "length")
+    if is_position and not {*in_name}.isdisjoint(CLUES["targets"]):
+        return "target"
+    if unit.quantity in RAW and not {*in_name}.isdisjoint(CLUES["sensors"]):
+        return "angle"
+    return CLUES["units"].get(unit.quantity, "other")
+
+
+def _kind_by_words(name: str) -> str:
+    """Return the kind that the last telling word of a name says."""
+    for word in reversed(words(name)):
+        for kind, telling in CLUES["kinds"].items():
+            if word in telling:
+                return kind
+    # "boom_up" is what a valve is told
+    sign, _ = direction(name)
+    return "command" if sign else "other"
+
+
+def distinctive_part(name: str) -> str:
     """Return what a column has for itself: of `/CalibratedJointVals3.position[Boom]`
     Boom, else its name.
 
     What stands before the brackets names the topic of a bag, whose columns share it.
     """
     inside = re.fullmatch(r"/.*\[([^\[\]]*)\]", name)
-    return inside[1] if inside and unit_of(inside[1]) is None else name
+    if inside and unit_of(inside[1]) is None:
+        return inside[1]
+    return name
 
 
 def joint_of(name: str, joints: Sequence[str]) -> int | None:
@@ -69,32 +93,66 @@ def joint_of(name: str, joints: Sequence[str]) -> int | None:
 
     Words of three letters and more may be cut short: `tele1_cmd` is the telescope's.
     """
-    if (own := own_part(name)) != name and (hit := joint_of(own, joints)):
-        return hit
-    there = {*words(name)} - {"joint", "link"}
-    exact = [{*words(joint)} - {"joint", "link"} for joint in joints]
-    alike = [
-        own.union(*(group for group in CLUES["same"] if own & {*group}))
-        for own in exact
-    ]
-    short = [{w[:n] for w in own for n in range(3, len(w))} for own in alike]
-    for named in (exact, alike, short):
-        hits = [k for k, mine in enumerate(named, 1) if mine & there]
-        if len(hits) == 1:
-            return hits[0]
+    part = distinctive_part(name)
+    if part != name:
+        joint = joint_of(part, joints)
+        if joint:
+            return joint
+    exact = [{*words(joint)} - GENERIC_WORDS for joint in joints]
+    alike = [_with_synonyms(joint_words) for joint_words in exact]
+    cut = [_cut_short(joint_words) for joint_words in alike]
+    in_name = {*words(name)} - GENERIC_WORDS
+    # the first way in which the name is one joint's decides
+    for words_of_joints in (exact, alike, cut):
+        joint = _only_joint(in_name, words_of_joints)
+        if joint is not None:
+            return joint
     return None
+
+
+def _with_synonyms(joint_words: set[str]) -> set[str]:
+    """Return words, and other words for the same joint."""
+    alike = {*joint_words}
+    for synonyms in CLUES["same"]:
+        if not joint_words.isdisjoint(synonyms):
+            alike.update(synonyms)
+    return alike
+
+
+def _cut_short(joint_words: Collection[str]) -> set[str]:
+    cut = set[str]()
+    for word in joint_words:
+        cut.update(word[:letters] for letters in range(SHORTEST_CUT, len(word)))
+    return cut
+
+
+def _only_joint(in_name: set[str], words_of_joints: Sequence[set[str]]) -> int | None:
+    """Return the number of the only joint that has one of the words; None: none or
+    several have."""
+    joints = list[int]()
+    for number, joint_words in enumerate(words_of_joints, 1):
+        if in_name & joint_words:
+            joints.append(number)
+    return joints[0] if len(joints) == 1 else None
 
 
 def number_in(name: str) -> int | None:
     """Return the last number in a column's name; None: it has none."""
-    numbers = [int(word) for word in words(own_part(name)) if word.isdecimal()]
-    return numbers[-1] if numbers and numbers[-1] < 100 else None
+    numbers = [word for word in words(distinctive_part(name)) if word.isdecimal()]
+    if not numbers:
+        return None
+    last = numbers[-1].lstrip("0") or "0"
+    # a longer one is no joint's, and Python refuses to convert texts of thousands
+    return int(last) if len(last) <= LONGEST_NUMBER else None
 
 
 def direction(name: str) -> tuple[int, frozenset[str]]:
     """Return +1, −1 or 0 for the direction that a name tells, and its other words."""
-    there = frozenset(words(name))
+    in_name = frozenset(words(name))
     for positive, negative in CLUES["opposite"]:
-        if word := {positive, negative} & there:
-            return (positive in word) - (negative in word), there - word
-    return 0, there
+        told = {positive, negative} & in_name
+        if told:
+            # 0 of a name that holds both
+            sign = (positive in told) - (negative in told)
+            return sign, in_name - told
+    return 0, in_name

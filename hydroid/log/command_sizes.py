@@ -34,8 +34,13 @@ def only_command(logs: Sequence[Log], joint: int, sign: float) -> float | None:
 
     None where they have several sizes, or there are none.
     """
-    commands = sign * np.concatenate([log.command[:, joint - 1] for log in logs])
-    sizes = np.sort(commands[commands >= LEAST_COMMAND])
-    if len(sizes) == 0 or not one_size(sizes, np.ones(len(sizes))):
+    commands = np.concatenate([log.command[:, joint - 1] for log in logs])
+    # those of the other direction become negative, and are left out
+    sizes = sign * commands
+    sizes = np.sort(sizes[sizes >= LEAST_COMMAND])
+    if len(sizes) == 0:
+        return None
+    weights = np.ones(len(sizes))
+    if not one_size(sizes, weights):
         return None
     return float(np.median(sizes))

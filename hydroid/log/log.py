@@ -12,6 +12,10 @@ from hydroid.errors import LogError
 from hydroid.findings import WORDS, Finding, Level
 from hydroid.words import listed
 
+LONGEST_REST = 2.0
+"""of which the start is the mean [s]"""
+LEVELS: tuple[Level, ...] = ("error", "warning", "note")
+
 
 @record
 class Log:
@@ -71,7 +75,9 @@ class Log:
         return self._with_pose(self.angle)
 
     def _with_pose(self, angle: Array) -> Array:
-        return angle if self.pose is None else np.where(self.measured, angle, self.pose)
+        if self.pose is None:
+            return angle
+        return np.where(self.measured, angle, self.pose)
 
     @property
     def duration(self) -> float:
@@ -98,8 +104,9 @@ class Log:
     def start_pressure(self) -> Array:
         """Chamber pressures before the first command, as `start` [Pa], shape (J, 2),
         NaN where unmeasured."""
-        unknown = np.full((self.joints, 2), np.nan)
-        return unknown if self.pressure is None else self._mean_at_rest(self.pressure)
+        if self.pressure is None:
+            return np.full((self.joints, 2), np.nan)
+        return self._mean_at_rest(self.pressure)
 
     @property
     def start_samples(self) -> Array:
@@ -113,11 +120,8 @@ class Log:
     def driving(self, joint: int) -> "Log":
         """Return the recording without the commands of all joints but this one (number,
         from 1)."""
-        return replace(
-            self,
-            command=self.command * (np.arange(self.joints) == joint - 1),
-            rest=self._rest,
-        )
+        is_joint = np.arange(self.joints) == joint - 1
+        return replace(self, command=self.command * is_joint, rest=self._rest)
 
     def first(self, seconds: float) -> "Log":
         """Return the recording from its start to `seconds` after its first command."""
@@ -127,24 +131,30 @@ class Log:
     def part(self, first: int, end: int) -> "Log":
         """Return the samples from `first` to before `end`, which start where they were
         measured."""
-        at = slice(first, end)
-        return replace(
+        samples = slice(first, end)
+        part = replace(
             self,
-            time=self.time[at] - self.time[first],
+            time=self.time[samples] - self.time[first],
             begin=self.begin + float(self.time[first]),
-            command=self.command[at],
-            angle=self.angle[at],
-            pressure=None if self.pressure is None else self.pressure[at],
+            command=self.command[samples],
+            angle=self.angle[samples],
             rest=0,
-            recorded=None if self.recorded is None else self.recorded[at],
         )
+        if self.pressure is not None:
+            part = replace(part, pressure=self.pressure[samples])
+        if self.recorded is not None:
+            part = replace(part, recorded=self.recorded[samples])
+        return part
 
     @property
     def _rest(self) -> int:
-        return self.first_command if self.rest is None else self.rest
+        if self.rest is None:
+            return self.first_command
+        return self.rest
 
     def _at_rest(self, signal: Array) -> Array:
-        longest = round(2.0 / self.period)  # a leaking valve lets an arm sink
+        # a leaking valve lets an arm sink
+        longest = round(LONGEST_REST / self.period)
         return signal[: min(self._rest, longest) + 1]
 
     def _mean_at_rest(self, signal: Array) -> Array:
@@ -186,33 +196,35 @@ def log_finding(
 
 def by_level(findings: Iterable[LogFinding]) -> list[LogFinding]:
     """Return findings, errors first, then warnings, then notes."""
-    return sorted(
-        findings, key=lambda finding: ("error", "warning", "note").index(finding.level)
-    )
+    return sorted(findings, key=lambda finding: LEVELS.index(finding.level))
 
 
 def grouped(findings: Iterable[LogFinding]) -> list[tuple[Level, str]]:
     """Return findings as lines with their levels: what several joints or logs share
     stands once."""
-    groups: dict[tuple[object, ...], list[LogFinding]] = {}
+    groups = dict[tuple[object, ...], list[LogFinding]]()
     for finding in by_level(findings):
-        # its sentence has room for several subjects
-        several = "{names}" in WORDS[finding.kind][0]
-        about = (
-            finding.hint
-            if several
-            else (finding.subjects, finding.column, finding.numbers.get("what"))
-        )
-        groups.setdefault((finding.level, finding.kind, about), []).append(finding)
+        key = (finding.level, finding.kind, _shared(finding))
+        groups.setdefault(key, []).append(finding)
     lines = list[tuple[Level, str]]()
     for group in groups.values():
-        subjects = tuple(
-            dict.fromkeys(subject for finding in group for subject in finding.subjects)
-        )
-        others = [
-            Path(source).name
-            for source in dict.fromkeys(finding.source for finding in group)
-        ][1:]
-        also = f" (also in {listed(others, 3)})" if others else ""
-        lines.append((group[0].level, f"{replace(group[0], subjects=subjects)}{also}"))
+        first = group[0]
+        subjects = dict[str, None]()
+        for finding in group:
+            subjects |= dict.fromkeys(finding.subjects)
+        line = str(replace(first, subjects=tuple(subjects)))
+        _, *others = dict.fromkeys(finding.source for finding in group)
+        if others:
+            names = [Path(source).name for source in others]
+            line += f" (also in {listed(names, 3)})"
+        lines.append((first.level, line))
     return lines
+
+
+def _shared(finding: LogFinding) -> object:
+    """Return what findings of a kind must have in common to be one line."""
+    sentence, _ = WORDS[finding.kind]
+    if "{names}" in sentence:
+        # it has room for several subjects
+        return finding.hint
+    return finding.subjects, finding.column, finding.numbers.get("what")

@@ -11,7 +11,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import BinaryIO, NoReturn, Protocol
 
-MATRIX, COMPRESSED = 14, 15
+MATRIX = 14
+COMPRESSED = 15
+"""kinds of elements that hold others"""
 NUMBERS = (1, 2, 3, 4, 5, 6, 7, 9, 12, 13, 16, 17, 18)
 """kinds of elements that hold numbers or text"""
 HOLDERS = (1, 2, 3, 16, 17)
@@ -44,14 +46,16 @@ class _Compressed:
     """The next bytes of the file, unpacked piece by piece."""
 
     def __init__(self, file: BinaryIO, size: int) -> None:
-        self._file, self._left = file, size
+        self._file = file
+        self._left = size
         self._unpacker = zlib.decompressobj()
         self._ready = b""
 
     def read(self, size: int, /) -> bytes:
         while len(self._ready) < size and (piece := self._unpacked()):
             self._ready += piece
-        data, self._ready = self._ready[:size], self._ready[size:]
+        data = self._ready[:size]
+        self._ready = self._ready[size:]
         return data
 
     def skip(self, size: int, /) -> None:
@@ -83,13 +87,17 @@ def large_variables(path: Path, names: Sequence[str], most: int) -> list[str]:
         head = file.read(128)
         if head[126:] not in (b"IM", b"MI"):
             return []
-        order, sizes = "<" if head[126:] == b"IM" else ">", list[int]()
+        # the letters tell in which order the writer's machine stores bytes
+        order = "<" if head[126:] == b"IM" else ">"
+        sizes = list[int]()
         while len(tag := file.read(8)) == 8:
             kind, size = struct.unpack(f"{order}2I", tag)
             end = file.tell() + size
             data = _Compressed(file, size) if kind == COMPRESSED else _Plain(file)
             if kind == COMPRESSED:
-                kind, size = struct.unpack(f"{order}2I", data.read(8).ljust(8, b"\0"))
+                # a file that was cut off ends within the tag
+                inner = data.read(8).ljust(8, b"\0")
+                kind, size = struct.unpack(f"{order}2I", inner)
             sizes.append(size)
             if kind == MATRIX and size <= most:
                 _look_through(data, size, order, depth=1)
@@ -99,7 +107,8 @@ def large_variables(path: Path, names: Sequence[str], most: int) -> list[str]:
 
 def _look_through(data: _Bytes, size: int, order: str, depth: int) -> None:
     """Read the tags of all elements in a matrix of some bytes."""
-    holds, first = False, True
+    holds = False
+    first = True
     while size > 0:
         kind, length, used = _tag(data, order)
         size -= used
@@ -110,11 +119,11 @@ def _look_through(data: _Bytes, size: int, order: str, depth: int) -> None:
         elif kind not in NUMBERS:
             _refuse(f"an element is of kind {kind}")
         elif first and used > 8:
-            flags = data.read(used - 8)
-            holds = (
-                struct.unpack(f"{order}I", flags[:4].ljust(4, b"\0"))[0] & 0xFF
-                in HOLDERS
-            )
+            # the first element of a matrix tells its class in its lowest byte
+            content = data.read(used - 8)
+            word = content[:4].ljust(4, b"\0")
+            (flags,) = struct.unpack(f"{order}I", word)
+            holds = flags & 0xFF in HOLDERS
         else:
             data.skip(used - 8)
         first = False
@@ -130,9 +139,11 @@ def _tag(data: _Bytes, order: str) -> tuple[int, int, int]:
     if len(tag) < 8:
         _refuse("it ends within a variable")
     kind, length = struct.unpack(f"{order}2I", tag)
-    if kind >> 16:
-        return kind & 0xFFFF, kind >> 16, 8
-    return kind, length, 8 + -(-length // 8) * 8
+    length_in_tag = kind >> 16
+    if length_in_tag:
+        return kind & 0xFFFF, length_in_tag, 8
+    padded = -(-length // 8) * 8
+    return kind, length, 8 + padded
 
 
 def _refuse(what: str) -> NoReturn:

@@ -8,21 +8,38 @@ import numpy as np
 from hydroid.arrays import Array, record
 from hydroid.log.log import Log
 
-# standard deviations of the Gaussians [s]; the slow one leaves no sensor noise
-QUICK, SLOW = 0.05, 0.25
-LEAST_PATH = 3.0  # [deg] that tell a direction
-# of the path goes against the command: it is logged the other way around
+QUICK = 0.05
+"""standard deviation of the Gaussian behind which speeds are read [s]"""
+SLOW = 0.25
+"""standard deviation of the Gaussian that leaves no sensor noise [s]"""
+LEAST_PATH = 3.0
+"""[deg] that tell a direction"""
 AGAINST = 0.75
-END = 0.02  # part of a joint's travel that counts as its end
-MOVING = 0.2  # part of a joint's speed above which it moves
+"""part of the path against the command from which it is logged the other way around"""
+END = 0.02
+"""part of a joint's travel that counts as its end"""
+MOVING = 0.2
+"""part of a joint's speed above which it moves"""
+LATE = 0.25
+"""how much later than its command a joint moves, by valve and oil [s]"""
+LONGEST_LAG = 0.8
+"""that is looked for [s]"""
+LONGEST_LEAD = 0.5
+"""of an angle before its command that is looked for [s]"""
+SHORTEST_LOG = 5.0
+"""[s] in which a correlation says something"""
 UNASKED_AFTER = 1.5
 """how long after a command a joint may still move by it [s]"""
-TARGET, VALVE, TARGET_WITHIN = 0.98, 0.7, 1.0
-"""least correlation of a target with the angle, largest one with its speed, and by how
-much it leads [s]"""
-LEAST_PUSH, LEAST_FROZEN = 20.0, 0.75
-"""command [%], and how long it must last [s], that would move a joint whose angle does
-not change"""
+TARGET = 0.98
+"""least correlation of a target with the angle"""
+VALVE = 0.7
+"""largest correlation of a target with the angle's speed"""
+TARGET_WITHIN = 1.0
+"""by how much a target leads the angle at most [s]"""
+LEAST_PUSH = 20.0
+"""command that would move a joint whose angle does not change [%]"""
+LEAST_FROZEN = 0.75
+"""how long such a command must last [s]"""
 
 
 @record
@@ -51,22 +68,23 @@ class JointMotion:
     def push(self) -> float:
         """Time integral of its strong commands, past the dead band of a valve [% s]."""
         size = np.abs(self._logged)
-        return np.where(size > 30, size, 0.0).sum() * self.log.period
+        strong = np.where(size > 30, size, 0.0)
+        return strong.sum() * self.log.period
 
     @cached_property
     def directed(self) -> tuple[float, float]:
         """Its way under strong commands [deg], and the share of this against them; 0 if
         it is too short."""
-        late = round(0.25 / self.log.period)  # of valve and oil
-        command, _, speed = self._slow
-        command, steps = (
-            command[: len(command) - late],
-            np.rad2deg(speed[late:]) * self.log.period,
-        )
+        late = round(LATE / self.log.period)
+        smooth_command, _, speed = self._slow
+        command = smooth_command[: len(smooth_command) - late]
+        steps = np.rad2deg(speed[late:]) * self.log.period
         strong = np.abs(command) > 0.3 * np.abs(self._logged).max()
         path = np.abs(steps[strong]).sum()
+        if path < LEAST_PATH:
+            return path, 0.0
         against = np.abs(steps[strong & (steps * command < 0)]).sum()
-        return (path, against / path) if path >= LEAST_PATH else (path, 0.0)
+        return path, against / path
 
     def contradicts(self, *, backward: bool) -> bool:
         """Whether it clearly moves against the direction that the arm gives to a
@@ -93,13 +111,24 @@ class JointMotion:
         The speed must follow the later command clearly, and any command before it
         clearly less.
         """
-        if self.log.duration < 5:
+        if self.log.duration < SHORTEST_LOG:
             return 0.0
         period = self.log.period
-        before = _correlations(self._quick[2], self._logged, round(0.5 / period) + 1)
-        best, most = before.argmax() * period, before.max()
-        clear = most > 0.8 and 1 - most**2 < 0.75 * (1 - self._following.max() ** 2)
-        return best if clear and 0.02 < best < 0.5 - period / 2 else 0.0
+        _, _, speed = self._quick
+        leads = round(LONGEST_LEAD / period) + 1
+        leading = _correlations(speed, self._logged, leads)
+        if leading.max() <= 0.8:
+            return 0.0
+        # parts of the variance that the command before and after does not explain
+        left = 1 - leading.max() ** 2
+        left_following = 1 - self._following.max() ** 2
+        if left >= 0.75 * left_following:
+            return 0.0
+        best = leading.argmax() * period
+        # at the longest lead the correlation may rise on
+        if 0.02 < best < LONGEST_LEAD - period / 2:
+            return best
+        return 0.0
 
     @cached_property
     def dead_band(self) -> float:
@@ -110,10 +139,14 @@ class JointMotion:
         decide.
         """
         late = round(self.likely_lag / self.log.period)
-        size, moves = np.abs(self._logged), np.abs(self._quick[2]) > 0.1 * self.speed
-        size, moves = size[: len(size) - late], moves[late:]
-        cost = [np.mean(moves == (size < 5 * k)) + 0.001 * k for k in range(20)]
-        return 5.0 * int(np.argmin(cost))
+        _, _, speed = self._quick
+        moves = np.abs(speed[late:]) > 0.1 * self.speed
+        size = np.abs(self._logged[: len(self._logged) - late])
+        costs = list[float]()
+        for step in range(20):
+            wrong = np.mean(moves == (size < 5 * step))
+            costs.append(wrong + 0.001 * step)
+        return 5.0 * int(np.argmin(costs))
 
     def held(self, sign: int) -> Array:
         """Angle [rad] and command [%], (2, n), of the samples in which it stands,
@@ -122,12 +155,14 @@ class JointMotion:
         By a command that is larger than most of those that move it: a joint also stands
         while its command is in the dead band. Less than a second of it may be lateness.
         """
-        command, angle, speed = self._slow
-        push, fast = sign * command * np.sign(command @ speed), np.abs(speed)
-        enough = 0.99 * np.median(np.abs(command[fast >= 0.1 * fast.max()]))
-        return np.stack([angle, command])[
-            :, (fast < 0.03 * fast.max()) & (push > enough)
-        ]
+        command, angle, signed_speed = self._slow
+        # upwards, whichever way the command is logged
+        push = sign * command * np.sign(command @ signed_speed)
+        speed = np.abs(signed_speed)
+        moving = speed >= 0.1 * speed.max()
+        enough = 0.99 * np.median(np.abs(command[moving]))
+        stands = (speed < 0.03 * speed.max()) & (push > enough)
+        return np.stack([angle, command])[:, stands]
 
     @cached_property
     def frozen(self) -> tuple[float, float] | None:
@@ -138,27 +173,37 @@ class JointMotion:
         it off there too; for much longer than its sensor gives the same reading
         elsewhere.
         """
-        angle, command, period = (
-            self.log.angle[:, self.joint - 1],
-            self._logged,
-            self.log.period,
-        )
+        angle = self.log.angle[:, self.joint - 1]
+        command = self._logged
+        period = self.log.period
         steps = np.abs(np.diff(angle))
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], steps == 0, [0]])))
-        begins, ends = edges[::2], edges[1::2]
-        moves = np.abs(command[:-1])[steps > MOVING * np.percentile(steps, 95)]
-        if not len(begins) or not len(moves):
+        # stretches of equal readings begin and end where this changes
+        stands = np.concatenate([[0], steps == 0, [0]])
+        edges = np.flatnonzero(np.diff(stands))
+        begins = edges[::2]
+        lengths = edges[1::2] - begins
+        moves = steps > MOVING * np.percentile(steps, 95)
+        moving = np.abs(command[:-1])[moves]
+        if not len(begins) or not len(moving):
             return None
-        enough = max(LEAST_PUSH, np.percentile(moves, 25))
-        longest = int(np.argmax(ends - begins))
-        begin, end = int(begins[longest]), int(ends[longest])
-        other = np.delete(ends - begins, longest).max(initial=0)
-        pushes = command[begin:end][np.abs(command[begin:end]) >= enough]
-        place = (angle[begin] - angle.min()) / np.ptp(angle)
-        at_end = not END < place < 1 - END and np.all(
-            np.sign(pushes) == np.sign(pushes[:1])
-        )
-        if at_end or len(pushes) * period < LEAST_FROZEN or end - begin < 3 * other:
+        longest = int(np.argmax(lengths))
+        begin = int(begins[longest])
+        end = begin + int(lengths[longest])
+        second_longest = np.delete(lengths, longest).max(initial=0)
+        # a coarse sensor gives the same reading for long, too
+        if end - begin < 3 * second_longest:
+            return None
+        enough = max(LEAST_PUSH, np.percentile(moving, 25))
+        given = command[begin:end]
+        pushes = given[np.abs(given) >= enough]
+        if len(pushes) * period < LEAST_FROZEN:
+            return None
+        part = (angle[begin] - angle.min()) / np.ptp(angle)
+        is_at_end = not END < part < 1 - END
+        # a command back from the end would move it
+        signs = np.sign(pushes)
+        one_way = np.all(signs == signs[:1])
+        if is_at_end and one_way:
             return None
         return begin * period, end * period
 
@@ -179,32 +224,39 @@ class JointMotion:
         speed = self._slow[2]
         moves = np.flatnonzero(idle & (np.abs(speed) > MOVING * self.speed))
         steps = np.rad2deg(speed[moves]) * period
-        return float(steps.clip(0).sum()), float(-steps.clip(None, 0).sum())
+        upwards = steps.clip(0).sum()
+        downwards = -steps.clip(None, 0).sum()
+        return float(upwards), float(downwards)
 
     @cached_property
     def is_target(self) -> bool:
         """Whether its command is where it shall be, which its angle follows, and no
         opening of a valve."""
-        if (
-            self.log.duration < 5
-            or not np.ptp(self._logged)
-            or self.travel < LEAST_PATH
-        ):
+        if self.log.duration < SHORTEST_LOG or self.travel < LEAST_PATH:
             return False
-        lags = min(round(TARGET_WITHIN / self.log.period), len(self._logged) // 2)
-        follows = _correlations(self._logged, self._slow[1], lags)
-        return (
-            follows.max(initial=0.0) > TARGET
-            and self._following.max(initial=0.0) < VALVE
-        )
+        if not np.ptp(self._logged):
+            return False
+        longest = round(TARGET_WITHIN / self.log.period)
+        lags = min(longest, len(self._logged) // 2)
+        _, angle, _ = self._slow
+        with_angle = _correlations(self._logged, angle, lags).max(initial=0.0)
+        # that with the speed takes as long again, and rarely matters
+        if with_angle <= TARGET:
+            return False
+        with_speed = self._following.max(initial=0.0)
+        return bool(with_speed < VALVE)
 
     @property
     def _logged(self) -> Array:
+        """Its command as logged [%]."""
         return self.log.command[:, self.joint - 1]
 
     @cached_property
     def _following(self) -> Array:
-        return _correlations(self._logged, self._quick[2], round(0.8 / self.log.period))
+        """Correlation of its speed with an earlier command, by lag."""
+        _, _, speed = self._quick
+        lags = round(LONGEST_LAG / self.log.period)
+        return _correlations(self._logged, speed, lags)
 
     @property
     def _quick(self) -> tuple[Array, ...]:
@@ -220,27 +272,32 @@ def _smoothed(log: Log, joint: int, seconds: float) -> tuple[Array, ...]:
     """Return command [%], angle [rad] and speed [rad/s], each (T,), behind a
     Gaussian."""
     width = seconds / log.period
-    command, angle = log.command[:, joint - 1], log.angle[:, joint - 1]
     reach = int(4 * width + 0.5)
-    at = np.arange(-reach, reach + 1)
-    bell = np.exp(-0.5 * (at / width) ** 2)
+    samples = np.arange(-reach, reach + 1)
+    bell = np.exp(-0.5 * (samples / width) ** 2)
     bell /= bell.sum()
-    slope = -at / width**2 * bell / log.period
-    return tuple(
-        np.convolve(np.pad(signal, reach, "symmetric"), by, "valid").astype(np.float64)
-        for signal, by in ((command, bell), (angle, bell), (angle, slope))
+    # a filter by the bell's derivative gives that of the smooth angle
+    slope = -samples / width**2 * bell / log.period
+    command = np.pad(log.command[:, joint - 1], reach, "symmetric")
+    angle = np.pad(log.angle[:, joint - 1], reach, "symmetric")
+    return (
+        np.convolve(command, bell, "valid").astype(np.float64),
+        np.convolve(angle, bell, "valid").astype(np.float64),
+        np.convolve(angle, slope, "valid").astype(np.float64),
     )
 
 
 def _correlations(leading: Array, following: Array, most: int) -> Array:
     """Return the size of the correlation of a signal with an earlier one, by lag below
     `most` samples."""
-    n = len(leading)
+    samples = len(leading)
+    correlations = list[float]()
+    # a signal that does not change has none
     with np.errstate(all="ignore"):
-        pairs = (
-            (leading[: n - lag], following[lag:]) for lag in range(min(most, n // 2))
-        )
-        return np.nan_to_num(np.abs([np.corrcoef(*pair)[0, 1] for pair in pairs]))
+        for lag in range(min(most, samples // 2)):
+            pair = np.corrcoef(leading[: samples - lag], following[lag:])
+            correlations.append(pair[0, 1])
+        return np.nan_to_num(np.abs(correlations))
 
 
 motion_of = lru_cache(maxsize=64)(JointMotion)
@@ -250,7 +307,5 @@ has computed"""
 
 def driven_joints(log: Log) -> dict[int, JointMotion]:
     """Return the motions of the joints that are driven and measured, by number."""
-    return {
-        j: motion_of(log, j)
-        for j in (np.flatnonzero(log.driven & log.measured) + 1).tolist()
-    }
+    joints = (np.flatnonzero(log.driven & log.measured) + 1).tolist()
+    return {joint: motion_of(log, joint) for joint in joints}

@@ -7,6 +7,7 @@ what noise, digits, and lines between samples explain. Of two recordings of a ma
 even of the same commands, the angles differ by more.
 """
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -38,37 +39,42 @@ def overlap(log: Log, known: Sequence[Log]) -> float:
     Only angles are compared: of joints that move in the log and that a known one
     measures too. A log in which nothing moves is known whole or not at all.
     """
-    stretches = [log.part(first, end) for first, end in _stretches(log)]
-    telling = [(one, moves) for one in stretches if (moves := _moves(one)).any()]
+    telling = 0
+    found = 0
+    for stretch in _stretches(log):
+        moves = _moves(stretch)
+        if moves.any():
+            telling += 1
+            found += any(_holds(other, stretch, moves) for other in known)
     if not telling:
-        return float(
-            any(
-                np.array_equal(log.angle, other.angle, equal_nan=True)
-                for other in known
-            )
-        )
-    return sum(any(_holds(other, *one) for other in known) for one in telling) / len(
-        telling
-    )
+        return float(any(_has_same_angles(log, other) for other in known))
+    return found / telling
 
 
-def _stretches(log: Log) -> list[tuple[int, int]]:
-    """First sample and end of stretches, all alike, that hold a short log whole and a
-    long one in part."""
-    length = min(round(STRETCH / log.period), len(log.time))
-    starts = np.linspace(
-        0, len(log.time) - length, min(-(-len(log.time) // length), MOST)
-    )
-    return [(int(start), int(start) + length) for start in starts]
+def _has_same_angles(log: Log, other: Log) -> bool:
+    return np.array_equal(log.angle, other.angle, equal_nan=True)
+
+
+def _stretches(log: Log) -> list[Log]:
+    """Return stretches of one length, which cover a short log whole and a long one in
+    part."""
+    samples = len(log.time)
+    length = min(round(STRETCH / log.period), samples)
+    count = min(math.ceil(samples / length), MOST)
+    starts = np.linspace(0, samples - length, count)
+    return [log.part(int(start), int(start) + length) for start in starts]
 
 
 def _moves(log: Log) -> Mask:
-    """Joints whose measured motion is more than a steady one, shape (J,)."""
+    """Return which joints have a measured motion that is more than a steady one, shape
+    (J,)."""
     time = log.time - log.time.mean()
     off = log.angle - log.angle.mean(axis=0)
-    steady = np.outer(time, time @ off / max(time @ time, log.period**2))
-    # False where it is NaN
-    return np.sqrt(np.mean((off - steady) ** 2, axis=0)) > MOTION
+    slopes = time @ off / max(time @ time, log.period**2)
+    steady = np.outer(time, slopes)
+    left = np.sqrt(np.mean((off - steady) ** 2, axis=0))
+    # False where the angle is not measured, and NaN
+    return left > MOTION
 
 
 def _holds(known: Log, log: Log, moves: Mask) -> bool:
@@ -76,54 +82,64 @@ def _holds(known: Log, log: Log, moves: Mask) -> bool:
     move there."""
     joints = np.flatnonzero(moves & known.measured)
     grid = np.arange(0.0, log.duration + 1e-9, known.period)
-    if not len(joints) or len(grid) > len(known.time) or len(grid) < 3:
+    if not len(joints) or len(grid) > len(known.time):
         return False
-    there = known.angle[:, joints]
-    wanted = np.column_stack(
-        [np.interp(grid, log.time, log.angle[:, joint]) for joint in joints]
-    )
-    middle = there.mean(axis=0)  # large numbers would lose the small differences
-    scale = np.maximum(
-        np.maximum(NOISE * _noise(there), LINES * wanted.std(axis=0)), ROUNDING
-    )
-    there, wanted = (there - middle) / scale, (wanted - middle) / scale
-    nearest = int(np.argmin(_squares(there, wanted)))
-    # a clock that is read between the samples of the other
-    return any(
-        _between(there[first:], wanted) <= 1.0
-        for first in {max(nearest - 1, 0), nearest}
-    )
+    # fewer have no second difference, which tells the noise
+    if len(grid) < 3:
+        return False
+    angles = known.angle[:, joints]
+    columns = [np.interp(grid, log.time, log.angle[:, joint]) for joint in joints]
+    wanted = np.column_stack(columns)
+    # large numbers would lose the small differences
+    middle = angles.mean(axis=0)
+    by_noise = NOISE * _noise(angles)
+    by_lines = LINES * wanted.std(axis=0)
+    scale = np.maximum(np.maximum(by_noise, by_lines), ROUNDING)
+    angles = (angles - middle) / scale
+    wanted = (wanted - middle) / scale
+    nearest = int(np.argmin(_squares(angles, wanted)))
+    # a clock may be read between the samples of the other
+    starts = {max(nearest - 1, 0), nearest}
+    return any(_between(angles[start:], wanted) <= 1.0 for start in starts)
 
 
 def _noise(angle: Array) -> Array:
-    """Standard deviation of the noise of angles [rad], shape (K,), from their second
-    differences."""
+    """Return the standard deviation of the noise of angles [rad], shape (K,), from
+    their second differences."""
     bends = np.abs(np.diff(angle, 2, axis=0))
+    # a normal variable's median size, and the variance of a - 2 b + c
     return np.median(bends, axis=0) / (0.6745 * np.sqrt(6.0))
 
 
-def _squares(there: Array, wanted: Array) -> Array:
-    """Sum of squared differences of `wanted`, (N, K), from each N samples of `there`,
-    (T, K) in turn."""
-    size = 1 << (len(there) + len(wanted)).bit_length()
-    spectra = np.fft.rfft(there, size, axis=0) * np.conj(
-        np.fft.rfft(wanted, size, axis=0)
-    )
-    products = np.fft.irfft(spectra.sum(axis=1), size)[: len(there) - len(wanted) + 1]
-    sums = np.concatenate([[0.0], np.cumsum((there**2).sum(axis=1))])
+def _squares(angles: Array, wanted: Array) -> Array:
+    """Return the sum of squared differences of `wanted`, (N, K), from each N samples of
+    `angles`, (T, K), in turn, shape (T - N + 1,)."""
+    size = 1 << (len(angles) + len(wanted)).bit_length()
+    spectra = np.fft.rfft(angles, size, axis=0)
+    spectra = spectra * np.conj(np.fft.rfft(wanted, size, axis=0))
+    lags = len(angles) - len(wanted) + 1
+    products = np.fft.irfft(spectra.sum(axis=1), size)[:lags]
+    sums = np.zeros(len(angles) + 1)
+    sums[1:] = np.cumsum((angles**2).sum(axis=1))
+    # without the squares of `wanted`, which are the same everywhere
     return sums[len(wanted) :] - sums[: -len(wanted)] - 2 * products
 
 
-def _between(there: Array, wanted: Array) -> float:
-    """Mean square difference of `wanted`, (N, K), from lines between the first samples
-    of `there`.
+def _between(angles: Array, wanted: Array) -> float:
+    """Return the mean square difference of `wanted`, (N, K), from lines between the
+    first samples of `angles`.
 
     `wanted` may lie between these and the next ones: where, is chosen once for all.
     """
-    first, following = there[: len(wanted)], there[1 : 1 + len(wanted)]
+    first = angles[: len(wanted)]
+    following = angles[1 : 1 + len(wanted)]
+    off = wanted - first
     if len(following) < len(wanted):
-        return float(np.mean((wanted - first) ** 2))
-    step, off = following - first, wanted - first
+        return float(np.mean(off**2))
+    step = following - first
     square = float(np.sum(step**2))
-    part = min(max(float(np.sum(step * off)) / square, 0.0), 1.0) if square else 0.0
+    part = 0.0
+    if square:
+        part = float(np.sum(step * off)) / square
+        part = min(max(part, 0.0), 1.0)
     return float(np.mean((off - part * step) ** 2))

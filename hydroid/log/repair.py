@@ -18,15 +18,19 @@ import numpy as np
 from hydroid.arrays import Array
 from hydroid.errors import LogError
 from hydroid.log.log import Log, LogFinding
-from hydroid.log.table import Recording
+from hydroid.log.table import Recording, Signal
 from hydroid.settings.log import LogSettings
 
-# in sample periods: a longer step is a gap, a shorter one jitter; one dropped sample
-# makes it 2
 GAP = 1.95
-# in periods of the samples or of the settings: a gap that is no longer is bridged
+"""in sample periods: a longer step is a gap, a shorter one jitter; one dropped sample
+makes it 2"""
 BRIDGED = 3.05
-SHORTEST = 0.5  # of a log [s]
+"""in periods of the samples or of the settings: a gap that is no longer is bridged"""
+SHORTEST = 0.5
+"""duration of a log [s]"""
+TURN = 2 * np.pi
+ROUNDING = 1 + 1e-9
+"""by which a gap may be longer than the settings allow, as its times are rounded"""
 MOST_LEFT_OUT = 0.05
 """part of the rows that may hold no numbers"""
 MOST_AGAIN = 0.005
@@ -37,7 +41,11 @@ set back"""
 def sample_period(time: Array) -> float:
     """Return the usual step between samples [s]; NaN where there is none."""
     steps = np.diff(time[~np.isnan(time)])
-    return np.median(steps[steps > 0]) if (steps > 0).any() else np.nan
+    # a row that stands twice has a step of 0
+    rising = steps[steps > 0]
+    if not len(rising):
+        return np.nan
+    return np.median(rising)
 
 
 def unwrap(recording: Recording, findings: list[LogFinding]) -> Recording:
@@ -45,32 +53,32 @@ def unwrap(recording: Recording, findings: list[LogFinding]) -> Recording:
 
     None turns by 180 deg within one sample: other jumps are errors.
     """
-    values, turn = recording.values, 2 * np.pi
-    if all(
-        np.isfinite(signal.high) for signal in recording.signals if signal.unit == "deg"
-    ):
+    if not any(map(_turns_on, recording.signals)):
         return recording
-    values = values.copy()
+    values = recording.values.copy()
     for signal, column in zip(recording.signals, values.T, strict=True):
-        if signal.unit == "deg" and not np.isfinite(signal.high):
-            rows = np.flatnonzero(~np.isnan(column))
-            steps = np.diff(column[rows])
-            # the motion within one sample
-            wraps = np.abs(np.abs(steps) - turn) < np.pi / 4
-            jumps = (np.abs(steps) > np.pi) & ~wraps
-            if wraps.any():
-                column[rows[1:]] -= turn * np.cumsum(np.sign(steps) * wraps)
-                findings.append(
-                    recording.finding("note", "wrap", rows[1:][wraps], signal)
-                )
-            if jumps.any():
-                step = np.rad2deg(steps[jumps][0])
-                findings.append(
-                    recording.finding(
-                        "error", "jump", rows[1:][jumps], signal, step=step
-                    )
-                )
+        if not _turns_on(signal):
+            continue
+        rows = np.flatnonzero(~np.isnan(column))
+        after = rows[1:]
+        steps = np.diff(column[rows])
+        # an eighth of a turn is left for the motion within one sample
+        wraps = np.abs(np.abs(steps) - TURN) < np.pi / 4
+        jumps = (np.abs(steps) > np.pi) & ~wraps
+        if wraps.any():
+            column[after] -= TURN * np.cumsum(np.sign(steps) * wraps)
+            findings.append(recording.finding("note", "wrap", after[wraps], signal))
+        if jumps.any():
+            step = np.rad2deg(steps[jumps][0])
+            findings.append(
+                recording.finding("error", "jump", after[jumps], signal, step=step)
+            )
     return replace(recording, values=values)
+
+
+def _turns_on(signal: Signal) -> bool:
+    """Return whether a signal is the angle of a continuous joint."""
+    return signal.unit == "deg" and not np.isfinite(signal.high)
 
 
 def fill(recording: Recording, longest: float, findings: list[LogFinding]) -> Recording:
@@ -81,14 +89,18 @@ def fill(recording: Recording, longest: float, findings: list[LogFinding]) -> Re
     `resample` bridges them.
     """
     timed = ~np.isnan(recording.time)
-    values, rows = recording.values[timed], recording.rows[timed]
-    time, empty = values[:, 0], np.isnan(values)
+    values = recording.values[timed]
+    time = values[:, 0]
+    empty = np.isnan(values)
     period = sample_period(time)
-    reach = longest * (1 + 1e-9) + period
-    for signal, column in zip(recording.signals[1:], values.T[1:], strict=True):
+    reach = longest * ROUNDING + period
+    columns = values.T[1:]
+    for signal, column in zip(recording.signals[1:], columns, strict=True):
         there = ~np.isnan(column)
+        # times of the last cell with a number, and of the next one
         before = np.maximum.accumulate(np.where(there, time, -np.inf))
-        after = np.minimum.accumulate(np.where(there, time, np.inf)[::-1])[::-1]
+        after = np.where(there, time, np.inf)
+        after = np.minimum.accumulate(after[::-1])[::-1]
         holes = ~there & (after - before <= reach)
         if signal.kind == "command":
             last = np.maximum.accumulate(there * np.arange(len(time)))
@@ -96,15 +108,17 @@ def fill(recording: Recording, longest: float, findings: list[LogFinding]) -> Re
         elif holes.any():
             column[holes] = np.interp(time[holes], time[there], column[there])
     steps = np.diff(time)
-    added = np.rint(steps[(steps > GAP * period) & (steps <= reach)] / period - 1).sum()
-    cells, lost = float((empty & ~np.isnan(values)).sum()), float((~timed).sum())
-    if cells or added or lost:
+    bridged = steps[(steps > GAP * period) & (steps <= reach)]
+    samples = np.rint(bridged / period - 1).sum()
+    cells = float((empty & ~np.isnan(values)).sum())
+    lost = float((~timed).sum())
+    if samples or cells or lost:
         findings.append(
             recording.finding(
-                "warning", "repair", cells=cells, samples=added, lost=lost
+                "warning", "repair", cells=cells, samples=samples, lost=lost
             )
         )
-    return replace(recording, values=values, rows=rows)
+    return replace(recording, values=values, rows=recording.rows[timed])
 
 
 def without_bad_rows(
@@ -125,61 +139,59 @@ def without_bad_rows(
         recording = fill(unwrap(recording, findings), settings.repair_s, findings)
     else:
         recording = unwrap(without_cut_end(recording, findings), findings)
-    values = recording.values
-    bad = np.isnan(values).any(axis=1)
-    if 0 < bad.sum() <= max(MOST_LEFT_OUT * len(values), 1):
+    empty = np.isnan(recording.values)
+    bad = empty.any(axis=1)
+    if bad.sum() > max(MOST_LEFT_OUT * len(empty), 1):
+        return recording
+    if bad.any():
         rows = np.flatnonzero(bad)
-        column = int(np.isnan(values[rows[0]]).argmax())
-        torn = np.isnan(values[rows[0]]).all()
-        signal = None if torn else recording.signals[column]
-        text = (
-            ""
-            if signal is None
-            else recording.table.text(signal.name, int(recording.rows[rows[0]]))
-        )
-        what = f"{text[:30]!r} is not a number" if text else "no value is there"
-        what = (
-            f"does not hold {len(recording.table.names)} cells with numbers"
-            if torn
-            else what
-        )
+        signal = None
+        what = f"does not hold {len(recording.table.names)} cells with numbers"
+        if not empty[rows[0]].all():
+            signal = recording.signals[int(empty[rows[0]].argmax())]
+            cell = recording.table.text(signal.name, int(recording.rows[rows[0]]))
+            what = f"{cell[:30]!r} is not a number" if cell else "no value is there"
         findings.append(
             recording.finding("warning", "row left out", rows, signal, what=what)
         )
         recording = recording.kept(np.flatnonzero(~bad))
-    elif bad.any():
-        return recording
+    return _in_order(recording, findings)
+
+
+def _in_order(recording: Recording, findings: list[LogFinding]) -> Recording:
+    """Leave out rows whose time has been, if they are few."""
     time = recording.time
     again = time[1:] <= np.maximum.accumulate(time)[:-1]
-    if 0 < again.sum() <= max(MOST_AGAIN * len(time), 1):
-        rows = 1 + np.flatnonzero(again)
-        what = f"time does not increase: {time[rows[0]]:.6g} s follows {time[rows[0] - 1]:.6g} s"
-        findings.append(
-            recording.finding(
-                "warning", "row left out", rows, recording.signals[0], what=what
-            )
+    if not 0 < again.sum() <= max(MOST_AGAIN * len(time), 1):
+        return recording
+    rows = 1 + np.flatnonzero(again)
+    first = rows[0]
+    what = (
+        f"time does not increase: {time[first]:.6g} s follows {time[first - 1]:.6g} s"
+    )
+    findings.append(
+        recording.finding(
+            "warning", "row left out", rows, recording.signals[0], what=what
         )
-        recording = recording.kept(np.delete(np.arange(len(time)), rows))
-    return recording
+    )
+    return recording.kept(np.delete(np.arange(len(time)), rows))
 
 
 def without_cut_end(recording: Recording, findings: list[LogFinding]) -> Recording:
     """Leave out the last row if it is cut off, as when a logger is killed: its last
     cell holds no number."""
-    table, values = recording.table, recording.values
-    if table.header is None or len(values) < 2:
+    table = recording.table
+    rows = len(recording.values)
+    if table.header is None or rows < 2:
         return recording
-    ends = [
-        column
-        for column, signal in enumerate(recording.signals)
-        if signal.name == table.names[-1]
-    ]
-    cut = np.isnan(values[-1]).all() or any(
-        np.isnan(values[-1, column]) for column in ends
-    )
-    if not cut or np.isnan(values[-2]).all():
+    before, last = np.isnan(recording.values[-2:])
+    is_cut = last.all()
+    for signal, empty in zip(recording.signals, last, strict=True):
+        is_cut |= empty and signal.name == table.names[-1]
+    # an empty row before the last one is no sign of a logger that was killed
+    if not is_cut or before.all():
         return recording
-    findings.append(recording.finding("warning", "cut end", [len(values) - 1]))
+    findings.append(recording.finding("warning", "cut end", [rows - 1]))
     return recording.kept(slice(None, -1))
 
 
@@ -197,40 +209,45 @@ def between_gaps(
     usual step, are none: `resample` bridges them. Raises LogError: no part is long
     enough.
     """
-    time, signal = recording.time, recording.signals[0]
-    steps, period = np.diff(time), sample_period(time)
+    time = recording.time
+    signal = recording.signals[0]
+    steps = np.diff(time)
+    period = sample_period(time)
     bridged = BRIDGED * max(period, settings.period_s)
     if repair:
-        bridged = max(bridged, settings.repair_s * (1 + 1e-9) + period)
+        bridged = max(bridged, settings.repair_s * ROUNDING + period)
     lost = 1 + np.flatnonzero((steps > GAP * period) & (steps <= bridged))
     if len(lost) and not repair:
-        samples = float(np.rint(steps[lost - 1] / period - 1).sum())
+        samples = np.rint(steps[lost - 1] / period - 1).sum()
         findings.append(
-            recording.finding("warning", "lost", lost, signal, samples=samples)
+            recording.finding("warning", "lost", lost, signal, samples=float(samples))
         )
     gaps = 1 + np.flatnonzero(steps > bridged)
     ends = [0, *gaps.tolist(), len(time)]
-    every = [slice(first, end) for first, end in pairwise(ends)]
-    kept = [
-        rows for rows in every if time[rows.stop - 1] - time[rows.start] >= SHORTEST
-    ]
-    if not kept:
+    parts = list[Recording]()
+    too_short = 0
+    for first, end in pairwise(ends):
+        if time[end - 1] - time[first] >= SHORTEST:
+            parts.append(recording.kept(slice(first, end)))
+        else:
+            too_short += 1
+    if not parts:
+        what = f"has no part of {SHORTEST} s without a gap"
         hint = "log at a higher rate, or use --repair"
-        raise LogError(
-            f"has no part of {SHORTEST} s without a gap", recording.table.source, hint
-        )
+        raise LogError(what, recording.table.source, hint)
     if len(gaps):
-        first, left = gaps[0], len(every) - len(kept)
         numbers = {
-            "gap": time[first] - time[first - 1],
+            "gap": time[gaps[0]] - time[gaps[0] - 1],
             "period": period,
-            "parts": float(len(kept)),
+            "parts": float(len(parts)),
         }
-        more = f", {left} shorter than {SHORTEST:g} s left out" if left else ""
+        left = ""
+        if too_short:
+            left = f", {too_short} shorter than {SHORTEST:g} s left out"
         findings.append(
-            recording.finding("warning", "gap", gaps, signal, **numbers, left=more)
+            recording.finding("warning", "gap", gaps, signal, **numbers, left=left)
         )
-    return [recording.kept(at) for at in kept]
+    return parts
 
 
 def resample(recording: Recording, settings: LogSettings, joints: int) -> Log:
@@ -241,49 +258,68 @@ def resample(recording: Recording, settings: LogSettings, joints: int) -> Log:
     acts. On a finer grid they change on a line from sample to sample: when between them
     is not known.
     """
-    period, time = settings.period_s, recording.time - recording.time[0]
-    grid = period * np.arange(int(time[-1] / period + 0.01) + 1, dtype=np.float64)
+    period = settings.period_s
+    time = recording.time - recording.time[0]
+    # the last sample counts where jitter makes it early by a hundredth
+    last = int(time[-1] / period + 0.01)
+    grid = period * np.arange(last + 1, dtype=np.float64)
     exact = on_grid(time, period)
-    time = time if exact is None else exact  # on the grid values pass unchanged
-    shape = len(grid), joints
-    command, angle, pressure = np.zeros(shape), np.full(shape, np.nan), None
-    given = dict[int, Array]()
-    for signal, values in zip(
-        recording.signals[1:], recording.values.T[1:], strict=True
-    ):
+    if exact is not None:
+        # values pass unchanged
+        time = exact
+    angle = np.full((len(grid), joints), np.nan)
+    pressure: Array | None = None
+    if any(signal.kind == "pressure" for signal in recording.signals):
+        pressure = np.full((len(grid), joints, 2), np.nan)
+    commands = dict[int, Array]()
+    columns = recording.values.T[1:]
+    for signal, values in zip(recording.signals[1:], columns, strict=True):
         joint = signal.joint - 1
-        if signal.kind == "command":
-            given[joint] = given.get(joint, 0.0) + (-values if signal.part else values)
-        elif signal.kind == "angle":
+        if signal.kind == "angle":
             angle[:, joint] = np.interp(grid, time, values)
-        else:
-            pressure = np.full((*shape, 2), np.nan) if pressure is None else pressure
+        elif pressure is not None and signal.kind == "pressure":
             pressure[:, joint, signal.part] = np.interp(grid, time, values)
-    at, slower = grid - settings.delay_s, period <= 0.8 * sample_period(time)
-    for joint, own in given.items():
-        values = own.clip(-100, 100)
-        if slower:
-            command[:, joint] = np.interp(at + 0.5 * period, time, values, left=0.0)
+        elif signal.part:
+            commands[joint] = commands.get(joint, 0.0) - values
         else:
-            command[:, joint] = hold(time, values[:, None], at, period)[:, 0]
+            commands[joint] = commands.get(joint, 0.0) + values
+    command = np.zeros((len(grid), joints))
+    at = grid - settings.delay_s
+    for joint, values in commands.items():
+        # amplifiers and converters overshoot
+        values = values.clip(-100, 100)
+        command[:, joint] = _resampled(time, values, at, period)
+    rows = np.rint(time / period).astype(np.int64)
+    rows = np.minimum(rows, last)
     recorded = np.zeros(len(grid), dtype=bool)
-    recorded[np.minimum(np.rint(time / period).astype(np.int64), len(grid) - 1)] = True
+    recorded[rows] = True
     return Log(
-        recording.table.source,
-        grid,
-        command.clip(-100, 100, out=command),
-        angle,
-        period,
-        pressure,
+        source=recording.table.source,
+        time=grid,
+        command=command.clip(-100, 100, out=command),
+        angle=angle,
+        period=period,
+        pressure=pressure,
         recorded=None if recorded.all() else recorded,
     )
+
+
+def _resampled(time: Array, command: Array, at: Array, period: float) -> Array:
+    """Return a command for a period from each time in `at` [s]."""
+    is_finer = period <= 0.8 * sample_period(time)
+    if is_finer:
+        return np.interp(at + 0.5 * period, time, command, left=0.0)
+    return hold(time, command[:, None], at, period)[:, 0]
 
 
 def on_grid(time: Array, period: float) -> Array | None:
     """Return times as multiples of a period; None if any is off by more than 1 % of the
     period."""
     steps = np.rint(time / period)
-    return period * steps if (np.abs(time / period - steps) <= 0.01).all() else None
+    off = np.abs(time / period - steps)
+    if not (off <= 0.01).all():
+        return None
+    return period * steps
 
 
 def hold(time: Array, command: Array, at: Array, period: float) -> Array:
@@ -303,11 +339,10 @@ def hold(time: Array, command: Array, at: Array, period: float) -> Array:
             """Return the integral of the command until some times [% s]."""
             index = np.searchsorted(time, end, side="right") - 1
             since = (end - time[index])[:, None]
-            return np.where(
-                index[:, None] >= 0, areas[index] + since * command[index], 0.0
-            )
+            begun = index[:, None] >= 0
+            return np.where(begun, areas[index] + since * command[index], 0.0)
 
         return (area(at + period) - area(at)) / period
-    # but for rounding
+    # a sample at the time itself counts, but for rounding
     index = np.searchsorted(exact, at + 1e-6 * period, side="right") - 1
     return np.where(index[:, None] >= 0, command[index], 0.0)

@@ -47,23 +47,24 @@ class Rod:
         `unit`: the one that the file states; empty: none. None: they are neither.
         """
         shortest, longest = self.ends
-        known = cells[np.isfinite(cells)]
-        fitting = list[tuple[float, str, float]]()
-        for name in [unit] if unit else ["mm", "cm", "m"]:
+        finite = cells[np.isfinite(cells)]
+        candidates = [unit] if unit else ["mm", "cm", "m"]
+        most = -np.inf
+        reading = None
+        for name in candidates:
             factor = UNITS[name].factor
-            low, high = factor * known.min(), factor * known.max()
+            low = factor * finite.min()
+            high = factor * finite.max()
             for offset in (0.0, shortest):
-                inside = (
-                    low + offset >= shortest - self.margin
-                    and high + offset <= longest + self.margin
-                )
-                if inside:
-                    fitting.append((high - low, name, offset / factor))
-        if not fitting:
-            return None
-        # in which the rod moves farthest
-        _, name, offset = max(fitting, key=lambda one: one[0])
-        return name, float(f"{offset:.9g}")
+                if low + offset < shortest - self.margin:
+                    continue
+                if high + offset > longest + self.margin:
+                    continue
+                # of several that fit, the one in which the rod moves farthest
+                if high - low > most:
+                    most = high - low
+                    reading = name, float(f"{offset / factor:.9g}")
+        return reading
 
     def nearest_unit(self, cells: Array) -> str:
         """Return the unit in which cells, (R,), are most like the cylinder's mean
@@ -84,13 +85,14 @@ class Rod:
         grid = np.linspace(*self.limits, POINTS)
         table = self.cylinder.length(grid)
         if table[0] > table[-1]:
-            grid, table = grid[::-1], table[::-1]
+            grid = grid[::-1]
+            table = table[::-1]
         within = np.clip(length, table[0], table[-1])
         angle = np.interp(within, table, grid)
         for _ in range(STEPS):
-            angle = angle - (
-                self.cylinder.length(angle) - within
-            ) / self.cylinder.moment_arm(angle)
+            error = self.cylinder.length(angle) - within
+            # the moment arm is the length's derivative by the angle
+            angle = angle - error / self.cylinder.moment_arm(angle)
         return angle
 
 
@@ -114,13 +116,15 @@ def as_angles(recording: Recording, findings: list[LogFinding]) -> Recording:
         return recording
     values = recording.values.copy()
     for signal, column in zip(recording.signals, values.T, strict=True):
-        if (rod := signal.rod) is None:
+        rod = signal.rod
+        if rod is None:
             continue
         shortest, longest = rod.ends
+        # holes are NaN, which is not outside
         with np.errstate(invalid="ignore"):
-            out = np.flatnonzero(
-                (column < shortest - rod.margin) | (column > longest + rod.margin)
-            )
+            too_short = column < shortest - rod.margin
+            too_long = column > longest + rod.margin
+        out = np.flatnonzero(too_short | too_long)
         if len(out):
             numbers = {
                 "length": 1e3 * column[out[0]],

@@ -21,13 +21,18 @@ LEAST_LEAP = np.radians(1.0)
 mm"""
 LEAST_SPEED = np.radians(100.0)
 """of a leap [rad/s, m/s]"""
-ABOVE_USUAL, ABOVE_NEAR = 3.0, 5.0
-"""how many times larger a leap is than nearly all steps of the log, and than the steps
-around it"""
-NEARLY_ALL = 99.5  # per cent
+ABOVE_USUAL = 3.0
+"""how many times larger a leap is than nearly all steps of the log"""
+ABOVE_NEAR = 5.0
+"""how many times larger a leap is than the steps around it"""
+NEARLY_ALL = 99.5
+"""[%]"""
+LEAST_STEPS = 10
+"""in a log, below which none is unusual"""
 COARSE = np.radians(0.5)
 """steps of a sensor [rad] that hide how a joint starts and stops"""
-FEW_STEPS = 3  # a joint must pass, before their size counts
+FEW_STEPS = 3
+"""that a joint must pass before their size counts"""
 
 
 def check_sensors(recording: Recording) -> Iterator[LogFinding]:
@@ -39,13 +44,17 @@ def check_sensors(recording: Recording) -> Iterator[LogFinding]:
         slides = signal.unit not in ("", "deg")
         rows = leaps(time, values)
         if len(rows):
-            size = abs(values[rows[0]] - values[rows[0] - 1])
+            first = rows[0]
+            size = abs(values[first] - values[first - 1])
             by = way(np.rad2deg(size), slides=slides)
             yield recording.finding(
                 "warning", "leap", rows, signal, signal.owner, by=by
             )
         step = resolution(values)
-        if step >= COARSE and np.nanmax(values) - np.nanmin(values) > FEW_STEPS * step:
+        if step < COARSE:
+            continue
+        travel = np.nanmax(values) - np.nanmin(values)
+        if travel > FEW_STEPS * step:
             by = way(np.rad2deg(step), slides=slides)
             yield recording.finding("note", "coarse", (), signal, signal.owner, by=by)
 
@@ -57,20 +66,25 @@ def leaps(time: Array, angle: Array) -> Index:
     steps = np.abs(np.diff(angle))
     whole = np.diff(time) <= GAP * period
     steps = np.where(whole & np.isfinite(steps), steps, 0.0)
-    if len(steps) < 10:
-        return np.flatnonzero(steps < 0)
+    if len(steps) < LEAST_STEPS:
+        return np.zeros(0, np.intp)
     usual = np.percentile(steps, NEARLY_ALL)
     least = max(LEAST_LEAP, LEAST_SPEED * period, ABOVE_USUAL * usual)
     large = np.flatnonzero(steps > least)
     # a leap and the one back may be up to three samples apart: the largest step nearby
     # does not count
-    around = np.clip(large[:, None] + [-4, -3, -2, 2, 3, 4], 0, len(steps) - 1)
+    around = large[:, None] + [-4, -3, -2, 2, 3, 4]
+    around = around.clip(0, len(steps) - 1)
     near = np.sort(steps[around], axis=1)[:, -2]
     return 1 + large[steps[large] > ABOVE_NEAR * near]
 
 
 def resolution(angle: Array) -> float:
     """Return the smallest difference between readings [rad]; 0 where all are alike."""
-    differences = np.diff(np.unique(angle[np.isfinite(angle)]))
-    differences = differences[differences > 1e-9]  # but for rounding
-    return float(differences.min(initial=np.inf)) if len(differences) else 0.0
+    readings = np.unique(angle[np.isfinite(angle)])
+    differences = np.diff(readings)
+    # smaller ones are rounding
+    differences = differences[differences > 1e-9]
+    if not len(differences):
+        return 0.0
+    return float(differences.min())

@@ -32,18 +32,22 @@ class CommandRange(NamedTuple):
         """Return its name, and the settings that bring it to percent where those of the
         log are given."""
         offset = self.offset + self.scale * offset
-        more = f" and log.command.offset: {offset:g}" if offset else ""
-        return {"range": self.name, "scale": f"{self.scale * gain:g}{more}"}
+        scale = f"{self.scale * gain:g}"
+        if offset:
+            scale += f" and log.command.offset: {offset:g}"
+        return {"range": self.name, "scale": scale}
 
     def with_overshoot(self, values: Array) -> "CommandRange":
         """Return a range in which no cell is beyond 100 %, for converters that
         overshoot."""
-        most = float(np.nanmax(np.abs(self.scale * values + self.offset))) / 100
+        percent = np.abs(self.scale * values + self.offset)
+        most = float(np.nanmax(percent)) / 100
         if most <= 1 + 1e-8:
             return self
-        scale, offset = (
-            float(f"{one / (most + 1e-5):.6g}") for one in (self.scale, self.offset)
-        )
+        # six digits, rounded to either side, still hold the largest cell
+        smaller = most + 1e-5
+        scale = float(f"{self.scale / smaller:.6g}")
+        offset = float(f"{self.offset / smaller:.6g}")
         return self._replace(scale=scale, offset=offset)
 
 
@@ -68,8 +72,9 @@ class Signal(NamedTuple):
 
     @property
     def slack(self) -> float:
-        """By how much numbers may be off."""
-        return SLACK * self.half / (1 + (self.low < 0))
+        """By how much numbers may be off, in a range around 0 half as much."""
+        slack = SLACK * self.half
+        return slack / 2 if self.low < 0 else slack
 
     @property
     def range(self) -> CommandRange:
@@ -78,10 +83,17 @@ class Signal(NamedTuple):
         return CommandRange(self.name, scale, -scale * self.middle)
 
 
-SIGNALS = tuple(
-    Signal(name, row["from"], row["to"], row.get("full", False), row.get("unit", ""))
-    for name, row in read_table("log/signals.yaml").items()
-)
+def _signals() -> tuple[Signal, ...]:
+    """Return the rows of `signals.yaml`, in its order."""
+    signals = list[Signal]()
+    for name, row in read_table("log/signals.yaml").items():
+        full = row.get("full", False)
+        unit = row.get("unit", "")
+        signals.append(Signal(name, row["from"], row["to"], full, unit))
+    return tuple(signals)
+
+
+SIGNALS = _signals()
 ON_EACH_SIDE = CommandRange("4 to 20 mA on each side", 6.25, -25.0)
 """of a column for each direction, of which one rests"""
 
@@ -107,13 +119,14 @@ def likely_range(
     values = values[~np.isnan(values)]
     if not values.any():
         return None
-    kinds, counts = np.unique(values, return_counts=True)
-    rests = values[0], kinds[counts.argmax()]
-    zero_is_given = 0 in kinds[counts >= COMMON * len(values)]
+    low = values.min()
+    high = values.max()
+    rests = values[0], _most_frequent(values)
     for signal in SIGNALS:
-        if _fits(signal, values.min(), values.max(), unit) and (
-            signal.low < 0 or _rests_in_the_middle(signal, values, rests, zero_is_given)
-        ):
+        if not _fits(signal, low, high, unit):
+            continue
+        # 0 is the middle of a range from below 0, and needs no proof
+        if signal.low < 0 or _rests_in_the_middle(signal, values, rests):
             return signal.range
     return None
 
@@ -129,46 +142,70 @@ def resting_range(
     tell: it begins at rest and rests most of the time.
     """
     values = values[~np.isnan(values)]
-    kinds, counts = np.unique(values, return_counts=True)
-    if not len(kinds) or values[0] != kinds[counts.argmax()]:
+    if not len(values) or values[0] != _most_frequent(values):
         return None
     rest = float(values[0])
-    for own in (likely if likely and likely.offset else None, usual):
-        if own is None:
-            continue
-        percent = own.scale * values + own.offset
-        off = own.scale * rest + own.offset
-        within = np.abs(percent).max() <= 100 * (1 + SLACK)
-        if 0 < abs(off) <= 100 * FARTHEST_REST and within:
-            return rest, own._replace(offset=float(f"{-own.scale * rest:.6g}"))
+    candidates = list[CommandRange]()
+    if likely and likely.offset:
+        candidates.append(likely)
+    if usual:
+        candidates.append(usual)
+    for command_range in candidates:
+        scale = command_range.scale
+        percent = scale * values + command_range.offset
+        percent_at_rest = scale * rest + command_range.offset
+        is_within = np.abs(percent).max() <= 100 * (1 + SLACK)
+        if is_within and 0 < abs(percent_at_rest) <= 100 * FARTHEST_REST:
+            offset = float(f"{-scale * rest:.6g}")
+            return rest, command_range._replace(offset=offset)
     return None
 
 
+def _most_frequent(values: Array) -> float:
+    """Return the value that most samples have; of several the smallest."""
+    distinct, counts = np.unique(values, return_counts=True)
+    return distinct[counts.argmax()]
+
+
 def _rest_at_four(both: Array) -> bool:
-    at_rest = np.mean((abs(both - 4) <= 0.48).any(axis=0))
-    return bool(both.min() >= 3.52 and both.max() <= 20.48 and at_rest > 0.95)
+    """Return whether cells, (2, R), are from 4 to 20 mA, of which one side rests."""
+    # with a slack of 6 % of half the range
+    at_rest = (abs(both - 4) <= 0.48).any(axis=0)
+    is_within = both.min() >= 3.52 and both.max() <= 20.48
+    return bool(is_within and np.mean(at_rest) > 0.95)
 
 
 def _fits(signal: Signal, low: float, high: float, unit: str) -> bool:
+    """Return whether cells from a lowest to a highest, in a unit, may be a signal."""
     slack = signal.slack
     if low < signal.low - slack or high > signal.high + slack:
         return False
     if signal.full:
         ends = [low <= signal.low + slack, high >= signal.high - slack]
-        if not (any(ends) if signal.low < 0 else all(ends)):
+        reached = any(ends) if signal.low < 0 else all(ends)
+        if not reached:
             return False
     if signal.unit and signal.unit != unit:
         return False
-    own = unit_of(signal.name.split()[-1])
+    unit_of_signal = unit_of(signal.name.split()[-1])
     stated = unit_of(unit) if unit else None
-    return own is None or stated is None or own.quantity == stated.quantity
+    if unit_of_signal is None or stated is None:
+        return True
+    return unit_of_signal.quantity == stated.quantity
 
 
 def _rests_in_the_middle(
-    signal: Signal, values: Array, rests: tuple[float, float], zero_is_given: bool
+    signal: Signal, values: Array, rests: tuple[float, float]
 ) -> bool:
-    near = [bool(abs(rest - signal.middle) <= signal.slack) for rest in rests]
-    enough = all(near) if zero_is_given else any(near)  # else 0 is no command
+    """Return whether cells rest in the middle of a signal, and lie on both sides of
+    it.
+
+    `rests`: the first cell, and the most frequent one.
+    """
+    near = [abs(rest - signal.middle) <= signal.slack for rest in rests]
+    zero_is_given = np.sum(values == 0) >= COMMON * len(values)
+    # where 0 is given often, it may be no command, and the middle some other one
+    enough = all(near) if zero_is_given else any(near)
     below = values.min() < signal.middle - USED * signal.half
     above = values.max() > signal.middle + USED * signal.half
     return bool(enough and below and above)

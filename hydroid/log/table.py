@@ -21,8 +21,14 @@ from hydroid.log.log import LogFinding, log_finding
 if TYPE_CHECKING:
     from hydroid.log.rods import Rod
 
-_DAY = 86_400 * 10**9  # [ns]
-_NO_TIME = np.iinfo(np.int64).min  # NaT of numpy
+_DAY = 86_400 * 10**9
+"""[ns]"""
+_NO_TIME = np.iinfo(np.int64).min
+"""NaT of numpy [ns]"""
+LONGEST_TIME = 50
+"""characters of a cell from which it is no date: to look for one would take long"""
+LARGEST = 1e100
+"""size of a number from which it counts as none: its square would be infinite"""
 _TIME = re.compile(
     r"(?:.*[T ])?(\d{1,2}):(\d{2}):(\d{2})(?:[.,](\d{1,9})\d*)? *([AaPp])?\.?[Mm]?\.?(?:Z|[+-][\d:]+)?"
 )
@@ -31,15 +37,19 @@ _TIME = re.compile(
 
 @record
 class Signal:
-    """One column in use: value = gain · cell + offset in [s], [%], [rad], [m] or [Pa],
-    from `low` to `high`.
+    """One column in use: value = gain · cell + offset in [s], [%], [rad], [m] or [Pa].
 
-    `name` is that in the header, `kind` time, command, angle or pressure, `joint` a
-    number from 1, or 0 for the time, `owner` the joint's name. `part` is 0, or 1 for
-    the column of a command's negative direction and of the pressure in chamber B.
-    `unit` is the one to be read: %, deg, mm of a joint that slides, or bar. `rest` is
-    the value of a command before its first message, in a format of messages. `rod` is
-    the cylinder whose length the cells of an angle are.
+    Attributes:
+        name: in the header.
+        kind: time, command, angle or pressure.
+        joint: its number from 1; 0 for the time.
+        part: 1 for the column of a command's negative direction and of the pressure in
+            chamber B, else 0.
+        low, high: limits of the values.
+        unit: in which messages state values: %, deg, mm of a joint that slides, or bar.
+        owner: the joint's name.
+        rest: value of a command before its first message, in a format of messages.
+        rod: the cylinder whose length the cells of an angle are.
     """
 
     name: str
@@ -86,7 +96,9 @@ class Table:
         """Return the text of a cell that holds no number, for a message; empty where it
         is no text."""
         cell = self.columns[name][row]
-        return cell if isinstance(cell, str) else ""
+        if isinstance(cell, str):
+            return cell
+        return ""
 
     def read(self, signals: Sequence[Signal]) -> "Recording":
         """Read the columns of signals; a number that is too large counts as none."""
@@ -95,19 +107,20 @@ class Table:
         for signal, column in zip(signals, values.T, strict=True):
             cells = self.columns[signal.name]
             if len(cells) != len(column):
-                what = (
-                    f"holds {len(cells)} values, but column {first} holds {len(column)}"
-                )
+                count = len(column)
+                what = f"holds {len(cells)} values, but column {first} holds {count}"
                 where = f"{self.source}, column {signal.name}"
-                raise LogError(
-                    what, where, "all columns of a log have one clock: resample it"
-                )
-            numbers, timed = _as_numbers(cells)
+                hint = "all columns of a log have one clock: resample it"
+                raise LogError(what, where, hint)
+            numbers, are_times = _as_numbers(cells)
+            # dates and times of day are in seconds, whatever unit the settings say
+            gain = 1.0 if are_times else signal.gain
             with np.errstate(all="ignore"):
-                column[:] = numbers * (1.0 if timed else signal.gain) + signal.offset
-        values[~(np.abs(values) < 1e100)] = np.nan
+                column[:] = numbers * gain + signal.offset
+        values[~(np.abs(values) < LARGEST)] = np.nan
+        rows = np.arange(len(values))
         clock = time_of_day(self.columns[first])
-        return Recording(self, tuple(signals), values, np.arange(len(values)), clock)
+        return Recording(self, tuple(signals), values, rows, clock)
 
 
 @record
@@ -148,18 +161,27 @@ class Recording:
     ) -> LogFinding:
         """Make a finding at the first of `rows`, about a signal or other subjects; it
         counts the others."""
-        word, of = "line" if self.table.header else "row", self.table.lines
-        at = [
-            f"{word} {row + 1 if of is None else of[row]}"
-            for row in self.rows[[*rows[:1], *rows[-1:]]]
-        ]
-        more = f" (and {len(rows) - 1} more, to {at[1]})" if len(rows) > 1 else ""
-        about = subjects or ((signal,) if signal else ())
-        row, column = at[0] if at else "", signal.name if signal else ""
+        row = self._place(rows[0]) if len(rows) else ""
+        more = ""
+        if len(rows) > 1:
+            more = f" (and {len(rows) - 1} more, to {self._place(rows[-1])})"
+        column = ""
+        about = subjects
+        if signal is not None:
+            column = signal.name
+            about = subjects or (signal,)
         source = self.table.source
         return log_finding(
             level, kind, source, *about, row=row, column=column, rows=more, **numbers
         )
+
+    def _place(self, row: int) -> str:
+        """Return where one of its rows stands in the file, as messages say it."""
+        word = "line" if self.table.header else "row"
+        table_row = self.rows[row]
+        lines = self.table.lines
+        number = table_row + 1 if lines is None else lines[table_row]
+        return f"{word} {number}"
 
 
 def number(cell: str) -> float | None:
@@ -173,14 +195,19 @@ def number(cell: str) -> float | None:
 
 def clock(cell: str) -> int | None:
     """Return the time of day in a cell [ns]; None: there is none."""
-    match = _TIME.fullmatch(cell) if len(cell) < 50 else None
+    if len(cell) >= LONGEST_TIME:
+        return None
+    match = _TIME.fullmatch(cell)
     if match is None:
         return None
     hour, minute, second, fraction, half = match.groups()
-    hours = int(hour) % 12 + 12 * (half in "Pp") if half else int(hour)
-    return ((hours * 60 + int(minute)) * 60 + int(second)) * 10**9 + int(
-        (fraction or "0").ljust(9, "0")
-    )
+    hours = int(hour)
+    # 12 AM is midnight, 12 PM noon
+    if half:
+        hours = hours % 12 + 12 * (half in "Pp")
+    seconds = (hours * 60 + int(minute)) * 60 + int(second)
+    nanoseconds = int((fraction or "0").ljust(9, "0"))
+    return seconds * 10**9 + nanoseconds
 
 
 def time_of_day(cells: NDArray[Any]) -> str:
@@ -219,25 +246,27 @@ class TextColumn:
         """Return numbers, NaN where there is none, or times, NaT where there is none;
         shape (R,)."""
         if self._ticks is None:
-            return (
-                np.frombuffer(self._numbers, np.float64)
-                if self._numbers
-                else np.zeros(0)
-            )
+            # numpy has no view of nothing
+            if not self._numbers:
+                return np.zeros(0)
+            return np.frombuffer(self._numbers, np.float64)
         ticks = np.array(self._ticks, np.int64)
         there = ticks != _NO_TIME
-        days = np.cumsum(np.diff(ticks[there], prepend=ticks[there][:1]) < -_DAY // 2)
+        steps = np.diff(ticks[there], prepend=ticks[there][:1])
+        # a smaller step back is a clock that was set, which is a fault
+        days = np.cumsum(steps < -_DAY // 2)
         ticks[there] += _DAY * days
         return ticks.view("M8[ns]")
 
 
 def _numbers(cells: Sequence[str]) -> "array[float]":
     """Return the numbers in cells, NaN where there is none."""
+    # nearly all pieces hold numbers alone, which float() reads much faster
     if not any("_" in cell for cell in cells):
         with suppress(ValueError):
             return array("d", map(float, cells))
-    numbers = map(number, cells)
-    return array("d", [np.nan if one is None else one for one in numbers])
+    values = map(number, cells)
+    return array("d", [np.nan if value is None else value for value in values])
 
 
 def _as_numbers(cells: NDArray[Any]) -> tuple[Array, bool]:
@@ -248,15 +277,21 @@ def _as_numbers(cells: NDArray[Any]) -> tuple[Array, bool]:
     if cells.dtype.kind == "m":
         return cells / np.timedelta64(1, "s"), True
     if cells.dtype.kind == "M":
-        there = ~np.isnat(cells)
-        ticks = (cells[there] - cells[there][:1]).astype("m8[ns]").astype(np.int64)
-    else:
-        column = TextColumn()
-        column.extend([str(cell) for cell in cells])
-        return _as_numbers(column.values())
-    seconds = np.full(len(cells), np.nan)
+        return _seconds(cells), True
+    column = TextColumn()
+    column.extend([str(cell) for cell in cells])
+    return _as_numbers(column.values())
+
+
+def _seconds(stamps: NDArray[Any]) -> Array:
+    """Return times from the first one [s], NaN where there is none."""
+    there = ~np.isnat(stamps)
+    since_first = stamps[there] - stamps[there][:1]
+    # in whole numbers: floats would round nanoseconds before the difference
+    ticks = since_first.astype("m8[ns]").astype(np.int64)
+    seconds = np.full(len(stamps), np.nan)
     seconds[there] = (ticks - ticks[:1]) / 1e9
-    return seconds, True
+    return seconds
 
 
 MOST_NUMBERS = 30_000_000
@@ -267,10 +302,9 @@ resampled"""
 def refuse_large(source: str, rows: int, columns: int) -> None:
     """Raise a LogError where a log is too long for the memory of a usual computer."""
     if rows * columns > MOST_NUMBERS:
-        most = (
-            f"at most {MOST_NUMBERS // columns:,} rows of {columns} columns can be read"
-        )
-        what = f"has {rows:,} rows; {most}"
+        most = MOST_NUMBERS // columns
+        can_be = f"at most {most:,} rows of {columns} columns can be read"
+        what = f"has {rows:,} rows; {can_be}"
         raise LogError(what, source, "cut it, or record at a lower rate")
 
 
@@ -300,11 +334,6 @@ def format_library(package: str, extra: str, path: Path, kind: str) -> Generator
     except LogError:
         raise
     except Exception as error:
-        reason = (
-            "damaged"
-            if isinstance(error, BLIND)
-            else " ".join(str(error).split())[:200]
-        )
-        raise LogError(
-            f"cannot be read as {kind} ({reason or 'damaged'})", path, "save it again"
-        ) from None
+        reason = "" if isinstance(error, BLIND) else " ".join(str(error).split())
+        what = f"cannot be read as {kind} ({reason[:200] or 'damaged'})"
+        raise LogError(what, path, "save it again") from None

@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 
 from hydroid.arrays import Array
-from hydroid.hydraulics.joint import opened
+from hydroid.hydraulics.joint import open_share
 from hydroid.hydraulics.solenoid import drive, resting_stroke, side_voltage
 from hydroid.posterior.bench import ONSET, RISEN, Bench, Movement, actuator
 from hydroid.posterior.column import Column, Measured
@@ -57,8 +57,10 @@ def opening_curve(bench: Bench, candidates: Candidates, sign: float) -> Measured
         voltage = side_voltage(beyond, passed, side.onset, side.dead_band)
         travel = resting_stroke(drive(voltage, c), c.gap, c.plunger_stiffness) - idle
         # the law of the compiled loops, candidate by candidate: it branches
-        areas = [opened(one, float(way)) for one, way in zip(side, travel, strict=True)]
-        area = 1e6 * np.array(areas, dtype=float)
+        shares = [
+            open_share(one, float(way)) for one, way in zip(side, travel, strict=True)
+        ]
+        area = 1e6 * side.opening * np.array(shares, dtype=float)
         yield (
             Column("opening", "opening of the valve", "mm²", False, sign * command),
             area,

@@ -10,9 +10,17 @@ from hydroid.arrays import Array, record
 from hydroid.errors import LogError
 from hydroid.files import Plain
 from hydroid.fitting.valve_start import JointStart, fitted_valve
-from hydroid.log import ColumnGuess, JointMotion, Log, Table, check_log, motion_of
+from hydroid.log import (
+    ColumnGuess,
+    JointMotion,
+    Log,
+    Reading,
+    Table,
+    check_log,
+    motion_of,
+)
 from hydroid.log.clues import column_unit, kind_of
-from hydroid.log.read import angle_margin
+from hydroid.log.mapping import angle_margin
 from hydroid.project.columns import column_lines
 from hydroid.project.section import given_section, guessed_section, missing_column
 from hydroid.settings.arm import Arm, Joint
@@ -253,12 +261,13 @@ def _read(
     first = Path(table.source)
     logs = list[Log]()
     for path in (first, *others):
-        log, findings = check_log(path, settings, no_limits, arm=arm)
+        log, findings = check_log(path, settings, no_limits, Reading(arm=arm))
         if log is None:
             if strict:
                 raise findings[0].error()
             reasons.append(f"the log cannot be used as it is: {findings[0]}")
-            log, _ = check_log(path, settings, no_limits, arm=arm, repair=True)
+            repaired = Reading(arm=arm, repair=True)
+            log, _ = check_log(path, settings, no_limits, repaired)
         for finding in findings:
             if finding.level == "warning" and finding.kind in SAID:
                 reasons.append(str(finding))

@@ -312,6 +312,9 @@ def _joint_text(
         "lever": joint.has("lever_slope"),
         "sides": _sides(joint, valve, motion, size.speed),
         "damping": short(DRAG * size.damping),
+        # at least none: on the logarithm of `within`, least squares does not get there,
+        # and what is left of the damping bends the valve's curve
+        "most_damping": short(10 * DRAG * size.damping),
         "delay": min(delay, LONGEST_DELAY),
         "lag": min(lag, LONGEST_LAG),
         "unit": "N·s/m" if joint.slides else "N·m·s/rad",

@@ -17,7 +17,7 @@ from pydantic import (
 
 from hydroid.errors import SettingsError
 from hydroid.files import Plain
-from hydroid.settings.document import Lines, read_document, read_yaml
+from hydroid.settings.document import MOST_BYTES, Lines, read_document, read_yaml
 from hydroid.words import listed
 
 _PLAIN = {
@@ -77,6 +77,12 @@ class Settings(BaseModel):
         return settings
 
 
+MOST_DIGITS = 10
+"""of a joint's number; Python refuses to convert texts of thousands"""
+LONGEST_SHOWN = 60
+"""letters of a value in a message"""
+
+
 def _number_of(key: Any, info: ValidationInfo) -> Any:
     """Take a joint's name, or its number as text, as JSON and `--set` spell it,
     for its number from 1."""
@@ -92,9 +98,9 @@ def _number_of(key: Any, info: ValidationInfo) -> Any:
 
 
 def _is_number(key: str) -> bool:
-    """Return whether a text is a whole number; `isdecimal` alone takes the digits of
-    any script."""
-    return key.isascii() and key.isdecimal()
+    """Return whether a text is a whole number that may be a joint's; `isdecimal` alone
+    takes the digits of any script."""
+    return key.isascii() and key.isdecimal() and len(key) < MOST_DIGITS
 
 
 def _joint_names(info: ValidationInfo) -> tuple[str, ...]:
@@ -253,6 +259,9 @@ def _line_of(key: str, lines: Lines) -> str:
 
 def parse_override(text: str) -> tuple[str, Any]:
     """Split `key=value`; the value is read as YAML."""
+    if len(text) > MOST_BYTES:
+        what = f"is larger than {MOST_BYTES >> 10} KiB, too large for a setting"
+        raise SettingsError(what, f"--set {text[:LONGEST_SHOWN]}...")
     key, equals, value = text.partition("=")
     if not equals or not key.strip():
         raise SettingsError(
@@ -331,4 +340,6 @@ def _shown(value: object) -> str:
         text = f"[{', '.join(map(_shown, value))}]"
     elif text in _YAML_WORDS:
         text = _YAML_WORDS[text]
-    return text if len(text) <= 60 else f"{text[:56]}...{text[-1]}"
+    if len(text) <= LONGEST_SHOWN:
+        return text
+    return f"{text[: LONGEST_SHOWN - 4]}...{text[-1]}"

@@ -31,7 +31,7 @@ from numba import njit
 from hydroid.arrays import Array
 from hydroid.hydraulics.cylinder import friction_damping, volume
 from hydroid.hydraulics.elementwise import compilable
-from hydroid.hydraulics.joint import opened
+from hydroid.hydraulics.joint import open_share, opened
 from hydroid.hydraulics.kernel import Plugin, make_pad, source_key
 from hydroid.hydraulics.pump import delivery, lowest
 from hydroid.hydraulics.records import LINEAR, Records, coefficients, has_force_curve
@@ -77,7 +77,9 @@ def steady_opening(command: float, c) -> float:
     """Net opening [m²] of a valve under a command [%] that is held, below 0 towards
     B."""
     travel = steady_stroke(command, c.a, c) - steady_stroke(-command, c.b, c)
-    return opened(c.a, travel) if travel > 0.0 else -opened(c.b, -travel)
+    if travel > 0.0:
+        return opened(c, open_share(c.a, travel))
+    return opened(c, -open_share(c.b, -travel))
 
 
 @compilable

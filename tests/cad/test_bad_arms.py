@@ -155,6 +155,17 @@ def test_limits_of_another_unit_are_doubted(tmp_path, boom, note):
     assert any(line.startswith(note) for line in arm.notes), arm.notes
 
 
+def test_limits_that_were_written_in_degrees_are_doubted():
+    arm = import_arm(MODELS / "bad_arms/limits_in_degrees.urdf")
+    note = "boom_joint: turns by 102 rad within its limits. Are they in deg?"
+    assert any(line.startswith(note) for line in arm.notes), arm.notes
+
+
+def test_every_bad_arm_is_in_a_test():
+    names = {path.stem for path in (MODELS / "bad_arms").iterdir()}
+    assert names == {*BAD, "limits_in_degrees"}
+
+
 def test_common_limits_are_not_doubted(tmp_path):
     arm = import_arm(write_robot(tmp_path, boom_joint=limits(-6.2832, 6.2832)))
     assert not any("limits" in line for line in arm.notes)

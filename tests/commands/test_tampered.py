@@ -147,12 +147,23 @@ COMMANDS = [
 ]
 
 
+FILES = [
+    "config.yaml",
+    "arm.yaml",
+    "estimate.yaml",
+    "model/arm.xml",
+    "model/meshes/base.stl",
+]
+
+
+@pytest.mark.parametrize("name", FILES)
 @pytest.mark.parametrize("command", COMMANDS, ids=[command[0] for command in COMMANDS])
-def test_a_run_without_its_settings_is_refused(
-    run: Path, command: list[str], hydroid_cli: Run
+def test_a_run_that_lacks_one_of_its_files_is_refused_in_one_line(
+    run: Path, command: list[str], name: str, hydroid_cli: Run
 ):
-    (run / "config.yaml").unlink()
-    assert "run/config.yaml: is missing" in hydroid_cli(*command, code=2).err
+    (run / name).unlink()
+    said = hydroid_cli(*command, code=2).err
+    assert said == f"hydroid: run/{name}: is missing; put it back, or fit again\n"
 
 
 def moved(text: str) -> str:

@@ -7,20 +7,22 @@ import numpy as np
 import pytest
 from made_logs import FAST, fast_arm, noisy, stepped
 
-from hydroid.advice.suggestions import refitted
+from hydroid.arrays import Array
 from hydroid.fitting.left_out import (
     BLOCK,
+    COMPARED,
     LEAST_BLOCKS,
     LeftOut,
     blocks,
     gain,
     is_better,
-    parts,
     predict_blocks,
-    predict_parts,
+    refit,
 )
+from hydroid.fitting.refinement import Refinement, refine_from_afar
+from hydroid.fitting.step import Step
 from hydroid.log import Log
-from hydroid.posterior.error_model import make_likelihood
+from hydroid.posterior.error_model import Likelihood, make_likelihood
 from hydroid.problem.problem import Problem
 from hydroid.settings.fit import FitSettings
 
@@ -39,43 +41,13 @@ def log_of(seed: int, stiffness: float = 1.0) -> Log:
 
 def predicted(settings: FitSettings, logs: list[Log]) -> LeftOut:
     problem = Problem(settings, logs)
-    truth = problem.parameters.vector(FAST, "truth")
-    return predict_parts(
-        problem, np.tile(truth, (len(np.unique(parts(problem))), 1)), refitted
+    return refit(problem, problem.parameters.vector(FAST, "truth"))
+
+
+def refined(likelihood: Likelihood, theta: Array) -> Refinement:
+    return refine_from_afar(
+        likelihood, theta, COMPARED, lambda *_: False, {}, Step("compared")
     )
-
-
-def test_a_part_is_predicted_by_a_fit_that_has_not_seen_it():
-    """A log that is another one changes its own prediction, and all fits but the one
-    without it."""
-    logs = [log_of(seed) for seed in range(3)]
-    before = predicted(MORE, logs)
-    after = predicted(MORE, [*logs[:2], replace(log_of(5, 1.3), source="log_2.csv")])
-    np.testing.assert_array_equal(after.thetas[2], before.thetas[2])
-    assert (after.thetas[:2] != before.thetas[:2]).any(axis=1).all()
-    problem = Problem(MORE, logs)
-    assert before.thetas.shape == (3, len(problem.parameters.names))
-    for part in range(3):
-        samples = parts(problem) == part
-        errors = problem.output_errors(before.thetas[part][None])[0]
-        np.testing.assert_allclose(before.errors[samples], errors[samples], atol=1e-12)
-
-
-def test_of_one_log_the_halves_are_parts():
-    log = log_of(0)
-    before = predicted(MORE, [log])
-    half, angle = len(log.time) // 2, log.angle.copy()
-    # beyond what the way of the first half is measured from
-    angle[half + 20 :, 1] += 0.1
-    after = predicted(MORE, [replace(log, angle=angle)])
-    np.testing.assert_allclose(after.thetas[1], before.thetas[1], rtol=1e-9)
-    assert np.abs(after.thetas[0] / before.thetas[0] - 1).max() > 0.01
-
-
-def test_more_than_three_logs_are_left_out_in_three_groups():
-    number = parts(Problem(ONE, [log_of(seed) for seed in range(5)]))
-    samples = len(log_of(0).time)
-    assert number[::samples].tolist() == [0, 1, 2, 0, 1]
 
 
 def test_blocks_are_spans_of_time_and_no_two_logs_share_one():
@@ -98,14 +70,14 @@ def test_a_block_is_predicted_as_by_a_fit_without_it():
     problem = Problem(MORE, [log_of(0)])
     truth = problem.parameters.vector(FAST, "truth")
     likelihood = make_likelihood(problem)
-    end = refitted(likelihood, truth, 1)
+    end = refined(likelihood, truth)
     all_of_it = problem.parameters.from_unit(end.point)
     found = predict_blocks(likelihood, end)
     number = blocks(problem)
     for block in range(number.max() + 1):
         out = number == block
         rest = replace(likelihood, shown=likelihood.shown.without(out))
-        alone = problem.parameters.from_unit(refitted(rest, truth, 1).point)
+        alone = problem.parameters.from_unit(refined(rest, truth).point)
         change = np.log(alone / all_of_it)
         assert (
             np.linalg.norm(np.log(found.thetas[block] / alone))
@@ -141,9 +113,11 @@ def test_a_term_that_is_not_there_gains_nothing_that_is_certain(fits: int, most:
 def test_the_gain_is_that_of_the_weighed_squares_and_its_error_that_of_the_blocks():
     problem = Problem(ONE, [log_of(seed) for seed in range(3)])
     rng = np.random.default_rng(0)
-    theta = problem.parameters.start[None]
-    before = LeftOut(problem, theta, rng.normal(0.0, 0.01, problem.measured.size))
-    after = LeftOut(problem, theta, rng.normal(0.0, 0.007, problem.measured.size))
+    theta = problem.parameters.start
+    before, after = (
+        LeftOut(problem, theta, theta[None], rng.normal(0.0, sd, problem.measured.size))
+        for sd in (0.01, 0.007)
+    )
     levels = np.zeros(blocks(problem).max() + 1)
     for one in (before, after):
         weighing = make_likelihood(problem).estimated(one.errors).errors
@@ -159,9 +133,11 @@ def test_the_gain_is_that_of_the_weighed_squares_and_its_error_that_of_the_block
 def test_what_diverges_is_worse_and_one_that_does_not_is_better():
     log = log_of(0).first(1.0)
     problem = Problem(ONE, [log])
-    theta = problem.parameters.start[None]
+    theta = problem.parameters.start
     noise = np.random.default_rng(1).normal(0.0, 0.01, len(log.time))
-    low, lost = (LeftOut(problem, theta, factor * noise) for factor in (1.0, np.inf))
+    low, lost = (
+        LeftOut(problem, theta, theta[None], factor * noise) for factor in (1.0, np.inf)
+    )
     assert is_better(low, lost)
     assert not is_better(lost, low)
     assert not is_better(lost, lost)

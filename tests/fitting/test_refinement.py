@@ -38,7 +38,7 @@ def problem(request):
     )
 
 
-ONE, OTHER = Step("refined"), Step("refined", without=1)
+ONE, OTHER = Step("refined"), Step("refined", horizon=1)
 
 
 def begin(problem) -> np.ndarray:

@@ -13,7 +13,7 @@ def every_step() -> list[Step]:
     terms = (), ("pump",), ("pump", "oil"), ("oil",)
     phases = "", "from afar", "at first", "on the way"
     rungs = [
-        Step(model, names, phase, without=part)
+        Step(model, names, phase, horizon=part)
         for model, names, phase, part in product(
             ("refined", "dynamic", "joint"), terms, phases, (0, 1, 2, 3)
         )
@@ -38,5 +38,5 @@ def test_no_two_steps_have_the_same_name():
 def test_a_step_leads_to_the_estimate_that_it_is_named_by(estimate: str):
     step = step_of(estimate)
     assert step.estimate == estimate
-    assert step.changed(without=2, phase="on the way").estimate == estimate
+    assert step.changed(joint=2, phase="on the way").estimate == estimate
     assert step.changed(model="dynamic").terms == step.terms

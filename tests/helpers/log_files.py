@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from hydroid.log import Log, LogFinding, check_log
-from hydroid.log.read import Ranges
+from hydroid.log import Log, LogFinding, Reading, check_log
+from hydroid.log.mapping import Ranges
 from hydroid.settings.log import LogSettings
 
 RIG = Path(__file__).parents[2] / "examples" / "logs"
@@ -63,7 +63,7 @@ def read(
     **options: Any,
 ) -> tuple[Log, list[LogFinding]]:
     """A log that can be used, and its findings; else the first error is raised."""
-    log, findings = check_log(path, settings, ranges, **options)
+    log, findings = check_log(path, settings, ranges, Reading(**options))
     if log is None:
         raise findings[0].error()
     return log, findings
@@ -81,7 +81,7 @@ def faults(
     ranges: Ranges = RANGES,
     **options: Any,
 ) -> list[LogFinding]:
-    log, findings = check_log(path, settings, ranges, **options)
+    log, findings = check_log(path, settings, ranges, Reading(**options))
     errors = [finding for finding in findings if finding.level == "error"]
     assert (log is None) == bool(errors)
     return errors

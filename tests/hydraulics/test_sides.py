@@ -39,6 +39,18 @@ def test_swapped_sides_mirror_the_motion(arm: Arm):
     assert abs(wheel(arm, UNLIKE, -command) + here).max() > 0.05
 
 
+def test_a_lagging_valve_turns_round_when_its_spool_does(arm: Arm):
+    """However large its two openings are: a lag ln 2 time constants after full command
+    reverses."""
+    command = np.repeat([100.0, -100.0], 100)
+    turned = list[int]()
+    for opening_b in (0.1, 0.4):
+        values = {"opening_lag": 0.3, "opening_a": 0.4, "opening_b": opening_b}
+        turned.append(int(np.argmax(wheel(arm, values, command))))
+    assert turned[0] == pytest.approx(turned[1], abs=1)
+    assert turned[0] == pytest.approx(100 + 0.3 * np.log(2) / 0.01, abs=4)
+
+
 @pytest.mark.parametrize(
     "name", ["delay", "plunger_damping", "opening_exponent", "slot_width", "overlap"]
 )

@@ -134,8 +134,27 @@ def with_kind(path: Path, kind: int) -> Path:
     return path
 
 
+def links_renamed(path: Path) -> Path:
+    """A file with a name changed behind the back of HDF5, whose checksums say so."""
+    from h5py import ExternalLink, File
+
+    write_mat73(path, COLUMNS)
+    with File(path, "r+") as file:
+        # a group of more than eight links has an index with checksums
+        for name in ("a", "b", "c", "d", "e", "f"):
+            file[f"film_{name}"] = ExternalLink("nowhere.h5", "/film")
+    data = path.read_bytes()
+    assert b"nowhere.h5" in data
+    path.write_bytes(data.replace(b"nowhere.h5", b"another.h5"))
+    return path
+
+
 MATLAB = "cannot be read as a MATLAB file"
 BAD = {
+    "links renamed by another program": (
+        lambda p: links_renamed(p / "log.mat"),
+        MATLAB,
+    ),
     "numbers of no kind": (
         lambda p: with_kind(p / "log.mat", 186),
         f"{MATLAB} (damaged: an element is of kind 186)",

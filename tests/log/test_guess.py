@@ -138,6 +138,22 @@ def test_no_time_is_an_error_that_lists_the_columns(tmp_path: Path) -> None:
         guess(tmp_path, ["a", "b"], STEPS, SWEEP)
 
 
+@pytest.mark.parametrize(
+    ("name", "number"),
+    [
+        ("u2_pct", 2),
+        ("valve 007", 7),
+        ("u0", 0),
+        ("u100", None),
+        ("u" + "9" * 5000, None),
+    ],
+)
+def test_the_last_number_of_a_name_is_a_joints_if_it_has_two_digits_at_most(
+    name: str, number: int | None
+) -> None:
+    assert number_in(name) == number
+
+
 def test_digits_in_a_topics_name_number_no_joint():
     """`/CalibratedJointVals3.position[Boom]` is the boom's, and no column of a topic 3
     is joint 3's."""

@@ -15,7 +15,7 @@ from log_files import (
     save,
 )
 
-from hydroid.log import check_parts, write_log
+from hydroid.log import Reading, check_parts, write_log
 
 holes = st.lists(st.tuples(st.integers(2, 75), st.integers(1, 3)), max_size=4)
 
@@ -164,7 +164,7 @@ def test_a_gap_that_is_short_against_the_new_period_does_not_split(
     path, _ = dropped(tmp_path, (100, 110))
     coarse = SETTINGS.changed({"period_s": 0.05})
     assert len(check_parts(path, coarse, RANGES)[0]) == 1
-    assert len(check_parts(path, SETTINGS, RANGES, repair=True)[0]) == 1
+    assert len(check_parts(path, SETTINGS, RANGES, Reading(repair=True))[0]) == 1
 
 
 CUTS = {

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from log_files import read
 
-from hydroid.log import Log, check_log, guess_columns, open_table, write_log
+from hydroid.log import Log, Reading, check_log, guess_columns, open_table, write_log
 from hydroid.log.rods import rods_of
 from hydroid.settings.arm import Arm, load_arm
 from hydroid.settings.log import LogSettings
@@ -97,7 +97,7 @@ def test_lengths_that_the_pins_do_not_allow_are_said(arm: Arm, tmp_path: Path) -
     settings = LogSettings.model_validate(
         {"command": None, "angle": None, "joints": {joint: entry}}
     )
-    log, (fault, *_) = check_log(path, settings, arm.ranges, arm=arm)
+    log, (fault, *_) = check_log(path, settings, arm.ranges, Reading(arm=arm))
     assert log is None
     assert fault.kind == "length outside"
     assert (
@@ -115,7 +115,7 @@ def test_a_length_without_a_cylinder_is_refused(arm: Arm, tmp_path: Path) -> Non
     settings = LogSettings.model_validate(
         {"command": None, "angle": None, "joints": {joint: entry}}
     )
-    _, (fault,) = check_log(path, settings, arm.ranges, arm=arm)
+    _, (fault,) = check_log(path, settings, arm.ranges, Reading(arm=arm))
     assert f"no cylinder of {arm.joint_names[joint - 1]} is known" in str(fault)
 
 
@@ -146,7 +146,7 @@ def test_lengths_without_a_unit_that_the_pins_do_not_allow_are_no_angles(
     guess = guess_columns(open_table(path), arm.joint_names, rods=rods_of(arm))
     assert guess.log["joints"][joint]["angle"]["unit"] == "mm"
     log, (fault, *_) = check_log(
-        path, LogSettings.model_validate(guess.log), arm.ranges, arm=arm
+        path, LogSettings.model_validate(guess.log), arm.ranges, Reading(arm=arm)
     )
     assert log is None
     assert fault.kind == "length outside"

@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
-from fuzz import KINDS as FILES, logs, run_kinds
+from fuzz import KINDS as FILES, logs, run, run_kinds
 from fuzz_formats import FORMATS, bounded
 
 from hydroid.errors import SettingsError
@@ -19,12 +19,15 @@ TIMES = int(os.environ.get("FUZZ", "1"))
 KINDS = FILES | FORMATS
 COUNTS = dict.fromkeys(FORMATS, 15) | {
     "log": 40,
+    "names": 20,
     "config": 40,
     "set": 40,
     "arm": 25,
     "mesh": 25,
     "values": 10,
     "model": 8,
+    "urdf": 8,
+    "mjcf": 8,
 }
 HEADER = logs()[0].split(b"\n", 1)[0]
 
@@ -45,7 +48,9 @@ def test_damaged_files_are_read_rightly_or_refused_in_one_line(
     assert not all(accepted)
 
 
-@pytest.mark.parametrize("name", ["log", "config", "arm", "mesh", "values", "model"])
+@pytest.mark.parametrize(
+    "name", ["log", "config", "arm", "mesh", "values", "model", "urdf", "mjcf"]
+)
 def test_intact_files_are_accepted(name: str, tmp_path: Path) -> None:
     for data in KINDS[name].seeds():
         assert KINDS[name].read(tmp_path, data)
@@ -97,6 +102,53 @@ def test_hostile_logs_are_refused_at_once(tmp_path: Path, data: bytes) -> None:
     started = time.perf_counter()
     assert not KINDS["log"].read(tmp_path, data)
     assert time.perf_counter() - started < 10
+
+
+BEGINNINGS = {
+    "a.csv": HEADER + b"\n",
+    "a.bag": b"#ROSBAG V2.0\n",
+    "a.mcap": b"\x89MCAP0\r\n",
+    "a.parquet": b"PAR1",
+    "v5.mat": b"MATLAB 5.0 MAT-file",
+    "v73.mat": b"\x89HDF\r\n\x1a\n",
+}
+
+
+@pytest.mark.parametrize("name", BEGINNINGS)
+def test_gigabytes_behind_the_first_bytes_of_a_format_are_not_read(
+    name: str, tmp_path: Path
+) -> None:
+    path = tmp_path / name
+    path.write_bytes(BEGINNINGS[name])
+    os.truncate(path, 2**33)  # a sparse file
+    with bounded(0):
+        assert run(("check", str(path))) is not None
+
+
+NAMES = {
+    "brackets": b"[" * 1_000_000,
+    "numbers in brackets": b"u[1" * 300_000,
+    "a word": b"A" * 1_000_000,
+    "spaces": b"u1 [V]" + b" " * 300_000 + b"x",
+}
+
+
+@pytest.mark.parametrize("name", NAMES.values(), ids=NAMES)
+@pytest.mark.parametrize("kind", ["log", "names"])
+def test_a_name_without_end_is_refused_at_once(
+    kind: str, name: bytes, tmp_path: Path
+) -> None:
+    started = time.perf_counter()
+    assert not KINDS[kind].read(tmp_path, logs()[0].replace(b"u2_pct", name))
+    assert time.perf_counter() - started < 10
+
+
+@pytest.mark.parametrize("part", ["outputs=[1] ", "outputs=[\0] ", "[" * 30])
+def test_a_setting_without_end_is_refused_at_once(part: str, tmp_path: Path) -> None:
+    data = (part * (20_000_000 // len(part))).encode()
+    started = time.perf_counter()
+    assert not KINDS["set"].read(tmp_path, data)
+    assert time.perf_counter() - started < 2
 
 
 @pytest.mark.parametrize(

@@ -98,3 +98,22 @@ builtins.__import__ = new
         130,
         "hydroid: stopped; nothing was written\n",
     )
+
+
+def test_a_stop_of_which_a_library_makes_another_error_is_one_line(tmp_path: Path):
+    """As MuJoCo's, NumPy's and others' initialisation does."""
+    (tmp_path / "a.csv").write_text("time_s,u2_pct,q2_deg\n0,0,0\n")
+    (tmp_path / "mujoco.py").write_text(
+        "import os, signal\n"
+        "try:\n"
+        "    os.kill(os.getpid(), signal.SIGINT)\n"
+        "except KeyboardInterrupt as stop:\n"
+        "    raise ImportError('initialization failed') from stop\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", cli("check", "a.csv", code="import hydroid")],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+    )
+    assert (done.returncode, done.stderr) == (130, "hydroid: stopped\n")

@@ -284,6 +284,14 @@ def test_an_override_finds_a_joint_by_its_name_and_by_its_number(tmp_path: Path)
     assert settings.objective.noise_deg == {3: 0.2}
 
 
+@pytest.mark.parametrize("key", ["tolerance_deg", "log.joints"])
+def test_a_number_of_thousands_of_digits_is_no_joints(tmp_path: Path, key: str):
+    with pytest.raises(SettingsError, match="9'; the arm's joints: swing"):
+        hydroid.load_settings(
+            written(tmp_path, MAPPINGS), {f"{key}.{'9' * 5000}": None}
+        )
+
+
 @pytest.mark.parametrize(
     "key", ["tolerance_deg.2", "objective.weights.2", "log.joints.2.command.scale"]
 )

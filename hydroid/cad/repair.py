@@ -107,6 +107,7 @@ def weigh(
         what = "no masses in the file"
     replaced = list[str]()
     densities = set[float]()
+    stated = {body.name: body.mass for body in links}
     every = _likely(links, model, hull_model(spec, notes.path), lost)
     are_water = _are_water(every)
     if are_water:
@@ -117,8 +118,7 @@ def weigh(
         if likely.least <= density <= likely.most and not are_water:
             continue
         mass = likely.density / USUAL * usual.mass
-        stated = float(f"{body.mass:.2g}")
-        was = f"{stated:g}" if stated else "none"
+        was = f"{float(f'{body.mass:.2g}'):g}" if body.mass else "none"
         replaced.append(f"{body.name} {was} -> {mass:.3g}")
         set_inertia(body, mass, usual.centre, likely.density / USUAL * usual.tensor)
         densities.add(likely.density)
@@ -128,24 +128,27 @@ def weigh(
             f"{what} [kg]: {', '.join(replaced)} ({taken} kg/m³ of hull is taken). Say "
             "what you know: --total-mass KG, or masses in arm.xml"
         )
+    if total is None:
+        _doubt_light(links, model, stated, notes)
     else:
-        _doubt_light(links, model, notes)
-    if total is not None:
         _scale_masses(links, total, notes)
 
 
 def _doubt_light(
-    links: Sequence[mujoco.MjsBody], model: mujoco.MjModel, notes: Notes
+    links: Sequence[mujoco.MjsBody],
+    model: mujoco.MjModel,
+    stated: Mapping[str, float],
+    notes: Notes,
 ) -> None:
-    """Say which links weigh less than a link without a shape might, for the way to the
-    next joint."""
+    """Say which links keep a mass, that the file `stated`, which is less than a link
+    without a shape might weigh, for the way to the next joint."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     for body, after in pairwise(links):
         ends = [data.joint(one.joints[0].name).xanchor for one in (body, after)]
         length = float(np.linalg.norm(ends[1] - ends[0]))
         least = SLIGHT * SLENDER * length**3
-        if body.mass < least:
+        if body.mass == stated[body.name] and body.mass < least:
             notes.add(
                 f"weighs {body.mass:.3g} kg and is {length:.3g} m long, where machines' links "
                 f"have {least:.3g} kg or more: kept. Say what you know: --total-mass KG",

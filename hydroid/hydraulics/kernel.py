@@ -184,7 +184,7 @@ def look_ahead(plugin: Plugin, state, commands, now: int, arm, pad: Pad) -> None
     driven_gain = gain[idle:]
     # all joints with an actuator have the same pump: read it at the last of them
     pump = coefficients[order[joints - 1]]
-    shared = idle < joints and pump.pump_flow < np.inf
+    shared = has_line(pump, joints - idle)
     part = 1.0 / substeps
     step = part * period
     demanded = False
@@ -237,6 +237,12 @@ def look_ahead(plugin: Plugin, state, commands, now: int, arm, pad: Pad) -> None
         hand_over(z, work[j], line, part, period)
         arm.applied[arm.columns[j]] = z.torque
         arm.armature[arm.columns[j]] = arm.own[j] + z.armature
+
+
+@compilable
+def has_line(pump, driven: int) -> bool:
+    """Whether so many driven joints share a line: the flow of their pump is limited."""
+    return driven > 0 and pump.pump_flow < np.inf
 
 
 @compilable

@@ -34,6 +34,8 @@ LEAST_STAND = 1.0
 
 Columns = Mapping[tuple[str, int], Signal]
 """the column of each kind and joint (number, from 1); of two the first"""
+CONSTANT = {"angle": "angle is constant", "command": "command is constant"}
+"""findings about a signal that does not change, by its kind"""
 
 
 @record
@@ -108,7 +110,7 @@ def _constant(
         else:
             continue
         if shall_change and np.ptp(values[:, joint - 1]) == 0:
-            yield _warning(log, f"{kind} is constant", signal)
+            yield _warning(log, CONSTANT[kind], signal)
 
 
 def _common_small_range(

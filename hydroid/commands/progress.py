@@ -163,7 +163,7 @@ class FitProgress(Progress):
                     number = max(number, rung)
         # a rung is compared with the one below: that leads no step back
         self._number = max(number, self._number)
-        words = f"start {step.start}" if step.start else step.estimate
+        words = f"start {step.start}" if step.model == "start" else step.estimate
         if step.numbers:
             words += " from nine numbers"
         return f"step {self._number} of {total} ({words})"

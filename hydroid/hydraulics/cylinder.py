@@ -54,7 +54,10 @@ def filling(travel, area, dead) -> Any:
 def rod(angle: float, c) -> Any:
     """Travel x [m], moment arm r = dx/dq [m/rad] and dr/dq of one cylinder at a joint
     angle [rad]."""
-    psi, first, second = angle, 1.0, 0.0
+    # angle at the cylinder's triangle, and its first two derivatives by the joint's
+    psi = angle
+    first = 1.0
+    second = 0.0
     if c.rocker > 0.0:
         psi, first, second = four_bar(angle, c)
     travel, arm, slope = triangle(
@@ -69,28 +72,29 @@ def bent(angle, c) -> Any:
     the middle, and slope.
 
     A joint that a linkage of unknown size turns is taken for a rotary actuator whose
-    moment arm r = 1 + slope s + bend s² depends on the place s in the joint's range, -1
-    to 1. The way is its integral.
+    moment arm r = 1 + slope s + bend s² depends on where the joint is in its range, s
+    from -1 to 1. The way is its integral.
     """
-    place = (angle - c.middle) / c.half
-    way = angle + c.half * place * place * (
-        0.5 * c.lever_slope + c.lever_bend * place / 3.0
-    )
-    return (
-        way,
-        1.0 + place * (c.lever_slope + c.lever_bend * place),
-        (c.lever_slope + 2.0 * c.lever_bend * place) / c.half,
-    )
+    s = (angle - c.middle) / c.half
+    way = angle + c.half * s * s * (0.5 * c.lever_slope + c.lever_bend * s / 3.0)
+    arm = 1.0 + s * (c.lever_slope + c.lever_bend * s)
+    slope = (c.lever_slope + 2.0 * c.lever_bend * s) / c.half
+    return way, arm, slope
 
 
 def fills(angle: Array, c) -> list[Array]:
     """ln(V/V_0) of chambers A and B at angles [rad] of COEFFICIENTS; ± D_m q/V_0 of a
     rotary actuator."""
-    travel, linear, dead = rod_motion(angle, c)[0], c.kind == LINEAR, c.dead_volume
-    sides = (c.a.area, travel, travel), (c.b.area, c.stroke - travel, -travel)
+    travel = rod_motion(angle, c)[0]
+    linear = c.kind == LINEAR
+    dead = c.dead_volume
+    cylinder_a = filling(travel, c.a.area, dead)
+    cylinder_b = filling(c.stroke - travel, c.b.area, dead)
+    turned_a = travel * c.a.area / dead
+    turned_b = -travel * c.b.area / dead
     return [
-        np.where(linear, filling(out, area, dead), turn * area / dead)
-        for area, out, turn in sides
+        np.where(linear, cylinder_a, turned_a),
+        np.where(linear, cylinder_b, turned_b),
     ]
 
 
@@ -100,20 +104,23 @@ def rod_motion(angle: Array, c) -> list[Array]:
 
     Of a rotary actuator x is the angle, and r is 1, unless its moment arm is `bent`.
     """
-    still = angle, 1.0, 0.0
+    still = (angle, 1.0, 0.0)
+    has_rocker = c.rocker > 0
     with np.errstate(all="ignore"):  # joints without a range, a rocker or a triangle
-        turned, rocked = bent(angle, c), four_bar(angle, c)
+        turned = bent(angle, c)
+        rocked = four_bar(angle, c)
         psi, first, second = (
-            np.where(c.rocker > 0, x, y) for x, y in zip(rocked, still, strict=True)
+            np.where(has_rocker, with_rocker, without)
+            for with_rocker, without in zip(rocked, still, strict=True)
         )
         travel, arm, slope = triangle(
             psi, c.pivot_distance_1, c.pivot_distance_2, c.theta0, c.shortest
         )
-        cylinder = travel, arm * first, slope * first**2 + arm * second
-    kinds = c.kind == LINEAR, c.kind == ROTARY
+        cylinder = (travel, arm * first, slope * first**2 + arm * second)
+    kinds = [c.kind == LINEAR, c.kind == ROTARY]
     return [
-        np.select(kinds, [x, y], z)
-        for x, y, z in zip(cylinder, turned, still, strict=True)
+        np.select(kinds, [linear, rotary], without)
+        for linear, rotary, without in zip(cylinder, turned, still, strict=True)
     ]
 
 
@@ -125,7 +132,11 @@ def stop_damping(travel, speed, stroke, penetration) -> Any:
     F_c opposes the motion at both ends; the article's sign at the lower one would push
     the rod out of the barrel. Travel x and stroke S [m], speed ẋ [m/s], K_p [N·s/m²].
     """
-    beyond = travel - stroke if speed > 0.0 else -travel if speed < 0.0 else 0.0
+    beyond = 0.0
+    if speed > 0.0:
+        beyond = travel - stroke
+    elif speed < 0.0:
+        beyond = -travel
     return penetration * np.maximum(beyond, 0.0)
 
 

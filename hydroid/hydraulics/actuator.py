@@ -16,8 +16,9 @@ viscous damping, so MuJoCo's dof_damping must be 0.
 import numpy as np
 
 from hydroid.arrays import Array, Index, Structs
-from hydroid.hydraulics.cylinder import GIVE, fills, holding_pressures, rod_motion
+from hydroid.hydraulics.cylinder import GIVE, holding_pressures, rod_motion
 from hydroid.hydraulics.kernel import Plugin
+from hydroid.hydraulics.oil import fills
 from hydroid.hydraulics.records import JOINT_STATE, NONE, Records, coefficients
 from hydroid.hydraulics.solenoid import drive, resting_stroke
 

@@ -1,18 +1,14 @@
-"""Cylinder or rotary actuator (article 2.2, equation (9)) and the oil in its two
-chambers.
+"""Cylinder or rotary actuator (article 2.2, equation (9)): how its rod moves with the
+joint, and what acts on it beside oil.
 
-    ṗ_A = β/V_A (Q_A − A_A ẋ),   ṗ_B = β/V_B (A_B ẋ − Q_B),   F_R = A_A p_A − A_B p_B − F_c
+    F_R = A_A p_A − A_B p_B − F_c
 
-with V = dead volume + area × travel. A rotary actuator has D_m for both areas, the
-joint's angle for its travel, and chambers of constant volume. The block that the
-article used has stiff oil; a large β is that limit.
+A rotary actuator has D_m for both areas, and the joint's angle for its travel.
 
-What is stored is not pressure but *oil*: y = p + β ln(V/V_0) (for a rotary chamber y =
-p ± β D_m q/V_0). It changes by valve flow alone, ẏ = β Q / V, whatever the joint does,
-so that shut chambers conserve their oil to the last digit and pressures come back with
-the angle. Where oil alone does not fill the chamber, the pressure rests at vapour
-pressure, which is taken for 0, and y remembers the missing volume: no oil is made or
-lost.
+dynamic         Way, moment arm and the arm's slope, all that a step passes through;
+                stops that damp (F_c), and what a joint rests on at the start.
+quasi-static    Way and moment arm at the middle of a step (`weigh`). A stop ends a
+                motion at once; what a joint rests on is left out.
 """
 
 # pyright: reportMissingParameterType=false
@@ -25,29 +21,14 @@ import numpy as np
 from hydroid.arrays import Array
 from hydroid.hydraulics.elementwise import compilable
 from hydroid.hydraulics.records import LINEAR, ROTARY
+from hydroid.hydraulics.seals import sliding_friction
 from hydroid.settings import linkage
 
-SLIDING = 1e-3  # speed [m/s, or rad/s] above which dry friction is nearly full; ours
 # what a joint's rest gives under the load that it carries at the start [rad]; ours
 GIVE = 5e-4
-SMALLEST = 0.1
-"""part of the dead volume that a chamber keeps, however far a joint is driven beyond
-its stops; ours"""
 
 triangle = compilable(linkage.triangle)
 four_bar = compilable(linkage.four_bar)
-
-
-@compilable
-def volume(travel, area, dead) -> Any:
-    """Volume of a chamber [m³] that opens with `travel` [m] at `area` [m²]."""
-    return np.maximum(dead + area * travel, SMALLEST * dead)
-
-
-@compilable
-def filling(travel, area, dead) -> Any:
-    """ln(V/V_0) of a chamber that opens with `travel` [m] at `area` [m²]."""
-    return np.log(volume(travel, area, dead) / dead)
 
 
 @compilable
@@ -82,22 +63,6 @@ def bent(angle, c) -> Any:
     return way, arm, slope
 
 
-def fills(angle: Array, c) -> list[Array]:
-    """ln(V/V_0) of chambers A and B at angles [rad] of COEFFICIENTS; ± D_m q/V_0 of a
-    rotary actuator."""
-    travel = rod_motion(angle, c)[0]
-    linear = c.kind == LINEAR
-    dead = c.dead_volume
-    cylinder_a = filling(travel, c.a.area, dead)
-    cylinder_b = filling(c.stroke - travel, c.b.area, dead)
-    turned_a = travel * c.a.area / dead
-    turned_b = -travel * c.b.area / dead
-    return [
-        np.where(linear, cylinder_a, turned_a),
-        np.where(linear, cylinder_b, turned_b),
-    ]
-
-
 def rod_motion(angle: Array, c) -> list[Array]:
     """Travel x [m], moment arm r = dx/dq [m/rad] and dr/dq of COEFFICIENTS at angles
     [rad], elementwise.
@@ -125,6 +90,23 @@ def rod_motion(angle: Array, c) -> list[Array]:
 
 
 @compilable
+def rod_way(c, angle: float) -> Any:
+    """Travel of one joint's rod [m] and its moment arm [m/rad] at an angle [rad]; of a
+    rotary actuator as `bent`."""
+    way, arm, _ = rod(angle, c) if c.kind == LINEAR else bent(angle, c)
+    return way, arm
+
+
+@compilable
+def weigh(c, w, angle: float, torque: float) -> None:
+    """Moment arm, load and friction of the rod of a quasi-static joint that a torque
+    [N·m] must hold at an angle [rad]."""
+    w.arm = rod_way(c, angle)[1]
+    w.push = torque / w.arm
+    sliding_friction(c, w)
+
+
+@compilable
 def stop_damping(travel, speed, stroke, penetration) -> Any:
     """F_c / ẋ of the hard stops [N·s/m], equation (9): K_p × penetration, only while
     moving further in.
@@ -138,12 +120,6 @@ def stop_damping(travel, speed, stroke, penetration) -> Any:
     elif speed < 0.0:
         beyond = -travel
     return penetration * np.maximum(beyond, 0.0)
-
-
-@compilable
-def friction_damping(speed, friction) -> Any:
-    """Dry friction [N] of the seals over speed [m/s], smooth through rest [N·s/m]."""
-    return friction / np.sqrt(speed * speed + SLIDING * SLIDING)
 
 
 @compilable

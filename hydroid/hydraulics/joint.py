@@ -13,17 +13,11 @@ so a branch leaves out what is switched off.
 
 import numpy as np
 
-from hydroid.hydraulics.cylinder import (
-    bent,
-    contact_torque,
-    filling,
-    friction_damping,
-    rod,
-    stop_damping,
-    volume,
-)
+from hydroid.hydraulics.cylinder import contact_torque, stop_damping
 from hydroid.hydraulics.elementwise import compilable, implicit_weight, kept
-from hydroid.hydraulics.records import LINEAR, NONE, ROTARY
+from hydroid.hydraulics.oil import begin_oil, press, take_flow, volume
+from hydroid.hydraulics.records import LINEAR, NONE
+from hydroid.hydraulics.seals import friction_damping
 from hydroid.hydraulics.solenoid import (
     beyond_dead_band,
     drive,
@@ -50,18 +44,7 @@ def begin(c, z, w, angle: float, velocity: float) -> None:
     w.oil_stiffness = 0.0
     w.a.flow = 0.0
     w.b.flow = 0.0
-    bulk = c.bulk_modulus
-    dead = c.dead_volume
-    if c.kind == LINEAR:
-        w.travel, w.arm, w.slope = rod(angle, c)
-        w.a.pressure = z.a.oil - bulk * filling(w.travel, c.a.area, dead)
-        w.b.pressure = z.b.oil - bulk * filling(c.stroke - w.travel, c.b.area, dead)
-    elif c.kind == ROTARY:
-        turned, w.arm, w.slope = bent(angle, c)
-        # its chambers have a constant volume
-        w.travel = 0.0
-        w.a.pressure = z.a.oil - bulk * c.a.area * turned / dead
-        w.b.pressure = z.b.oil + bulk * c.b.area * turned / dead
+    begin_oil(c, z, w, angle)
 
 
 @compilable
@@ -186,18 +169,6 @@ def mean_opening(c, z, w, commands, now: int, plugin) -> float:
 
 
 @compilable
-def _press(w, lever: float, rate: float) -> float:
-    """How a chamber answers to flow and motion; its stiffness at the joint times the
-    step."""
-    w.lever = lever
-    w.rate = rate
-    relax = w.filled * rate * w.relief
-    w.weight = implicit_weight(relax)
-    w.rise = rate / (1.0 + w.weight * relax)
-    return w.filled * lever * lever * w.rise
-
-
-@compilable
 def _rest(z, w, step: float) -> float:
     """Torque [N·m] of what a joint rests on; its stiffness and damping join those of
     the joint."""
@@ -240,8 +211,8 @@ def load(c, z, w, step: float) -> None:
         rub += friction_damping(arm * w.speed, c.dry_friction)
     w.drag = c.damping + arm * arm * rub
     pressed = step * c.bulk_modulus
-    w.stiffness = _press(w.a, arm * c.a.area, pressed / volume_a)
-    w.stiffness += _press(w.b, -arm * c.b.area, pressed / volume_b)
+    w.stiffness = press(w.a, arm * c.a.area, pressed / volume_a)
+    w.stiffness += press(w.b, -arm * c.b.area, pressed / volume_b)
     rest = 0.0
     if z.contact != 0.0:
         rest = _rest(z, w, step)
@@ -264,25 +235,13 @@ def coast(c, z, w, step: float) -> None:
 
 
 @compilable
-def _take_flow(z, w, mean: float) -> None:
-    """Take over pressure and oil of a chamber at the mean velocity [rad/s] of a
-    sub-step."""
-    gain = w.rise * (w.inflow - w.lever * mean)
-    # the valve gives less as the pressure rises: so much of it passed in the mean
-    flow = w.inflow - w.weight * w.filled * w.relief * gain
-    w.pressure += gain
-    z.oil += w.rate * flow
-    w.flow += flow
-
-
-@compilable
 def settle(c, z, w, gain: float, step: float) -> None:
     """Take over a velocity gain [rad/s]: pressures, oil, way and torque of the
     sub-step."""
     mean = w.speed + w.weight * gain
     if c.kind != NONE:
-        _take_flow(z.a, w.a, mean)
-        _take_flow(z.b, w.b, mean)
+        take_flow(z.a, w.a, mean)
+        take_flow(z.b, w.b, mean)
         w.oil_stiffness += w.stiffness / step
     w.torque += w.push - (w.weight * w.stiffness + w.drag) * mean
     w.resistance += w.drag

@@ -30,6 +30,11 @@ that a load does not slow the motion while the supply can lift it. The drop is
     Δp = p_S - p - κ max(p_S - p - MARGIN p_S, 0),
 
 with `compensation` κ: 0 without a compensator, as in the article, 1 with an ideal one.
+
+dynamic         `port_flow` and `meter`: flows that follow from the pressures of the
+                chambers, with leakage, an anti-cavitation valve and p_cr
+quasi-static    `rod_speed`: the same edges solved for the speed at which forces
+                balance, without these three. A flow never runs back to the pump.
 """
 
 # pyright: reportMissingParameterType=false
@@ -154,3 +159,67 @@ def meter(c, w, area: float, supply: float) -> None:
     b = np.maximum(-area, 0.0)
     _fill(c, w.a, supply, c.leakage + a, c.leakage + b * c.a.return_)
     _fill(c, w.b, supply, c.leakage + b, c.leakage + a * c.b.return_)
+
+
+@compilable
+def speed_against(force: float, drag: float, edges: float) -> Any:
+    """Speed v > 0 at which `edges` v² + `drag` v = `force`, and the root of the
+    equation's discriminant."""
+    root = np.sqrt(drag * drag + 4.0 * force * edges)
+    return 2.0 * force / (drag + root), root
+
+
+@compilable
+def rod_speed(c, w, supply: float) -> Any:
+    """Speed at which a quasi-static joint's chamber fills [m/s], its flow from the pump
+    [m³/s], and how that rises with P [Pa].
+
+    The scratch space w has the net opening `travel` [m²], above 0 towards A, the load
+    `push` of gravity and springs, dry friction `thrust` [N], damping `drag` [N·s/m]; of
+    a rotary actuator torques. P is `supply`.
+    """
+    if w.travel == 0.0:
+        return 0.0, 0.0, 0.0
+    side, other, sign = (c.a, c.b, 1.0) if w.travel > 0.0 else (c.b, c.a, -1.0)
+    area = abs(w.travel)
+    load = sign * w.push + w.thrust
+    drag = w.drag
+    # what the drops over both edges take from the force of the oil, over v²
+    pump_edge = c.conductance * area
+    tank_edge = c.conductance * area * other.return_
+    into = (side.area / pump_edge) ** 2 * side.area
+    back = (other.area / tank_edge) ** 2 * other.area
+    free = supply * side.area - c.tank_pressure * other.area - load
+    if free <= 0.0:
+        return 0.0, 0.0, 0.0
+    speed, root = speed_against(free, drag, into + back)
+    rise = side.area * side.area / root
+    drop = supply  # over the pump edge of an empty chamber
+    if c.compensation > 0.0:
+        # beyond its margin the edge feels only a part of drop and pressures
+        left = 1.0 - c.compensation
+        fed = 1.0 - c.compensation * (1.0 - MARGIN)
+        drop = fed * supply
+        push = left * free + c.compensation * MARGIN * supply * side.area
+        root = np.sqrt(left * left * drag * drag + 4.0 * push * (into + left * back))
+        slower = 2.0 * push / (left * drag + root)
+        if slower < speed:
+            speed = slower
+            rise = fed * side.area * side.area / root
+    flow = side.area * speed
+    if flow > c.flow_limit:
+        speed = c.flow_limit / side.area
+        flow = c.flow_limit
+        rise = 0.0
+    pressed = (drag + back * speed) * speed + c.tank_pressure * other.area + load
+    # the load overruns the pump's oil: the chamber cavitates, and what leaves the other
+    # one governs
+    if pressed < 0.0:
+        falling = -c.tank_pressure * other.area - load
+        speed, _ = speed_against(falling, drag, back)
+        flow = pump_edge * np.sqrt(drop)
+        rise = 0.5 * flow / supply
+        if flow > c.flow_limit:
+            flow = c.flow_limit
+            rise = 0.0
+    return speed, side.draw * flow, side.draw * rise

@@ -13,7 +13,7 @@ from hydroid.estimate import (
     finite,
     finite_ends,
 )
-from hydroid.hydraulics.cylinder import volume
+from hydroid.hydraulics.oil import volume
 from hydroid.hydraulics.records import LINEAR
 from hydroid.hydraulics.solenoid import FULL_SCALE, drive, resting_stroke
 from hydroid.posterior.bench import ONSET, RISEN, Bench, actuator, make_bench

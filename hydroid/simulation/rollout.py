@@ -129,26 +129,31 @@ class SteppedArm:
         rollout: Callable[..., None] | None = None,
         copies: int = 1,
     ) -> None:
-        self._roll, self.copies = rollout or roll, copies
-        self.model, self.data = m, d = copy(model), mujoco.MjData(model)
-        self._armature = own = model.dof_armature.copy()
+        self._roll = rollout or roll
+        self.copies = copies
+        self.model = copy(model)
+        self.data = mujoco.MjData(model)
+        self._armature = model.dof_armature.copy()
         self._inertia = model.stat.meaninertia
+        m = self.model
+        d = self.data
+        # addresses of the bindings: compiled code calls MuJoCo without them
         self._handles = Handles(
-            m._address,  # pyright: ignore[reportPrivateUsage]  # of the bindings: no callback is needed
-            d._address,  # pyright: ignore[reportPrivateUsage]
-            d.qpos,
-            d.qvel,
-            d.M,
-            d.qfrc_applied,
-            m.dof_armature,
-            d.warning.number,
-            columns,
-            own[columns],
-            np.setdiff1d(np.arange(m.nv), columns),
-            steps,
-            d.qfrc_bias,
-            m.qpos_spring,
-            np.where(m.jnt_limited[:, None], m.jnt_range, [-np.inf, np.inf]),
+            model=m._address,  # pyright: ignore[reportPrivateUsage]
+            data=d._address,  # pyright: ignore[reportPrivateUsage]
+            angle=d.qpos,
+            velocity=d.qvel,
+            mass=d.M,
+            applied=d.qfrc_applied,
+            armature=m.dof_armature,
+            warnings=d.warning.number,
+            columns=columns,
+            own=self._armature[columns],
+            pushed=np.setdiff1d(np.arange(m.nv), columns),
+            steps=steps,
+            gravity=d.qfrc_bias,
+            slack=m.qpos_spring,
+            limits=np.where(m.jnt_limited[:, None], m.jnt_range, [-np.inf, np.inf]),
         )
 
     def start(
@@ -183,10 +188,8 @@ class SteppedArm:
     @property
     def healthy(self) -> bool:
         """Whether the arm is finite and drew no warning of MuJoCo's since its start."""
-        return (
-            bool(np.isfinite([self.data.qpos, self.data.qvel]).all())
-            and not self.data.warning.number.any()
-        )
+        finite = np.isfinite([self.data.qpos, self.data.qvel]).all()
+        return bool(finite) and not self.data.warning.number.any()
 
     def roll(
         self, plugin: Plugin, state: Structs, course: Course, record: Record
@@ -236,8 +239,10 @@ def roll(arm, plugin: Plugin, state, course, record, source: int = SOURCE) -> No
     """Roll one candidate out as `SteppedArm.roll` does; `source` is the kernel's, for
     numba's cache."""
     commands, torque, taken, _ = course
-    pad, past = make_pad(state.size), commands.shape[0] - torque.shape[0]
-    for k in range(torque.shape[0]):
+    steps = torque.shape[0]
+    past = commands.shape[0] - steps
+    pad = make_pad(state.size)
+    for k in range(steps):
         if taken.size:
             pad.line[0].taken = taken[k]
         if state.size:
@@ -274,9 +279,8 @@ def compile_rollout() -> None:
         "<mujoco><worldbody><body><joint/><geom size='1'/></body></worldbody></mujoco>"
     )
     nothing = np.empty((0, 1))
-    course, record = (
-        Course(nothing, nothing),
-        Record(nothing, np.empty((0, 1), JOINT_STATE)),
-    )
+    course = Course(nothing, nothing)
+    record = Record(nothing, np.empty((0, 1), JOINT_STATE))
+    no_state = np.empty(0, JOINT_STATE)
     with event.install_listener("numba:compile", _Announcement()):
-        SteppedArm(model).roll(NO_ACTUATORS, np.empty(0, JOINT_STATE), course, record)
+        SteppedArm(model).roll(NO_ACTUATORS, no_state, course, record)

@@ -43,7 +43,7 @@ class Box:
     scale: Array
     varied: Mask
 
-    def of(self, kept: Mask) -> "Box":
+    def restricted(self, kept: Mask) -> "Box":
         """Return it with only some of the p coordinates varied, shape (p,)."""
         varied = self.varied.copy()
         varied[varied] = kept

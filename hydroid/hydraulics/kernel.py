@@ -172,7 +172,7 @@ def look_ahead(plugin: Plugin, state, commands, now: int, arm, pad: Pad) -> None
 
     `state` is its actuators', (J,) of JOINT_STATE; of the commands [%], (.., J), that
     at `now` holds. The joints are the `columns` of the arm's angle, velocity, applied
-    torque and armature, and `own` is their armature without oil.
+    torque and armature, and `bare_armature` is theirs without oil.
     """
     coefficients, order, entries, idle, period, substeps = plugin
     work, lines, common, matrix, gain = pad
@@ -237,7 +237,7 @@ def look_ahead(plugin: Plugin, state, commands, now: int, arm, pad: Pad) -> None
         z = state[j]
         hand_over(z, work[j], line, part, period)
         arm.applied[arm.columns[j]] = z.torque
-        arm.armature[arm.columns[j]] = arm.own[j] + z.armature
+        arm.armature[arm.columns[j]] = arm.bare_armature[j] + z.armature
 
 
 @compilable

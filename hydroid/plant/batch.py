@@ -26,7 +26,7 @@ from hydroid.hydraulics.kernel import Plugin
 from hydroid.mjcf import quiet_mujoco
 from hydroid.plant.plant import PHYSICS, Plant
 from hydroid.simulation.quasi_static import SOURCE, roll_quasi_static
-from hydroid.simulation.rollout import Course, Handles, Record, bind, roll
+from hydroid.simulation.rollout import Course, Handles, Trace, bind, roll
 
 
 def _typed_pointer(typing: Any, address: Any) -> Any:
@@ -106,7 +106,7 @@ def _roll_some(
             armature=carray(_pointer(at[6]), (joints,), np.float64),
             warnings=carray(_pointer(at[9]), (numbers,), np.int32)[::2],
             columns=shared.columns,
-            own=shared.own,
+            bare_armature=shared.bare_armature,
             pushed=shared.pushed,
             steps=shared.steps,
             gravity=carray(_pointer(at[7]), (joints,), np.float64),
@@ -122,11 +122,11 @@ def _roll_some(
             substeps=plugin.substeps,
         )
         course = Course(plants.commands[i], plants.torque[i], nothing, no_openings)
-        record = Record(plants.angle[i], no_states)
+        trace = Trace(plants.angle[i], no_states)
         if quasi:
-            roll_quasi_static(handles, actuators, plants.state[i], course, record)
+            roll_quasi_static(handles, actuators, plants.state[i], course, trace)
         else:
-            roll(handles, actuators, plants.state[i], course, record)
+            roll(handles, actuators, plants.state[i], course, trace)
         finite = np.isfinite(handles.angle).all()
         plants.failed[i] = handles.warnings.any() or not finite
 

@@ -25,7 +25,7 @@ from hydroid.plant.steady import SteadyArm, SteadyCommands, Weighing, by_name
 from hydroid.problem.bindings import Bindings
 from hydroid.quantity_table import MECHANICAL, QUANTITIES
 from hydroid.simulation.quasi_static import roll_quasi_static
-from hydroid.simulation.rollout import Course, Record, SteppedArm, compile_rollout, roll
+from hydroid.simulation.rollout import Course, SteppedArm, Trace, compile_rollout, roll
 from hydroid.simulation.scenario import Candidates, Chain, model_values
 
 PHYSICS = mujoco.mjtState.mjSTATE_INTEGRATION.value
@@ -255,7 +255,7 @@ class Plant:
         with quiet_mujoco():
             if self._roll is None:
                 self._roll = self._arm.bind(
-                    self._plugin, self._state, self._course, self._record
+                    self._plugin, self._state, self._course, self._trace
                 )
             self._roll()
         np.copyto(self._mass, self.data.M)
@@ -481,7 +481,7 @@ class Plant:
         self.model = self._arm.model
         self.data = self._arm.data
         no_states = np.empty((0, len(coupled)), JOINT_STATE)
-        self._record = Record(np.empty((1, len(self._columns))), no_states)
+        self._trace = Trace(np.empty((1, len(self._columns))), no_states)
 
 
 def _joint_numbers(

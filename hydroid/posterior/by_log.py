@@ -116,8 +116,8 @@ def _left_out(problem: Problem, uncertainty: Uncertainty, logs: Ints) -> _LeftOu
     linear = uncertainty.linear
     lengths = [len(channel.measured) for channel in problem.channels]
     log_of_sample = np.repeat([channel.log for channel in problem.channels], lengths)
-    columns = [np.flatnonzero(log_of_sample == log) for log in logs]
-    effects = [linear.effects[:, own] for own in columns]
+    samples = [np.flatnonzero(log_of_sample == log) for log in logs]
+    effects = [linear.effects[:, of_log] for of_log in samples]
     shares = np.array([u @ u.T for u in effects])
     share, axes = np.linalg.eigh(shares)
     alone = share > 0.99
@@ -125,9 +125,9 @@ def _left_out(problem: Problem, uncertainty: Uncertainty, logs: Ints) -> _LeftOu
     inverses = (axes * gain[:, None]) @ axes.transpose(0, 2, 1)
     row = linear.innovations.copy()
     steps = np.empty((len(logs), len(linear.slopes)))
-    for g, (own, u) in enumerate(zip(columns, effects, strict=True)):
-        steps[g] = inverses[g] @ u @ row[own]
-        row[own] += steps[g] @ u
+    for g, (of_log, u) in enumerate(zip(samples, effects, strict=True)):
+        steps[g] = inverses[g] @ u @ row[of_log]
+        row[of_log] += steps[g] @ u
     return _LeftOut(shares, axes, alone, inverses, steps, row)
 
 

@@ -110,7 +110,7 @@ def turn(c, z, w, supply: float, limits, period: float) -> Any:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def roll_quasi_static(
-    arm, plugin: Plugin, state, course, record, source: int = SOURCE
+    arm, plugin: Plugin, state, course, trace, source: int = SOURCE
 ) -> None:
     """Roll one candidate out, as `rollout.roll` does; joints that follow a log take its
     angle.
@@ -130,7 +130,7 @@ def roll_quasi_static(
     for k in range(steps):
         now = past + k
         # of states that nobody reads, only the last is stored
-        observed = record.states.size > 0 or k + 1 == steps
+        observed = trace.states.size > 0 or k + 1 == steps
         demanded = False
         for i in range(arm.pushed.size):
             arm.angle[arm.pushed[i]] = followed[k, i]
@@ -174,4 +174,4 @@ def roll_quasi_static(
             arm.angle[column] = after
             if observed:
                 store_oil(c, z, w, speed, after, supply)
-        write_sample(arm, record, state, k)
+        write_sample(arm, trace, state, k)

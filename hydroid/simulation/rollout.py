@@ -1,10 +1,10 @@
-"""The compiled rollout: one candidate through its whole record, MuJoCo's steps
+"""The compiled rollout: one candidate through its whole log, MuJoCo's steps
 included.
 
 `mujoco.batch` has a rollout, but nothing can be done between its steps; and where
 Python does something at every step, threads wait for the interpreter. So the compiled
 loop calls `mj_step` of MuJoCo's own library itself, on an MjModel and MjData of the
-bindings, and no thread needs Python before the record's end. The bits are those of
+bindings, and no thread needs Python before the log's end. The bits are those of
 `mujoco.batch`. Only an error of MuJoCo's, not a divergence, would end the process
 instead of raising; a model that gets through `SteppedArm.start` has none to expect.
 """
@@ -69,7 +69,7 @@ class Handles(NamedTuple):
     armature: Array
     warnings: NDArray[np.int32]
     columns: Index  # joints with actuators and those they couple with, (J,)
-    own: Array  # the arm's own armature of these [kg·m²], (J,)
+    bare_armature: Array  # the arm's own, without oil, of these [kg·m²], (J,)
     pushed: Index  # the other joints, (P,)
     steps: int  # in one sample
     # torques that hold the arm, where a rollout asks for them [N·m], (V,)
@@ -94,7 +94,7 @@ class Course(NamedTuple):
     opening: Array = np.empty((0, 0))
 
 
-class Record(NamedTuple):
+class Trace(NamedTuple):
     """What a rollout writes: angles of moving joints [rad], (T, V); states, (T, J) of
     JOINT_STATE, or ()."""
 
@@ -148,7 +148,7 @@ class SteppedArm:
             armature=m.dof_armature,
             warnings=d.warning.number,
             columns=columns,
-            own=self._armature[columns],
+            bare_armature=self._armature[columns],
             pushed=np.setdiff1d(np.arange(m.nv), columns),
             steps=steps,
             gravity=d.qfrc_bias,
@@ -192,14 +192,14 @@ class SteppedArm:
         return bool(finite) and not self.data.warning.number.any()
 
     def roll(
-        self, plugin: Plugin, state: Structs, course: Course, record: Record
+        self, plugin: Plugin, state: Structs, course: Course, trace: Trace
     ) -> None:
         """Step one candidate up to the first warning of MuJoCo's; call it within
         `quiet_mujoco`.
 
         `state` is its actuators', (J,) of JOINT_STATE: steps change it.
         """
-        self._roll(self._handles, plugin, state, course, record)
+        self._roll(self._handles, plugin, state, course, trace)
 
     @property
     def handles(self) -> Handles:
@@ -207,10 +207,10 @@ class SteppedArm:
         return self._handles
 
     def bind(
-        self, plugin: Plugin, state: Structs, course: Course, record: Record
+        self, plugin: Plugin, state: Structs, course: Course, trace: Trace
     ) -> Callable[[], object]:
         """Return a call of `roll` with these arrays, whatever they hold by then."""
-        return bind(self._roll, self._handles, plugin, state, course, record)
+        return bind(self._roll, self._handles, plugin, state, course, trace)
 
 
 def bind(compiled: Any, *arguments: Any) -> Callable[[], object]:
@@ -226,16 +226,16 @@ def bind(compiled: Any, *arguments: Any) -> Callable[[], object]:
 
 
 @compilable
-def write_sample(arm, record, state, k: int) -> None:
-    """Record the sample that step k ends, if it ends one."""
+def write_sample(arm, trace, state, k: int) -> None:
+    """Write the sample that step k ends, if it ends one."""
     if (k + 1) % arm.steps == 0:
-        record.angle[k // arm.steps] = arm.angle
-        if record.states.size:
-            record.states[k // arm.steps] = state
+        trace.angle[k // arm.steps] = arm.angle
+        if trace.states.size:
+            trace.states[k // arm.steps] = state
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def roll(arm, plugin: Plugin, state, course, record, source: int = SOURCE) -> None:
+def roll(arm, plugin: Plugin, state, course, trace, source: int = SOURCE) -> None:
     """Roll one candidate out as `SteppedArm.roll` does; `source` is the kernel's, for
     numba's cache."""
     commands, torque, taken, _ = course
@@ -253,7 +253,7 @@ def roll(arm, plugin: Plugin, state, course, record, source: int = SOURCE) -> No
         if arm.warnings.any():
             return
         take_over(plugin, state, arm, pad)
-        write_sample(arm, record, state, k)
+        write_sample(arm, trace, state, k)
 
 
 class _Announcement(event.Listener):
@@ -280,7 +280,7 @@ def compile_rollout() -> None:
     )
     nothing = np.empty((0, 1))
     course = Course(nothing, nothing)
-    record = Record(nothing, np.empty((0, 1), JOINT_STATE))
+    trace = Trace(nothing, np.empty((0, 1), JOINT_STATE))
     no_state = np.empty(0, JOINT_STATE)
     with event.install_listener("numba:compile", _Announcement()):
-        SteppedArm(model).roll(NO_ACTUATORS, no_state, course, record)
+        SteppedArm(model).roll(NO_ACTUATORS, no_state, course, trace)

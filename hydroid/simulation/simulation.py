@@ -24,7 +24,7 @@ from hydroid.hydraulics.records import JOINT_STATE, has_force_curve
 from hydroid.mjcf import quiet_mujoco
 from hydroid.simulation.openings import valve_openings
 from hydroid.simulation.quasi_static import roll_quasi_static
-from hydroid.simulation.rollout import Course, Record, SteppedArm, compile_rollout, roll
+from hydroid.simulation.rollout import Course, SteppedArm, Trace, compile_rollout, roll
 from hydroid.simulation.scenario import Candidates, Chain, Response, Scenario, distinct
 
 Follow = Callable[[SteppedArm, Index], tuple[Array, Array | None]]
@@ -180,15 +180,16 @@ class Simulation:
             actuators = plugin.candidate(row)
             state = states[row]
             angle = np.full((1 + samples, start.size), np.nan)
-            record = np.zeros((1 + samples if observed else 1, len(state)), JOINT_STATE)
+            kept = 1 + samples if observed else 1
+            history = np.zeros((kept, len(state)), JOINT_STATE)
             angle[0] = start
-            record[0] = state
+            history[0] = state
             course = Course(commands, torque, taken[row], openings[row])
-            arm.roll(actuators, state, course, Record(angle[1:], record[1:]))
+            arm.roll(actuators, state, course, Trace(angle[1:], history[1:]))
             chambers = None
             if observed:
                 turned = angle[:, chain.columns]
-                chambers = pressures(actuators.coefficients, record, turned)
+                chambers = pressures(actuators.coefficients, history, turned)
             return angle.reshape(len(angle), arm.copies, -1), chambers
 
         return follow

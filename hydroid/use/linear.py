@@ -25,11 +25,11 @@ import numpy as np
 
 from hydroid.arrays import Array, Index, record
 from hydroid.errors import SettingsError
-from hydroid.hydraulics.cylinder import volume
+from hydroid.hydraulics.cylinder import rod_way
+from hydroid.hydraulics.oil import volume
 from hydroid.hydraulics.records import LINEAR, coefficients
 from hydroid.hydraulics.solenoid import drive, resting_stroke, side_voltage
 from hydroid.plant import Plant
-from hydroid.simulation.quasi_static import linkage
 from hydroid.simulation.settled import settled_speeds
 
 NEAR_COMMAND, NEAR_ANGLE = 0.5, 1e-3
@@ -224,7 +224,7 @@ def _oil(plant: Plant, joint: int, command: Array) -> tuple[float, float] | None
             return None
         return 2.0 * np.pi * float(one["oil_frequency"]), float(one["oil_damping"])
     c = _coefficients(plant, joint)
-    travel, arm = linkage(c, float(plant.angle[joint]))
+    travel, arm = rod_way(c, float(plant.angle[joint]))
     stiffness = 2.0 * (arm * c.a.area) ** 2 * c.bulk_modulus / c.dead_volume
     if c.kind == LINEAR:
         side_a = c.a.area**2 / volume(travel, c.a.area, c.dead_volume)

@@ -109,14 +109,16 @@ def linearise(plant: Plant, command: Array) -> LinearArm:
 
     # what states and commands do, side by side: to the states' rates, to openings and
     # to speeds
-    count, total = len(joints), len(states)
+    count = len(joints)
+    total = len(states)
     rates = np.zeros((total, total + count))
     openings = np.zeros((count, total + count))
     first = 0
     for k, valve in enumerate(valves):
         _put_valve(valve, k, first, rates, openings)
         first += len(valve.states)
-    opened, direct = openings[:, :total], openings[:, total:]
+    opened = openings[:, :total]
+    direct = openings[:, total:]
     speeds = np.hstack([gain @ opened, gain @ direct])
     speeds[:, first_angle:total] += turn
     first = first_oil

@@ -79,19 +79,13 @@ def linearise(plant: Plant, command: Array) -> LinearArm:
     are held [%], (J,).
 
     Raises:
-        SettingsError: a joint stands at a command of 0, where a dead band has no slope.
+        SettingsError: a command is beyond 100 %, or within a dead band, which has no
+            slope.
     """
     columns: Index = np.array(plant.joints) - 1
     names = tuple(plant.names[column] for column in columns.tolist())
-    if idle := [
-        name
-        for name, one in zip(names, command[columns].tolist(), strict=True)
-        if one == 0.0
-    ]:
-        what = f"{', '.join(idle)} at a command of 0 has a dead band, and no slope"
-        raise SettingsError(
-            what, "--at", "name a command of every joint, such as boom=30"
-        )
+    for joint in columns.tolist():
+        _refuse_without_slope(plant, joint, command)
     valves = [_valve(plant, joint, float(command[joint])) for joint in columns.tolist()]
     oils = [_oil(plant, joint, command) for joint in columns.tolist()]
     count = len(columns)
@@ -145,6 +139,26 @@ def linearise(plant: Plant, command: Array) -> LinearArm:
     )
 
 
+def _refuse_without_slope(plant: Plant, joint: int, command: Array) -> None:
+    """Refuse the command of a joint (0-based) that is none, or about which its speed
+    has no slope."""
+    name = plant.names[joint]
+    value = float(command[joint])
+    if value == 0.0:
+        what = f"{name} at a command of 0 has a dead band, and no slope"
+        hint = "name a command of every joint, such as boom=30"
+        raise SettingsError(what, "--at", hint)
+    # NaN is not within them either
+    if not abs(value) <= 100.0:
+        what = f"the command of {name} is {value:g} %"
+        raise SettingsError(what, "--at", "allowed are -100 to 100 %")
+    band = _side(plant, joint, command)["dead_band"]
+    if abs(value) - NEAR_COMMAND < band:
+        what = f"{name} at {value:g} % is within its dead band, which has no slope"
+        hint = f"beyond {band + NEAR_COMMAND:.3g} % it moves that way"
+        raise SettingsError(what, "--at", hint)
+
+
 def _side(plant: Plant, joint: int, command: Array) -> dict[str, float]:
     """Return the quantities of the side that a joint (0-based) is driven towards."""
     one, end = plant.actuators[joint], "a" if command[joint] > 0.0 else "b"
@@ -163,8 +177,12 @@ def _slopes(plant: Plant, command: Array, columns: Index) -> tuple[Array, Array,
     for k, joint in enumerate(columns.tolist()):
         commands[[4 * k, 4 * k + 1], joint] += [NEAR_COMMAND, -NEAR_COMMAND]
         poses[[4 * k + 2, 4 * k + 3], joint] += [NEAR_ANGLE, -NEAR_ANGLE]
+    # at full command the slope is that from below
+    commands = commands.clip(-100.0, 100.0)
+    own = np.arange(count)
+    apart = commands[4 * own, columns] - commands[4 * own + 1, columns]
     speeds = steady.speeds(commands, poses)[:, columns]
-    gain = (speeds[0:-1:4] - speeds[1:-1:4]).T / (2.0 * NEAR_COMMAND)
+    gain = (speeds[0:-1:4] - speeds[1:-1:4]).T / apart
     turn = (speeds[2:-1:4] - speeds[3:-1:4]).T / (2.0 * NEAR_ANGLE)
     return gain, turn, speeds[-1]
 

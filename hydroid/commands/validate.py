@@ -96,6 +96,10 @@ def validate(
         predictions += [replace(p, fit=name) for p in tested[name].predictions]
     best = tested[next(iter(fits))]
     run = run_of(best.model)
+    if run and out is not None and set:
+        # with other settings it is another model than the run's
+        text = "note: what --set gives does not go into %s and its report"
+        LOGGER.log(NOTE, text, run)
     lines = verdict_lines(fits)
     steps = list[Finding]()
     if run:

@@ -13,7 +13,7 @@ from pydantic import Field, ValidationInfo, model_validator
 from hydroid.errors import HydroidError, SettingsError
 from hydroid.files import Plain, find_config
 from hydroid.parameters import ParameterSet
-from hydroid.quantity_table import MECHANICAL
+from hydroid.quantity_table import MECHANICAL, TARGETS
 from hydroid.settings.arm import Arm, load_arm
 from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.load import ByJoint, Joints, Positive, Settings, load, validate
@@ -86,6 +86,18 @@ class FitSettings(Settings):
         """Return the mass that the gripper holds in a log [kg]."""
         name = self.payload_name(log)
         return 0.0 if name is None else self.payloads[name]
+
+    def parameters_of(self, quantity: str) -> tuple[str, ...]:
+        """Return the parameters that set a quantity of every joint with an actuator;
+        none if what the settings say counts for some joint."""
+        joints = self.arm.joints
+        open_joints = {n for n, joint in enumerate(joints, 1) if joint.actuator}
+        found = list[str]()
+        for name, parameter in self.parameters.items():
+            if quantity in TARGETS[parameter.quantity] and parameter.per is None:
+                found.append(name)
+                open_joints -= {*(parameter.joints or open_joints)}
+        return () if open_joints else tuple(found)
 
     @classmethod
     def names_of_joints(cls, values: Plain, folder: Path) -> tuple[str, ...]:

@@ -28,7 +28,9 @@ def start(
     if not (cwd / "log.csv").exists():
         head(cwd / "log.csv", 600)
         (cwd / "mech.yaml").write_text(STAGE_1)
-    code = "import hydroid.commands.app as a, hydroid.fitting.checkpoints as s; s.SAVE_EVERY = 0; a.main()"
+    # under nohup the tests ignore SIGHUP, and so would the run
+    code = "import signal; signal.signal(signal.SIGHUP, signal.SIG_DFL); "
+    code += "import hydroid.commands.app as a, hydroid.fitting.checkpoints as s; s.SAVE_EVERY = 0; a.main()"
     words = [command, "log.csv", *map(str, options), "--out", out, "--resume"]
     return subprocess.Popen(
         [sys.executable, "-c", code, *words],

@@ -18,7 +18,7 @@ times what speed falls per load.
 """
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import mujoco
@@ -216,7 +216,7 @@ def _slopes(plant: Plant, command: Array, columns: Index) -> tuple[Array, Array,
     commands = commands.clip(-100.0, 100.0)
     own = np.arange(count)
     apart = commands[4 * own, columns] - commands[4 * own + 1, columns]
-    speeds = steady.speeds(commands, poses)[:, columns]
+    speeds = plant.steady().speeds(commands, poses)[:, columns]
     gain = (speeds[0:-1:4] - speeds[1:-1:4]).T / apart
     turn = (speeds[2:-1:4] - speeds[3:-1:4]).T / (2.0 * NEAR_ANGLE)
     return gain, turn, speeds[-1]

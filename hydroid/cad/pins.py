@@ -15,6 +15,7 @@ import mujoco
 import numpy as np
 
 from hydroid.arrays import Array, record
+from hydroid.cad.loops import SAME
 from hydroid.cad.source import Notes
 
 PARTS = {
@@ -32,8 +33,6 @@ PARTS = {
 """words in the names of a cylinder's links and joints"""
 PINS = {"eye", "pin", "end", "mount", "pivot", "link", "joint", "frame"}
 """words in the names of frames at which rods are pinned"""
-SAME = 0.002
-"""distance up to which two pins are one [m]"""
 
 
 @record
@@ -81,6 +80,9 @@ def pins_of(spec: mujoco.MjSpec, data: mujoco.MjData) -> list[Pin]:
             continue
         if equality.objtype == mujoco.mjtObj.mjOBJ_SITE:
             at = data.site(equality.name1).xpos
+            # a loop that closes at no pose shows no pin
+            if np.linalg.norm(data.site(equality.name2).xpos - at) > SAME:
+                continue
         else:
             body = data.body(equality.name1)
             at = body.xpos + body.xmat.reshape(3, 3) @ np.array(equality.data[:3])
@@ -162,7 +164,8 @@ def closed_pins(
             notes.add(what, rod)
             closed.append(Pin((rod, anchor.owner), anchor.at))
             continue
-        below = [body for body in joints if spec.body(body).parent.name == carrier]
+        carried = {body.name for body in spec.body(carrier).bodies}
+        below = [body for body in joints if body in carried]
         if len(ends) == len(below) == 1 and not anchors:
             what = f"the rod's end {ends[0].name} meets no other pin: taken to be pinned to"
             notes.add(f"{what} {below[0]} where it is drawn. Compare arm.png", rod)

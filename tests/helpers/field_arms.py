@@ -400,6 +400,61 @@ def at_rest(*parts: Part) -> tuple[Part, ...]:
     )
 
 
+FAR = {"boom": 0.8, "stick": -1.5, "bucket": -1.0}
+"""angles of a pose [rad] that is far from the one in which all joints are at 0"""
+
+
+def drawn_far(folder: Path) -> Path:
+    """Write an MJCF that is drawn in another pose, whose angles `ref` states."""
+    parts = tuple(replace(part, turn=FAR.get(part.name, 0.0)) for part in ARM)
+    pin = ("bucket_pivot_rod", "stick", rocker_pin(FAR["bucket"]))
+    bars = [pin if site[0] == pin[0] else site for site in LINKAGE_SITES]
+    path = mjcf(parts, folder, sites=(*SITES, *bars))
+    text = path.read_text()
+    for name, angle in FAR.items():
+        joint = f'<joint name="{name}_joint"'
+        text = text.replace(joint, f'{joint} ref="{angle}"')
+    path.write_text(text)
+    return path
+
+
+def cylinders_of_far() -> tuple[Part, ...]:
+    """Return tubes, rods and their eyes as they stand in another pose than the links
+    are drawn in."""
+    parts = list[Part]()
+    for name, carrier, joint, foot, eye in (
+        ("boom", "house", BOOM, BOOM_FOOT, BOOM_EYE),
+        ("stick", "boom", STICK, STICK_FOOT, STICK_EYE),
+    ):
+        parts += cylinder(name, carrier, foot, joint + turned(eye, FAR[name]))
+        reach = LENGTHS[name](FAR[name]) - 0.4
+        parts.append(frame(f"{name}_rod_eye", f"{name}_rod", reach + 0j))
+    return tuple(parts)
+
+
+def loops_of_sites(folder: Path, reach: float = 0.0) -> Path:
+    """Write an MJCF whose loops are open as drawn: constraints between sites pull them
+    together. The boom's rod is longer by `reach` [m]."""
+    drawn = (*ARM, *at_rest(*open_cylinders(), *linkage()[:2]), *linkage()[2:4])
+    parts = [
+        replace(part, turn=part.turn + 0.2) if part.name == "rocker" else part
+        for part in drawn
+    ]
+    ends = {part.name: part.at for part in (*rod_ends(), *linkage()[4:])}
+    pairs = (
+        ("boom_rod", ends["boom_rod_eye"] + reach, "boom", BOOM_EYE),
+        ("stick_rod", ends["stick_rod_eye"], "stick", STICK_EYE),
+        ("bucket_rod", ends["bucket_rod_eye"], "rocker", ROCKER_LENGTH + 0j),
+        ("coupler", ends["coupler_end"], "bucket", COUPLER_END),
+    )
+    sites = list[tuple[str, str, complex]]()
+    closed = ""
+    for first, at, second, place in pairs:
+        sites += [(f"{first}_end", first, at), (f"{second}_eye", second, place)]
+        closed += f'<connect site1="{first}_end" site2="{second}_eye"/>'
+    return mjcf(parts, folder, sites, f"<equality>{closed}</equality>")
+
+
 def loader(folder: Path) -> Path:
     """Write a loader whose tilt cylinder stands on the chassis and turns a bell crank
     on the boom: six bars."""
@@ -552,6 +607,28 @@ FIELD_ARMS = (
         said="taken to be pinned",
         lengths=BOTH,
         masses=WITH_ROD_PARTS,
+    ),
+    FieldArm(
+        "cylinders that stand as in another pose than the links",
+        as_urdf(*ARM, *cylinders_of_far(), *anchors()),
+        said="meet at another pose than drawn: -85.7 deg of stick_joint",
+        lengths=BOTH,
+        masses=WITH_ROD_PARTS,
+    ),
+    FieldArm("drawn far from where angles are 0", drawn_far, lengths=LENGTHS),
+    FieldArm(
+        "loops of sites that are drawn open",
+        loops_of_sites,
+        said="moved until they close",
+        lengths=LENGTHS,
+        masses=WITH_ROD_PARTS | {"stick": ROD_OF_BUCKET["stick"]},
+    ),
+    FieldArm(
+        "a loop among others that closes in no pose",
+        lambda folder: loops_of_sites(folder, 9.0),
+        said="part of a cylinder that the file pins at one end",
+        lengths={name: LENGTHS[name] for name in ("stick", "bucket")},
+        masses=WITH_ROD_PARTS | {"stick": ROD_OF_BUCKET["stick"]},
     ),
     FieldArm(
         "open cylinders without a pin",

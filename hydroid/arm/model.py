@@ -15,9 +15,10 @@ from itertools import product
 import mujoco
 import numpy as np
 
+from hydroid.arm.tip import tip_of
 from hydroid.arrays import Array, Mask, record
 from hydroid.errors import ModelError, SettingsError
-from hydroid.mjcf import mujoco_errors, read_mjcf
+from hydroid.mjcf import mujoco_errors, quiet_mujoco, read_mjcf
 from hydroid.settings.arm import Arm
 
 ALONE = "alone"  # the name of the arm that is not one of two
@@ -35,27 +36,23 @@ def load_model(arm: Arm) -> mujoco.MjSpec:
 
 
 def add_payload(spec: mujoco.MjSpec, arm: Arm, mass: float) -> mujoco.MjSpec:
-    """Return a copy of the arm's model that carries `mass` [kg] at the site of its
-    payload."""
-    if arm.payload is None:
-        hint = (
-            "name the site of the model that holds it in the arm's file, payload: SITE"
-        )
-        raise SettingsError(f"{arm.name} has no place for a payload", "payloads", hint)
+    """Return a copy of the arm's model that carries `mass` [kg] at its tip."""
+    with quiet_mujoco():
+        model = spec.compile()
+    tip = tip_of(model, arm)
     loaded = spec.copy()
-    site = loaded.site(arm.payload)
     # of a ball of 5 cm: its own inertia is small beside what its distance makes
     moment = 0.4 * mass * 0.05**2
-    body = site.parent.add_body(
+    name = model.body(tip.body).name
+    carrier = loaded.body(name) if name else loaded.joint(arm.joint_names[-1]).parent
+    carrier.add_body(
         name="payload",
-        pos=site.pos,
+        pos=tip.at,
         explicitinertial=True,
         mass=mass,
         ipos=[0.0] * 3,
         inertia=[moment] * 3,
     )
-    if site.frame is not None:
-        body.set_frame(site.frame)
     return loaded
 
 

@@ -104,8 +104,9 @@ class Arm(Settings):
     ] = {}
     """what moves the joints, by name; a joint that stage 2 does not drive needs none"""
     payload: str | None = None
-    """site of the model where the gripper holds a payload's centre of mass; null:
-    logs have no payloads"""
+    """site of the model that is the arm's tip: where the gripper holds a payload's
+    centre of mass; null: the end of the last link, which is the farthest point of its
+    shapes in the direction of its centre of mass"""
     pair: Beside | None = None
     """MJCF of a machine with two of these arms, whose joints are named right_JOINT and
     left_JOINT; null: the arm stands alone"""

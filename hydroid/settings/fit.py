@@ -58,7 +58,7 @@ class FitSettings(Settings):
     priors: dict[str, PriorSettings] = {}
     """what is known besides the logs, each under a name of your choice"""
     payloads: dict[str, Positive] = {}
-    """mass that the gripper holds, by the log's file name [kg]"""
+    """mass that the arm carries at its tip, by the log's file name [kg]"""
     log: LogSettings = LogSettings()
     simulation: SimulationSettings = SimulationSettings()
     objective: ObjectiveSettings = ObjectiveSettings()

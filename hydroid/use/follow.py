@@ -107,7 +107,7 @@ def follow(model: IdentifiedModel, path: Log, *, payload: float = 0.0) -> Follow
     Args:
         model: of stage 2.
         path: angles over time [rad]; joints that it does not hold rest in its `pose`.
-        payload: mass in the gripper [kg].
+        payload: mass at the tip [kg].
 
     Raises:
         LogError: a joint that takes no commands should move, or an angle is missing.

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from hydroid.log import Log, LogFinding, log_finding
 from hydroid.settings.fit import FitSettings
-from hydroid.settings.log import OTHER, log_file
+from hydroid.settings.log import OTHER
 
 if TYPE_CHECKING:
     from hydroid.fitting.agreement import Agreement
@@ -47,11 +47,10 @@ def odd_logs(
 
 def _conditions(log: Log, settings: FitSettings) -> str:
     """Return what is known of a log in brackets: its time of day, load and group."""
-    file = log_file(log.source)
     conditions = list[str]()
     if log.clock:
         conditions.append(log.clock)
-    if load := settings.payloads.get(file.name):
+    if load := settings.payload_of(log.source):
         conditions.append(f"load {load:g} kg")
     group = settings.log.group_of(log.source)
     if group != OTHER:

@@ -18,7 +18,7 @@ times what speed falls per load.
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import mujoco
@@ -96,23 +96,12 @@ def linearise(plant: Plant, command: Array) -> LinearArm:
     oils = [_oil(plant, joint, command) for joint in joints]
     gain, turn, speed = _slopes(plant, command, columns)
 
-    # the states are those of all valves, then of all oils, then the angles
-    states = [
-        f"{name} {state}"
-        for name, valve in zip(names, valves, strict=True)
-        for state in valve.states
-    ]
-    first_oil = len(states)
-    for name, oil in zip(names, oils, strict=True):
-        if oil is not None:
-            states += [f"{name} speed", f"{name} acceleration"]
-    first_angle = len(states)
-    states += [f"{name} angle" for name in names]
-
     # what states and commands do, side by side: to the states' rates, to openings and
     # to speeds
+    states = _state_names(names, valves, oils)
     count = len(joints)
     total = len(states)
+    first_angle = total - count
     rates = np.zeros((total, total + count))
     openings = np.zeros((count, total + count))
     first = 0
@@ -123,7 +112,6 @@ def linearise(plant: Plant, command: Array) -> LinearArm:
     direct = openings[:, total:]
     speeds = np.hstack([gain @ opened, gain @ direct])
     speeds[:, first_angle:total] += turn
-    first = first_oil
     for k, oil in enumerate(oils):
         if oil is not None:
             _put_oil(oil, k, first, rates, speeds)
@@ -131,18 +119,34 @@ def linearise(plant: Plant, command: Array) -> LinearArm:
     rates[first_angle:] = speeds
 
     outputs = np.vstack([np.eye(total, total + count)[first_angle:], speeds])
+    delays = [_side(plant, joint, command)["delay"] for joint in joints]
     return LinearArm(
         a=rates[:, :total],
         b=rates[:, total:],
         c=outputs[:, :total],
         d=outputs[:, total:],
-        delay=np.array([_side(plant, joint, command)["delay"] for joint in joints]),
+        delay=np.array(delays),
         joints=names,
-        states=tuple(states),
+        states=states,
         command=command[columns],
         angle=plant.angle[columns],
         speed=speed,
     )
+
+
+def _state_names(
+    names: Sequence[str], valves: "Sequence[_Valve]", oils: "Sequence[_Oil | None]"
+) -> tuple[str, ...]:
+    """Return the names of all states: those of all valves, then of all oils, then the
+    angles."""
+    states = list[str]()
+    for name, valve in zip(names, valves, strict=True):
+        states += [f"{name} {state}" for state in valve.states]
+    for name, oil in zip(names, oils, strict=True):
+        if oil is not None:
+            states += [f"{name} speed", f"{name} acceleration"]
+    states += [f"{name} angle" for name in names]
+    return tuple(states)
 
 
 def _refuse_without_slope(plant: Plant, joint: int, command: Array) -> None:

@@ -96,23 +96,12 @@ def linearise(plant: Plant, command: Array) -> LinearArm:
     oils = [_oil(plant, joint, command) for joint in joints]
     gain, turn, speed = _slopes(plant, command, columns)
 
-    # the states are those of all valves, then of all oils, then the angles
-    states = [
-        f"{name} {state}"
-        for name, valve in zip(names, valves, strict=True)
-        for state in valve.states
-    ]
-    first_oil = len(states)
-    for name, oil in zip(names, oils, strict=True):
-        if oil is not None:
-            states += [f"{name} speed", f"{name} acceleration"]
-    first_angle = len(states)
-    states += [f"{name} angle" for name in names]
-
     # what states and commands do, side by side: to the states' rates, to openings and
     # to speeds
+    states = _state_names(names, valves, oils)
     count = len(joints)
     total = len(states)
+    first_angle = total - count
     rates = np.zeros((total, total + count))
     openings = np.zeros((count, total + count))
     first = 0
@@ -123,7 +112,6 @@ def linearise(plant: Plant, command: Array) -> LinearArm:
     direct = openings[:, total:]
     speeds = np.hstack([gain @ opened, gain @ direct])
     speeds[:, first_angle:total] += turn
-    first = first_oil
     for k, oil in enumerate(oils):
         if oil is not None:
             _put_oil(oil, k, first, rates, speeds)
@@ -131,18 +119,34 @@ def linearise(plant: Plant, command: Array) -> LinearArm:
     rates[first_angle:] = speeds
 
     outputs = np.vstack([np.eye(total, total + count)[first_angle:], speeds])
+    delays = [_side(plant, joint, command)["delay"] for joint in joints]
     return LinearArm(
         a=rates[:, :total],
         b=rates[:, total:],
         c=outputs[:, :total],
         d=outputs[:, total:],
-        delay=np.array([_side(plant, joint, command)["delay"] for joint in joints]),
+        delay=np.array(delays),
         joints=names,
-        states=tuple(states),
+        states=states,
         command=command[columns],
         angle=plant.angle[columns],
         speed=speed,
     )
+
+
+def _state_names(
+    names: Sequence[str], valves: "Sequence[_Valve]", oils: "Sequence[_Oil | None]"
+) -> tuple[str, ...]:
+    """Return the names of all states: those of all valves, then of all oils, then the
+    angles."""
+    states = list[str]()
+    for name, valve in zip(names, valves, strict=True):
+        states += [f"{name} {state}" for state in valve.states]
+    for name, oil in zip(names, oils, strict=True):
+        if oil is not None:
+            states += [f"{name} speed", f"{name} acceleration"]
+    states += [f"{name} angle" for name in names]
+    return tuple(states)
 
 
 def _refuse_without_slope(plant: Plant, joint: int, command: Array) -> None:
@@ -214,8 +218,8 @@ def _slopes(plant: Plant, command: Array, columns: Index) -> tuple[Array, Array,
         poses[[4 * k + 2, 4 * k + 3], joint] += [NEAR_ANGLE, -NEAR_ANGLE]
     # at full command the slope is that from below
     commands = commands.clip(-100.0, 100.0)
-    own = np.arange(count)
-    apart = commands[4 * own, columns] - commands[4 * own + 1, columns]
+    more = 4 * np.arange(count)
+    apart = commands[more, columns] - commands[more + 1, columns]
     speeds = plant.steady().speeds(commands, poses)[:, columns]
     gain = (speeds[0:-1:4] - speeds[1:-1:4]).T / apart
     turn = (speeds[2:-1:4] - speeds[3:-1:4]).T / (2.0 * NEAR_ANGLE)

@@ -15,6 +15,7 @@ import mujoco
 import numpy as np
 import robots
 import trimesh
+from printed import follow
 from robots import LIMIT
 from worlds import World, write_log
 
@@ -773,6 +774,37 @@ def outcome(arm: FieldArm, folder: Path) -> Outcome:
     if arm.said and not told:
         return Outcome("wrong", f"nobody says {arm.said!r}")
     return Outcome("said" if told else "right", told)
+
+
+def followed(arm: FieldArm, folder: Path, budget: str) -> Outcome:
+    """Write an arm that is taken as it should be and two logs of it, and follow the
+    commands that `init` prints: check, a fit of a budget, and validation on the second.
+
+    Right: the fit predicts the second log.
+    """
+    found = outcome(arm, folder)
+    if found.verdict not in ("right", "said"):
+        return found
+    taken = load_arm(folder / "mine" / "arm.yaml")
+    names = [name.removesuffix("_joint") for name in taken.joint_names]
+    columns = dict[str, tuple[str, str]]()
+    parts = list[Any]()
+    for number, (name, ends) in enumerate(
+        zip(names, taken.ranges.values(), strict=True), 1
+    ):
+        unit = "m" if number in taken.slides else "deg"
+        columns[name] = (f"{name}_cmd_V", f"{name}_{unit}")
+        parts.append((name, "", name, "", (0.0, 0.0, 0.0), "{} {}".format(*ends)))
+    world = World(names, parts, columns)
+    write_log(world, folder / "log.csv", 60.0, 1)
+    write_log(world, folder / "other.csv", 60.0, 2)
+    words = ["followed", "--log", "log.csv"]
+    for option, value in arm.options.items():
+        words += [f"--{option}", str(value)]
+    for robot in (*folder.glob("arm.urdf"), *folder.glob("arm.xml")):
+        words += ["--arm", robot.name]
+    ended = follow(folder, words, "other.csv", budget)
+    return Outcome(ended.verdict, ended.line)
 
 
 def faults(arm: FieldArm, taken: Arm) -> list[str]:

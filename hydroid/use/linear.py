@@ -18,11 +18,12 @@ times what speed falls per load.
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
+from scipy.signal import StateSpace, lsim
 
 from hydroid.arrays import Array, Index, record
 from hydroid.errors import SettingsError
@@ -68,6 +69,24 @@ class LinearArm:
     command: Array
     angle: Array
     speed: Array
+
+    def step(self, k: int, time: Array) -> Array:
+        """Return the change of a joint's speed [rad/s] after its command, the k-th, has
+        risen by 1 % at time 0, shape (T,); times are equally spaced [s], shape (T,)."""
+        given = np.zeros((len(time), len(self.joints)))
+        given[:, k] = 1.0
+        system = StateSpace(self.a, self.b, self.c, self.d)
+        speed = lsim(system, given, time - time[0])[1][:, len(self.joints) + k]
+        return np.interp(time - self.delay[k], time, speed, left=0.0)
+
+    def response(self, k: int, frequency: Array) -> Array:
+        """Return by how much a joint's speed swings per 1 % of its command, the k-th:
+        complex [rad/s], shape (F,), at frequencies [Hz], shape (F,)."""
+        own = len(self.joints) + k
+        swing = 2j * np.pi * frequency
+        matrices = swing[:, None, None] * np.eye(len(self.a)) - self.a
+        states = np.linalg.solve(matrices, self.b[:, k, None].astype(complex))[..., 0]
+        return (states @ self.c[own] + self.d[own, k]) * np.exp(-swing * self.delay[k])
 
     def text(self) -> str:
         """Return it as JSON."""

@@ -141,7 +141,8 @@ def joint_lags(plant: Plant) -> Array:
     # at half its stroke the solenoid adds as much stiffness as the spring has
     damping = 0.5 * (own["plunger_damping_a"] + own["plunger_damping_b"])
     late = late + 0.5 * damping / own["plunger_stiffness"]
-    late = late + 2.0 * own["oil_damping"] / (2.0 * np.pi * own["oil_frequency"])
+    held_back = 2.0 * own["oil_damping"] * (1.0 - own["oil_damping_share"])
+    late = late + held_back / (2.0 * np.pi * own["oil_frequency"])
     driven = [joint - 1 for joint in plant.joints]
     lags[driven] = late[driven]
     return lags

@@ -115,12 +115,17 @@ def linearise(plant: Plant, command: Array) -> LinearArm:
     moved, fed = gain @ opened, gain @ direct
     moved[:, first_angle:] += turn
     for place, k in enumerate(ringing):
-        pace, ratio = oils[k] or (0.0, 0.0)
+        pace, ratio, share = oils[k] or (0.0, 0.0, 0.0)
         one, two = first_oil + 2 * place, first_oil + 2 * place + 1
-        a[one, two] = 1.0
-        a[two], b[two] = pace**2 * moved[k], pace**2 * fed[k]
+        drag = 2.0 * ratio * pace
+        # the state is v̇ − 2ζωσu, as in `overshoot`
+        passed = share * drag
+        a[one], b[one] = passed * moved[k], passed * fed[k]
+        a[one, two] += 1.0
+        wanted = pace**2 - drag * passed
+        a[two], b[two] = wanted * moved[k], wanted * fed[k]
         a[two, one] -= pace**2
-        a[two, two] -= 2.0 * ratio * pace
+        a[two, two] -= drag
         moved[k], fed[k] = 0.0, 0.0
         moved[k, one] = 1.0
         states += [f"{names[k]} speed", f"{names[k]} acceleration"]
@@ -215,14 +220,15 @@ def _coefficients(plant: Plant, joint: int) -> Any:
     return coefficients(alone)[0, 0]
 
 
-def _oil(plant: Plant, joint: int, command: Array) -> tuple[float, float] | None:
-    """Natural frequency [rad/s] and damping ratio of a joint on its oil; None where it
-    has none."""
+def _oil(plant: Plant, joint: int, command: Array) -> tuple[float, float, float] | None:
+    """Natural frequency [rad/s] and damping ratio of a joint on its oil, and the share
+    of the damping between valve and joint; None where it has none."""
     one = plant.actuators[joint]
     if plant.quasi_static:
         if np.isinf(one["oil_frequency"]):
             return None
-        return 2.0 * np.pi * float(one["oil_frequency"]), float(one["oil_damping"])
+        pace = 2.0 * np.pi * float(one["oil_frequency"])
+        return pace, float(one["oil_damping"]), float(one["oil_damping_share"])
     c = _coefficients(plant, joint)
     travel, arm = linkage(c, float(plant.angle[joint]))
     stiffness = 2.0 * (arm * c.a.area) ** 2 * c.bulk_modulus / c.dead_volume
@@ -248,7 +254,7 @@ def _oil(plant: Plant, joint: int, command: Array) -> tuple[float, float] | None
     speeds = settled_speeds(steady.plugin, *two, quasi_static=False)[:, place]
     yielding = float(speeds[1] - speeds[0]) / (2.0 * change)
     pace = float(np.sqrt(stiffness / inertia))
-    return pace, 0.5 * yielding * float(np.sqrt(stiffness * inertia))
+    return pace, 0.5 * yielding * float(np.sqrt(stiffness * inertia)), 0.0
 
 
 def _inertia(plant: Plant, joint: int) -> float:

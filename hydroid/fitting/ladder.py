@@ -108,8 +108,6 @@ class Ladder:
         self.kept = min(estimates.values(), key=lambda e: e.rms if e.usable else np.inf)
         self._watch, self._checkpoints, self._late = watch, checkpoints, False
         self._step = step_of(self.kept.name)
-        # whether output errors led near the kept estimate, before its innovations
-        self._from_afar = False
 
     def climb(self, whole: Problem) -> None:
         """Refine the estimate with each model and term that the settings of a fit's
@@ -143,10 +141,7 @@ class Ladder:
         if climbs:
             kept = self.kept
             likelihood = make_likelihood(self.problem)
-            # a term that was added to an estimate began with the drift that its lack
-            # had left
-            how = refine if self._from_afar else refine_from_afar
-            last = self._refined(likelihood, kept.theta, refinement, self._step, how)
+            last = self._refined(likelihood, kept.theta, refinement, self._step)
             new = self._measured(self.problem, last, self._step)
             self.kept = self.estimates[kept.name] = replace(new, gained=kept.gained)
         if settings.joint_refinement:
@@ -187,34 +182,69 @@ class Ladder:
         if if_better and (self._late or last.leaves_noise(start.theta)):
             return
         own = whole.varied(whole.settings.of_estimate(step.estimate))
-        theta = _begun(own, last, start.theta) if begun is None else begun
+        if begun is None:
+            begun = _begun(own, last, start.theta)
+            begun = self._begun_alone(own, last, begun, settings, step)
         likelihood = make_likelihood(own)
-        other_model = own.settings.quasi_static != last.settings.quasi_static
-        if other_model:
+        if own.settings.quasi_static != last.settings.quasi_static:
             # there is nothing for a model that is slow to simulate
             if self._is_white():
                 return
-            theta = self._nearer(likelihood, theta, settings, step)
-            if own.rms(own.output_errors(theta[None]))[0] > start.rms:
+            begun = self._nearer(likelihood, begun, settings, step)
+            if own.rms(own.output_errors(begun[None]))[0] > start.rms:
                 return
-        # what a search, or another model, ended at may be far from an optimum
-        far = not if_better or other_model or bool(_new_curves(own, last))
-        how = refine_from_afar if far else refine
+        # what the model below, or a search, left for drift may be what is new here
+        on_the_way = step.changed(phase="on the way")
         result = self._refined(
-            likelihood, theta, settings, step.changed(phase="on the way"), how
+            likelihood, begun, settings, on_the_way, refine_from_afar
         )
         if self._late and if_better:
             return
         new = self._measured(own, result, step)
         if not if_better:
-            self._keep(own, new, step, from_afar=far)
+            self._keep(own, new, step)
             return
         without = self._left_out_of(last, self.refinements[start.name])
         with_it = self._left_out_of(own, result)
         gained = gain(with_it, without)
         self.estimates[step.estimate] = new = replace(new, gained=gained)
         if not self._late and is_clear(*gained):
-            self._keep(own, new, step, from_afar=far)
+            self._keep(own, new, step)
+
+    def _begun_alone(
+        self,
+        problem: Problem,
+        last: Problem,
+        theta: Array,
+        settings: RefinementSettings,
+        step: Step,
+    ) -> Array:
+        """Return where a model begins, (P,), whose new parameters are each of one
+        joint: at what each joint alone leads to, from theta.
+
+        A joint whose errors are large weighs little beside the others, and together
+        with them least squares ends before it has moved. All other joints follow their
+        logs meanwhile.
+        """
+        new = {*problem.settings.parameters} - {*last.settings.parameters}
+        of_joints = {
+            joint: new & problem.settings.acting_on(joint)
+            for joint in lone_joints(problem)
+        }
+        if new != set[str]().union(*of_joints.values()):
+            return theta
+        for joint in (joint for joint, own in of_joints.items() if own):
+            own = alone(problem, joint, theta)
+            end = self._refined(
+                make_likelihood(own),
+                theta,
+                settings,
+                step.changed(joint=joint, phase="at first"),
+                refine_from_afar,
+            )
+            reached = own.parameters.from_unit(end.point)
+            theta = np.where(problem.parameters.free, reached, theta)
+        return theta
 
     def _nearer(
         self,
@@ -327,18 +357,10 @@ class Ladder:
         errors = self.problem.output_errors(self.kept.theta[None])
         return not any(lasting(shown, shown.innovations(errors)[0]).values())
 
-    def _keep(
-        self,
-        problem: Problem,
-        estimate: Estimate,
-        step: Step,
-        *,
-        from_afar: bool = False,
-    ) -> None:
+    def _keep(self, problem: Problem, estimate: Estimate, step: Step) -> None:
         self.problem = problem
         self.kept = estimate
         self._step = step
-        self._from_afar = from_afar
 
     def _left_out_of(self, problem: Problem, end: Refinement) -> LeftOut:
         return predict_blocks(make_likelihood(problem), end)

@@ -33,7 +33,8 @@ def odd_logs(
         row, number = one.odd
         source = one.sources[row]
         name = settings.arm.joint_names[one.joint - 1]
-        value, by = one.numbers[row, number], 2 * one.sd[row, number]
+        value = one.numbers[row, number]
+        by = 2 * one.sd[row, number]
         about = _conditions(of[source], settings)
         found.append(
             log_finding(

@@ -126,10 +126,8 @@ def undriven_findings(logs: Sequence[Log], settings: FitSettings) -> list[LogFin
 
     Joints of stage 1 may move by themselves.
     """
-    names, driven = (
-        settings.arm.joint_names,
-        np.any([log.driven for log in logs], axis=0),
-    )
+    names = settings.arm.joint_names
+    driven = np.any([log.driven for log in logs], axis=0)
     idle = [joint for joint in settings.outputs if len(logs) and not driven[joint - 1]]
     hopeless = settings.stage == "hyd" and len(idle) == len(settings.outputs)
     level, kind = ("error", "nothing to fit") if hopeless else ("warning", "not driven")

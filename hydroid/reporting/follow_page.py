@@ -86,7 +86,8 @@ def _missed(group: Sequence[Missed], lead: float, arm: Arm) -> str:
     worst = max(group, key=lambda one: abs(one.wished - one.had))
     _, unit, factor = arm.joints[worst.joint].shown
     spans = [f"{one.from_s - lead:.2f} to {one.to_s - lead:.2f}" for one in group]
-    had, wished = two_digits(factor * worst.had), two_digits(factor * worst.wished)
+    had = two_digits(factor * worst.had)
+    wished = two_digits(factor * worst.wished)
     what = f"{arm.joint_names[worst.joint]}: {worst.limit}, at worst {had} {unit}/s where {wished} are wished"
     return f"{what}; {listed(spans, 3)} s into the path"
 

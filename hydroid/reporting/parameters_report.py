@@ -198,7 +198,8 @@ def in_words(finding: Finding, settings: FitSettings) -> Finding:
 def status(estimate: ParameterEstimate) -> str:
     """Say how well a parameter is known, in a few words; empty where its interval says
     it all."""
-    flag, source = estimate.flag, estimate.source
+    flag = estimate.flag
+    source = estimate.source
     plain = flag == Flag.IDENTIFIABLE or (
         source == Source.PRIOR and flag != Flag.NO_EFFECT
     )

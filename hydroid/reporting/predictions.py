@@ -94,7 +94,8 @@ def prediction_sections(
 def draw(run: str | Path, *, figures: bool = False) -> Path:
     """Draw the report of a finished run in its folder, from what it stores; return the
     page."""
-    folder, page = Path(run), fit_page(load_record(run))
+    folder = Path(run)
+    page = fit_page(load_record(run))
     page_file.write_page(page, folder)
     if figures:
         page_file.write_figures(page, folder / "figures")

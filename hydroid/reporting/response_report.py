@@ -22,9 +22,12 @@ from hydroid.words import number, two_digits
 
 MOTIONS = 8
 """logs that a page shows in motion"""
-SAMPLES, MOST_BINS, LEAST_BINS = 9000, 1000, 150
-"""parts of the curves of all responses of a page together, and of one of them: the page
-stays small"""
+SAMPLES = 9000
+"""parts of the curves of all responses of a page together: the page stays small"""
+MOST_BINS = 1000
+"""parts of one response's curves, at most"""
+LEAST_BINS = 150
+"""parts of one response's curves, at least"""
 FAR = 3.0
 """ranges of the measured angle beyond which a response that runs away is not drawn"""
 ALL = "joints"

@@ -54,7 +54,8 @@ class Tip:
         self._data = mujoco.MjData(self._model)
         self._site = self._model.site(arm.payload).id
         self._moving = np.array(joints) - 1
-        self._low, self._high = arm.lower, arm.upper
+        self._low = arm.lower
+        self._high = arm.upper
 
     def place(self, angle: Array) -> Array:
         """Return where the tip is [m], shape (3,), at angles of all joints [rad], shape
@@ -90,9 +91,12 @@ class Tip:
             if off < REACHED or damping > 1e3:
                 break
             tried = self._step(missing, pose, damping)
-            left = point - self.place(tried)
-            if float(np.linalg.norm(left)) < off:
-                pose, missing, off = tried, left, float(np.linalg.norm(left))
+            still_missing = point - self.place(tried)
+            distance = float(np.linalg.norm(still_missing))
+            if distance < off:
+                pose = tried
+                missing = still_missing
+                off = distance
                 damping = max(0.3 * damping, 1e-9)
             else:
                 damping *= 4.0
@@ -108,18 +112,18 @@ class Tip:
         next_pose = pose.copy()
         for _ in range(len(self._moving)):
             near = slopes[:, free]
-            step = near.T @ np.linalg.solve(
-                near @ near.T + damping * np.eye(3), missing
-            )
-            step *= min(
-                1.0, LARGEST_TURN / max(float(np.abs(step).max()), LARGEST_TURN)
-            )
-            beyond = (pose[free] + step > self._high[free]) | (
-                pose[free] + step < self._low[free]
-            )
-            beyond &= (pose[free] >= self._high[free]) | (pose[free] <= self._low[free])
+            damped = near @ near.T + damping * np.eye(3)
+            step = near.T @ np.linalg.solve(damped, missing)
+            largest = float(np.abs(step).max())
+            step *= min(1.0, LARGEST_TURN / max(largest, LARGEST_TURN))
+            before = pose[free]
+            after = before + step
+            low = self._low[free]
+            high = self._high[free]
+            beyond = (after > high) | (after < low)
+            beyond &= (before >= high) | (before <= low)
             next_pose[:] = pose
-            next_pose[free] = pose[free] + step
+            next_pose[free] = after
             if not beyond.any() or beyond.all():
                 break
             # a joint at its end cannot help: the others take its part

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from hydroid.log import Log, LogFinding, log_finding
 from hydroid.settings.fit import FitSettings
-from hydroid.settings.log import OTHER, log_file
+from hydroid.settings.log import OTHER
 
 if TYPE_CHECKING:
     from hydroid.fitting.agreement import Agreement
@@ -46,9 +46,8 @@ def odd_logs(
 
 def _conditions(log: Log, settings: FitSettings) -> str:
     """Return what is known of a log in brackets: its time of day, load and group."""
-    file = log_file(log.source)
     known = [log.clock] if log.clock else []
-    if load := settings.payloads.get(file.name):
+    if load := settings.payload_of(log.source):
         known.append(f"load {load:g} kg")
     if (group := settings.log.group_of(log.source)) != OTHER:
         known.append(f"group {group}")

@@ -16,6 +16,7 @@ from hydroid.commands.inputs import (
 )
 from hydroid.errors import SettingsError
 from hydroid.files import write_atomic
+from hydroid.words import listed
 
 if TYPE_CHECKING:
     from hydroid.arrays import Array
@@ -126,12 +127,20 @@ def _commands(plant: "Plant", at: str) -> "Array":
     import numpy as np
 
     given = np.zeros(len(plant.names))
+    driven = [plant.names[number - 1] for number in plant.joints]
+    named = set[str]()
     for part in names(at):
         joint, _, value = part.partition("=")
         if joint not in plant.names:
             raise SettingsError(
                 f"no joint {joint!r}", "--at", f"the arm has {', '.join(plant.names)}"
             )
+        if joint in named:
+            raise SettingsError(f"{joint} has two commands", "--at", "leave one out")
+        named.add(joint)
+        if joint not in driven:
+            what = f"{joint} takes no commands"
+            raise SettingsError(what, "--at", f"those of {listed(driven)} count")
         try:
             given[plant.names.index(joint)] = float(value)
         except ValueError:

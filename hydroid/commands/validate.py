@@ -23,7 +23,7 @@ from hydroid.findings import Finding
 from hydroid.identified_model import IdentifiedModel, warn_of_changes
 from hydroid.log import Log
 from hydroid.log.overlap import KNOWN, overlap
-from hydroid.progress import LOGGER
+from hydroid.progress import LOGGER, NOTE
 from hydroid.words import listed, numbered
 
 if TYPE_CHECKING:
@@ -96,6 +96,10 @@ def validate(
         predictions += [replace(p, fit=name) for p in tested[name].predictions]
     best = tested[next(iter(fits))]
     run = run_of(best.model)
+    if run and out is not None and set:
+        # with other settings it is another model than the run's
+        text = "note: what --set gives does not go into %s and its report"
+        LOGGER.log(NOTE, text, run)
     lines = verdict_lines(fits)
     steps = list[Finding]()
     if run:
@@ -169,6 +173,11 @@ def _test(
     predictions = list["Prediction"]()
     for log in logs:
         unseen = _unseen(log, known) if known else None
+        load = model.settings.payload_of(log.source)
+        if unseen and load:
+            # another day's log may have the name of one that was fitted
+            text = "note: %s: is taken to hold %g kg, by its name (payloads)"
+            LOGGER.log(NOTE, text, log.source, load)
         predictions.append(predicted(model, log, unseen))
     settings = model.settings
     if tolerance is not None:

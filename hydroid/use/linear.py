@@ -18,7 +18,7 @@ times what speed falls per load.
 """
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import mujoco
@@ -84,12 +84,14 @@ def linearise(plant: Plant, command: Array) -> LinearArm:
     are held [%], (J,).
 
     Raises:
-        SettingsError: a joint stands at a command of 0, where a dead band has no slope.
+        SettingsError: a command is beyond 100 %, or within a dead band, which has no
+            slope.
     """
     columns: Index = np.array(plant.joints) - 1
     joints: list[int] = columns.tolist()
     names = tuple(plant.names[joint] for joint in joints)
-    _refuse_resting(names, command[columns])
+    for joint in joints:
+        _refuse_without_slope(plant, joint, command)
     valves = [_valve(plant, joint, command) for joint in joints]
     oils = [_oil(plant, joint, command) for joint in joints]
     gain, turn, speed = _slopes(plant, command, columns)
@@ -143,12 +145,23 @@ def linearise(plant: Plant, command: Array) -> LinearArm:
     )
 
 
-def _refuse_resting(names: Sequence[str], command: Array) -> None:
-    """Refuse commands of 0 among those of the named joints [%]."""
-    resting = [names[k] for k in np.flatnonzero(command == 0.0).tolist()]
-    if resting:
-        what = f"{', '.join(resting)} at a command of 0 has a dead band, and no slope"
+def _refuse_without_slope(plant: Plant, joint: int, command: Array) -> None:
+    """Refuse the command of a joint (0-based) that is none, or about which its speed
+    has no slope."""
+    name = plant.names[joint]
+    value = float(command[joint])
+    if value == 0.0:
+        what = f"{name} at a command of 0 has a dead band, and no slope"
         hint = "name a command of every joint, such as boom=30"
+        raise SettingsError(what, "--at", hint)
+    # NaN is not within them either
+    if not abs(value) <= 100.0:
+        what = f"the command of {name} is {value:g} %"
+        raise SettingsError(what, "--at", "allowed are -100 to 100 %")
+    band = _side(plant, joint, command)["dead_band"]
+    if abs(value) - NEAR_COMMAND < band:
+        what = f"{name} at {value:g} % is within its dead band, which has no slope"
+        hint = f"beyond {band + NEAR_COMMAND:.3g} % it moves that way"
         raise SettingsError(what, "--at", hint)
 
 
@@ -204,8 +217,12 @@ def _slopes(plant: Plant, command: Array, columns: Index) -> tuple[Array, Array,
     for k, joint in enumerate(columns.tolist()):
         commands[[4 * k, 4 * k + 1], joint] += [NEAR_COMMAND, -NEAR_COMMAND]
         poses[[4 * k + 2, 4 * k + 3], joint] += [NEAR_ANGLE, -NEAR_ANGLE]
+    # at full command the slope is that from below
+    commands = commands.clip(-100.0, 100.0)
+    own = np.arange(count)
+    apart = commands[4 * own, columns] - commands[4 * own + 1, columns]
     speeds = plant.steady().speeds(commands, poses)[:, columns]
-    gain = (speeds[0:-1:4] - speeds[1:-1:4]).T / (2.0 * NEAR_COMMAND)
+    gain = (speeds[0:-1:4] - speeds[1:-1:4]).T / apart
     turn = (speeds[2:-1:4] - speeds[3:-1:4]).T / (2.0 * NEAR_ANGLE)
     return gain, turn, speeds[-1]
 

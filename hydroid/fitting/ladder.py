@@ -108,6 +108,8 @@ class Ladder:
         self.kept = min(estimates.values(), key=lambda e: e.rms if e.usable else np.inf)
         self._watch, self._checkpoints, self._late = watch, checkpoints, False
         self._step = step_of(self.kept.name)
+        # whether output errors led near the kept estimate, before its innovations
+        self._from_afar = False
 
     def climb(self, whole: Problem) -> None:
         """Refine the estimate with each model and term that the settings of a fit's
@@ -141,7 +143,10 @@ class Ladder:
         if climbs:
             kept = self.kept
             likelihood = make_likelihood(self.problem)
-            last = self._refined(likelihood, kept.theta, refinement, self._step)
+            # a term that was added to an estimate began with the drift that its lack
+            # had left
+            how = refine if self._from_afar else refine_from_afar
+            last = self._refined(likelihood, kept.theta, refinement, self._step, how)
             new = self._measured(self.problem, last, self._step)
             self.kept = self.estimates[kept.name] = replace(new, gained=kept.gained)
         if settings.joint_refinement:
@@ -182,34 +187,36 @@ class Ladder:
         if if_better and (self._late or last.leaves_noise(start.theta)):
             return
         own = whole.varied(whole.settings.of_estimate(step.estimate))
+        other_model = own.settings.quasi_static != last.settings.quasi_static
+        # what a search, or another model, ended at may be far from an optimum
+        far = not if_better or other_model or bool(_new_curves(own, last))
         if begun is None:
             begun = _begun(own, last, start.theta)
             begun = self._begun_alone(own, last, begun, settings, step)
         likelihood = make_likelihood(own)
-        if own.settings.quasi_static != last.settings.quasi_static:
+        if other_model:
             # there is nothing for a model that is slow to simulate
             if self._is_white():
                 return
             begun = self._nearer(likelihood, begun, settings, step)
             if own.rms(own.output_errors(begun[None]))[0] > start.rms:
                 return
-        # what the model below, or a search, left for drift may be what is new here
+        how = refine_from_afar if far else refine
         on_the_way = step.changed(phase="on the way")
-        result = self._refined(
-            likelihood, begun, settings, on_the_way, refine_from_afar
-        )
+        result = self._refined(likelihood, begun, settings, on_the_way, how)
         if self._late and if_better:
             return
         new = self._measured(own, result, step)
         if not if_better:
-            self._keep(own, new, step)
+            self._keep(own, new, step, from_afar=far)
             return
         without = self._left_out_of(last, self.refinements[start.name])
         with_it = self._left_out_of(own, result)
         gained = gain(with_it, without)
         self.estimates[step.estimate] = new = replace(new, gained=gained)
         if not self._late and is_clear(*gained):
-            self._keep(own, new, step)
+            far = far or (self._from_afar and bool(_new_of_joints(own, last)))
+            self._keep(own, new, step, from_afar=far)
 
     def _begun_alone(
         self,
@@ -226,22 +233,10 @@ class Ladder:
         with them least squares ends before it has moved. All other joints follow their
         logs meanwhile.
         """
-        new = {*problem.settings.parameters} - {*last.settings.parameters}
-        of_joints = {
-            joint: new & problem.settings.acting_on(joint)
-            for joint in lone_joints(problem)
-        }
-        if new != set[str]().union(*of_joints.values()):
-            return theta
-        for joint in (joint for joint, own in of_joints.items() if own):
+        for joint in _new_of_joints(problem, last):
             own = alone(problem, joint, theta)
-            end = self._refined(
-                make_likelihood(own),
-                theta,
-                settings,
-                step.changed(joint=joint, phase="at first"),
-                refine_from_afar,
-            )
+            lone_step = step.changed(joint=joint, phase="at first")
+            end = self._refined(make_likelihood(own), theta, settings, lone_step)
             reached = own.parameters.from_unit(end.point)
             theta = np.where(problem.parameters.free, reached, theta)
         return theta
@@ -357,10 +352,18 @@ class Ladder:
         errors = self.problem.output_errors(self.kept.theta[None])
         return not any(lasting(shown, shown.innovations(errors)[0]).values())
 
-    def _keep(self, problem: Problem, estimate: Estimate, step: Step) -> None:
+    def _keep(
+        self,
+        problem: Problem,
+        estimate: Estimate,
+        step: Step,
+        *,
+        from_afar: bool = False,
+    ) -> None:
         self.problem = problem
         self.kept = estimate
         self._step = step
+        self._from_afar = from_afar
 
     def _left_out_of(self, problem: Problem, end: Refinement) -> LeftOut:
         return predict_blocks(make_likelihood(problem), end)
@@ -399,6 +402,16 @@ def _begun(problem: Problem, last: Problem, theta: Array) -> Array:
     for joint in _new_curves(problem, last):
         begun = by_speeds(problem, joint, begun)
     return begun
+
+
+def _new_of_joints(problem: Problem, last: Problem) -> list[int]:
+    """The joints, from 1, that can be fitted alone and have new parameters, if all new
+    ones are each of one joint."""
+    new = {*problem.settings.parameters} - {*last.settings.parameters}
+    own = {j: new & problem.settings.acting_on(j) for j in lone_joints(problem)}
+    if new != set[str]().union(*own.values()):
+        return []
+    return [joint for joint, names in own.items() if names]
 
 
 def _new_curves(problem: Problem, last: Problem) -> list[int]:

@@ -7,7 +7,7 @@ is shows long before least squares has converged, so that ends early on the way
 (`FIRM`). What is kept at the end is refined to the tolerance of the settings.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Protocol
 
@@ -190,9 +190,11 @@ class Ladder:
         other_model = own.settings.quasi_static != last.settings.quasi_static
         # what a search, or another model, ended at may be far from an optimum
         far = not if_better or other_model or bool(_new_curves(own, last))
+        renewed = list[int]()
         if begun is None:
             begun = _begun(own, last, start.theta)
-            begun = self._begun_alone(own, last, begun, settings, step)
+            renewed = _renewed(own, last, begun)
+            begun = self._each_alone(own, renewed, begun, settings, step)
         likelihood = make_likelihood(own)
         if other_model:
             # there is nothing for a model that is slow to simulate
@@ -215,25 +217,24 @@ class Ladder:
         gained = gain(with_it, without)
         self.estimates[step.estimate] = new = replace(new, gained=gained)
         if not self._late and is_clear(*gained):
-            far = far or (self._from_afar and bool(_new_of_joints(own, last)))
-            self._keep(own, new, step, from_afar=far)
+            self._keep(
+                own, new, step, from_afar=far or (self._from_afar and bool(renewed))
+            )
 
-    def _begun_alone(
+    def _each_alone(
         self,
         problem: Problem,
-        last: Problem,
+        joints: Sequence[int],
         theta: Array,
         settings: RefinementSettings,
         step: Step,
     ) -> Array:
-        """Return where a model begins, (P,), whose new parameters are each of one
-        joint: at what each joint alone leads to, from theta.
+        """Return what some joints, each alone, lead to from theta, (P,).
 
         A joint whose errors are large weighs little beside the others, and together
-        with them least squares ends before it has moved. All other joints follow their
-        logs meanwhile.
+        with them least squares ends before it has moved.
         """
-        for joint in _new_of_joints(problem, last):
+        for joint in joints:
             own = alone(problem, joint, theta)
             lone_step = step.changed(joint=joint, phase="at first")
             end = self._refined(make_likelihood(own), theta, settings, lone_step)
@@ -404,12 +405,17 @@ def _begun(problem: Problem, last: Problem, theta: Array) -> Array:
     return begun
 
 
-def _new_of_joints(problem: Problem, last: Problem) -> list[int]:
-    """The joints, from 1, that can be fitted alone and have new parameters, if all new
-    ones are each of one joint."""
+def _renewed(problem: Problem, last: Problem, theta: Array) -> list[int]:
+    """The joints, from 1, that begin alone: all that is new in the model is of single
+    joints, and of these.
+
+    None where joints share a pump: what those that follow their logs take from it is
+    not known well enough.
+    """
     new = {*problem.settings.parameters} - {*last.settings.parameters}
     own = {j: new & problem.settings.acting_on(j) for j in lone_joints(problem)}
-    if new != set[str]().union(*own.values()):
+    pump_flow = problem.bindings.candidates(theta[None]).joints.pump_flow
+    if np.isfinite(pump_flow).any() or new != set[str]().union(*own.values()):
         return []
     return [joint for joint, names in own.items() if names]
 

@@ -65,6 +65,7 @@ def response(plant: Plant, change: dict[str, float], seconds: float) -> np.ndarr
             {
                 "oil_frequency": 3.0,
                 "oil_damping": 0.3,
+                "oil_damping_share": 0.6,
                 "pump_flow": 5.0,
                 "pump_droop": 100.0,
             },

@@ -29,8 +29,8 @@ from hydroid.log import Log
 from hydroid.parallel.cluster import open_workers
 from hydroid.progress import LOGGER, NOTE
 from hydroid.quantity_table import MECHANICAL
+from hydroid.settings.arm import TIP_LOAD
 from hydroid.settings.fit import FitSettings
-from hydroid.settings.log import log_file
 from hydroid.settings.parameters import nominal_value
 from hydroid.settings.problem import ParameterSettings
 from hydroid.units import seconds
@@ -344,7 +344,8 @@ def adapt(
 
     Use it after a change of the machine: a slower engine, a colder day, another tool.
     For a load of known mass, set the payload of the logs instead: --set
-    'payloads={LOADED.csv: 250}'. Each freed parameter is tested on parts of the logs
+    'payloads={LOADED.csv: 250}'. A load at the tip that nobody has weighed is found like
+    the other parameters, under the name tip_load. Each freed parameter is tested on parts of the logs
     that are left out. The result is a run that every command takes.
 
     Example: hydroid adapt LOADED.csv --fit runs/hyd --free P_flow,P_droop
@@ -354,9 +355,9 @@ def adapt(
 
     Args:
         logs (LOG): The new logs.
-        free (NAME,NAME): Parameters to be freed [default: masses, pump and effects of
-            the logs' groups, one after the other, as long as the error falls on every
-            part of the logs left out].
+        free (NAME,NAME): Parameters to be freed [default: masses, pump, effects of
+            the logs' groups and tip_load, one after the other, as long as the error
+            falls on every part of the logs left out].
         out (DIR): Run folder [default of the command line: runs/adapt].
         set (KEY=VALUE): Replace a setting of the fit, such as
             refinement.iterations=100.
@@ -368,11 +369,14 @@ def adapt(
     model = open_model(fit, overrides=set)
     read = read_logs(logs, model.settings, repair=repair)
     if set:
-        stray = model.settings.payloads.keys() - _own_payloads(fit, read)
+        stray = model.settings.payloads.keys() - _own_payloads(
+            fit, model.settings, read
+        )
         if stray:
             raise SettingsError("is none of the logs", f"payloads.{min(stray)}")
     refuse_undriven(read, model.settings)
     from hydroid.advice.adaptation import adapted, load_findings, steps
+    from hydroid.advice.loads import asked_loads, load_finding
     from hydroid.reporting.verdict_table import left_out_table
 
     with Progress() as progress:
@@ -389,16 +393,22 @@ def adapt(
     named = [step | {"parameter": step["parameter"] or "none"} for step in path]
     title = "Parameters freed one after another"
     table = left_out_table(title, {"parameter": "freed"}, named, settings.arm)
-    of_loads = load_findings(settings)
+    # where a load at the tip was tried too, a mass that was freed says more than it
+    of_loads = load_findings(settings) if free else ()
+    if TIP_LOAD in chosen:
+        of_loads = load_finding(asked_loads(model, read))
     findings = [*result.content["findings"], *map(asdict, of_loads)]
     content = {**result.content, "steps": path, "findings": findings}
     lines = [table, *map(str, of_loads), *result.lines]
     return replace(result, lines=lines, content=content)
 
 
-def _own_payloads(fit: "ModelSource", logs: Sequence[Log]) -> builtins.set[str]:
-    """Return the logs that may have a payload: these, and those of the fit itself."""
+def _own_payloads(
+    fit: "ModelSource", settings: FitSettings, logs: Sequence[Log]
+) -> builtins.set[str | None]:
+    """Return the names of logs that may have a payload: these, and those of the fit
+    itself."""
     return {
         *open_model(fit).settings.payloads,
-        *(log_file(log.source).name for log in logs),
+        *(settings.payload_name(log.source) for log in logs),
     }

@@ -39,12 +39,14 @@ def correlations(covariance: Covariance) -> Array:
 def correlation_table(summary: FitSummary) -> Table | None:
     """Return the correlations as a table, for scripts; None: the summary has no
     covariance."""
-    known = summary.covariance
-    if known is None or not known.parameters:
+    covariance = summary.covariance
+    if covariance is None or not covariance.parameters:
         return None
-    rows = zip(known.parameters, correlations(known).tolist(), strict=True)
+    rows = zip(covariance.parameters, correlations(covariance).tolist(), strict=True)
     return Table(
-        "", ("symbol", *known.parameters), tuple((name, *row) for name, row in rows)
+        "",
+        ("symbol", *covariance.parameters),
+        tuple((name, *row) for name, row in rows),
     )
 
 
@@ -53,12 +55,12 @@ def correlation_section(settings: FitSettings, summary: FitSummary) -> Section |
 
     None where fewer than two vary.
     """
-    known = summary.covariance
-    if known is None or len(known.parameters) < 2:
+    covariance = summary.covariance
+    if covariance is None or len(covariance.parameters) < 2:
         return None
-    order = _by_joint(settings, known.parameters)
-    matrix = correlations(known)[np.ix_(order, order)]
-    names = tuple(known.parameters[i] for i in order)
+    order = _by_joint(settings, covariance.parameters)
+    matrix = correlations(covariance)[np.ix_(order, order)]
+    names = tuple(covariance.parameters[i] for i in order)
     pairs = strongest(matrix, names)
     points = tuple(
         f"{named(settings, first)} and {named(settings, second)}: {_signed(value)}"

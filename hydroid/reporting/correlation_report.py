@@ -42,12 +42,10 @@ def correlation_table(summary: FitSummary) -> Table | None:
     covariance = summary.covariance
     if covariance is None or not covariance.parameters:
         return None
-    rows = zip(covariance.parameters, correlations(covariance).tolist(), strict=True)
-    return Table(
-        "",
-        ("symbol", *covariance.parameters),
-        tuple((name, *row) for name, row in rows),
-    )
+    names = covariance.parameters
+    matrix = correlations(covariance).tolist()
+    rows = tuple((name, *row) for name, row in zip(names, matrix, strict=True))
+    return Table("", ("symbol", *names), rows)
 
 
 def correlation_section(settings: FitSettings, summary: FitSummary) -> Section | None:
@@ -94,7 +92,9 @@ def correlation_map(matrix: Array, names: tuple[str, ...]) -> Chart:
     rows, columns = np.nonzero(np.tril(np.abs(matrix) >= FAINT))
     values = np.clip(matrix[rows, columns], -1.0, 1.0)
     cells = Mark("cells", columns.astype(float), rows.astype(float), values)
-    height = 60 + min(ROW * len(names), LARGEST) + (60 if len(names) <= 40 else 0)
+    height = 60 + min(ROW * len(names), LARGEST)
+    if len(names) <= 40:
+        height += 60
     return Chart((Panel("", "", (cells,), height=height, rows=names, columns=names),))
 
 
@@ -104,8 +104,10 @@ def _by_joint(settings: FitSettings, names: tuple[str, ...]) -> list[int]:
     """
 
     def joint(i: int) -> int:
-        own = settings.parameters.get(names[i])
-        return own.joints[0] if own is not None and own.joints else 0
+        parameter = settings.parameters.get(names[i])
+        if parameter is None or not parameter.joints:
+            return 0
+        return parameter.joints[0]
 
     return sorted(range(len(names)), key=joint)
 

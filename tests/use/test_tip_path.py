@@ -9,7 +9,7 @@ from made_models import EARLY, EARLY_SETTINGS, made_model
 
 import hydroid
 from hydroid.errors import LogError
-from hydroid.identified_model import IdentifiedModel
+from hydroid.identified_model import IdentifiedModel, identified
 from hydroid.use.tip_path import TipKinematics
 
 

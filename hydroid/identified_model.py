@@ -3,13 +3,15 @@ or nominal values."""
 
 import hashlib
 import json
+import math
 import os
 from collections.abc import Mapping
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 from hydroid.arrays import Array, record
-from hydroid.errors import RunError
+from hydroid.errors import RunError, SettingsError
 from hydroid.estimate import (
     DESCRIPTION,
     NAME,
@@ -25,10 +27,12 @@ from hydroid.files import (
     write_atomic,
     yaml_text,
 )
-from hydroid.progress import LOGGER
+from hydroid.progress import LOGGER, NOTE
+from hydroid.quantity_table import TARGETS
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load
 from hydroid.settings.problem import ParameterSettings
+from hydroid.words import listed
 
 CONFIG = "config.yaml"
 ARM = "arm.yaml"
@@ -116,11 +120,47 @@ def load_identified(
         RunError: the folder holds no estimate, or a fit's settings are not beside its
             estimate.
         SettingsError: a file that cannot be read, a parameter that is unknown,
-            or missing and not `nominal`.
+            or missing and not `nominal`, or an override that fixes one at another value.
     """
     if source is not None and config is None:
         warn_of_changes(Path(source))
-    return read_identified(source, config, overrides, nominal=nominal)
+    model = read_identified(source, config, overrides, nominal=nominal)
+    if source is not None:
+        _refuse_other_values(model, overrides or {})
+        _tell_idle(model.settings, overrides or {})
+    return model
+
+
+def _refuse_other_values(model: IdentifiedModel, overrides: Mapping[str, Any]) -> None:
+    """Refuse overrides that fix parameters: their values are the estimate's."""
+    for key in overrides:
+        group, _, rest = key.partition(".")
+        if group != "parameters":
+            continue
+        for name, value in model.values.items():
+            fixed = model.settings.parameters[name].fixed
+            is_meant = rest in ("", name) or rest.startswith(f"{name}.")
+            if fixed is None or not is_meant or math.isclose(fixed, value):
+                continue
+            what = (
+                f"{name} is fixed at {fixed:g}, but the estimate's value is {value:g}"
+            )
+            hint = "fit again with it, or give a YAML file of values with --fit"
+            raise SettingsError(what, f"--set {key}", hint)
+
+
+def _tell_idle(settings: FitSettings, overrides: Mapping[str, Any]) -> None:
+    """Say which overrides of `hydraulics` change nothing, because parameters set these
+    quantities."""
+    for key in overrides:
+        group, _, quantity = key.partition(".")
+        if group != "hydraulics":
+            continue
+        setting = [settings.parameters_of(name) for name in TARGETS.get(quantity, ())]
+        if setting and all(setting):
+            names = listed(sorted({*chain.from_iterable(setting)}), 3)
+            text = "note: %s changes nothing: the estimate has %s"
+            LOGGER.log(NOTE, text, f"--set {key}", names)
 
 
 def read_identified(

@@ -6,9 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from made_logs import TRUTH
 
 import hydroid
+from hydroid import load_settings
 from hydroid.errors import RunError, SettingsError
 from hydroid.estimate import FitSummary, ParameterEstimate, write_estimate
 from hydroid.identified_model import load_identified, write_settings
@@ -67,6 +69,44 @@ def test_values_that_cannot_be_used_are_refused(tmp_path: Path, text: str, says:
     (tmp_path / "p.yaml").write_text(text)
     with pytest.raises(SettingsError, match=says):
         load_identified(tmp_path / "p.yaml")
+
+
+@pytest.mark.parametrize("given", ["parameters.D.fixed", "parameters.D", "parameters"])
+def test_an_override_cannot_give_a_parameter_another_value_than_the_estimate(
+    tmp_path: Path, given: str
+):
+    """It was the estimate's that counted, in silence."""
+    folder = run_folder(tmp_path / "run", "refined")
+    value = load_identified(folder).values["D"]
+    parameters = yaml.safe_load((folder / "config.yaml").read_text())["parameters"]
+    for wrong in (value, value + 1.0):
+        parameters["D"]["fixed"] = wrong
+        whole = {"parameters": parameters, "parameters.D": parameters["D"]}
+        changes = {given: whole.get(given, wrong)}
+        if wrong == value:
+            assert load_identified(folder, overrides=changes).values["D"] == value
+            continue
+        with pytest.raises(SettingsError, match=r"D is fixed at .*estimate's value is"):
+            load_identified(folder, overrides=changes)
+
+
+def test_an_override_of_what_the_estimate_sets_is_said_to_change_nothing(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+):
+    values = {"dead": 10.0, "one": 2.0}
+    quantities = {
+        "dead": {"quantity": "dead_band", "bounds": [0, 50]},
+        "one": {"quantity": "overlap", "joints": [2], "bounds": [0, 50]},
+    }
+    settings = load_settings("fit-hyd", {"parameters": quantities})
+    write_settings(tmp_path, settings)
+    (tmp_path / "values.yaml").write_text(yaml.safe_dump(values))
+    caplog.set_level("INFO", "hydroid")
+    for name, says in (("dead_band", True), ("dead_band_a", True), ("overlap", False)):
+        caplog.clear()
+        load_identified(tmp_path / "values.yaml", None, {f"hydraulics.{name}": 1.0})
+        text = f"--set hydraulics.{name} changes nothing: the estimate has dead"
+        assert (text in caplog.text) == says
 
 
 def test_a_folder_without_an_estimate_is_refused(tmp_path: Path):

@@ -23,7 +23,6 @@ from hydroid.problem.problem import Problem
 from hydroid.progress import Progress
 from hydroid.settings.arm import TIP_LOAD
 from hydroid.settings.fit import FitSettings
-from hydroid.settings.log import log_file
 from hydroid.settings.problem import ParameterSettings
 from hydroid.settings.search import MultistartSettings, RefinementSettings
 
@@ -57,7 +56,7 @@ def adapted(
             if parameter.has_prior:
                 changes["nominal"] = value
         parameters[name] = parameter.changed(changes)
-    names = {log_file(log.source).name for log in logs}
+    names = {settings.payload_name(log.source) for log in logs}
     kept = {name: mass for name, mass in settings.payloads.items() if name in names}
     kind = settings.simulation.model
     return settings.changed(

@@ -16,7 +16,7 @@ import typer
 from typer.core import TyperGroup
 
 import hydroid
-from hydroid.commands.console import log_lines, program, show, show_error
+from hydroid.commands.console import log_lines, program, show, show_error, tell
 from hydroid.commands.progress import VISIBLE, listen, stopped
 from hydroid.errors import HydroidError, RunError, Stopped
 
@@ -190,7 +190,7 @@ def main() -> None:
         code = _ending(error)
     if code == STOPPED:
         rest = "" if kept is None else f"; {kept or 'nothing was written'}"
-        typer.echo(f"hydroid: stopped{rest}", err=True)
+        tell(f"hydroid: stopped{rest}")
     sys.exit(code)
 
 
@@ -215,7 +215,9 @@ def _ending(error: Exception) -> int:
         return 2
     if isinstance(error, OSError) and error.errno in SYSTEM:
         what = f"cannot be used ({error.strerror})"
-        show_error(RunError(what, error.filename or "the system"))
+        where = error.filename or "a temporary file, or numba's cache,"
+        hint = "" if error.filename else "see TMPDIR and NUMBA_CACHE_DIR"
+        show_error(RunError(what, where, hint))
         return 2
     # what the interrupt met may have made another error of it
     if stopped():

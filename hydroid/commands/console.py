@@ -6,8 +6,8 @@ import logging
 import os
 import shlex
 import sys
-from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Generator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from shutil import which
@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import typer
 
-from hydroid.errors import HydroidError
+from hydroid.errors import HydroidError, RunError
 from hydroid.files import Plain, fill_template
 from hydroid.progress import logging_to
 from hydroid.words import printable
@@ -96,9 +96,27 @@ def written(report: "Page | Mapping[str, Table]", out: str | Path | None) -> lis
 def show(result: Printed, *, as_json: bool, verbose: bool = False) -> None:
     """Print a result: as JSON, or as tables and lines, with its details if
     `verbose`."""
-    if as_json:
-        _print_json(result.plain())
-        return
+    with _printing():
+        if as_json:
+            _print_json(result.plain())
+        else:
+            _print_lines(result, verbose=verbose)
+
+
+@contextmanager
+def _printing() -> Generator[None]:
+    """Turn what keeps the output from being written, such as a full disk,
+    into a RunError; a reader that has left is none."""
+    try:
+        yield
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        what = f"cannot be written ({error.strerror})"
+        raise RunError(what, "the output") from None
+
+
+def _print_lines(result: Printed, *, verbose: bool) -> None:
     details = result.details if verbose else ()
     for line in (*details, *result.lines):
         if not isinstance(line, str):
@@ -108,6 +126,13 @@ def show(result: Printed, *, as_json: bool, verbose: bool = False) -> None:
             # a command to be pasted: as this shell finds it
             line = line.replace("hydroid", program(), 1)
         typer.echo(printable(line))
+
+
+def tell(line: str) -> None:
+    """Print a line on stderr; where it cannot be written, as on a full disk,
+    the work goes on without it."""
+    with suppress(OSError):
+        typer.echo(printable(line), err=True)
 
 
 def program() -> str:
@@ -139,10 +164,11 @@ def show_error(error: Any) -> None:
             "usage" if is_usage else type(error).__name__.removesuffix("Error").lower()
         )
         parts = {"kind": kind, "what": what, "where": where, "hint": error.hint}
-        _print_json({"error": parts})
-        return
+        with suppress(OSError):
+            _print_json({"error": parts})
+            return
     text = str(type(error)(what, where, error.hint))
-    typer.echo(printable(f"hydroid: {' '.join(text.split())}"), err=True)
+    tell(f"hydroid: {' '.join(text.split())}")
 
 
 def _is_given(option: str) -> bool:
@@ -173,4 +199,4 @@ class _Terminal(logging.Handler):
     is drawn."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        typer.echo(printable(self.format(record)), err=True)
+        tell(self.format(record))

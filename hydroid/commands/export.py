@@ -16,6 +16,8 @@ from hydroid.commands.inputs import (
 )
 from hydroid.errors import SettingsError
 from hydroid.files import write_atomic
+from hydroid.identified_model import IdentifiedModel
+from hydroid.words import listed
 
 if TYPE_CHECKING:
     from hydroid.arrays import Array
@@ -70,21 +72,18 @@ def export(
             covariance to draw from.
     """
     if to not in KINDS:
-        raise SettingsError(
-            f"{to!r} is no kind of export", "--to", f"choose {', '.join(KINDS)}"
-        )
+        hint = f"choose {', '.join(KINDS)}"
+        raise SettingsError(f"{to!r} is no kind of export", "--to", hint)
     if to == "urdf" and robot is None:
-        raise SettingsError(
-            "needs your robot's file", "--to urdf", "name it: --robot robot.urdf"
-        )
+        hint = "name it: --robot robot.urdf"
+        raise SettingsError("needs your robot's file", "--to urdf", hint)
     folder = Path("export" if out is None else out)
     model = open_model(fit, overrides=set)
     if to == "parameters":
-        from hydroid.use.draws import draw as drawn
         from hydroid.use.tables import parameter_files
 
-        found = drawn(model, draws, seed, getattr(fit, "problem", None))
-        return _written(parameter_files(found), folder, write=out is not None)
+        machines = _drawn(fit, model, draws, seed)
+        return _written(parameter_files(machines), folder, write=out is not None)
     from hydroid.plant import Plant
 
     plant = Plant(model)
@@ -93,9 +92,9 @@ def export(
     if to == "mjcf":
         from hydroid.use.robot_files import write_moving
 
-        files = (
-            [] if out is None else [str(file) for file in write_moving(plant, folder)]
-        )
+        files = list[str]()
+        if out is not None:
+            files += map(str, write_moving(plant, folder))
         return Result(files, {"files": files}, files)
     result = _written(_files(plant, to, robot, at), folder, write=out is not None)
     return _with_page(result, plant, at, out) if to == "linear" else result
@@ -149,28 +148,37 @@ def _commands(plant: "Plant", at: str) -> "Array":
     """Return the commands [%] that a text such as boom=30,arm=-40 says, (J,)."""
     import numpy as np
 
-    given = np.zeros(len(plant.names))
+    commands = np.zeros(len(plant.names))
+    driven = [plant.names[number - 1] for number in plant.joints]
+    named = set[str]()
     for part in names(at):
         joint, _, value = part.partition("=")
         if joint not in plant.names:
-            raise SettingsError(
-                f"no joint {joint!r}", "--at", f"the arm has {', '.join(plant.names)}"
-            )
+            hint = f"the arm has {', '.join(plant.names)}"
+            raise SettingsError(f"no joint {joint!r}", "--at", hint)
+        if joint in named:
+            raise SettingsError(f"{joint} has two commands", "--at", "leave one out")
+        named.add(joint)
+        if joint not in driven:
+            what = f"{joint} takes no commands"
+            raise SettingsError(what, "--at", f"those of {listed(driven)} count")
         try:
-            given[plant.names.index(joint)] = float(value)
+            commands[plant.names.index(joint)] = float(value)
         except ValueError:
-            raise SettingsError(
-                f"{part!r} is no command", "--at", "write boom=30,arm=-40 in %"
-            ) from None
-    return given
+            hint = "write boom=30,arm=-40 in %"
+            raise SettingsError(f"{part!r} is no command", "--at", hint) from None
+    return commands
 
 
 def _written(
     files: Mapping[str, str] | Mapping[str, str | bytes], folder: Path, *, write: bool
 ) -> Result[list[str]]:
-    paths = [str(folder / name) for name in files] if write else []
-    for path, content in zip(paths, files.values(), strict=False):
-        write_atomic(Path(path), content)
+    """Write files by name, where they are to be written; return their paths."""
+    paths = list[str]()
+    if write:
+        for name, content in files.items():
+            write_atomic(folder / name, content)
+            paths.append(str(folder / name))
     return Result(paths, {"files": paths}, paths)
 
 
@@ -189,6 +197,12 @@ def draw(fit: ModelSource, n: int, seed: int = 0) -> "Draws":
         RunError: the fit holds no covariance of its parameters.
         SettingsError: n is below 1.
     """
-    from hydroid.use.draws import draw as drawn
+    return _drawn(fit, open_model(fit), n, seed)
 
-    return drawn(open_model(fit), n, seed, getattr(fit, "problem", None))
+
+def _drawn(fit: ModelSource, model: IdentifiedModel, n: int, seed: int) -> "Draws":
+    """Return n machines drawn from the model of a fit."""
+    from hydroid.use.draws import draw as draw_machines
+
+    # the result of a fit has its problem with it; a run folder's is made from its logs
+    return draw_machines(model, n, seed, getattr(fit, "problem", None))

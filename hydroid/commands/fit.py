@@ -16,6 +16,7 @@ from hydroid.estimate import NAME, FitSummary
 from hydroid.identified_model import IdentifiedModel
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.log import OTHER, log_file
+from hydroid.words import listed
 
 if TYPE_CHECKING:
     import pandas
@@ -175,10 +176,10 @@ def fit(
             diverged.
     """
     read = read_logs(logs, settings)
-    names = [log_file(log.source).name for log in read]
-    _refuse_stray_payloads(settings, names)
+    files = [*dict.fromkeys(log_file(log.source) for log in read)]
+    _refuse_wrong_payloads(settings, files)
     refuse_undriven(read, settings)
-    _refuse_empty_groups(settings, names)
+    _refuse_empty_groups(settings, files)
     from hydroid.fitting.fit import fit as run_fit
     from hydroid.problem.problem import Problem
     from hydroid.run.folder import RunFolder
@@ -201,20 +202,25 @@ def fit(
     return result
 
 
-def _refuse_stray_payloads(settings: FitSettings, names: Sequence[str]) -> None:
-    """Refuse a payload of no log: misspelt, it would be left out silently."""
-    stray = sorted(set(settings.payloads) - set(names))
-    if stray:
-        hint = f"logs: {', '.join(names)}"
-        raise SettingsError("is none of the logs", f"payloads.{stray[0]}", hint)
+def _refuse_wrong_payloads(settings: FitSettings, files: Sequence[Path]) -> None:
+    """Refuse a payload of no log, which would be left out silently if it is misspelt,
+    and one of several, which may have different ones."""
+    for name in sorted(settings.payloads):
+        held = [str(f) for f in files if settings.payload_name(str(f)) == name]
+        if not held:
+            hint = f"logs: {', '.join(file.name for file in files)}"
+            raise SettingsError("is none of the logs", f"payloads.{name}", hint)
+        if len(held) > 1:
+            hint = "write one for each, with as much of its path as tells them apart"
+            raise SettingsError(f"is {listed(held)}", f"payloads.{name}", hint)
 
 
-def _refuse_empty_groups(settings: FitSettings, names: Sequence[str]) -> None:
+def _refuse_empty_groups(settings: FitSettings, files: Sequence[Path]) -> None:
     """Refuse to estimate the effect of a group that no log is in."""
-    groups = {None, OTHER, *map(settings.log.group_of, names)}
+    groups = {None, OTHER, *(settings.log.group_of(str(file)) for file in files)}
     for parameter in settings.parameters.values():
         if parameter.fixed is None and parameter.per not in groups:
-            hint = f"logs: {', '.join(names)}"
+            hint = f"logs: {', '.join(map(str, files))}"
             raise SettingsError(
                 "none of the logs is in it", f"log.groups.{parameter.per}", hint
             )

@@ -12,8 +12,7 @@ from contextvars import ContextVar
 from types import FrameType
 from typing import TYPE_CHECKING, Any, Self
 
-import typer
-
+from hydroid.commands.console import tell
 from hydroid.files import NOTICES
 from hydroid.words import printable
 
@@ -89,7 +88,7 @@ class Progress:
             self._move_bar(line, done, total)
         elif time.monotonic() - self._shown > BETWEEN_LINES:
             self._shown = time.monotonic()
-            typer.echo(line, err=True)
+            tell(line)
 
     def _move_bar(self, line: str, done: float, total: float | None) -> None:
         from rich.markup import escape

@@ -31,7 +31,6 @@ from hydroid.progress import LOGGER, NOTE
 from hydroid.quantity_table import MECHANICAL
 from hydroid.settings.arm import TIP_LOAD
 from hydroid.settings.fit import FitSettings
-from hydroid.settings.log import log_file
 from hydroid.settings.parameters import nominal_value
 from hydroid.settings.problem import ParameterSettings
 from hydroid.units import seconds
@@ -370,7 +369,9 @@ def adapt(
     model = open_model(fit, overrides=set)
     read = read_logs(logs, model.settings, repair=repair)
     if set:
-        stray = model.settings.payloads.keys() - _own_payloads(fit, read)
+        stray = model.settings.payloads.keys() - _own_payloads(
+            fit, model.settings, read
+        )
         if stray:
             raise SettingsError("is none of the logs", f"payloads.{min(stray)}")
     refuse_undriven(read, model.settings)
@@ -402,9 +403,12 @@ def adapt(
     return replace(result, lines=lines, content=content)
 
 
-def _own_payloads(fit: "ModelSource", logs: Sequence[Log]) -> builtins.set[str]:
-    """Return the logs that may have a payload: these, and those of the fit itself."""
+def _own_payloads(
+    fit: "ModelSource", settings: FitSettings, logs: Sequence[Log]
+) -> builtins.set[str | None]:
+    """Return the names of logs that may have a payload: these, and those of the fit
+    itself."""
     return {
         *open_model(fit).settings.payloads,
-        *(log_file(log.source).name for log in logs),
+        *(settings.payload_name(log.source) for log in logs),
     }

@@ -1,7 +1,7 @@
 """`hydroid validate` and `hydroid report`: fits on logs that they were not fitted to;
 reports drawn anew."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -23,7 +23,7 @@ from hydroid.findings import Finding
 from hydroid.identified_model import IdentifiedModel, warn_of_changes
 from hydroid.log import Log
 from hydroid.log.overlap import KNOWN, overlap
-from hydroid.progress import LOGGER
+from hydroid.progress import LOGGER, NOTE
 from hydroid.words import listed, numbered
 
 if TYPE_CHECKING:
@@ -85,19 +85,22 @@ def validate(
     )
     from hydroid.run.record import run_of
 
-    tested: dict[str, _Tested] = {}
+    tested = dict[str, _Tested]()
     names = numbered(model.name for model in models)
     for source, model, unseen, name in zip(sources, models, read, names, strict=True):
         tested[name] = _test(source, model, unseen, tolerance)
-        if out is not None:
-            _keep(tested[name], apart=apart)
     fits = ordered({name: test.verdict for name, test in tested.items()})
-    arm = models[0].settings.arm
-    predictions = list["Prediction"]()
-    for name in fits:
-        predictions += [replace(p, fit=name) for p in tested[name].predictions]
     best = tested[next(iter(fits))]
     run = run_of(best.model)
+    if out is not None:
+        for test in tested.values():
+            _keep(test, apart=apart)
+        if run and set:
+            # with other settings it is another model than the run's
+            text = "note: what --set gives does not go into %s and its report"
+            LOGGER.log(NOTE, text, run)
+    arm = models[0].settings.arm
+    predictions = _by_fit(fits, tested)
     lines = verdict_lines(fits)
     steps = list[Finding]()
     if run:
@@ -130,6 +133,14 @@ def _asked_loads(test: "_Tested") -> "list[Load]":
         if prediction.unseen is not False and any(beyond):
             odd.append(prediction.log)
     return asked_loads(test.model, odd)
+
+
+def _by_fit(fits: Iterable[str], tested: "Mapping[str, _Tested]") -> "list[Prediction]":
+    """Return all predictions with the names of their fits, in the order of these."""
+    predictions = list["Prediction"]()
+    for name in fits:
+        predictions += [replace(p, fit=name) for p in tested[name].predictions]
+    return predictions
 
 
 def _fitted_lines(predictions: "Sequence[Prediction]") -> list[str]:
@@ -191,6 +202,11 @@ def _test(
     predictions = list["Prediction"]()
     for log in logs:
         unseen = _unseen(log, known) if known else None
+        load = model.settings.payload_of(log.source)
+        if unseen and load:
+            # another day's log may have the name of one that was fitted
+            text = "note: %s: is taken to hold %g kg, by its name (payloads)"
+            LOGGER.log(NOTE, text, log.source, load)
         predictions.append(predicted(model, log, unseen))
     settings = model.settings
     if tolerance is not None:

@@ -7,7 +7,7 @@ import numpy as np
 from hydroid.arrays import Array
 from hydroid.log.clues import CLUES, column_unit
 from hydroid.log.log import LogFinding
-from hydroid.log.repair import GAP, SHORTEST, sample_period
+from hydroid.log.repair import FINER, GAP, SHORTEST, sample_period
 from hydroid.log.sensors import check_sensors
 from hydroid.log.signals import likely_range
 from hydroid.log.table import Recording, Signal
@@ -92,8 +92,10 @@ def _time(recording: Recording, settings: LogSettings) -> Iterator[LogFinding]:
         step = f"{period:.4g}"
         if uneven:
             step = f"{steps.min():.4g} to {steps.max():.4g}"
+        is_finer = settings.period_s <= FINER * period
+        kind = "resampled finer" if is_finer else "resampled"
         yield recording.finding(
-            "note", "resampled", (), signal, step=step, period=settings.period_s
+            "note", kind, (), signal, step=step, period=settings.period_s
         )
 
 

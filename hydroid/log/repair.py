@@ -36,6 +36,8 @@ MOST_LEFT_OUT = 0.05
 MOST_AGAIN = 0.005
 """part of the rows that may stand at a time which has been: more are a clock that was
 set back"""
+FINER = 0.8
+"""part of a log's period up to which a grid is finer than the log"""
 
 
 def sample_period(time: Array) -> float:
@@ -49,26 +51,35 @@ def sample_period(time: Array) -> float:
 
 
 def unwrap(recording: Recording, findings: list[LogFinding]) -> Recording:
-    """Join angles of continuous joints where they jump by one turn, as an encoder's do.
+    """Join angles where they jump by one turn, as an encoder's do.
 
-    None turns by 180 deg within one sample: other jumps are errors.
+    No continuous joint turns by 180 deg within one sample: other jumps are errors. Of a
+    joint with a range, angles are joined if all of them lie within the range then.
     """
-    if not any(map(_turns_on, recording.signals)):
-        return recording
-    values = recording.values.copy()
-    for signal, column in zip(recording.signals, values.T, strict=True):
-        if not _turns_on(signal):
+    values = recording.values
+    for place, signal in enumerate(recording.signals):
+        if signal.kind != "angle" or signal.unit != "deg":
             continue
+        column = values[:, place]
         rows = np.flatnonzero(~np.isnan(column))
         after = rows[1:]
         steps = np.diff(column[rows])
         # an eighth of a turn is left for the motion within one sample
         wraps = np.abs(np.abs(steps) - TURN) < np.pi / 4
         jumps = (np.abs(steps) > np.pi) & ~wraps
+        is_continuous = not np.isfinite(signal.high)
+        joined = column
         if wraps.any():
-            column[after] -= TURN * np.cumsum(np.sign(steps) * wraps)
+            joined = column.copy()
+            joined[after] -= TURN * np.cumsum(np.sign(steps) * wraps)
+        if not is_continuous:
+            joined = _within_range(signal, joined)
+        if wraps.any() and joined is not None:
+            if values is recording.values:
+                values = values.copy()
+            values[:, place] = joined
             findings.append(recording.finding("note", "wrap", after[wraps], signal))
-        if jumps.any():
+        if is_continuous and jumps.any():
             step = np.rad2deg(steps[jumps][0])
             findings.append(
                 recording.finding("error", "jump", after[jumps], signal, step=step)
@@ -76,9 +87,17 @@ def unwrap(recording: Recording, findings: list[LogFinding]) -> Recording:
     return replace(recording, values=values)
 
 
-def _turns_on(signal: Signal) -> bool:
-    """Return whether a signal is the angle of a continuous joint."""
-    return signal.unit == "deg" and not np.isfinite(signal.high)
+def _within_range(signal: Signal, angle: Array) -> Array | None:
+    """Return an angle, (R,), by whole turns moved into the range of its joint [rad];
+    None where it does not fit in."""
+    middle = 0.5 * (signal.low + signal.high)
+    there = angle[~np.isnan(angle)]
+    if not len(there):
+        return None
+    turns = np.rint((middle - 0.5 * (there.min() + there.max())) / TURN)
+    moved = angle + TURN * turns
+    is_inside = np.isnan(moved) | ((signal.low <= moved) & (moved <= signal.high))
+    return moved if is_inside.all() else None
 
 
 def fill(recording: Recording, longest: float, findings: list[LogFinding]) -> Recording:
@@ -306,7 +325,7 @@ def resample(recording: Recording, settings: LogSettings, joints: int) -> Log:
 
 def _resampled(time: Array, command: Array, at: Array, period: float) -> Array:
     """Return a command for a period from each time in `at` [s]."""
-    is_finer = period <= 0.8 * sample_period(time)
+    is_finer = period <= FINER * sample_period(time)
     if is_finer:
         return np.interp(at + 0.5 * period, time, command, left=0.0)
     return hold(time, command[:, None], at, period)[:, 0]

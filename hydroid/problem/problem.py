@@ -26,7 +26,6 @@ from hydroid.problem.channels import (
 )
 from hydroid.problem.priors import Priors
 from hydroid.settings.fit import FitSettings
-from hydroid.settings.log import log_file
 from hydroid.simulation import Response, Simulation
 from hydroid.simulation.scenario import Scenario
 
@@ -224,7 +223,7 @@ def make_simulation(
     Its response has the angles of the joints `outputs` and the chamber pressures of
     `pressures`, 0-based.
     """
-    payload = settings.payloads.get(log_file(log.source).name)
+    payload = settings.payload_of(log.source)
     if payload:
         spec = add_payload(spec, settings.arm, payload)
     scenario = Scenario(spec, settings.arm, log, outputs, settings.simulation)

@@ -30,7 +30,6 @@ from hydroid.run.archive import CheckpointFile
 from hydroid.run.process import LOCK, locked, run_log
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
-from hydroid.settings.log import log_file
 from hydroid.words import numbered
 
 VERSIONS = {name: version(name) for name in ("hydroid", "mujoco", "numpy")}
@@ -108,8 +107,8 @@ def log_hash(log: Log, settings: FitSettings) -> str:
     A file that was moved or saved again is the same log, and one that was repaired is
     another.
     """
-    name = log_file(log.source).name
-    named = repr((settings.payloads.get(name), settings.log.group_of(name)))
+    payload = settings.payload_of(log.source) or None
+    named = repr((payload, settings.log.group_of(log.source)))
     return hashlib.sha256(samples(log) + named.encode()).hexdigest()
 
 
@@ -246,7 +245,7 @@ class RunFolder:
         """Write `estimate.yaml` of a fit's model,
         and the fitted arm in `model/` as it began a log."""
         write_estimate(self.path, model.summarise())
-        payload = model.settings.payloads.get(log_file(log.source).name, 0.0)
+        payload = model.settings.payload_of(log.source)
         plant = Plant(model, payload=payload)
         plant.reset(log.start)
         plant.export(self.path / "model")

@@ -13,11 +13,11 @@ from pydantic import Field, ValidationInfo, model_validator
 from hydroid.errors import HydroidError, SettingsError
 from hydroid.files import Plain, find_config
 from hydroid.parameters import ParameterSet
-from hydroid.quantity_table import MECHANICAL
+from hydroid.quantity_table import MECHANICAL, TARGETS
 from hydroid.settings.arm import Arm, load_arm
 from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.load import ByJoint, Joints, Positive, Settings, load, validate
-from hydroid.settings.log import LogSettings
+from hydroid.settings.log import LogSettings, log_file
 from hydroid.settings.parameters import by_group, expanded, make_parameter, with_curves
 from hydroid.settings.problem import (
     ObjectiveSettings,
@@ -58,7 +58,8 @@ class FitSettings(Settings):
     priors: dict[str, PriorSettings] = {}
     """what is known besides the logs, each under a name of your choice"""
     payloads: dict[str, Positive] = {}
-    """mass that the arm carries at its tip, by the log's file name [kg]"""
+    """mass that the arm carries at its tip, by the log's file name, or the end of its
+    path where several have one name, as in {day2/log.csv: 250} [kg]"""
     log: LogSettings = LogSettings()
     simulation: SimulationSettings = SimulationSettings()
     objective: ObjectiveSettings = ObjectiveSettings()
@@ -69,6 +70,34 @@ class FitSettings(Settings):
     """at the end, refine the parameters of both stages together: all that have bounds,
     fixed ones included"""
     design: DesignSettings = DesignSettings()
+
+    def payload_name(self, log: str) -> str | None:
+        """Return the name in `payloads` that a log's path ends with, the longest of
+        several; None: its gripper is empty."""
+        parts = log_file(log).parts
+        named = [
+            name
+            for name in self.payloads
+            if Path(name).parts == parts[-len(Path(name).parts) :]
+        ]
+        return max(named, key=lambda name: len(Path(name).parts), default=None)
+
+    def payload_of(self, log: str) -> float:
+        """Return the mass that the gripper holds in a log [kg]."""
+        name = self.payload_name(log)
+        return 0.0 if name is None else self.payloads[name]
+
+    def parameters_of(self, quantity: str) -> tuple[str, ...]:
+        """Return the parameters that set a quantity of every joint with an actuator;
+        none if what the settings say counts for some joint."""
+        joints = self.arm.joints
+        open_joints = {n for n, joint in enumerate(joints, 1) if joint.actuator}
+        found = list[str]()
+        for name, parameter in self.parameters.items():
+            if quantity in TARGETS[parameter.quantity] and parameter.per is None:
+                found.append(name)
+                open_joints -= {*(parameter.joints or open_joints)}
+        return () if open_joints else tuple(found)
 
     @classmethod
     def names_of_joints(cls, values: Plain, folder: Path) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ from pydantic import (
 
 from hydroid.errors import SettingsError
 from hydroid.files import Plain
+from hydroid.quantity_table import TARGETS
 from hydroid.settings.document import MOST_BYTES, Lines, read_document, read_yaml
 from hydroid.words import listed
 
@@ -184,8 +185,21 @@ def _replace(values: Plain, key: str, value: Any, names: Sequence[str]) -> str:
             raise SettingsError(f"{folder} has no settings below it", f"--set {key}")
     part = _same_key(mapping, last, names)
     parts.append(part)
+    if folders == ["hydraulics"]:
+        _remove_sides(mapping, last)
     mapping[part] = value
     return ".".join(map(str, parts))
+
+
+def _remove_sides(hydraulics: Plain, name: str) -> None:
+    """Remove what an override of a quantity replaces: of both sides each side's value,
+    of one side the value of both, which the other side keeps."""
+    replaced = {*TARGETS.get(name, (name,))}
+    for other in [*hydraulics]:
+        sides = {*TARGETS.get(other, (other,))}
+        if other != name and sides & replaced:
+            value = hydraulics.pop(other)
+            hydraulics.update(dict.fromkeys(sides - replaced, value))
 
 
 def _same_key(mapping: Plain, key: str, names: Sequence[str]) -> Any:

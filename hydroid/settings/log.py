@@ -30,6 +30,14 @@ def log_file(source: str | Path) -> Path:
     return Path(_PART.sub("", str(source)))
 
 
+def ends_with(source: str | Path, pattern: str) -> bool:
+    """Return whether a pattern names the file of a log: by its name, as `mon_*.csv`
+    does, or by the end of its path, as `monday/*.csv`."""
+    ending = Path(pattern)
+    tail = Path(*log_file(source).parts[-len(ending.parts) :])
+    return fnmatch(str(tail), str(ending))
+
+
 JOINT = "{joint}"
 OTHER = "other"
 """the group of logs that are in no group of `groups`"""
@@ -161,8 +169,9 @@ class LogSettings(Settings):
         Annotated[tuple[Name, ...], BeforeValidator(_one_or_more)],
     ] = {}
     """logs that share a day, an oil temperature or an operator, by a name of your
-    choice: a pattern of file names, or several, as in {monday: mon_*.csv}. Parameters
-    may have an effect in each (`per: group`)"""
+    choice: a pattern of file names, or of the ends of paths, or several, as in {monday:
+    mon_*.csv} or {monday: monday/*.csv}. Parameters may have an effect in each (`per:
+    group`)"""
     repair_s: Annotated[float, Field(ge=0, le=10)] = 0.1
     """longest gap that --repair fills [s]"""
 
@@ -190,18 +199,17 @@ class LogSettings(Settings):
         return ColumnMap(names, **given)
 
     def group_of(self, log: str) -> str:
-        """Return the group of a log by its file's name.
+        """Return the group of a log by its file's name and folders.
 
         Raises SettingsError: it is in several.
         """
-        name = log_file(log).name
         found = list[str]()
         for group, patterns in self.groups.items():
-            if any(fnmatch(name, pattern) for pattern in patterns):
+            if any(ends_with(log, pattern) for pattern in patterns):
                 found.append(group)
         if len(found) > 1:
             raise SettingsError(
-                f"{name} is in the groups {listed(found)}", "log.groups"
+                f"{log_file(log).name} is in the groups {listed(found)}", "log.groups"
             )
         return found[0] if found else OTHER
 

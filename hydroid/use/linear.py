@@ -103,33 +103,24 @@ def linearise(plant: Plant, command: Array) -> LinearArm:
     are held [%], (J,).
 
     Raises:
-        SettingsError: a joint stands at a command of 0, where a dead band has no slope.
+        SettingsError: a command is beyond 100 %, or within a dead band, which has no
+            slope.
     """
     columns: Index = np.array(plant.joints) - 1
     joints: list[int] = columns.tolist()
     names = tuple(plant.names[joint] for joint in joints)
-    _refuse_resting(names, command[columns])
+    for joint in joints:
+        _refuse_without_slope(plant, joint, command)
     valves = [_valve(plant, joint, command) for joint in joints]
     oils = [_oil(plant, joint, command) for joint in joints]
     gain, turn, speed = _slopes(plant, command, columns)
 
-    # the states are those of all valves, then of all oils, then the angles
-    states = [
-        f"{name} {state}"
-        for name, valve in zip(names, valves, strict=True)
-        for state in valve.states
-    ]
-    first_oil = len(states)
-    for name, oil in zip(names, oils, strict=True):
-        if oil is not None:
-            states += [f"{name} speed", f"{name} acceleration"]
-    first_angle = len(states)
-    states += [f"{name} angle" for name in names]
-
     # what states and commands do, side by side: to the states' rates, to openings and
     # to speeds
+    states = _state_names(names, valves, oils)
     count = len(joints)
     total = len(states)
+    first_angle = total - count
     rates = np.zeros((total, total + count))
     openings = np.zeros((count, total + count))
     first = 0
@@ -140,7 +131,6 @@ def linearise(plant: Plant, command: Array) -> LinearArm:
     direct = openings[:, total:]
     speeds = np.hstack([gain @ opened, gain @ direct])
     speeds[:, first_angle:total] += turn
-    first = first_oil
     for k, oil in enumerate(oils):
         if oil is not None:
             _put_oil(oil, k, first, rates, speeds)
@@ -148,26 +138,53 @@ def linearise(plant: Plant, command: Array) -> LinearArm:
     rates[first_angle:] = speeds
 
     outputs = np.vstack([np.eye(total, total + count)[first_angle:], speeds])
+    delays = [_side(plant, joint, command)["delay"] for joint in joints]
     return LinearArm(
         a=rates[:, :total],
         b=rates[:, total:],
         c=outputs[:, :total],
         d=outputs[:, total:],
-        delay=np.array([_side(plant, joint, command)["delay"] for joint in joints]),
+        delay=np.array(delays),
         joints=names,
-        states=tuple(states),
+        states=states,
         command=command[columns],
         angle=plant.angle[columns],
         speed=speed,
     )
 
 
-def _refuse_resting(names: Sequence[str], command: Array) -> None:
-    """Refuse commands of 0 among those of the named joints [%]."""
-    resting = [names[k] for k in np.flatnonzero(command == 0.0).tolist()]
-    if resting:
-        what = f"{', '.join(resting)} at a command of 0 has a dead band, and no slope"
+def _state_names(
+    names: Sequence[str], valves: "Sequence[_Valve]", oils: "Sequence[_Oil | None]"
+) -> tuple[str, ...]:
+    """Return the names of all states: those of all valves, then of all oils, then the
+    angles."""
+    states = list[str]()
+    for name, valve in zip(names, valves, strict=True):
+        states += [f"{name} {state}" for state in valve.states]
+    for name, oil in zip(names, oils, strict=True):
+        if oil is not None:
+            states += [f"{name} speed", f"{name} acceleration"]
+    states += [f"{name} angle" for name in names]
+    return tuple(states)
+
+
+def _refuse_without_slope(plant: Plant, joint: int, command: Array) -> None:
+    """Refuse the command of a joint (0-based) that is none, or about which its speed
+    has no slope."""
+    name = plant.names[joint]
+    value = float(command[joint])
+    if value == 0.0:
+        what = f"{name} at a command of 0 has a dead band, and no slope"
         hint = "name a command of every joint, such as boom=30"
+        raise SettingsError(what, "--at", hint)
+    # NaN is not within them either
+    if not abs(value) <= 100.0:
+        what = f"the command of {name} is {value:g} %"
+        raise SettingsError(what, "--at", "allowed are -100 to 100 %")
+    band = _side(plant, joint, command)["dead_band"]
+    if abs(value) - NEAR_COMMAND < band:
+        what = f"{name} at {value:g} % is within its dead band, which has no slope"
+        hint = f"beyond {band + NEAR_COMMAND:.3g} % it moves that way"
         raise SettingsError(what, "--at", hint)
 
 
@@ -218,8 +235,12 @@ def _slopes(plant: Plant, command: Array, columns: Index) -> tuple[Array, Array,
     for k, joint in enumerate(columns.tolist()):
         commands[[4 * k, 4 * k + 1], joint] += [NEAR_COMMAND, -NEAR_COMMAND]
         poses[[4 * k + 2, 4 * k + 3], joint] += [NEAR_ANGLE, -NEAR_ANGLE]
+    # at full command the slope is that from below
+    commands = commands.clip(-100.0, 100.0)
+    more = 4 * np.arange(count)
+    apart = commands[more, columns] - commands[more + 1, columns]
     speeds = plant.steady().speeds(commands, poses)[:, columns]
-    gain = (speeds[0:-1:4] - speeds[1:-1:4]).T / (2.0 * NEAR_COMMAND)
+    gain = (speeds[0:-1:4] - speeds[1:-1:4]).T / apart
     turn = (speeds[2:-1:4] - speeds[3:-1:4]).T / (2.0 * NEAR_ANGLE)
     return gain, turn, speeds[-1]
 

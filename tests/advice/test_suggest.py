@@ -184,13 +184,31 @@ def test_stating_a_value_leaves_it_as_stated_and_helps_what_goes_with_it(
     for action in stated:
         assert action["parameter"] in {"A_A", "A_B"} - {action["of"]}
         assert action["after_percent"] == pytest.approx(5, rel=0.05)
-    # a rotary actuator of a joint that a cylinder may turn: nobody can measure its
-    # areas
-    moved = {
-        n: p.changed({"joints": (4,)}) for n, p in problem.settings.parameters.items()
+
+
+@pytest.mark.parametrize(
+    ("turns", "stated"), [("-40 60", {"flow"}), ("-180 180", {"flow", "size"})]
+)
+def test_no_data_sheet_has_the_size_of_what_stands_in_for_a_cylinder(
+    tmp_path, turns: str, stated: set[str]
+):
+    """A rotary actuator is one where a cylinder may turn its joint: of a slewing gear
+    it is a motor, which has a data sheet, as has the pump."""
+    model = re.sub(
+        r'(name="lift" axis="[^"]*") range="[^"]*"', rf'\1 range="{turns}"', BOOM
+    )
+    free = {
+        "size": {"quantity": "area", "joints": [1], "within": 5},
+        "flow": PARAMETERS["flow"],
     }
-    rotary = problem.varied(problem.settings.with_parameters(moved))
-    assert "state" not in {action["action"] for action in next_actions(rotary, known)}
+    settings = two_joints(tmp_path, model, parameters=free)
+    problem = Problem(settings, [drive(two_joints(tmp_path))])
+    known = uncertainty(problem, problem.parameters.start)
+    # both together are known well, and each of them badly
+    root = np.array([[100.0, 100.0], [0.5, -0.5]])
+    known = replace(known, posterior=replace(known.posterior, root=regular(root)))
+    actions = next_actions(problem, known)
+    assert {a["of"] for a in actions if a["action"] == "state"} == stated
 
 
 def test_levers_change_with_the_angle_only_where_a_cylinder_may_turn_the_joint(

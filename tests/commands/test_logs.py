@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from log_files import RIG, assert_same
+from log_files import RIG, assert_same, head
 
-from hydroid import check, convert, load_settings, read_logs, simulate
+from hydroid import check, convert, fit as run_fit, load_settings, read_logs, simulate
 from hydroid.advice.assumptions import exchanged
 from hydroid.commands.logs import run_logs
-from hydroid.errors import LogError
+from hydroid.errors import LogError, SettingsError
 from hydroid.fitting.multistart import lone_joints
 from hydroid.log import Log, check_parts
 from hydroid.posterior.error_model import likelihood_at
@@ -123,6 +123,28 @@ def test_a_gap_gives_two_logs_that_share_the_files_payload_and_group(
     loaded, plain = (Problem(s, [two]) for s in (fit, fit.changed({"payloads": {}})))
     theta = fit.parameter_set().start[None]
     assert not np.array_equal(loaded.output_errors(theta), plain.output_errors(theta))
+
+
+def test_logs_of_one_name_have_payloads_and_groups_of_their_own(tmp_path: Path) -> None:
+    days = [tmp_path / day / "log.csv" for day in ("monday", "tuesday", "friday")]
+    for day in days:
+        day.parent.mkdir()
+        head(day, 200)
+    monday, tuesday, friday = (str(day) for day in days)
+    fit = settings(
+        payloads={"log.csv": 50.0, "tuesday/log.csv": 80.0},
+        **{"log.groups": {"cold": ["monday/*.csv", "fri*/log.csv"]}},
+    )
+    assert [fit.payload_of(day) for day in (monday, tuesday)] == [50.0, 80.0]
+    assert fit.payload_of(f"{tuesday}[2]") == 80.0
+    assert fit.payload_of("yesterday/logs.csv") == 0.0
+    assert fit.log.group_of(monday) == fit.log.group_of(friday) == "cold"
+    assert fit.log.group_of(tuesday) == fit.log.group_of("log.csv") == "other"
+    # which of two is meant?
+    with pytest.raises(
+        SettingsError, match=r"payloads\.log\.csv: is .*monday.* and .*fri"
+    ):
+        run_fit(fit, days)
 
 
 def test_a_log_with_a_hole_gives_the_likelihoods_rows_of_its_two_parts(

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import Run
+from conftest import SMALL
 from log_files import RIG
 
 import hydroid
@@ -286,6 +287,24 @@ def test_whatever_decides_a_result_is_in_the_hash_of_its_log():
     assert log_hash(replace(log, source="moved/b.csv"), settings) == others[-1]
     (copy := replace(log, angle=zeros.copy())).angle[3, 1] = 1e-12
     assert log_hash(copy, settings) != others[-1]
+
+
+def test_an_unseen_log_of_a_loaded_ones_name_is_said_to_be_loaded(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+):
+    rows = (RIG / "rig_shoulder_1.csv").read_text().splitlines()
+    logs = [tmp_path / day / "a.csv" for day in ("monday", "tuesday")]
+    for number, log in enumerate(logs):
+        log.parent.mkdir()
+        samples = rows[1 + 300 * number : 300 * (number + 1)]
+        log.write_text("\n".join([rows[0], *samples]) + "\n")
+    small = SMALL | {"refinement.iterations": 1, "payloads": {"a.csv": 5.0}}
+    caplog.set_level("INFO", "hydroid")
+    fit = hydroid.fit_mech(logs[0], set=small)
+    hydroid.validate(logs[0], fit=fit)
+    assert "is taken to hold" not in caplog.text
+    hydroid.validate(logs[1], fit=fit)
+    assert f"{logs[1]}: is taken to hold 5 kg, by its name (payloads)" in caplog.text
 
 
 def test_a_simulated_log_is_none_of_the_commands(run: Path):

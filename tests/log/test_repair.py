@@ -65,6 +65,25 @@ def test_repair_restores_length_and_leaves_the_rest_alone(
         assert said == []
 
 
+@pytest.mark.parametrize("wrapped", ["0 to 360", "-360 to 0"])
+def test_an_encoder_that_wraps_is_joined_where_the_joints_range_says_how(
+    tmp_path: Path, wrapped: str
+) -> None:
+    """Joint 1 goes through 0 and lies between -30 and 90 deg."""
+    whole = cells()
+    whole[:, 3] -= 15
+    plain, _ = read(save(tmp_path / "plain.csv", lines(whole)))
+    turned = whole.copy()
+    turned[:, 3] %= 360
+    turned[:, 3] -= 360 * (wrapped == "-360 to 0")
+    log, findings = read(save(tmp_path / "turned.csv", lines(turned)))
+    assert [finding.kind for finding in findings] == ["wrap"]
+    np.testing.assert_allclose(log.angle, plain.angle, atol=1e-9)
+    # where the range does not hold all of them, they stay as they are
+    turned[40:, 3] += 85
+    assert faults(save(tmp_path / "far.csv", lines(turned)))
+
+
 def test_a_long_hole_is_not_repaired(tmp_path: Path) -> None:
     table = lines(cells())
     for row in table[30:41]:

@@ -311,6 +311,16 @@ WRONG = (
         lambda: of("q6", lambda q: (q + 280) % 360 - 180),
     ),
     Wrong(
+        "an encoder of 0 to 360 deg on a joint with a range",
+        "note: wraps by 360",
+        lambda: of("q5", lambda q: q % 360),
+    ),
+    Wrong(
+        "a log of 50 Hz, read at 100 Hz",
+        "note: commands change on a line",
+        lambda: of("", lambda values: values[::2]),
+    ),
+    Wrong(
         "a misspelt column",
         "error: did you mean 'U2_pct'?",
         lambda: renamed("u2", "U2"),

@@ -14,20 +14,30 @@ import pytest
 from log_files import head
 
 SHORT = ["--quiet", "--set", "search.ga.population=10", "--algorithm", "ga"]
+STAGE_1 = "{K: 0.2, D: 80, S: 0, M1: 4.6, M2: 5.1, M3: 22.5, M4: 1.6, M5: 4, M6: 4.7}"
+"""what stage 2 takes of stage 1"""
 OWN = {".lock", "run.log", "checkpoint.previous.npz"}
 """files of a run that tell of its course"""
 
 
-def start(cwd: Path, *options: object, out: str) -> "subprocess.Popen[str]":
+def start(
+    cwd: Path, *options: object, out: str, command: str = "fit-mech"
+) -> "subprocess.Popen[str]":
     """Begin or resume a run of six seconds of a virtual rig's log; checkpoints after
     every generation."""
     if not (cwd / "log.csv").exists():
         head(cwd / "log.csv", 600)
-    code = "import hydroid.commands.app as a, hydroid.fitting.checkpoints as s; s.SAVE_EVERY = 0; a.main()"
-    command = ["fit-mech", "log.csv", *map(str, options), "--out", out, "--resume"]
-    command = [sys.executable, "-c", code, *command]
+        (cwd / "mech.yaml").write_text(STAGE_1)
+    # under nohup the tests ignore SIGHUP, and so would the run
+    code = "import signal; signal.signal(signal.SIGHUP, signal.SIG_DFL); "
+    code += "import hydroid.commands.app as a, hydroid.fitting.checkpoints as s; s.SAVE_EVERY = 0; a.main()"
+    words = [command, "log.csv", *map(str, options), "--out", out, "--resume"]
     return subprocess.Popen(
-        command, cwd=cwd, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        [sys.executable, "-c", code, *words],
+        cwd=cwd,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
     )
 
 
@@ -81,24 +91,36 @@ SEARCHES = {
         *PYMOO,
         "--set=search.pymoo={algorithm: mopso-cd, population: 10, generations: 20}",
     ],
+    "ladder": [
+        "-q",
+        "--mech=mech.yaml",
+        "--set=simulation.model=ladder",
+        "--set=search.nsga2={population: 6, generations: 4}",
+        "--set=refinement.iterations=5",
+    ],
 }
+ENDS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
+STOPPED = 130
+"""exit status of a run that a signal has ended in order"""
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", SEARCHES)
 def test_killed_runs_end_the_same(tmp_path: Path, kind: str):
-    """Every run is killed at moments drawn at random, and resumed; KILLS in the
+    """Every run is ended at moments drawn at random, and resumed; KILLS in the
     environment asks for more."""
     rng = random.Random(kind)
+    command = "fit-hyd" if kind == "ladder" else "fit-mech"
     # the report's commands name the run's folder
     whole, killed = tmp_path / "whole", tmp_path / "killed"
     whole.mkdir()
     killed.mkdir()
     hits, began = 0, time.monotonic()
-    finish(start(whole, *SEARCHES[kind], out="run"))
+    finish(start(whole, *SEARCHES[kind], out="run", command=command))
     took = time.monotonic() - began
-    while hits < int(os.environ.get("KILLS", "3")):
-        process = start(killed, *SEARCHES[kind], out="run")
+    while hits < int(os.environ.get("KILLS", "4")):
+        end = ENDS[hits % len(ENDS)]
+        process = start(killed, *SEARCHES[kind], out="run", command=command)
         if rng.random() < 0.5:
             time.sleep(took * rng.random())
         else:  # while a file is written
@@ -107,13 +129,17 @@ def test_killed_runs_end_the_same(tmp_path: Path, kind: str):
                 killed / "run",
                 rng.choice((".checkpoint.npz.*.part", ".*.part")),
             )
-        process.kill()
-        process.communicate()
+        process.send_signal(end)
+        _, errors = process.communicate()
         if process.returncode == 0:  # it was faster
             assert content(killed / "run") == content(whole / "run")
             shutil.rmtree(killed / "run")
-        hits += process.returncode == -signal.SIGKILL
-    finish(start(killed, *SEARCHES[kind], out="run"))
+            continue
+        # without a handler while Python begins
+        assert process.returncode in (STOPPED, -end), errors
+        assert "Traceback" not in errors
+        hits += 1
+    finish(start(killed, *SEARCHES[kind], out="run", command=command))
     assert content(killed / "run") == content(whole / "run")
 
 

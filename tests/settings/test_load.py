@@ -284,6 +284,25 @@ def test_an_override_finds_a_joint_by_its_name_and_by_its_number(tmp_path: Path)
     assert settings.objective.noise_deg == {3: 0.2}
 
 
+@pytest.mark.parametrize(
+    ("said", "given", "a", "b"),
+    [
+        ("dead_band: 20", {"dead_band": 5}, 5, 5),
+        ("dead_band_a: 10, dead_band_b: 20", {"dead_band": 5}, 5, 5),
+        ("dead_band: 20", {"dead_band_a": 5}, 5, 20),
+        ("dead_band: 20", {"dead_band_b": 5, "dead_band_a": 3}, 3, 5),
+        ("dead_band_a: 10", {"dead_band": 5, "dead_band_b": 7}, 5, 7),
+    ],
+)
+def test_an_override_of_one_side_or_both_replaces_the_other_way_of_saying_it(
+    tmp_path: Path, said: str, given: dict[str, float], a: float, b: float
+):
+    path = written(tmp_path, f"{MAPPINGS}\nhydraulics: {{{said}}}\n")
+    changes = {f"hydraulics.{name}": value for name, value in given.items()}
+    hydraulics = hydroid.load_settings(path, changes).hydraulics
+    assert (hydraulics.dead_band_a, hydraulics.dead_band_b) == (a, b)
+
+
 @pytest.mark.parametrize("key", ["tolerance_deg", "log.joints"])
 def test_a_number_of_thousands_of_digits_is_no_joints(tmp_path: Path, key: str):
     with pytest.raises(SettingsError, match="9'; the arm's joints: swing"):

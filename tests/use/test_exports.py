@@ -197,6 +197,16 @@ def test_an_fmu_steps_as_the_plant_does(model, tmp_path):
         ({"to": "linear"}, "dead band, and no slope"),
         ({"to": "linear", "at": "boom=3"}, "no joint 'boom'"),
         ({"to": "linear", "at": "shoulder=x"}, "is no command"),
+        ({"to": "linear", "at": "shoulder=nan"}, "is nan %; allowed are -100 to 100"),
+        ({"to": "linear", "at": "shoulder=-400"}, "is -400 %; allowed are -100 to"),
+        (
+            {"to": "linear", "at": "shoulder=40,elbow=3,shoulder=-40"},
+            "shoulder has two commands",
+        ),
+        (
+            {"to": "linear", "at": "roll=30"},
+            "roll takes no commands; those of shoulder and elbow count",
+        ),
         ({"to": "table", "pose": "nowhere"}, "no pose"),
         ({"to": "parameters"}, "no covariance"),
     ],

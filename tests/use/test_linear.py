@@ -110,10 +110,33 @@ def test_it_reads_as_json_with_names_and_units():
     np.testing.assert_allclose(read["speed"], speed)
 
 
-def test_a_dead_band_has_no_slope():
+@pytest.mark.parametrize(
+    ("shoulder", "says"),
+    [
+        (0.0, "shoulder at a command of 0"),
+        (20.0, "shoulder at 20 % is within its dead band.*beyond 25.5 % it moves"),
+        (-25.2, "shoulder at -25.2 % is within its dead band"),
+        (100.1, "the command of shoulder is 100.1 %; allowed are -100 to 100 %"),
+        (np.nan, "the command of shoulder is nan %"),
+        (np.inf, "the command of shoulder is inf %"),
+    ],
+)
+def test_a_command_about_which_no_speed_has_a_slope(shoulder: float, says: str):
+    plant = made("quasi-static", dead_band=25.0)
+    with pytest.raises(SettingsError, match=says):
+        linearise(plant, np.array([0, shoulder, 40.0, 0, 0, 0, 0]))
+
+
+def test_the_slope_at_full_command_is_that_from_below():
     plant = made("quasi-static")
-    with pytest.raises(SettingsError, match="elbow at a command of 0"):
-        linearise(plant, np.array([0, 40.0, 0, 0, 0, 0, 0]))
+    full, below = (
+        linearise(plant, np.array([0, command, 40.0, 0, 0, 0, 0]))
+        for command in (100.0, 99.0)
+    )
+    row = full.states.index("shoulder angle")
+    column = full.states.index("shoulder plunger")
+    assert full.a[row, column] == pytest.approx(below.a[row, column], rel=0.02)
+    assert full.a[row, column] > 0.0
 
 
 def test_step_and_bode_are_those_of_the_system():

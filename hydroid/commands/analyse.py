@@ -88,8 +88,8 @@ def analyse(
         logs (LOG): Logs of commands and joint angles [default: those of the run].
         fit (RUN|YAML): An estimate, as a run folder or a YAML file [default: the start
             values of the parameters].
-        profile (K,D): Parameters to profile. Each point of a profile takes a
-            refinement.
+        profile (K,D): Parameters to profile. Each point of a profile costs a
+            refinement, so this is slow.
 
     Raises:
         SettingsError: a name that is no free parameter.

@@ -58,11 +58,11 @@ def export(
         to (KIND): parameters, table, urdf, mjcf, linear or fmu.
         out (DIR): Folder of the files [default of the command line: runs/export].
         draws (1 to 100000): Number of draws of the parameters.
-        robot (URDF): The URDF whose masses are replaced; of urdf.
+        robot (URDF): With --to urdf: your robot's URDF, whose masses are replaced.
         pose (NAME): The pose where the plant starts, by its name in the arm's file
             [default: the start pose of the settings].
-        at (JOINT=PCT,...): Commands about which the model is linear, such as
-            boom=30,arm=-40; of linear.
+        at (JOINT=PCT,...): With --to linear: the commands about which the model is
+            linear, such as boom=30,arm=-40.
 
     Raises:
         SettingsError: another kind, an option that is missing, or a fit of stage 1,

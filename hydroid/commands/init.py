@@ -46,9 +46,9 @@ def init(
             template of boxes].
         log (LOG): A log; its columns are guessed. Repeat it for several logs: the next
             steps keep the last to validate on.
-        config (YAML): Settings whose `log` section you have completed, such as
-            mine/fit.yaml: its columns are taken in place of guesses, its arm stays, and
-            the other settings are written anew.
+        config (YAML): The fit.yaml of an earlier init, whose `log` section you have
+            completed. Its columns and its arm stay; all other settings are written
+            anew.
         joints (NAME,NAME): Names of the arm's joints in the order of the log's numbers
             (u1, u2, ...) [default: the order in the arm's file].
         lengths (M,M): Lengths of the links that these joints move [m], in place of

@@ -40,12 +40,13 @@ SettingChanges = Mapping[str, Any] | Sequence[str] | None
 SHARED = f"""
     logs (LOG): Logs of commands and joint angles. Formats: {FORMATS}.
     log (LOG): A log. Formats: {FORMATS}.
-    fit (RUN|YAML): An estimate: a run folder, a folder written by Plant.save (Python), an
-        estimate.yaml, or a YAML file of values by name.
-    out (DIR): Folder for the tables [default: runs/COMMAND on the command line; in Python nothing
-        is written].
-    config (YAML): Settings: a file, as `hydroid init` writes it for your machine, or the name of a
-        shipped config, which is the shipped arm's. A run needs none: it holds its own.
+    fit (RUN|YAML): An estimate: the folder of a run or of Plant.save (Python), an
+        estimate.yaml, or a YAML file that gives parameters values.
+    out (DIR): Folder for the page and its tables [default: runs/COMMAND; in Python
+        nothing is written].
+    config (YAML): Settings: the fit.yaml that `hydroid init` wrote for your machine, or
+        the name of a shipped config, for the shipped arm. With the folder of a run it
+        is not needed.
     set (KEY=VALUE): Replace a setting, such as search.ga.generations=80.
     repair: Fill gaps in the logs up to log.repair_s (0.1 s), and list what was filled. The files
         themselves stay as they are.
@@ -62,9 +63,9 @@ SHARED = f"""
     start (RUN|YAML): Start the search from the values of an estimate.
     resume: Continue the stopped run in --out; start it if there is none.
     refinement: After the search, refine its estimate by least squares.
-    budget (TIME): Time for search and refinement, such as 90s, 5min or 2h; intervals and report
-        take some more. The best model until then is kept; the same command with --resume and more
-        time goes on.
+    budget (TIME): Time for search and refinement, such as 90s, 5min or 2h. The best
+        model so far is then kept; its intervals and report take a little longer. To go
+        on, repeat the command with --resume and more time.
     threads (N): Number of threads (0: one per core, or with --dask one per worker).
 """
 

@@ -56,11 +56,11 @@ def suggest(
 ) -> "Result[tuple[Finding, ...]]":
     """Find what the model lacks, and what to do next.
 
-    Tests every parameter that is kept fixed, switched off or shared, such as a delay or
-    dry friction. The most promising ones are freed: does that lower the error on parts
-    of the logs left out? Tests whether the logs contradict the sign of an angle, and
-    predicts for the best actions, from weighing a link to a new experiment, how much
-    each would reduce the uncertainty.
+    First it tests every parameter that is kept fixed, switched off or shared, such as a
+    delay or dry friction: the most promising ones are freed, and judged by the error on
+    parts of the logs that are left out. Then it tests whether the logs contradict the
+    sign of an angle. Last it lists actions, from weighing a link to a new experiment,
+    and how much each would reduce the uncertainty.
 
     Example: hydroid suggest --fit runs/hyd
 
@@ -151,8 +151,8 @@ def design(
         commands = hydroid.design("a.csv", fit="runs/a", duration=30).result.log
 
     Args:
-        logs (LOG): Logs that there are already: what they determine need not be
-            measured again.
+        logs (LOG): Logs that you already have; the experiment measures what they leave
+            open.
         duration (S): Length of the experiment [s].
         joints (2,3): Joints to drive, by number or name [default: the compared joints].
 

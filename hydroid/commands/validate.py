@@ -58,14 +58,14 @@ def validate(
         print(validated.result[0]["shoulder"].rms)  # [deg]
 
     Args:
-        fit (RUN|YAML): An estimate: a run folder, a folder written by Plant.save
-            (Python), or a YAML file. Repeat the option for several estimates.
-        tolerance (0.001 to 90): The rms error [deg] that you accept for every joint;
-            config.yaml can hold one for each (tolerance_deg) [default: that of the fit,
-            or else 2 % of a joint's travel].
-        apart: These logs are of other conditions than the fit's, such as another load:
-            its own report shows them, and does not count them in its verdict. Without
-            it, they count again.
+        fit (RUN|YAML): An estimate: the folder of a run or of Plant.save (Python), or a
+            YAML file. Repeat the option to compare several.
+        tolerance (0.001 to 90): The rms error that you accept [deg], for every joint;
+            for one per joint, set tolerance_deg in config.yaml [default: the fit's, or
+            else 2 % of a joint's travel].
+        apart: These logs were recorded under other conditions, such as another load.
+            The fit's report shows them, but its verdict does not count them. Repeat
+            without --apart to count them again.
 
     Raises:
         LogError: a log cannot be used.

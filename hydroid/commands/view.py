@@ -142,9 +142,9 @@ def view(
         fit (RUN|YAML): An estimate, as a run folder or a YAML file [default: the arm's
             file and `hydraulics` in the settings].
         span (FROM:TO): Part of the log to film [s], such as 10:20 [default: all].
-        collisions: Instead, find which bodies meet along the log's joint angles: of the
-            arm, its base and the floor; with --arm also of the carrier and the other
-            arm. The exit status is 1 if bodies meet.
+        collisions: Show nothing, but find which of the arm's bodies meet each other,
+            the base or the floor along the log's joint angles; with --arm, also the
+            carrier and the other arm. The exit status is 1 if bodies meet.
         config (YAML): Settings [default: config.yaml in the folder of the estimate,
             or else fit-hyd].
 

@@ -69,9 +69,36 @@ def quantity_section(settings: FitSettings, summary: FitSummary) -> Section | No
             cards[f"known_{name}"] = Table(name, header, tuple(rows))
     text = (
         "With 95 % intervals, which are right only if the model is right. "
-        "estimate.yaml has all quantities."
+        "All quantities stand further down."
     )
     return Section("What is known", text, cards=cards) if cards else None
+
+
+def every_quantity_section(
+    settings: FitSettings, summary: FitSummary
+) -> Section | None:
+    """Return the folded section with all quantities of the compared joints.
+
+    None without any.
+    """
+    rows = list[tuple[Cell, ...]]()
+    for joint in settings.outputs:
+        name = settings.arm.joint_names[joint - 1]
+        for quantity in summary.quantities.values():
+            if quantity.joint == joint:
+                value = quantity.value, quantity.unit, *quantity.interval
+                rows.append((name, quantity.label, *value))
+    if not rows:
+        return None
+    header = ("joint", "quantity", "value", "unit", "from", "to")
+    note = "from, to: 95 % interval; empty: no limit."
+    text = (
+        "Speeds, gains, dead bands, dead times, time constants, flows, frequencies and "
+        "loads of the joints."
+    )
+    tables = {"quantities": Table("", header, tuple(rows), note)}
+    answer = f"{len(rows)}, with intervals"
+    return Section("All quantities", text, tables=tables, folded=True, answer=answer)
 
 
 def _within(quantity: QuantityEstimate) -> str:
@@ -113,8 +140,8 @@ def error_section(settings: FitSettings, summary: FitSummary) -> Section | None:
     if not rows:
         return None
     text = (
-        f"Even with exact parameters a prediction is uncertain by {listed(after)} after 10 s of motion: what "
-        "moves a joint beside its commands adds up."
+        f"Even with exact parameters a prediction is uncertain by {listed(after)} after 10 s of motion, "
+        "because what else moves a joint, beside its commands, adds up."
     )
     note = (
         "Standard deviations; after 10 s at the mean speed of the logs. What is left and lasts is the error "

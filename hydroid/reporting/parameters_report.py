@@ -37,7 +37,7 @@ _NOTE = (
 )
 _PRIORS = (
     "What was known before the logs, and what they made of it: bars are 95 % intervals, points the "
-    "estimates. A bar as wide as the grey band has learnt nothing."
+    "estimates. Where a bar is as wide as the grey one, the logs added nothing."
 )
 
 
@@ -54,7 +54,10 @@ def parameter_section(
     if settings.stage == "hyd" and not tells_pressure:
         # without pressures in the log only their product with the areas is known
         supply = number(settings.hydraulics.supply_pressure)
-        text = f"Areas, masses, torques and flows hold for the given supply of {supply} bar."
+        text = (
+            "Areas, masses, torques and flows hold only for the supply pressure of the "
+            f"settings, {supply} bar."
+        )
     tables = {"parameters": short_table(settings, summary)}
     answer = known_of_free(summary)
     return Section(

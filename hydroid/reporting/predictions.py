@@ -18,6 +18,7 @@ from hydroid.reporting.actuator_report import speed_section, step_section
 from hydroid.reporting.correlation_report import correlation_section
 from hydroid.reporting.knowledge_report import (
     error_section,
+    every_quantity_section,
     further_findings,
     quantity_section,
     unknown_section,
@@ -148,6 +149,7 @@ def _fit_sections(
         residual_section(settings, summary, fitted),
         speed_section(settings, summary, [prediction.log for prediction in fitted]),
         step_section(settings, summary),
+        every_quantity_section(settings, summary),
         parameter_section(settings, summary, *further_findings(summary)),
         prior_section(settings, summary),
         correlation_section(settings, summary),
@@ -192,7 +194,10 @@ def _made_from(record: Record) -> tuple[str, ...]:
     settings = f"settings: config.yaml in {record.folder}, model {record.summary.final}"
     if record.settings.stage == "hyd":
         settings += f" ({record.settings.simulation.model})"
-    made_from = [f"Fitted to {_log_list(logs)}", settings, f"seed {record.seed}"]
+    seconds = sum(prediction.log.duration for prediction in record.result.fitted)
+    sampled = f"{seconds:.0f} s at {1.0 / record.settings.log.period_s:.3g} Hz"
+    fitted_to = f"Fitted to {_log_list(logs)}: {sampled}"
+    made_from = [fitted_to, settings, f"seed {record.seed}"]
     if date := record.identity.get("finished"):
         made_from.append(str(date))
     return tuple(made_from)

@@ -20,9 +20,9 @@ from hydroid.settings.fit import FitSettings
 from hydroid.words import listed, two_digits
 
 _TEXT = (
-    "Tested is what the past of a log does not foretell of each sample: the innovation. If the model is "
-    "right, innovations are white and owe nothing to the command, and 95 % of both correlations lie within "
-    "the grey band. With many samples the band is narrow: what counts is how large a correlation is."
+    "The test uses innovations: the part of each sample that the log's past does not predict. If the model "
+    "is right, they are white and not correlated with the command, and 95 % of both correlations lie within "
+    "the grey band. With many samples the band is narrow; then look at how large a correlation is."
 )
 _HEADER = (
     "joint",

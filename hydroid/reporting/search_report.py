@@ -39,7 +39,7 @@ def search_section(record: Record) -> Section:
         draw = partial(learning, result.history, objective)
         plots.append(Plot("learning", "Best candidate so far.", draw))
         draw = partial(pareto, result.front[1], segments, objective)
-        caption = "The Pareto set: lower fits that segment better."
+        caption = "The Pareto set: a lower point fits that segment better."
         plots.append(Plot("pareto", caption, draw))
     if any(len(costs) > 1 for costs in result.starts.values()):
         caption = "Where least squares ended from each start: starts at 0 found the best optimum."

@@ -32,9 +32,9 @@ _FITTED = (
     "Last three columns: simple models."
 )
 _TESTED = (
-    "Rms errors{unit} on {count} unseen log{s} (not fitted): of the change over 1, 5 and 10 s, and over "
-    "whole logs. In brackets: the best simple model. The word after it: whether the fit is better or "
-    "worse than that model, or cannot be told from it."
+    "Rms errors{unit} on {count} unseen log{s}, which the fit did not use: of the angle's change over 1, 5 "
+    "and 10 s, and of the angle over whole logs. In brackets: the best simple model. The word after it: "
+    "whether the fit is better or worse than that model, or cannot be told from it."
 )
 WHOLE = "whole logs"
 """name of a column"""

@@ -7,9 +7,10 @@ import pytest
 from linear_problem import ar1
 from report_fits import MODEL, make_fit, make_problem, make_record, make_uncertainty
 
+from hydroid.estimate import QuantityEstimate
 from hydroid.findings import Finding
 from hydroid.fitting.summary import summarise
-from hydroid.reporting.knowledge_report import error_section
+from hydroid.reporting.knowledge_report import error_section, every_quantity_section
 from hydroid.reporting.merged_report import merged_tables
 from hydroid.reporting.page import Table, log_names
 from hydroid.reporting.parameters_report import parameter_table
@@ -131,6 +132,26 @@ def test_how_sure_a_prediction_can_be_is_said_of_each_joint():
     assert error_section(problem.settings, summary.changed({"errors": {}})) is None
 
 
+def test_every_quantity_of_a_compared_joint_is_in_the_table():
+    problem = make_problem()
+    summary = summarise(problem, make_fit(problem))
+    made = {
+        "a": QuantityEstimate(
+            label="dead time", joint=2, value=0.1, unit="s", interval=(0.08, None)
+        ),
+        "b": QuantityEstimate(
+            label="of another", joint=3, value=1.0, unit="s", interval=(0.0, 2.0)
+        ),
+    }
+    section = every_quantity_section(
+        problem.settings, summary.changed({"quantities": made})
+    )
+    table = section.tables["quantities"]
+    assert table.rows == (("shoulder", "dead time", 0.1, "s", 0.08, None),)
+    none = summary.changed({"quantities": {}})
+    assert every_quantity_section(problem.settings, none) is None
+
+
 def test_what_is_left_of_an_error_and_lasts_is_a_finding():
     """Innovations of a second or so, where they should be white."""
     problem = make_problem(samples=3000)
@@ -143,7 +164,7 @@ def test_what_is_left_of_an_error_and_lasts_is_a_finding():
     assert finding.level == "note"
     time = summary.errors["q2"].lasts_s
     assert time == pytest.approx(1.0, rel=0.5)
-    words = f"What is left of the shoulder's error lasts {time:.2g} s: the model errs, not the sensor."
+    words = f"Part of the shoulder's error lasts {time:.2g} s, so it is the model's and not the sensor's."
     assert finding.what == words
 
 

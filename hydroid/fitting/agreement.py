@@ -159,14 +159,7 @@ def _compare(
     model = replace(model, limits=np.array([-np.inf, np.inf]))
     courses = _stretched(courses, model)
     common = _refit(model, courses)
-    rests = list[Baseline]()
-    costs = np.empty(len(courses))
-    for k, course in enumerate(courses):
-        others = [other for other in courses if other is not course]
-        rests.append(_refit(common, others))
-        costs[k] = sum(
-            np.sum(other.errors(rests[k].predict(other.log)) ** 2) for other in others
-        )
+    rests, costs = _without_each(common, courses)
     own = _numbers(rests, courses)
     sources = tuple(course.log.source for course in courses)
     # the log without which the others fit best; it spoils the rest of each of the
@@ -180,6 +173,22 @@ def _compare(
         return Agreement(joint, sources, clean.values, sd, (seeming, odd))
     sd = np.array([_deviations(own, k) for k in range(len(courses))])
     return Agreement(joint, sources, own.values, sd, None)
+
+
+def _without_each(
+    model: Baseline, courses: Sequence[_Course]
+) -> tuple[list[Baseline], Array]:
+    """Return a model fitted again without each of n logs, and the sums of its squared
+    errors on the others, (n,)."""
+    rests = list[Baseline]()
+    costs = np.zeros(len(courses))
+    for k, course in enumerate(courses):
+        others = [other for other in courses if other is not course]
+        rest = _refit(model, others)
+        rests.append(rest)
+        for other in others:
+            costs[k] += np.sum(other.errors(rest.predict(other.log)) ** 2)
+    return rests, costs
 
 
 @record

@@ -7,7 +7,7 @@ twice, also not by a resumed run.
 """
 
 import time
-from collections.abc import Callable, Generator, MutableMapping
+from collections.abc import Callable, Generator, MutableMapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -73,7 +73,9 @@ class Memo:
     """
 
     def __init__(self, problem: Problem, stored: Arrays | None = None) -> None:
-        self.problem, self.infeasible, self.elsewhere = problem, 0, 0
+        self.problem = problem
+        self.infeasible = 0
+        self.elsewhere = 0
         self._values: dict[bytes, Array] = {}
         """objectives of each candidate, overall last, shape (S + 1,)"""
         pairs = zip(stored["theta"], stored["values"], strict=True) if stored else ()
@@ -94,23 +96,29 @@ class Memo:
         """Evaluate theta as `Problem.evaluate` does, simulating what is new in it.
         Raises RunError: a resumed search does not repeat itself.
         """
-        new = {row.tobytes(): row for row in theta if row.tobytes() not in self._values}
+        new = {row.tobytes(): row for row in theta}
+        new = {key: row for key, row in new.items() if key not in self._values}
         values = {key: self.stored.pop(key) for key in new if key in self.stored}
-        unknown = [key for key in new if key not in values]
-        if unknown and self.stored:
-            raise RunError(
-                "the search cannot be continued: its library does not repeat what it did before",
-                hint="use the versions that the run began with, or begin another with --out",
-            )
+        unknown = [row for key, row in new.items() if key not in values]
         if unknown:
-            rows = self.problem.evaluate(np.array([new[key] for key in unknown]))
-            # a candidate with one infinite objective is infeasible: none of its
-            # objectives may win
-            rows[~np.isfinite(rows).all(axis=1)] = np.inf
-            values |= zip(unknown, rows, strict=True)
+            values |= self._simulated(unknown)
         self.infeasible += sum(not np.isfinite(row[-1]) for row in values.values())
         self._values.update((key, values[key]) for key in new)
         return np.array([self._values[row.tobytes()] for row in theta])
+
+    def _simulated(self, unknown: Sequence[Array]) -> dict[bytes, Array]:
+        """Return the objectives of candidates that are not stored, by their bytes."""
+        if self.stored:
+            what = "the search cannot be continued: its library does not repeat what it did before"
+            hint = (
+                "use the versions that the run began with, or begin another with --out"
+            )
+            raise RunError(what, hint=hint)
+        rows = self.problem.evaluate(np.array(unknown))
+        # a candidate with one infinite objective is infeasible: none of its objectives
+        # may win
+        rows[~np.isfinite(rows).all(axis=1)] = np.inf
+        return {one.tobytes(): row for one, row in zip(unknown, rows, strict=True)}
 
     def arrays(self) -> Arrays:
         """Return all candidates and their objectives, overall last: shapes (m, P) and

@@ -7,9 +7,9 @@ is shows long before least squares has converged, so that ends early on the way
 (`FIRM`). What is kept at the end is refined to the tolerance of the settings.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
-from typing import Protocol
+from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
 
@@ -86,6 +86,15 @@ class Watcher(Protocol):
         whether it is to end."""
 
 
+class _Beginning(NamedTuple):
+    """Where a model begins: theta, shape (P,); whether that may be far from an optimum;
+    whether each joint alone led there."""
+
+    theta: Array
+    far: bool
+    alone: bool
+
+
 class Ladder:
     """The estimates of a fit while it climbs.
 
@@ -103,10 +112,13 @@ class Ladder:
         watch: Watcher,
         checkpoints: Checkpoints,
     ) -> None:
-        self.problem, self.estimates = problem, estimates
+        self.problem = problem
+        self.estimates = estimates
         self.refinements = dict[str, Refinement]()
         self.kept = min(estimates.values(), key=lambda e: e.rms if e.usable else np.inf)
-        self._watch, self._checkpoints, self._late = watch, checkpoints, False
+        self._watch = watch
+        self._checkpoints = checkpoints
+        self._late = False
         self._step = step_of(self.kept.name)
         # whether output errors led near the kept estimate, before its innovations
         self._from_afar = False
@@ -114,57 +126,73 @@ class Ladder:
     def climb(self, whole: Problem) -> None:
         """Refine the estimate with each model and term that the settings of a fit's
         problem name."""
-        settings, refinement = whole.settings, whole.settings.refinement
+        settings = whole.settings
+        refinement = settings.refinement
         assert refinement is not None
-        two = settings.stage == "hyd" and settings.simulation.model == "ladder"
-        climbs = two or bool(settings.terms())
-        tolerance = (
-            max(FIRM, refinement.gain_tolerance)
-            if climbs
-            else refinement.gain_tolerance
-        )
-        on_the_way = refinement.changed({"gain_tolerance": tolerance})
+        has_dynamic = settings.stage == "hyd" and settings.simulation.model == "ladder"
+        climbs = has_dynamic or bool(settings.terms())
+        on_the_way = refinement
+        if climbs:
+            tolerance = max(FIRM, refinement.gain_tolerance)
+            on_the_way = refinement.changed({"gain_tolerance": tolerance})
         lone = self._lone_terms(settings)
-        for model in ("refined", "dynamic")[: 1 + two]:
-            possible = settings.terms(model)
-            terms = tuple(term for term in possible if term in self._step.terms)
-            self._rung(
-                whole, Step(model, terms), on_the_way, if_better=model == "dynamic"
-            )
-            for term in possible if self._step.model == model else ():
-                if term not in (*terms, *lone):
-                    with_term = self._step.changed(terms=(*self._step.terms, term))
-                    self._rung(whole, with_term, on_the_way, if_better=True)
-            if model == "refined":
-                self._add_lone_terms(whole, lone, on_the_way)
+        self._climb_model(whole, "refined", lone, on_the_way)
+        self._add_lone_terms(whole, lone, on_the_way)
+        if has_dynamic:
+            self._climb_model(whole, "dynamic", lone, on_the_way)
         if self._step.model == "dynamic":
             for term in self._step.terms:
                 self._try_without(whole, term, on_the_way)
         if climbs:
-            kept = self.kept
-            likelihood = make_likelihood(self.problem)
-            # a term that was added to an estimate began with the drift that its lack
-            # had left
-            how = refine if self._from_afar else refine_from_afar
-            last = self._refined(likelihood, kept.theta, refinement, self._step, how)
-            new = self._measured(self.problem, last, self._step)
-            self.kept = self.estimates[kept.name] = replace(new, gained=kept.gained)
+            self._end(refinement)
         if settings.joint_refinement:
-            self._rung(
-                whole, self._step.changed(model="joint"), refinement, if_better=False
-            )
+            joint = self._step.changed(model="joint")
+            self._rung(whole, joint, refinement, if_better=False)
+
+    def _climb_model(
+        self,
+        whole: Problem,
+        model: Literal["refined", "dynamic"],
+        lone: Collection[str],
+        settings: RefinementSettings,
+    ) -> None:
+        """Refine with a model, and then with each of its terms besides; those of `lone`
+        are another method's."""
+        possible = whole.settings.terms(model)
+        terms = tuple(term for term in possible if term in self._step.terms)
+        if_better = model == "dynamic"
+        self._rung(whole, Step(model, terms), settings, if_better=if_better)
+        if self._step.model != model:
+            return
+        for term in possible:
+            if term not in terms and term not in lone:
+                with_term = self._step.changed(terms=(*self._step.terms, term))
+                self._rung(whole, with_term, settings, if_better=True)
+
+    def _end(self, settings: RefinementSettings) -> None:
+        """Refine the estimate that is kept to the tolerance of the settings."""
+        kept = self.kept
+        # a term that was added to an estimate began with the drift that its lack had
+        # left
+        how = refine if self._from_afar else refine_from_afar
+        likelihood = make_likelihood(self.problem)
+        last = self._refined(likelihood, kept.theta, settings, self._step, how)
+        new = self._measured(self.problem, last, self._step)
+        self.kept = replace(new, gained=kept.gained)
+        self.estimates[kept.name] = self.kept
 
     def known(self, theta: Array) -> Uncertainty:
         """Return how well the logs determine theta, (P,): the estimate that is kept, or
         one of a search."""
-        problem, descent = self.problem, self.refinements.get(self.kept.name)
+        problem = self.problem
+        descent = self.refinements.get(self.kept.name)
         if descent is None or not len(descent.jacobian):
             return uncertainty(problem, theta)
         # what least squares ended with
-        parameters, free = problem.parameters, problem.parameters.free
-        change = (
-            estimate_box(parameters, theta).scale[free] / parameters.width(theta)[free]
-        )
+        parameters = problem.parameters
+        free = parameters.free
+        scale = estimate_box(parameters, theta).scale[free]
+        change = scale / parameters.width(theta)[free]
         slopes = descent.jacobian[: problem.measured.size].T * change[:, None]
         return uncertainty(problem, theta, slopes, descent.numbers)
 
@@ -183,43 +211,61 @@ class Ladder:
         if_better: else it is kept in any case. begun: where it begins, shape (P,), if
         not at the kept one.
         """
-        last, start = self.problem, self.kept
+        last = self.problem
+        start = self.kept
         if if_better and (self._late or last.leaves_noise(start.theta)):
             return
         own = whole.varied(whole.settings.of_estimate(step.estimate))
-        other_model = own.settings.quasi_static != last.settings.quasi_static
-        # what a search, or another model, ended at may be far from an optimum
-        far = not if_better or other_model or bool(_new_curves(own, last))
-        renewed = list[int]()
-        if begun is None:
-            begun = _begun(own, last, start.theta)
-            renewed = _renewed(own, last, begun)
-            begun = self._each_alone(own, renewed, begun, settings, step)
-        likelihood = make_likelihood(own)
-        if other_model:
-            # there is nothing for a model that is slow to simulate
-            if self._is_white():
-                return
-            begun = self._nearer(likelihood, begun, settings, step)
-            if own.rms(own.output_errors(begun[None]))[0] > start.rms:
-                return
-        how = refine_from_afar if far else refine
+        begin = self._beginning(own, begun, settings, step)
+        if begin is None:
+            return
+        # what a search ended at may be far from an optimum, too
+        how = refine_from_afar if begin.far or not if_better else refine
         on_the_way = step.changed(phase="on the way")
-        result = self._refined(likelihood, begun, settings, on_the_way, how)
+        likelihood = make_likelihood(own)
+        result = self._refined(likelihood, begin.theta, settings, on_the_way, how)
         if self._late and if_better:
             return
         new = self._measured(own, result, step)
-        if not if_better:
-            self._keep(own, new, step, from_afar=far)
-            return
-        without = self._left_out_of(last, self.refinements[start.name])
-        with_it = self._left_out_of(own, result)
-        gained = gain(with_it, without)
-        self.estimates[step.estimate] = new = replace(new, gained=gained)
-        if not self._late and is_clear(*gained):
-            self._keep(
-                own, new, step, from_afar=far or (self._from_afar and bool(renewed))
-            )
+        if if_better:
+            without = self._left_out_of(last, self.refinements[start.name])
+            gained = gain(self._left_out_of(own, result), without)
+            new = replace(new, gained=gained)
+            self.estimates[step.estimate] = new
+            if self._late or not is_clear(*gained):
+                return
+        from_afar = how is refine_from_afar or (self._from_afar and begin.alone)
+        self._keep(own, new, step, from_afar=from_afar)
+
+    def _beginning(
+        self,
+        problem: Problem,
+        theta: Array | None,
+        settings: RefinementSettings,
+        step: Step,
+    ) -> "_Beginning | None":
+        """Return where the next model begins: at theta, (P,), or near the estimate that
+        is kept.
+
+        None: another model, which is slow to simulate, has nothing to explain, or
+        begins with larger errors.
+        """
+        last = self.problem
+        start = self.kept
+        far = bool(_new_curves(problem, last))
+        renewed = list[int]()
+        if theta is None:
+            theta = _begun(problem, last, start.theta)
+            renewed = _renewed(problem, last, theta)
+            theta = self._each_alone(problem, renewed, theta, settings, step)
+        if problem.settings.quasi_static != last.settings.quasi_static:
+            if self._is_white():
+                return None
+            far = True
+            theta = self._nearer(make_likelihood(problem), theta, settings, step)
+            if problem.rms(problem.output_errors(theta[None]))[0] > start.rms:
+                return None
+        return _Beginning(theta, far, bool(renewed))
 
     def _each_alone(
         self,
@@ -309,8 +355,13 @@ class Ladder:
             return None
         begun = _begun(problem, last, theta)
         after = alone(problem, step.joint, begun)
+        # both from afar: else what helped the one would count for the term
         without = self._refined(
-            make_likelihood(before), theta, settings, step.changed(phase="without it")
+            make_likelihood(before),
+            theta,
+            settings,
+            step.changed(terms=step.terms[:-1]),
+            refine_from_afar,
         )
         with_it = self._refined(
             make_likelihood(after), begun, settings, step, refine_from_afar
@@ -335,8 +386,8 @@ class Ladder:
             terms=tuple(one for one in self._step.terms if one != term)
         )
         own = whole.varied(whole.settings.of_estimate(step.estimate))
-        parameters, before = own.parameters, self.problem.parameters
-        theta = parameters.started(before.mapping(self.kept.theta))
+        values = self.problem.parameters.mapping(self.kept.theta)
+        theta = own.parameters.started(values)
         result = self._refined(
             make_likelihood(own), theta, settings, step.changed(phase="on the way")
         )

@@ -4,9 +4,9 @@ its line of progress."""
 from dataclasses import dataclass, replace
 from typing import Literal
 
-Phase = Literal["", "from afar", "at first", "on the way", "without it"]
+Phase = Literal["", "from afar", "at first", "on the way"]
 """of a rung: by output errors, to see whether it is likely at all, to see whether it is
-better, without its last term, or to the end (no words)"""
+better, or to the end (no words)"""
 
 
 @dataclass(frozen=True)

@@ -279,33 +279,39 @@ def _lasting_findings(
 def _parameter_findings(
     problem: Problem, estimate: Mapping[str, ParameterEstimate]
 ) -> list[Finding]:
-    """What is to be said about what the logs determine; a bound of 0 cannot be widened.
-
-    That no log has an effect of other groups is meant to be so.
-    """
+    """What is to be said about what the logs determine; a bound of 0 cannot be
+    widened."""
     kinds = defaultdict[tuple[str, str], list[str]](list)
     for parameter in problem.parameters.parameters:
-        one = estimate[parameter.name]
-        idle = one.flag == Flag.NO_EFFECT
-        if one.at_bound and not idle:
-            kind = _at_bound(problem, parameter, one.at_bound)
-            kinds[kind, one.at_bound].append(parameter.name)
-        if idle and problem.settings.parameters[parameter.name].per:
-            continue
-        kind = one.source if one.source == Source.PRIOR and not idle else one.flag
-        kinds[str(kind), ""].append(parameter.name)
-        # simulations diverge where it is changed
-        if one.effect_deg is None and one.flag != Flag.FIXED:
-            kinds["effect unknown", ""].append(parameter.name)
+        for kind in _kinds_of(problem, parameter, estimate[parameter.name]):
+            kinds[kind].append(parameter.name)
     findings = list[Finding]()
     for kind in _KINDS:
         level = "warning" if kind in _WARNINGS else "note"
         for (own, side), names in kinds.items():
             if own == kind:
-                findings.append(
-                    Finding(kind, level, tuple(names), {"side": side} if side else {})
-                )
+                values = {"side": side} if side else {}
+                findings.append(Finding(kind, level, tuple(names), values))
     return findings
+
+
+def _kinds_of(
+    problem: Problem, parameter: Parameter, one: ParameterEstimate
+) -> Iterator[tuple[str, str]]:
+    """Yield kinds of findings about a parameter, each with the side of its bounds.
+
+    That no log has an effect of other groups is meant to be so.
+    """
+    idle = one.flag == Flag.NO_EFFECT
+    if one.at_bound and not idle:
+        yield _at_bound(problem, parameter, one.at_bound), one.at_bound
+    if idle and problem.settings.parameters[parameter.name].per:
+        return
+    by_prior = one.source == Source.PRIOR and not idle
+    yield str(one.source if by_prior else one.flag), ""
+    # simulations diverge where it is changed
+    if one.effect_deg is None and one.flag != Flag.FIXED:
+        yield "effect unknown", ""
 
 
 def _at_bound(problem: Problem, parameter: Parameter, side: str) -> str:

@@ -8,7 +8,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import KW_ONLY, field, replace
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +17,7 @@ from hydroid.arrays import Array, Index, Ints, record
 from hydroid.errors import LogError
 from hydroid.findings import Level
 from hydroid.log.log import LogFinding, log_finding
-
-if TYPE_CHECKING:
-    from hydroid.log.rods import Rod
+from hydroid.log.rods import Rod
 
 _DAY = 86_400 * 10**9
 """[ns]"""
@@ -63,7 +61,7 @@ class Signal:
     unit: str = ""
     owner: str = ""
     rest: float = 0.0
-    rod: "Rod | None" = None
+    rod: Rod | None = None
 
     def __str__(self) -> str:
         return f"{self.kind} of joint {self.owner}" if self.joint else self.kind

@@ -31,6 +31,8 @@ from hydroid.settings.search import RefinementSettings
 FIRST = 10
 """iterations after which another model must err less than the last one: each is slow to
 simulate"""
+LESS = 0.1
+"""part by which the errors of one joint must fall for its model to be refined again"""
 FIRM = 1e-3  # gain below which least squares ends where another rung may follow
 
 
@@ -93,6 +95,14 @@ class _Beginning(NamedTuple):
     theta: Array
     far: bool
     alone: bool
+
+
+class _Alone(NamedTuple):
+    """Where a joint alone leads: theta with another term, shape (P + N,), if that is
+    better; else, without it, (P,). Neither: there was nothing to refine."""
+
+    theta: Array | None = None
+    without: Array | None = None
 
 
 class Ladder:
@@ -227,6 +237,9 @@ class Ladder:
         if self._late and if_better:
             return
         new = self._measured(own, result, step)
+        if step.estimate == start.name:
+            new = replace(new, gained=start.gained)
+            self.estimates[start.name] = new
         if if_better:
             without = self._left_out_of(last, self.refinements[start.name])
             gained = gain(self._left_out_of(own, result), without)
@@ -330,29 +343,40 @@ class Ladder:
 
         The other joints follow their logs meanwhile.
         """
-        problem, theta, step = self.problem, self.kept.theta, self._step
+        problem = self.problem
+        theta = self.kept.theta
+        step = self._step
         for term, joint in lone.items():
             tried = step.changed(terms=(*step.terms, term), joint=joint)
             own = whole.varied(whole.settings.of_estimate(tried.estimate))
-            reached = self._better_alone(problem, own, theta, tried, settings)
-            if reached is not None:
-                problem, theta, step = own, reached, tried.changed(joint=0)
+            alone_with = self._alone(problem, own, theta, tried, settings)
+            if alone_with.theta is not None:
+                problem = own
+                theta = alone_with.theta
+                step = tried.changed(joint=0)
+            elif alone_with.without is not None:
+                theta = _likelier(problem, theta, alone_with.without)
         if step != self._step:
             self._rung(whole, step, settings, if_better=True, begun=theta)
+        elif theta is not self.kept.theta:
+            # a joint went on alone from where all together had ended
+            again = step.changed(start=2)
+            self._rung(whole, again, settings, if_better=False, begun=theta)
+            self._step = step
 
-    def _better_alone(
+    def _alone(
         self,
         last: Problem,
         problem: Problem,
         theta: Array,
         step: Step,
         settings: RefinementSettings,
-    ) -> Array | None:
-        """Return where a joint alone leads, (P,), from the theta of the last problem;
-        None: not better."""
+    ) -> "_Alone":
+        """Refine a joint alone without the last term of a step, and with it, from the
+        theta of the last problem, (P,)."""
         before = alone(last, step.joint, theta)
         if self._late or before.leaves_noise(theta):
-            return None
+            return _Alone()
         begun = _begun(problem, last, theta)
         after = alone(problem, step.joint, begun)
         # both from afar: else what helped the one would count for the term
@@ -366,11 +390,14 @@ class Ladder:
         with_it = self._refined(
             make_likelihood(after), begun, settings, step, refine_from_afar
         )
-        if self._late or not is_better(
+        if self._late:
+            return _Alone()
+        gained = is_better(
             self._left_out_of(after, with_it), self._left_out_of(before, without)
-        ):
-            return None
-        return after.parameters.from_unit(with_it.point)
+        )
+        if gained:
+            return _Alone(theta=after.parameters.from_unit(with_it.point))
+        return _Alone(without=before.parameters.from_unit(without.point))
 
     def _try_without(
         self, whole: Problem, term: str, settings: RefinementSettings
@@ -454,6 +481,19 @@ def _begun(problem: Problem, last: Problem, theta: Array) -> Array:
     for joint in _new_curves(problem, last):
         begun = by_speeds(problem, joint, begun)
     return begun
+
+
+def _likelier(problem: Problem, theta: Array, other: Array) -> Array:
+    """Return another parameter set, (P,), where it makes the errors of all joints
+    together so much likelier than theta that it is worth a refinement; else theta."""
+    costs = [np.inf, np.inf]
+    for k, one in enumerate((theta, other)):
+        errors = problem.output_errors(one[None])
+        if np.isfinite(errors).all():
+            likelihood = make_likelihood(problem).estimated(errors[0])
+            costs[k] = likelihood.negative_log(likelihood.rows(one[None])[0])
+    samples = problem.measured.size / len(problem.settings.outputs)
+    return other if costs[1] < costs[0] - LESS * samples else theta
 
 
 def _renewed(problem: Problem, last: Problem, theta: Array) -> list[int]:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from itertools import chain, count
+from itertools import count
 from unicodedata import category
 
 
@@ -18,8 +18,11 @@ def listed(names: Sequence[str], most: int | None = None) -> str:
 def distinct(name: str, taken: set[str], ending: str = "_{}") -> str:
     """Return a name that is not taken, whatever its case, numbered where it must be;
     from now on it is."""
-    others = (name + ending.format(n) for n in count(2))
-    free = next(one for one in chain([name], others) if one.lower() not in taken)
+    free = name
+    numbers = count(2)
+    # files of two names that differ in their case alone are one on some systems
+    while free.lower() in taken:
+        free = name + ending.format(next(numbers))
     taken.add(free.lower())
     return free
 
@@ -33,9 +36,13 @@ def numbered(names: Iterable[str]) -> list[str]:
 def printable(text: str) -> str:
     """Replace what would act on a terminal instead of being shown: a file may be called
     by such letters."""
-    return "".join(
-        "?" if category(c) in _ACTING and c not in "\n\t" else c for c in text
-    )
+    return "".join(map(_harmless, text))
+
+
+def _harmless(letter: str) -> str:
+    if category(letter) in _ACTING and letter not in "\n\t":
+        return "?"
+    return letter
 
 
 _ACTING = ("Cc", "Cf", "Cs")  # controls, marks of direction, and halves of letters
@@ -51,11 +58,10 @@ def number(value: float) -> str:
     scientific = f"{value:.3e}"
     # of the rounded value: 0.99999 is 1.000, not 1.0000
     exponent = int(scientific.partition("e")[2])
-    return (
-        f"{float(scientific):.{max(0, 3 - exponent)}f}"
-        if -4 <= exponent < 7
-        else scientific
-    )
+    if not -4 <= exponent < 7:
+        return scientific
+    decimals = max(0, 3 - exponent)
+    return f"{float(scientific):.{decimals}f}"
 
 
 def two_digits(value: float) -> str:
@@ -74,18 +80,16 @@ def three_digits(value: float) -> str:
 def interval_words(low: float | None, high: float | None) -> str:
     """Write an interval by two digits of its width, and of each end; nothing where it
     has no limit."""
-    if low is None or high is None:
-        if low is None and high is None:
-            return ""
-        return (
-            f"up to {three_digits(high)}"
-            if high is not None
-            else f"from {three_digits(low or 0.0)}"
-        )
-    ends = [
-        f"{end:.{max(_decimals(high - low), _decimals(end))}f}" for end in (low, high)
-    ]
-    return " to ".join(ends)
+    if low is None and high is None:
+        return ""
+    if low is None:
+        return f"up to {three_digits(high or 0.0)}"
+    if high is None:
+        return f"from {three_digits(low)}"
+    of_width = _decimals(high - low)
+    first = f"{low:.{max(of_width, _decimals(low))}f}"
+    last = f"{high:.{max(of_width, _decimals(high))}f}"
+    return f"{first} to {last}"
 
 
 def _decimals(size: float) -> int:
@@ -97,19 +101,18 @@ def _decimals(size: float) -> int:
 def told_apart(first: float, second: float) -> tuple[str, str]:
     """Write two numbers beside each other: two significant digits, three where two
     would tie."""
-    two = _significant(first, 2), _significant(second, 2)
-    return (
-        two if two[0] != two[1] else (_significant(first, 3), _significant(second, 3))
-    )
+    for digits in (2, 3):
+        pair = (_significant(first, digits), _significant(second, digits))
+        if pair[0] != pair[1]:
+            break
+    return pair
 
 
 def _significant(value: float, digits: int) -> str:
     """Write significant digits, zeros among them, or all before the point."""
-    return (
-        f"{value:.0f}"
-        if abs(value) >= 10**digits
-        else f"{value:#.{digits}g}".rstrip(".")
-    )
+    if abs(value) >= 10**digits:
+        return f"{value:.0f}"
+    return f"{value:#.{digits}g}".rstrip(".")
 
 
 def plain(value: float) -> str:
@@ -117,7 +120,10 @@ def plain(value: float) -> str:
     if not math.isfinite(value):
         return "–"
     text = f"{value:.6g}"
-    return f"{float(text):.0f}" if "e+" in text and abs(value) < 1e9 else text
+    # a large number of few digits reads more easily without its exponent
+    if "e+" in text and abs(value) < 1e9:
+        return f"{float(text):.0f}"
+    return text
 
 
 class _Number(float):

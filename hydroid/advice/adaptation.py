@@ -16,7 +16,7 @@ import numpy as np
 from hydroid.errors import SettingsError
 from hydroid.files import Plain
 from hydroid.findings import Finding
-from hydroid.fitting.left_out import LeftOut, gain, is_better, refit
+from hydroid.fitting.left_out import LeftOut, gain, is_better, not_fitted, refit
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
 from hydroid.problem.problem import Problem
@@ -164,7 +164,7 @@ def _candidates(settings: FitSettings, logs: Sequence[Log]) -> list[str]:
 def _as_it_is(problem: Problem, model: IdentifiedModel) -> LeftOut:
     """Return what a model that is not fitted to them makes of the parts of the logs."""
     errors = problem.output_errors(model.theta[None])[0]
-    return LeftOut(problem, model.theta, model.theta[None], errors)
+    return not_fitted(problem, model.theta, errors)
 
 
 def load_findings(settings: FitSettings) -> tuple[Finding, ...]:

@@ -46,9 +46,9 @@ PRIOR_SD = 1.0
 all that an experiment can do"""
 
 
-def forecast(known: Posterior) -> Posterior:
+def forecast(posterior: Posterior) -> Posterior:
     """Return what is known if every parameter is known to PRIOR_SD at least."""
-    return known.add(np.eye(len(known.root)) / PRIOR_SD)
+    return posterior.add(np.eye(len(posterior.root)) / PRIOR_SD)
 
 
 def measured(
@@ -106,7 +106,7 @@ DIVERGED = Broken(DIVERGES, "design", 1.0)
 class ExperimentSimulator:
     """Simulates experiments at an estimate within the limits of the settings."""
 
-    def __init__(self, settings: FitSettings, known: Posterior) -> None:
+    def __init__(self, settings: FitSettings, posterior: Posterior) -> None:
         # an experiment has no measured motion
         if settings.simulation.other_joints == "measured":
             settings = settings.changed({"simulation.other_joints": "locked"})
@@ -116,9 +116,9 @@ class ExperimentSimulator:
         self._outputs = [j - 1 for j in settings.outputs]
         self._spec = load_model(arm)
         self._pose = arm.pose(settings.start_pose)
-        self._box = known.box
+        self._box = posterior.box
         # steps so short that curvature matters little
-        self._axes = known.axes(1e-5).one_sided
+        self._axes = posterior.axes(1e-5).one_sided
         self._margin = settings.design.clearance_m
         self._machine = None
         self._counted = np.empty(0, bool)
@@ -230,7 +230,7 @@ class ExperimentSimulator:
 class Design:
     """A designed experiment beside the random ones it was chosen from.
 
-    random: those drawn at random that keep the limits. known: what is known without it.
+    random: those drawn at random that keep the limits. before: the posterior without it.
     moved: which of the p parameters any of these improves (`MOVED`), but for effects of
     a group of logs, which belong to another day, (p,); the others must not hide them.
     names: of the parameters.
@@ -238,7 +238,7 @@ class Design:
 
     best: Trial
     random: tuple[Trial, ...]
-    known: Posterior
+    before: Posterior
     moved: Mask
     names: tuple[str, ...]
 
@@ -251,21 +251,21 @@ class Design:
     @property
     def after(self) -> Posterior:
         """The posterior after the experiment."""
-        return self.known.add(self.best.gained)
+        return self.before.add(self.best.gained)
 
     @property
     def random_deviations(self) -> Array:
         """Relative standard deviation of each parameter after a random experiment, the
         median; (p,)."""
         return np.median(
-            [self.known.add(t.gained).deviations for t in self.random], axis=0
+            [self.before.add(t.gained).deviations for t in self.random], axis=0
         )
 
 
-def typical(known: Posterior, moved: Mask) -> float:
+def typical(posterior: Posterior, moved: Mask) -> float:
     """Return the geometric mean of the relative standard deviations of some parameters,
     a mask (p,)."""
-    return float(np.exp(np.mean(np.log(known.deviations[moved]))))
+    return float(np.exp(np.mean(np.log(posterior.deviations[moved]))))
 
 
 def broken_limits(broken: Sequence[Broken]) -> SettingsError:
@@ -299,17 +299,17 @@ def design(
     Raises SettingsError: no random experiment keeps the limits.
     """
     parameters = settings.parameter_set()
-    known = forecast(_known(settings, theta, logs))
+    posterior = forecast(_logs_posterior(settings, theta, logs))
     rng = np.random.default_rng(seed)
     experiments = RandomExperiments(settings, rng)
-    simulator = ExperimentSimulator(settings, known)
+    simulator = ExperimentSimulator(settings, posterior)
     random = _random_trials(settings, experiments, simulator, progress)
-    names = parameters.named(known.box.varied)
+    names = parameters.named(posterior.box.varied)
     lasting = np.array([settings.parameters[name].per is None for name in names])
-    moved = moved_by(random, known, lasting)
+    moved = moved_by(random, posterior, lasting)
 
     def score(trial: Trial) -> float:
-        return -typical(known.add(trial.gained), moved)
+        return -typical(posterior.add(trial.gained), moved)
 
     # the number breaks ties: trials themselves cannot be compared
     scored = [(score(trial), number, trial) for number, trial in enumerate(random)]
@@ -325,10 +325,12 @@ def design(
         best_score, _, best = elite[0]
         progress(f"improving: typically {-100 * best_score:.3g} %", tried, effort)
     _, _, best = elite[0]
-    return Design(best, tuple(random), known, moved, names)
+    return Design(best, tuple(random), posterior, moved, names)
 
 
-def _known(settings: FitSettings, theta: Array, logs: Sequence[Log]) -> Posterior:
+def _logs_posterior(
+    settings: FitSettings, theta: Array, logs: Sequence[Log]
+) -> Posterior:
     """Return what logs and priors say at an estimate, shape (P,)."""
     if logs:
         return uncertainty(Problem(settings, logs), theta).posterior
@@ -365,11 +367,11 @@ def _random_trials(
     return kept
 
 
-def moved_by(random: Sequence[Trial], known: Posterior, counted: Mask) -> Mask:
+def moved_by(random: Sequence[Trial], posterior: Posterior, counted: Mask) -> Mask:
     """Return which counted parameters any random experiment improves, (p,);
     all counted if there is none."""
-    deviations = [known.add(trial.gained).deviations for trial in random]
-    moved = counted & (np.min(deviations, axis=0) < MOVED * known.deviations)
+    deviations = [posterior.add(trial.gained).deviations for trial in random]
+    moved = counted & (np.min(deviations, axis=0) < MOVED * posterior.deviations)
     if moved.any():
         return moved
     return counted if counted.any() else np.ones_like(counted)

@@ -83,17 +83,17 @@ class Explained:
         return Score(amount * square / deviation, amount, square / deviation, gain)
 
 
-def explained(problem: Problem, known: Uncertainty) -> Explained:
+def explained(problem: Problem, uncertainty: Uncertainty) -> Explained:
     """Return what a fit has explained at an estimate. Parameters at bounds are held."""
-    linear = known.linear
+    linear = uncertainty.linear
     # the estimate does not depend on the weak priors
     weak = np.zeros(len(linear.slopes))
-    of_priors = problem.priors.weighed_at(known.theta)(known.theta[None])[0]
+    of_priors = problem.priors.weighed_at(uncertainty.theta)(uncertainty.theta[None])[0]
     left = np.concatenate([linear.innovations, of_priors, weak])
 
     def variance(row: Array) -> float:
         samples = problem.measured.size
-        return known.variance(row[:samples]) + float(np.sum(row[samples:] ** 2))
+        return uncertainty.variance(row[:samples]) + float(np.sum(row[samples:] ** 2))
 
     return Explained(linear.effects, left, variance)
 
@@ -140,16 +140,16 @@ class Candidate:
 
 
 def score_terms(
-    problem: Problem, known: Uncertainty, progress: Progress
+    problem: Problem, uncertainty: Uncertainty, progress: Progress
 ) -> list[Candidate]:
     """Test every term of a problem at an estimate; those that the logs cannot show are
     left out."""
-    every = terms(problem, known.theta)
-    fit = explained(problem, known)
+    every = terms(problem, uncertainty.theta)
+    fit = explained(problem, uncertainty)
     candidates = list[Candidate]()
     for done, term in enumerate(every):
         progress("terms", done, len(every))
-        candidate = _tested(term, known, fit)
+        candidate = _tested(term, uncertainty, fit)
         if candidate is not None:
             candidates.append(candidate)
     return candidates
@@ -173,7 +173,7 @@ def promising(tests: Sequence[Candidate]) -> list[Candidate]:
     return list(best.values())
 
 
-def _tested(term: Term, known: Uncertainty, fit: Explained) -> Candidate | None:
+def _tested(term: Term, uncertainty: Uncertainty, fit: Explained) -> Candidate | None:
     """Test one term by the largest change whose effect is small, a limit by each that
     acts.
 
@@ -188,9 +188,11 @@ def _tested(term: Term, known: Uncertainty, fit: Explained) -> Candidate | None:
         end = high if high - term.value >= term.value - low else low
         parts = 4.0 ** np.arange(-5.0, 1.0)
         values = term.value + parts * (end - term.value)
-    innovations = term.innovations(known.likelihood, known.theta, values.tolist())
-    effects = innovations - known.linear.innovations
-    noise = max(float(rms(known.linear.innovations)), np.finfo(float).tiny)
+    innovations = term.innovations(
+        uncertainty.likelihood, uncertainty.theta, values.tolist()
+    )
+    effects = innovations - uncertainty.linear.innovations
+    noise = max(float(rms(uncertainty.linear.innovations)), np.finfo(float).tiny)
     sizes = rms(effects, axis=1) / noise
     acting = np.flatnonzero(np.isfinite(sizes) & (sizes > 0))
     if not is_limit:

@@ -14,7 +14,7 @@ import numpy as np
 from hydroid.advice.adaptation import adapted, carrying, first_guess
 from hydroid.arrays import Array, record
 from hydroid.findings import Finding
-from hydroid.fitting.left_out import LeftOut, is_better, refit
+from hydroid.fitting.left_out import is_better, not_fitted, refit
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
 from hydroid.posterior.error_model import likelihood_at
@@ -54,7 +54,7 @@ def asked_loads(model: IdentifiedModel, logs: Sequence[Log]) -> list[Load]:
     for log in logs:
         problem = Problem(adapted(able, [TIP_LOAD], [log]), [log])
         errors = problem.output_errors(able.theta[None])[0]
-        before = LeftOut(problem, able.theta, able.theta[None], errors)
+        before = not_fitted(problem, able.theta, errors)
         begin = able.theta.copy()
         begin[-1] = first_guess(able)
         after = refit(problem, begin)

@@ -43,7 +43,7 @@ Content = Mapping[str, Any]
 
 
 def advice(
-    problem: Problem, known: Uncertainty, run: str, progress: Progress
+    problem: Problem, uncertainty: Uncertainty, run: str, progress: Progress
 ) -> tuple[Content, tuple[Finding, ...]]:
     """Return the suggestions about an estimate with its uncertainty, and what is to be
     said, the first first.
@@ -51,10 +51,10 @@ def advice(
     The suggestions are as JSON has them (docs/json.md); `run` is the estimate's folder
     in commands.
     """
-    tests = score_terms(problem, known, progress)
+    tests = score_terms(problem, uncertainty, progress)
     candidates = promising(tests)
     # the model as it is: what a freed term is compared with
-    without = refit(problem, known.theta)
+    without = refit(problem, uncertainty.theta)
     ranked = list[tuple[bool, float, Plain]]()
     most = min(MOST_TRIED, len(candidates))
     for i, candidate in enumerate(candidates):
@@ -79,7 +79,7 @@ def advice(
         "left_out_deg": without.by_joint,
         "tested": len(tests),
         "terms": [row for _, _, row in ranked],
-        "actions": next_actions(problem, known),
+        "actions": next_actions(problem, uncertainty),
         "assumptions": [
             {"kind": "sign", "joint": joint, "evidence": evidence}
             for joint, evidence in doubted.items()
@@ -164,14 +164,14 @@ def squared_changes(left_out: LeftOut, joint: int) -> Array:
     return np.concatenate(squares)
 
 
-def next_actions(problem: Problem, known: Uncertainty) -> list[Plain]:
+def next_actions(problem: Problem, uncertainty: Uncertainty) -> list[Plain]:
     """Return the actions that would help most, the best first, as JSON has them
     (docs/json.md)."""
-    now = forecast(known.posterior)
+    now = forecast(uncertainty.posterior)
     wide = now.deviations
     names = np.array(problem.parameters.names)[now.box.varied]
     useful = list[tuple[float, Plain]]()
-    for kind, subject, rows in _forecasts(problem, known, now):
+    for kind, subject, rows in _forecasts(problem, uncertainty, now):
         narrow = now.add(rows).deviations
         # the one that improves most, but for the one that is stated
         factors = np.where(names == subject, 0.0, wide / narrow)
@@ -193,7 +193,7 @@ def next_actions(problem: Problem, known: Uncertainty) -> list[Plain]:
 
 
 def _forecasts(
-    problem: Problem, known: Uncertainty, now: Posterior
+    problem: Problem, uncertainty: Uncertainty, now: Posterior
 ) -> Iterator[tuple[str, str, Array]]:
     """Yield actions, their subjects, and rows of the information that each adds, shape
     (k, p).
@@ -207,7 +207,7 @@ def _forecasts(
         if _can_be_stated(settings, settings.parameters[name]):
             kind = "weigh" if settings.parameters[name].quantity == "mass" else "state"
             yield kind, name, row[None] / STATED_SD[kind]
-    settings = _with_noise_of(settings, known)
+    settings = _with_noise_of(settings, uncertainty)
     try:
         draws = RandomExperiments(settings, np.random.default_rng(1))
     except SettingsError:
@@ -233,20 +233,20 @@ def _can_be_stated(settings: FitSettings, parameter: ParameterSettings) -> bool:
     )
 
 
-def _with_noise_of(settings: FitSettings, known: Uncertainty) -> FitSettings:
+def _with_noise_of(settings: FitSettings, uncertainty: Uncertainty) -> FitSettings:
     """Return the settings of an experiment with the noise and drift of a fit's worst
     angle.
 
     Collisions are not checked: this is what the best of a few could measure, and
     `hydroid design` then looks for one free of collisions.
     """
-    errors = known.errors
+    errors = uncertainty.errors
     noise = [
         errors.numbers[i, 0]
         for i, signal in enumerate(errors.signals)
         if signal.quantity == "angle"
     ]
-    drift = [error.after_10_s_deg for error in angle_errors(known).values()]
+    drift = [error.after_10_s_deg for error in angle_errors(uncertainty).values()]
     changes = {
         "noise_deg": np.degrees(np.sqrt(max(noise))),
         "drift_deg": max(drift),

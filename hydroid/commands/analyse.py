@@ -109,12 +109,12 @@ def analyse(
     wanted = names(profile)
     profiles: dict[str, Profile] = {}
     with Progress() as progress:
-        known = uncertainty(problem, model.theta)
+        of_estimate = uncertainty(problem, model.theta)
         for done, name in enumerate(wanted):
             progress("profiles", done, len(wanted))
-            profiles[name] = identifiability.profile(problem, known, name)
-    identified = identifiability.identifiability(problem, known)
-    summary = account(problem, known)
+            profiles[name] = identifiability.profile(problem, of_estimate, name)
+    identified = identifiability.identifiability(problem, of_estimate)
+    summary = account(problem, of_estimate)
     findings = summary.findings
     better = tuple(name for name, found in profiles.items() if found.better_optimum)
     if better:
@@ -133,7 +133,7 @@ def analyse(
     page = replace(page, files={**page.files, "parameters": table})
     said = [f"- {in_words(finding, problem.settings)}" for finding in findings]
     lines = [table, *said, *written(page, out)]
-    return Result(lines, content, Analysis(known, identified, profiles), page)
+    return Result(lines, content, Analysis(of_estimate, identified, profiles), page)
 
 
 def quantity(
@@ -169,19 +169,20 @@ def quantity(
     from hydroid.posterior.posterior import stored_posterior
 
     opened = open_model(model)
-    known = stored_posterior(opened)
-    if known is None:
+    posterior = stored_posterior(opened)
+    if posterior is None:
         hint = "name the folder of a fit, with the settings that it used"
         raise RunError("holds no covariance of these parameters", opened.source, hint)
     shape = np.shape(function(Plant(opened)))
 
     def values(theta: Array) -> Array:
-        plants = (Plant(replace(opened, theta=row)) for row in theta)
-        return np.stack(
-            [np.ravel(np.asarray(function(plant), float)) for plant in plants]
-        )
+        rows = list[Array]()
+        for row in theta:
+            plant = Plant(replace(opened, theta=row))
+            rows.append(np.ravel(np.asarray(function(plant), float)))
+        return np.stack(rows)
 
-    found = known.propagate(values, positive)
+    found = posterior.propagate(values, positive)
     ends = found.interval.reshape(*shape, 2)
     return QuantityResult(
         found.value.reshape(shape), found.sd.reshape(shape), ends, unit

@@ -172,7 +172,7 @@ def design(
         result = best_experiment(settings, model.theta, existing, seed, progress)
     rows = list[Plain]()
     for i, name in enumerate(result.names):
-        before = result.known.deviations[i]
+        before = result.before.deviations[i]
         random = result.random_deviations[i]
         after = result.after.deviations[i]
         rows.append(

@@ -198,14 +198,14 @@ def _fit(
         )
     # what stage 1 and --start say are settings like any others: they are read with them
     # once more
-    known = Plain()
+    stated = Plain()
     if stage == "hyd":
-        known |= held_mechanics(mech, settings, changes)
+        stated |= held_mechanics(mech, settings, changes)
     if options.start is not None:
-        known |= _starts(options.start, settings, known)
-    if known:
+        stated |= _starts(options.start, settings, stated)
+    if stated:
         # what --set says has the last word, and keeps its place among the changes
-        settings = load_settings(config, {**changes, **known, **changes})
+        settings = load_settings(config, {**changes, **stated, **changes})
     if config == f"fit-{stage}":
         what = f"note: the arm is the shipped {settings.arm.name}"
         LOGGER.log(

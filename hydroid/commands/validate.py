@@ -198,10 +198,10 @@ def _test(
         fitted = record.fitted
         baselines = record.baselines
     # also those of fits that it began from
-    known = seen_logs(source)
+    seen = seen_logs(source)
     predictions = list["Prediction"]()
     for log in logs:
-        unseen = _unseen(log, known) if known else None
+        unseen = _unseen(log, seen) if seen else None
         load = model.settings.payload_of(log.source)
         if unseen and load:
             # another day's log may have the name of one that was fitted

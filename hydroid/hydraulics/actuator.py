@@ -4,9 +4,10 @@ their chambers.
 `make_plugin` lays out what compiled code reads, and `at_rest` the state that it
 changes; then `hydroid.simulation.rollout` repeats, for one candidate at a time,
 
-    kernel.look_ahead: MuJoCo's step gets qfrc_applied = torque and dof_armature =
-    armature plus the arm's own kernel.take_over: MuJoCo's qpos becomes the angle that
-    follows from its new velocity
+    kernel.look_ahead   MuJoCo's step gets qfrc_applied = torque and dof_armature =
+                        armature plus the arm's own
+    kernel.take_over    MuJoCo's qpos becomes the angle that follows from its new
+                        velocity
 
 J is the number of moving joints, n that of candidates. All joints that move belong in,
 also those without hydraulics (kind NONE): their inertia couples. The plugin integrates

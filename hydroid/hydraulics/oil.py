@@ -18,7 +18,9 @@ dynamic         y is integrated: `begin_oil`, then `press` and `take_flow` in ea
                 sub-step
 quasi-static    pressures follow from load and speed at once: `store_oil` writes the y
                 that has them, for those who read pressures. No oil is compressed, and
-                none is missing where a chamber cavitates.
+                none is missing where a chamber cavitates. Of the spring that oil is,
+                a joint may have what a log shows (`overshoot` of
+                `simulation.quasi_static`).
 """
 
 # pyright: reportMissingParameterType=false

@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 
 from hydroid.estimate import FitSummary
+from hydroid.files import Plain
 from hydroid.posterior.identifiability import THRESHOLD, Profile
 from hydroid.reporting.chart import Chart, Mark, Panel
 from hydroid.reporting.correlation_report import correlation_section, correlation_table
@@ -38,11 +39,16 @@ def analysis_page(
         parameter_section(settings, summary),
     ]
     lead = f"Logs and priors together: {known_of_free(summary)}."
-    warned = tuple(str(in_words(one, settings)) for one in warnings(summary))
+    warned = [str(in_words(finding, settings)) for finding in warnings(summary)]
     matrix = correlation_table(summary)
     files = {} if matrix is None else {"correlations": matrix}
     return Page(
-        "analysis", "Analysis", lead, tuple(filter(None, sections)), warned, files=files
+        "analysis",
+        "Analysis",
+        lead,
+        sections=tuple(filter(None, sections)),
+        warnings=tuple(warned),
+        files=files,
     )
 
 
@@ -51,33 +57,29 @@ def profile_section(
 ) -> Section | None:
     """Return the section of profiles as curves, a tab for each; None without any."""
     tabs = list[Plot]()
-    for name, one in profiles.items():
+    for name, profile in profiles.items():
         unit = settings.parameters[name].unit
-        drawing = partial(profile_chart, f"{name} [{unit}]" if unit else name, one)
-        tabs.append(
-            Plot(
-                f"profile_{len(tabs) + 1}", named(settings, name), drawing, button=name
-            )
-        )
+        label = f"{name} [{unit}]" if unit else name
+        draw = partial(profile_chart, label, profile)
+        caption = named(settings, name)
+        tabs.append(Plot(f"profile_{len(tabs) + 1}", caption, draw, button=name))
     return Section("Profiles", _PROFILES, tabs=tuple(tabs)) if tabs else None
 
 
-def profile_chart(label: str, one: Profile) -> Chart:
+def profile_chart(label: str, profile: Profile) -> Chart:
     """Draw the deviance against the values of a parameter, and the line that ends its
     interval."""
-    values, deviances = one.points.T
+    values, deviances = profile.points.T
+    threshold = np.array([THRESHOLD])
+    look: Plain = {"color": "blue", "label": "deviance"}
     marks = (
-        Mark(
-            "rule",
-            y=np.array([THRESHOLD]),
-            color="grey",
-            label="end of the 95 % interval",
-        ),
-        Mark("line", values, deviances, color="blue", label="deviance"),
-        Mark("points", values, deviances, color="blue", width=6, label="deviance"),
+        Mark("rule", y=threshold, color="grey", label="end of the 95 % interval"),
+        Mark("line", values, deviances, **look),
+        Mark("points", values, deviances, width=6, **look),
     )
+    # the ends of a profile may rise so far that the interval would not be seen
     highest = max(3.0 * THRESHOLD, 1.1 * float(np.median(deviances)))
     lowest = min(-0.5, float(deviances.min()))
-    return Chart(
-        (Panel(label, "deviance [-]", marks, height=260, y_limits=(lowest, highest)),)
-    )
+    limits = (lowest, highest)
+    panel = Panel(label, "deviance [-]", marks, height=260, y_limits=limits)
+    return Chart((panel,))

@@ -39,13 +39,13 @@ def correlations(covariance: Covariance) -> Array:
 def correlation_table(summary: FitSummary) -> Table | None:
     """Return the correlations as a table, for scripts; None: the summary has no
     covariance."""
-    known = summary.covariance
-    if known is None or not known.parameters:
+    covariance = summary.covariance
+    if covariance is None or not covariance.parameters:
         return None
-    rows = zip(known.parameters, correlations(known).tolist(), strict=True)
-    return Table(
-        "", ("symbol", *known.parameters), tuple((name, *row) for name, row in rows)
-    )
+    names = covariance.parameters
+    matrix = correlations(covariance).tolist()
+    rows = tuple((name, *row) for name, row in zip(names, matrix, strict=True))
+    return Table("", ("symbol", *names), rows)
 
 
 def correlation_section(settings: FitSettings, summary: FitSummary) -> Section | None:
@@ -53,12 +53,12 @@ def correlation_section(settings: FitSettings, summary: FitSummary) -> Section |
 
     None where fewer than two vary.
     """
-    known = summary.covariance
-    if known is None or len(known.parameters) < 2:
+    covariance = summary.covariance
+    if covariance is None or len(covariance.parameters) < 2:
         return None
-    order = _by_joint(settings, known.parameters)
-    matrix = correlations(known)[np.ix_(order, order)]
-    names = tuple(known.parameters[i] for i in order)
+    order = _by_joint(settings, covariance.parameters)
+    matrix = correlations(covariance)[np.ix_(order, order)]
+    names = tuple(covariance.parameters[i] for i in order)
     pairs = strongest(matrix, names)
     points = tuple(
         f"{named(settings, first)} and {named(settings, second)}: {_signed(value)}"
@@ -92,7 +92,9 @@ def correlation_map(matrix: Array, names: tuple[str, ...]) -> Chart:
     rows, columns = np.nonzero(np.tril(np.abs(matrix) >= FAINT))
     values = np.clip(matrix[rows, columns], -1.0, 1.0)
     cells = Mark("cells", columns.astype(float), rows.astype(float), values)
-    height = 60 + min(ROW * len(names), LARGEST) + (60 if len(names) <= 40 else 0)
+    height = 60 + min(ROW * len(names), LARGEST)
+    if len(names) <= 40:
+        height += 60
     return Chart((Panel("", "", (cells,), height=height, rows=names, columns=names),))
 
 
@@ -102,8 +104,10 @@ def _by_joint(settings: FitSettings, names: tuple[str, ...]) -> list[int]:
     """
 
     def joint(i: int) -> int:
-        own = settings.parameters.get(names[i])
-        return own.joints[0] if own is not None and own.joints else 0
+        parameter = settings.parameters.get(names[i])
+        if parameter is None or not parameter.joints:
+            return 0
+        return parameter.joints[0]
 
     return sorted(range(len(names)), key=joint)
 

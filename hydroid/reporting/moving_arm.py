@@ -94,39 +94,38 @@ def moving_arm(
     simulated = measured.copy()
     simulated[:, compared] = prediction.response
     error = measured - simulated
+    # links that do not turn on each other are drawn as one rigid part
     moves = np.ptp(measured, axis=0) + np.abs(error).max(axis=0) > 1e-4  # [rad]
     roots = _roots(model, moves)
     parts = sorted(set(roots))
     count = int(np.clip(RATE * np.ptp(log.time) + 1, 2, most))
     moments = np.unique(np.linspace(0, len(log.time) - 1, count).round().astype(int))
-    poses = np.stack(
-        [body_poses(model, angle[moments]) for angle in (measured, simulated)]
-    )
-
-    outlines = _rigid_parts(model, poses[1, 0], roots, parts)
-    placed = np.concatenate(
-        [one.placed(poses[:, :, parts]) for one in outlines], axis=2
-    )
+    measured_poses = body_poses(model, measured[moments])
+    simulated_poses = body_poses(model, simulated[moments])
+    outlines = _rigid_parts(model, simulated_poses[0], roots, parts)
+    poses = np.stack([measured_poses, simulated_poses])[:, :, parts]
+    corners = [outline.placed(poses) for outline in outlines]
+    placed = np.concatenate(corners, axis=2)
     heading = _heading(model, measured[moments])
-    side = _view(
-        outlines,
-        placed,
-        [sight(SIDE[0] + np.degrees(turn), SIDE[1]) for turn in heading],
-    )
+    # the camera at the side turns with the machine
+    cameras = [sight(SIDE[0] + np.degrees(turn), SIDE[1]) for turn in heading]
+    side = _view(outlines, placed, cameras)
     views = {"side": side}
     if np.ptp(heading) > SLEWS:
         scale = float(np.linalg.norm(side.axes[0, :3]))
         views["above"] = _view(outlines, placed, [sight(90.0, -90.0)], scale)
 
-    lying = dict[str, list[Array]]()
-    for name, arm in zip(("measured", "simulated"), poses[:, :, parts], strict=True):
-        rows = arm.reshape(len(moments), len(parts), 12).swapaxes(0, 1)
-        lying[name] = [
-            part if np.ptp(part, axis=0).any() else part[:1] for part in rows
-        ]
+    by_part = {"measured": _by_part(poses[0]), "simulated": _by_part(poses[1])}
     errors, units = _errors(model, names, compared, error[moments])
     worst = int(np.abs([*errors.values()]).max(axis=0).argmax())
-    return MovingArm(outlines, log.time[moments], lying, views, errors, units, worst)
+    return MovingArm(outlines, log.time[moments], by_part, views, errors, units, worst)
+
+
+def _by_part(poses: Array) -> list[Array]:
+    """Return poses of parts, shape (F, parts, 3, 4), part by part, (F, 12), or (1, 12)
+    of one that stands still."""
+    rows = poses.reshape(*poses.shape[:2], 12).swapaxes(0, 1)
+    return [part if np.ptp(part, axis=0).any() else part[:1] for part in rows]
 
 
 def _roots(model: mujoco.MjModel, moves: Array) -> list[int]:
@@ -167,18 +166,19 @@ def _heading(model: mujoco.MjModel, angles: Array) -> Array:
     turned = np.zeros(len(angles))
     base = data.xanchor[0]
     for joint in range(model.njnt):
-        if (
-            model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_HINGE
-            or abs(data.xaxis[joint, 2]) < UPRIGHT
-        ):
+        is_hinge = model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE
+        if not is_hinge or abs(data.xaxis[joint, 2]) < UPRIGHT:
             break
         turned += np.sign(data.xaxis[joint, 2]) * (angles[:, joint] - angles[0, joint])
         base = data.xanchor[joint]
     centres = data.xipos[1:]
     reach = centres[-1] - base
     sideways = float(np.hypot(*reach[:2]))
-    known = sideways > REACH * float(np.ptp(centres, axis=0).max(initial=0.0) + 1e-9)
-    return turned + (np.arctan2(reach[1], reach[0]) if known else 0.0)
+    size = float(np.ptp(centres, axis=0).max(initial=0.0) + 1e-9)
+    # an arm that stands upright faces nowhere
+    if sideways <= REACH * size:
+        return turned
+    return turned + np.arctan2(reach[1], reach[0])
 
 
 def _view(
@@ -194,11 +194,10 @@ def _view(
     """
     # y points down
     axes = np.stack([camera[:2] for camera in cameras]) * np.array([[1.0], [-1.0]])
-    seen = np.einsum(
-        "fij,afnj->afni" if len(cameras) > 1 else "gij,afnj->afni", axes, placed
-    )
-    low = seen.min(axis=(0, 1, 2))
-    high = seen.max(axis=(0, 1, 2))
+    product = "fij,afnj->afni" if len(cameras) > 1 else "gij,afnj->afni"
+    in_picture = np.einsum(product, axes, placed)
+    low = in_picture.min(axis=(0, 1, 2))
+    high = in_picture.max(axis=(0, 1, 2))
     scale = scale or (_SIZE - 2 * _MARGIN) / float(max(high - low))
     width, height = (scale * (high - low) + 2 * _MARGIN).round().astype(int).tolist()
     depths = list[float]()
@@ -208,12 +207,8 @@ def _view(
         depths.append(float((corners @ cameras[0][2]).mean()))
         first += len(outline.corners)
     farthest_first = sorted(range(len(outlines)), key=lambda i: -depths[i])
-    return View(
-        (width, height),
-        scale * axes.reshape(-1, 6),
-        _MARGIN - scale * low,
-        farthest_first,
-    )
+    corner = _MARGIN - scale * low
+    return View((width, height), scale * axes.reshape(-1, 6), corner, farthest_first)
 
 
 def _errors(

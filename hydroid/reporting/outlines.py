@@ -32,16 +32,19 @@ def shapes(model: mujoco.MjModel) -> list[Shape]:
     """Return the shapes of all bodies; of an arm without any, lines from body to
     body."""
     directions = trimesh.creation.icosphere(subdivisions=1).vertices.T
-    found: list[Shape] = []
+    outlines = list[Shape]()
     for geom in np.flatnonzero(model.geom_group <= SHOWN).tolist():
-        if (points := _points(model, geom)) is not None:
-            turn = np.empty(9)
-            mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
-            # the corners that lie farthest out in any direction give the outline
-            outermost = points[np.unique((points @ directions).argmax(axis=0))]
-            pose = np.column_stack([turn.reshape(3, 3), model.geom_pos[geom]])
-            found.append(Shape(int(model.geom_bodyid[geom]), placed(outermost, pose)))
-    return found or _lines(model)
+        points = _points(model, geom)
+        if points is None:
+            continue
+        turn = np.empty(9)
+        mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
+        # the corners that lie farthest out in any direction give the outline
+        outermost = points[np.unique((points @ directions).argmax(axis=0))]
+        pose = np.column_stack([turn.reshape(3, 3), model.geom_pos[geom]])
+        body = int(model.geom_bodyid[geom])
+        outlines.append(Shape(body, placed(outermost, pose)))
+    return outlines or _lines(model)
 
 
 def body_poses(model: mujoco.MjModel, angles: Array) -> Array:
@@ -62,9 +65,10 @@ def sight(azimuth: float, elevation: float) -> Array:
     """Return to the right, up and ahead for a camera that looks to these angles [deg],
     rows of (3, 3).
     """
-    a, e = np.radians([azimuth, elevation])
-    ahead = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
-    right = np.array([np.sin(a), -np.cos(a), 0.0])
+    around, upwards = np.radians([azimuth, elevation])
+    level = np.array([np.cos(around), np.sin(around)])
+    ahead = np.array([*(np.cos(upwards) * level), np.sin(upwards)])
+    right = np.array([level[1], -level[0], 0.0])
     return np.stack([right, np.cross(right, ahead), ahead])
 
 
@@ -73,12 +77,13 @@ def _lines(model: mujoco.MjModel) -> list[Shape]:
 
     That of the last leads to its centre of mass.
     """
-    found: list[Shape] = []
+    lines = list[Shape]()
     for body in range(1, model.nbody):
         ends = model.body_pos[model.body_parentid == body]
-        ends = ends if len(ends) else model.body_ipos[[body]]
-        found += [Shape(body, np.stack([np.zeros(3), end])) for end in ends]
-    return found
+        if not len(ends):
+            ends = model.body_ipos[[body]]
+        lines += [Shape(body, np.stack([np.zeros(3), end])) for end in ends]
+    return lines
 
 
 def _points(model: mujoco.MjModel, geom: int) -> Array | None:

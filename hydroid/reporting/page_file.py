@@ -56,14 +56,18 @@ def write_figures(page: Page, out: Path) -> list[Path]:
     files."""
     from hydroid.reporting.figure import figure, saved, style
 
-    written: list[Path] = []
+    written = list[Path]()
     for plot in page.plots:
-        if isinstance(drawing := plot.draw(), Chart):
-            with style():
-                images = saved(figure(drawing))
-            for ending, image in zip(("png", "svg"), images, strict=True):
-                written.append(out / f"{plot.name}.{ending}")
-                write_atomic(written[-1], image)
+        drawing = plot.draw()
+        # an arm in motion is for the page alone
+        if not isinstance(drawing, Chart):
+            continue
+        with style():
+            images = saved(figure(drawing))
+        for ending, image in zip(("png", "svg"), images, strict=True):
+            file = out / f"{plot.name}.{ending}"
+            write_atomic(file, image)
+            written.append(file)
     return written
 
 
@@ -76,30 +80,36 @@ def plain(drawn: Any) -> Any:
         case Chart():
             return vars(drawn.thinned())
         case np.ndarray() if drawn.ndim == 1:
-            return [
-                float(f"{v:.5g}") if math.isfinite(v) else None for v in drawn.tolist()
-            ]
+            return [_five_digits(value) for value in drawn.tolist()]
         case np.ndarray():
             return list(drawn)
         case _:
             return vars(drawn)
 
 
+def _five_digits(value: float) -> float | None:
+    return float(f"{value:.5g}") if math.isfinite(value) else None
+
+
 def html(page: Page) -> str:
     """Return the page as one file."""
     drawings = {plot.name: plot.draw() for plot in page.plots}
     charts = {name for name, drawing in drawings.items() if isinstance(drawing, Chart)}
-    content = _packed(
-        json.dumps(drawings, default=plain, ensure_ascii=False, separators=(",", ":"))
-    )
-    scripts = [_script(), *([_library()] if charts else [])]
+    short = (",", ":")
+    text = json.dumps(drawings, default=plain, ensure_ascii=False, separators=short)
+    scripts = [_script()]
+    packed_library = ""
+    # Bokeh is large: a page without charts does without it
+    if charts:
+        scripts.append(_library())
+        packed_library = _packed_library()
     return fill_template(
         "reporting/template.html.j2",
         page=page,
         charts=charts,
-        content=content,
-        script=scripts[0],
-        packed_library=_packed_library() if charts else "",
+        content=_packed(text),
+        script=_script(),
+        packed_library=packed_library,
         policy=_policy(*scripts),
     )
 
@@ -110,11 +120,11 @@ def _policy(*scripts: str) -> str:
 
     A name that got into the page as HTML in spite of all care could then do nothing.
     """
-    hashes = (
-        base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
-        for script in scripts
-    )
-    allowed = " ".join(f"'sha256-{one}'" for one in hashes)
+    sources = list[str]()
+    for script in scripts:
+        digest = hashlib.sha256(script.encode()).digest()
+        sources.append(f"'sha256-{base64.b64encode(digest).decode()}'")
+    allowed = " ".join(sources)
     return (
         f"default-src 'none'; script-src {allowed}; style-src 'unsafe-inline'; img-src data:; "
         "base-uri 'none'; form-action 'none'"
@@ -125,21 +135,17 @@ def _policy(*scripts: str) -> str:
 def _script() -> str:
     """The page's own script."""
     folder = files("hydroid").joinpath("reporting")
-    return "\n".join(
-        folder.joinpath(name).read_text("utf-8")
-        for name in ("moving_arm.js", "charts.js")
-    )
+    names = ("moving_arm.js", "charts.js")
+    return "\n".join(folder.joinpath(name).read_text("utf-8") for name in names)
 
 
 @cache
 def _library() -> str:
     """Bokeh's scripts, from the installed package."""
     folder = files("bokeh").joinpath("server", "static", "js")
-    scripts = (
-        folder.joinpath(name).read_text("utf-8")
-        for name in ("bokeh.min.js", "bokeh-api.min.js")
-    )
-    return ";\n".join(scripts)
+    names = ("bokeh.min.js", "bokeh-api.min.js")
+    # a script may end without the semicolon that parts it from the next
+    return ";\n".join(folder.joinpath(name).read_text("utf-8") for name in names)
 
 
 @cache

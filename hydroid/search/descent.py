@@ -147,9 +147,10 @@ class LinearModel:
 
     def step(self, damping: float, row: Array | None = None) -> Array:
         """Minimise |row + J s|² + damping |D s|² inside the box; s of shape (moving,)."""
-        triangle, right = (
-            (self._triangle, self._right) if row is None else self.reduced(row)
-        )
+        triangle = self._triangle
+        right = self._right
+        if row is not None:
+            triangle, right = self.reduced(row)
         size = np.linalg.norm(right)
         if not size:
             return np.zeros_like(right)
@@ -157,9 +158,8 @@ class LinearModel:
         # tolerances mean something
         unit = self.scale / size
         point = self.at.point[self._moving]
-        matrix = np.vstack(
-            [triangle / self.scale, np.sqrt(damping) * np.eye(len(unit))]
-        )
+        damped = np.sqrt(damping) * np.eye(len(unit))
+        matrix = np.vstack([triangle / self.scale, damped])
         target = np.append(-right / size, np.zeros(len(unit)))
         limits = (-point * unit, (1 - point) * unit)
         # changes of the active set: far more than it takes

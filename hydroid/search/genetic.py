@@ -121,10 +121,9 @@ class SimpleGa:
         # parents come in pairs: of an odd number of children the last one's sibling is
         # left out
         parents = self.select(population.objectives, count + count % 2, rng)
-        children = crossover(population.chromosomes[parents], self.settings, rng)[
-            :count
-        ]
-        return mutate(children, self.settings.mutation_rate, self.coding, rng)
+        children = crossover(population.chromosomes[parents], self.settings, rng)
+        rate = self.settings.mutation_rate
+        return mutate(children[:count], rate, self.coding, rng)
 
     def tell(self, population: Population | None, offspring: Population) -> Population:
         """Return the elite of the present population, then all offspring."""
@@ -148,6 +147,5 @@ class Nsga2(SimpleGa):
     def tell(self, population: Population | None, offspring: Population) -> Population:
         """Return the best of parents and children together, in crowded order."""
         everyone = offspring if population is None else population.join(offspring)
-        return everyone.take(
-            crowded_order(everyone.objectives)[: self.settings.population]
-        )
+        order = crowded_order(everyone.objectives)
+        return everyone.take(order[: self.settings.population])

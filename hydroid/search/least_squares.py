@@ -9,8 +9,11 @@
 One step is one of two things. *Without a Jacobian* it takes one, by finite differences
 in one batch, and ends where the linear model promises no gain. *With one* it tries a
 step s that minimises
-|r + J s|² + λ |D s|² inside the box, D the lengths of J's columns, with Nielsen's rule for the
-damping λ. What differs from a textbook:
+
+    |r + J s|² + λ |D s|²
+
+inside the box, D the lengths of J's columns, with Nielsen's rule for the damping λ.
+What differs from a textbook:
 
 - A Jacobian of p simulations is expensive. After a step it is updated from that step
   (C. G. Broyden, 1965) as long as the updated one lowers the logarithm of the cost by
@@ -116,8 +119,10 @@ def _advance(now: State, residuals: Function, settings: RefinementSettings) -> S
         if corrected is not None:
             steps.append(corrected)
     points = np.array([model.reach(s) for s in steps])
-    if np.linalg.norm(points[0] - now.point) <= SHORTEST * np.linalg.norm(now.point):
+    moved = np.linalg.norm(points[0] - now.point)
+    if moved <= SHORTEST * np.linalg.norm(now.point):
         return _no_step(now)
+    # both in one batch: they are simulated at the same time
     rows = residuals(points)
     cost = costs(rows)
     best = np.argmin(cost)

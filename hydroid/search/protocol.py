@@ -3,9 +3,9 @@
     population = None
     for _ in range(1 + search.generations):
         chromosomes = search.ask(population, rng)
-        offspring = Population(chromosomes,
-        objectives(search.coding.decode(chromosomes))) population =
-        search.tell(population, offspring)
+        points = search.coding.decode(chromosomes)
+        offspring = Population(chromosomes, objectives(points))
+        population = search.tell(population, offspring)
 
 A search draws from the generator passed in alone, and the same answers lead it the same
 way. So a run is continued by running it again from its seed, with the objectives that

@@ -210,10 +210,15 @@ def _put_oil(oil: "_Oil", joint: int, first: int, rates: Array, speeds: Array) -
     on."""
     speed = first
     acceleration = first + 1
-    rates[speed, acceleration] = 1.0
-    rates[acceleration] = oil.frequency**2 * speeds[joint]
+    drag = 2.0 * oil.damping * oil.frequency
+    # the second state is the acceleration without what passes the oil at once, as in
+    # `overshoot`
+    passed = oil.share * drag
+    rates[speed] = passed * speeds[joint]
+    rates[speed, acceleration] += 1.0
+    rates[acceleration] = (oil.frequency**2 - drag * passed) * speeds[joint]
     rates[acceleration, speed] -= oil.frequency**2
-    rates[acceleration, acceleration] -= 2.0 * oil.damping * oil.frequency
+    rates[acceleration, acceleration] -= drag
     speeds[joint] = 0.0
     speeds[joint, speed] = 1.0
 
@@ -312,10 +317,12 @@ def _coefficients(plant: Plant, joint: int) -> Any:
 
 
 class _Oil(NamedTuple):
-    """A joint on its oil: natural frequency [rad/s] and damping ratio."""
+    """A joint on its oil: natural frequency [rad/s], damping ratio, and the share of
+    the damping between valve and joint."""
 
     frequency: float
     damping: float
+    share: float = 0.0
 
 
 def _oil(plant: Plant, joint: int, command: Array) -> _Oil | None:
@@ -332,7 +339,8 @@ def _oil(plant: Plant, joint: int, command: Array) -> _Oil | None:
     if np.isinf(actuator["oil_frequency"]):
         return None
     frequency = 2.0 * np.pi * float(actuator["oil_frequency"])
-    return _Oil(frequency, float(actuator["oil_damping"]))
+    damping = float(actuator["oil_damping"])
+    return _Oil(frequency, damping, float(actuator["oil_damping_share"]))
 
 
 def _oil_stiffness(plant: Plant, joint: int) -> float:

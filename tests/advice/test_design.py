@@ -113,7 +113,7 @@ def test_the_best_is_no_worse_than_any_random_one_and_repeats(
 ):
     settings, result = designed
     least, at_random = (
-        np.array([typical(result.known.add(t.gained), result.moved) for t in trials])
+        np.array([typical(result.before.add(t.gained), result.moved) for t in trials])
         for trials in ([result.best], result.random)
     )
     assert least < np.median(at_random)
@@ -184,7 +184,7 @@ def test_what_no_experiment_moves_hides_nothing_else(tmp_path):
     assert "open_A_lift" not in still
     place = result.names.index("ring")
     assert result.after.deviations[place] == pytest.approx(
-        result.known.deviations[place]
+        result.before.deviations[place]
     )
 
 

@@ -25,6 +25,16 @@ from hydroid.run.folder import log_hash
 from hydroid.run.record import RESULT, VALIDATIONS, load_record, validation_name
 
 pytestmark = pytest.mark.usefixtures("no_report")
+RESUMED = [
+    "fit-mech",
+    "a.csv",
+    "--config",
+    "run/config.yaml",
+    "--out",
+    "run",
+    "--resume",
+]
+"""the command that goes on with the run"""
 
 
 @pytest.fixture
@@ -81,16 +91,7 @@ def test_a_forged_result_or_checkpoint_is_one_line(
     assert f"{RESULT}: cannot be read" in hydroid_cli("report", "run", code=2).err
     (run / "checkpoint.npz").write_bytes(sealed(content))
     (run / "checkpoint.previous.npz").unlink(missing_ok=True)
-    again = [
-        "fit-mech",
-        "a.csv",
-        "--config",
-        "run/config.yaml",
-        "--out",
-        "run",
-        "--resume",
-    ]
-    assert "checkpoint.npz: is damaged" in hydroid_cli(*again, code=2).err
+    assert "checkpoint.npz: is damaged" in hydroid_cli(*RESUMED, code=2).err
 
 
 def test_what_is_packed_comes_back_to_the_bit(tmp_path: Path):
@@ -118,16 +119,7 @@ def test_a_description_that_is_none_is_one_line(
 ):
     (run / "run.json").write_text(content)
     hydroid_cli("report", "run", code=2)
-    again = [
-        "fit-mech",
-        "a.csv",
-        "--config",
-        "run/config.yaml",
-        "--out",
-        "run",
-        "--resume",
-    ]
-    assert "run.json: " in hydroid_cli(*again, code=2).err
+    assert "run.json: " in hydroid_cli(*RESUMED, code=2).err
 
 
 def test_a_damaged_validation_is_left_out(run: Path, hydroid_cli: Run):

@@ -6,10 +6,9 @@ import pickle
 import numpy as np
 import pytest
 from made_logs import HYDRAULIC, TRUTH
+from made_models import made_model
 
-from hydroid import load_settings
 from hydroid.errors import SettingsError
-from hydroid.identified_model import identified
 from hydroid.plant import Plant, PlantBatch
 
 VALUES = (
@@ -20,24 +19,12 @@ JOINTS = [2, 5]
 
 
 def plant(kind: str, **values: float) -> Plant:
-    stage = "mech" if kind == "mech" else "hyd"
-    settings = load_settings(f"fit-{stage}", {"start_pose": "study"} | made(kind))
-    named = {
-        name: value
-        for name, value in (VALUES | values).items()
-        if name in settings.parameters
-    }
-    return Plant(identified(settings, named, "test"), joints=JOINTS)
-
-
-def made(kind: str) -> dict:
     if kind == "mech":
-        return {}
-    return {
-        "simulation.model": kind,
-        "hydraulics.pump_flow": 6.0,
-        "hydraulics.opening_lag": 0.05,
-    }
+        return Plant(made_model(VALUES | values, stage="mech"), joints=JOINTS)
+    hydraulics = {"pump_flow": 6.0, "opening_lag": 0.05}
+    changes = {"simulation.model": kind}
+    model = made_model(VALUES | values, changes, hydraulics=hydraulics)
+    return Plant(model, joints=JOINTS)
 
 
 def commands(steps: int, n: int = 1, seed: int = 0) -> np.ndarray:

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from log_files import RIG
 from made_logs import HYDRAULIC, TRUTH, at_rest
+from made_models import made_model
 
 from hydroid import fit, load_settings, read_logs
 from hydroid.arm.model import load_machine, load_model
 from hydroid.errors import RunError, SettingsError
-from hydroid.identified_model import IdentifiedModel, identified
+from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
 from hydroid.plant import Plant, load_plant
 from hydroid.problem.bindings import Bindings
@@ -29,11 +30,7 @@ VALUES = (
 
 
 def model(stage: str = "mech", **changes: object) -> IdentifiedModel:
-    settings = load_settings(f"fit-{stage}", {"start_pose": "study"} | changes)
-    values = {
-        name: value for name, value in VALUES.items() if name in settings.parameters
-    }
-    return identified(settings, values, "test")
+    return made_model(VALUES, changes, stage)
 
 
 def log_of(settings: FitSettings, joints: list[int], seconds: float = 4.0) -> Log:

@@ -3,26 +3,12 @@ wish cannot be had."""
 
 import numpy as np
 import pytest
-from made_logs import HYDRAULIC, TRUTH
+from made_models import EARLY, EARLY_SETTINGS, made_model
 
-from hydroid import load_settings
 from hydroid.errors import SettingsError
-from hydroid.identified_model import identified
 from hydroid.plant import Limit, Plant
 
-VALUES = (
-    TRUTH
-    | HYDRAULIC
-    | {
-        "open_A": 0.3,
-        "open_B": 0.3,
-        "delay": 0.02,
-        "friction": 20.0,
-        "S": 0.0,
-        "A": 0.05,
-        "C": 0.05,
-    }
-)
+VALUES = EARLY | {"delay": 0.02}
 MODELS = ["dynamic", "quasi-static"]
 CLOSE = {"dynamic": 0.05, "quasi-static": 0.01}
 """part of a speed; the dynamic model's oil also yields to a load that changes on the
@@ -30,15 +16,9 @@ way"""
 
 
 def made(model="quasi-static", joints=(2, 3), **hydraulics) -> Plant:
-    values = {"onset_a": 0.05, "onset_b": 0.05, "leakage": 0.0} | hydraulics
-    more = {f"hydraulics.{name}": value for name, value in values.items()}
-    settings = load_settings(
-        "fit-hyd", {"start_pose": "study", "simulation.model": model} | more
-    )
-    values = {
-        name: value for name, value in VALUES.items() if name in settings.parameters
-    }
-    return Plant(identified(settings, values, "test"), joints=joints)
+    changes = {"simulation.model": model}
+    made = made_model(VALUES, changes, hydraulics=EARLY_SETTINGS | hydraulics)
+    return Plant(made, joints=joints)
 
 
 @pytest.mark.parametrize("model", MODELS)
@@ -144,9 +124,6 @@ def test_what_cannot_be_asked_is_refused(refused, says):
 
 
 def test_stage_1_has_no_speeds():
-    settings = load_settings("fit-mech", {"start_pose": "study"})
-    values = {
-        name: value for name, value in VALUES.items() if name in settings.parameters
-    }
+    plant = Plant(made_model(VALUES, stage="mech"))
     with pytest.raises(SettingsError, match="stage 2"):
-        Plant(identified(settings, values, "test")).commands({"shoulder": 0.1})
+        plant.commands({"shoulder": 0.1})

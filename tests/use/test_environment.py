@@ -6,31 +6,21 @@ import warnings
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
-from made_logs import HYDRAULIC, TRUTH
+from made_logs import TRUTH
+from made_models import VALUES, made_model
 
 import hydroid
-from hydroid import load_settings
 from hydroid.errors import RunError, SettingsError
-from hydroid.identified_model import IdentifiedModel, identified
+from hydroid.identified_model import IdentifiedModel
 from hydroid.plant import Plant
 from hydroid.use.environment import Env, VectorEnv
-
-VALUES = (
-    TRUTH | HYDRAULIC | {"open_A": 0.4, "open_B": 0.4, "delay": 0.03, "friction": 20.0}
-)
 
 
 @pytest.fixture(scope="module")
 def model() -> IdentifiedModel:
-    changes = {
-        "start_pose": "study",
-        "simulation.model": "quasi-static",
-        "outputs": [2, 3],
-    }
-    settings = load_settings("fit-hyd", changes)
-    return identified(
-        settings, {n: v for n, v in VALUES.items() if n in settings.parameters}, "test"
-    )
+    values = VALUES | {"open_A": 0.4, "open_B": 0.4, "delay": 0.03, "S": TRUTH["S"]}
+    changes = {"simulation.model": "quasi-static", "outputs": [2, 3]}
+    return made_model(values, changes)
 
 
 def test_gymnasium_finds_nothing_wrong(model):

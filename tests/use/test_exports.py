@@ -9,33 +9,22 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from made_logs import HYDRAULIC, TRUTH, step_log
+from made_logs import step_log
+from made_models import VALUES, made_model
 
 import hydroid
 from hydroid import load_settings
 from hydroid.errors import HydroidError
-from hydroid.identified_model import IdentifiedModel, identified
+from hydroid.identified_model import IdentifiedModel
 from hydroid.plant import Plant, load_plant
 
-VALUES = (
-    TRUTH
-    | HYDRAULIC
-    | {"open_A": 0.3, "open_B": 0.3, "delay": 0.05, "friction": 20.0, "S": 0.0}
-)
 URDF = Path(__file__).parents[2] / "examples" / "urdf"
 
 
 @pytest.fixture(scope="module")
 def model() -> IdentifiedModel:
-    changes = {
-        "start_pose": "study",
-        "simulation.model": "quasi-static",
-        "outputs": [2, 3],
-    }
-    settings = load_settings("fit-hyd", changes)
-    return identified(
-        settings, {n: v for n, v in VALUES.items() if n in settings.parameters}, "test"
-    )
+    changes = {"simulation.model": "quasi-static", "outputs": [2, 3]}
+    return made_model(VALUES, changes)
 
 
 def rows(path: Path) -> list[dict[str, str]]:
@@ -71,9 +60,7 @@ def test_draws_of_a_fit_are_written_with_ranges_and_errors(tmp_path):
     settings = load_settings(
         "fit-mech", {"start_pose": "study", "refinement.iterations": 3} | small
     )
-    truth = identified(
-        settings, {n: v for n, v in VALUES.items() if n in settings.parameters}, "test"
-    )
+    truth = made_model(VALUES, small, stage="mech")
     log = hydroid.simulate(
         step_log(settings.arm.pose("study"), [60.0, -80.0]), fit=truth, noise_deg=0.1
     ).log

@@ -6,40 +6,21 @@ from pathlib import Path
 import numpy as np
 import pandas
 import pytest
-from made_logs import HYDRAULIC, TRUTH
+from made_models import EARLY, EARLY_SETTINGS, made_model
 
 import hydroid
-from hydroid import load_settings
 from hydroid.errors import HydroidError
-from hydroid.identified_model import IdentifiedModel, identified
+from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log, write_log
 from hydroid.plant import Limit, Plant
 from hydroid.use.follow import follow, joint_lags
 
-VALUES = (
-    TRUTH
-    | HYDRAULIC
-    | {
-        "open_A": 0.3,
-        "open_B": 0.3,
-        "delay": 0.05,
-        "friction": 20.0,
-        "S": 0.0,
-        "A": 0.05,
-        "C": 0.05,
-    }
-)
 JOINTS = {"shoulder": 1, "elbow": 2}
 
 
 def model(kind="quasi-static", **hydraulics) -> IdentifiedModel:
-    values = {"onset_a": 0.05, "onset_b": 0.05, "leakage": 0.0} | hydraulics
-    changes = {f"hydraulics.{name}": value for name, value in values.items()}
-    changes |= {"start_pose": "study", "simulation.model": kind, "outputs": [2, 3]}
-    settings = load_settings("fit-hyd", changes)
-    return identified(
-        settings, {n: v for n, v in VALUES.items() if n in settings.parameters}, "test"
-    )
+    changes = {"simulation.model": kind, "outputs": [2, 3]}
+    return made_model(EARLY, changes, hydraulics=EARLY_SETTINGS | hydraulics)
 
 
 def path(one: IdentifiedModel, speed=0.05, seconds=6.0, rest=0.5, joints=JOINTS) -> Log:
@@ -180,9 +161,6 @@ def test_a_path_that_is_none_is_refused(refused, says):
 
 
 def test_a_fit_of_stage_1_is_refused():
-    settings = load_settings("fit-mech", {"start_pose": "study"})
-    mech = identified(
-        settings, {n: v for n, v in VALUES.items() if n in settings.parameters}, "test"
-    )
+    mech = made_model(EARLY, stage="mech")
     with pytest.raises(HydroidError, match="stage 2"):
         hydroid.follow(path(model()), fit=mech)

@@ -4,34 +4,22 @@ import json
 
 import numpy as np
 import pytest
-from made_logs import HYDRAULIC, TRUTH
+from made_models import VALUES, made_model
 from scipy.signal import StateSpace, lsim
 
-from hydroid import load_settings
 from hydroid.errors import SettingsError
-from hydroid.identified_model import identified
 from hydroid.plant import Plant
 from hydroid.reporting.linear_page import linear_page
 from hydroid.reporting.page_file import write_page
 from hydroid.use.linear import linearise
 
-VALUES = (
-    TRUTH
-    | HYDRAULIC
-    | {"open_A": 0.3, "open_B": 0.3, "delay": 0.05, "friction": 20.0, "S": 0.0}
-)
 HELD = {"shoulder": 40.0, "elbow": -50.0}
 
 
 def made(model: str, **hydraulics: float) -> Plant:
-    values = {"leakage": 0.0} | hydraulics
-    changes = {f"hydraulics.{name}": value for name, value in values.items()}
-    changes |= {"start_pose": "study", "simulation.model": model, "log.period_s": 0.002}
-    settings = load_settings("fit-hyd", changes)
-    values = {
-        name: value for name, value in VALUES.items() if name in settings.parameters
-    }
-    return Plant(identified(settings, values, "test"), joints=[2, 3])
+    changes = {"simulation.model": model, "log.period_s": 0.002}
+    made = made_model(VALUES, changes, hydraulics={"leakage": 0.0} | hydraulics)
+    return Plant(made, joints=[2, 3])
 
 
 def response(plant: Plant, change: dict[str, float], seconds: float) -> np.ndarray:
@@ -65,6 +53,7 @@ def response(plant: Plant, change: dict[str, float], seconds: float) -> np.ndarr
             {
                 "oil_frequency": 3.0,
                 "oil_damping": 0.3,
+                "oil_damping_share": 0.6,
                 "pump_flow": 5.0,
                 "pump_droop": 100.0,
             },

@@ -5,10 +5,9 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from made_logs import HYDRAULIC, TRUTH
+from made_models import EARLY, EARLY_SETTINGS, made_model
 
 import hydroid
-from hydroid import load_settings
 from hydroid.errors import LogError
 from hydroid.identified_model import IdentifiedModel, identified
 from hydroid.use.tip_path import TipKinematics
@@ -16,22 +15,7 @@ from hydroid.use.tip_path import TipKinematics
 
 def model() -> IdentifiedModel:
     """Shoulder and elbow with hydraulics, and little friction."""
-    values = TRUTH | HYDRAULIC
-    values |= {
-        "open_A": 0.3,
-        "open_B": 0.3,
-        "delay": 0.05,
-        "friction": 20.0,
-        "S": 0.0,
-        "A": 0.05,
-        "C": 0.05,
-    }
-    changes = {"start_pose": "study", "outputs": [2, 3]}
-    changes |= {f"hydraulics.{name}": 0.05 for name in ("onset_a", "onset_b")}
-    settings = load_settings("fit-hyd", changes | {"hydraulics.leakage": 0.0})
-    return identified(
-        settings, {n: v for n, v in values.items() if n in settings.parameters}, "test"
-    )
+    return made_model(EARLY, {"outputs": [2, 3]}, hydraulics=EARLY_SETTINGS)
 
 
 def forward(arm, angle):

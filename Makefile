@@ -1,7 +1,7 @@
 # Everything runs in .venv, made on demand: each target works alone on a fresh clone with Python >= 3.11 and make.
 PYTHON ?= python3
 BIN := .venv/bin
-.PHONY: setup check test test-slow demo excavator figures article bench docs model wheel slurm clean
+.PHONY: setup check test test-slow demo excavator machines figures article bench docs model wheel slurm clean
 
 setup: .venv/.ready
 
@@ -34,6 +34,9 @@ excavator: setup  ## a real excavator: fitted to its twelve logs, judged on the 
 	rm -rf runs/excavator
 	$(BIN)/hydroid fit-hyd examples/excavator/fit_*.csv --config examples/excavator/fit.yaml --out runs/excavator/fit
 	$(BIN)/hydroid validate examples/excavator/check_*.csv --fit runs/excavator/fit --out runs/excavator/validation
+
+machines: setup  ## the gallery's further machines: a boom, and two cranes with telescopes
+	$(BIN)/python docs/machines.py
 
 figures: setup  ## after demo and excavator: docs/figures.yaml, and the pages that state these figures
 	$(BIN)/python docs/figures.py

@@ -46,11 +46,19 @@ JOINTS = (
 TIMES = (*map(column_of, JUDGED), WHOLE)
 """columns of the table of verdicts that the README's table has as rows"""
 
+MACHINES = {
+    "boom": "boom (virtual)",
+    "crane": "truck's crane with a telescope (virtual)",
+    "forwarder": "forwarder's crane (virtual)",
+}
+"""of `docs/machines.py`, and what the gallery calls them"""
+
 Figures = dict[str, Any]
 
 
-def collected(runs: Path) -> Figures:
-    """Return the figures of the runs of both targets of `make`."""
+def collected(runs: Path, former: Figures) -> Figures:
+    """Return the figures of the runs of both targets of `make`, and those of further
+    machines; of machines without a run the former ones."""
     stage_1, stage_2 = (load_record(runs / "demo" / stage) for stage in ("mech", "hyd"))
     rig = _joints(stage_2)
     for one in stage_1.verdict:
@@ -71,9 +79,28 @@ def collected(runs: Path) -> Figures:
     return {
         "rig": rig,
         "excavator": excavator,
+        "machines": _machines(runs, former.get("machines", {})),
         "quantities": quantities,
         "parameters": parameters,
     }
+
+
+def _machines(runs: Path, former: Figures) -> Figures:
+    """Return what the verdict says of the joints of the gallery's further machines, by
+    name."""
+    machines = Figures()
+    for name in MACHINES:
+        folder = runs / name / "fit"
+        if not (folder / "report.html").exists():
+            machines[name] = former.get(name, {})
+            continue
+        joints = _joints(load_record(folder))
+        shown = ("verdict", "beside")
+        machines[name] = {
+            joint: {key: figures[key] for key in shown}
+            for joint, figures in joints.items()
+        }
+    return machines
 
 
 def _joints(record: Record) -> Figures:
@@ -211,11 +238,30 @@ def quantities(figures: Figures) -> str:
     return _table(lines)
 
 
+def machines(figures: Figures) -> str:
+    """Return the gallery's table of machines and their verdicts."""
+    head = ["machine", "joint", "verdict", *(f"after {time}" for time in TIMES[:-1])]
+    lines = [[*head, WHOLE], ["---"] * (len(head) + 1)]
+    groups = {
+        "rig of one arm (virtual)": figures["rig"],
+        **{called: figures["machines"][name] for name, called in MACHINES.items()},
+        "excavator (real)": figures["excavator"],
+    }
+    for machine, joints in groups.items():
+        for joint, one in joints.items():
+            # logs of 5 s say nothing of 5 and 10 s
+            errors = [one["beside"][time] or "–" for time in TIMES]
+            lines.append([machine, joint, one["verdict"], *errors])
+            machine = ""
+    return _table(lines)
+
+
 PARTS: dict[str, Callable[[Figures], str]] = {
     "at a glance": at_a_glance,
     "ahead": ahead,
     "not better": not_better,
     "quantities": quantities,
+    "machines": machines,
 }
 
 
@@ -267,7 +313,8 @@ def main(given: Sequence[str]) -> None:
     """Write the file, unless only the pages are asked for, and the pages."""
     if given != ["--pages"]:
         try:
-            found = collected(Path(*given) if given else ROOT / "runs")
+            former = yaml.safe_load(FILE.read_text(encoding="utf-8"))
+            found = collected(Path(*given) if given else ROOT / "runs", former)
         except HydroidError as error:
             sys.exit(f"{error}; `make demo excavator` comes first")
         write_atomic(

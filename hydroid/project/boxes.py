@@ -41,7 +41,7 @@ def boxes_urdf(joints: Sequence[str], lengths: Sequence[float]) -> str:
     Raises SettingsError: not a length for each joint, or one that no link has.
     """
     if not joints or len(joints) != len(lengths):
-        what = f"{len(lengths)} lengths for {len(joints)} joints"
+        what = f"{len(lengths)} lengths are given for {len(joints)} joints"
         raise SettingsError(
             what,
             "--lengths",

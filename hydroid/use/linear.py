@@ -174,7 +174,9 @@ def _refuse_without_slope(plant: Plant, joint: int, command: Array) -> None:
     name = plant.names[joint]
     value = float(command[joint])
     if value == 0.0:
-        what = f"{name} at a command of 0 has a dead band, and no slope"
+        what = (
+            f"{name} has no command: around 0 is the dead band, where nothing is linear"
+        )
         hint = "name a command of every joint, such as boom=30"
         raise SettingsError(what, "--at", hint)
     # NaN is not within them either

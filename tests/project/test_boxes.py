@@ -53,14 +53,14 @@ def columns(truth: Truth) -> dict[str, np.ndarray]:
 @pytest.mark.parametrize(
     ("more", "said"),
     [
-        ({"lengths": "0,3.7"}, "2 lengths for 4 joints"),
+        ({"lengths": "0,3.7"}, "2 lengths are given for 4 joints"),
         ({"lengths": "0,3.7,1.6,long"}, "something else than numbers"),
         ({"lengths": "0,3.7,1.6,-1"}, "-1 is no length of a link"),
         ({"lengths": "0,3.7,1.6,nan"}, "nan is no length of a link"),
         ({"lengths": "0,0,0,0"}, "no link has a length"),
         ({"joints": "a,b,b,c"}, "holds a name twice"),
         ({"joints": "a,b,<c,d"}, "no name of a joint"),
-        ({"joints": None}, "4 lengths for 0 joints"),
+        ({"joints": None}, "4 lengths are given for 0 joints"),
         ({"arm": __file__}, "leave it out, or --arm"),
     ],
 )

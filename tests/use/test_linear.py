@@ -102,7 +102,7 @@ def test_it_reads_as_json_with_names_and_units():
 @pytest.mark.parametrize(
     ("shoulder", "says"),
     [
-        (0.0, "shoulder at a command of 0"),
+        (0.0, "shoulder has no command"),
         (20.0, "shoulder at 20 % is within its dead band.*beyond 25.5 % it moves"),
         (-25.2, "shoulder at -25.2 % is within its dead band"),
         (100.1, "the command of shoulder is 100.1 %; allowed are -100 to 100 %"),

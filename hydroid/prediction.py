@@ -76,7 +76,8 @@ def _respond(
     model: IdentifiedModel, log: Log, outputs: list[int], pressures: Sequence[int] = ()
 ) -> Response:
     """Simulate the angles of `outputs` and the pressures of some joints, 0-based."""
-    settings, bindings = model.settings, Bindings(model.settings)
+    settings = model.settings
+    bindings = Bindings(model.settings)
     simulation = make_simulation(
         load_model(settings.arm), log, outputs, settings, pressures
     )

@@ -7,8 +7,8 @@ on one link, the rod on the other, and nothing says that one slides in the other
 """
 
 import re
-from collections.abc import Iterator, Sequence
-from itertools import combinations
+from collections.abc import Collection, Iterator, Sequence
+from itertools import chain, combinations
 from typing import Any
 
 import mujoco
@@ -138,7 +138,7 @@ def closed_pins(
     """
     frames = _frames(spec, data)
     closed = [*_meeting(frames, pins)]
-    parts = {body for pair in cylinders for body in pair}
+    cylinder_parts = {*chain.from_iterable(cylinders)}
     for tube, rod in cylinders:
         feet = pins_at(pins, tube, rod)
         is_loose = len(feet) == 1 and not pins_at([*pins, *closed], rod, tube)
@@ -146,31 +146,60 @@ def closed_pins(
         if not is_loose or not is_part_of_cylinder(spec.body(rod).joints[0]):
             continue
         carrier = feet[0].other(tube)
-        joints = dict[str, Any]()
-        for pin in pins_at(pins, carrier):
-            if pin.joint and pin.other(carrier) not in parts:
-                joints[pin.other(carrier)] = pin.joint
-        ends = [frame for frame in frames if frame.owner == rod]
-        anchors = [
-            frame
-            for frame in frames
-            if frame.owner in joints and _other_words(frame.name) == _other_words(rod)
-        ]
-        if len(anchors) == 1:
-            (anchor,) = anchors
-            joint = data.joint(joints[anchor.owner].name)
-            at = _pose(joint, feet[0], anchor, ends[0]) if ends else ""
-            what = f"its pin and {anchor.name} meet at another pose than drawn{at}"
-            notes.add(what, rod)
-            closed.append(Pin((rod, anchor.owner), anchor.at))
-            continue
-        carried = {body.name for body in spec.body(carrier).bodies}
-        below = [body for body in joints if body in carried]
-        if len(ends) == len(below) == 1 and not anchors:
-            what = f"the rod's end {ends[0].name} meets no other pin: taken to be pinned to"
-            notes.add(f"{what} {below[0]} where it is drawn. Compare arm.png", rod)
-            closed.append(Pin((rod, below[0]), ends[0].at))
+        links = _links_on(carrier, pins, cylinder_parts)
+        loose = _LooseRod(rod, feet[0], carrier, links, frames)
+        pin = _pin_at_another_pose(loose, data, notes)
+        if pin is None:
+            pin = _pin_as_drawn(loose, spec, notes)
+        if pin is not None:
+            closed.append(pin)
     return closed
+
+
+def _links_on(
+    carrier: str, pins: Sequence[Pin], cylinder_parts: Collection[str]
+) -> dict[str, Any]:
+    """Return the links that turn on a body, each with its joint, without tubes and
+    rods."""
+    joints = dict[str, Any]()
+    for pin in pins_at(pins, carrier):
+        link = pin.other(carrier)
+        if pin.joint and link not in cylinder_parts:
+            joints[link] = pin.joint
+    return joints
+
+
+def _pin_at_another_pose(
+    loose: "_LooseRod", data: mujoco.MjData, notes: Notes
+) -> Pin | None:
+    """Return the pin of a loose rod to the one frame that is named as the rod is."""
+    anchors = loose.anchors
+    if len(anchors) != 1:
+        return None
+    (anchor,) = anchors
+    pose = ""
+    if ends := loose.ends:
+        joint = data.joint(loose.links[anchor.owner].name)
+        pose = _pose(joint, loose.foot, anchor, ends[0])
+    what = f"its pin and {anchor.name} meet at another pose than drawn{pose}"
+    notes.add(what, loose.rod)
+    return Pin((loose.rod, anchor.owner), anchor.at)
+
+
+def _pin_as_drawn(loose: "_LooseRod", spec: mujoco.MjSpec, notes: Notes) -> Pin | None:
+    """Return the pin of a loose rod to the one link that its carrier carries, where the
+    rod's one end is drawn."""
+    # several frames of the rod's name leave open to which of them it is pinned
+    if loose.anchors:
+        return None
+    carried = {body.name for body in spec.body(loose.carrier).bodies}
+    below = [link for link in loose.links if link in carried]
+    ends = loose.ends
+    if len(ends) != 1 or len(below) != 1:
+        return None
+    what = f"the rod's end {ends[0].name} meets no other pin: taken to be pinned to"
+    notes.add(f"{what} {below[0]} where it is drawn. Compare arm.png", loose.rod)
+    return Pin((loose.rod, below[0]), ends[0].at)
 
 
 def _pose(joint: Any, foot: Pin, anchor: "_Frame", end: "_Frame") -> str:
@@ -202,6 +231,36 @@ class _Frame:
     name: str
     owner: str
     at: Array
+
+
+@record
+class _LooseRod:
+    """A rod that slides in its tube and whose other end meets nothing.
+
+    `foot` is where its tube turns on its `carrier`, `links` turn on the carrier by
+    their joints, and `frames` are those of the whole file.
+    """
+
+    rod: str
+    foot: Pin
+    carrier: str
+    links: dict[str, Any]
+    frames: Sequence[_Frame]
+
+    @property
+    def ends(self) -> list[_Frame]:
+        """The rod's own frames: where it may be pinned."""
+        return [frame for frame in self.frames if frame.owner == self.rod]
+
+    @property
+    def anchors(self) -> list[_Frame]:
+        """The frames of other links that are named as the rod is."""
+        words = _other_words(self.rod)
+        return [
+            frame
+            for frame in self.frames
+            if frame.owner in self.links and _other_words(frame.name) == words
+        ]
 
 
 def _frames(spec: mujoco.MjSpec, data: mujoco.MjData) -> list[_Frame]:

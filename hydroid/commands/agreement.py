@@ -25,32 +25,37 @@ def odd_logs(
     agreements: "Sequence[Agreement]", logs: Sequence[Log], settings: FitSettings
 ) -> list[LogFinding]:
     """Return which logs stand out, and in what."""
-    found = list[LogFinding]()
-    of = {log.source: log for log in logs}
-    for one in agreements:
-        if one.odd is None:
+    findings = list[LogFinding]()
+    by_source = {log.source: log for log in logs}
+    for agreement in agreements:
+        if agreement.odd is None:
             continue
-        row, number = one.odd
-        source = one.sources[row]
-        name = settings.arm.joint_names[one.joint - 1]
-        value, by = one.numbers[row, number], 2 * one.sd[row, number]
-        about = _conditions(of[source], settings)
-        found.append(
-            log_finding(
-                "warning", KINDS[number], source, name, value=value, by=by, about=about
-            )
+        row, number = agreement.odd
+        source = agreement.sources[row]
+        finding = log_finding(
+            "warning",
+            KINDS[number],
+            source,
+            settings.arm.joint_names[agreement.joint - 1],
+            value=agreement.numbers[row, number],
+            by=2 * agreement.sd[row, number],
+            about=_conditions(by_source[source], settings),
         )
-    return found
+        findings.append(finding)
+    return findings
 
 
 def _conditions(log: Log, settings: FitSettings) -> str:
     """Return what is known of a log in brackets: its time of day, load and group."""
-    known = [log.clock] if log.clock else []
+    conditions = list[str]()
+    if log.clock:
+        conditions.append(log.clock)
     if load := settings.payload_of(log.source):
-        known.append(f"load {load:g} kg")
-    if (group := settings.log.group_of(log.source)) != OTHER:
-        known.append(f"group {group}")
-    return f" ({', '.join(known)})" if known else ""
+        conditions.append(f"load {load:g} kg")
+    group = settings.log.group_of(log.source)
+    if group != OTHER:
+        conditions.append(f"group {group}")
+    return f" ({', '.join(conditions)})" if conditions else ""
 
 
 def tables(
@@ -61,14 +66,16 @@ def tables(
     from hydroid.reporting.page import Table
 
     rows = list[tuple[str, ...]]()
-    for one in agreements:
-        if one.odd is None and not every:
+    for agreement in agreements:
+        if agreement.odd is None and not every:
             continue
-        for k, source in enumerate(one.sources):
-            mark = "stands out" if one.odd and one.odd[0] == k else ""
-            pairs = zip(FORMS, one.numbers[k], 2 * one.sd[k], strict=True)
+        joint = names[agreement.joint - 1]
+        intervals = 2 * agreement.sd
+        for k, source in enumerate(agreement.sources):
+            pairs = zip(FORMS, agreement.numbers[k], intervals[k], strict=True)
             cells = [form.format(value, by) for form, value, by in pairs]
-            rows.append((names[one.joint - 1], Path(source).name, *cells, mark))
+            mark = "stands out" if _odd_number(agreement, k) is not None else ""
+            rows.append((joint, Path(source).name, *cells, mark))
     if not rows:
         return []
     header = ("joint", "log", "speed", "dead bands wider by [%]", "later by [s]", "")
@@ -84,14 +91,23 @@ def plain(
 ) -> list[Mapping[str, object]]:
     """Return agreements as JSON holds them."""
     rows = list[Mapping[str, object]]()
-    for one in agreements:
-        for k, source in enumerate(one.sources):
-            row: dict[str, object] = {"joint": names[one.joint - 1], "log": source}
-            for name, value, sd in zip(KEYS, one.numbers[k], one.sd[k], strict=True):
+    for agreement in agreements:
+        joint = names[agreement.joint - 1]
+        for k, source in enumerate(agreement.sources):
+            row: dict[str, object] = {"joint": joint, "log": source}
+            of_log = zip(KEYS, agreement.numbers[k], agreement.sd[k], strict=True)
+            for name, value, sd in of_log:
                 row[name] = float(value)
                 row[f"{name}_sd"] = float(sd)
-            row["stands_out"] = (
-                KEYS[one.odd[1]] if one.odd and one.odd[0] == k else None
-            )
+            odd = _odd_number(agreement, k)
+            row["stands_out"] = None if odd is None else KEYS[odd]
             rows.append(row)
     return rows
+
+
+def _odd_number(agreement: "Agreement", log: int) -> int | None:
+    """Return in which of its numbers a log stands out, if it does; both are counted
+    from 0."""
+    if agreement.odd is None or agreement.odd[0] != log:
+        return None
+    return agreement.odd[1]

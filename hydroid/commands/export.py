@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hydroid.commands.console import Result
+from hydroid.commands.console import Result, written
 from hydroid.commands.inputs import (
     ModelSource,
     SettingChanges,
@@ -16,6 +16,7 @@ from hydroid.commands.inputs import (
 )
 from hydroid.errors import SettingsError
 from hydroid.files import write_atomic
+from hydroid.identified_model import IdentifiedModel
 from hydroid.progress import LOGGER
 from hydroid.words import listed
 
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from hydroid.plant import Plant
     from hydroid.use.draws import Draws
 
+MACHINES = 40  # drawn for the bands of a linear model's page
 KINDS = ("parameters", "table", "urdf", "mjcf", "linear", "fmu")
 
 
@@ -46,7 +48,7 @@ def export(
     ranges, and the errors of the model. table: settled speed against command of each
     joint, as CSV for a PLC. urdf: your own file with the masses of the fit. mjcf: a
     model that plain MuJoCo steps. linear: A, B, C, D and delays near a pose and
-    opening, as JSON. fmu: FMI 2 for co-simulation.
+    opening, as JSON, and a page with step response and Bode plot. fmu: FMI 2 for co-simulation.
 
     Example: hydroid export runs/hyd --to parameters --draws 100
 
@@ -71,21 +73,18 @@ def export(
             covariance to draw from.
     """
     if to not in KINDS:
-        raise SettingsError(
-            f"{to!r} is no kind of export", "--to", f"choose {', '.join(KINDS)}"
-        )
+        hint = f"choose {', '.join(KINDS)}"
+        raise SettingsError(f"{to!r} is no kind of export", "--to", hint)
     if to == "urdf" and robot is None:
-        raise SettingsError(
-            "needs your robot's file", "--to urdf", "name it: --robot robot.urdf"
-        )
+        hint = "name it: --robot robot.urdf"
+        raise SettingsError("needs your robot's file", "--to urdf", hint)
     folder = Path("export" if out is None else out)
     model = open_model(fit, overrides=set)
     if to == "parameters":
-        from hydroid.use.draws import draw as drawn
         from hydroid.use.tables import parameter_files
 
-        found = drawn(model, draws, seed, getattr(fit, "problem", None))
-        return _written(parameter_files(found), folder, write=out is not None)
+        machines = _drawn(fit, model, draws, seed)
+        return _written(parameter_files(machines), folder, write=out is not None)
     from hydroid.plant import Plant
 
     plant = Plant(model)
@@ -94,11 +93,12 @@ def export(
     if to == "mjcf":
         from hydroid.use.robot_files import write_moving
 
-        files = (
-            [] if out is None else [str(file) for file in write_moving(plant, folder)]
-        )
+        files = list[str]()
+        if out is not None:
+            files += map(str, write_moving(plant, folder))
         return Result(files, {"files": files}, files)
-    return _written(_files(plant, to, robot, at), folder, write=out is not None)
+    result = _written(_files(plant, to, robot, at), folder, write=out is not None)
+    return _with_page(result, plant, at, out) if to == "linear" else result
 
 
 def _files(
@@ -127,19 +127,40 @@ def _files(
     return {f"{plant.identified.settings.arm.name}.fmu": fmu_bytes(plant)}
 
 
+def _with_page(
+    result: Result[list[str]], plant: "Plant", at: str, out: "Source | None"
+) -> Result[list[str]]:
+    """Return the result of a linear model with its page: step response and Bode plot,
+    with bands where the logs leave something open."""
+    from hydroid.posterior.posterior import stored_posterior
+    from hydroid.reporting.linear_page import linear_page
+    from hydroid.use.draws import draw as drawn
+    from hydroid.use.linear import LinearArm, linearise
+
+    command = _commands(plant, at)
+    others = list[LinearArm]()
+    if stored_posterior(plant.identified) is not None:
+        for other in drawn(plant.identified, MACHINES).plants(joints=plant.joints):
+            other.reset(plant.angle)
+            others.append(linearise(other, command))
+    arm = plant.identified.settings.arm
+    page = linear_page(linearise(plant, command), others, arm)
+    files = [*result.result, *written(page, out)]
+    return Result(files, {"files": files}, files, page)
+
+
 def _commands(plant: "Plant", at: str) -> "Array":
     """Return the commands [%] that a text such as boom=30,arm=-40 says, (J,)."""
     import numpy as np
 
-    given = np.zeros(len(plant.names))
+    commands = np.zeros(len(plant.names))
     driven = [plant.names[number - 1] for number in plant.joints]
     named = set[str]()
     for part in names(at):
         joint, _, value = part.partition("=")
         if joint not in plant.names:
-            raise SettingsError(
-                f"no joint {joint!r}", "--at", f"the arm has {', '.join(plant.names)}"
-            )
+            hint = f"the arm has {', '.join(plant.names)}"
+            raise SettingsError(f"no joint {joint!r}", "--at", hint)
         if joint in named:
             raise SettingsError(f"{joint} has two commands", "--at", "leave one out")
         named.add(joint)
@@ -147,20 +168,22 @@ def _commands(plant: "Plant", at: str) -> "Array":
             what = f"{joint} takes no commands"
             raise SettingsError(what, "--at", f"those of {listed(driven)} count")
         try:
-            given[plant.names.index(joint)] = float(value)
+            commands[plant.names.index(joint)] = float(value)
         except ValueError:
-            raise SettingsError(
-                f"{part!r} is no command", "--at", "write boom=30,arm=-40 in %"
-            ) from None
-    return given
+            hint = "write boom=30,arm=-40 in %"
+            raise SettingsError(f"{part!r} is no command", "--at", hint) from None
+    return commands
 
 
 def _written(
     files: Mapping[str, str] | Mapping[str, str | bytes], folder: Path, *, write: bool
 ) -> Result[list[str]]:
-    paths = [str(folder / name) for name in files] if write else []
-    for path, content in zip(paths, files.values(), strict=False):
-        write_atomic(Path(path), content)
+    """Write files by name, where they are to be written; return their paths."""
+    paths = list[str]()
+    if write:
+        for name, content in files.items():
+            write_atomic(folder / name, content)
+            paths.append(str(folder / name))
     return Result(paths, {"files": paths}, paths)
 
 
@@ -179,6 +202,12 @@ def draw(fit: ModelSource, n: int, seed: int = 0) -> "Draws":
         RunError: the fit holds no covariance of its parameters.
         SettingsError: n is below 1.
     """
-    from hydroid.use.draws import draw as drawn
+    return _drawn(fit, open_model(fit), n, seed)
 
-    return drawn(open_model(fit), n, seed, getattr(fit, "problem", None))
+
+def _drawn(fit: ModelSource, model: IdentifiedModel, n: int, seed: int) -> "Draws":
+    """Return n machines drawn from the model of a fit."""
+    from hydroid.use.draws import draw as draw_machines
+
+    # the result of a fit has its problem with it; a run folder's is made from its logs
+    return draw_machines(model, n, seed, getattr(fit, "problem", None))

@@ -20,6 +20,7 @@ from hydroid.words import plain
 
 if TYPE_CHECKING:
     from hydroid.identified_model import IdentifiedModel
+    from hydroid.settings.arm import Arm
     from hydroid.settings.fit import FitSettings
     from hydroid.use.follow import Followed
 
@@ -50,12 +51,13 @@ def follow(
     Args:
         trajectory (TRAJECTORY.csv): Joint angles over time, in the columns and units of
             the fit's logs; or the tip's position over time, in columns x_m, y_m and
-            z_m. Joints without a column, or without commands, rest in the start pose of
-            the settings.
+            z_m. The tip is the site that the arm's file names as payload, or else the
+            end of the last link. Joints without a column, or without commands, rest in
+            the start pose of the settings.
         out (LOG.csv): The commands, in the columns and units of the fit's logs, beside
             the wished angles; the page has the same name [default of the command line:
             runs/follow/commands.csv].
-        payload (0 or more): Mass in the gripper [kg].
+        payload (0 or more): Mass at the tip [kg].
 
     Raises:
         LogError: the trajectory cannot be used, or moves a joint that takes no
@@ -70,58 +72,63 @@ def follow(
         raise SettingsError(
             "a fit of stage 1 has no valves", model.source, "name a fit of stage 2"
         )
-    path = _tip_path(trajectory, model)
+    path, tip = _tip_path(trajectory, model)
     if path is None:
-        settings = _of_its_joints(trajectory, model.settings)
-        (path,) = read_arms(
-            trajectory, settings, None, angles=True, repair=repair
-        ).values()
+        settings = _without_absent_joints(trajectory, model.settings)
+        paths = read_arms(trajectory, settings, None, angles=True, repair=repair)
+        (path,) = paths.values()
     from hydroid.reporting.follow_page import follow_page, missed_lines, tracking_table
     from hydroid.use.follow import follow as find_commands
 
-    found = find_commands(model, path, payload=payload)
+    followed = find_commands(model, path, payload=payload)
     arm = model.settings.arm
     name = "commands" if out is None else Path(out).stem
-    page = follow_page(name, found, arm)
-    lines = [tracking_table(found, arm), *missed_lines(found, arm)]
-    if found.lead_s:
+    page = follow_page(name, followed, arm)
+    lines = [tracking_table(followed, arm), *missed_lines(followed, arm)]
+    if tip:
+        lines.append(f"The tip is {tip}.")
+    if followed.lead_s:
         lines.append(
-            f"The path begins {plain(found.lead_s)} s into the file: delay and lags need commands that early."
+            f"The path begins {plain(followed.lead_s)} s into the file: "
+            "delay and lags need commands that early."
         )
     if out is not None:
-        write_log(Path(out), found.log, model.settings.log, arm=model.settings.arm)
+        write_log(Path(out), followed.log, model.settings.log, arm=arm)
         lines += [str(out), *written(page, Path(out).parent)]
-    rows = [_joint(found, joint, arm.joint_names[joint - 1]) for joint in found.joints]
-    missed = [
-        {**vars(one), "joint": arm.joint_names[one.joint]} for one in found.missed
-    ]
     content = {
         "out": out and str(out),
-        "lead_s": found.lead_s,
-        "joints": rows,
-        "missed": missed,
+        "lead_s": followed.lead_s,
+        "tip": tip or None,
+        "joints": [_errors(followed, joint, arm) for joint in followed.joints],
+        "missed": [
+            {**vars(missed), "joint": arm.joint_names[missed.joint]}
+            for missed in followed.missed
+        ],
     }
-    return Result(lines, content, found, page)
+    return Result(lines, content, followed, page)
 
 
-def _tip_path(trajectory: "Source | Log", model: "IdentifiedModel") -> "Log | None":
-    """Return the joint angles along a file's path of the tip; None: it holds no such
-    path."""
+def _tip_path(
+    trajectory: "Source | Log", model: "IdentifiedModel"
+) -> "tuple[Log | None, str]":
+    """Return the joint angles along a file's path of the tip, and what the tip is;
+    None: it holds no such path."""
     if isinstance(trajectory, Log) or not is_file(trajectory):
-        return None
+        return None, ""
     from hydroid.plant import Plant
-    from hydroid.use.tip_path import Tip, holds_tip, tip_path
+    from hydroid.use.tip_path import TipKinematics, holds_tip, tip_path
 
     settings = model.settings
     table = open_table(Path(trajectory), settings.log)
     if not holds_tip(table):
-        return None
-    tip = Tip(settings.arm, Plant(model).joints)
+        return None, ""
+    tip = TipKinematics(settings.arm, Plant(model).joints)
     start = settings.arm.pose(settings.start_pose)
-    return tip_path(table, settings.log.time.column, settings.log.period_s, tip, start)
+    time, period = settings.log.time.column, settings.log.period_s
+    return tip_path(table, time, period, tip, start), tip.tip.what
 
 
-def _of_its_joints(
+def _without_absent_joints(
     trajectory: "Source | Log", settings: "FitSettings"
 ) -> "FitSettings":
     """Return the settings without the joints that a file has no angle of.
@@ -132,30 +139,32 @@ def _of_its_joints(
     if isinstance(trajectory, Log) or not is_file(trajectory):
         return settings
     columns = settings.log
-    names = {*open_table(Path(trajectory), columns).names} - {columns.time.column}
-    every = range(1, 1 + len(settings.arm.joints))
-    mapped = {joint: columns.columns("angle", joint) for joint in every}
-    absent = [
-        joint for joint, own in mapped.items() if own and not {*own.column} & names
-    ]
-    commands = [columns.columns("command", joint) for joint in every]
-    known = {
-        name for own in (*mapped.values(), *commands) if own for name in own.column
-    }
-    if names - known or len(absent) == len(settings.arm.joints):
+    names = {*open_table(Path(trajectory), columns).names}
+    expected = {columns.time.column}
+    absent = list[int]()
+    for joint in range(1, 1 + len(settings.arm.joints)):
+        angle = columns.columns("angle", joint)
+        command = columns.columns("command", joint)
+        if angle and names.isdisjoint(angle.column):
+            absent.append(joint)
+        for mapped in filter(None, (angle, command)):
+            expected.update(mapped.column)
+    if names - expected or len(absent) == len(settings.arm.joints):
         return settings
     joints = dict(columns.joints) | dict.fromkeys(absent)
     return settings.changed({"log": columns.changed({"joints": joints})})
 
 
-def _joint(found: "Followed", joint: int, name: str) -> dict[str, object]:
+def _errors(followed: "Followed", joint: int, arm: "Arm") -> dict[str, object]:
+    """Return the predicted errors of a joint (number, from 1), with and without its
+    band."""
     import math
 
-    error, wide = found.rms(joint)
+    error, wide = followed.rms(joint)
     banded = math.degrees(wide) if math.isfinite(wide) else None
     return {
         "joint": joint,
-        "name": name,
+        "name": arm.joint_names[joint - 1],
         "rms_deg": math.degrees(error),
         "rms_with_band_deg": banded,
     }

@@ -79,20 +79,12 @@ def init(
             raise SettingsError(
                 "names its arm, which stays as it is", kept_config, hint
             )
-        project = go_on(
-            Path(folder) if folder else None, kept_config, logs, force=force
-        )
-    elif robot is not None and lengths:
-        raise SettingsError(
-            "are those of the arm's file", "--lengths", "leave it out, or --arm"
-        )
-    elif folder is None:
-        raise SettingsError(
-            "which folder shall the project have?", hint="hydroid init DIR"
-        )
+        where = Path(folder) if folder else None
+        project = go_on(where, kept_config, logs, force=force)
     else:
+        _refuse_two_arms(robot, lengths)
         project = write_project(
-            Path(folder),
+            _required(folder),
             robot,
             logs,
             names(joints),
@@ -106,6 +98,19 @@ def init(
         content[key] = [*getattr(project, key)]
     lines = _lines(project, guessed=kept_config is None)
     return Result(lines, content, project, exit_status=2 if project.missing else 0)
+
+
+def _refuse_two_arms(robot: Path | None, lengths: str | list[str] | None) -> None:
+    if robot is not None and lengths:
+        what = "are those of the arm's file"
+        raise SettingsError(what, "--lengths", "leave it out, or --arm")
+
+
+def _required(folder: "Source | None") -> Path:
+    if folder is None:
+        what = "which folder shall the project have?"
+        raise SettingsError(what, hint="hydroid init DIR")
+    return Path(folder)
 
 
 def _existing(given: "Source") -> Path:

@@ -13,7 +13,7 @@ from hydroid.commands.inputs import LogSource, LogSources, ModelSource, as_list
 from hydroid.commands.progress import Progress
 from hydroid.errors import LogError, RunError, SettingsError
 from hydroid.estimate import read_estimate
-from hydroid.files import is_file
+from hydroid.files import Plain, is_file
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import (
     Log,
@@ -57,26 +57,26 @@ def read_logs(
     Raises:
         LogError: the first fault that keeps a log from being used.
     """
-    read: list[Log] = []
-    findings: list[LogFinding] = []
+    read = list[Log]()
+    findings = list[LogFinding]()
     pose = settings.arm.pose(settings.start_pose)
     with Progress() as progress:
         for source in as_list(logs):
             if isinstance(source, Log):
-                known = source.measured.all() or source.pose is not None
-                read.append(source if known else replace(source, pose=pose))
+                if source.pose is None and not source.measured.all():
+                    source = replace(source, pose=pose)
+                read.append(source)
                 continue
-            parts, more = check_file(
+            parts, of_file = check_file(
                 Path(source), settings, repair=repair, angles=angles, progress=progress
             )
             if not parts:
-                raise more[0].error()
-            findings += more
+                raise of_file[0].error()
+            findings += of_file
             read += [replace(part, pose=pose) for part in parts]
     for level, line in grouped(findings):
-        LOGGER.log(
-            logging.WARNING if level == "warning" else NOTE, "%s: %s", level, line
-        )
+        importance = logging.WARNING if level == "warning" else NOTE
+        LOGGER.log(importance, "%s: %s", level, line)
     return read
 
 
@@ -91,11 +91,8 @@ def read_log(
     read = read_logs(log, settings, repair=repair, angles=angles)
     if len(read) > 1:
         what = f"gaps split it into {len(read)} parts, and one log is needed"
-        raise LogError(
-            what,
-            log_file(read[0].source),
-            "cut the file at its gaps, and name one part",
-        )
+        hint = "cut the file at its gaps, and name one part"
+        raise LogError(what, log_file(read[0].source), hint)
     return read[0]
 
 
@@ -113,7 +110,8 @@ def check_file(
     A bag that is given as `.` or `..` has its folder's name: by names payloads and
     groups find their logs.
     """
-    path = path.resolve() if path.name in ("", "..") else path
+    if path.name in ("", ".."):
+        path = path.resolve()
     arm = settings.arm
     outputs = settings.outputs if angles else None
     reading = Reading(outputs=outputs, arm=arm, repair=repair)
@@ -126,15 +124,18 @@ def undriven_findings(logs: Sequence[Log], settings: FitSettings) -> list[LogFin
 
     Joints of stage 1 may move by themselves.
     """
-    names, driven = (
-        settings.arm.joint_names,
-        np.any([log.driven for log in logs], axis=0),
-    )
+    names = settings.arm.joint_names
+    driven = np.any([log.driven for log in logs], axis=0)
     idle = [joint for joint in settings.outputs if len(logs) and not driven[joint - 1]]
-    hopeless = settings.stage == "hyd" and len(idle) == len(settings.outputs)
-    level, kind = ("error", "nothing to fit") if hopeless else ("warning", "not driven")
+    if not idle:
+        return []
+    level = "warning"
+    kind = "not driven"
+    if settings.stage == "hyd" and len(idle) == len(settings.outputs):
+        level = "error"
+        kind = "nothing to fit"
     subjects = [names[joint - 1] for joint in idle]
-    return [log_finding(level, kind, log.source, *subjects) for log in logs if subjects]
+    return [log_finding(level, kind, log.source, *subjects) for log in logs]
 
 
 def refuse_undriven(logs: Sequence[Log], settings: FitSettings) -> None:
@@ -174,31 +175,36 @@ def read_arms(
     from hydroid.arm.model import ALONE, SIDES
 
     if arm not in (None, *SIDES, "both"):
-        raise SettingsError(
-            f"{arm!r} is no arm of a pair",
-            "--arm",
-            f"choose {', '.join(SIDES)} or both",
-        )
-    moving = (ALONE,) if arm is None else SIDES if arm == "both" else (arm,)
+        hint = f"choose {', '.join(SIDES)} or both"
+        raise SettingsError(f"{arm!r} is no arm of a pair", "--arm", hint)
     columns = settings.log.angles_only() if angles else settings.log
-    names = (
-        open_table(Path(log), settings.log).names
-        if isinstance(log, str | Path) and arm
-        else ()
-    )
 
     def read(columns: LogSettings) -> Log:
-        layout = {"log": columns} | ({"outputs": ()} if angles else {})
-        one = read_log(log, settings.changed(layout), repair=repair, angles=angles)
+        changes: Plain = {"log": columns}
+        if angles:
+            # a path may leave joints out that a fit compares
+            changes["outputs"] = ()
+        read = read_log(log, settings.changed(changes), repair=repair, angles=angles)
         if pose is None:
-            return one
-        return replace(
-            one, angle=np.full_like(one.angle, np.nan), pose=settings.arm.pose(pose)
-        )
+            return read
+        unmeasured = np.full_like(read.angle, np.nan)
+        return replace(read, angle=unmeasured, pose=settings.arm.pose(pose))
 
-    if any(name.startswith(tuple(f"{side}_" for side in SIDES)) for name in names):
+    if arm is None:
+        return {ALONE: read(columns)}
+    moving = SIDES if arm == "both" else (arm,)
+    if _names_sides(log, settings, SIDES):
         return {side: read(columns.of_arm(side)) for side in moving}
     return dict.fromkeys(moving, read(columns))
+
+
+def _names_sides(log: LogSource, settings: FitSettings, sides: Sequence[str]) -> bool:
+    """Return whether any column of a file is of one side of a pair."""
+    if isinstance(log, Log):
+        return False
+    beginnings = tuple(f"{side}_" for side in sides)
+    names = open_table(Path(log), settings.log).names
+    return any(name.startswith(beginnings) for name in names)
 
 
 def seen_logs(fit: ModelSource) -> list[Log]:
@@ -214,7 +220,8 @@ def seen_logs(fit: ModelSource) -> list[Log]:
         return logs_behind(read_estimate(Path(fit))[0])
     if isinstance(fit, IdentifiedModel):
         return logs_behind(Path(fit.source))
-    return [*(one.log for one in fit.predictions), *fit.earlier]
+    own = [prediction.log for prediction in fit.predictions]
+    return [*own, *fit.earlier]
 
 
 def earlier_logs(fits: "Sequence[ModelSource | None]") -> tuple[Log, ...]:
@@ -231,25 +238,28 @@ def earlier_logs(fits: "Sequence[ModelSource | None]") -> tuple[Log, ...]:
         try:
             seen |= {samples(log): log for log in seen_logs(fit)}
         except RunError as error:
-            LOGGER.warning(
-                "warning: %s; the logs of that fit will count as unseen", error
-            )
+            what = "warning: %s; the logs of that fit will count as unseen"
+            LOGGER.warning(what, error)
     return tuple(seen.values())
 
 
 def run_logs(folder: Path) -> list[Path]:
     """Return the logs that a run folder was fitted to."""
     if not is_file(folder / "run.json"):
-        hint = "name one, as in hydroid suggest LOG.csv --fit RUN, or give a run folder as --fit"
+        hint = (
+            "name one, as in hydroid suggest LOG.csv --fit RUN, "
+            "or give a run folder as --fit"
+        )
         raise SettingsError("no log is given", hint=hint)
     from hydroid.run.folder import RunFolder
 
-    logs = [*dict.fromkeys(map(log_file, RunFolder(folder).identity().get("logs", {})))]
+    sources = RunFolder(folder).identity().get("logs", {})
+    # parts between gaps are of one file
+    logs = [*dict.fromkeys(map(log_file, sources))]
     missing = [str(log) for log in logs if not log.exists()]  # a bag is a folder
     if missing or not logs:
-        raise RunError(
-            f"its log {', '.join(missing)} is not there", folder, "name the log"
-        )
+        what = f"its log {', '.join(missing)} is not there"
+        raise RunError(what, folder, "name the log")
     return logs
 
 
@@ -275,6 +285,5 @@ def _warn_of_changes(folder: Path, logs: Sequence[Log], settings: FitSettings) -
     fitted = RunFolder(folder).identity().get("logs", {})
     for log in logs:
         if fitted.get(log.source) != log_hash(log, settings):
-            LOGGER.warning(
-                "warning: %s: is not what %s was fitted to", log.source, folder
-            )
+            what = "warning: %s: is not what %s was fitted to"
+            LOGGER.warning(what, log.source, folder)

@@ -1,8 +1,8 @@
 """`hydroid validate` and `hydroid report`: fits on logs that they were not fitted to;
 reports drawn anew."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -31,6 +31,7 @@ OWN_ERROR = 2e-7
 """rms error of every joint [rad, m] below which a log is the fit's own simulation"""
 
 if TYPE_CHECKING:
+    from hydroid.advice.loads import Load
     from hydroid.fitting.validation import Prediction
     from hydroid.fitting.verdict import Baselines
     from hydroid.joint_verdict import JointVerdict
@@ -77,6 +78,7 @@ def validate(
     sources: list[ModelSource] = as_list(fit)
     models = [open_model(source, None, set) for source in sources]
     read = [read_logs(logs, model.settings, repair=repair) for model in models]
+    from hydroid.advice.loads import load_finding
     from hydroid.fitting.verdict import standing_out
     from hydroid.reporting.predictions import validation_page
     from hydroid.reporting.verdict_table import (
@@ -87,23 +89,22 @@ def validate(
     )
     from hydroid.run.record import run_of
 
-    tested: dict[str, _Tested] = {}
+    tested = dict[str, _Tested]()
     names = numbered(model.name for model in models)
     for source, model, unseen, name in zip(sources, models, read, names, strict=True):
         tested[name] = _test(source, model, unseen, tolerance)
-        if out is not None:
-            _keep(tested[name], apart=apart)
     fits = ordered({name: test.verdict for name, test in tested.items()})
-    arm = models[0].settings.arm
-    predictions = list["Prediction"]()
-    for name in fits:
-        predictions += [replace(p, fit=name) for p in tested[name].predictions]
     best = tested[next(iter(fits))]
     run = run_of(best.model)
-    if run and out is not None and set:
-        # with other settings it is another model than the run's
-        text = "note: what --set gives does not go into %s and its report"
-        LOGGER.log(NOTE, text, run)
+    if out is not None:
+        for test in tested.values():
+            _keep(test, apart=apart)
+        if run and set:
+            # with other settings it is another model than the run's
+            text = "note: what --set gives does not go into %s and its report"
+            LOGGER.log(NOTE, text, run)
+    arm = models[0].settings.arm
+    predictions = _by_fit(fits, tested)
     lines = verdict_lines(fits)
     steps = list[Finding]()
     if run:
@@ -111,11 +112,39 @@ def validate(
         steps.append(step)
         lines += next_lines(step)
     page = validation_page(predictions, fits, arm, *steps)
+    loads = load_finding(_asked_loads(best))
+    lines += map(str, loads)
     lines += map(str, standing_out(best.predictions, best.verdict, str(run or "RUN")))
     lines[1:1] = _fitted_lines(best.predictions)
     lines += written(page, out)
     content = _content(fits, predictions, arm.joint_names)
+    content["findings"] = [asdict(one) for one in loads]
     return Result(lines, content, predictions, page, details=[page.tables["errors"]])
+
+
+def _asked_loads(test: "_Tested") -> "list[Load]":
+    """Return the loads that unseen logs ask for in which a joint errs by more than the
+    fit expects of any log."""
+    from hydroid.advice.loads import asked_loads
+
+    odd = list[Log]()
+    for prediction in test.predictions:
+        errors = prediction.indices
+        beyond = [
+            errors[joint].rms > band.expected
+            for joint, band in prediction.bands.items()
+        ]
+        if prediction.unseen is not False and any(beyond):
+            odd.append(prediction.log)
+    return asked_loads(test.model, odd)
+
+
+def _by_fit(fits: Iterable[str], tested: "Mapping[str, _Tested]") -> "list[Prediction]":
+    """Return all predictions with the names of their fits, in the order of these."""
+    predictions = list["Prediction"]()
+    for name in fits:
+        predictions += [replace(p, fit=name) for p in tested[name].predictions]
+    return predictions
 
 
 def _fitted_lines(predictions: "Sequence[Prediction]") -> list[str]:

@@ -16,8 +16,9 @@ viscous damping, so MuJoCo's dof_damping must be 0.
 import numpy as np
 
 from hydroid.arrays import Array, Index, Structs
-from hydroid.hydraulics.cylinder import GIVE, fills, holding_pressures, rod_motion
+from hydroid.hydraulics.cylinder import GIVE, holding_pressures, rod_motion
 from hydroid.hydraulics.kernel import Plugin
+from hydroid.hydraulics.oil import fills
 from hydroid.hydraulics.records import JOINT_STATE, NONE, Records, coefficients
 from hydroid.hydraulics.solenoid import drive, resting_stroke
 
@@ -57,20 +58,25 @@ def at_rest(plugin: Plugin, angle: Array, torque: Array) -> Structs:
     rests = np.isfinite(c.trapped_pressure) & (c.kind != NONE)
     pressure_a = np.where(rests, c.trapped_pressure, pressure_a)
     pressure_b = np.where(rests, level, pressure_b)
+    fill_a, fill_b = fills(angle, c)
     state = np.zeros(c.shape, JOINT_STATE)
-    for side, pressure, fill in zip(
-        "ab", (pressure_a, pressure_b), fills(angle, c), strict=True
-    ):
-        z = state[side]
-        z["oil"] = pressure + c.bulk_modulus * fill
-        z["drive"] = drive(0.0, c)
-        z["stroke"] = resting_stroke(z["drive"], c.gap, c.plunger_stiffness)
-    state["hold"], state["external"] = torque, -torque
-    carried = np.where(
-        rests, torque - lever * (c.a.area * pressure_a - c.b.area * pressure_b), 0.0
-    )
-    state["contact"], state["stop"] = carried / GIVE, angle + np.sign(carried) * GIVE
-    state["line"], state["share"] = c.relief, c.pump_idle
+    state["a"]["oil"] = pressure_a + c.bulk_modulus * fill_a
+    state["b"]["oil"] = pressure_b + c.bulk_modulus * fill_b
+    idle_drive = drive(0.0, c)
+    for side in "ab":
+        plunger = state[side]
+        plunger["drive"] = idle_drive
+        plunger["stroke"] = resting_stroke(idle_drive, c.gap, c.plunger_stiffness)
+    state["hold"] = torque
+    state["external"] = -torque
+    # what trapped oil does not carry, the joint rests on
+    by_oil = lever * (c.a.area * pressure_a - c.b.area * pressure_b)
+    carried = np.where(rests, torque - by_oil, 0.0)
+    state["contact"] = carried / GIVE
+    state["stop"] = angle + np.sign(carried) * GIVE
+    state["line"] = c.relief
+    state["share"] = c.pump_idle
+    # equal to no displacement: the first sub-step works out the opening
     state["displacement"] = np.nan
     return state
 
@@ -84,13 +90,13 @@ def pressures(coefficients: Structs, state: Structs, angle: Array) -> Array:
     record.
     """
     c: Records = coefficients.view(np.recarray)
-    oil = [
-        state[side]["oil"] - c.bulk_modulus * fill
-        for side, fill in zip("ab", fills(angle, c), strict=True)
-    ]
-    return np.where(
-        (c.kind != NONE)[..., None], np.maximum(np.stack(oil, axis=-1), 0.0), 0.0
-    )
+    fill_a, fill_b = fills(angle, c)
+    pressure_a = state["a"]["oil"] - c.bulk_modulus * fill_a
+    pressure_b = state["b"]["oil"] - c.bulk_modulus * fill_b
+    # less oil than the chamber's volume: it cavitates
+    both = np.maximum(np.stack([pressure_a, pressure_b], axis=-1), 0.0)
+    driven = c.kind != NONE
+    return np.where(driven[..., None], both, 0.0)
 
 
 def swallowed(c: Records, angle: Array, velocity: Array) -> Array:
@@ -100,5 +106,5 @@ def swallowed(c: Records, angle: Array, velocity: Array) -> Array:
     Elementwise over COEFFICIENTS; 0 of a joint without actuator.
     """
     speed = rod_motion(angle, c)[1] * velocity
-    flow = np.where(speed > 0, c.a.draw * c.a.area, -c.b.draw * c.b.area) * speed
-    return np.where(c.kind == NONE, 0.0, flow)
+    area = np.where(speed > 0, c.a.draw * c.a.area, -c.b.draw * c.b.area)
+    return np.where(c.kind == NONE, 0.0, area * speed)

@@ -1,18 +1,14 @@
-"""Cylinder or rotary actuator (article 2.2, equation (9)) and the oil in its two
-chambers.
+"""Cylinder or rotary actuator (article 2.2, equation (9)): how its rod moves with the
+joint, and what acts on it beside oil.
 
-    ṗ_A = β/V_A (Q_A − A_A ẋ),   ṗ_B = β/V_B (A_B ẋ − Q_B),   F_R = A_A p_A − A_B p_B − F_c
+    F_R = A_A p_A − A_B p_B − F_c
 
-with V = dead volume + area × travel. A rotary actuator has D_m for both areas, the
-joint's angle for its travel, and chambers of constant volume. The block that the
-article used has stiff oil; a large β is that limit.
+A rotary actuator has D_m for both areas, and the joint's angle for its travel.
 
-What is stored is not pressure but *oil*: y = p + β ln(V/V_0) (for a rotary chamber y =
-p ± β D_m q/V_0). It changes by valve flow alone, ẏ = β Q / V, whatever the joint does,
-so that shut chambers conserve their oil to the last digit and pressures come back with
-the angle. Where oil alone does not fill the chamber, the pressure rests at vapour
-pressure, which is taken for 0, and y remembers the missing volume: no oil is made or
-lost.
+dynamic         Way, moment arm and the arm's slope, all that a step passes through;
+                stops that damp (F_c), and what a joint rests on at the start.
+quasi-static    Way and moment arm at the middle of a step (`weigh`). A stop ends a
+                motion at once; what a joint rests on is left out.
 """
 
 # pyright: reportMissingParameterType=false
@@ -25,36 +21,24 @@ import numpy as np
 from hydroid.arrays import Array
 from hydroid.hydraulics.elementwise import compilable
 from hydroid.hydraulics.records import LINEAR, ROTARY
+from hydroid.hydraulics.seals import sliding_friction
 from hydroid.settings import linkage
 
-SLIDING = 1e-3  # speed [m/s, or rad/s] above which dry friction is nearly full; ours
 # what a joint's rest gives under the load that it carries at the start [rad]; ours
 GIVE = 5e-4
-SMALLEST = 0.1
-"""part of the dead volume that a chamber keeps, however far a joint is driven beyond
-its stops; ours"""
 
 triangle = compilable(linkage.triangle)
 four_bar = compilable(linkage.four_bar)
 
 
 @compilable
-def volume(travel, area, dead) -> Any:
-    """Volume of a chamber [m³] that opens with `travel` [m] at `area` [m²]."""
-    return np.maximum(dead + area * travel, SMALLEST * dead)
-
-
-@compilable
-def filling(travel, area, dead) -> Any:
-    """ln(V/V_0) of a chamber that opens with `travel` [m] at `area` [m²]."""
-    return np.log(volume(travel, area, dead) / dead)
-
-
-@compilable
 def rod(angle: float, c) -> Any:
     """Travel x [m], moment arm r = dx/dq [m/rad] and dr/dq of one cylinder at a joint
     angle [rad]."""
-    psi, first, second = angle, 1.0, 0.0
+    # angle at the cylinder's triangle, and its first two derivatives by the joint's
+    psi = angle
+    first = 1.0
+    second = 0.0
     if c.rocker > 0.0:
         psi, first, second = four_bar(angle, c)
     travel, arm, slope = triangle(
@@ -69,29 +53,14 @@ def bent(angle, c) -> Any:
     the middle, and slope.
 
     A joint that a linkage of unknown size turns is taken for a rotary actuator whose
-    moment arm r = 1 + slope s + bend s² depends on the place s in the joint's range, -1
-    to 1. The way is its integral.
+    moment arm r = 1 + slope s + bend s² depends on where the joint is in its range, s
+    from -1 to 1. The way is its integral.
     """
-    place = (angle - c.middle) / c.half
-    way = angle + c.half * place * place * (
-        0.5 * c.lever_slope + c.lever_bend * place / 3.0
-    )
-    return (
-        way,
-        1.0 + place * (c.lever_slope + c.lever_bend * place),
-        (c.lever_slope + 2.0 * c.lever_bend * place) / c.half,
-    )
-
-
-def fills(angle: Array, c) -> list[Array]:
-    """ln(V/V_0) of chambers A and B at angles [rad] of COEFFICIENTS; ± D_m q/V_0 of a
-    rotary actuator."""
-    travel, linear, dead = rod_motion(angle, c)[0], c.kind == LINEAR, c.dead_volume
-    sides = (c.a.area, travel, travel), (c.b.area, c.stroke - travel, -travel)
-    return [
-        np.where(linear, filling(out, area, dead), turn * area / dead)
-        for area, out, turn in sides
-    ]
+    s = (angle - c.middle) / c.half
+    way = angle + c.half * s * s * (0.5 * c.lever_slope + c.lever_bend * s / 3.0)
+    arm = 1.0 + s * (c.lever_slope + c.lever_bend * s)
+    slope = (c.lever_slope + 2.0 * c.lever_bend * s) / c.half
+    return way, arm, slope
 
 
 def rod_motion(angle: Array, c) -> list[Array]:
@@ -100,21 +69,41 @@ def rod_motion(angle: Array, c) -> list[Array]:
 
     Of a rotary actuator x is the angle, and r is 1, unless its moment arm is `bent`.
     """
-    still = angle, 1.0, 0.0
+    still = (angle, 1.0, 0.0)
+    has_rocker = c.rocker > 0
     with np.errstate(all="ignore"):  # joints without a range, a rocker or a triangle
-        turned, rocked = bent(angle, c), four_bar(angle, c)
+        turned = bent(angle, c)
+        rocked = four_bar(angle, c)
         psi, first, second = (
-            np.where(c.rocker > 0, x, y) for x, y in zip(rocked, still, strict=True)
+            np.where(has_rocker, with_rocker, without)
+            for with_rocker, without in zip(rocked, still, strict=True)
         )
         travel, arm, slope = triangle(
             psi, c.pivot_distance_1, c.pivot_distance_2, c.theta0, c.shortest
         )
-        cylinder = travel, arm * first, slope * first**2 + arm * second
-    kinds = c.kind == LINEAR, c.kind == ROTARY
+        cylinder = (travel, arm * first, slope * first**2 + arm * second)
+    kinds = [c.kind == LINEAR, c.kind == ROTARY]
     return [
-        np.select(kinds, [x, y], z)
-        for x, y, z in zip(cylinder, turned, still, strict=True)
+        np.select(kinds, [linear, rotary], without)
+        for linear, rotary, without in zip(cylinder, turned, still, strict=True)
     ]
+
+
+@compilable
+def rod_way(c, angle: float) -> Any:
+    """Travel of one joint's rod [m] and its moment arm [m/rad] at an angle [rad]; of a
+    rotary actuator as `bent`."""
+    way, arm, _ = rod(angle, c) if c.kind == LINEAR else bent(angle, c)
+    return way, arm
+
+
+@compilable
+def weigh(c, w, angle: float, torque: float) -> None:
+    """Moment arm, load and friction of the rod of a quasi-static joint that a torque
+    [N·m] must hold at an angle [rad]."""
+    w.arm = rod_way(c, angle)[1]
+    w.push = torque / w.arm
+    sliding_friction(c, w)
 
 
 @compilable
@@ -125,14 +114,12 @@ def stop_damping(travel, speed, stroke, penetration) -> Any:
     F_c opposes the motion at both ends; the article's sign at the lower one would push
     the rod out of the barrel. Travel x and stroke S [m], speed ẋ [m/s], K_p [N·s/m²].
     """
-    beyond = travel - stroke if speed > 0.0 else -travel if speed < 0.0 else 0.0
+    beyond = 0.0
+    if speed > 0.0:
+        beyond = travel - stroke
+    elif speed < 0.0:
+        beyond = -travel
     return penetration * np.maximum(beyond, 0.0)
-
-
-@compilable
-def friction_damping(speed, friction) -> Any:
-    """Dry friction [N] of the seals over speed [m/s], smooth through rest [N·s/m]."""
-    return friction / np.sqrt(speed * speed + SLIDING * SLIDING)
 
 
 @compilable

@@ -39,6 +39,7 @@ def implicit_weight(speed) -> Any:
 @compilable
 def kept(steps) -> Any:
     """Part of its error that a first-order lag of so many steps leaves after one."""
+    # no lag: exp(-1e300) is 0, and nothing divides by 0
     return np.exp(-1.0 / np.maximum(steps, 1e-300))
 
 
@@ -50,6 +51,8 @@ def ringing(frequency: Array, ratio: Array, step: float) -> tuple[Array, Array]:
     damping, below 1.
     """
     pace = 2.0 * np.pi * np.where(np.isfinite(frequency), frequency, 0.0)
-    turn, decay = pace * np.sqrt(1.0 - ratio**2) * step, np.exp(-ratio * pace * step)
+    turn = pace * np.sqrt(1.0 - ratio**2) * step
+    decay = np.exp(-ratio * pace * step)
     sine = decay * step * np.sinc(turn / np.pi)
-    return decay * np.cos(turn) - ratio * pace * sine, sine
+    cosine = decay * np.cos(turn) - ratio * pace * sine
+    return cosine, sine

@@ -13,17 +13,11 @@ so a branch leaves out what is switched off.
 
 import numpy as np
 
-from hydroid.hydraulics.cylinder import (
-    bent,
-    contact_torque,
-    filling,
-    friction_damping,
-    rod,
-    stop_damping,
-    volume,
-)
+from hydroid.hydraulics.cylinder import contact_torque, stop_damping
 from hydroid.hydraulics.elementwise import compilable, implicit_weight, kept
-from hydroid.hydraulics.records import LINEAR, NONE, ROTARY
+from hydroid.hydraulics.oil import begin_oil, press, take_flow, volume
+from hydroid.hydraulics.records import LINEAR, NONE
+from hydroid.hydraulics.seals import friction_damping
 from hydroid.hydraulics.solenoid import (
     beyond_dead_band,
     drive,
@@ -41,25 +35,16 @@ STILL = 1e-15
 @compilable
 def begin(c, z, w, angle: float, velocity: float) -> None:
     """Geometry and chamber pressures at the start of the step."""
-    z.angle, z.velocity = angle, velocity
-    w.way, w.speed, w.torque, w.resistance, w.oil_stiffness = (
-        0.0,
-        velocity,
-        0.0,
-        0.0,
-        0.0,
-    )
-    w.a.flow, w.b.flow = 0.0, 0.0
-    bulk, dead = c.bulk_modulus, c.dead_volume
-    if c.kind == LINEAR:
-        w.travel, w.arm, w.slope = rod(angle, c)
-        w.a.pressure = z.a.oil - bulk * filling(w.travel, c.a.area, dead)
-        w.b.pressure = z.b.oil - bulk * filling(c.stroke - w.travel, c.b.area, dead)
-    elif c.kind == ROTARY:
-        turned, w.arm, w.slope = bent(angle, c)
-        w.travel = 0.0
-        w.a.pressure = z.a.oil - bulk * c.a.area * turned / dead
-        w.b.pressure = z.b.oil + bulk * c.b.area * turned / dead
+    z.angle = angle
+    z.velocity = velocity
+    w.way = 0.0
+    w.speed = velocity
+    w.torque = 0.0
+    w.resistance = 0.0
+    w.oil_stiffness = 0.0
+    w.a.flow = 0.0
+    w.b.flow = 0.0
+    begin_oil(c, z, w, angle)
 
 
 @compilable
@@ -69,9 +54,12 @@ def command(c, z, w, commands, now: int) -> None:
 
     `commands` are those of all steps, of which that at `now` is given in this one.
     """
-    w.a.before, w.b.before = z.a.asked, z.b.asked
-    w.a.after, w.b.after = commands[now - c.a.late], -commands[now - c.b.late]
-    z.a.asked, z.b.asked = w.a.after, w.b.after
+    w.a.before = z.a.asked
+    w.b.before = z.b.asked
+    w.a.after = commands[now - c.a.late]
+    w.b.after = -commands[now - c.b.late]
+    z.a.asked = w.a.after
+    z.b.asked = w.b.after
 
 
 @compilable
@@ -81,25 +69,25 @@ def _advance(c, side, z, asked: float, step: float, whole: bool) -> float:
 
     `whole`: whether the step is a sub-step, and not a part of one.
     """
-    pilot_steps, keep, weight, driven = (
-        side.pilot_steps,
-        side.pilot_keep,
-        side.plunger_weight,
-        z.drive,
-    )
+    pilot_steps = side.pilot_steps
+    keep = side.pilot_keep
+    weight = side.plunger_weight
     if not whole:
         pilot_steps = side.pilot_lag / step
-        keep, weight = kept(pilot_steps), plunger_weight(side.plunger_damping, step, c)
-    # else the coil's drive stays; while the pilot stage follows, it is a mean of its
-    # own
+        keep = kept(pilot_steps)
+        weight = plunger_weight(side.plunger_damping, step, c)
+    driven = z.drive
+    # a command that has settled leaves the coil's drive as it is
     if z.held != asked:
+        # while the pilot stage follows, the drive is another mean in every sub-step
         z.held = asked if z.pilot == asked else np.nan
         beyond, part = beyond_dead_band(
             z.pilot, asked, pilot_steps, keep, side.dead_band
         )
         z.pilot = asked + (z.pilot - asked) * keep
         z.drive = drive(side_voltage(beyond, part, side.onset, side.dead_band), c)
-    before, speed = z.stroke, z.speed
+    before = z.stroke
+    speed = z.speed
     # a coil pulls a plunger off its seat again
     balanced = before > 0.0 or z.drive == 0.0
     if balanced and speed == 0.0 and z.drive == driven:
@@ -121,8 +109,10 @@ def _move_plunger(c, side, z, w, substep: int, step: float) -> float:
     # part of the sub-step under the new command
     later = min(max(substep + 1.0 - side.fresh, 0.0), 1.0)
     if later in (0.0, 1.0) or w.before == w.after:
-        return _advance(c, side, z, w.after if later > 0.0 else w.before, step, True)
-    mean = (1.0 - later) * _advance(c, side, z, w.before, (1.0 - later) * step, False)
+        asked = w.after if later > 0.0 else w.before
+        return _advance(c, side, z, asked, step, True)
+    earlier = 1.0 - later
+    mean = earlier * _advance(c, side, z, w.before, earlier * step, False)
     return mean + later * _advance(c, side, z, w.after, later * step, False)
 
 
@@ -179,23 +169,39 @@ def mean_opening(c, z, w, commands, now: int, plugin) -> float:
 
 
 @compilable
-def _press(w, lever: float, rate: float) -> float:
-    """How a chamber answers to flow and motion; its stiffness at the joint times the
-    step."""
-    w.lever, w.rate = lever, rate
-    relax = w.filled * rate * w.relief
-    w.weight = implicit_weight(relax)
-    w.rise = rate / (1.0 + w.weight * relax)
-    return w.filled * lever * lever * w.rise
+def _rest(z, w, step: float) -> float:
+    """Torque [N·m] of what a joint rests on; its stiffness and damping join those of
+    the joint."""
+    torque = contact_torque(z.stop - z.angle - w.way, z.contact)
+    if torque != 0.0:
+        w.stiffness += step * abs(z.contact)
+        # further in: damped, so that it does not bounce
+        if z.contact * w.speed < 0.0:
+            w.drag += 2.0 * np.sqrt(abs(z.contact) * w.inertia)
+    return torque
+
+
+@compilable
+def _joint_weight(w, step: float) -> float:
+    """Weight of the new velocity, from how fast the joint rings and fades."""
+    rings = step * w.stiffness
+    fades = step * w.drag
+    # most sub-steps resolve both rates, and then the weight is a half without the root
+    if rings <= 4.0 * w.inertia and fades <= 2.0 * w.inertia:
+        return 0.5
+    return implicit_weight(max(np.sqrt(rings / w.inertia), fades / w.inertia))
 
 
 @compilable
 def load(c, z, w, step: float) -> None:
     """Torque, oil stiffness and resistance of the sub-step, with both chambers
     eliminated."""
+    # lever and volumes are those of the middle of the sub-step
     turn = w.way + 0.5 * step * w.speed
-    arm, rub = w.arm + w.slope * turn, 0.0
-    volume_a, volume_b = c.dead_volume, c.dead_volume
+    arm = w.arm + w.slope * turn
+    rub = 0.0
+    volume_a = c.dead_volume
+    volume_b = c.dead_volume
     if c.kind == LINEAR:
         travel = w.travel + turn * (w.arm + 0.5 * w.slope * turn)
         volume_a = volume(travel, c.a.area, c.dead_volume)
@@ -205,20 +211,12 @@ def load(c, z, w, step: float) -> None:
         rub += friction_damping(arm * w.speed, c.dry_friction)
     w.drag = c.damping + arm * arm * rub
     pressed = step * c.bulk_modulus
-    w.stiffness = _press(w.a, arm * c.a.area, pressed / volume_a)
-    w.stiffness += _press(w.b, -arm * c.b.area, pressed / volume_b)
+    w.stiffness = press(w.a, arm * c.a.area, pressed / volume_a)
+    w.stiffness += press(w.b, -arm * c.b.area, pressed / volume_b)
     rest = 0.0
     if z.contact != 0.0:
-        rest = contact_torque(z.stop - z.angle - w.way, z.contact)
-        if rest != 0.0:
-            w.stiffness += step * abs(z.contact)
-            # further in: damped, so that it does not bounce
-            if z.contact * w.speed < 0.0:
-                w.drag += 2.0 * np.sqrt(abs(z.contact) * w.inertia)
-    rings, fades = step * w.stiffness, step * w.drag
-    w.weight = 0.5
-    if not (rings <= 4.0 * w.inertia and fades <= 2.0 * w.inertia):
-        w.weight = implicit_weight(max(np.sqrt(rings / w.inertia), fades / w.inertia))
+        rest = _rest(z, w, step)
+    w.weight = _joint_weight(w, step)
     w.push = rest + w.a.lever * w.a.pushing + w.b.lever * w.b.pushing
     flowing = (
         w.a.filled * w.a.lever * w.a.rise * w.a.inflow
@@ -230,17 +228,10 @@ def load(c, z, w, step: float) -> None:
 @compilable
 def coast(c, z, w, step: float) -> None:
     """The load of a joint without actuator, the same in all sub-steps."""
-    w.drag, w.stiffness, w.push = c.damping, 0.0, z.hold
+    w.drag = c.damping
+    w.stiffness = 0.0
+    w.push = z.hold
     w.weight = implicit_weight(step * c.damping / w.inertia)
-
-
-@compilable
-def _take_flow(z, w, mean: float) -> None:
-    gain = w.rise * (w.inflow - w.lever * mean)
-    flow = w.inflow - w.weight * w.filled * w.relief * gain
-    w.pressure += gain
-    z.oil += w.rate * flow
-    w.flow += flow
 
 
 @compilable
@@ -249,8 +240,8 @@ def settle(c, z, w, gain: float, step: float) -> None:
     sub-step."""
     mean = w.speed + w.weight * gain
     if c.kind != NONE:
-        _take_flow(z.a, w.a, mean)
-        _take_flow(z.b, w.b, mean)
+        take_flow(z.a, w.a, mean)
+        take_flow(z.b, w.b, mean)
         w.oil_stiffness += w.stiffness / step
     w.torque += w.push - (w.weight * w.stiffness + w.drag) * mean
     w.resistance += w.drag

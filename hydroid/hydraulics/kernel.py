@@ -34,7 +34,9 @@ bit.
 # a law takes floats or arrays that broadcast, and compiled code whatever has its fields
 
 import hashlib
+from inspect import getfile
 from pathlib import Path
+from types import FunctionType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -58,9 +60,9 @@ RAMP_TORQUE = 1.0 / 6.0
 RAMP_WAY = 1.0 / 2.0
 
 
-def source_key(*more: str | None) -> int:
-    """Return a number that changes with the text of the hydraulics' files, and of
-    `more` files.
+def source_key(*inlined: FunctionType) -> int:
+    """Return a number that changes with the text of the hydraulics' files, and of those
+    of `inlined` functions.
 
     Numba keys its cache on one file only. As a default argument of a compiled function,
     this number makes all files part of the key from which the function takes code in.
@@ -68,11 +70,10 @@ def source_key(*more: str | None) -> int:
     files = [
         *sorted(Path(__file__).parent.glob("*.py")),
         Path(linkage.__file__),
-        *map(Path, filter(None, more)),
+        *(Path(getfile(function)) for function in inlined),
     ]
-    return int.from_bytes(
-        hashlib.sha256(b"".join(file.read_bytes() for file in files)).digest()[:7]
-    )
+    texts = b"".join(file.read_bytes() for file in files)
+    return int.from_bytes(hashlib.sha256(texts).digest()[:7])
 
 
 SOURCE = source_key()
@@ -171,7 +172,7 @@ def look_ahead(plugin: Plugin, state, commands, now: int, arm, pad: Pad) -> None
 
     `state` is its actuators', (J,) of JOINT_STATE; of the commands [%], (.., J), that
     at `now` holds. The joints are the `columns` of the arm's angle, velocity, applied
-    torque and armature, and `own` is their armature without oil.
+    torque and armature, and `bare_armature` is theirs without oil.
     """
     coefficients, order, entries, idle, period, substeps = plugin
     work, lines, common, matrix, gain = pad
@@ -236,7 +237,7 @@ def look_ahead(plugin: Plugin, state, commands, now: int, arm, pad: Pad) -> None
         z = state[j]
         hand_over(z, work[j], line, part, period)
         arm.applied[arm.columns[j]] = z.torque
-        arm.armature[arm.columns[j]] = arm.own[j] + z.armature
+        arm.armature[arm.columns[j]] = arm.bare_armature[j] + z.armature
 
 
 @compilable

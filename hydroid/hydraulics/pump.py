@@ -32,6 +32,11 @@ D, which is positive: the sub-step stays as stable as it is without a pump. (Bet
 joints whose draws differ this is not f gᵀ: the predicted velocities err in the second
 order of the sub-step, no oil is lost.) Where P would pass the relief pressure, or the
 limit of its fall, δ is what is missing to it.
+
+dynamic         `draw_from_line` to `close_line`: P is integrated, V_line has a volume
+quasi-static    `line_pressure`: P satisfies Q_P(P) = Σ Q_i(P) at once, without V_line
+
+In both the pump comes up after a demand as `come_up` says.
 """
 
 # pyright: reportMissingParameterType=false
@@ -42,6 +47,11 @@ from typing import Any
 import numpy as np
 
 from hydroid.hydraulics.elementwise import compilable
+from hydroid.hydraulics.valve import rod_speed
+
+ITERATIONS = 30  # for a quasi-static line's pressure at most; three to five suffice
+# part of the pump's flow, or of its pressure, that may be left when they end
+SETTLED = 1e-9
 
 
 @compilable
@@ -151,3 +161,57 @@ def close_line(line, c) -> None:
     line.drawn = line.taken
     line.softness = 0.0
     line.swept = 0.0
+
+
+@compilable
+def line_pressure(coefficients, driven, work, line, share: float) -> float:
+    """Pressure of the line [Pa] at which quasi-static actuators take what the pump
+    gives with its φ at `share`.
+
+    The actuators are those of the `driven` joints, with (J,) of COEFFICIENTS and of
+    SCRATCH. Newton's method from the last step's, within a bracket: what is taken rises
+    with the pressure, and what is given falls.
+    """
+    pump = coefficients[driven[driven.size - 1]]
+    low = lowest(pump)
+    high = pump.relief
+    if pump.pump_limit < np.inf:
+        excess, _ = taken_beyond(coefficients, driven, work, line, share, low)
+        if excess >= 0.0:
+            return low  # where the pump gives whatever is taken
+    pressure = min(max(line.pressure, low, 1e-3 * high), high)
+    for _ in range(ITERATIONS):
+        excess, slope = taken_beyond(coefficients, driven, work, line, share, pressure)
+        if excess > 0.0:
+            high = pressure
+        else:
+            low = pressure
+        met = abs(excess) <= SETTLED * share * pump.pump_flow
+        if met or high - low <= SETTLED * pump.relief:
+            break
+        after = pressure - excess / slope  # infinite where nothing flows
+        if not low < after < high:
+            # beyond the relief pressure Newton's step ends there, elsewhere it halves
+            after = high if after > high == pump.relief else 0.5 * (low + high)
+        pressure = after
+    return pressure
+
+
+@compilable
+def taken_beyond(
+    coefficients, driven, work, line, share: float, pressure: float
+) -> Any:
+    """Flow that quasi-static actuators take beyond what the pump gives at a line
+    pressure [Pa], and its slope."""
+    pump = coefficients[driven[driven.size - 1]]
+    given, slope = delivery(pressure, share, pump)
+    excess = line.taken - given
+    for a in range(driven.size):
+        j = driven[a]
+        c = coefficients[j]
+        _, flow, rise = rod_speed(c, work[j], min(pressure, c.supply_pressure))
+        excess += flow
+        # behind a reducing valve that works, the line's pressure is not felt
+        if pressure <= c.supply_pressure:
+            slope += rise
+    return excess, slope

@@ -15,7 +15,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from hydroid.arrays import Mask, Structs
+from hydroid.arrays import Array, Mask, Structs
 from hydroid.hydraulics.elementwise import kept, ringing
 from hydroid.hydraulics.solenoid import curve_exists, force_curve, plunger_weight
 from hydroid.hydraulics.valve import KNOTS, conductance
@@ -28,9 +28,11 @@ from hydroid.settings.linkage import four_bar, triangle
 Records: TypeAlias = np.recarray[Any, Any]
 Fields = list[tuple[str, Any]]
 
-NONE, LINEAR, ROTARY = 0, 1, 2
-"""kinds of actuator; a joint with none keeps the constant torque that holds its start
-pose"""
+# kinds of actuator
+NONE = 0
+"""a joint without one keeps the constant torque that holds its start pose"""
+LINEAR = 1
+ROTARY = 2
 
 
 def _fields(names: str) -> Fields:
@@ -112,7 +114,8 @@ JOINT_STATE = np.dtype(
             # torque e that is neither oil nor damping; torque that held the start [N·m]
             "external hold "
             "angle velocity "  # at the start of the step [rad]; at its end [rad/s]
-            # on ringing oil: velocity [rad/s], and how it changes [rad/s²]
+            # on ringing oil: velocity [rad/s], and how it changes without what passes
+            # the oil at once [rad/s²]
             "turning surge "
             "opening "  # of the valve, as a share of the full one; below 0 towards B
             # of the spool [m], NaN before the first; the share without a lag
@@ -175,30 +178,35 @@ def nominal_joints(arm: Arm, settings: HydraulicSettings) -> Structs:
     shape (J,)."""
     table = np.zeros(len(arm.joints), JOINT)
     for row, joint in zip(table, arm.joints, strict=True):
-        actuator, ends = joint.actuator, np.array(joint.limits)
+        actuator = joint.actuator
+        ends = np.array(joint.limits)
         for name, value in actuator_values(actuator, settings).items():
-            if name != "mass":
-                row[name] = (
-                    math.inf if value is None else value * QUANTITIES[name].factor
-                )
+            if name == "mass":
+                continue
+            row[name] = math.inf if value is None else value * QUANTITIES[name].factor
         if actuator is not None:
-            row["kind"], row["middle"], row["half"] = (
-                ROTARY,
-                ends.mean(),
-                0.5 * np.ptp(ends),
-            )
+            row["kind"] = ROTARY
+            row["middle"] = ends.mean()
+            row["half"] = 0.5 * np.ptp(ends)
         if isinstance(actuator, LinearActuator):
-            row["kind"], row["sense"], row["stroke"] = (
-                LINEAR,
-                actuator.sense,
-                1e-3 * actuator.stroke,
-            )
-            row["retracted"] = ends[np.argmin(actuator.length(ends))]
-            if (bars := actuator.settings.four_bar) is not None:
-                for name in BARS:
-                    row[name] = getattr(bars, name)
-                row["retracted"] = four_bar(row["retracted"], bars)[0]
+            row["kind"] = LINEAR
+            _describe_cylinder(row, actuator, ends)
     return table
+
+
+def _describe_cylinder(row: Any, actuator: LinearActuator, ends: Array) -> None:
+    """Write what is of a cylinder to its joint, a row of JOINT, whose range has these
+    ends [rad]."""
+    row["sense"] = actuator.sense
+    row["stroke"] = 1e-3 * actuator.stroke
+    row["retracted"] = ends[np.argmin(actuator.length(ends))]
+    bars = actuator.settings.four_bar
+    if bars is None:
+        return
+    for name in BARS:
+        row[name] = getattr(bars, name)
+    # the triangle then has the angle of the rocker instead of the joint's
+    row["retracted"] = four_bar(row["retracted"], bars)[0]
 
 
 def has_force_curve(joints: Any) -> Mask:
@@ -234,21 +242,27 @@ def coefficients(joints: Records, period: float = 0.01, substeps: int = 1) -> Re
     table["ring_cosine"], table["ring_sine"] = ringing(
         p.oil_frequency, p.oil_damping, period
     )
+    # a pump with a limit has check valves
     table["backflow"] = np.where(np.isinf(p.pump_flow), -np.inf, 0.0)
-    table["relief"] = np.max(
-        p.supply_pressure, axis=1, where=p.kind != NONE, initial=0.0
-    )[:, None]
+    # the pump's relief valve opens where the joint of the highest pressure has it
+    driven = p.kind != NONE
+    relief = np.max(p.supply_pressure, axis=1, where=driven, initial=0.0)
+    table["relief"] = relief[:, None]
     for end, side in (("a", table.a), ("b", table.b)):
         for name, field in _SIDE_FIELDS.items():
             side[field] = joints[f"{name}_{end}"]
-        side["late"] = np.floor(side.delay / period)
-        side["fresh"] = (side.delay / period - side.late) * substeps
+        steps = side.delay / period
+        side["late"] = np.floor(steps)
+        side["fresh"] = (steps - side.late) * substeps
         side["pilot_steps"] = side.pilot_lag * substeps / period
         side["pilot_keep"] = kept(side["pilot_steps"])
         side["plunger_weight"] = plunger_weight(
             side.plunger_damping, period / substeps, table
         )
-        side["has_curve"] = np.any([side[name] != 1.0 for name in CURVE], axis=0)
+        bent = [side[name] != 1.0 for name in CURVE]
+        side["has_curve"] = np.any(bent, axis=0)
+        # a knot is a part of the travel; the curve asks for the share that the power
+        # law gives there
         for k, knot in enumerate(KNOTS, 1):
             side[f"knot_{k}"] = knot**side.opening_exponent
     return table

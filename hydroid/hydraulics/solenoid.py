@@ -49,13 +49,14 @@ def beyond_dead_band(
     whole = asked - dead_band + (start - asked) * (1.0 - keep) * steps
     if start > dead_band and end > dead_band:
         return whole, 1.0
-    reached = (
-        steps * np.log((start - asked) / (dead_band - asked))
-        if asked != dead_band
-        else 0.0
-    )
-    first = (start - dead_band) * steps + (asked - dead_band) * reached
-    return (first, reached) if start > dead_band else (whole - first, 1.0 - reached)
+    # part of the step after which the stage is at the edge of its dead band
+    reached = 0.0
+    if asked != dead_band:
+        reached = steps * np.log((start - asked) / (dead_band - asked))
+    until_edge = (start - dead_band) * steps + (asked - dead_band) * reached
+    if start > dead_band:
+        return until_edge, reached
+    return whole - until_edge, 1.0 - reached
 
 
 @compilable
@@ -101,11 +102,12 @@ def force_curve(force_1, force_2, stroke_1, stroke_2, rated_current) -> Any:
     Where no curve exists, it is a coil without force: k = 0, δ = stroke_2.
     """
     exists = curve_exists(force_1, force_2, stroke_1, stroke_2)
-    ratio = np.sqrt(np.where(exists, force_1 / np.where(exists, force_2, 1.0), 4.0))
+    # any ratio but 1 does where there is no curve: what follows from it is not taken
+    quotient = np.where(exists, force_1 / np.where(exists, force_2, 1.0), 4.0)
+    ratio = np.sqrt(quotient)
     gap = np.where(exists, (stroke_2 - ratio * stroke_1) / (ratio - 1.0), stroke_2)
-    return np.where(
-        exists, force_1 * (stroke_1 + gap) ** 2 / rated_current**2, 0.0
-    ), gap
+    at_rated = force_1 * (stroke_1 + gap) ** 2
+    return np.where(exists, at_rated / rated_current**2, 0.0), gap
 
 
 @compilable
@@ -161,4 +163,6 @@ def plunger_step(motion, drive, damping, step, weight, c) -> Any:
     gain = step * net / (c.plunger_mass + weight * step * drag)
     after = stroke + step * (speed + weight * gain)
     speed = speed + gain
-    return (0.0, np.maximum(speed, 0.0)) if after <= 0.0 else (after, speed)
+    if after <= 0.0:
+        return 0.0, np.maximum(speed, 0.0)
+    return after, speed

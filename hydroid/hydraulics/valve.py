@@ -1,16 +1,16 @@
 """Four-way spool valve (article 2.2, equations (6) to (8)).
 
 For x > 0 oil runs from the pump to chamber A and from B to the tank, for x < 0 from the
-pump to B and from A
-to the tank; the article prints x > 0 only. Its law Q = C_q A sgn(Δp) √(2|Δp|/ρ) has an infinite slope at Δp =
-0, so below the transition pressure p_cr it becomes a straight line:
+pump to B and from A to the tank; the article prints x > 0 only. Its law
+Q = C_q A sgn(Δp) √(2|Δp|/ρ) has an infinite slope at Δp = 0, so below the transition
+pressure p_cr it becomes a straight line:
 
     Q = C_q A √(2/ρ) Δp / (Δp² + p_cr²)^(1/4).
 
-The article leaves A(x) open. Ours: A_max min((|x| − overlap)/w, 1)^n, each direction with its own A_max,
-overlap, w and n, plus a leakage area on all four edges. With a flow limit, the pump
-gives no more than that to this actuator; with a check valve (`hydroid.hydraulics.pump`)
-no oil runs back to it.
+The article leaves A(x) open. Ours: A_max min((|x| − overlap)/w, 1)^n, each direction
+with its own A_max, overlap, w and n, plus a leakage area on all four edges. With a flow
+limit, the pump gives no more than that to this actuator; with a check valve
+(`hydroid.hydraulics.pump`) no oil runs back to it.
 
 A spool is cut with notches, and a servo may drive it through a small part of its
 travel, so its opening is no one power of the travel. Four factors, `curve_1` to
@@ -30,6 +30,11 @@ that a load does not slow the motion while the supply can lift it. The drop is
     Δp = p_S - p - κ max(p_S - p - MARGIN p_S, 0),
 
 with `compensation` κ: 0 without a compensator, as in the article, 1 with an ideal one.
+
+dynamic         `port_flow` and `meter`: flows that follow from the pressures of the
+                chambers, with leakage, an anti-cavitation valve and p_cr
+quasi-static    `rod_speed`: the same edges solved for the speed at which forces
+                balance, without these three. A flow never runs back to the pump.
 """
 
 # pyright: reportMissingParameterType=false
@@ -63,12 +68,15 @@ def bent_opening(share, factors, ends) -> Any:
     Its slope has a factor of each part, up to each of `ends`, and 1 beyond the last
     one. Where all factors are 1, the result is the power law's, to the bit.
     """
-    more, whole, low = 0.0, 0.0, 0.0
+    # what factors other than 1 add up to the share, and up to the full opening
+    more = 0.0
+    whole = 0.0
+    low = 0.0
     for factor, high in zip(factors, ends):  # noqa: B905  # compiled code knows no strict=
-        more = more + (factor - 1.0) * np.minimum(
-            np.maximum(share - low, 0.0), high - low
-        )
-        whole, low = whole + (factor - 1.0) * (high - low), high
+        passed = np.minimum(np.maximum(share - low, 0.0), high - low)
+        more = more + (factor - 1.0) * passed
+        whole = whole + (factor - 1.0) * (high - low)
+        low = high
     return (share + more) / (1.0 + whole)
 
 
@@ -76,10 +84,9 @@ def bent_opening(share, factors, ends) -> Any:
 def curved(share, side) -> Any:
     """Part of the full opening on the side's curve, from the part that the power law
     gives."""
-    factors = side.curve_1, side.curve_2, side.curve_3, side.curve_4
-    return bent_opening(
-        share, factors, (side.knot_1, side.knot_2, side.knot_3, side.knot_4)
-    )
+    factors = (side.curve_1, side.curve_2, side.curve_3, side.curve_4)
+    ends = (side.knot_1, side.knot_2, side.knot_3, side.knot_4)
+    return bent_opening(share, factors, ends)
 
 
 def conductance(flow_coefficient) -> Any:
@@ -93,7 +100,8 @@ def root(drop, transition) -> Any:
     square = drop * drop
     scale = square + transition * transition
     inverse = 1.0 / np.sqrt(np.sqrt(scale))
-    return drop * inverse, (1.0 - 0.5 * square * (inverse * inverse) ** 2) * inverse
+    slope = (1.0 - 0.5 * square * (inverse * inverse) ** 2) * inverse
+    return drop * inverse, slope
 
 
 @compilable
@@ -104,19 +112,21 @@ def port_flow(pressure, supply, pump_area, tank_area, c) -> Any:
     Also returns -dQ/dp [m³/(s Pa)], which is never negative, the part of Q that comes
     from the pump, at `supply` pressure [Pa], and its rise with that pressure.
     """
-    drop, kept, fed = supply - pressure, 1.0, 1.0
+    drop = supply - pressure
+    # how the drop over the edge answers to the pressures of chamber and supply
+    kept = 1.0
+    fed = 1.0
     if c.compensation > 0.0 and drop > MARGIN * supply:
         drop = drop - c.compensation * (drop - MARGIN * supply)
-        kept, fed = 1.0 - c.compensation, 1.0 - c.compensation * (1.0 - MARGIN)
+        kept = 1.0 - c.compensation
+        fed = 1.0 - c.compensation * (1.0 - MARGIN)
     into, into_slope = root(drop, c.transition_pressure)
     out, out_slope = root(pressure - c.tank_pressure, c.transition_pressure)
     pumped = c.conductance * pump_area * into
     pumped_slope = c.conductance * pump_area * into_slope
     if pumped >= c.flow_limit or pumped < c.backflow:
-        pumped, pumped_slope = (
-            np.maximum(np.minimum(pumped, c.flow_limit), c.backflow),
-            0.0,
-        )
+        pumped = np.maximum(np.minimum(pumped, c.flow_limit), c.backflow)
+        pumped_slope = 0.0
     filling = c.anticavitation if pressure < c.tank_pressure else 0.0
     drained = c.conductance * (tank_area + filling)
     return (
@@ -145,6 +155,71 @@ def meter(c, w, area: float, supply: float) -> None:
 
     `area` is the net opening [m²]; w is the joint's scratch space of a look-ahead.
     """
-    a, b = np.maximum(area, 0.0), np.maximum(-area, 0.0)
+    a = np.maximum(area, 0.0)
+    b = np.maximum(-area, 0.0)
     _fill(c, w.a, supply, c.leakage + a, c.leakage + b * c.a.return_)
     _fill(c, w.b, supply, c.leakage + b, c.leakage + a * c.b.return_)
+
+
+@compilable
+def speed_against(force: float, drag: float, edges: float) -> Any:
+    """Speed v > 0 at which `edges` v² + `drag` v = `force`, and the root of the
+    equation's discriminant."""
+    root = np.sqrt(drag * drag + 4.0 * force * edges)
+    return 2.0 * force / (drag + root), root
+
+
+@compilable
+def rod_speed(c, w, supply: float) -> Any:
+    """Speed at which a quasi-static joint's chamber fills [m/s], its flow from the pump
+    [m³/s], and how that rises with P [Pa].
+
+    The scratch space w has the net opening `travel` [m²], above 0 towards A, the load
+    `push` of gravity and springs, dry friction `thrust` [N], damping `drag` [N·s/m]; of
+    a rotary actuator torques. P is `supply`.
+    """
+    if w.travel == 0.0:
+        return 0.0, 0.0, 0.0
+    side, other, sign = (c.a, c.b, 1.0) if w.travel > 0.0 else (c.b, c.a, -1.0)
+    area = abs(w.travel)
+    load = sign * w.push + w.thrust
+    drag = w.drag
+    # what the drops over both edges take from the force of the oil, over v²
+    pump_edge = c.conductance * area
+    tank_edge = c.conductance * area * other.return_
+    into = (side.area / pump_edge) ** 2 * side.area
+    back = (other.area / tank_edge) ** 2 * other.area
+    free = supply * side.area - c.tank_pressure * other.area - load
+    if free <= 0.0:
+        return 0.0, 0.0, 0.0
+    speed, root = speed_against(free, drag, into + back)
+    rise = side.area * side.area / root
+    drop = supply  # over the pump edge of an empty chamber
+    if c.compensation > 0.0:
+        # beyond its margin the edge feels only a part of drop and pressures
+        left = 1.0 - c.compensation
+        fed = 1.0 - c.compensation * (1.0 - MARGIN)
+        drop = fed * supply
+        push = left * free + c.compensation * MARGIN * supply * side.area
+        root = np.sqrt(left * left * drag * drag + 4.0 * push * (into + left * back))
+        slower = 2.0 * push / (left * drag + root)
+        if slower < speed:
+            speed = slower
+            rise = fed * side.area * side.area / root
+    flow = side.area * speed
+    if flow > c.flow_limit:
+        speed = c.flow_limit / side.area
+        flow = c.flow_limit
+        rise = 0.0
+    pressed = (drag + back * speed) * speed + c.tank_pressure * other.area + load
+    # the load overruns the pump's oil: the chamber cavitates, and what leaves the other
+    # one governs
+    if pressed < 0.0:
+        falling = -c.tank_pressure * other.area - load
+        speed, _ = speed_against(falling, drag, back)
+        flow = pump_edge * np.sqrt(drop)
+        rise = 0.5 * flow / supply
+        if flow > c.flow_limit:
+            flow = c.flow_limit
+            rise = 0.0
+    return speed, side.draw * flow, side.draw * rise

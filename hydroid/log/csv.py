@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from hydroid.arrays import record
 from hydroid.errors import LogError
 from hydroid.log.binary import FORMATS
-from hydroid.log.csv_layout import Layout, find_layout, is_content
+from hydroid.log.csv_layout import CsvLayout, find_csv_layout, is_content
 from hydroid.log.table import Recording, Signal, Table, TextColumn
 from hydroid.progress import Progress, no_progress
 
@@ -44,7 +44,7 @@ class CsvTable(Table):
     it."""
 
     encoding: str
-    layout: Layout
+    layout: CsvLayout
 
     def read(self, signals: Sequence[Signal]) -> Recording:
         """Read columns; the recording does not keep the others."""
@@ -87,7 +87,7 @@ def _read_table(path: Path, encoding: str, file: Iterable[str]) -> Table:
     if not sample:
         raise LogError("is empty", path, IS_CSV)
     # what the first lines say holds for all: a file is too long to be read twice
-    layout = find_layout(sample, path)
+    layout = find_csv_layout(sample, path)
     text_columns = [TextColumn() for _ in layout.names]
     line_numbers = array("q")
     decimal_commas = False
@@ -141,7 +141,7 @@ def _sample(lines: Iterator[tuple[int, str]]) -> dict[int, str]:
 
 
 def _data_lines(
-    sample: Mapping[int, str], others: Iterable[tuple[int, str]], layout: Layout
+    sample: Mapping[int, str], others: Iterable[tuple[int, str]], layout: CsvLayout
 ) -> Iterator[tuple[int, str]]:
     """Yield the lines with data and their numbers, those of the sample first."""
     for number, line in chain(sample.items(), others):

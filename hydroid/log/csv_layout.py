@@ -27,7 +27,7 @@ Rows = Mapping[int, Sequence[str]]
 
 
 @record
-class Layout:
+class CsvLayout:
     """How the lines of a CSV file are read.
 
     Attributes:
@@ -69,7 +69,7 @@ class Layout:
         return cells[:count]
 
 
-def find_layout(sample: Mapping[int, str], path: Path) -> Layout:
+def find_csv_layout(sample: Mapping[int, str], path: Path) -> CsvLayout:
     """Return the layout of a file from its first lines with content, by their numbers.
 
     Raises LogError: no line holds names, or there is one column only.
@@ -98,7 +98,7 @@ def find_layout(sample: Mapping[int, str], path: Path) -> Layout:
     elif width > len(names):
         remarks.append("the first column has no name")
         names = ["", *names]
-    return Layout(
+    return CsvLayout(
         separator=separator,
         header=header,
         names=names,

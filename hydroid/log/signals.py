@@ -51,7 +51,7 @@ class CommandRange(NamedTuple):
         return self._replace(scale=scale, offset=offset)
 
 
-class Signal(NamedTuple):
+class CommandSignal(NamedTuple):
     """A row of the table: from `low` over no command to `high`."""
 
     name: str
@@ -83,13 +83,13 @@ class Signal(NamedTuple):
         return CommandRange(self.name, scale, -scale * self.middle)
 
 
-def _signals() -> tuple[Signal, ...]:
+def _signals() -> tuple[CommandSignal, ...]:
     """Return the rows of `signals.yaml`, in its order."""
-    signals = list[Signal]()
+    signals = list[CommandSignal]()
     for name, row in read_table("log/signals.yaml").items():
         full = row.get("full", False)
         unit = row.get("unit", "")
-        signals.append(Signal(name, row["from"], row["to"], full, unit))
+        signals.append(CommandSignal(name, row["from"], row["to"], full, unit))
     return tuple(signals)
 
 
@@ -175,7 +175,7 @@ def _rest_at_four(both: Array) -> bool:
     return bool(is_within and np.mean(at_rest) > 0.95)
 
 
-def _fits(signal: Signal, low: float, high: float, unit: str) -> bool:
+def _fits(signal: CommandSignal, low: float, high: float, unit: str) -> bool:
     """Return whether cells from a lowest to a highest, in a unit, may be a signal."""
     slack = signal.slack
     if low < signal.low - slack or high > signal.high + slack:
@@ -195,7 +195,7 @@ def _fits(signal: Signal, low: float, high: float, unit: str) -> bool:
 
 
 def _rests_in_the_middle(
-    signal: Signal, values: Array, rests: tuple[float, float]
+    signal: CommandSignal, values: Array, rests: tuple[float, float]
 ) -> bool:
     """Return whether cells rest in the middle of a signal, and lie on both sides of
     it.

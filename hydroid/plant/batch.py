@@ -9,7 +9,7 @@ is met once per call.
 # a law takes floats or arrays that broadcast, and compiled code whatever has its fields
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
@@ -20,13 +20,13 @@ from numba.extending import intrinsic
 from numba.np.numpy_support import carray
 from numpy.typing import ArrayLike
 
-from hydroid.arrays import Array, Ints, Mask
+from hydroid.arrays import Array, Ints, Mask, Structs
 from hydroid.errors import SettingsError
 from hydroid.hydraulics.kernel import Plugin
 from hydroid.mjcf import quiet_mujoco
 from hydroid.plant.plant import PHYSICS, Plant
 from hydroid.simulation.quasi_static import SOURCE, roll_quasi_static
-from hydroid.simulation.rollout import Course, Handles, Record, bind, roll
+from hydroid.simulation.rollout import Course, Handles, Trace, bind, roll
 
 
 def _typed_pointer(typing: Any, address: Any) -> Any:
@@ -45,10 +45,10 @@ _pointer: Any = intrinsic(_typed_pointer)
 
 
 class Population(NamedTuple):
-    """What n plants have, each with a row; `places` are addresses in MuJoCo, in the
-    order of `_places`."""
+    """What n plants have, each with a row; `addresses` are those in MuJoCo, in the
+    order of `_addresses`."""
 
-    places: Ints  # (n, 10)
+    addresses: Ints  # (n, 10)
     coefficients: Any  # (n, J), of COEFFICIENTS
     state: Any  # (n, J), of JOINT_STATE
     commands: Array  # (n, past + steps, J)
@@ -57,8 +57,9 @@ class Population(NamedTuple):
     failed: Mask  # (n,)
 
 
-def _places(plant: Plant) -> list[int]:
-    model, data = plant.model, plant.data
+def _addresses(plant: Plant) -> list[int]:
+    model = plant.model
+    data = plant.data
     arrays = [
         data.qpos,
         data.qvel,
@@ -66,11 +67,11 @@ def _places(plant: Plant) -> list[int]:
         data.qfrc_applied,
         model.dof_armature,
         data.qfrc_bias,
+        model.qpos_spring,
+        data.warning.number,
     ]
-    addresses = [
-        array.ctypes.data for array in (*arrays, model.qpos_spring, data.warning.number)
-    ]
-    return [model._address, data._address, *addresses]  # pyright: ignore[reportPrivateUsage]
+    of_arrays = [array.ctypes.data for array in arrays]
+    return [model._address, data._address, *of_arrays]  # pyright: ignore[reportPrivateUsage]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -84,47 +85,50 @@ def _roll_some(
 ) -> None:
     """Roll some plants out, from rows[0] to before rows[1]; `shared` has what is alike
     of all."""
-    joints, entries, nothing = shared.angle.size, shared.mass.size, np.empty(0)
+    joints = shared.angle.size
+    entries = shared.mass.size
+    # a warning of MuJoCo's has two numbers: every other one is its count
+    numbers = 2 * shared.warnings.size - 1
+    nothing = np.empty(0)
+    no_openings = np.empty((0, 0))
+    no_states: Structs = np.empty((0, plants.state.shape[1]), plants.state.dtype)
     for i in range(rows[0], rows[1]):
         if plants.failed[i]:
             continue
-        at = plants.places[i]
+        at = plants.addresses[i]
         handles = Handles(
-            at[0],
-            at[1],
-            carray(_pointer(at[2]), (joints,), np.float64),
-            carray(_pointer(at[3]), (joints,), np.float64),
-            carray(_pointer(at[4]), (entries,), np.float64),
-            carray(_pointer(at[5]), (joints,), np.float64),
-            carray(_pointer(at[6]), (joints,), np.float64),
-            carray(_pointer(at[9]), (2 * shared.warnings.size - 1,), np.int32)[::2],
-            shared.columns,
-            shared.own,
-            shared.pushed,
-            shared.steps,
-            carray(_pointer(at[7]), (joints,), np.float64),
-            carray(_pointer(at[8]), (joints,), np.float64),
-            shared.limits,
+            model=at[0],
+            data=at[1],
+            angle=carray(_pointer(at[2]), (joints,), np.float64),
+            velocity=carray(_pointer(at[3]), (joints,), np.float64),
+            mass=carray(_pointer(at[4]), (entries,), np.float64),
+            applied=carray(_pointer(at[5]), (joints,), np.float64),
+            armature=carray(_pointer(at[6]), (joints,), np.float64),
+            warnings=carray(_pointer(at[9]), (numbers,), np.int32)[::2],
+            columns=shared.columns,
+            bare_armature=shared.bare_armature,
+            pushed=shared.pushed,
+            steps=shared.steps,
+            gravity=carray(_pointer(at[7]), (joints,), np.float64),
+            slack=carray(_pointer(at[8]), (joints,), np.float64),
+            limits=shared.limits,
         )
-        own = Plugin(
-            plants.coefficients[i],
-            plugin.order,
-            plugin.entries,
-            plugin.idle,
-            plugin.period,
-            plugin.substeps,
+        actuators = Plugin(
+            coefficients=plants.coefficients[i],
+            order=plugin.order,
+            entries=plugin.entries,
+            idle=plugin.idle,
+            period=plugin.period,
+            substeps=plugin.substeps,
         )
-        course = Course(plants.commands[i], plants.torque[i], nothing, np.empty((0, 0)))
-        record = Record(
-            plants.angle[i], np.empty((0, plants.state.shape[1]), plants.state.dtype)
-        )
+        course = Course(plants.commands[i], plants.torque[i], nothing, no_openings)
+        trace = Trace(plants.angle[i], no_states)
         if quasi:
-            roll_quasi_static(handles, own, plants.state[i], course, record)
+            roll_quasi_static(handles, actuators, plants.state[i], course, trace)
         else:
-            roll(handles, own, plants.state[i], course, record)
-        plants.failed[i] = (
-            handles.warnings.any() or not np.isfinite(handles.angle).all()
-        )
+            roll(handles, actuators, plants.state[i], course, trace)
+        finite = np.isfinite(handles.angle).all()
+        plants.failed[i] = handles.warnings.any() or not finite
 
 
 class RowState(NamedTuple):
@@ -160,10 +164,16 @@ class PlantBatch:
 
     def __init__(self, plants: Sequence[Plant], *, threads: int | None = None) -> None:
         kinds = {
-            (one.identified.settings.stage, one.joints, one.period, one.quasi_static)
-            for one in plants
+            (
+                plant.identified.settings.stage,
+                plant.joints,
+                plant.period,
+                plant.timestep,
+                plant.quasi_static,
+            )
+            for plant in plants
         }
-        if len(kinds) != 1 or len({one.timestep for one in plants}) != 1:
+        if len(kinds) != 1:
             raise SettingsError(
                 "needs plants with the same joints, period and model",
                 "a batch of plants",
@@ -174,7 +184,7 @@ class PlantBatch:
         self._shares = np.linspace(0, len(plants), count + 1).astype(np.int64)
         first = self.plants[0]
         self._active = np.isin(np.arange(1, 1 + len(first.names)), first.joints)
-        self._past = max(one.past for one in plants)
+        self._past = max(plant.past for plant in plants)
         self._time = np.zeros(len(plants))
         self._gather()
 
@@ -208,8 +218,9 @@ class PlantBatch:
             The joint angles of all plants [rad], shape (n, J).
         """
         chosen = np.arange(len(self)) if rows is None else np.asarray(rows, int)
-        one = isinstance(pose, str) or pose is None or np.ndim(pose) == 1
-        poses: Any = [pose] * len(chosen) if one else pose
+        poses: Any = pose
+        if pose is None or isinstance(pose, str) or np.ndim(pose) == 1:
+            poses = [pose] * len(chosen)
         for row, start in zip(chosen.tolist(), poses, strict=True):
             self.plants[row].reset(start)
             self._take(row)
@@ -218,21 +229,22 @@ class PlantBatch:
     def state(self, row: int) -> "RowState":
         """Return where the plant of a row stands; to `restore` it is a hundredth of a
         reset."""
-        plant, population = self.plants[row], self._population
+        plant = self.plants[row]
+        population = self._population
         physics = np.empty(mujoco.mj_stateSize(plant.model, PHYSICS))
         mujoco.mj_getState(plant.model, plant.data, physics, PHYSICS)
         return RowState(
-            physics,
-            plant.data.M.copy(),
-            plant.model.dof_armature.copy(),
-            plant.model.qpos_spring.copy(),
-            population.coefficients[row].copy(),
-            population.state[row].copy(),
-            population.commands[row].copy(),
-            self._balance[row].copy(),
-            self._pose[row].copy(),
-            self._angle[row].copy(),
-            float(self._time[row]),
+            physics=physics,
+            mass=plant.data.M.copy(),
+            armature=plant.model.dof_armature.copy(),
+            slack=plant.model.qpos_spring.copy(),
+            coefficients=population.coefficients[row].copy(),
+            joints=population.state[row].copy(),
+            commands=population.commands[row].copy(),
+            balance=self._balance[row].copy(),
+            pose=self._pose[row].copy(),
+            angle=self._angle[row].copy(),
+            time=float(self._time[row]),
         )
 
     def restore(self, row: int, state: "RowState") -> None:
@@ -240,7 +252,8 @@ class PlantBatch:
 
         Its locked joints must stand where they stood then.
         """
-        plant, population = self.plants[row], self._population
+        plant = self.plants[row]
+        population = self._population
         mujoco.mj_setState(plant.model, plant.data, state.physics, PHYSICS)
         plant.data.M[:] = state.mass
         plant.data.warning.number[:] = 0
@@ -266,69 +279,77 @@ class PlantBatch:
             ValueError: another shape, or a command that is not finite or for a joint
                 that takes none.
         """
-        given = np.broadcast_to(
-            np.asarray(command, float), (len(self), len(self._active))
-        )
+        shape = (len(self), len(self._active))
+        given = np.broadcast_to(np.asarray(command, float), shape)
         if not np.isfinite(given).all() or given[:, ~self._active].any():
             raise ValueError("commands must be finite, and 0 of joints that take none")
         moving = given[:, self._columns].clip(-100.0, 100.0)
-        commands, steps = self._population.commands, self._population.torque.shape[1]
+        commands = self._population.commands
+        steps = self._population.torque.shape[1]
         commands[:, :-steps] = commands[:, steps:]
         commands[:, -steps:] = moving[:, None, self._coupled]
         if self._pushed.size:
-            self._population.torque[:] = (self._gain * moving + self._balance)[
-                :, None, self._pushed
-            ]
+            torque = self._gain * moving + self._balance
+            self._population.torque[:] = torque[:, None, self._pushed]
         with quiet_mujoco():
-            if len(self._calls) == 1:
-                self._calls[0]()
-            else:
-                for done in [self._pool.submit(call) for call in self._calls]:
-                    done.result()
+            # this thread takes a share too: to wake one costs as much as ten plants
+            own, *others = self._calls
+            waiting = [self._pool.submit(call) for call in others]
+            own()
+            for done in waiting:
+                done.result()
         self._time += self.plants[0].period
         return self.angle
 
     def _gather(self) -> None:
         """Stack what the plants have, and bind the compiled calls to it."""
-        first, n = self.plants[0], len(self)
+        first = self.plants[0]
+        n = len(self)
         parts = first.parts
-        self._columns, self._coupled, self._pushed = (
-            parts.columns,
-            parts.chain.columns,
-            parts.chain.pushed,
-        )
-        steps, joints = parts.course.torque.shape[0], len(self._coupled)
+        self._columns = parts.columns
+        self._coupled = parts.chain.columns
+        self._pushed = parts.chain.pushed
+        steps = parts.course.torque.shape[0]
+        joints = len(self._coupled)
         self._angle = np.empty((n, 1, len(self._columns)))
         self._pose = np.empty((n, len(first.names)))
-        self._gain, self._balance = np.empty((2, n, len(self._columns)))
+        self._gain = np.empty((n, len(self._columns)))
+        self._balance = np.empty((n, len(self._columns)))
         self._population = Population(
-            np.empty((n, 10), np.int64),
-            np.zeros((n, joints), parts.plugin.coefficients.dtype),
-            np.zeros((n, joints), parts.state.dtype),
-            np.zeros((n, self._past + steps, joints)),
-            np.zeros((n, steps, len(self._pushed))),
-            self._angle,
-            np.zeros(n, np.bool_),
+            addresses=np.empty((n, 10), np.int64),
+            coefficients=np.zeros((n, joints), parts.plugin.coefficients.dtype),
+            state=np.zeros((n, joints), parts.state.dtype),
+            commands=np.zeros((n, self._past + steps, joints)),
+            torque=np.zeros((n, steps, len(self._pushed))),
+            angle=self._angle,
+            failed=np.zeros(n, np.bool_),
         )
         for row in range(n):
             self._take(row)
-        shared = parts.arm.handles, parts.plugin
-        pairs = [self._shares[k : k + 2].copy() for k in range(len(self._shares) - 1)]
-        self._calls = [
-            bind(_roll_some, rows, *shared, self._population, first.quasi_static)
-            for rows in pairs
-        ]
+        self._calls: list[Callable[[], object]] = []
+        for k in range(len(self._shares) - 1):
+            call = bind(
+                _roll_some,
+                self._shares[k : k + 2].copy(),
+                parts.arm.handles,
+                parts.plugin,
+                self._population,
+                first.quasi_static,
+            )
+            self._calls.append(call)
 
     def _take(self, row: int) -> None:
         """Take over a plant that was reset."""
-        plant, population = self.plants[row], self._population
+        plant = self.plants[row]
+        population = self._population
         parts = plant.parts
-        population.places[row] = _places(plant)
+        population.addresses[row] = _addresses(plant)
         population.coefficients[row] = parts.plugin.coefficients
         population.state[row] = parts.state
         population.commands[row] = 0.0
         population.failed[row] = False
-        self._gain[row], self._balance[row] = parts.gain, parts.balance
+        self._gain[row] = parts.gain
+        self._balance[row] = parts.balance
         self._pose[row] = plant.angle
         self._angle[row, 0] = plant.data.qpos
         self._time[row] = plant.time

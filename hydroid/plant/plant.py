@@ -1,6 +1,6 @@
 """One candidate of a fit, stepped command by command."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
 from pathlib import Path
 from typing import NamedTuple
@@ -25,8 +25,8 @@ from hydroid.plant.steady import SteadyArm, SteadyCommands, Weighing, by_name
 from hydroid.problem.bindings import Bindings
 from hydroid.quantity_table import MECHANICAL, QUANTITIES
 from hydroid.simulation.quasi_static import roll_quasi_static
-from hydroid.simulation.rollout import Course, Record, SteppedArm, compile_rollout, roll
-from hydroid.simulation.scenario import Chain, model_values
+from hydroid.simulation.rollout import Course, SteppedArm, Trace, compile_rollout, roll
+from hydroid.simulation.scenario import Candidates, Chain, model_values
 
 PHYSICS = mujoco.mjtState.mjSTATE_INTEGRATION.value
 """what MuJoCo needs to go on to the same bits"""
@@ -70,7 +70,7 @@ class Plant:
             `reset` puts them.
         period: how long one command is held [s], a multiple of MuJoCo's step; by
             default the logs' period.
-        payload: mass in the gripper [kg].
+        payload: mass at the tip [kg].
 
     Attributes:
         joints: those that take commands.
@@ -80,8 +80,8 @@ class Plant:
         data: its state.
 
     Raises:
-        SettingsError: a joint that does not exist, a period that is no multiple, a
-            payload without a place, or parameters without a force-stroke curve.
+        SettingsError: a joint that does not exist, a period that is no multiple,
+            or parameters without a force-stroke curve.
     """
 
     def __init__(
@@ -94,42 +94,29 @@ class Plant:
     ) -> None:
         settings = identified.settings
         arm = settings.arm
-        self.identified, names = identified, dict(enumerate(arm.joint_names, 1))
-        wanted = set(joints or identified.summarise().joints or settings.outputs)
-        self.joints = tuple(
-            number for number, name in names.items() if wanted & {number, name}
-        )
-        self._named = [names[joint] for joint in self.joints]
-        self._active = np.isin([*names], self.joints)
-        if stray := wanted.difference(names, names.values()):
-            what = f"the arm has joints 1 to {len(names)}: {', '.join(names.values())}"
-            raise SettingsError(what, f"joints {[*stray]}")
+        self.identified = identified
+        wanted = joints or identified.summarise().joints or settings.outputs
+        self.joints = _joint_numbers(wanted, arm.joint_names)
+        self._named = [arm.joint_names[joint - 1] for joint in self.joints]
+        self._active = np.isin(np.arange(1, 1 + len(arm.joint_names)), self.joints)
         self._moving = self._active | (settings.simulation.other_joints == "passive")
         self.timestep = settings.log.period_s / settings.simulation.steps
         self.period = settings.log.period_s if period is None else period
-        self._steps = round(self.period / self.timestep)
-        if self._steps < 1 or abs(self._steps * self.timestep - self.period) > 1e-9:
-            raise SettingsError(
-                f"must be a multiple of {self.timestep:g} s",
-                f"period {self.period:g} s",
-            )
+        self._steps = _multiple(self.period, self.timestep)
         self._spec = load_model(arm)
         if payload:
             self._spec = add_payload(self._spec, arm, payload)
         self._candidate = Bindings(settings).candidates(identified.theta[None])
+        if settings.stage == "hyd":
+            _refuse_without_force(self._candidate, identified.source)
         self._locked_pose = np.empty(0)  # none yet
-        if settings.stage == "hyd" and not has_force_curve(self._candidate.joints)[0]:
-            hint = "it takes F1 > F2 > 0, x2 > x1 > 0 and F1/F2 < (x2/x1)²"
-            raise SettingsError(
-                "no force-stroke curve runs through its two points",
-                identified.source,
-                hint,
-            )
         compile_rollout()
         self.reset()
 
     def __repr__(self) -> str:
-        return f"<Plant: {', '.join(self._named)}; steps of {self.period:g} s; {self.identified.source}>"
+        names = ", ".join(self._named)
+        source = self.identified.source
+        return f"<Plant: {names}; steps of {self.period:g} s; {source}>"
 
     @property
     def time(self) -> float:
@@ -154,16 +141,15 @@ class Plant:
     @property
     def parts(self) -> PlantParts:
         """What it is made of, since its last reset."""
-        chain, arm, course = self._chain, self._arm, self._course
         return PlantParts(
-            self._columns,
-            chain,
-            arm,
-            self._plugin,
-            self._state,
-            course,
-            self._gain,
-            self._balance,
+            columns=self._columns,
+            chain=self._chain,
+            arm=self._arm,
+            plugin=self._plugin,
+            state=self._state,
+            course=self._course,
+            gain=self._gain,
+            balance=self._balance,
         )
 
     @property
@@ -196,13 +182,11 @@ class Plant:
     def pressure(self) -> Array:
         """Pressures of chambers A and B [Pa], shape (J, 2); NaN where a joint has no
         hydraulics."""
-        pressure, angle = (
-            np.full((len(self._pose), 2), np.nan),
-            self.data.qpos[self._chain.columns],
-        )
-        pressure[self._chain.joints] = pressures(
-            self._plugin.coefficients, self._state, angle
-        )
+        angle = self.data.qpos[self._chain.columns]
+        coefficients = self._plugin.coefficients
+        pressure = np.full((len(self._pose), 2), np.nan)
+        pressure[self._chain.joints] = pressures(coefficients, self._state, angle)
+        # others couple with the active ones through their inertia alone
         pressure[~self._active] = np.nan
         return pressure
 
@@ -219,9 +203,9 @@ class Plant:
         Raises:
             SettingsError: no such pose, or not J finite angles.
         """
-        self._pose = self._posed(
-            self.identified.settings.start_pose if pose is None else pose
-        )
+        if pose is None:
+            pose = self.identified.settings.start_pose
+        self._pose = self._posed(pose)
         self._start = self._pose.copy()
         self._weighing: Weighing | None = None  # springs are slack where it starts
         locked = np.where(self._moving, 0.0, self._pose)
@@ -234,13 +218,15 @@ class Plant:
             plugin, states = self._chain.start(
                 self._candidate, start_angle, self._balance[None]
             )
-            self._plugin, self._state = plugin.candidate(0), states[0]
+            self._plugin = plugin.candidate(0)
+            self._state = states[0]
             commands = np.zeros((self._plugin.past + self._steps, len(self._state)))
-            self._course = Course(
-                commands, np.empty((self._steps, len(self._chain.pushed)))
-            )
+            torque = np.empty((self._steps, len(self._chain.pushed)))
+            self._course = Course(commands, torque)
             self._mass = self.data.M.copy()
-        self._roll, self._taken = None, 0
+        # arrays are others than before: the compiled call is bound at the next step
+        self._roll = None
+        self._taken = 0
         return self.angle
 
     def step(self, command: ArrayLike | Mapping[str, float]) -> Array:
@@ -258,7 +244,7 @@ class Plant:
             ValueError: not J finite commands, or one for a joint that takes none.
             RunError: the simulation diverged.
         """
-        given = self._of_joints(command, "command", "%")
+        given = self._by_joint(command, "command", "%")
         self.data.ctrl[:] = given[self._columns].clip(-100.0, 100.0)
         commands, torque, *_ = self._course
         torque[:] = (self._gain * self.data.ctrl + self._balance)[self._chain.pushed]
@@ -269,7 +255,7 @@ class Plant:
         with quiet_mujoco():
             if self._roll is None:
                 self._roll = self._arm.bind(
-                    self._plugin, self._state, self._course, self._record
+                    self._plugin, self._state, self._course, self._trace
                 )
             self._roll()
         np.copyto(self._mass, self.data.M)
@@ -302,7 +288,7 @@ class Plant:
             ValueError: not J finite commands, or one for a joint that takes none.
             SettingsError: no such pose, or a plant of stage 1, which has no valves.
         """
-        given = self._of_joints(commands, "command", "%").clip(-100.0, 100.0)
+        given = self._by_joint(commands, "command", "%").clip(-100.0, 100.0)
         return self.steady().speeds(given[None], self._posed(at)[None])[0]
 
     def commands(
@@ -321,10 +307,8 @@ class Plant:
         Raises:
             ValueError, SettingsError: as of `speeds`.
         """
-        wished, pose = (
-            self._of_joints(speeds, "speed", "rad/s")[None],
-            self._posed(at)[None],
-        )
+        wished = self._by_joint(speeds, "speed", "rad/s")[None]
+        pose = self._posed(at)[None]
         steady = self.steady()
         command, reached = steady.commands(wished, pose)
         (limits,) = steady.limits(wished, reached, command, pose)
@@ -358,22 +342,16 @@ class Plant:
     def state(self) -> PlantState:
         """Return where the plant stands, oil, valves and commands on their way
         included."""
-        size = mujoco.mj_stateSize(self.model, PHYSICS)
-        physics = np.empty(size)
+        physics = np.empty(mujoco.mj_stateSize(self.model, PHYSICS))
         mujoco.mj_getState(self.model, self.data, physics, PHYSICS)
-        commands, armature = (
-            self._course.commands.copy(),
-            self.model.dof_armature.copy(),
-        )
-        mass = self._mass.copy()
         return PlantState(
-            self._start.copy(),
-            self._taken,
-            self._state.copy(),
-            commands,
-            physics,
-            mass,
-            armature,
+            start=self._start.copy(),
+            taken=self._taken,
+            state=self._state.copy(),
+            commands=self._course.commands.copy(),
+            physics=physics,
+            mass=self._mass.copy(),
+            armature=self.model.dof_armature.copy(),
         )
 
     def restore(self, state: PlantState) -> Array:
@@ -414,29 +392,37 @@ class Plant:
         Raises:
             RunError: the folder cannot be written.
         """
-        model, candidate = copy(self.model), self._candidate
+        model = copy(self.model)
+        # a rollout with hydraulics steps with no damping and with another armature
         model.dof_damping[:] = self._values["dof_damping"][0]
-        # a rollout steps with another
         model.dof_armature[:] = self._locked.model.dof_armature
         spec = read_mjcf(folder / "arm.xml")  # with the meshes' names there
         motors = np.array([self._gain, self._balance])[:, self._chain.pushed]
-        actuators = Plain()
-        if self._chain.joints.size:
-            hydraulic = {
-                name: q for name, q in QUANTITIES.items() if name not in MECHANICAL
-            }
-            actuators["units"] = {name: q.unit for name, q in hydraulic.items()}
-            for joint, values in zip(
-                self._named, candidate.joints[0, self._active], strict=True
-            ):
-                actuators[joint] = {
-                    name: float(values[name] / q.factor)
-                    for name, q in hydraulic.items()
-                }
         fitted = locked_spec(spec, self._locked, model, motors)
-        write_fitted(folder, fitted, ", ".join(self._named), actuators)
+        names = ", ".join(self._named)
+        write_fitted(folder, fitted, names, self._actuator_values())
 
-    def _of_joints(
+    def _actuator_values(self) -> Plain:
+        """Return units and values of the hydraulic quantities of the joints that take
+        commands, as a file has them; nothing in stage 1."""
+        values = Plain()
+        if not self._chain.joints.size:
+            return values
+        hydraulic = {
+            name: quantity
+            for name, quantity in QUANTITIES.items()
+            if name not in MECHANICAL
+        }
+        values["units"] = {name: q.unit for name, q in hydraulic.items()}
+        active = self._candidate.joints[0, self._active]
+        for joint, actuator in zip(self._named, active, strict=True):
+            values[joint] = {
+                name: float(actuator[name] / quantity.factor)
+                for name, quantity in hydraulic.items()
+            }
+        return values
+
+    def _by_joint(
         self, values: ArrayLike | Mapping[str, float], what: str, unit: str
     ) -> Array:
         """Return values by joint, shape (J,), given so or by name; 0 of joints that
@@ -473,24 +459,59 @@ class Plant:
         return angle
 
     def _lock(self, pose: Array) -> None:
-        settings, candidate = self.identified.settings, self._candidate
+        """Make the arm anew with its locked joints in a pose [rad], shape (J,), which
+        is 0 of those that move."""
+        settings = self.identified.settings
         locked = lock(self._spec, settings.arm, self._moving, pose)
         locked.model.opt.timestep = self.timestep
         model = dressed_model(self._spec, locked)
-        self._locked, self._locked_pose, self._columns = locked, pose, locked.columns
-        self._values = model_values(locked, candidate)
-        self._gain = candidate.joints.gain[0, self._columns]
-        moving = np.arange(len(self._columns))
-        pushed, substeps = (
-            moving[: 0 if settings.stage == "hyd" else None],
-            settings.substeps,
-        )
-        self._chain = chain = Chain(
-            settings.arm, locked, self._active, substeps, pushed
+        self._locked = locked
+        self._locked_pose = pose
+        self._columns = locked.columns
+        self._values = model_values(locked, self._candidate)
+        self._gain = self._candidate.joints.gain[0, self._columns]
+        # in stage 1 a gain pushes every joint
+        pushed = np.arange(0 if settings.stage == "hyd" else len(self._columns))
+        self._chain = Chain(
+            settings.arm, locked, self._active, settings.substeps, pushed
         )
         rollout = roll_quasi_static if settings.quasi_static else roll
-        self._arm = SteppedArm(model, chain.columns, self._steps, rollout)
-        self.model, self.data = self._arm.model, self._arm.data
-        self._record = Record(
-            np.empty((1, len(moving))), np.empty((0, len(chain.columns)), JOINT_STATE)
+        coupled = self._chain.columns
+        self._arm = SteppedArm(model, coupled, self._steps, rollout)
+        self.model = self._arm.model
+        self.data = self._arm.data
+        no_states = np.empty((0, len(coupled)), JOINT_STATE)
+        self._trace = Trace(np.empty((1, len(self._columns))), no_states)
+
+
+def _joint_numbers(
+    wanted: Iterable[int | str], names: Sequence[str]
+) -> tuple[int, ...]:
+    """Return joints' numbers, from 1, in the arm's order, by numbers or names."""
+    asked = set(wanted)
+    numbered = dict(enumerate(names, 1))
+    stray = asked.difference(numbered, names)
+    if stray:
+        what = f"the arm has joints 1 to {len(names)}: {', '.join(names)}"
+        raise SettingsError(what, f"joints {[*stray]}")
+    return tuple(number for number, name in numbered.items() if asked & {number, name})
+
+
+def _multiple(period: float, timestep: float) -> int:
+    """Return how many of MuJoCo's steps a period has, both [s]."""
+    steps = round(period / timestep)
+    if steps < 1 or abs(steps * timestep - period) > 1e-9:
+        raise SettingsError(
+            f"must be a multiple of {timestep:g} s", f"period {period:g} s"
+        )
+    return steps
+
+
+def _refuse_without_force(candidate: Candidates, source: str) -> None:
+    """Raise a SettingsError where a joint's solenoid has no force-stroke curve."""
+    if not has_force_curve(candidate.joints)[0]:
+        raise SettingsError(
+            "no force-stroke curve runs through its two points",
+            source,
+            "it takes F1 > F2 > 0, x2 > x1 > 0 and F1/F2 < (x2/x1)²",
         )

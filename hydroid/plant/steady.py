@@ -61,10 +61,8 @@ class Weighing:
     ) -> None:
         whole = lock(spec, arm, np.ones(len(slack), dtype=bool), slack)
         whole.model.qpos_spring[:] = slack
-        self._values, self._arm = (
-            model_values(whole, candidate),
-            SteppedArm(whole.model),
-        )
+        self._values = model_values(whole, candidate)
+        self._arm = SteppedArm(whole.model)
 
     def loads(self, pose: Array) -> Array:
         """Return the torques [N·m] that hold the joints at angles [rad], both of shape
@@ -96,10 +94,14 @@ class SteadyArm:
         """Return settled speeds [rad/s] under commands [%] at angles [rad], all of
         shape (S, J)."""
         load = self.weighing.loads(pose)
-        at = pose[:, self.columns], load[:, self.columns], command[:, self.columns]
-        return self._spread(
-            settled_speeds(self.plugin, *at, quasi_static=self.quasi_static)
+        speeds = settled_speeds(
+            self.plugin,
+            pose[:, self.columns],
+            load[:, self.columns],
+            command[:, self.columns],
+            quasi_static=self.quasi_static,
         )
+        return self._spread(speeds)
 
     def commands(
         self, speed: Array, pose: Array, load: Array | None = None
@@ -110,11 +112,15 @@ class SteadyArm:
         A joint at an end of its range moves no further. `load` is that of `weighing`,
         where it is known.
         """
-        held = self.weighing.loads(pose) if load is None else load
+        if load is None:
+            load = self.weighing.loads(pose)
         wished = np.where(self.stopped(speed, pose), 0.0, speed)
-        at = pose[:, self.columns], held[:, self.columns], wished[:, self.columns]
         command, reached = settled_commands(
-            self.plugin, *at, quasi_static=self.quasi_static
+            self.plugin,
+            pose[:, self.columns],
+            load[:, self.columns],
+            wished[:, self.columns],
+            quasi_static=self.quasi_static,
         )
         return self._spread(command), self._spread(reached)
 
@@ -130,13 +136,12 @@ class SteadyArm:
         """Return why joints (0-based) do not have their wished speeds, for each of S
         poses."""
         away = np.abs(reached - speed) > np.maximum(CLOSE * np.abs(speed), LEAST_SPEED)
-        away &= np.isin(
-            np.arange(len(self.ranges)),
-            self.columns[self.plugin.order[self.plugin.idle :]],
-        )
+        driven = self.columns[self.plugin.order[self.plugin.idle :]]
+        away &= np.isin(np.arange(len(self.ranges)), driven)
         stopped = self.stopped(speed, pose)
-        found = [dict[int, Limit]() for _ in speed]
+        limits = [dict[int, Limit]() for _ in speed]
         rows = np.flatnonzero(away.any(axis=1))
+        # a joint that an endless pump would make faster waits for the pump
         alone = self._with_endless_pump(speed[rows], pose[rows])
         gained = np.abs(alone - reached[rows]) > CLOSE * np.abs(speed[rows])
         for row, pumped in zip(rows.tolist(), gained, strict=True):
@@ -147,19 +152,21 @@ class SteadyArm:
                     limit = Limit.LEAKS
                 elif abs(command[row, joint]) < FULL_COMMAND - 1e-6:
                     limit = Limit.SLOWEST
+                elif pumped[joint]:
+                    limit = Limit.PUMP
                 else:
-                    limit = Limit.PUMP if pumped[joint] else Limit.FULL
-                found[row][joint] = limit
-        return found
+                    limit = Limit.FULL
+                limits[row][joint] = limit
+        return limits
 
     def _with_endless_pump(self, speed: Array, pose: Array) -> Array:
         """Return the speeds that joints would reach if the pump had no limit [rad/s],
         (S, J)."""
         endless = self.plugin.coefficients.copy()
         endless["pump_flow"] = np.inf
-        return replace(
-            self, plugin=self.plugin._replace(coefficients=endless)
-        ).commands(speed, pose)[1]
+        plugin = self.plugin._replace(coefficients=endless)
+        _, reached = replace(self, plugin=plugin).commands(speed, pose)
+        return reached
 
     def _spread(self, values: Array) -> Array:
         """Spread values of the V joints over all, 0 of the others."""

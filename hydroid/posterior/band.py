@@ -54,21 +54,22 @@ class Band:
 
 
 def fitted_bands(
-    problem: Problem, known: Uncertainty, responses: Sequence[Array]
+    problem: Problem, uncertainty: Uncertainty, responses: Sequence[Array]
 ) -> list[dict[int, Band]]:
     """Return the bands of the compared joints around responses [rad], (T, K), to the
     fitted logs."""
     bands: list[dict[int, Band]] = [{} for _ in problem.logs]
-    slopes = known.likelihood.errors.errors(known.linear.slopes)
+    posterior = uncertainty.posterior
+    slopes = uncertainty.likelihood.errors.errors(uncertainty.linear.slopes)
     for number, channel in enumerate(problem.channels):
-        if channel.quantity == "angle":
-            sd = known.posterior.sd(slopes[:, channel.rows]) / channel.weight
-            simulated = responses[channel.log][:, channel.column]
-            noise = error_variances(known.errors, number, simulated)
-            error = channel.measured - simulated
-            bands[channel.log][channel.joint] = _band(
-                known.posterior, noise, sd**2, error
-            )
+        if channel.quantity != "angle":
+            continue
+        sd = posterior.sd(slopes[:, channel.rows]) / channel.weight
+        simulated = responses[channel.log][:, channel.column]
+        sensor, drift = error_variances(uncertainty.errors, number, simulated)
+        error = channel.measured - simulated
+        spread = Spread(sd**2, sensor, drift)
+        bands[channel.log][channel.joint] = _band(posterior, spread, error)
     return bands
 
 
@@ -77,7 +78,8 @@ def error_variances(
 ) -> tuple[float, Array]:
     """Return the variance of a channel's sensor, and that of its drift along a
     simulated way, shape (T,)."""
-    course, i = errors.courses[channel], errors.of[channel]
+    course = errors.courses[channel]
+    i = errors.of[channel]
     along = replace(course, way=travelled(simulated, course.period))
     return float(errors.numbers[i, 0]), errors.drift(along, i)
 
@@ -91,58 +93,85 @@ def prediction_bands(
     Empty where the model's values are not those of a fit, which alone knows its
     covariance and errors.
     """
-    known, outputs = stored_posterior(model), model.settings.outputs
-    if known is None or model.summary is None:
+    posterior = stored_posterior(model)
+    if posterior is None or model.summary is None:
         return {}
-    stored, left_out = model.summary.errors, model.summary.left_out_deg
+    outputs = model.settings.outputs
+    stored = model.summary.errors
     if any(f"q{joint}" not in stored for joint in outputs):
         return {}
     problem = Problem(model.settings, [log])
+    errors = stored_error_model(problem, stored)
+    variances = _angle_variances(problem, posterior, response.shape)
+    bands: dict[int, Band] = {}
+    for column, joint in enumerate(outputs):
+        sensor, drift = error_variances(errors, column, response[:, column])
+        unseen = np.radians(model.summary.left_out_deg.get(f"q{joint}", ()))
+        bands[joint] = _band(
+            posterior,
+            Spread(variances[:, column], sensor, drift),
+            log.angle[:, joint - 1] - response[:, column],
+            unseen,
+        )
+    return bands
+
+
+def _angle_variances(
+    problem: Problem, posterior: Posterior, shape: tuple[int, ...]
+) -> Array:
+    """Return the variances of the angles simulated for the problem's only log, of shape
+    (T, K), that the uncertainty of the parameters gives."""
 
     def angles(theta: Array) -> Array:
         return problem.responses(theta)[0].angle.reshape(len(theta), -1)
 
-    errors = stored_error_model(problem, stored)
-    slopes = differentiate(angles, known.box, known.axes(STEP))
-    parts = known.parts(slopes).reshape(-1, *response.shape)
-    slopes = slopes.reshape(parts.shape)
-    bands: dict[int, Band] = {}
-    for column, joint in enumerate(outputs):
-        variance = np.sum(parts[:, :, column] ** 2, axis=0)
-        if np.mean(variance) > np.mean(np.sum(slopes[:, :, column] ** 2, axis=0)):
-            # no better than from parameters known to 100 % each
-            variance = np.full_like(variance, np.inf)
-        noise = error_variances(errors, column, response[:, column])
-        error = log.angle[:, joint - 1] - response[:, column]
-        unseen = np.radians(left_out.get(f"q{joint}", ()))
-        explained = np.mean(variance + noise[0] + noise[1])
-        wrong = max(np.mean(unseen**2) - explained, 0.0) if unseen.size else 0.0
-        widened = (
-            wrong
-            * float(student.ppf(0.5 + COVERAGE / 2, unseen.size or 1) / NORMAL) ** 2
-        )
-        bands[joint] = _band(known, noise, variance, error, wrong, widened)
-    return bands
+    slopes = differentiate(angles, posterior.box, posterior.axes(STEP))
+    parts = posterior.parts(slopes)
+    variance = np.sum(parts.reshape(-1, *shape) ** 2, axis=0)
+    # as large if each parameter was known to 100 % by itself
+    unknown = np.sum(slopes.reshape(-1, *shape) ** 2, axis=0)
+    for column in range(shape[1]):
+        if np.mean(variance[:, column]) > np.mean(unknown[:, column]):
+            variance[:, column] = np.inf
+    return variance
+
+
+@record
+class Spread:
+    """Variances of what a predicted angle errs by [rad²].
+
+    Attributes:
+        parameters: of their uncertainty, shape (T,).
+        sensor: of its noise.
+        drift: of the error model's drift, shape (T,).
+    """
+
+    parameters: Array
+    sensor: float
+    drift: Array
 
 
 def _band(
-    known: Posterior,
-    noise: tuple[float, Array],
-    variance: Array,
+    posterior: Posterior,
+    spread: Spread,
     error: Array,
-    wrong: float = 0.0,
-    widened: float = 0.0,
+    unseen: Sequence[float] | Array = (),
 ) -> Band:
-    """Return the band of an error [rad] from the variances of sensor and drift, and of
-    the rest, (T,).
-
-    wrong: mean square error of the model on unseen logs. widened: the same, as wide as
-    it is known.
-    """
-    sensor, drift = noise
-    variance = variance + sensor + drift
-    half = np.sqrt(known.quantile**2 * variance + NORMAL**2 * widened)
-    inside = float(np.mean(np.abs(error) <= half))
+    """Return the band of an error [rad], (T,), with the rms errors of logs that were
+    left out, `unseen` [rad]."""
+    variance = spread.parameters + spread.sensor + spread.drift
+    # what is beyond all this on logs that were left out is the model's
+    wrong = 0.0
+    widened = 0.0
+    if len(unseen):
+        wrong = max(np.mean(np.square(unseen)) - np.mean(variance), 0.0)
+        quantile = float(student.ppf(0.5 + COVERAGE / 2, len(unseen)))
+        widened = wrong * (quantile / NORMAL) ** 2
+    half = np.sqrt(posterior.quantile**2 * variance + NORMAL**2 * widened)
     return Band(
-        np.sqrt(sensor), half, inside, rms(error), np.sqrt(np.mean(variance) + wrong)
+        noise=np.sqrt(spread.sensor),
+        half=half,
+        inside=float(np.mean(np.abs(error) <= half)),
+        error=rms(error),
+        expected=np.sqrt(np.mean(variance) + wrong),
     )

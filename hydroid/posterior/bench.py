@@ -7,6 +7,7 @@ differences give its derivatives.
 """
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,9 +25,19 @@ from hydroid.simulation.rollout import SteppedArm
 from hydroid.simulation.scenario import Scenario
 from hydroid.simulation.steady import NEAR, steady_velocity
 
-ONSET, RISEN = 0.1, 1.0 - np.exp(-1.0)
-"""parts of the steady speed: it takes the dead time to reach the first, and from there
-the time constant to reach the second"""
+ONSET = 0.1
+"""part of the steady speed that is reached after the dead time"""
+RISEN = 1.0 - np.exp(-1.0)
+"""part of it that is reached a time constant later"""
+
+
+class Direction(NamedTuple):
+    """A direction of commands: their sign, its `ending` in names of quantities, and its
+    `word` in labels."""
+
+    sign: float
+    ending: str
+    word: str
 
 
 @record
@@ -58,6 +69,11 @@ class Bench:
         return shown.factor, shown.unit
 
     @property
+    def slides(self) -> bool:
+        """Whether the joint slides: its angle is then a way [m], its torque a force."""
+        return self.settings.arm.joints[self.joint - 1].slides
+
+    @property
     def pose(self) -> str:
         """The angle at which the joint is tested, in words."""
         factor, unit = self.unit
@@ -67,24 +83,22 @@ class Bench:
     def sense(self) -> float:
         """Direction in which a positive command turns the joint, 1 or -1."""
         actuator = self.settings.arm.joints[self.joint - 1].actuator
-        return (
-            np.sign(actuator.moment_arm(self.angle))
-            if isinstance(actuator, LinearActuator)
-            else 1.0
-        )
+        if not isinstance(actuator, LinearActuator):
+            return 1.0
+        return np.sign(actuator.moment_arm(self.angle))
 
     def weigh(self, candidates: Candidates) -> tuple[Array, Array]:
         """Return gravity's torque [N·m] and the joint's inertia [kg·m²] at its angle,
         shape (n,) each."""
-        torque, inertia = np.empty((2, len(candidates)))
-        arm, values = (
-            SteppedArm(self.scenario.arm.model),
-            self.scenario.values(candidates),
-        )
+        torque = np.empty(len(candidates))
+        inertia = np.empty(len(candidates))
+        arm = SteppedArm(self.scenario.arm.model)
+        values = self.scenario.values(candidates)
         with quiet_mujoco():
             for row in range(len(candidates)):
                 arm.start(values, [row], np.array([self.angle]))
-                torque[row], inertia[row] = arm.data.qfrc_bias[0], arm.data.M[0]
+                torque[row] = arm.data.qfrc_bias[0]
+                inertia[row] = arm.data.M[0]
         return torque, inertia
 
     def loads(self, candidates: Candidates) -> Array:
@@ -94,15 +108,14 @@ class Bench:
         Springs are slack where the first log starts.
         """
         load = np.empty((len(candidates), 3))
-        arm, values = (
-            SteppedArm(self.scenario.arm.model),
-            self.scenario.values(candidates),
-        )
+        arm = SteppedArm(self.scenario.arm.model)
+        values = self.scenario.values(candidates)
+        angles = (self.angle - NEAR, self.angle, self.angle + NEAR)
         with quiet_mujoco():
             for row in range(len(candidates)):
-                for place in range(3):
-                    pose = np.array([self.angle + (place - 1) * NEAR])
-                    load[row, place] = arm.start(values, [row], pose)[0]
+                for column, angle in enumerate(angles):
+                    held = arm.start(values, [row], np.array([angle]))
+                    load[row, column] = held[0]
         return load
 
     def steady(self, candidates: Candidates, commands: Array, loads: Array) -> Array:
@@ -145,7 +158,8 @@ class Movement:
         They are the joint's as its sensor reads them, late but to scale. Springs are
         slack where the first log starts.
         """
-        settings, to_scale = self.bench.settings, candidates.joints.copy()
+        settings = self.bench.settings
+        to_scale = candidates.joints.copy()
         to_scale["sensor_scale"] = 1.0
         commands = np.full((self.samples * settings.simulation.steps, 1), self.command)
         scenario = self.bench.scenario.restarted(np.array([self.bench.angle]), commands)
@@ -164,36 +178,40 @@ class Movement:
     def reaches(self, speeds: Array, level: Array) -> Array:
         """Return when speeds, shape (n, samples), first reach a level, shape (n,) [s];
         NaN where never."""
-        over, row = speeds >= level[:, None], np.arange(len(speeds))
-        k, from_rest = over.argmax(axis=1), np.pad(speeds, ((0, 0), (1, 0)))
-        # a speed is that between two samples
+        over = speeds >= level[:, None]
+        first = over.argmax(axis=1)
+        # the joint rests at the start; a speed is that between two samples
+        from_rest = np.pad(speeds, ((0, 0), (1, 0)))
         times = np.append(0.0, np.arange(self.samples) + 0.5)
-        before, after = from_rest[row, k], from_rest[row, k + 1]
+        row = np.arange(len(speeds))
+        before = from_rest[row, first]
+        after = from_rest[row, first + 1]
+        between = times[first + 1] - times[first]
         with np.errstate(all="ignore"):
-            time = times[k] + (times[k + 1] - times[k]) * (level - before) / (
-                after - before
-            )
+            time = times[first] + between * (level - before) / (after - before)
         return np.where(over.any(axis=1), self.bench.period * time, np.nan)
 
 
 def make_bench(settings: FitSettings, logs: Sequence[Log], joint: int) -> Bench:
     """Return a joint at the middle of its logged travel; the other joints are as the
     first log starts."""
-    arm, pose, period = settings.arm, logs[0].start, logs[0].period
+    arm = settings.arm
+    pose = logs[0].start
+    period = logs[0].period
     shown = [log for log in logs if log.measured[joint - 1]] or logs
     angles = np.concatenate([log.posed[:, joint - 1] for log in shown])
-    middle = (angles.min() + angles.max()) / 2  # then as words say it
-    slides = arm.joints[joint - 1].slides
-    middle = (
-        np.round(1e3 * middle) / 1e3
-        if slides
-        else np.radians(np.round(np.degrees(middle)))
-    )
-    command, still = np.zeros((2, len(pose))), np.tile(pose, (2, 1))
+    middle = (angles.min() + angles.max()) / 2
+    # in whole degrees or millimetres, as words say it
+    if arm.joints[joint - 1].slides:
+        middle = np.round(1e3 * middle) / 1e3
+    else:
+        middle = np.radians(np.round(np.degrees(middle)))
+    command = np.zeros((2, len(pose)))
+    still = np.tile(pose, (2, 1))
     rest = Log("a test movement", np.array([0.0, period]), command, still, period)
     alone = settings.simulation.changed({"other_joints": "locked"})
     scenario = Scenario(load_model(arm), arm, rest, [joint - 1], alone)
-    only = only_command(logs, joint, 1.0), only_command(logs, joint, -1.0)
+    only = (only_command(logs, joint, 1.0), only_command(logs, joint, -1.0))
     return Bench(settings, joint, float(middle), period, scenario, only)
 
 

@@ -9,7 +9,9 @@ order it needs no further fit. With J = V D U (`Linear`), U_g the columns of log
 its residual and A_g = U_g U_g', leaving out log g changes
 
     the parameters by  d_g = V D^-1 (1 - A_g)^-1 U_g r_g,
-    the residual of g to  r_g + U_g' (1 - A_g)^-1 U_g r_g    (that of D. M. Allen, 1974, for a whole log).
+    the residual of g to  r_g + U_g' (1 - A_g)^-1 U_g r_g
+
+(that of D. M. Allen, 1974, for a whole log).
 
 The root mean square of the latter is the error to expect on an unseen log. The variance
 of a parameter by log is, but for the priors' part of it, which belongs to no log,
@@ -29,7 +31,7 @@ from collections import defaultdict
 import numpy as np
 from scipy.stats import chi2, t as student
 
-from hydroid.arrays import Array, record, rms
+from hydroid.arrays import Array, Ints, Mask, record, rms
 from hydroid.posterior.posterior import COVERAGE
 from hydroid.posterior.uncertainty import Source, Uncertainty, ends
 from hydroid.problem.problem import Problem
@@ -61,65 +63,120 @@ class ByLog:
 
 def by_log(problem: Problem, uncertainty: Uncertainty) -> ByLog:
     """Return what the differences between the logs say: nothing of one log."""
-    of = np.array([channel.log for channel in problem.channels])
-    logs, number = (
-        np.unique(of),
-        np.repeat(of, [len(channel.measured) for channel in problem.channels]),
-    )
+    log_of_channel = np.array([channel.log for channel in problem.channels])
+    logs = np.unique(log_of_channel)
     if len(logs) < 2:
         unknown = np.full(len(uncertainty.theta), np.nan)
         return ByLog(unknown, np.stack([unknown, unknown], axis=1), unknown, (), {})
-    linear, row = uncertainty.linear, uncertainty.linear.innovations.copy()
-    columns = [np.flatnonzero(number == g) for g in logs]
-    effects = [linear.effects[:, own] for own in columns]
-    shares = np.array([u @ u.T for u in effects])  # A_g
-    scatters = np.array([uncertainty.scatters[of == g].sum(axis=0) for g in logs])
-    share, axes = np.linalg.eigh(shares)
-    alone = share > 0.99  # only this log has information on the direction
-    gain = np.where(alone, 0.0, 1 / (1 - np.minimum(share, 0.99)))
-    # of each effect when log g is left out: (1 - A_g)^-1 U_g r_g
-    inverses = (axes * gain[:, None]) @ axes.transpose(0, 2, 1)
-    steps = np.array(
-        [m @ u @ row[own] for m, u, own in zip(inverses, effects, columns, strict=True)]
+    left_out = _left_out(problem, uncertainty, logs)
+    linear = uncertainty.linear
+    relative, freedom, ratio = _deviations(uncertainty, left_out, log_of_channel, logs)
+    for i, parameter in enumerate(uncertainty.status):
+        # what a bound or a prior says does not differ from log to log
+        if parameter.at_bound is not None or parameter.source is Source.PRIOR:
+            relative[i] = np.nan
+    half = student.ppf(0.5 + COVERAGE / 2, freedom) * relative
+    # in 5 % of the fits with a right model any parameter is said to differ
+    stated = np.isfinite(relative)
+    level = 0.05 / max(stated.sum(), 1)
+    differing = stated & (chi2.sf(freedom * ratio, freedom) < level)
+    return ByLog(
+        relative=relative,
+        interval=ends(problem.parameters, linear.box, half),
+        freedom=freedom,
+        differing=problem.parameters.named(differing),
+        left_out=_angle_errors(problem, uncertainty, left_out.row),
     )
-    for own, step, u in zip(columns, steps, effects, strict=True):
-        row[own] += step @ u
-    left_out = defaultdict[str, list[float]](list)
+
+
+@record
+class _LeftOut:
+    """What leaving out each of G logs does to p effects.
+
+    Attributes:
+        shares: A_g, shape (G, p, p).
+        axes: of these, in columns, shape (G, p, p).
+        alone: directions on which only this log has information, shape (G, p).
+        inverses: (1 - A_g)^-1, without the directions that log g alone determines,
+            shape (G, p, p).
+        steps: of the effects, (1 - A_g)^-1 U_g r_g, shape (G, p).
+        row: the innovations, those of each log where it is left out, shape (R,).
+    """
+
+    shares: Array
+    axes: Array
+    alone: Mask
+    inverses: Array
+    steps: Array
+    row: Array
+
+
+def _left_out(problem: Problem, uncertainty: Uncertainty, logs: Ints) -> _LeftOut:
+    """Leave out each of the logs, given by their indices, (G,)."""
+    linear = uncertainty.linear
+    lengths = [len(channel.measured) for channel in problem.channels]
+    log_of_sample = np.repeat([channel.log for channel in problem.channels], lengths)
+    samples = [np.flatnonzero(log_of_sample == log) for log in logs]
+    effects = [linear.effects[:, of_log] for of_log in samples]
+    shares = np.array([u @ u.T for u in effects])
+    share, axes = np.linalg.eigh(shares)
+    alone = share > 0.99
+    gain = np.where(alone, 0.0, 1 / (1 - np.minimum(share, 0.99)))
+    inverses = (axes * gain[:, None]) @ axes.transpose(0, 2, 1)
+    row = linear.innovations.copy()
+    steps = np.empty((len(logs), len(linear.slopes)))
+    for g, (of_log, u) in enumerate(zip(samples, effects, strict=True)):
+        steps[g] = inverses[g] @ u @ row[of_log]
+        row[of_log] += steps[g] @ u
+    return _LeftOut(shares, axes, alone, inverses, steps, row)
+
+
+def _angle_errors(
+    problem: Problem, uncertainty: Uncertainty, row: Array
+) -> dict[str, list[float]]:
+    """Return the rms error of each compared angle in each log [deg] from a row of
+    innovations, (R,)."""
+    by_angle = defaultdict[str, list[float]](list)
     errors = uncertainty.likelihood.errors.errors(row[None])[0]
     for channel in problem.channels:
         if channel.quantity == "angle":
             error = rms(errors[channel.rows]) / channel.weight
-            left_out[f"q{channel.joint}"].append(float(np.degrees(error)))
+            by_angle[f"q{channel.joint}"].append(float(np.degrees(error)))
+    return by_angle
 
-    rows, pooled = linear.changes, scatters.sum(axis=0)  # of the p parameters that vary
-    expected = _expected(rows @ inverses, shares, scatters, linear.prior_scatter)
-    mean, square = (
-        np.trace(expected, axis1=1, axis2=2),
-        np.sum(expected**2, axis=(1, 2)),
+
+def _deviations(
+    uncertainty: Uncertainty, left_out: _LeftOut, log_of_channel: Ints, logs: Ints
+) -> tuple[Array, Array, Array]:
+    """Return relative standard deviations by log, infinite where one log alone
+    determines a parameter, their degrees of freedom, and the variance of the changes
+    over that of the pooled noise, (P,) each."""
+    linear = uncertainty.linear
+    changes = linear.changes
+    scatters = np.array(
+        [uncertainty.scatters[log_of_channel == log].sum(axis=0) for log in logs]
     )
+    expected = _expected(
+        changes @ left_out.inverses, left_out.shares, scatters, linear.prior_scatter
+    )
+    mean = np.trace(expected, axis1=1, axis2=2)
+    square = np.sum(expected**2, axis=(1, 2))
+    changed = np.sum((left_out.steps @ changes.T) ** 2, axis=0)
     # what the priors say is no less certain where the logs differ
-    noise = np.sum(rows @ pooled * rows, axis=1) / uncertainty.posterior.deviations**2
+    pooled = np.sum(changes @ scatters.sum(axis=0) * changes, axis=1)
+    noise = pooled / uncertainty.posterior.deviations**2
     with np.errstate(all="ignore"):  # 0 / 0 of a parameter without effect: not known
-        freedom, ratio = mean**2 / square, np.sum((steps @ rows.T) ** 2, axis=0) / mean
+        freedom = mean**2 / square
+        ratio = changed / mean
         widened = np.sqrt(1 - noise + noise * ratio)
     # a parameter that owes a tenth of its deviation to what one log alone has is
     # unknown by log
-    owed = np.linalg.norm(rows @ np.where(alone[:, None], axes, 0.0), axis=2)
-    widened[(owed > 0.1 * np.linalg.norm(rows, axis=1)).any(axis=0)] = np.inf
-    freedom, ratio = linear.spread(freedom), linear.spread(ratio)
+    of_one_log = np.where(left_out.alone[:, None], left_out.axes, 0.0)
+    owed = np.linalg.norm(changes @ of_one_log, axis=2)
+    widened[(owed > 0.1 * np.linalg.norm(changes, axis=1)).any(axis=0)] = np.inf
     relative = uncertainty.relative * linear.spread(widened)
-    out = [
-        s.at_bound is not None or s.source is Source.PRIOR for s in uncertainty.status
-    ]
-    relative[~np.isfinite(uncertainty.relative) | out] = np.nan
-    half = student.ppf(0.5 + COVERAGE / 2, freedom) * relative
-    # in 5 % of the fits with a right model any parameter is said to differ
-    known = np.isfinite(relative)
-    differing = known & (chi2.sf(freedom * ratio, freedom) < 0.05 / max(known.sum(), 1))
-    interval = ends(problem.parameters, linear.box, half)
-    return ByLog(
-        relative, interval, freedom, problem.parameters.named(differing), left_out
-    )
+    relative[~np.isfinite(uncertainty.relative)] = np.nan
+    return relative, linear.spread(freedom), linear.spread(ratio)
 
 
 def _expected(changes: Array, shares: Array, scatters: Array, priors: Array) -> Array:
@@ -132,9 +189,8 @@ def _expected(changes: Array, shares: Array, scatters: Array, priors: Array) -> 
     """
     through = changes @ shares
     direct = np.einsum("gpk,hpk->pgh", changes @ scatters, through)
-    expected = np.einsum(
-        "gpk,hpk->pgh", through @ (scatters.sum(axis=0) + priors), through
-    )
+    pooled = scatters.sum(axis=0) + priors
+    expected = np.einsum("gpk,hpk->pgh", through @ pooled, through)
     expected -= direct + direct.transpose(0, 2, 1)
     logs = range(len(scatters))
     expected[:, logs, logs] += np.einsum("gpk,gpk->pg", changes @ scatters, changes)

@@ -14,14 +14,16 @@ import numpy as np
 from hydroid.arrays import Array
 from hydroid.hydraulics.joint import open_share
 from hydroid.hydraulics.solenoid import drive, resting_stroke, side_voltage
-from hydroid.posterior.bench import ONSET, RISEN, Bench, Movement, actuator
+from hydroid.posterior.bench import ONSET, RISEN, Bench, Direction, Movement, actuator
 from hydroid.posterior.column import Column, Measured
 from hydroid.simulation import Candidates
 
 OPENING_COMMANDS = tuple(range(5, 101, 5))
 """at which a valve's opening is stated [%]"""
-START_POINTS, REST_POINTS = 40, 15
-"""of a step response: in its start, where a joint may ring, and after it"""
+START_POINTS = 40
+"""of a step response in its start, where a joint may ring"""
+REST_POINTS = 15
+"""the same after its start"""
 FREQUENCY_POINTS = 24
 LEAST_PERIODS = 4.0
 """samples in a period of the highest frequency"""
@@ -30,9 +32,10 @@ DENSE = 400
 circles"""
 MARGIN = 0.02
 """part of a joint's range before its ends where a step response stops to be one"""
-LEAST_START, TIME_CONSTANTS = 1.0, 5.0
-"""how long the start of a step lasts at least [s], and how many time constants after
-the dead time"""
+LEAST_START = 1.0
+"""how long the start of a step lasts at least [s]"""
+TIME_CONSTANTS = 5.0
+"""the same in time constants after the dead time"""
 LOWEST = 0.2
 """the lowest frequency [Hz]: below it the speed follows the command"""
 
@@ -57,30 +60,26 @@ def opening_curve(bench: Bench, candidates: Candidates, sign: float) -> Measured
         voltage = side_voltage(beyond, passed, side.onset, side.dead_band)
         travel = resting_stroke(drive(voltage, c), c.gap, c.plunger_stiffness) - idle
         # the law of the compiled loops, candidate by candidate: it branches
-        shares = [
-            open_share(one, float(way)) for one, way in zip(side, travel, strict=True)
-        ]
-        area = 1e6 * side.opening * np.array(shares, dtype=float)
-        yield (
-            Column("opening", "opening of the valve", "mm²", False, sign * command),
-            area,
-        )
+        share = np.empty(len(travel))
+        for i, (valve, way) in enumerate(zip(side, travel, strict=True)):
+            share[i] = open_share(valve, float(way))
+        label = "opening of the valve"
+        column = Column("opening", label, "mm²", False, sign * command)
+        yield column, 1e6 * side.opening * share
 
 
 def step_curves(
-    step: Movement, estimate: Candidates, ending: str, word: str
+    step: Movement, estimate: Candidates, direction: Direction
 ) -> StepCurves:
     """Return what makes the curves of a step from the speeds of candidates, up to an
-    end of the range.
-
-    `ending` and `word` name the direction, as in the other quantities.
-    """
+    end of the range."""
     bench = step.bench
     angles = step.angles(estimate)
     samples = _before_the_end(bench, angles[0, 1:])
     start = min(_start(step, step.speeds_of(angles)[:, :samples]), samples)
     unit = f"{bench.unit[1]}/s"
-    size = f"{abs(step.command):g} % command, {word}"
+    size = f"{abs(step.command):g} % command, {direction.word}"
+    ending = direction.ending
     begun = np.linspace(0, start - 1, START_POINTS)
     rest = np.linspace(start - 1, samples - 1, REST_POINTS)
     points = np.unique(np.concatenate([begun, rest]).round().astype(int))
@@ -88,26 +87,23 @@ def step_curves(
     frequencies = np.geomspace(LOWEST, highest, FREQUENCY_POINTS)
 
     def curves(speeds: Array) -> Measured:
+        name = f"step_{ending}"
+        label = f"speed after a step to {size}"
         for k in points.tolist():
-            label = f"speed after a step to {size}"
             at = (k + 0.5) * bench.period  # a speed is that between two samples
-            yield (
-                Column(f"step_{ending}", label, unit, False, at, "time [s]"),
-                speeds[:, k],
-            )
+            yield Column(name, label, unit, False, at, "time [s]"), speeds[:, k]
         amplitude, phase = frequency_response(
             speeds[:, :start], frequencies, bench.period
         )
         label = f"speed over command after a step to {size}"
         along = "frequency [Hz]"
+        name = f"amplitude_{ending}"
         for i, at in enumerate(frequencies.tolist()):
             gain = amplitude[:, i] / abs(step.command)
-            yield (
-                Column(f"amplitude_{ending}", label, f"{unit} per %", True, at, along),
-                gain,
-            )
+            yield Column(name, label, f"{unit} per %", True, at, along), gain
+        name = f"phase_{ending}"
         for i, at in enumerate(frequencies.tolist()):
-            yield Column(f"phase_{ending}", label, "deg", False, at, along), phase[:, i]
+            yield Column(name, label, "deg", False, at, along), phase[:, i]
 
     return curves
 
@@ -141,14 +137,18 @@ def _before_the_end(bench: Bench, angles: Array) -> int:
     lower, upper = [*bench.settings.arm.ranges.values()][bench.joint - 1]
     margin = MARGIN * (upper - lower) if np.isfinite(upper - lower) else 0.0
     beyond = np.flatnonzero((angles < lower + margin) | (angles > upper - margin))
-    return max(int(beyond[0]), 2) if len(beyond) else len(angles)
+    if not len(beyond):
+        return len(angles)
+    # two points make a curve
+    return max(int(beyond[0]), 2)
 
 
 def _start(step: Movement, speeds: Array) -> int:
     """Return how many samples of a step, speeds of shape (1, samples), are its
     start."""
     highest = speeds.max(axis=1)
-    onset, risen = (step.reaches(speeds, part * highest)[0] for part in (ONSET, RISEN))
+    onset = step.reaches(speeds, ONSET * highest)[0]
+    risen = step.reaches(speeds, RISEN * highest)[0]
     seconds = onset + TIME_CONSTANTS * (risen - onset)
     if not np.isfinite(seconds):
         return speeds.shape[1]

@@ -1,7 +1,9 @@
 """Which directions an estimate leaves open, and intervals without the linear
 approximation."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 from scipy.stats import chi2
@@ -50,70 +52,122 @@ def profile(problem: Problem, uncertainty: Uncertainty, name: str) -> Profile:
     whose sum of squares is no likelihood: it is scaled so that its curvature is the
     estimate's variance (L. Pace, A. Salvan, N. Sartori, 2011).
     """
-    parameters, linear, theta = (
-        problem.parameters,
-        uncertainty.linear,
-        uncertainty.theta,
-    )
+    parameters = problem.parameters
     free = parameters.named(parameters.free)
     if name not in free:
         raise SettingsError(
             f"no free parameter {name!r} to profile", hint=f"free: {', '.join(free)}"
         )
-    i, residuals = parameters.names.index(name), uncertainty.likelihood.rows
-    cost = np.sum(residuals(theta[None])[0] ** 2)
-    # what a deviance of 1 is: the parameter's variance over (J J')^-1; held at a bound,
-    # the others' largest
-    units = linear.spread(
-        uncertainty.posterior.deviations**2 / np.sum(linear.changes**2, axis=1)
+    i = parameters.names.index(name)
+    held = _Held(
+        parameters=parameters,
+        index=i,
+        residuals=uncertainty.likelihood.rows,
+        estimate=uncertainty.theta,
+        unit=_deviance_unit(uncertainty, i),
     )
-    unit = units[i] if linear.box.varied[i] else np.nanmax(units)
-
-    def fit_others(start: Array, value: float) -> tuple[Array, float]:
-        """Fit all but the one, held at a value; return the result, shape (P,), and its
-        sum of squares."""
-        held = [
-            replace(p, fixed=value) if j == i else p
-            for j, p in enumerate(parameters.parameters)
-        ]
-        others, theta = (
-            ParameterSet(tuple(held)),
-            np.where(np.arange(len(held)) == i, value, start),
-        )
-        if not others.free.any():
-            return theta, np.sum(residuals(theta[None])[0] ** 2)
-        how = RefinementSettings(iterations=50, gain_tolerance=1e-6)
-        ended = least_squares(
-            others.to_unit(start), lambda unit: residuals(others.from_unit(unit)), how
-        )
-        return others.from_unit(ended.point), 2 * ended.cost
-
     reach = 3.0 * uncertainty.standard_deviation[i]
-    reach = np.inf if np.isnan(reach) else reach  # it lies at a bound
-    ends = list[float]()
-    points = [(float(theta[i]), 0.0)]
-    for bound, end in ((parameters.lower[i], -np.inf), (parameters.upper[i], np.inf)):
-        # from the estimate outwards, until beyond THRESHOLD or at the bound, or after
-        # twelve points
-        near, start, value, crossing = 0.0, theta, theta[i], end
-        length = (np.clip(bound, value - reach, value + reach) - value) / STEPS
-        for number in range(2 * STEPS if length else 0):
-            before, length = value, length * (1.5 if number >= STEPS else 1.0)
-            value = (
-                bound if (bound - value - length) / length < 1e-6 else value + length
-            )
-            start, square = fit_others(start, value)
-            deviance = (square - cost) / unit
-            points.append((float(value), float(deviance)))
-            if deviance > THRESHOLD:  # the root is about linear
-                roots = np.sqrt(np.maximum([near, deviance], 0.0))
-                crossing = np.interp(np.sqrt(THRESHOLD), roots, [before, value])
-            if deviance > THRESHOLD or value == bound:
-                break
-            near = deviance
-        ends.append(crossing)
+    if np.isnan(reach):  # it lies at a bound
+        reach = np.inf
+    low, below = _one_side(held, parameters.lower[i], reach)
+    high, above = _one_side(held, parameters.upper[i], reach)
+    points = [(float(uncertainty.theta[i]), 0.0), *below, *above]
     lowest = min(deviance for _, deviance in points)
-    return Profile((ends[0], ends[1]), lowest, np.array(sorted(points)))
+    return Profile(
+        (-np.inf if low is None else low, np.inf if high is None else high),
+        lowest,
+        np.array(sorted(points)),
+    )
+
+
+def _deviance_unit(uncertainty: Uncertainty, i: int) -> float:
+    """Return the rise of the sum of squares that is a deviance of 1 of a parameter.
+
+    It is the parameter's variance over (J J')^-1.
+    """
+    linear = uncertainty.linear
+    variance = uncertainty.posterior.deviations**2
+    units = linear.spread(variance / np.sum(linear.changes**2, axis=1))
+    # one held at a bound has no variance: the others' largest
+    return units[i] if linear.box.varied[i] else np.nanmax(units)
+
+
+@record
+class _Held:
+    """A parameter that is held at values while the others are fitted.
+
+    Attributes:
+        index: of the parameter.
+        residuals: of candidates, (n, P) -> (n, R).
+        estimate: of all parameters, shape (P,).
+        unit: rise of the sum of squares that is a deviance of 1.
+    """
+
+    parameters: ParameterSet
+    index: int
+    residuals: Callable[[Array], Array]
+    estimate: Array
+    unit: float
+
+    @cached_property
+    def cost(self) -> float:
+        """Sum of squares at the estimate."""
+        return self._square(self.estimate)
+
+    def at(self, value: float, start: Array) -> tuple[Array, float]:
+        """Fit all but the held one from a start, shape (P,); return the result and its
+        deviance."""
+        parameters = list(self.parameters.parameters)
+        parameters[self.index] = replace(parameters[self.index], fixed=value)
+        others = ParameterSet(tuple(parameters))
+        if not others.free.any():
+            theta = start.copy()
+            theta[self.index] = value
+            return theta, (self._square(theta) - self.cost) / self.unit
+        ended = least_squares(
+            others.to_unit(start),
+            lambda unit: self.residuals(others.from_unit(unit)),
+            RefinementSettings(iterations=50, gain_tolerance=1e-6),
+        )
+        deviance = (2 * ended.cost - self.cost) / self.unit
+        return others.from_unit(ended.point), deviance
+
+    def _square(self, theta: Array) -> float:
+        return np.sum(self.residuals(theta[None])[0] ** 2)
+
+
+def _one_side(
+    held: _Held, bound: float, reach: float
+) -> tuple[float | None, list[tuple[float, float]]]:
+    """Go from the estimate towards a bound, in steps by which `reach` is reached; until
+    beyond THRESHOLD, at the bound, or after twelve points.
+
+    Returns the value where the deviance passes THRESHOLD, None where it does not, and
+    the points, values with their deviances.
+    """
+    value = held.estimate[held.index]
+    length = (np.clip(bound, value - reach, value + reach) - value) / STEPS
+    points = list[tuple[float, float]]()
+    theta = held.estimate
+    near = 0.0
+    if not length:
+        return None, points
+    for number in range(2 * STEPS):
+        before = value
+        # in vain so far: further, faster
+        if number >= STEPS:
+            length *= 1.5
+        beyond = (bound - value - length) / length
+        value = bound if beyond < 1e-6 else value + length
+        theta, deviance = held.at(value, theta)
+        points.append((float(value), float(deviance)))
+        if deviance > THRESHOLD:  # the root is about linear
+            roots = np.sqrt(np.maximum([near, deviance], 0.0))
+            return np.interp(np.sqrt(THRESHOLD), roots, [before, value]), points
+        if value == bound:
+            break
+        near = deviance
+    return None, points
 
 
 @record
@@ -143,11 +197,9 @@ def identifiability(problem: Problem, uncertainty: Uncertainty) -> Identifiabili
     combinations: list[dict[str, float]] = []
     for axis in axes[values < 1 / WEAK_ABOVE][::-1]:
         changes = axis / axis[np.argmax(np.abs(axis))]
-        order = [
-            i
-            for i in np.argsort(-np.abs(changes), kind="stable")
-            if abs(changes[i]) >= 0.1
-        ]
-        combinations.append({str(names[~alone][i]): float(changes[i]) for i in order})
+        largest_first = np.argsort(-np.abs(changes), kind="stable")
+        some = largest_first[np.abs(changes[largest_first]) >= 0.1]
+        pairs = zip(names[~alone][some].tolist(), changes[some].tolist(), strict=True)
+        combinations.append(dict(pairs))
     rank = int(np.sum(~alone)) - len(combinations)
     return Identifiability(tuple(names[alone].tolist()), tuple(combinations), rank)

@@ -57,7 +57,8 @@ class Linear:
     def changes(self) -> Array:
         """Relative change of each parameter per unit of each effect, V D^-1, shape (p,
         p)."""
-        return self._svd[0] / self._svd[1]
+        axes, sizes, _ = self._svd
+        return axes / sizes
 
     @property
     def effects(self) -> Array:
@@ -70,13 +71,15 @@ class Linear:
         priors = self.effects[:, self.innovations.size :]
         return priors @ priors.T
 
-    def of(self, kept: Mask) -> "Linear":
+    def restricted(self, kept: Mask) -> "Linear":
         """Return it with only some of the p parameters varying, shape (p,)."""
-        rows = {
-            name: getattr(self, name)[kept]
-            for name in ("slopes", "prior_slopes", "diverging")
-        }
-        return replace(self, box=self.box.of(kept), **rows)
+        return Linear(
+            box=self.box.restricted(kept),
+            innovations=self.innovations,
+            slopes=self.slopes[kept],
+            prior_slopes=self.prior_slopes[kept],
+            diverging=self.diverging[kept],
+        )
 
     def spread(self, values: Array) -> Array:
         """Return values of the parameters that vary, shape (p,), among all, shape (P,);
@@ -137,9 +140,8 @@ def estimate_box(parameters: ParameterSet, theta: Array) -> Box:
     SettingsError: a free parameter on a log scale is 0.
     """
     least = np.where(parameters.log, 0.0, 0.01 * (parameters.upper - parameters.lower))
-    scale = np.maximum(
-        np.maximum(np.abs(theta), least), [p.least for p in parameters.parameters]
-    )
+    of_groups = [p.least for p in parameters.parameters]
+    scale = np.maximum(np.maximum(np.abs(theta), least), of_groups)
     for name in parameters.named(parameters.free & (scale == 0)):
         raise SettingsError(
             f"parameter {name} is 0",

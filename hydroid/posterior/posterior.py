@@ -1,14 +1,13 @@
 """What is known of the parameters: one Gaussian posterior, and what follows from it by
 the delta method.
 
-It is about relative changes v of the parameters that vary, with C^-1 = G' G: a change is |G v| standard
-deviations long. A weak prior on every parameter (`WEAK_PRIOR`) makes G regular. A
+It is about relative changes v of the parameters that vary, with C^-1 = G' G: a change
+is |G v| standard deviations long. A weak prior on every parameter (`WEAK_PRIOR`) makes G regular. A
 direction that nothing measures keeps the prior's standard deviation, which no result
 can be mistaken for.
 
 Let g be the derivatives of a quantity per relative change. To first order its variance
-is
-g' C g = |G^-T g|² (G. W. Oehlert, *A note on the delta method*, 1992).
+is g' C g = |G^-T g|² (G. W. Oehlert, *A note on the delta method*, 1992).
 """
 
 from collections.abc import Callable
@@ -39,7 +38,7 @@ STEP = 0.1
 
 
 @record
-class Known:
+class Estimated:
     """Some quantities at an estimate, shape (m,), NaN where one does not exist.
 
     `sd` is infinite where not determined, NaN where unknown; `interval` is of 95 %, (m,
@@ -98,7 +97,7 @@ class Posterior:
         covariance."""
         return covariance_axes(self.box, self.root, step)
 
-    def of(self, chosen: Mask) -> "Posterior":
+    def marginal(self, chosen: Mask) -> "Posterior":
         """Return what is known of some of the parameters, shape (P,), whatever the
         others are."""
         inside = chosen[self.box.varied]
@@ -106,14 +105,16 @@ class Posterior:
         # left (Schur complement)
         triangle = regular(self.root[:, np.argsort(inside, kind="stable")])
         others = np.sum(~inside)
-        return replace(self, box=self.box.of(inside), root=triangle[others:, others:])
+        return replace(
+            self, box=self.box.restricted(inside), root=triangle[others:, others:]
+        )
 
     def propagate(
         self,
         function: Callable[[Array], Array],
         positive: Mask | bool,
         concerned: Mask | None = None,
-    ) -> Known:
+    ) -> Estimated:
         """Return the quantities that a function of the parameters, (n, P) -> (n, m),
         gives at the estimate.
 
@@ -124,25 +125,28 @@ class Posterior:
         first-order interval then means nothing. `concerned` are parameters on which any
         can depend, shape (P,); None: all.
         """
-        concerned = np.ones_like(self.box.varied) if concerned is None else concerned
-        own, inside = self.of(concerned), concerned[self.box.varied]
+        if concerned is None:
+            concerned = np.ones_like(self.box.varied)
+        marginal = self.marginal(concerned)
+        inside = concerned[self.box.varied]
         value = function(self.box.at[None])[0]
         slopes = np.zeros((len(inside), len(value)))
         if inside.any():
-            slopes[inside] = differentiate(function, own.box, own.axes(STEP), value)
+            axes = marginal.axes(STEP)
+            slopes[inside] = differentiate(function, marginal.box, axes, value)
         finite = np.isfinite(slopes).all(axis=0)
         sd = np.where(finite, self.sd(np.where(finite, slopes, 0.0)), np.nan)
         logarithmic = positive & (value > 0)
         lost = sd > UNIDENTIFIABLE_ABOVE * np.linalg.norm(slopes, axis=0)
-        lost |= logarithmic & (
-            self.quantile * sd > UNIDENTIFIABLE_ABOVE * NORMAL * value
-        )
+        half = self.quantile * sd
+        lost |= logarithmic & (half > UNIDENTIFIABLE_ABOVE * NORMAL * value)
         sd[lost] = np.inf
         ends = interval(value, self.quantile * sd, logarithmic)
         ends[lost & positive, 0] = 0.0
         # a relative change by less than a thousandth of a parameter's: the settings
         # give it
-        return Known(value, sd, ends, np.all(abs(slopes) <= 1e-3 * abs(value), axis=0))
+        given = np.all(abs(slopes) <= 1e-3 * abs(value), axis=0)
+        return Estimated(value, sd, ends, given)
 
     def stored(self, parameters: ParameterSet) -> Covariance:
         """Return what a file keeps of it."""
@@ -177,20 +181,22 @@ def stored_posterior(model: IdentifiedModel) -> Posterior | None:
 
     Those that the settings no longer free, or whose values changed, are not the fit's.
     """
-    summary, parameters = model.summary, model.settings.parameter_set()
+    summary = model.summary
     if summary is None or summary.covariance is None:
         return None
-    known, fitted = summary.covariance, summary.estimate
+    parameters = model.settings.parameter_set()
+    covariance = summary.covariance
+    fitted = summary.estimate
     free = {*parameters.named(parameters.free)}
-    if any(
-        name not in fitted or model.values[name] != fitted[name].value for name in free
-    ):
-        return None
+    for name in free:
+        if name not in fitted or model.values[name] != fitted[name].value:
+            return None
+    # those at a bound were held, so that no covariance has them
     held = {name for name in free if fitted[name].at_bound}
-    if not free - held <= set(known.parameters) <= free:
+    if not free - held <= set(covariance.parameters) <= free:
         return None
-    varied = np.isin(parameters.names, known.parameters)
+    varied = np.isin(parameters.names, covariance.parameters)
     scale = np.zeros(len(varied))
-    scale[varied] = known.scale
+    scale[varied] = covariance.scale
     box = Box(model.theta, parameters.lower, parameters.upper, scale, varied)
-    return Posterior(box, np.array(known.root), known.quantile)
+    return Posterior(box, np.array(covariance.root), covariance.quantile)

@@ -1,11 +1,12 @@
 """All quantities of a fit: what its logs determine, in the words of an engineer."""
 
 from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from hydroid.arrays import Array
+from hydroid.arrays import Array, record
 from hydroid.estimate import (
     CurveEstimate,
     Interval,
@@ -13,24 +14,49 @@ from hydroid.estimate import (
     finite,
     finite_ends,
 )
-from hydroid.hydraulics.cylinder import volume
+from hydroid.hydraulics.oil import volume
 from hydroid.hydraulics.records import LINEAR
 from hydroid.hydraulics.solenoid import FULL_SCALE, drive, resting_stroke
-from hydroid.posterior.bench import ONSET, RISEN, Bench, actuator, make_bench
+from hydroid.posterior.bench import (
+    ONSET,
+    RISEN,
+    Bench,
+    Direction,
+    Movement,
+    actuator,
+    make_bench,
+)
 from hydroid.posterior.column import Column, Measured
-from hydroid.posterior.curves import opening_curve, step_curves
-from hydroid.posterior.posterior import Known
+from hydroid.posterior.curves import StepCurves, opening_curve, step_curves
+from hydroid.posterior.posterior import Estimated
 from hydroid.posterior.uncertainty import Uncertainty
 from hydroid.problem.problem import Problem
 from hydroid.simulation import Candidates
 
 Measure = Callable[[Candidates], Measured]
-Test = Callable[[Candidates, Array], Measured]
-"""measures n candidates with the loads of `Bench.loads`"""
-
-
 Quantities = tuple[dict[str, QuantityEstimate], dict[str, CurveEstimate]]
 """what follows from an estimate: single quantities, and curves, by name"""
+
+# of the curve of speed [%]
+COMMANDS = (5.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0, 100.0)
+# the same of stage 1, whose directions are alike
+GAIN_COMMANDS = (-100.0, -75.0, -50.0, -25.0, -10.0, 10.0, 25.0, 50.0, 75.0, 100.0)
+# how long the step is held in which dead time and time constant are sought [s]
+LASTS = 3.0
+
+
+class Figure(NamedTuple):
+    """A quantity of a direction, (n,), with the command that must move the joint [%].
+
+    `of_several`: whether it compares commands, so that the logs must tell all of them.
+    """
+
+    command: float
+    name: str
+    label: str
+    unit: str
+    value: Array
+    of_several: bool = False
 
 
 def quantities(problem: Problem, uncertainty: Uncertainty) -> Quantities:
@@ -42,9 +68,9 @@ def quantities(problem: Problem, uncertainty: Uncertainty) -> Quantities:
     scalars = dict[str, QuantityEstimate]()
     curves = dict[str, CurveEstimate]()
     for joint in problem.settings.outputs:
-        of_joint = _joint_quantities(problem, uncertainty, joint)
-        scalars |= of_joint[0]
-        curves |= of_joint[1]
+        joint_scalars, joint_curves = _joint_quantities(problem, uncertainty, joint)
+        scalars |= joint_scalars
+        curves |= joint_curves
     return scalars, curves
 
 
@@ -63,38 +89,38 @@ def _joint_quantities(
     parameters = problem.settings.parameters.values()
     concerned = np.array([p.joints is None or joint in p.joints for p in parameters])
     positive = np.array([column.positive for column in columns])
-    known = uncertainty.posterior.propagate(values, positive, concerned)
+    estimated = uncertainty.posterior.propagate(values, positive, concerned)
 
-    named = problem.settings.arm.joint_names[joint - 1]
+    joint_name = problem.settings.arm.joint_names[joint - 1]
     scalars = dict[str, QuantityEstimate]()
     points = defaultdict[str, list[int]](list)
-    for i in np.flatnonzero(np.isfinite(known.value)).tolist():
+    for i in np.flatnonzero(np.isfinite(estimated.value)).tolist():
         column = columns[i]
         if column.at is not None:
             points[column.name].append(i)
-        elif not known.given[i]:
-            scalars[f"{named}_{column.name}"] = QuantityEstimate(
+        elif not estimated.given[i]:
+            scalars[f"{joint_name}_{column.name}"] = QuantityEstimate(
                 label=column.label,
                 joint=joint,
-                value=float(known.value[i]),
+                value=float(estimated.value[i]),
                 unit=column.unit,
-                sd=finite(known.sd[i]),
-                interval=finite_ends(known.interval[i]),
+                sd=finite(estimated.sd[i]),
+                interval=finite_ends(estimated.interval[i]),
             )
     curves = dict[str, CurveEstimate]()
-    for name, of_curve in points.items():
-        if not known.given[of_curve].all():
-            curves[f"{named}_{name}"] = _curve(
-                [columns[i] for i in of_curve], known, of_curve, joint
-            )
+    for name, rows in points.items():
+        # a curve of which a parameter changes one point is stated as a whole
+        if not estimated.given[rows].all():
+            of_points = [columns[i] for i in rows]
+            curves[f"{joint_name}_{name}"] = _curve(of_points, estimated, rows, joint)
     return scalars, curves
 
 
 def _curve(
-    columns: Sequence[Column], known: Known, rows: Sequence[int], joint: int
+    columns: Sequence[Column], estimated: Estimated, rows: Sequence[int], joint: int
 ) -> CurveEstimate:
     """Return the curve of a joint whose points, at least one, are `rows` of what is
-    known."""
+    estimated."""
     order = sorted(range(len(rows)), key=lambda i: columns[i].at or 0.0)
     last = columns[-1]
     return CurveEstimate(
@@ -103,8 +129,8 @@ def _curve(
         unit=last.unit,
         along=last.along,
         at=tuple(_rounded(columns[i].at) for i in order),
-        value=tuple(_rounded(known.value[rows[i]]) for i in order),
-        interval=tuple(_rounded_ends(known.interval[rows[i]]) for i in order),
+        value=tuple(_rounded(estimated.value[rows[i]]) for i in order),
+        interval=tuple(_rounded_ends(estimated.interval[rows[i]]) for i in order),
     )
 
 
@@ -116,8 +142,9 @@ def _rounded(value: float | None) -> float:
 
 def _rounded_ends(interval: Array) -> Interval:
     low, high = finite_ends(interval)
-    return None if low is None else _rounded(low), None if high is None else _rounded(
-        high
+    return (
+        None if low is None else _rounded(low),
+        None if high is None else _rounded(high),
     )
 
 
@@ -126,34 +153,39 @@ def joint_measure(bench: Bench, estimate: Candidates) -> Measure:
 
     What is tested is planned at the estimate.
     """
-    tests, further = list[Test](), gain_model
+    tests: list[DirectionTest] = []
+    further = gain_model
     if bench.settings.stage == "hyd":
-        torque, signs = bench.weigh(estimate)[0][0], ("positive", "negative")
-        words = (
-            ("raising", "lowering")
-            if torque * bench.sense > 0
-            else ("lowering", "raising")
-        )
-        # below 1 N·m no direction is called raising
-        words = words if abs(torque) >= 1.0 else signs
-        names = zip((1.0, -1.0), signs, words, strict=True)
-        tests, further = [direction_test(bench, estimate, *name) for name in names], oil
+        further = oil
+        for direction in _directions(bench, estimate):
+            tests.append(direction_test(bench, estimate, direction))
 
     def measure(candidates: Candidates) -> Measured:
         loads = bench.loads(candidates) if tests else np.empty((0, 3))
-        torque, inertia = bench.weigh(candidates)
-        word, of = ("force", "N") if bench.unit[1] == "mm" else ("torque", "N·m")
+        gravity, inertia = bench.weigh(candidates)
         for test in tests:
-            yield from test(candidates, loads)
+            yield from test.measure(candidates, loads)
         yield from further(bench, candidates, inertia)
-        yield (
-            Column(
-                "gravity_torque_at_pose", f"gravity {word} at {bench.pose}", of, False
-            ),
-            torque,
-        )
+        word, unit = ("force", "N") if bench.slides else ("torque", "N·m")
+        label = f"gravity {word} at {bench.pose}"
+        yield Column("gravity_torque_at_pose", label, unit, False), gravity
 
     return measure
+
+
+def _directions(bench: Bench, estimate: Candidates) -> list[Direction]:
+    """Return both directions of a joint with the words that gravity gives them."""
+    gravity = bench.weigh(estimate)[0][0]
+    words = ("lowering", "raising")
+    if gravity * bench.sense > 0:
+        words = ("raising", "lowering")
+    # below 1 N·m no direction is called raising
+    if abs(gravity) < 1.0:
+        words = ("positive", "negative")
+    return [
+        Direction(1.0, "positive", words[0]),
+        Direction(-1.0, "negative", words[1]),
+    ]
 
 
 def gain_model(bench: Bench, candidates: Candidates, inertia: Array) -> Measured:
@@ -161,25 +193,21 @@ def gain_model(bench: Bench, candidates: Candidates, inertia: Array) -> Measured
     gravity's change act.
     """
     joint = candidates.joints[:, bench.joint - 1]
-    gain, damping, friction = joint["gain"], joint["damping"], joint["friction"]
+    gain = joint["gain"]
+    damping = joint["damping"]
+    friction = joint["friction"]
     factor, unit = bench.unit
     with np.errstate(all="ignore"):
-        ratio = factor * (gain / damping)
-        yield (
-            Column("gain", "gain between command and speed, K/D", f"{unit}/s per %"),
-            ratio,
-        )
-        yield (
-            Column("time_constant", "time constant, inertia/D", "s"),
-            inertia / damping,
-        )
+        label = "gain between command and speed, K/D"
+        yield Column("gain", label, f"{unit}/s per %"), factor * (gain / damping)
+        label = "time constant, inertia/D"
+        yield Column("time_constant", label, "s"), inertia / damping
         yield Column("dead_band", "dead band, friction/K", "%"), friction / gain
-        for u in (-100.0, -75.0, -50.0, -25.0, -10.0, 10.0, 25.0, 50.0, 75.0, 100.0):
-            torque = np.sign(u) * np.maximum(gain * abs(u) - friction, 0.0)
-            yield (
-                Column("speed", "speed", f"{unit}/s", False, u),
-                factor * (torque / damping),
-            )
+        for command in GAIN_COMMANDS:
+            size = np.maximum(gain * abs(command) - friction, 0.0)
+            torque = np.sign(command) * size
+            column = Column("speed", "speed", f"{unit}/s", False, command)
+            yield column, factor * (torque / damping)
 
 
 def oil(bench: Bench, candidates: Candidates, inertia: Array) -> Measured:
@@ -189,132 +217,147 @@ def oil(bench: Bench, candidates: Candidates, inertia: Array) -> Measured:
     and the seals' friction are left out of the damping.
     """
     c, travel, arm = actuator(bench, candidates)
-    volumes = c.dead_volume, c.dead_volume
-    if c.kind[0] == LINEAR:
-        volumes = (
-            volume(travel, c.a.area, c.dead_volume),
-            volume(c.stroke - travel, c.b.area, c.dead_volume),
-        )
-    stiffness = (
-        arm**2 * c.bulk_modulus * (c.a.area**2 / volumes[0] + c.b.area**2 / volumes[1])
-    )
-    frequency = np.sqrt(stiffness / inertia) / (2.0 * np.pi)
-    damping = c.damping / (2.0 * np.sqrt(stiffness * inertia))
-    if not bench.settings.quasi_static:  # it knows of neither oil nor inertia
-        yield (
-            Column(
-                "natural_frequency", "natural frequency of the arm on the oil", "Hz"
-            ),
-            frequency,
-        )
-        yield (
-            Column("damping_ratio", "damping ratio of the arm on the oil", ""),
-            damping,
-        )
+    # the quasi-static model knows of neither oil nor inertia
+    if not bench.settings.quasi_static:
+        volume_a = c.dead_volume
+        volume_b = c.dead_volume
+        if c.kind[0] == LINEAR:
+            volume_a = volume(travel, c.a.area, c.dead_volume)
+            volume_b = volume(c.stroke - travel, c.b.area, c.dead_volume)
+        springs = c.a.area**2 / volume_a + c.b.area**2 / volume_b
+        stiffness = arm**2 * c.bulk_modulus * springs
+        frequency = np.sqrt(stiffness / inertia) / (2.0 * np.pi)
+        damping = c.damping / (2.0 * np.sqrt(stiffness * inertia))
+        label = "natural frequency of the arm on the oil"
+        yield Column("natural_frequency", label, "Hz"), frequency
+        label = "damping ratio of the arm on the oil"
+        yield Column("damping_ratio", label, ""), damping
     yield Column("area_ratio", "ratio of areas, A/B", ""), c.a.area / c.b.area
 
 
-# of the curve of speed [%]
-COMMANDS = (5.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0, 100.0)
-# how long the step is held in which dead time and time constant are sought [s]
-LASTS = 3.0
+@record
+class DirectionTest:
+    """What is measured of a joint in one direction, planned at an estimate.
+
+    Attributes:
+        planned: speed at the estimate under each of COMMANDS, above 0 where it goes in
+            the direction.
+        told: those of COMMANDS whose effect the logs tell.
+        step: in which dead time and time constant are sought.
+        after_step: the curves of this step.
+        opens_later: whether the spool crosses an overlap beyond the dead band.
+    """
+
+    bench: Bench
+    direction: Direction
+    planned: dict[float, float]
+    told: list[float]
+    step: Movement
+    after_step: StepCurves
+    opens_later: bool
+
+    @property
+    def rise(self) -> float:
+        """Size of the command of the step [%]."""
+        return abs(self.step.command)
+
+    def measure(self, candidates: Candidates, loads: Array) -> Measured:
+        """Measure n candidates with the loads of `Bench.loads`, (n, 3)."""
+        bench = self.bench
+        commands = self.direction.sign * np.array(COMMANDS)
+        steady = bench.steady(candidates, commands, loads)
+        unit = f"{bench.unit[1]}/s"
+        for command, velocity in zip(commands.tolist(), steady.T, strict=True):
+            if abs(command) in self.told:
+                label = f"speed at {bench.pose}"
+                yield Column("speed", label, unit, False, command), velocity
+        towards = self.direction.sign * bench.sense
+        speed = dict(zip(COMMANDS, towards * steady.T, strict=True))
+        after = self.step.speeds(candidates)
+        yield from self._stated(self._steady_figures(candidates, speed))
+        yield from self._stated(self._step_figures(after, speed[self.rise]))
+        yield from self._stated(self._full_flow(candidates, speed[100.0]))
+        if self.opens_later:
+            label = f"dead band with the spool's overlap, {self.direction.word}"
+            column = Column(f"dead_band_{self.direction.ending}", label, "%")
+            dead_band, beyond = valve_opens(bench, candidates, self.direction.sign)
+            yield column, np.add(dead_band, beyond)
+        yield from opening_curve(bench, candidates, self.direction.sign)
+        if self.planned[self.rise] != 0.0:
+            yield from self.after_step(after)
+
+    def _stated(self, figures: Iterable[Figure]) -> Measured:
+        """Return the figures that the logs tell, of commands that move the joint."""
+        for figure in figures:
+            moved = self.planned[figure.command] != 0.0
+            told = figure.command in self.told
+            if figure.of_several:
+                told = len(self.told) == len(COMMANDS)
+            if moved and told:
+                name = f"{figure.name}_{self.direction.ending}"
+                label = f"{figure.label}, {self.direction.word}"
+                yield Column(name, label, figure.unit), figure.value
+
+    def _steady_figures(
+        self, candidates: Candidates, speed: dict[float, Array]
+    ) -> Iterator[Figure]:
+        """Return what speeds, by command, say."""
+        pose = self.bench.pose
+        unit = f"{self.bench.unit[1]}/s"
+        for command in (50.0, 100.0):
+            label = f"speed at {command:g} % command and {pose}"
+            yield Figure(command, f"speed_{command:g}", label, unit, speed[command])
+        gain = (speed[60.0] - speed[40.0]) / (60.0 - 40.0)
+        label = f"gain between command and speed at {pose}"
+        yield Figure(60.0, "gain", label, f"{unit} per %", gain, of_several=True)
+
+    def _step_figures(self, after: Array, steady: Array) -> Iterator[Figure]:
+        """Return what speeds after the step, (n, samples), say beside the steady one,
+        (n,)."""
+        onset = self.step.reaches(after, ONSET * steady)
+        risen = self.step.reaches(after, RISEN * steady)
+        at = f"at {self.rise:g} % command"
+        yield Figure(self.rise, "dead_time", f"dead time {at}", "s", onset)
+        lag = risen - onset
+        yield Figure(self.rise, "time_constant", f"time constant {at}", "s", lag)
+
+    def _full_flow(self, candidates: Candidates, speed: Array) -> Iterator[Figure]:
+        """Return the flow into the chamber at full command, from the speed there."""
+        c, _, arm = actuator(self.bench, candidates)
+        side = c.a if self.direction.sign > 0 else c.b
+        flow = 6e4 * side.area * np.abs(arm) * speed / self.bench.unit[0]
+        label = f"flow at 100 % command and {self.bench.pose}"
+        yield Figure(100.0, "full_flow", label, "L/min", flow)
 
 
 def direction_test(
-    bench: Bench, estimate: Candidates, sign: float, ending: str, word: str
-) -> Test:
-    """Return what measures a joint in a direction.
-
-    `sign` is that of the commands; `ending` and `word` stand at the end of names and
-    labels.
-    """
-    commands, (factor, unit) = sign * np.array(COMMANDS), bench.unit
-    towards = sign * bench.sense
-    planned = dict(
-        zip(
-            COMMANDS,
-            towards * bench.steady(estimate, commands, bench.loads(estimate))[0],
-            strict=True,
-        )
+    bench: Bench, estimate: Candidates, direction: Direction
+) -> DirectionTest:
+    """Return what measures a joint in a direction."""
+    commands = direction.sign * np.array(COMMANDS)
+    towards = direction.sign * bench.sense
+    steady = towards * bench.steady(estimate, commands, bench.loads(estimate))[0]
+    planned = dict(zip(COMMANDS, steady, strict=True))
+    told = [size for size in COMMANDS if bench.tells(direction.sign * size)]
+    step = bench.movement(direction.sign * _rise(planned, told), LASTS)
+    return DirectionTest(
+        bench=bench,
+        direction=direction,
+        planned=planned,
+        told=told,
+        step=step,
+        after_step=step_curves(step, estimate, direction),
+        opens_later=valve_opens(bench, estimate, direction.sign)[1][0] > 0.0,
     )
-    told = [u for u in COMMANDS if bench.tells(sign * u)]
-    # the smallest command from 50 % that clearly moves the joint, or the largest
-    clear = (u for u in told if u >= 50.0 and planned[u] > ONSET * planned[100.0])
-    rise = next(clear, told[-1] if told else 100.0)
-    step = bench.movement(sign * rise, LASTS)
-    after_step = step_curves(step, estimate, ending, word)
-    opens_later = valve_opens(bench, estimate, sign)[1][0] > 0.0
 
-    def measure(candidates: Candidates, loads: Array) -> Measured:
-        steady = bench.steady(candidates, commands, loads)
-        for u, velocity in zip(commands.tolist(), steady.T, strict=True):
-            if abs(u) in told:
-                yield (
-                    Column("speed", f"speed at {bench.pose}", f"{unit}/s", False, u),
-                    velocity,
-                )
-        speed = dict(zip(COMMANDS, towards * steady.T, strict=True))
-        gain = (speed[60.0] - speed[40.0]) / (60.0 - 40.0)
-        run = step.speeds(candidates)
-        onset, risen = (
-            step.reaches(run, part * speed[rise]) for part in (ONSET, RISEN)
-        )
-        c, _, arm = actuator(bench, candidates)
-        flow = (
-            6e4 * (c.a if sign > 0 else c.b).area * np.abs(arm) * speed[100.0] / factor
-        )
-        pose = bench.pose
-        rows = [  # each with the command that must move the joint
-            (
-                50.0,
-                "speed_50",
-                f"speed at 50 % command and {pose}",
-                f"{unit}/s",
-                speed[50.0],
-            ),
-            (
-                100.0,
-                "speed_100",
-                f"speed at 100 % command and {pose}",
-                f"{unit}/s",
-                speed[100.0],
-            ),
-            (
-                60.0,
-                "gain",
-                f"gain between command and speed at {pose}",
-                f"{unit}/s per %",
-                gain,
-            ),
-            (rise, "dead_time", f"dead time at {rise:g} % command", "s", onset),
-            (
-                rise,
-                "time_constant",
-                f"time constant at {rise:g} % command",
-                "s",
-                risen - onset,
-            ),
-            (100.0, "full_flow", f"flow at 100 % command and {pose}", "L/min", flow),
-        ]
-        for u, name, label, own_unit, value in rows:
-            of_several = name == "gain" and len(told) < len(COMMANDS)
-            if planned[u] != 0.0 and u in told and not of_several:
-                yield Column(f"{name}_{ending}", f"{label}, {word}", own_unit), value
-        if opens_later:
-            band = np.add(*valve_opens(bench, candidates, sign))
-            yield (
-                Column(
-                    f"dead_band_{ending}",
-                    f"dead band with the spool's overlap, {word}",
-                    "%",
-                ),
-                band,
-            )
-        yield from opening_curve(bench, candidates, sign)
-        if planned[rise] != 0.0:
-            yield from after_step(run)
 
-    return measure
+def _rise(planned: Mapping[float, float], told: Sequence[float]) -> float:
+    """Return the command of a step [%]: the smallest from 50 % that clearly moves the
+    joint, or the largest, of those that are told."""
+    for size in told:
+        if size >= 50.0 and planned[size] > ONSET * planned[100.0]:
+            return size
+    return told[-1] if told else 100.0
 
 
 def valve_opens(
@@ -331,14 +374,10 @@ def valve_opens(
     side = c.a if sign > 0 else c.b
     idle = resting_stroke(drive(0.0, c), c.gap, c.plunger_stiffness)
     stroke = idle + side.overlap
+    span = c.current_max - c.current_min
     with np.errstate(all="ignore"):  # of a coil without force
         current = np.sqrt(c.plunger_stiffness * stroke / c.coil) * (stroke + c.gap)
-        voltage = (
-            FULL_SCALE * (current - c.current_min) / (c.current_max - c.current_min)
-        )
-        beyond = (
-            (voltage - side.onset)
-            * (100.0 - side.dead_band)
-            / (FULL_SCALE - side.onset)
-        )
+        voltage = FULL_SCALE * (current - c.current_min) / span
+        lifted = (voltage - side.onset) * (100.0 - side.dead_band)
+        beyond = lifted / (FULL_SCALE - side.onset)
     return side.dead_band, np.where(voltage > FULL_SCALE, np.nan, beyond)

@@ -27,7 +27,7 @@ from typing import Literal
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from hydroid.arrays import Array, record, rms
+from hydroid.arrays import Array, Mask, record, rms
 from hydroid.parameters import ParameterSet
 from hydroid.posterior.error_model import ErrorModel, Likelihood, likelihood_at
 from hydroid.posterior.linear import Linear, linearised, white_posterior
@@ -89,13 +89,9 @@ class ParameterStatus:
         if self.flag is Flag.FIXED or not self.known:
             return None
         # nine tenths of the information are the only source that is named
-        return (
-            Source.DATA
-            if self.share > 0.9
-            else Source.BOTH
-            if self.share >= 0.1
-            else Source.PRIOR
-        )
+        if self.share > 0.9:
+            return Source.DATA
+        return Source.BOTH if self.share >= 0.1 else Source.PRIOR
 
 
 def flag_of(relative_sd: float, share: float = 1.0) -> Flag:
@@ -177,49 +173,77 @@ def uncertainty(
 def uncertainty_from(likelihood: Likelihood, whole: Linear) -> Uncertainty:
     """Return the uncertainty from derivatives by all free parameters, without
     simulations."""
-    problem, fitted = likelihood.problem, likelihood.errors
-    free, room, white = whole.box.varied, whole.box.room, whole.white.deviations
-    effects = 0.01 * rms(fitted.errors(whole.slopes), axis=1)
-    sensitivity = whole.spread(np.where(whole.diverging, np.nan, effects))
-    edge = held_by_bound(room, white)
-    held = edge & (white <= UNIDENTIFIABLE_ABOVE)
-    linear = whole.of(~held | held.all())
+    fitted = likelihood.errors
+    white = whole.white.deviations
+    at_bound = held_by_bound(whole.box.room, white)
+    # what the logs do not determine says nothing by lying at a bound
+    held = at_bound & (white <= UNIDENTIFIABLE_ABOVE)
+    linear = whole.restricted(~held | held.all())
     shown = fitted.errors(whole.innovations[None])
     errors = likelihood.shown
     scatters = _scatters(likelihood, errors, linear.effects)
-    size = np.linalg.norm(linear.changes, axis=0)  # D V' is (V D^-1)^-1
-    half = np.linalg.cholesky(scatters.sum(axis=0) + linear.prior_scatter)
-    root = regular(solve_triangular(half, (linear.changes / size**2).T, lower=True))
-    posterior = Posterior(linear.box, root)
+    posterior = _posterior(linear, scatters)
     relative = linear.spread(posterior.deviations)
+    effects = 0.01 * rms(fitted.errors(whole.slopes), axis=1)
+    sensitivity = whole.spread(np.where(whole.diverging, np.nan, effects))
+    status = _status(whole, relative, sensitivity, at_bound)
+    unknown = np.array([not parameter.known for parameter in status])
+    relative[unknown] = np.inf
+    parameters = likelihood.problem.parameters
+    return Uncertainty(
+        likelihood=likelihood,
+        linear=linear,
+        errors=errors,
+        innovations=errors.innovations(shown)[0],
+        scatters=scatters,
+        sensitivity=sensitivity,
+        posterior=posterior,
+        relative=relative,
+        interval=ends(parameters, linear.box, NORMAL * relative),
+        status=status,
+    )
+
+
+def _posterior(linear: Linear, scatters: Array) -> Posterior:
+    """Return what is known of the parameters that vary where effects scatter as the
+    errors and the priors make them, (C, p, p)."""
+    scatter = scatters.sum(axis=0) + linear.prior_scatter
+    # D V' is (V D^-1)^-1
+    size = np.linalg.norm(linear.changes, axis=0)
+    rows = (linear.changes / size**2).T
+    half = np.linalg.cholesky(scatter)
+    return Posterior(linear.box, regular(solve_triangular(half, rows, lower=True)))
+
+
+def _status(
+    whole: Linear, relative: Array, sensitivity: Array, at_bound: Mask
+) -> tuple[ParameterStatus, ...]:
+    """Return how well each of P parameters is known.
+
+    `relative` are their standard deviations, (P,), NaN where they are fixed or held;
+    `at_bound` says which of the p free ones lie at a bound.
+    """
+    free = whole.box.varied
     # held ones are flagged as if they were free
-    known = np.where(np.isnan(relative), whole.spread(white), relative)
+    held = np.isnan(relative)
+    deviations = np.where(held, whole.spread(whole.white.deviations), relative)
     prior = whole.spread(white_posterior(whole.box, whole.prior_slopes).deviations)
-    shares = np.where(free, np.clip(1 - (known / prior) ** 2, 0.0, 1.0), 1.0)
+    shares = np.where(free, np.clip(1 - (deviations / prior) ** 2, 0.0, 1.0), 1.0)
     shares[sensitivity == 0] = 0.0  # not the rounding of their factorisation
     # a stated prior limits a parameter to half of what the weak one leaves, or less
-    unknown = (known > UNIDENTIFIABLE_ABOVE) & ~(prior < 0.5 * WEAK_PRIOR)
-    relative[unknown] = np.inf
+    stated = prior < 0.5 * WEAK_PRIOR
+    unknown = (deviations > UNIDENTIFIABLE_ABOVE) & ~stated
     status = [ParameterStatus(Flag.FIXED)] * len(free)
-    for i, at_edge, (down, up) in zip(
-        np.flatnonzero(free).tolist(), edge, room.T, strict=True
-    ):
-        flag = Flag.NO_EFFECT if sensitivity[i] == 0 else flag_of(known[i], shares[i])
-        side = ("lower" if down <= up else "upper") if at_edge else None
-        status[i] = ParameterStatus(flag, side, float(shares[i]), not unknown[i])
-    between = ends(problem.parameters, linear.box, NORMAL * relative)
-    return Uncertainty(
-        likelihood,
-        linear,
-        errors,
-        errors.innovations(shown)[0],
-        scatters,
-        sensitivity,
-        posterior,
-        relative,
-        between,
-        tuple(status),
-    )
+    below, above = whole.box.room
+    for k, i in enumerate(np.flatnonzero(free).tolist()):
+        flag = flag_of(deviations[i], shares[i])
+        if sensitivity[i] == 0:
+            flag = Flag.NO_EFFECT
+        bound: Literal["lower", "upper"] | None = None
+        if at_bound[k]:
+            bound = "lower" if below[k] <= above[k] else "upper"
+        status[i] = ParameterStatus(flag, bound, float(shares[i]), not unknown[i])
+    return tuple(status)
 
 
 def _scatters(likelihood: Likelihood, errors: ErrorModel, rows: Array) -> Array:

@@ -55,11 +55,9 @@ class ResidualTest:
         """Parts of the autocorrelations, and of the correlations with the command,
         beyond the bound.
         """
-        beyond = [
-            np.mean(np.abs(values) > self.bound)
-            for values in (self.autocorrelation, self.with_command)
-        ]
-        return float(beyond[0]), float(beyond[1])
+        in_time = np.mean(np.abs(self.autocorrelation) > self.bound)
+        with_command = np.mean(np.abs(self.with_command) > self.bound)
+        return float(in_time), float(with_command)
 
 
 def residual_tests(
@@ -108,11 +106,8 @@ def lasting(errors: ErrorModel, innovations: Array) -> dict[int, float]:
 
 def _courses(errors: ErrorModel, signal: int) -> list[Course]:
     """Return the courses of a signal, given by its index."""
-    return [
-        course
-        for course, own in zip(errors.courses, errors.of, strict=True)
-        if own == signal
-    ]
+    pairs = zip(errors.courses, errors.of, strict=True)
+    return [course for course, of_signal in pairs if of_signal == signal]
 
 
 def _lasting(courses: list[Course], innovations: Array) -> float:
@@ -133,7 +128,8 @@ def _lasting(courses: list[Course], innovations: Array) -> float:
 def _between(courses: Sequence[Course]) -> float:
     """Return the mean time between two samples that count [s]."""
     samples = sum(int(np.sum(course.used)) for course in courses)
-    return sum(course.period * len(course.used) for course in courses) / max(samples, 1)
+    duration = sum(course.period * len(course.used) for course in courses)
+    return duration / max(samples, 1)
 
 
 def _lags(longest: float, period: float, logs: Sequence[Array]) -> int:
@@ -149,10 +145,11 @@ def autocorrelation(logs: list[Array], lags: int) -> Array:
     shape (lags,).
     """
     square = sum(float(log @ log) for log in logs)
-    products = [
-        sum(float(log[lag:] @ log[:-lag]) for log in logs) for lag in range(1, lags + 1)
-    ]
-    return np.array(products) / max(square, np.finfo(float).tiny)
+    products = np.zeros(lags)
+    for log in logs:
+        for lag in range(1, lags + 1):
+            products[lag - 1] += log[lag:] @ log[:-lag]
+    return products / max(square, np.finfo(float).tiny)
 
 
 def cross_correlation(logs: list[Array], causes: list[Array], lags: int) -> Array:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hydroid.arrays import Array, Mask
+from hydroid.arrays import Array, Mask, record
 from hydroid.errors import SettingsError
 from hydroid.hydraulics.records import Records, nominal_joints
 from hydroid.quantity_table import QUANTITIES, TARGETS
@@ -13,6 +13,24 @@ from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.problem import ParameterSettings
 from hydroid.simulation import Candidates
+
+
+@record
+class Binding:
+    """What one parameter sets, or changes in some logs.
+
+    Attributes:
+        column: of the parameter in theta.
+        quantity: of joints, or the mass of links.
+        targets: these joints or links, 0-based.
+        group: of the logs in which it is added to what is set otherwise; None: it sets
+            the quantity in all.
+    """
+
+    column: int
+    quantity: str
+    targets: list[int]
+    group: str | None
 
 
 class Bindings:
@@ -26,71 +44,76 @@ class Bindings:
     """
 
     def __init__(self, settings: FitSettings) -> None:
-        self._arm, self._stage, self._group_of = (
-            settings.arm,
-            settings.stage,
-            settings.log.group_of,
-        )
+        self._arm = settings.arm
+        self._stage = settings.stage
+        self._group_of = settings.log.group_of
         self._nominal = nominal_joints(settings.arm, settings.hydraulics)
-        rows = [
-            (column, quantity, _places(settings.arm, name, p), p.per)
-            for column, (name, p) in enumerate(settings.parameters.items())
-            for quantity in TARGETS[p.quantity]
-        ]
+        bindings: list[Binding] = []
+        for column, (name, parameter) in enumerate(settings.parameters.items()):
+            targets = _targets(settings.arm, name, parameter)
+            for quantity in TARGETS[parameter.quantity]:
+                bindings.append(Binding(column, quantity, targets, parameter.per))
         # what is added comes last
-        self._rows = sorted(rows, key=lambda row: row[-1] is not None)
-        names, taken = (
-            list(settings.parameters),
-            dict[tuple[str, int, str | None], str](),
-        )
-        for column, quantity, places, group in self._rows:
-            name = names[column]
-            for place in places:
-                if (other := taken.setdefault((quantity, place, group), name)) != name:
-                    raise SettingsError(
-                        f"{other} and {name} both set the {quantity} of the same joint or link",
-                        f"parameters.{name}",
-                        "give each its own joints, or remove one",
-                    )
+        self._bindings = sorted(bindings, key=lambda binding: binding.group is not None)
+        self._refuse_doubled(list(settings.parameters))
+
+    def _refuse_doubled(self, names: Sequence[str]) -> None:
+        """Refuse two parameters, by their names, for the same thing."""
+        taken = dict[tuple[str, int, str | None], str]()
+        for binding in self._bindings:
+            name = names[binding.column]
+            for target in binding.targets:
+                key = (binding.quantity, target, binding.group)
+                other = taken.setdefault(key, name)
+                if other == name:
+                    continue
+                raise SettingsError(
+                    f"{other} and {name} both set the {binding.quantity} of the same "
+                    "joint or link",
+                    f"parameters.{name}",
+                    "give each its own joints, or remove one",
+                )
 
     def candidates(self, theta: Array, log: str = "") -> Candidates:
         """Spread theta, shape (n, P), over joints and links, in SI, as they are in a
         log of this name."""
-        own = self._group_of(log)
+        group = self._group_of(log)
         joints: Records = np.tile(self._nominal, (len(theta), 1)).view(np.recarray)
         mass = np.tile(self._arm.masses, (len(theta), 1))
-        for column, quantity, places, group in self._rows:
-            target = mass if quantity == "mass" else joints[quantity]
-            value, factor = theta[:, column, None], QUANTITIES[quantity].factor
-            if group is None:
-                target[:, places] = value * factor
-            elif group == own:
-                least = QUANTITIES[quantity].lowest
-                target[:, places] = np.maximum(
-                    target[:, places] + value * factor, least * factor
-                )
+        for binding in self._bindings:
+            table = mass if binding.quantity == "mass" else joints[binding.quantity]
+            quantity = QUANTITIES[binding.quantity]
+            value = theta[:, binding.column, None] * quantity.factor
+            if binding.group is None:
+                table[:, binding.targets] = value
+            elif binding.group == group:
+                changed = table[:, binding.targets] + value
+                least = quantity.lowest * quantity.factor
+                table[:, binding.targets] = np.maximum(changed, least)
         return Candidates(joints, mass)
 
     def refuse_idle(self, driven: Mask, outputs: Sequence[int]) -> None:
         """Refuse driven, (J,), or compared joints, 0-based, for which stage 1 has no
         gain or no damping."""
+        if self._stage != "mech":
+            return
         moved = {*np.flatnonzero(driven).tolist(), *outputs}
-        for quantity in ("gain", "damping") if self._stage == "mech" else ():
-            served = {
-                place
-                for _, what, places, _ in self._rows
-                if what == quantity
-                for place in places
-            }
-            for joint in sorted(moved - served)[:1]:
+        for quantity in ("gain", "damping"):
+            served = set[int]()
+            for binding in self._bindings:
+                if binding.quantity == quantity:
+                    served.update(binding.targets)
+            idle = moved - served
+            if idle:
                 raise SettingsError(
-                    f"joint {joint + 1} is driven or compared, but no parameter is its {quantity}",
+                    f"joint {min(idle) + 1} is driven or compared, but no parameter is "
+                    f"its {quantity}",
                     "parameters",
                     "add one, or leave the joint's command out with log.joints",
                 )
 
 
-def _places(arm: Arm, name: str, settings: ParameterSettings) -> list[int]:
+def _targets(arm: Arm, name: str, settings: ParameterSettings) -> list[int]:
     """0-based joints or links that the parameter acts on."""
     where = f"parameters.{name}"
     if settings.link is not None:

@@ -2,9 +2,8 @@
 of their errors (article 3.1) over segments of the record (3.2 and figure 18).
 
 The error of equation (17), ε = y - ŷ, is an array (n, T): n candidates, T samples.
-Equation (18) is a *mean*
-norm, (1/N Σ|ε|^p)^(1/p): the mean absolute error for p = 1, the root mean square for p = 2. For p = inf it is
-the largest |ε|.
+Equation (18) is a *mean* norm, (1/N Σ|ε|^p)^(1/p): the mean absolute error for p = 1,
+the root mean square for p = 2. For p = inf it is the largest |ε|.
 
 Equation (19) divides by "the p-norm of the measured data". We take the same mean norm
 (18) of y, so that (19) has no unit and means the same for short and long segments. A
@@ -14,8 +13,8 @@ A segment is a pair of sample indices [first, end). Segments cover the record wi
 overlap, and none is empty.
 """
 
-from collections.abc import Sequence
-from typing import Literal
+from collections.abc import Iterator, Sequence
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -28,6 +27,7 @@ from hydroid.simulation import Response
 
 Quantity = Literal["angle", "pressure_a", "pressure_b"]
 SIDES: tuple[Quantity, Quantity] = ("pressure_a", "pressure_b")
+"""of a joint's pressures, in the order of a log's and a response's columns"""
 
 
 @record
@@ -59,51 +59,72 @@ class Channel:
         if self.quantity == "angle":
             simulated = response.angle[:, :, self.column]
         else:
-            simulated = response.pressure[
-                :, :, self.column, "ab".index(self.quantity[-1])
-            ]
+            side = SIDES.index(self.quantity)
+            simulated = response.pressure[:, :, self.column, side]
         return self.weight * (self.measured - simulated)
 
 
 def compared_pressures(log: Log, settings: FitSettings) -> list[int]:
     """Joints whose chamber pressures count in the objectives, 0-based: driven ones that
     the log measures."""
-    if (
-        settings.stage != "hyd"
-        or settings.objective.pressure_weight == 0
-        or log.pressure is None
-    ):
+    pressure = log.pressure
+    weight = settings.objective.pressure_weight
+    if settings.stage != "hyd" or weight == 0 or pressure is None:
         return []
-    return [
-        j
-        for j in range(log.joints)
-        if log.driven[j] and not np.isnan(log.pressure[0, j]).all()
-    ]
+    # a joint whose first sample has no pressure has none anywhere
+    measured = ~np.isnan(pressure[0]).all(axis=1)
+    return np.flatnonzero(log.driven & measured).tolist()
 
 
 def make_channels(logs: Sequence[Log], settings: FitSettings) -> tuple[Channel, ...]:
     """List the channels log by log, angles first."""
-    objective = settings.objective
-    end, channels = 0, list[Channel]()
+    channels = list[Channel]()
+    end = 0
     for i, log in enumerate(logs):
         samples = len(log.time)
-        for column, joint in enumerate(settings.outputs):
-            weight, rows = objective.weights.get(joint, 1.0), slice(end, end + samples)
-            measured = log.angle[:, joint - 1]
-            channels.append(Channel(i, joint, "angle", column, measured, weight, rows))
+        for signal in (*_angles(log, settings), *_pressures(log, settings)):
+            rows = slice(end, end + samples)
             end += samples
-        for column, joint in enumerate(compared_pressures(log, settings)):
-            assert log.pressure is not None
-            weight = np.deg2rad(objective.pressure_weight) / 1e5  # deg/bar -> rad/Pa
-            for side, quantity in enumerate(SIDES):
-                measured = log.pressure[:, joint, side]
-                if not np.isnan(measured[0]):
-                    rows = slice(end, end + samples)
-                    channels.append(
-                        Channel(i, joint + 1, quantity, column, measured, weight, rows)
-                    )
-                    end += samples
+            channels.append(
+                Channel(
+                    log=i,
+                    joint=signal.joint,
+                    quantity=signal.quantity,
+                    column=signal.column,
+                    measured=signal.measured,
+                    weight=signal.weight,
+                    rows=rows,
+                )
+            )
     return tuple(channels)
+
+
+class _Signal(NamedTuple):
+    """A compared signal of one log, its fields as those of its `Channel`."""
+
+    joint: int
+    quantity: Quantity
+    column: int
+    measured: Array
+    weight: float
+
+
+def _angles(log: Log, settings: FitSettings) -> Iterator[_Signal]:
+    weights = settings.objective.weights
+    for column, joint in enumerate(settings.outputs):
+        measured = log.angle[:, joint - 1]
+        yield _Signal(joint, "angle", column, measured, weights.get(joint, 1.0))
+
+
+def _pressures(log: Log, settings: FitSettings) -> Iterator[_Signal]:
+    weight = np.deg2rad(settings.objective.pressure_weight) / 1e5  # deg/bar -> rad/Pa
+    for column, joint in enumerate(compared_pressures(log, settings)):
+        assert log.pressure is not None
+        for side, quantity in enumerate(SIDES):
+            measured = log.pressure[:, joint, side]
+            # one side may have no sensor
+            if not np.isnan(measured[0]):
+                yield _Signal(joint + 1, quantity, column, measured, weight)
 
 
 def norm(error: Array, p: float | str) -> Array:
@@ -137,7 +158,8 @@ def overall_objective(
     scale = norm(measured[None, :], settings.norm)[0]
     if scale == 0:
         raise SettingsError(
-            "a relative norm has nothing to divide by: the measured output of a segment is zero throughout",
+            "a relative norm has nothing to divide by: the measured output of a segment "
+            "is zero throughout",
             "objective.relative",
             "use relative: false, or other segments",
         )
@@ -165,9 +187,10 @@ def segment_bounds(samples: int, segments: int) -> Ints:
     """Cut a record of so many samples into segments of equal length: [first, end) of
     each, shape (S, 2)."""
     if segments > samples:
-        what = f"{segments} segments do not fit into {samples} samples"
         raise SettingsError(
-            what, "objective.segments", "each segment needs a sample of its own"
+            f"{segments} segments do not fit into {samples} samples",
+            "objective.segments",
+            "each segment needs a sample of its own",
         )
     edges = np.arange(segments + 1, dtype=np.int64) * samples // segments
     return np.stack((edges[:-1], edges[1:]), axis=1)

@@ -17,14 +17,14 @@ which is half the square of its scores, so that least squares minimises it. Such
 confines no search.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from hydroid.arrays import Array, Mask, record
 from hydroid.errors import SettingsError
-from hydroid.parameters import ParameterSet, Prior
+from hydroid.parameters import Parameter, ParameterSet, Prior
 from hydroid.settings.problem import PriorSettings
 
 REACH = 2.0  # standard deviations that a candidate of a search may be away from a prior
@@ -61,9 +61,9 @@ class _Combination:
 
     def tolerance(self, theta: Array) -> Array:
         """Excess of one standard deviation, shape (n,)."""
-        return self.sd * (
-            np.ones(len(theta)) if self.divisor is None else theta[:, self.divisor]
-        )
+        if self.divisor is None:
+            return self.sd * np.ones(len(theta))
+        return self.sd * theta[:, self.divisor]
 
     def distances(self, theta: Array) -> Array:
         """Distance from the value in standard deviations, shape (n, 1)."""
@@ -88,13 +88,13 @@ class _Bends:
 
 @record
 class _Heavy:
-    """A prior with heavy tails on m distances."""
+    """A prior with heavy tails on the m distances of another one."""
 
-    of: _Combination | _Bends
+    inner: _Combination | _Bends
 
     def distances(self, theta: Array) -> Array:
         """Scores, (n, m)."""
-        distances = self.of.distances(theta)
+        distances = self.inner.distances(theta)
         square = (distances * distances).sum(axis=1, keepdims=True)
         # log(1 + x)/x is 1 there to the last digit
         far = np.maximum(square / FREEDOM, 1e-12)
@@ -104,10 +104,9 @@ class _Heavy:
     def weight(self, theta: Array) -> float:
         """Factor on distances at one theta, (1, P), by which a normal prior has the
         same slope there."""
-        distances = self.of.distances(theta)[0]
-        return float(
-            np.sqrt((FREEDOM + len(distances)) / (FREEDOM + distances @ distances))
-        )
+        distances = self.inner.distances(theta)[0]
+        square = distances @ distances
+        return float(np.sqrt((FREEDOM + len(distances)) / (FREEDOM + square)))
 
 
 class Priors:
@@ -122,27 +121,24 @@ class Priors:
     def __init__(
         self, settings: Mapping[str, PriorSettings], parameters: ParameterSet
     ) -> None:
-        self._own, narrowed = dict[int, Prior](), list(parameters.parameters)
+        self._single = dict[int, Prior]()
+        searched = list(parameters.parameters)
         for column, p in enumerate(parameters.parameters):
             if p.prior is not None and p.fixed is None:
-                self._own[column] = p.prior
-                low, high = (
-                    max(p.lower, p.prior.value(-REACH)),
-                    min(p.upper, p.prior.value(REACH)),
-                )
-                narrowed[column] = replace(p, lower=low, upper=high)
-        self.searched = ParameterSet(tuple(narrowed))
+                self._single[column] = p.prior
+                lower = max(p.lower, p.prior.value(-REACH))
+                upper = min(p.upper, p.prior.value(REACH))
+                searched[column] = replace(p, lower=lower, upper=upper)
+        self.searched = ParameterSet(tuple(searched))
         self._combinations = list[_Combination]()
-        self._further = list[_Combination | _Heavy]()
-        names, firm = (
-            [parameters.names[column] for column in self._own],
-            [True] * len(self._own),
-        )
+        self._several = list[_Combination | _Heavy]()
+        names = [parameters.names[column] for column in self._single]
+        firm = [True] * len(self._single)
         for name, prior in settings.items():
-            further = _further(name, prior, self.searched)
+            further = _prior_of_several(name, prior, self.searched)
             if further is None:
                 continue
-            self._further.append(further)
+            self._several.append(further)
             if isinstance(further, _Combination):
                 self._combinations.append(further)
             many = further.distances(self.searched.start[None]).shape[1]
@@ -151,17 +147,20 @@ class Priors:
         self.names = tuple(names)
         self.firm: Mask = np.array(firm, dtype=bool)
         if self._combinations:
-            off = (
-                np.abs(self.scores(self.project(self.searched.start[None]))[0])
-                * self.firm
+            self._refuse_contradiction()
+
+    def _refuse_contradiction(self) -> None:
+        """Refuse combinations that no candidate within the bounds can meet at once."""
+        nearest = self.project(self.searched.start[None])
+        away = np.abs(self.scores(nearest)[0]) * self.firm
+        worst = np.argmax(away)
+        # projections end a little off
+        if away[worst] > 1.5 * REACH:
+            raise SettingsError(
+                "cannot hold within the bounds together with the other priors",
+                f"priors.{self.names[worst]}",
+                "widen the bounds, correct the value, or give it a larger sd",
             )
-            worst = np.argmax(off)
-            if off[worst] > 1.5 * REACH:
-                raise SettingsError(
-                    "cannot hold within the bounds together with the other priors",
-                    f"priors.{self.names[worst]}",
-                    "widen the bounds, correct the value, or give it a larger sd",
-                )
 
     def __len__(self) -> int:
         return len(self.names)
@@ -173,9 +172,15 @@ class Priors:
         Those of a prior with heavy tails have half of their squares for its negative
         logarithm.
         """
-        own = [prior.score(theta[:, [column]]) for column, prior in self._own.items()]
-        further = [prior.distances(theta) for prior in self._further]
-        return np.hstack([np.empty((len(theta), 0)), *own, *further])
+        scores = self._single_scores(theta)
+        scores += [prior.distances(theta) for prior in self._several]
+        return np.hstack([np.empty((len(theta), 0)), *scores])
+
+    def _single_scores(self, theta: Array) -> list[Array]:
+        """Return the scores of the priors of single parameters, (n, 1) each."""
+        return [
+            prior.score(theta[:, [column]]) for column, prior in self._single.items()
+        ]
 
     def weighed_at(self, theta: Array) -> Callable[[Array], Array]:
         """Return scores, (n, P) -> (n, M), with priors of heavy tails as they act at
@@ -185,22 +190,16 @@ class Priors:
         of the negative logarithm, and their information is what theta's neighbours are
         known by.
         """
-        weights = [
-            1.0 if isinstance(p, _Combination) else p.weight(theta[None])
-            for p in self._further
-        ]
+        weighed: list[tuple[_Combination | _Bends, float]] = []
+        for prior in self._several:
+            if isinstance(prior, _Heavy):
+                weighed.append((prior.inner, prior.weight(theta[None])))
+            else:
+                weighed.append((prior, 1.0))
 
         def scores(near: Array) -> Array:
-            rows = [
-                prior.score(near[:, [column]]) for column, prior in self._own.items()
-            ]
-            for prior, weight in zip(self._further, weights, strict=True):
-                distances = (
-                    prior.distances
-                    if isinstance(prior, _Combination)
-                    else prior.of.distances
-                )
-                rows.append(weight * distances(near))
+            rows = self._single_scores(near)
+            rows += [weight * prior.distances(near) for prior, weight in weighed]
             return np.hstack([np.empty((len(near), 0)), *rows])
 
         return scores
@@ -214,15 +213,15 @@ class Priors:
         """
         if not self._combinations:
             return theta
-        theta, free = theta.copy(), self.searched.free
-        low, high = self.searched.lower[free], self.searched.upper[free]
+        theta = theta.copy()
+        free = self.searched.free
+        low = self.searched.lower[free]
+        high = self.searched.upper[free]
         for _ in range(MAX_SWEEPS):
             before = theta.copy()
             for combination in self._combinations:
-                excess, slack = (
-                    combination.excess(theta),
-                    REACH * combination.tolerance(theta),
-                )
+                excess = combination.excess(theta)
+                slack = REACH * combination.tolerance(theta)
                 beyond = excess - np.clip(excess, -slack, slack)
                 theta -= beyond[:, None] * combination.step
                 theta[:, free] = np.clip(theta[:, free], low, high)
@@ -231,49 +230,62 @@ class Priors:
         return theta
 
 
-def _further(
+def _prior_of_several(
     name: str, prior: PriorSettings, parameters: ParameterSet
 ) -> _Combination | _Heavy | None:
     """Return a prior on several parameters; None where all of them are fixed."""
-    names = parameters.names
     for parameter in prior.names:
-        if parameter not in names:
-            hint = f"parameters: {', '.join(names)}"
-            raise SettingsError(f"no parameter {parameter!r}", f"priors.{name}", hint)
-    if prior.smooth is None:
-        combination = _combination(prior, parameters)
-        return (
-            combination
-            if combination is None or prior.tails == "normal"
-            else _Heavy(combination)
-        )
-    columns = [names.index(parameter) for parameter in prior.smooth]
+        if parameter not in parameters.names:
+            raise SettingsError(
+                f"no parameter {parameter!r}",
+                f"priors.{name}",
+                f"parameters: {', '.join(parameters.names)}",
+            )
+    if prior.smooth is not None:
+        return _bends(name, prior.smooth, prior.sd or 0.0, parameters)
+    combination = _combination(prior, parameters)
+    if combination is None or prior.tails == "normal":
+        return combination
+    return _Heavy(combination)
+
+
+def _bends(
+    name: str, smooth: Sequence[str], sd: float, parameters: ParameterSet
+) -> _Heavy | None:
+    """Return the prior on a curve's bends between the factors `smooth`; None where all
+    of them are fixed."""
+    columns = [parameters.names.index(factor) for factor in smooth]
     for column in columns:
         p = parameters.parameters[column]
-        if (p.lower if p.fixed is None else p.fixed) <= 0:
+        if _least(p) <= 0:
             raise SettingsError(
                 f"{p.name} may be 0", f"priors.{name}.smooth", "give it bounds above 0"
             )
-    return (
-        _Heavy(_Bends(columns, prior.sd or 0.0))
-        if parameters.free[columns].any()
-        else None
-    )
+    if not parameters.free[columns].any():
+        return None
+    return _Heavy(_Bends(columns, sd))
+
+
+def _least(parameter: Parameter) -> float:
+    """Return the least value that a parameter can have."""
+    return parameter.lower if parameter.fixed is None else parameter.fixed
 
 
 def _combination(prior: PriorSettings, parameters: ParameterSet) -> _Combination | None:
     """Return a combination; None where all of its parameters are fixed."""
-    names, free = parameters.names, parameters.free
-    factors = np.array([prior.factors.get(n, 0.0) for n in names])
+    names = parameters.names
+    free = parameters.free
+    factors = np.array([prior.factors.get(name, 0.0) for name in names])
     if not factors[free].any():
         return None
     width = np.where(free, parameters.upper - parameters.lower, 0.0)
+    # shortest in a box whose sides all count for 1
     step = factors * width**2 / np.sum((factors * width) ** 2)
     sd = prior.sd or CONSTRAINT_SD * float(np.abs(factors) @ width)
     if prior.ratio is None:
         return _Combination(factors, prior.value or 0.0, sd, None, step)
     divisor = names.index(prior.ratio[1])
     p = parameters.parameters[divisor]
-    if (p.lower if p.fixed is None else p.fixed) <= 0:
+    if _least(p) <= 0:
         raise SettingsError(f"a ratio divides by {p.name}, which may be 0", "priors")
     return _Combination(factors, 0.0, sd, divisor, step)

@@ -56,8 +56,11 @@ class Problem:
         logs: Sequence[Log],
         spread: DaskWorkers | None = None,
     ) -> None:
-        spec, outputs = load_model(settings.arm), [j - 1 for j in settings.outputs]
-        self.settings, self.logs, self.outputs = settings, tuple(logs), outputs
+        spec = load_model(settings.arm)
+        outputs = [joint - 1 for joint in settings.outputs]
+        self.settings = settings
+        self.logs = tuple(logs)
+        self.outputs = outputs
         self._spread = spread
         self.bindings = Bindings(settings)
         self.driven = np.any([log.driven for log in logs], axis=0)
@@ -76,24 +79,21 @@ class Problem:
         ]
         self.channels = make_channels(logs, settings)
         self.measured = np.concatenate([c.weight * c.measured for c in self.channels])
-        # of an angle; a pressure is one objective, however long
-        many = settings.objective.segments
-        self.bounds: Ints = np.concatenate(
-            [
-                c.rows.start
-                + segment_bounds(len(c.measured), many if c.quantity == "angle" else 1)
-                for c in self.channels
-            ]
-        )
+        segments: list[Ints] = []
+        for channel in self.channels:
+            # a pressure is one objective, however long
+            many = 1
+            if channel.quantity == "angle":
+                many = settings.objective.segments
+            within = segment_bounds(len(channel.measured), many)
+            segments.append(channel.rows.start + within)
+        self.bounds: Ints = np.concatenate(segments)
 
     @property
     def active_joints(self) -> tuple[int, ...]:
         """Joints that a log drives or that are compared, numbered from 1."""
-        return tuple(
-            sorted(
-                {*(np.flatnonzero(self.driven) + 1).tolist(), *self.settings.outputs}
-            )
-        )
+        driven = (np.flatnonzero(self.driven) + 1).tolist()
+        return tuple(sorted({*driven, *self.settings.outputs}))
 
     def varied(
         self, settings: FitSettings, logs: Sequence[Log] | None = None
@@ -109,9 +109,8 @@ class Problem:
         1."""
         follows = self.settings.simulation.other_joints == "measured"
         compared = np.isin(np.arange(log.joints), self.outputs)
-        return (
-            np.flatnonzero(log.measured & (log.driven | compared | (not follows))) + 1
-        ).tolist()
+        simulated = log.driven | compared | (not follows)
+        return (np.flatnonzero(log.measured & simulated) + 1).tolist()
 
     def theta(self, unit: Array) -> Array:
         """Return candidates, (n, P), from points of the search's unit box, moved to
@@ -148,16 +147,15 @@ class Problem:
         size = max(1, CHUNK // len(self.measured))
         chunks = [theta[at : at + size] for at in range(0, len(theta), size)]
         parts = [self.norms(self.errors(self.responses(chunk))) for chunk in chunks]
-        return np.vstack([*parts])
+        return np.vstack(parts)
 
     def norms(self, errors: Array) -> Array:
         """Return the objectives of output errors, (n, R), by segment and overall last:
         shape (n, S + 1)."""
         objective = self.settings.objective
         segments = segment_objectives(errors, self.measured, self.bounds, objective)
-        return np.column_stack(
-            [segments, overall_objective(errors, self.measured, objective)]
-        )
+        overall = overall_objective(errors, self.measured, objective)
+        return np.column_stack([segments, overall])
 
     def output_errors(self, theta: Array) -> Array:
         """Weighted output errors of (17) [rad] of theta, shape (n, P): (n, R); NaN
@@ -178,17 +176,20 @@ class Problem:
     def leaves_noise(self, theta: Array) -> bool:
         """Whether errors at an estimate, (P,), change between samples as white noise
         does."""
-        error = self.output_errors(theta[None])[0]
-        each = [error[c.rows] for c in self.channels]
-        return all(np.mean(np.diff(one) ** 2) > WHITE * np.var(one) for one in each)
+        errors = self.output_errors(theta[None])[0]
+        for channel in self.channels:
+            error = errors[channel.rows]
+            if not np.mean(np.diff(error) ** 2) > WHITE * np.var(error):
+                return False
+        return True
 
     def responses(self, theta: Array) -> list[Response]:
         """Simulate theta, shape (n, P); return one response of n candidates per log."""
-        pairs = zip(self._simulations, self.logs, strict=True)
-        return [
-            one.simulate(self.bindings.candidates(theta, log.source))
-            for one, log in pairs
-        ]
+        responses: list[Response] = []
+        for simulation, log in zip(self._simulations, self.logs, strict=True):
+            candidates = self.bindings.candidates(theta, log.source)
+            responses.append(simulation.simulate(candidates))
+        return responses
 
     def angles(self, errors: Array, joints: Collection[int] = ()) -> Array:
         """Return the output errors, of (n, R), of the angles of joints (from 1), or

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from hydroid.arrays import Array
-from hydroid.estimate import CurveEstimate, FitSummary, QuantityEstimate
+from hydroid.estimate import CurveEstimate, FitSummary
 from hydroid.log import Log
 from hydroid.reporting.chart import Chart, Color, Mark, Panel
 from hydroid.reporting.page import Plot, Section
@@ -58,32 +58,32 @@ def speed_section(
             continue
         opening = summary.curves.get(f"{name}_opening")
         opens = opens or opening is not None
-        late = [one.value for one in _dead_times(name, summary)]
-        pairs = [
-            measured_speeds(log, joint, float(np.mean(late)) if late else 0.0)
-            for log in logs
-            if log.measured[joint - 1]
-        ]
-        cloud = np.hstack(pairs) if pairs else np.empty((2, 0))
+        cloud = _measured_cloud(logs, joint, _dead_times(name, summary))
         commands = np.concatenate([log.command[:, joint - 1] for log in logs])
-        drawing = partial(_speed_chart, name, (speed, opening), commands, cloud)
-        tabs.append(
-            Plot(
-                f"speed_{len(tabs) + 1}", f"{name}: {speed.label}", drawing, button=name
-            )
-        )
+        draw = partial(_speed_chart, name, (speed, opening), commands, cloud)
+        caption = f"{name}: {speed.label}"
+        tabs.append(Plot(f"speed_{len(tabs) + 1}", caption, draw, button=name))
         fastest.append(f"{name} {two_digits(max(map(abs, speed.value)))} {speed.unit}")
     if not tabs:
         return None
-    title = "Speed and valve against command" if opens else "Speed against command"
+    title = "Speed against command"
+    text = _SPEED_ALONE
+    if opens:
+        title = "Speed and valve against command"
+        text = _SPEED
     answer = f"fastest: {listed(fastest)}"
-    return Section(
-        title,
-        _SPEED if opens else _SPEED_ALONE,
-        tabs=tuple(tabs),
-        folded=True,
-        answer=answer,
-    )
+    return Section(title, text, tabs=tuple(tabs), folded=True, answer=answer)
+
+
+def _measured_cloud(logs: Sequence[Log], joint: int, dead_times: list[float]) -> Array:
+    """Return commands [%] and measured speeds [rad/s] of a joint in all logs, shape
+    (2, n)."""
+    late = float(np.mean(dead_times)) if dead_times else 0.0
+    pairs = [np.empty((2, 0))]
+    for log in logs:
+        if log.measured[joint - 1]:
+            pairs.append(np.array(measured_speeds(log, joint, late)))
+    return np.hstack(pairs)
 
 
 def step_section(settings: FitSettings, summary: FitSummary) -> Section | None:
@@ -97,11 +97,11 @@ def step_section(settings: FitSettings, summary: FitSummary) -> Section | None:
         name = settings.arm.joint_names[joint - 1]
         if not any(f"{name}_step_{towards}" in summary.curves for towards in TOWARDS):
             continue
-        drawing = partial(_response_chart, name, summary.curves)
+        draw = partial(_response_chart, name, summary.curves)
         caption = f"{name}: step and frequency response"
-        tabs.append(Plot(f"step_{len(tabs) + 1}", caption, drawing, button=name))
-        if late := _dead_times(name, summary):
-            slowest.append(f"{name} {two_digits(max(one.value for one in late))} s")
+        tabs.append(Plot(f"step_{len(tabs) + 1}", caption, draw, button=name))
+        if dead_times := _dead_times(name, summary):
+            slowest.append(f"{name} {two_digits(max(dead_times))} s")
     if not tabs:
         return None
     answer = f"dead time: {listed(slowest)}" if slowest else ""
@@ -120,7 +120,8 @@ def measured_speeds(log: Log, joint: int, late: float) -> tuple[Array, Array]:
     angle = log.angle[:, joint - 1]
     half = max(round(0.5 * OVER / log.period), 1)
     delay = round(late / log.period)
-    low, high = np.min(angle), np.max(angle)
+    low = np.min(angle)
+    high = np.max(angle)
     margin = AT_END * (high - low)
     commands = list[float]()
     speeds = list[float]()
@@ -135,13 +136,15 @@ def measured_speeds(log: Log, joint: int, late: float) -> tuple[Array, Array]:
     return np.array(commands), np.array(speeds)
 
 
-def _dead_times(name: str, summary: FitSummary) -> list[QuantityEstimate]:
-    """Return the dead times of a joint in both directions, as far as the fit states
+def _dead_times(name: str, summary: FitSummary) -> list[float]:
+    """Return the dead times of a joint in both directions [s], as far as the fit states
     them."""
-    times = [
-        summary.quantities.get(f"{name}_dead_time_{towards}") for towards in TOWARDS
-    ]
-    return [one for one in times if one is not None]
+    times = list[float]()
+    for towards in TOWARDS:
+        dead_time = summary.quantities.get(f"{name}_dead_time_{towards}")
+        if dead_time is not None:
+            times.append(dead_time.value)
+    return times
 
 
 def _speed_chart(
@@ -181,38 +184,28 @@ def _speed_chart(
 def _both_sides(curve: CurveEstimate) -> list[Mark]:
     """Draw a curve against the command, with the dead band between its two sides."""
     marks = list[Mark]()
-    for sign, color in (1.0, "blue"), (-1.0, "orange"):
-        x, y, low, high = _rows(curve)
-        side = sign * x > 0
-        word = "positive" if sign > 0 else "negative"
-        label = f"model, {word} command"
-        marks.append(
-            Mark(
-                "band",
-                x[side],
-                low[side],
-                high[side],
-                color=color,
-                label=label,
-                alpha=0.25,
-            )
-        )
-        marks.append(Mark("line", x[side], y[side], color=color, label=label))
+    rows = _rows(curve)
+    for sign, towards in (1.0, "positive"), (-1.0, "negative"):
+        x, y, low, high = rows[:, sign * rows[0] > 0]
+        color = TOWARDS[towards]
+        label = f"model, {towards} command"
+        marks.append(Mark("band", x, low, high, color=color, label=label, alpha=0.25))
+        marks.append(Mark("line", x, y, color=color, label=label))
     return marks
 
 
 def _response_chart(name: str, curves: Mapping[str, CurveEstimate]) -> Chart:
     """Draw what the curves say of one joint in both directions."""
-    panels = (
-        _response_panel(
-            "speed", f"{name}: step of the command", 250, _towards(name, "step", curves)
-        ),
-        _response_panel(
-            "amplitude", "frequency response", 200, _towards(name, "amplitude", curves)
-        ),
-        _response_panel("phase", "", 200, _towards(name, "phase", curves)),
+    step = _towards(name, "step", curves)
+    amplitude = _towards(name, "amplitude", curves)
+    phase = _towards(name, "phase", curves)
+    return Chart(
+        (
+            _response_panel("speed", f"{name}: step of the command", 250, step),
+            _response_panel("amplitude", "frequency response", 200, amplitude),
+            _response_panel("phase", "", 200, phase),
+        )
     )
-    return Chart(panels)
 
 
 def _towards(
@@ -227,14 +220,16 @@ def _response_panel(
     y: str, title: str, height: int, curves: Mapping[str, CurveEstimate]
 ) -> Panel:
     marks = list[Mark]()
-    along, unit = "", ""
+    along = ""
+    unit = ""
     for towards, curve in curves.items():
         x, value, low, high = _rows(curve)
         label = curve.label.partition(" to ")[2]  # the command and the direction
         color = TOWARDS[towards]
         marks.append(Mark("band", x, low, high, color=color, label=label, alpha=0.25))
         marks.append(Mark("line", x, value, color=color, label=label))
-        along, unit = curve.along, curve.unit
+        along = curve.along
+        unit = curve.unit
     over_frequency = along.startswith("frequency")
     decades = y == "amplitude"
     panel = Panel(along, f"{y} [{unit}]", tuple(marks), title, height)

@@ -64,9 +64,8 @@ class Mark:
         keep = [np.array([0, last])]
         for values in (self.y, -self.y, self.end, -self.end):
             if len(values):
-                parts = np.pad(values, (0, -len(values) % size), mode="edge").reshape(
-                    -1, size
-                )
+                padded = np.pad(values, (0, -len(values) % size), mode="edge")
+                parts = padded.reshape(-1, size)
                 lowest = np.where(np.isfinite(parts), parts, np.inf).argmin(axis=1)
                 keep.append(lowest + size * np.arange(len(parts)))
         at = np.unique(np.minimum(np.concatenate(keep), last))
@@ -115,6 +114,23 @@ class Chart:
             marks = tuple(mark.thinned(self.bins) for mark in panel.marks)
             panels.append(replace(panel, marks=marks))
         return replace(self, panels=tuple(panels))
+
+
+def reference(time: Array, values: Array, label: str, width: float = 5) -> Mark:
+    """Draw what was measured or wished, so that a model's line is seen on top of it."""
+    return Mark("line", time, values, color="ink", label=label, width=width, alpha=0.35)
+
+
+def zero_line() -> Mark:
+    """Draw the line at 0, about which errors lie."""
+    return Mark("rule", y=np.zeros(1), color="grey", width=1)
+
+
+def command_panel(*marks: Mark, height: int = 130) -> Panel:
+    """Return the panel of commands [%] over time, which ends a chart of responses."""
+    # a full command is seen inside the panel, not on its edge
+    limits = (-108, 108)
+    return Panel("time [s]", "command [%]", marks, height=height, y_limits=limits)
 
 
 def finite(values: Array) -> Array:

@@ -17,8 +17,10 @@ STRONG = 0.9
 """correlation from which two parameters are named"""
 MOST = 6
 """pairs that are named"""
-ROW, LARGEST = 18, 760
-"""height of a row [px], and of all rows together"""
+ROW = 18
+"""height of a row [px]"""
+LARGEST = 760
+"""height of all rows together, at most [px]"""
 
 _TEXT = (
     "Two parameters that are correlated trade against each other: the logs know a combination of them better "

@@ -4,13 +4,14 @@ to check an arm by.
 
 import io
 import warnings
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from typing import Any
 
 import mujoco
 import numpy as np
 from matplotlib import style as styles
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
@@ -65,7 +66,8 @@ def saved(drawing: Figure, title: str = "") -> tuple[bytes, bytes]:
     """Return a figure as PNG of 150 dpi and as SVG that needs no font; within
     `style`."""
     drawing.suptitle(title, x=0.02, ha="left", fontsize=11, fontweight="bold")
-    png, svg = io.BytesIO(), io.BytesIO()
+    png = io.BytesIO()
+    svg = io.BytesIO()
     drawing.savefig(png, format="png", dpi=150, metadata={"Software": None})
     drawing.savefig(svg, format="svg", metadata={"Date": None, "Creator": None})
     return png.getvalue(), svg.getvalue()
@@ -74,24 +76,26 @@ def saved(drawing: Figure, title: str = "") -> tuple[bytes, bytes]:
 def figure(chart: Chart) -> Figure:
     """Draw a chart without what is off; within `style`."""
     heights = [panel.height / 80 for panel in chart.panels]  # [in], of 80 px
-    drawing = Figure(
-        (6.4, sum(heights) + 0.6 * len(heights) + 0.5), layout="constrained"
-    )
-    axes = drawing.subplots(
+    # titles and ticks take 0.6 in of each panel, the legend below all of them 0.5 in
+    height = sum(heights) + 0.6 * len(heights) + 0.5
+    drawing = Figure((6.4, height), layout="constrained")
+    every_axes = drawing.subplots(
         len(heights), squeeze=False, sharex=chart.linked, height_ratios=heights
     ).ravel()
-    for one, panel in zip(axes, chart.thinned().panels, strict=True):
+    for axes, panel in zip(every_axes, chart.thinned().panels, strict=True):
         for mark in panel.marks:
             if not mark.off:
-                _draw(one, mark)
-        _name_axes(one, panel)
+                _draw(axes, mark)
+        _name_axes(axes, panel)
     legend(drawing)
     return drawing
 
 
 def _draw(axes: Axes, mark: Mark) -> None:
     """Draw a mark in a panel."""
-    x, y, end = mark.x, mark.y, mark.end
+    x = mark.x
+    y = mark.y
+    end = mark.end
     look: Plain = {
         "color": SHADES[mark.color],
         "alpha": mark.alpha,
@@ -115,10 +119,14 @@ def _draw(axes: Axes, mark: Mark) -> None:
         case "bars":
             axes.barh(y, end - x, left=x, height=0.6, **look)
         case "cells":
-            for sign, color in (1, "blue"), (-1, "orange"):
-                chosen = sign * end > 0
-                shade = [to_rgba(SHADES[color], alpha) for alpha in np.abs(end[chosen])]
-                axes.bar(x[chosen], 1.0, 1.0, y[chosen] - 0.5, color=shade)
+            _draw_cells(axes, x[end > 0], y[end > 0], end[end > 0], "blue")
+            _draw_cells(axes, x[end < 0], y[end < 0], -end[end < 0], "orange")
+
+
+def _draw_cells(axes: Axes, x: Array, y: Array, strength: Array, color: str) -> None:
+    """Draw unit squares at points, the stronger the less transparent."""
+    shades = [to_rgba(SHADES[color], alpha) for alpha in strength]
+    axes.bar(x, 1.0, 1.0, y - 0.5, color=shades)
 
 
 def _name_axes(axes: Axes, panel: Panel) -> None:
@@ -142,19 +150,19 @@ def _name_axes(axes: Axes, panel: Panel) -> None:
 
 def legend(drawing: Figure) -> None:
     """Explain every label of a figure once, below it."""
-    labels = {
-        h.get_label(): h
-        for one in drawing.axes
-        for h in one.get_legend_handles_labels()[0]
-    }
-    if len(labels) > 1:
-        columns = int(
-            15 * drawing.get_figwidth() / (8 + max(len(str(label)) for label in labels))
-        )
-        where: Any = "outside lower center"
-        drawing.legend(
-            handles=list(labels.values()), loc=where, ncols=max(1, min(3, columns))
-        )
+    by_label = dict[str, Artist]()
+    for axes in drawing.axes:
+        handles, labels = axes.get_legend_handles_labels()
+        by_label |= dict(zip(labels, handles, strict=True))
+    if len(by_label) <= 1:
+        return
+    # a letter is about 1/15 in wide, and a label's line and blanks are 8 letters
+    longest = max(map(len, by_label))
+    columns = int(15 * drawing.get_figwidth() / (8 + longest))
+    where: Any = "outside lower center"
+    drawing.legend(
+        handles=[*by_label.values()], loc=where, ncols=max(1, min(3, columns))
+    )
 
 
 VIEWS = {"from the right (-y)": (0.0, "z [m]"), "from above": (-90.0, "y [m]")}
@@ -171,99 +179,132 @@ def arm_picture(arm: Arm, title: str) -> tuple[bytes, bytes]:
     PNG and SVG.
     """
     model = load_model(arm).compile()
-    data, angles = mujoco.MjData(model), np.clip(0.0, arm.lower, arm.upper)
+    data = mujoco.MjData(model)
+    angles = np.clip(0.0, arm.lower, arm.upper)
     data.qpos[:] = angles
     mujoco.mj_forward(model, data)
     (poses,) = body_poses(model, angles[None])
     outlines = [Shape(shape.body, shape.placed(poses)) for shape in shapes(model)]
-    cylinders = [
-        (number, joint, joint.actuator)
-        for number, joint in enumerate(arm.joints)
-        if isinstance(joint.actuator, LinearActuator) and not joint.slides
-    ]
+    cylinders = dict[int, LinearActuator]()
+    for number, joint in enumerate(arm.joints):
+        if isinstance(joint.actuator, LinearActuator) and not joint.slides:
+            cylinders[number] = joint.actuator
+    rows = 2 if cylinders else 1
     with style():
         drawing = Figure((7.2, 7.5 if cylinders else 4.4), layout="constrained")
-        axes: Any = drawing.subplots(2 if cylinders else 1, 2, squeeze=False)
-        for one, name in zip(axes[0], VIEWS, strict=True):
-            _view(one, arm, data, outlines, poses, name)
-        for number, joint, linkage in cylinders:
-            angle, look = (
-                np.linspace(*joint.range, 181),
-                {"color": _color(number), "label": joint.name},
-            )
-            axes[1, 0].plot(angle, linkage.length(np.radians(angle)), **look)
-            axes[1, 1].plot(angle, linkage.moment_arm(np.radians(angle)), **look)
+        every_axes: Any = drawing.subplots(rows, 2, squeeze=False)
+        for axes, name in zip(every_axes[0], VIEWS, strict=True):
+            view = _View(axes, arm, data, *VIEWS[name])
+            view.draw(outlines, poses)
+            axes.set(title=name)
         if cylinders:
-            x = "joint angle [deg]"
-            axes[1, 0].set(
-                xlabel=x, ylabel="pivot to pivot [m]", title="lengths of the cylinders"
-            )
-            axes[1, 1].set(
-                xlabel=x,
-                ylabel="moment arm [m]",
-                title="moment arms, 0 at a dead centre",
-            )
-            axes[1, 1].axhline(0.0, color="grey", lw=1)
+            _draw_cylinders(every_axes[1, 0], every_axes[1, 1], arm, cylinders)
         legend(drawing)
         return saved(drawing, title)
 
 
-def _view(
-    axes: Axes, arm: Arm, data: Any, outlines: Sequence[Shape], poses: Array, name: str
+def _draw_cylinders(
+    lengths: Axes, moment_arms: Axes, arm: Arm, cylinders: Mapping[int, LinearActuator]
 ) -> None:
-    """Draw links, joints' axes and pivots in one of the VIEWS.
+    """Draw the cylinders of joints (by number, from 0) over the joints' ranges."""
+    for number, cylinder in cylinders.items():
+        joint = arm.joints[number]
+        degrees = np.linspace(*joint.range, 181)
+        radians = np.radians(degrees)
+        look: Plain = {"color": _color(number), "label": joint.name}
+        lengths.plot(degrees, cylinder.length(radians), **look)
+        moment_arms.plot(degrees, cylinder.moment_arm(radians), **look)
+    lengths.set(title="lengths of the cylinders", ylabel="pivot to pivot [m]")
+    moment_arms.set(title="moment arms, 0 at a dead centre", ylabel="moment arm [m]")
+    moment_arms.axhline(0.0, color="grey", lw=1)
+    for axes in (lengths, moment_arms):
+        axes.set(xlabel="joint angle [deg]")
 
-    The outlines' corners are in the world.
+
+class _View:
+    """An arm that is seen along one of the VIEWS.
+
+    Args:
+        axes: in which it is drawn.
+        arm: that is drawn.
+        data: of its model, in the pose that is drawn.
+        elevation: of the sight [deg].
+        upwards: name of the axis that points upwards.
     """
-    elevation, upwards = VIEWS[name]
-    *across, ahead = sight(90.0, elevation)
-    model, onto = data.model, np.transpose(across)
-    moved_by = model.body_jntadr[model.body_weldid].tolist()
-    for shape in outlines:
-        joint = moved_by[shape.body]
-        color, label = (
-            ("grey", None) if joint < 0 else (_color(joint), arm.joint_names[joint])
-        )
-        outline = shape.corners @ onto
+
+    def __init__(
+        self, axes: Axes, arm: Arm, data: Any, elevation: float, upwards: str
+    ) -> None:
+        self._axes = axes
+        self._arm = arm
+        self._data = data
+        *across, self._ahead = sight(90.0, elevation)
+        self._onto = np.transpose(across)
+        axes.set(xlabel="x [m]", ylabel=upwards)
+        axes.set_aspect("equal", adjustable="datalim")
+
+    def draw(self, outlines: Sequence[Shape], poses: Array) -> None:
+        """Draw outlines, whose corners are in the world [m], pivots in bodies' poses,
+        and the joints' axes."""
+        for shape in outlines:
+            self._draw_outline(shape)
+        self._draw_pivots(poses)
+        self._draw_joints()
+
+    def _draw_outline(self, shape: Shape) -> None:
+        model = self._data.model
+        joint = int(model.body_jntadr[model.body_weldid[shape.body]])
+        color = "grey"
+        label = None
+        if joint >= 0:
+            color = _color(joint)
+            label = self._arm.joint_names[joint]
+        outline = shape.corners @ self._onto
         with suppress(QhullError):  # all on one line
             outline = outline[ConvexHull(outline).vertices]
-        axes.fill(*outline.T, fc=color, ec=color, alpha=0.45, label=label)
-    for child, joint in zip(model.jnt_bodyid.tolist(), arm.joints, strict=True):
-        if (
-            isinstance(joint.actuator, LinearActuator)
-            and joint.actuator.pivots is not None
+        self._axes.fill(*outline.T, fc=color, ec=color, alpha=0.45, label=label)
+
+    def _draw_pivots(self, poses: Array) -> None:
+        """Draw a line between the pivots of each cylinder."""
+        model = self._data.model
+        for child, joint in zip(
+            model.jnt_bodyid.tolist(), self._arm.joints, strict=True
         ):
+            cylinder = joint.actuator
+            if not isinstance(cylinder, LinearActuator) or cylinder.pivots is None:
+                continue
             bodies = [model.body_parentid[child], child]
-            ends = placed(np.array(joint.actuator.pivots)[:, None], poses[bodies])[:, 0]
-            axes.plot(*(ends @ onto).T, "o-", color="black", lw=3, ms=4)
-    size = 0.12 * (
-        np.ptp(data.xipos[1:], axis=0).max() + np.ptp(data.xanchor, axis=0).max() + 0.1
-    )
-    said = 0
-    for number, (joint, at, axis) in enumerate(
-        zip(arm.joints, data.xanchor, data.xaxis, strict=True)
-    ):
-        axes.plot(
-            *(np.array([at - size * axis, at + size * axis]) @ onto).T,
-            "D-",
-            color="black",
-            lw=1,
-            ms=4,
-        )
-        if joint.slides == (abs(axis @ ahead) > ACROSS):
-            continue  # the other view tells
-        sense = "turns counter-clockwise" if axis @ ahead < 0 else "turns clockwise"
-        text = f"{joint.name}: + {'slides along the line' if joint.slides else sense}"
-        corner: Plain = {
-            "transform": axes.transAxes,
-            "va": "top",
-            "fontsize": 7,
-            "color": _color(number),
-        }
-        axes.text(0.03, 0.98 - 0.055 * said, text, **corner).set_in_layout(False)
-        said += 1
-    axes.set(title=name, xlabel="x [m]", ylabel=upwards)
-    axes.set_aspect("equal", adjustable="datalim")
+            ends = placed(np.array(cylinder.pivots)[:, None], poses[bodies])[:, 0]
+            self._axes.plot(*(ends @ self._onto).T, "o-", color="black", lw=3, ms=4)
+
+    def _draw_joints(self) -> None:
+        """Draw the joints' axes, and name the sense of those that this view shows."""
+        data = self._data
+        bodies = np.ptp(data.xipos[1:], axis=0).max()
+        anchors = np.ptp(data.xanchor, axis=0).max()
+        half = 0.12 * (bodies + anchors + 0.1)
+        named = 0
+        for number, joint in enumerate(self._arm.joints):
+            anchor = data.xanchor[number]
+            axis = data.xaxis[number]
+            ends = np.array([anchor - half * axis, anchor + half * axis])
+            self._axes.plot(*(ends @ self._onto).T, "D-", color="black", lw=1, ms=4)
+            across = axis @ self._ahead
+            if joint.slides == (abs(across) > ACROSS):
+                continue  # the other view tells
+            sense = "turns counter-clockwise" if across < 0 else "turns clockwise"
+            if joint.slides:
+                sense = "slides along the line"
+            self._write(f"{joint.name}: + {sense}", named, _color(number))
+            named += 1
+
+    def _write(self, text: str, line: int, color: str) -> None:
+        """Write a line of text into the view's corner."""
+        where: Plain = {"transform": self._axes.transAxes, "va": "top"}
+        height = 0.98 - 0.055 * line
+        written = self._axes.text(0.03, height, text, fontsize=7, color=color, **where)
+        # or the text would shrink the view
+        written.set_in_layout(False)
 
 
 def _color(joint: int) -> str:

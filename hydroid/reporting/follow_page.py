@@ -6,9 +6,17 @@ from functools import partial
 
 import numpy as np
 
+from hydroid.files import Plain
 from hydroid.fitting.validation import Prediction
-from hydroid.reporting.chart import Chart, Mark, Panel
-from hydroid.reporting.page import Page, Plot, Section, Table
+from hydroid.reporting.chart import (
+    Chart,
+    Mark,
+    Panel,
+    command_panel,
+    reference,
+    zero_line,
+)
+from hydroid.reporting.page import Cell, Page, Plot, Section, Table
 from hydroid.reporting.response_report import motion_section
 from hydroid.settings.arm import Arm
 from hydroid.use.follow import Followed, Missed
@@ -27,68 +35,58 @@ _NOTE = (
 def follow_page(name: str, followed: Followed, arm: Arm) -> Page:
     """Return the page; its file has the `name`, its table is `tracking`."""
     table = tracking_table(followed, arm)
+    missed = tuple(missed_lines(followed, arm))
+    sections = [Section(table.title, "", missed, {"tracking": table})]
     columns = [joint - 1 for joint in followed.joints]
-    moving = Prediction(
-        name, followed.log, followed.joints, followed.angle[:, columns], {}, None
-    )
+    angle = followed.angle[:, columns]
+    moving = Prediction(name, followed.log, followed.joints, angle, {}, None)
     motion = motion_section(arm, {"the path": moving}, _MOTION)
+    if motion is not None:
+        sections.append(motion)
     tabs = list[Plot]()
     for joint in followed.joints:
-        name_of_joint = arm.joint_names[joint - 1]
+        joint_name = arm.joint_names[joint - 1]
         draw = partial(_chart, followed, joint, arm)
-        tabs.append(
-            Plot(f"joint_{joint}", name_of_joint, draw, zoom=True, button=name_of_joint)
-        )
-    sections = (
-        Section(
-            table.title, "", tuple(missed_lines(followed, arm)), {"tracking": table}
-        ),
-        *([motion] if motion else []),
-        Section(
-            "Joint by joint",
-            "Wished and predicted angle, the error with its band, and the command.",
-            tabs=tuple(tabs),
-        ),
-    )
-    return Page(name, f"Commands for {arm.name}", _lead(followed, arm), sections, ())
+        tab = Plot(f"joint_{joint}", joint_name, draw, zoom=True, button=joint_name)
+        tabs.append(tab)
+    text = "Wished and predicted angle, the error with its band, and the command."
+    sections.append(Section("Joint by joint", text, tabs=tuple(tabs)))
+    title = f"Commands for {arm.name}"
+    return Page(name, title, _lead(followed, arm), tuple(sections), ())
 
 
 def tracking_table(followed: Followed, arm: Arm) -> Table:
     """Return the predicted errors of the joints."""
-    rows: list[tuple[str | float | None, ...]] = []
+    rows = list[tuple[Cell, ...]]()
     for joint in followed.joints:
         _, unit, factor = arm.joints[joint - 1].shown
-        error, wide = (factor * size for size in followed.rms(joint))
+        error, wide = followed.rms(joint)
+        banded = factor * wide if np.isfinite(wide) else None
         command = followed.log.command[:, joint - 1]
         full = 100.0 * float(np.mean(np.abs(command) >= 100.0))
-        rows.append(
-            (
-                arm.joint_names[joint - 1],
-                unit,
-                error,
-                wide if np.isfinite(wide) else None,
-                full,
-            )
-        )
+        name = arm.joint_names[joint - 1]
+        rows.append((name, unit, factor * error, banded, full))
     header = ("joint", "unit", "error", "with its band", "full command [% of time]")
     return Table("Predicted tracking error", header, tuple(rows), _NOTE)
 
 
 def missed_lines(followed: Followed, arm: Arm) -> list[str]:
     """Return a sentence for each joint and reason for which a wish cannot be had."""
-    groups: dict[tuple[int, str], list[Missed]] = {}
-    for one in followed.missed:
-        groups.setdefault((one.joint, one.limit), []).append(one)
+    groups = dict[tuple[int, str], list[Missed]]()
+    for span in followed.missed:
+        groups.setdefault((span.joint, span.limit), []).append(span)
     return [_missed(group, followed.lead_s, arm) for group in groups.values()]
 
 
 def _missed(group: Sequence[Missed], lead: float, arm: Arm) -> str:
-    worst = max(group, key=lambda one: abs(one.wished - one.had))
+    worst = max(group, key=lambda span: abs(span.wished - span.had))
     _, unit, factor = arm.joints[worst.joint].shown
-    spans = [f"{one.from_s - lead:.2f} to {one.to_s - lead:.2f}" for one in group]
-    had, wished = two_digits(factor * worst.had), two_digits(factor * worst.wished)
-    what = f"{arm.joint_names[worst.joint]}: {worst.limit}, at worst {had} {unit}/s where {wished} are wished"
-    return f"{what}; {listed(spans, 3)} s into the path"
+    spans = [f"{span.from_s - lead:.2f} to {span.to_s - lead:.2f}" for span in group]
+    had = two_digits(factor * worst.had)
+    wished = two_digits(factor * worst.wished)
+    what = f"{arm.joint_names[worst.joint]}: {worst.limit}"
+    speeds = f"at worst {had} {unit}/s where {wished} are wished"
+    return f"{what}, {speeds}; {listed(spans, 3)} s into the path"
 
 
 def _lead(followed: Followed, arm: Arm) -> str:
@@ -98,9 +96,10 @@ def _lead(followed: Followed, arm: Arm) -> str:
     worst = max(followed.joints, key=relative)
     _, unit, factor = arm.joints[worst - 1].shown
     error = number(factor * followed.rms(worst)[0])
-    text = f"The model follows the path to {error} {unit} rms at most ({arm.joint_names[worst - 1]})."
+    name = arm.joint_names[worst - 1]
+    text = f"The model follows the path to {error} {unit} rms at most ({name})."
     if followed.missed:
-        names = dict.fromkeys(arm.joint_names[one.joint] for one in followed.missed)
+        names = dict.fromkeys(arm.joint_names[span.joint] for span in followed.missed)
         text += f" {', '.join(names)} cannot move as fast as the path asks everywhere."
     return text
 
@@ -112,37 +111,24 @@ def _chart(followed: Followed, joint: int, arm: Arm) -> Chart:
     wished = factor * followed.log.angle[:, column]
     predicted = factor * followed.angle[:, column]
     error = wished - predicted
-    upper = (
-        Mark("line", time, wished, color="ink", label="wished", width=5, alpha=0.35),
-        Mark("line", time, predicted, color="orange", label="predicted"),
-    )
-    middle = [Mark("rule", y=np.zeros(1), color="grey", width=1)]
-    if (half := followed.half.get(joint)) is not None and np.isfinite(half).all():
-        wide = factor * half
-        middle.append(
-            Mark(
-                "band",
-                time,
-                error - wide,
-                error + wide,
-                color="orange",
-                label="95 % band",
-                alpha=0.18,
-            )
-        )
-    middle.append(Mark("line", time, error, color="orange", label="predicted", width=1))
+    look: Plain = {"color": "orange", "label": "predicted"}
+    upper = (reference(time, wished, "wished"), Mark("line", time, predicted, **look))
+    middle = [zero_line()]
+    half = followed.half.get(joint)
+    if half is not None and np.isfinite(half).all():
+        low = error - factor * half
+        high = error + factor * half
+        label = "95 % band"
+        band = Mark("band", time, low, high, color="orange", label=label, alpha=0.18)
+        middle.append(band)
+    middle.append(Mark("line", time, error, width=1, **look))
+    spans = [span for span in followed.missed if span.joint == column]
+    shaded = _shaded(spans, followed.lead_s)
     command = Mark("step", time, followed.log.command[:, column], color="grey")
-    spans = [one for one in followed.missed if one.joint == column]
     panels = (
         Panel("", f"{word} [{unit}]", upper, arm.joint_names[column], 280),
         Panel("", f"error [{unit}]", tuple(middle), height=190),
-        Panel(
-            "time [s]",
-            "command [%]",
-            (*_shaded(spans, followed.lead_s), command),
-            height=160,
-            y_limits=(-108, 108),
-        ),
+        command_panel(*shaded, command, height=160),
     )
     return Chart(panels, linked=True)
 
@@ -150,8 +136,8 @@ def _chart(followed: Followed, joint: int, arm: Arm) -> Chart:
 def _shaded(spans: Sequence[Missed], lead: float) -> list[Mark]:
     if not spans:
         return []
-    begin = np.array([one.from_s for one in spans]) - lead
-    end = np.array([one.to_s for one in spans]) - lead
+    begin = np.array([span.from_s for span in spans]) - lead
+    end = np.array([span.to_s for span in spans]) - lead
     return [
         Mark("spans", x=begin, end=end, color="pink", label="cannot be had", alpha=0.3)
     ]

@@ -5,7 +5,7 @@ from typing import Any
 
 from hydroid.estimate import FitSummary, QuantityEstimate
 from hydroid.findings import Finding
-from hydroid.reporting.page import Section, Table
+from hydroid.reporting.page import Cell, Section, Table
 from hydroid.reporting.parameters_report import in_words
 from hydroid.settings.fit import FitSettings
 from hydroid.words import interval_words, listed, two_digits
@@ -21,7 +21,8 @@ MOST_WARNINGS = 3
 
 def warnings(summary: FitSummary) -> tuple[Finding, ...]:
     """Return what must be read before any use of the estimate, at most three things."""
-    return tuple(one for one in summary.findings if one.level != "note")[:MOST_WARNINGS]
+    warned = [finding for finding in summary.findings if finding.level != "note"]
+    return tuple(warned[:MOST_WARNINGS])
 
 
 def unknown_section(settings: FitSettings, summary: FitSummary) -> Section:
@@ -31,25 +32,21 @@ def unknown_section(settings: FitSettings, summary: FitSummary) -> Section:
 
     Which parameters cannot be told apart, their correlations show.
     """
-    points = tuple(
-        str(in_words(one, settings)) for one in _others(summary)[:MOST_UNKNOWN]
-    )
+    named = [in_words(finding, settings) for finding in _others(summary)[:MOST_UNKNOWN]]
+    points = tuple(map(str, named))
     none = "" if points else "The logs determine every free parameter."
     return Section("What is not known", none, points)
 
 
 def further_findings(summary: FitSummary) -> tuple[str, ...]:
     """Return the findings that `unknown_section` has no room for."""
-    return tuple(str(one) for one in _others(summary)[MOST_UNKNOWN:])
+    return tuple(map(str, _others(summary)[MOST_UNKNOWN:]))
 
 
 def _others(summary: FitSummary) -> list[Finding]:
     first = warnings(summary)
-    return [
-        one
-        for one in summary.findings
-        if one not in first and one.kind != "combination"
-    ]
+    others = [finding for finding in summary.findings if finding not in first]
+    return [finding for finding in others if finding.kind != "combination"]
 
 
 def quantity_section(settings: FitSettings, summary: FitSummary) -> Section | None:
@@ -59,20 +56,17 @@ def quantity_section(settings: FitSettings, summary: FitSummary) -> Section | No
     """
     cards = dict[str, Table]()
     for joint in settings.outputs:
-        known = [
-            q
-            for q in summary.quantities.values()
-            if q.joint == joint and q.within <= BEST_WITHIN
-        ]
-        known.sort(key=lambda one: one.within)
-        rows = [
-            (q.label, f"{q.value:.3g}", q.unit, _within(q)) for q in known[:MOST_KNOWN]
-        ]
+        of_joint = [q for q in summary.quantities.values() if q.joint == joint]
+        certain = [quantity for quantity in of_joint if quantity.within <= BEST_WITHIN]
+        certain.sort(key=lambda quantity: quantity.within)
+        rows = list[tuple[Cell, ...]]()
+        for quantity in certain[:MOST_KNOWN]:
+            value = f"{quantity.value:.3g}"
+            rows.append((quantity.label, value, quantity.unit, _within(quantity)))
         name = settings.arm.joint_names[joint - 1]
         if rows:
-            cards[f"known_{name}"] = Table(
-                name, ("quantity", "value", "unit", "interval"), tuple(rows)
-            )
+            header = ("quantity", "value", "unit", "interval")
+            cards[f"known_{name}"] = Table(name, header, tuple(rows))
     text = (
         "With 95 % intervals, which are right only if the model is right. "
         "estimate.yaml has all quantities."
@@ -80,13 +74,13 @@ def quantity_section(settings: FitSettings, summary: FitSummary) -> Section | No
     return Section("What is known", text, cards=cards) if cards else None
 
 
-def _within(one: QuantityEstimate) -> str:
+def _within(quantity: QuantityEstimate) -> str:
     """Write an interval: of a percentage its ends, since ± 3 % of 40 % could mean
     either."""
-    low, high = one.interval
-    if one.unit == "%" and low is not None and high is not None:
+    low, high = quantity.interval
+    if quantity.unit == "%" and low is not None and high is not None:
         return f"{interval_words(low, high)} %"
-    return f"± {100 * one.within:.2g} %"
+    return f"± {100 * quantity.within:.2g} %"
 
 
 def error_section(settings: FitSettings, summary: FitSummary) -> Section | None:

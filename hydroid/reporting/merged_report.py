@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from hydroid.joint_verdict import JointVerdict
 from hydroid.reporting.page import Cell, Table
 from hydroid.reporting.parameters_report import status
 from hydroid.run.record import Record
@@ -31,37 +32,44 @@ def merged_tables(runs: Sequence[Record]) -> dict[str, Table]:
     """
     runs = sorted(runs, key=lambda run: run.rms_deg)
     units = dict[str, str]()
+    # errors stand before parameters, whatever run brings them in
+    for run in runs:
+        for verdict in run.summary.verdict:
+            units[_error_name(verdict)] = verdict.shown.unit
     flags = dict[str, str]()
     for run in runs:
-        units |= {f"error of {one.name}": one.shown.unit for one in run.summary.verdict}
-    for run in runs:
-        units |= {name: one.unit for name, one in run.summary.estimate.items()}
-        flags = {
-            name: status(one) for name, one in run.summary.estimate.items()
-        } | flags
+        for name, estimate in run.summary.estimate.items():
+            units[name] = estimate.unit
+            flags.setdefault(name, status(estimate))
     values = [_errors(run) | run.summary.values for run in runs]
-    rows = [
-        (run.folder, run.seed, *map(one.get, units))
-        for run, one in zip(runs, values, strict=True)
-    ]
-    spread: list[tuple[Cell, ...]] = []
+    spread = list[tuple[Cell, ...]]()
     for name, unit in units.items():
-        given = [value for one in values if (value := one.get(name)) is not None]
-        quantiles = (
-            np.quantile(given, [0.5, 0, 0.25, 0.75, 1]).tolist()
-            if given
-            else [None] * 5
-        )
+        quantiles = _quantiles([of_run.get(name) for of_run in values])
         spread.append((name, unit, *quantiles, flags.get(name, "")))
-    header = "run", "seed", *(f"{name} [{unit}]" for name, unit in units.items())
+    header = ["run", "seed", *(f"{name} [{unit}]" for name, unit in units.items())]
+    rows = list[tuple[Cell, ...]]()
+    for run, of_run in zip(runs, values, strict=True):
+        rows.append((run.folder, run.seed, *map(of_run.get, units)))
+    title = f"{len(runs)} runs"
+    by_run = "Runs, smallest error first"
+    last_first = tuple(header[:1:-1])
     return {
-        "spread": Table(
-            f"{len(runs)} runs", SPREAD, tuple(spread), optional=SPREAD[4:6]
-        ),
-        "runs": Table(
-            "Runs, smallest error first", header, tuple(rows), optional=header[:1:-1]
-        ),
+        "spread": Table(title, SPREAD, tuple(spread), optional=SPREAD[4:6]),
+        "runs": Table(by_run, tuple(header), tuple(rows), optional=last_first),
     }
+
+
+def _quantiles(values: Sequence[float | None]) -> list[float | None]:
+    """Return the quantiles of SPREAD of the values that there are, each None without
+    any."""
+    given = [value for value in values if value is not None]
+    if not given:
+        return [None] * 5
+    return np.quantile(given, [0.5, 0, 0.25, 0.75, 1]).tolist()
+
+
+def _error_name(verdict: JointVerdict) -> str:
+    return f"error of {verdict.name}"
 
 
 def _errors(run: Record) -> dict[str, float | None]:
@@ -70,9 +78,9 @@ def _errors(run: Record) -> dict[str, float | None]:
     None: there is none.
     """
     errors = dict[str, float | None]()
-    for one in run.summary.verdict:
-        factor = one.shown.of_degrees(1.0)
-        errors[f"error of {one.name}"] = (
-            None if one.fitted_deg is None else factor * one.fitted_deg
-        )
+    for verdict in run.summary.verdict:
+        name = _error_name(verdict)
+        errors[name] = None
+        if verdict.fitted_deg is not None:
+            errors[name] = verdict.shown.of_degrees(1.0) * verdict.fitted_deg
     return errors

@@ -31,8 +31,10 @@ SLEWS = np.radians(1.0)
 """turn of the machine from which on it is shown from above, too [rad]"""
 REACH = 0.05
 """part of the arm's size that it must reach sideways for its direction to be known"""
-# longer side of the picture from the side, and what stays free around the arm
-_SIZE, _MARGIN = 1000, 30
+_SIZE = 1000
+"""longer side of the picture from the side"""
+_MARGIN = 30
+"""what stays free around the arm in it"""
 
 
 @record
@@ -195,7 +197,8 @@ def _view(
     seen = np.einsum(
         "fij,afnj->afni" if len(cameras) > 1 else "gij,afnj->afni", axes, placed
     )
-    low, high = seen.min(axis=(0, 1, 2)), seen.max(axis=(0, 1, 2))
+    low = seen.min(axis=(0, 1, 2))
+    high = seen.max(axis=(0, 1, 2))
     scale = scale or (_SIZE - 2 * _MARGIN) / float(max(high - low))
     width, height = (scale * (high - low) + 2 * _MARGIN).round().astype(int).tolist()
     depths = list[float]()

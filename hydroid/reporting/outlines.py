@@ -48,11 +48,13 @@ def body_poses(model: mujoco.MjModel, angles: Array) -> Array:
     """Return turn and place [m] of all bodies at angles of all joints [rad], (F, nq) ->
     (F, nbody, 3, 4).
     """
-    data, poses = mujoco.MjData(model), np.empty((len(angles), model.nbody, 3, 4))
+    data = mujoco.MjData(model)
+    poses = np.empty((len(angles), model.nbody, 3, 4))
     for pose, angle in zip(poses, angles, strict=True):
         data.qpos[:] = angle
         mujoco.mj_kinematics(model, data)
-        pose[..., :3], pose[..., 3] = data.xmat.reshape(-1, 3, 3), data.xpos
+        pose[..., :3] = data.xmat.reshape(-1, 3, 3)
+        pose[..., 3] = data.xpos
     return poses
 
 
@@ -84,7 +86,9 @@ def _points(model: mujoco.MjModel, geom: int) -> Array | None:
 
     None: it is no solid.
     """
-    kinds, make, size = mujoco.mjtGeom, trimesh.creation, model.geom_size[geom]
+    kinds = mujoco.mjtGeom
+    make = trimesh.creation
+    size = model.geom_size[geom]
     match kinds(int(model.geom_type[geom])):
         case kinds.mjGEOM_MESH:
             mesh = model.mesh(int(model.geom_dataid[geom]))

@@ -19,8 +19,10 @@ from hydroid.words import numbered, plain, three_digits
 if TYPE_CHECKING:
     import rich.table
 
-FIGURE_SPACE, POINT_SPACE = "\u2007", "\u2008"
-"""blanks as wide as a digit and as a point"""
+FIGURE_SPACE = "\u2007"
+"""blank as wide as a digit"""
+POINT_SPACE = "\u2008"
+"""blank as wide as a point"""
 _NUMBER = re.compile(r"([-−]?\d+)(\.\d+)?(?= |$)")
 SHORT = 20
 """letters of a cell up to which it stands in one line"""
@@ -77,10 +79,13 @@ class Table:
         """
         from rich.console import Console
 
-        console, endless = Console(), Console(width=1000)
-        limited = console.is_terminal or os.environ.get("COLUMNS", "").isdigit()
-        width = console.width if limited else endless.width
-        table, needed = self._rich(()), 0
+        console = Console()
+        endless = Console(width=1000)
+        width = endless.width
+        if console.is_terminal or os.environ.get("COLUMNS", "").isdigit():
+            width = console.width
+        table = self._rich(())
+        needed = 0
         for left_out in range(len(self.optional) + 1):
             table = self._rich(self.optional[:left_out])
             needed = table.__rich_measure__(endless, endless.options).minimum
@@ -103,24 +108,33 @@ class Table:
         each of its cells begins with a number.
         """
         columns = list[list[str]]()
-        for i, right in enumerate(self.numeric):
-            cells = [row[i] for row in self.shown]
-            columns.append(_aligned(cells, digit, point, right=right))
+        for cells, numeric in zip(self._shown_columns, self.numeric, strict=True):
+            if numeric:
+                columns.append(_aligned_right(cells, digit, point))
+            else:
+                columns.append(_aligned_left(cells, digit))
         return [list(row) for row in zip(*columns, strict=True)]
+
+    @property
+    def _shown_columns(self) -> list[list[str]]:
+        """The text of each cell for a reader, by columns."""
+        cells = self.shown
+        return [[row[i] for row in cells] for i in range(len(self.header))]
 
     @cached_property
     def numeric(self) -> tuple[bool, ...]:
         """Columns that hold numbers only."""
-        kinds = ({type(row[i]) for row in self.rows} for i in range(len(self.header)))
-        return tuple(bool(kind) and str not in kind for kind in kinds)
+        return tuple(self._is_numeric(i) for i in range(len(self.header)))
+
+    def _is_numeric(self, column: int) -> bool:
+        kinds = {type(row[column]) for row in self.rows}
+        return bool(kinds) and str not in kinds
 
     @cached_property
     def short(self) -> tuple[bool, ...]:
         """Columns of text whose cells are too short to be broken into lines."""
-        columns = (
-            zip(*self.shown, strict=True) if self.rows else [()] * len(self.header)
-        )
-        return tuple(max(map(len, column), default=0) <= SHORT for column in columns)
+        columns = self._shown_columns
+        return tuple(max(map(len, cells), default=0) <= SHORT for cells in columns)
 
     def _rich(self, left_out: Sequence[str]) -> "rich.table.Table":
         """Return the table for a terminal; headers of numbers are broken into words."""
@@ -128,58 +142,78 @@ class Table:
         from rich.table import Table as RichTable
         from rich.text import Text
 
-        note = (
-            f"{self.note} Left out for width: {', '.join(left_out)}."
-            if left_out
-            else self.note
-        )
+        note = self.note
+        if left_out:
+            note = f"{note} Left out for width: {', '.join(left_out)}."
         # Text, not str: rich would read [deg] as markup
         table = RichTable(
             title=Text(self.title),
             caption=Text(note) if note else None,
             box=box.SIMPLE_HEAD,
+            padding=(0, 1, 0, 0),
+            pad_edge=False,
+            show_edge=False,
+            title_justify="left",
+            caption_justify="left",
         )
-        table.padding, table.pad_edge, table.show_edge = (0, 1, 0, 0), False, False
-        table.title_justify = table.caption_justify = "left"
         kept = [i for i, name in enumerate(self.header) if name not in left_out]
+        columns = self._shown_columns
         for i in kept:
-            name, right = self.header[i], self.numeric[i]
-            widest = max(map(len, (name, *(row[i] for row in self.shown))))
-            table.add_column(
-                Text(name.replace(" ", "\n") if right else name),
-                justify="right" if right else "left",
-                # rich wraps words where room is short, but never numbers
-                no_wrap=right,
-                # before that optional columns go
-                min_width=None if right else min(widest, 18),
-                overflow="fold",
-            )
+            name = self.header[i]
+            if self.numeric[i]:
+                # rich wraps words where room is short, but numbers must not wrap
+                title = Text(name.replace(" ", "\n"))
+                table.add_column(title, justify="right", no_wrap=True, overflow="fold")
+                continue
+            widest = max(len(text) for text in [name, *columns[i]])
+            # text narrower than this is worth less than an optional column
+            least = min(widest, 18)
+            table.add_column(Text(name), min_width=least, overflow="fold")
         for row in self.aligned(" ", " "):
             table.add_row(*(Text(row[i]) for i in kept))
         return table
 
 
-def _aligned(cells: list[str], digit: str, point: str, *, right: bool) -> list[str]:
-    """Return the cells of a column, which stands at the `right` or left, with their
-    numbers at the point.
-    """
-    numbers = [_NUMBER.match(cell) for cell in cells]
-    if not right and any(
-        cell and not number for cell, number in zip(cells, numbers, strict=True)
-    ):
-        return cells
-    parts = [number.groups("") if number else ("", "") for number in numbers]
-    widest = max((len(whole) for whole, _ in parts), default=0)
-    longest = max((len(rest) for _, rest in parts), default=0)
-    result = list[str]()
-    for cell, (whole, rest) in zip(cells, parts, strict=True):
-        if not right:
-            result.append(digit * (widest - len(whole)) + cell if cell else cell)
-        elif rest or not longest:
-            result.append(cell + digit * (longest - len(rest)))
+def _number_parts(cell: str) -> tuple[str, str]:
+    """Return the digits of a number before and from the point on, with which a cell
+    begins; both empty: it begins with none."""
+    number = _NUMBER.match(cell)
+    if number is None:
+        return "", ""
+    whole, fraction = number.groups("")
+    return whole, fraction
+
+
+def _aligned_right(cells: Sequence[str], digit: str, point: str) -> list[str]:
+    """Return the cells of a column of numbers, which stands at the right, with their
+    points below each other."""
+    parts = [_number_parts(cell) for cell in cells]
+    longest = max((len(fraction) for _, fraction in parts), default=0)
+    aligned = list[str]()
+    for cell, (whole, fraction) in zip(cells, parts, strict=True):
+        blanks = ""
+        if fraction or not longest:
+            blanks = digit * (longest - len(fraction))
+        elif whole:
+            blanks = point + digit * (longest - 1)
+        aligned.append(cell + blanks)
+    return aligned
+
+
+def _aligned_left(cells: Sequence[str], digit: str) -> list[str]:
+    """Return the cells of a column of text, which stands at the left, with the numbers
+    at their beginnings below each other; unchanged where a cell begins with none."""
+    wholes = [_number_parts(cell)[0] for cell in cells]
+    widest = max((len(whole) for whole in wholes), default=0)
+    aligned = list[str]()
+    for cell, whole in zip(cells, wholes, strict=True):
+        if not cell:
+            aligned.append(cell)
+        elif not whole:
+            return list(cells)
         else:
-            result.append(cell + point + digit * (longest - 1) if whole else cell)
-    return result
+            aligned.append(digit * (widest - len(whole)) + cell)
+    return aligned
 
 
 def shown(cell: Cell) -> str:
@@ -277,13 +311,8 @@ class Page:
 def log_names(sources: Iterable[str]) -> dict[str, str]:
     """Return short names of logs, all different, by their sources."""
     sources = list(sources)
-    return dict(
-        zip(
-            sources,
-            numbered(short_name(Path(s).name or s) for s in sources),
-            strict=True,
-        )
-    )
+    names = [short_name(Path(source).name or source) for source in sources]
+    return dict(zip(sources, numbered(names), strict=True))
 
 
 def short_name(name: str) -> str:

@@ -40,7 +40,8 @@ def write_tables(tables: Mapping[str, Table], out: Path, **more: str) -> Path:
     A table's name, which may hold a joint's, leads nowhere else: what is no letter or
     digit becomes `_`.
     """
-    content, taken = dict[str, str](), set[str]()
+    content = dict[str, str]()
+    taken = set[str]()
     for name, table in tables.items():
         file = distinct(re.sub(r"[^\w.-]", "_", short_name(name)), taken)
         content[f"tables/{file}.csv"] = table.csv()

@@ -1,31 +1,34 @@
 """The parameters of a fit: their table, in words, and what the logs made of their
 priors."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 
-from hydroid.arrays import Array
 from hydroid.estimate import FitSummary, ParameterEstimate
+from hydroid.files import Plain
 from hydroid.findings import Finding
 from hydroid.parameters import Parameter, Prior
 from hydroid.posterior.uncertainty import Flag, Source
 from hydroid.reporting.chart import Chart, Mark, Panel
 from hydroid.reporting.page import Cell, Given, Plot, Section, Table
 from hydroid.settings.fit import FitSettings
-from hydroid.settings.naming import named, place, quantity_and_side
+from hydroid.settings.naming import belongs_to, named, quantity_and_side
 from hydroid.words import interval_words, listed, number
 
-ENDS = ("from", "to", "by log from", "by log to", "profile from", "profile to")
+WHAT_IT_IS = ("joint", "side", "quantity", "symbol", "value", "unit")
+"""columns with which every table of parameters begins"""
+NO_LIMITS = (None, None)
+"""interval without an end"""
 FARTHEST = 5.0
 """standard deviations of the prior up to which a posterior is drawn"""
 MOST_ALIKE = 3
 """parameters of the same words that a sentence names"""
 ROW = 16
 """height of a parameter's row in a chart [px]"""
+Row = dict[str, Cell]  # by the names of columns
 Intervals = Mapping[str, tuple[float, float]]
 
 _NOTE = (
@@ -47,9 +50,9 @@ def parameter_section(
     """
     text = ""
     free = {p.quantity for p in settings.parameters.values() if p.fixed is None}
-    supplied = "supply_pressure" in free or settings.objective.pressure_weight
-    if settings.stage == "hyd" and not supplied:
-        # without pressures in the log only p A is known
+    tells_pressure = "supply_pressure" in free or settings.objective.pressure_weight
+    if settings.stage == "hyd" and not tells_pressure:
+        # without pressures in the log only their product with the areas is known
         supply = number(settings.hydraulics.supply_pressure)
         text = f"Areas, masses, torques and flows hold for the given supply of {supply} bar."
     tables = {"parameters": short_table(settings, summary)}
@@ -61,9 +64,10 @@ def parameter_section(
 
 def known_of_free(summary: FitSummary) -> str:
     """Say how many of the free parameters have an interval."""
-    free = [one for one in summary.estimate.values() if one.flag != Flag.FIXED]
-    known = sum(one.sd is not None for one in free)
-    return f"{known} of {len(free)} free parameters have an interval"
+    every = summary.estimate.values()
+    free = [estimate for estimate in every if estimate.flag != Flag.FIXED]
+    with_interval = sum(estimate.sd is not None for estimate in free)
+    return f"{with_interval} of {len(free)} free parameters have an interval"
 
 
 def prior_section(settings: FitSettings, summary: FitSummary) -> Section | None:
@@ -71,50 +75,35 @@ def prior_section(settings: FitSettings, summary: FitSummary) -> Section | None:
 
     None where no parameter has an interval.
     """
-    known = [one for one in summary.estimate.values() if one.sd is not None]
-    if not known:
+    every = summary.estimate.values()
+    sources = [estimate.source for estimate in every if estimate.sd is not None]
+    if not sources:
         return None
-    by_data = sum(one.source == Source.DATA for one in known)
     plot = Plot("priors", _PRIORS, partial(prior_chart, settings, summary))
-    answer = f"{by_data} of {len(known)} known from the logs"
+    answer = f"{sources.count(Source.DATA)} of {len(sources)} known from the logs"
     return Section("Prior and posterior", plots=(plot,), folded=True, answer=answer)
 
 
 def short_table(settings: FitSettings, summary: FitSummary) -> Table:
     """Return one line per parameter for a reader: `parameter_table` has bounds and more
     digits."""
-    by_log = ("by log",) if summary.left_out_deg else ()
-    header = (
-        "joint",
-        "side",
-        "quantity",
-        "symbol",
-        "value",
-        "unit",
-        "interval",
-        *by_log,
-        "source",
-    )
-    rows = list[tuple[Cell, ...]]()
-    for name, one in summary.estimate.items():
-        what, side = quantity_and_side(settings, name)
-        said = place(settings, name), side, what, name
-        logs = (interval_words(*one.interval_by_log),) if by_log else ()
-        share = ""
-        if one.source == Source.BOTH and one.data_share:
-            share = f" ({100 * one.data_share:.0f} %)"
-        rows.append(
-            (
-                *said,
-                one.value,
-                one.unit,
-                interval_words(*one.interval),
-                *logs,
-                origin(one) + share,
-            )
-        )
+    columns = [*WHAT_IT_IS, "interval"]
+    if summary.left_out_deg:
+        columns.append("by log")
+    columns.append("source")
+    rows = list[Row]()
+    for name, estimate in summary.estimate.items():
+        source = origin(estimate)
+        if estimate.source == Source.BOTH and estimate.data_share:
+            source += f" ({100 * estimate.data_share:.0f} %)"
+        row = _what_it_is(settings, name, estimate)
+        row["unit"] = estimate.unit
+        row["interval"] = interval_words(*estimate.interval)
+        row["by log"] = interval_words(*estimate.interval_by_log)
+        row["source"] = source
+        rows.append(row)
     note = "interval: of 95 %; by log: the same, from the differences between logs."
-    return Table("Parameters", header, tuple(rows), note)
+    return Table.of("Parameters", {name: name for name in columns}, rows, note)
 
 
 def parameter_table(
@@ -124,46 +113,53 @@ def parameter_table(
     it is known from.
     """
 
-    def row(p: Parameter) -> dict[str, Any]:
-        one = summary.estimate[p.name]
-        own = settings.parameters[p.name]
-        low, high = map(Given, own.bounds) if own.bounds else (p.lower, p.upper)
-        ends = (
-            *one.interval,
-            *one.interval_by_log,
-            *(profiles or {}).get(p.name, (None, None)),
-        )
-        what, side = quantity_and_side(settings, p.name)
-        return {
-            "joint": place(settings, p.name),
-            "side": side,
-            "quantity": what,
-            "symbol": p.name,
-            "value": one.value,
-            "unit": p.unit,
-            **({"lower": low, "upper": high} if low < high else {}),
-            **dict(zip(ENDS, ends, strict=True)),
-            "data [%]": None if one.data_share is None else 100 * one.data_share,
-            "source": origin(one),
-        }
-
-    by_log = ENDS[2:4] if summary.left_out_deg else ()
-    columns = [
-        "joint",
-        "side",
-        "quantity",
-        "symbol",
-        "value",
-        "unit",
-        *ENDS[:2],
-        *by_log,
-    ]
-    columns += [*(ENDS[4:] if profiles else ()), "lower", "upper", "data [%]", "source"]
+    by_log = ("by log from", "by log to") if summary.left_out_deg else ()
+    columns = [*WHAT_IT_IS, "from", "to", *by_log]
+    if profiles:
+        columns += ["profile from", "profile to"]
+    columns += ["lower", "upper", "data [%]", "source"]
+    rows = list[Row]()
+    for parameter in settings.parameter_set().parameters:
+        name = parameter.name
+        estimate = summary.estimate[name]
+        row = _what_it_is(settings, name, estimate)
+        row["unit"] = parameter.unit
+        row["from"], row["to"] = estimate.interval
+        row["by log from"], row["by log to"] = estimate.interval_by_log
+        row["profile from"], row["profile to"] = (profiles or {}).get(name, NO_LIMITS)
+        row |= _bounds(settings, parameter)
+        if estimate.data_share is not None:
+            row["data [%]"] = 100 * estimate.data_share
+        row["source"] = origin(estimate)
+        rows.append(row)
     optional = ("quantity", "side", "joint", *by_log, "data [%]", "lower", "upper")
-    rows = map(row, settings.parameter_set().parameters)
-    return Table.of(
-        "Parameters", {name: name for name in columns}, rows, _NOTE, optional
-    )
+    shown = {name: name for name in columns}
+    return Table.of("Parameters", shown, rows, _NOTE, optional)
+
+
+def _what_it_is(settings: FitSettings, name: str, estimate: ParameterEstimate) -> Row:
+    """Return the columns with which every table of parameters begins, without the
+    unit."""
+    quantity, side = quantity_and_side(settings, name)
+    return {
+        "joint": belongs_to(settings, name),
+        "side": side,
+        "quantity": quantity,
+        "symbol": name,
+        "value": estimate.value,
+    }
+
+
+def _bounds(settings: FitSettings, parameter: Parameter) -> Row:
+    """Return the bounds of a parameter, the user's own as they are given; none of one
+    that is fixed."""
+    given = settings.parameters[parameter.name].bounds
+    lower, upper = given or (parameter.lower, parameter.upper)
+    if lower >= upper:
+        return {}
+    if given:
+        return {"lower": Given(lower), "upper": Given(upper)}
+    return {"lower": lower, "upper": upper}
 
 
 def in_words(finding: Finding, settings: FitSettings) -> Finding:
@@ -174,47 +170,48 @@ def in_words(finding: Finding, settings: FitSettings) -> Finding:
     groups = dict[str, list[str]]()
     details = dict(finding.details)
     for name in finding.subjects:
-        key = (
-            quantity_and_side(settings, name)[0]
-            if name in settings.parameters
-            else name
-        )
-        groups.setdefault(key, []).append(name)
+        words = name
+        if name in settings.parameters:
+            words, _ = quantity_and_side(settings, name)
+        groups.setdefault(words, []).append(name)
     subjects = list[str]()
-    for what, names in groups.items():
-        if names == [what]:  # no parameter
-            subjects.append(what)
+    for words, names in groups.items():
+        if names == [words]:  # no parameter
+            subjects.append(words)
         elif len(names) == 1:
             subjects.append(named(settings, names[0], details.pop(names[0], "")))
         else:
-            said = [
-                f"{name}: {details.pop(name)}" if name in details else name
-                for name in names
-            ]
-            subjects.append(f"{what} ({listed(said, MOST_ALIKE)})")
+            symbols = [_with_detail(name, details) for name in names]
+            subjects.append(f"{words} ({listed(symbols, MOST_ALIKE)})")
     return replace(finding, subjects=tuple(subjects), details=details)
+
+
+def _with_detail(name: str, details: dict[str, str]) -> str:
+    """Return a symbol with its detail, which is taken from the details."""
+    return f"{name}: {details.pop(name)}" if name in details else name
 
 
 def status(estimate: ParameterEstimate) -> str:
     """Say how well a parameter is known, in a few words; empty where its interval says
     it all."""
-    flag, source = estimate.flag, estimate.source
-    plain = flag == Flag.IDENTIFIABLE or (
-        source == Source.PRIOR and flag != Flag.NO_EFFECT
-    )
-    words = (
-        "" if plain else flag,
-        source if source in (Source.BOTH, Source.PRIOR) else "",
-        f"at {estimate.at_bound} bound" if estimate.at_bound else "",
-    )
+    flag = estimate.flag
+    source = estimate.source
+    # what a prior alone tells is as narrow as the prior: that is no news
+    from_prior = source == Source.PRIOR and flag != Flag.NO_EFFECT
+    words = list[str | None]()
+    if flag != Flag.IDENTIFIABLE and not from_prior:
+        words.append(flag)
+    if source in (Source.BOTH, Source.PRIOR):
+        words.append(source)
+    if estimate.at_bound:
+        words.append(f"at {estimate.at_bound} bound")
     return ", ".join(filter(None, words))
 
 
 def origin(estimate: ParameterEstimate) -> str:
     """Say what a parameter is known from, and how well: data, for one that the logs
     determine."""
-    said = status(estimate)
-    return said or estimate.source or ""
+    return status(estimate) or estimate.source or ""
 
 
 def prior_chart(settings: FitSettings, summary: FitSummary) -> Chart:
@@ -222,87 +219,71 @@ def prior_chart(settings: FitSettings, summary: FitSummary) -> Chart:
 
     Those without a prior are drawn between their bounds.
     """
-    with_prior = list[Parameter]()
-    without = list[Parameter]()
+    scores = dict[str, list[float]]()
+    positions = dict[str, list[float]]()
     for parameter in settings.parameter_set().parameters:
-        if summary.estimate[parameter.name].sd is not None:
-            (without if parameter.prior is None else with_prior).append(parameter)
+        name = parameter.name
+        estimate = summary.estimate[name]
+        if estimate.sd is None:
+            continue
+        if parameter.prior is None:
+            positions[name] = _position(estimate, parameter)
+        else:
+            scores[name] = _score(estimate, parameter.prior)
     panels = list[Panel]()
-    if with_prior:
-        scores = [
-            _score(summary.estimate[p.name], p.prior)
-            for p in with_prior
-            if p.prior is not None
-        ]
+    if scores:
+        ends = np.array([-1.96, 1.96])
+        look: Plain = {"color": "pale", "label": "prior, 95 %", "alpha": 0.6}
+        prior = Mark("spans", ends[:1], end=ends[1:], **look)
         x = "standard deviations from the prior's value"
-        expected = Mark(
-            "spans",
-            np.array([-1.96]),
-            end=np.array([1.96]),
-            color="pale",
-            label="prior, 95 %",
-        )
-        panels.append(
-            _bars(
-                "Beside their priors",
-                x,
-                with_prior,
-                np.array(scores),
-                replace(expected, alpha=0.6),
-            )
-        )
-    if without:
-        places = [_position(summary.estimate[p.name], p) for p in without]
+        panels.append(_bars("Beside their priors", x, scores, prior))
+    if positions:
         x = "lower bound: 0; upper bound: 1"
-        panels.append(
-            _bars("Without a prior: between their bounds", x, without, np.array(places))
-        )
+        title = "Without a prior: between their bounds"
+        panels.append(_bars(title, x, positions))
     return Chart(tuple(panels))
 
 
-def _score(one: ParameterEstimate, prior: Prior) -> list[float]:
+def _score(estimate: ParameterEstimate, prior: Prior) -> list[float]:
     """Return estimate and ends of the interval in standard deviations from the prior's
     value."""
-    least = 1e-12 * abs(prior.nominal)  # a logarithm needs more than 0
-    low, high = one.interval
-    values = [
-        prior.score(np.array(max(value, least) if prior.log else value))
-        if value is not None
-        else end
-        for value, end in ((one.value, 0.0), (low, -FARTHEST), (high, FARTHEST))
-    ]
-    return [float(np.clip(value, -FARTHEST, FARTHEST)) for value in values]
+    low, high = estimate.interval
+    ends = ((estimate.value, 0.0), (low, -FARTHEST), (high, FARTHEST))
+    scores = list[float]()
+    for value, without_limit in ends:
+        score = without_limit
+        if value is not None:
+            # a logarithm needs more than 0
+            least = 1e-12 * abs(prior.nominal) if prior.log else -np.inf
+            score = prior.score(np.array(max(value, least)))
+        scores.append(float(np.clip(score, -FARTHEST, FARTHEST)))
+    return scores
 
 
-def _position(one: ParameterEstimate, parameter: Parameter) -> list[float]:
+def _position(estimate: ParameterEstimate, parameter: Parameter) -> list[float]:
     """Return estimate and ends of the interval on the parameter's scale between its
     bounds."""
-    low, high = one.interval
-    ends = [
-        parameter.lower if low is None else low,
-        parameter.upper if high is None else high,
-    ]
-    values = np.clip([one.value, *ends], parameter.lower, parameter.upper)
+    low, high = estimate.interval
+    if low is None:
+        low = parameter.lower
+    if high is None:
+        high = parameter.upper
+    values = np.clip([estimate.value, low, high], parameter.lower, parameter.upper)
     return parameter.position(values).tolist()
 
 
 def _bars(
-    title: str, x: str, parameters: list[Parameter], rows: Array, *behind: Mark
+    title: str, x: str, rows: Mapping[str, Sequence[float]], *behind: Mark
 ) -> Panel:
-    """Draw estimates and the ends of their intervals, shape (n, 3), each in a row."""
+    """Draw the estimates of parameters and the ends of their intervals, each in a
+    row."""
+    value, low, high = np.array([*rows.values()]).T
     at = np.arange(float(len(rows)))
+    label = "posterior, 95 %"
     marks = (
         *behind,
-        Mark(
-            "bars",
-            rows[:, 1],
-            at,
-            rows[:, 2],
-            color="blue",
-            label="posterior, 95 %",
-            alpha=0.5,
-        ),
-        Mark("points", rows[:, 0], at, color="blue", width=5, label="estimate"),
+        Mark("bars", low, at, high, color="blue", label=label, alpha=0.5),
+        Mark("points", value, at, color="blue", width=5, label="estimate"),
     )
     height = 70 + ROW * len(rows)
-    return Panel(x, "", marks, title, height, rows=tuple(p.name for p in parameters))
+    return Panel(x, "", marks, title, height, rows=tuple(rows))

@@ -2,7 +2,7 @@
 and of a validation.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -47,6 +47,8 @@ from hydroid.words import listed
 
 MOST_LOGS = 6
 """logs that the foot of a page names"""
+SOFTWARE = ("hydroid", "mujoco", "numpy", "python")
+"""whose versions stand at the foot of a page"""
 
 
 def validation_page(
@@ -57,24 +59,27 @@ def validation_page(
     Its tables are `verdict`, `errors` and `horizons`.
     """
     ordered = sorted(predictions, key=lambda p: p.unseen is not True)
-    sections = [
-        *verdict_sections(fits, *steps),
-        *prediction_sections(ordered, arm, fits),
-    ]
-    files = {"errors": error_table(ordered, arm, one_fit=len(fits) == 1)}
-    warned = outside(next(iter(fits.values())))
-    logs = [
-        short_name(Path(source).name)
-        for source in dict.fromkeys(p.log.source for p in ordered)
-    ]
-    made_from = (
-        f"Fits: {listed([*map(short_name, fits)])}",
-        f"logs: {listed(logs, MOST_LOGS)}",
+    verdicts = verdict_sections(fits, *steps)
+    sections = (*verdicts, *prediction_sections(ordered, arm, fits))
+    logs = dict.fromkeys(prediction.log.source for prediction in ordered)
+    return Page(
+        "validation",
+        "Validation",
+        lead(fits),
+        sections,
+        warnings=outside(next(iter(fits.values()))),
+        files={"errors": error_table(ordered, arm, one_fit=len(fits) == 1)},
+        made_from=(
+            f"Fits: {listed([*map(short_name, fits)])}",
+            f"logs: {_log_list(logs)}",
+        ),
     )
-    page = Page(
-        "validation", "Validation", lead(fits), tuple(sections), warned, files=files
-    )
-    return replace(page, made_from=made_from)
+
+
+def _log_list(sources: Iterable[str]) -> str:
+    """Return the names of logs as the foot of a page has them."""
+    names = [short_name(Path(source).name) for source in sources]
+    return listed(names, MOST_LOGS)
 
 
 def prediction_sections(
@@ -83,18 +88,19 @@ def prediction_sections(
     """Return errors and responses of each joint in each log, and the errors by
     prediction time."""
     if len(fits) == 1:
-        predictions = [replace(one, fit="simulated") for one in predictions]
+        predictions = [replace(p, fit="simulated") for p in predictions]
+    sections = [response_section(predictions, arm, fits.values())]
     horizons = horizon_section(fits)
-    return [
-        response_section(predictions, arm, fits.values()),
-        *([horizons] if horizons else []),
-    ]
+    if horizons is not None:
+        sections.append(horizons)
+    return sections
 
 
 def draw(run: str | Path, *, figures: bool = False) -> Path:
     """Draw the report of a finished run in its folder, from what it stores; return the
     page."""
-    folder, page = Path(run), fit_page(load_record(run))
+    folder = Path(run)
+    page = fit_page(load_record(run))
     page_file.write_page(page, folder)
     if figures:
         page_file.write_figures(page, folder / "figures")
@@ -104,89 +110,89 @@ def draw(run: str | Path, *, figures: bool = False) -> Path:
 def fit_page(record: Record) -> Page:
     """Return the page of a fit, with the unseen logs that it was validated on."""
     settings = record.settings
+    fits = {str(record.summary.final): record.verdict}
+    shown = [*record.validations.values(), *record.result.fitted]
+    versions = {
+        name: str(record.identity[name]) for name in SOFTWARE if name in record.identity
+    }
+    return Page(
+        "report",
+        title=f"Fit of {settings.arm.name}, stage {2 if settings.stage == 'hyd' else 1}",
+        lead=lead(fits),
+        sections=_fit_sections(record, fits, shown),
+        warnings=_fit_warnings(record),
+        versions=versions,
+        data=_search_data(record),
+        files={
+            "parameters": parameter_table(settings, record.summary),
+            "errors": error_table(shown, settings.arm, one_fit=True),
+        },
+        made_from=_made_from(record),
+    )
+
+
+def _fit_sections(
+    record: Record, fits: Verdicts, shown: Sequence[Prediction]
+) -> tuple[Section, ...]:
+    """Return the sections of the page of a fit, those that are folded last."""
+    settings = record.settings
     summary = record.summary
     fitted = record.result.fitted
-    shown = [*record.validations.values(), *fitted]
-    fits = {str(summary.final): record.verdict}
+    step = next_step(summary, record.verdict, record.folder, fitted)
     sections = (
-        *verdict_sections(
-            fits, next_step(summary, record.verdict, record.folder, fitted)
-        ),
+        *verdict_sections(fits, step),
         *prediction_sections(shown, settings.arm, fits),
         quantity_section(settings, summary),
         error_section(settings, summary),
         unknown_section(settings, summary),
         residual_section(settings, summary, fitted),
-        speed_section(settings, summary, [one.log for one in fitted]),
+        speed_section(settings, summary, [prediction.log for prediction in fitted]),
         step_section(settings, summary),
         parameter_section(settings, summary, *further_findings(summary)),
         prior_section(settings, summary),
         correlation_section(settings, summary),
         search_section(record),
     )
-    in_order = sorted(filter(None, sections), key=lambda section: section.folded)
-    title = f"Fit of {settings.arm.name}, stage {2 if settings.stage == 'hyd' else 1}"
-    made_by = {
-        k: str(v)
-        for k, v in record.identity.items()
-        if k in ("hydroid", "mujoco", "numpy", "python")
-    }
+    return tuple(sorted(filter(None, sections), key=lambda section: section.folded))
+
+
+def _fit_warnings(record: Record) -> tuple[str, ...]:
+    """Return what must be read before the estimate of a fit is used."""
+    warned = list[str]()
     unseen = [*record.validations.values()]
-    apart = [Path(one.log.source).name for one in unseen if one.apart]
-    left_out = (
-        [f"The verdict does not count {listed(apart)}: validated with --apart."]
-        if apart
-        else []
-    )
-    out = map(str, standing_out(unseen, record.verdict, record.folder))
-    said = (str(in_words(one, settings)) for one in warnings(summary))
-    warned = (*left_out, *out, *outside(record.verdict), *said)
-    # the history and the Pareto set with every bit, in the search's units: rad unless
-    # relative
+    apart = [Path(p.log.source).name for p in unseen if p.apart]
+    if apart:
+        what = f"The verdict does not count {listed(apart)}: validated with --apart."
+        warned.append(what)
+    warned += map(str, standing_out(unseen, record.verdict, record.folder))
+    warned += outside(record.verdict)
+    for finding in warnings(record.summary):
+        warned.append(str(in_words(finding, record.settings)))
+    return tuple(warned)
+
+
+def _search_data(record: Record) -> dict[str, str]:
+    """Return the history and the Pareto set of the search as CSV with every bit, in its
+    units: rad unless relative."""
     theta, objectives = record.result.front
-    unit = "" if settings.objective.relative else "_rad"
-    segments = (f"segment_{s}{unit}" for s in range(1, objectives.shape[1]))
-    header = (
-        *next(iter(summary.estimates.values())).values,
-        *segments,
-        f"overall{unit}",
-    )
-    data = {
+    unit = "" if record.settings.objective.relative else "_rad"
+    names = [*next(iter(record.summary.estimates.values())).values]
+    names += [f"segment_{number}{unit}" for number in range(1, objectives.shape[1])]
+    names.append(f"overall{unit}")
+    candidates = np.column_stack([theta, objectives]).tolist()
+    return {
         "history.csv": csv_text([HISTORY, *record.result.history.tolist()]),
-        "pareto.csv": csv_text(
-            [header, *np.column_stack([theta, objectives]).tolist()]
-        ),
+        "pareto.csv": csv_text([names, *candidates]),
     }
-    files = {
-        "parameters": parameter_table(settings, summary),
-        "errors": error_table(shown, settings.arm, one_fit=True),
-    }
-    made_from = _made_from(record)
-    return Page(
-        "report",
-        title,
-        lead(fits),
-        tuple(in_order),
-        warned,
-        made_by,
-        data,
-        files,
-        made_from,
-    )
 
 
 def _made_from(record: Record) -> tuple[str, ...]:
     """Return the logs, settings, seed and date of a fit, for the foot of its page."""
-    logs = [short_name(Path(one.log.source).name) for one in record.result.fitted]
-    model = record.settings.simulation.model
+    logs = [prediction.log.source for prediction in record.result.fitted]
     settings = f"settings: config.yaml in {record.folder}, model {record.summary.final}"
     if record.settings.stage == "hyd":
-        settings += f" ({model})"
-    date = record.identity.get("finished")
-    seed = f"seed {record.seed}"
-    return (
-        f"Fitted to {listed(logs, MOST_LOGS)}",
-        settings,
-        seed,
-        *([str(date)] if date else []),
-    )
+        settings += f" ({record.settings.simulation.model})"
+    made_from = [f"Fitted to {_log_list(logs)}", settings, f"seed {record.seed}"]
+    if date := record.identity.get("finished"):
+        made_from.append(str(date))
+    return tuple(made_from)

@@ -3,6 +3,7 @@ of any model.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -13,7 +14,7 @@ from hydroid.fitting.validation import Prediction
 from hydroid.posterior.stored_errors import stored_error_model
 from hydroid.posterior.whiteness import ResidualTest, residual_tests
 from hydroid.problem.problem import Problem
-from hydroid.reporting.chart import Chart, Mark, Panel
+from hydroid.reporting.chart import Chart, Mark, Panel, zero_line
 from hydroid.reporting.page import Cell, Plot, Section, Table
 from hydroid.settings.fit import FitSettings
 from hydroid.words import listed, two_digits
@@ -38,10 +39,9 @@ def residual_section(
 
     None: nothing can be tested.
     """
-    usable = [one for one in fitted if np.isfinite(one.response).all()]
-    if not usable or any(
-        f"q{joint}" not in summary.errors for joint in settings.outputs
-    ):
+    usable = [p for p in fitted if np.isfinite(p.response).all()]
+    has_errors = all(f"q{joint}" in summary.errors for joint in settings.outputs)
+    if not usable or not has_errors:
         return None
     tests = _tests(settings, summary, usable)
     tabs = list[Plot]()
@@ -49,18 +49,12 @@ def residual_section(
     lasting = list[str]()
     for joint, test in tests.items():
         name = settings.arm.joint_names[joint - 1]
-        drawing = partial(_correlations, name, test)
-        tabs.append(
-            Plot(
-                f"residual_{len(tabs) + 1}",
-                f"{name}: correlations",
-                drawing,
-                button=name,
-            )
-        )
-        own, command = (100 * part for part in test.outside)
+        draw = partial(_correlations, name, test)
+        caption = f"{name}: correlations"
+        tabs.append(Plot(f"residual_{len(tabs) + 1}", caption, draw, button=name))
         largest = float(np.abs(test.with_command).max())
-        rows.append((name, two_digits(own), two_digits(command), two_digits(largest)))
+        shares = [100 * part for part in test.outside]
+        rows.append((name, *map(two_digits, (*shares, largest))))
         if seconds := summary.errors[f"q{joint}"].lasts_s:
             lasting.append(f"{name} (for {two_digits(seconds)} s)")
     answer = f"an error lasts in {listed(lasting)}" if lasting else "white"
@@ -75,7 +69,7 @@ def residual_section(
 def _tests(
     settings: FitSettings, summary: FitSummary, fitted: Sequence[Prediction]
 ) -> dict[int, ResidualTest]:
-    logs = [one.log for one in fitted]
+    logs = [prediction.log for prediction in fitted]
     problem = Problem(settings, logs)
     errors = stored_error_model(problem, summary.errors)
     row = np.zeros((1, len(problem.measured)))
@@ -87,40 +81,30 @@ def _tests(
 
 
 def _correlations(name: str, test: ResidualTest) -> Chart:
+    itself = _panel(test.lags, test.autocorrelation, test.bound)
+    command = _panel(test.command_lags, test.with_command, test.bound)
     return Chart(
         (
-            _panel(
-                f"{name}: autocorrelation",
-                "lag [s]",
-                test.lags,
-                test.autocorrelation,
-                test.bound,
-            ),
-            _panel(
-                f"{name}: correlation with the command",
-                "lag behind the command [s]",
-                test.command_lags,
-                test.with_command,
-                test.bound,
+            replace(itself, x="lag [s]", title=f"{name}: autocorrelation"),
+            replace(
+                command,
+                x="lag behind the command [s]",
+                title=f"{name}: correlation with the command",
             ),
         )
     )
 
 
-def _panel(title: str, x: str, lags: Array, values: Array, bound: float) -> Panel:
+def _panel(lags: Array, values: Array, bound: float) -> Panel:
+    """Draw correlations over lags [s], and what chance makes of them."""
     ends = lags[[0, -1]]
-    largest = max(1.2 * float(np.abs(values).max()), 2.0 * bound, 0.1)
+    low = np.full(2, -bound)
+    label = "95 % by chance"
     marks = (
-        Mark(
-            "band",
-            ends,
-            np.full(2, -bound),
-            np.full(2, bound),
-            color="pale",
-            label="95 % by chance",
-            alpha=0.6,
-        ),
-        Mark("rule", y=np.zeros(1), color="grey", width=1),
+        Mark("band", ends, low, -low, color="pale", label=label, alpha=0.6),
+        zero_line(),
         Mark("line", lags, values, color="blue", width=1.2),
     )
-    return Panel(x, "correlation [-]", marks, title, 200, (-largest, largest))
+    largest = max(1.2 * float(np.abs(values).max()), 2.0 * bound, 0.1)
+    limits = (-largest, largest)
+    return Panel("", "correlation [-]", marks, height=200, y_limits=limits)

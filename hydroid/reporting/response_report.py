@@ -10,23 +10,38 @@ import numpy as np
 
 from hydroid.arm.model import load_model
 from hydroid.arrays import rms
+from hydroid.files import Plain
 from hydroid.fitting.validation import Prediction
 from hydroid.fitting.verdict import rms_deg
 from hydroid.joint_verdict import JointVerdict
-from hydroid.reporting.chart import SERIES, Chart, Mark, Panel, finite
+from hydroid.reporting.chart import (
+    SERIES,
+    Chart,
+    Mark,
+    Panel,
+    command_panel,
+    finite,
+    reference,
+    zero_line,
+)
 from hydroid.reporting.moving_arm import MOST, moving_arm
 from hydroid.reporting.page import Plot, Section, Table, log_names, short_name
 from hydroid.settings.arm import Arm
-from hydroid.units import display
+from hydroid.units import Display, display
 from hydroid.words import number, two_digits
 
 MOTIONS = 8
 """logs that a page shows in motion"""
-SAMPLES, MOST_BINS, LEAST_BINS = 9000, 1000, 150
-"""parts of the curves of all responses of a page together, and of one of them: the page
-stays small"""
+SAMPLES = 9000
+"""parts of the curves of all responses of a page together: the page stays small"""
+MOST_BINS = 1000
+"""parts of one response's curves, at most"""
+LEAST_BINS = 150
+"""parts of one response's curves, at least"""
 FAR = 3.0
 """ranges of the measured angle beyond which a response that runs away is not drawn"""
+COMMAND_COLORS = ("blue", "green", "pink", "yellow", "sky", "grey")
+"""of the joints' commands in one panel"""
 ALL = "joints"
 """column of the responses of all joints together"""
 
@@ -68,48 +83,59 @@ def response_section(
     of the first fit that does.
     """
     by_log = dict[str, list[Prediction]]()
-    for one in predictions:
-        by_log.setdefault(one.log.source, []).append(one)
+    for prediction in predictions:
+        by_log.setdefault(prediction.log.source, []).append(prediction)
     names = log_names(by_log)
     tolerances = dict[int, float]()
-    for one in chain.from_iterable(verdicts):
-        tolerances.setdefault(one.joint, one.tolerance_deg)
+    for verdict in chain.from_iterable(verdicts):
+        tolerances.setdefault(verdict.joint, verdict.tolerance_deg)
     count = sum(len(_compared(group)) for group in by_log.values())
     bins = min(MOST_BINS, max(LEAST_BINS, SAMPLES // max(count, 1)))
     tabs = list[Plot]()
+    moving = dict[str, Prediction]()
     for log, group in by_log.items():
         row = f"{names[log]} {_kind(group[0])}".strip()
-        of_log = [
-            _joint_tab(arm, joint, group, names[log], bins, tolerances)
-            for joint in _compared(group)
-        ]
-        if len(of_log) > 1:
-            of_log.append(_all_tab(arm, group, names[log], bins, of_log))
-        tabs += [_numbered(tab, row, len(tabs) + i) for i, tab in enumerate(of_log, 1)]
-    rows = {
-        log: f"{names[log]} {_kind(group[0])}".strip() for log, group in by_log.items()
-    }
-    beside = motions(arm, {rows[log]: group[0] for log, group in by_log.items()})
-    title, text = ("Errors by log", _MATRIX) if len(tabs) > 1 else ("Response", "")
-    return Section(
-        title,
-        text,
-        tabs=tuple(tabs),
-        beside=beside,
-        beside_note=_MOTION if beside else "",
-    )
+        moving[row] = group[0]
+        for tab in _log_tabs(arm, group, names[log], bins, tolerances):
+            tabs.append(replace(tab, name=f"response_{len(tabs) + 1}", row=row))
+    beside = motions(arm, moving)
+    title = "Response"
+    text = ""
+    if len(tabs) > 1:
+        title = "Errors by log"
+        text = _MATRIX
+    note = _MOTION if beside else ""
+    return Section(title, text, tabs=tuple(tabs), beside=beside, beside_note=note)
+
+
+def _log_tabs(
+    arm: Arm,
+    group: Sequence[Prediction],
+    log: str,
+    bins: int,
+    tolerances: Mapping[int, float],
+) -> list[Plot]:
+    """Return the tabs of a log: one for each joint that is compared, and one of all of
+    them together."""
+    tabs = list[Plot]()
+    for joint in _compared(group):
+        tabs.append(_joint_tab(arm, joint, group, log, bins, tolerances))
+    if len(tabs) > 1:
+        tabs.append(_all_tab(arm, group, log, bins, tabs))
+    return tabs
 
 
 def error_table(predictions: Sequence[Prediction], arm: Arm, *, one_fit: bool) -> Table:
     """Return all errors of all predictions, one row for each joint of each."""
-    names = log_names(dict.fromkeys(one.log.source for one in predictions))
+    sources = dict.fromkeys(prediction.log.source for prediction in predictions)
+    names = log_names(sources)
     rows = list[dict[str, object]]()
-    for one in predictions:
-        for row in one.plain(arm.joint_names):
+    for prediction in predictions:
+        for row in prediction.plain(arm.joint_names):
             row |= {
-                "fit": short_name(one.fit),
-                "log": names[one.log.source],
-                "kind": _kind(one),
+                "fit": short_name(prediction.fit),
+                "log": names[prediction.log.source],
+                "kind": _kind(prediction),
             }
             shown = arm.joints[row["joint"] - 1].shown
             row["unit"] = shown.unit
@@ -134,10 +160,11 @@ def motion_section(
 
     It is for pages without responses beside it. None of what diverged.
     """
-    tabs = [
-        replace(plot, button=plot.row, row="") for plot in motions(arm, predictions)
-    ]
-    return Section("The arm in motion", caption, tabs=tuple(tabs)) if tabs else None
+    plots = motions(arm, predictions)
+    if not plots:
+        return None
+    tabs = tuple(replace(plot, button=plot.row, row="") for plot in plots)
+    return Section("The arm in motion", caption, tabs=tabs)
 
 
 def motions(arm: Arm, predictions: Mapping[str, Prediction]) -> tuple[Plot, ...]:
@@ -146,48 +173,35 @@ def motions(arm: Arm, predictions: Mapping[str, Prediction]) -> tuple[Plot, ...]
 
     What diverged is left out.
     """
-    usable = [
-        item for item in predictions.items() if np.isfinite(item[1].response).all()
-    ]
-    usable.sort(key=lambda item: -max(one.rms for one in item[1].indices.values()))
-    del usable[MOTIONS:]
-    if not usable:
+
+    def worst_rms(row: str) -> float:
+        return max(error.rms for error in predictions[row].indices.values())
+
+    usable = [row for row, p in predictions.items() if np.isfinite(p.response).all()]
+    rows = sorted(usable, key=worst_rms, reverse=True)[:MOTIONS]
+    if not rows:
         return ()
     model = load_model(arm).compile()
+    # all pictures of a page share what it may hold
+    moments = MOST // len(rows)
     plots = list[Plot]()
-    for row, one in usable:
-        drawing = partial(moving_arm, model, arm.joint_names, one, MOST // len(usable))
-        plots.append(
-            Plot(
-                f"motion_{len(plots) + 1}",
-                f"The arm in motion: {row}",
-                drawing,
-                row=row,
-            )
-        )
+    for row in rows:
+        draw = partial(moving_arm, model, arm.joint_names, predictions[row], moments)
+        caption = f"The arm in motion: {row}"
+        plots.append(Plot(f"motion_{len(plots) + 1}", caption, draw, row=row))
     return tuple(plots)
 
 
 def _compared(group: Sequence[Prediction]) -> list[int]:
     """Return the joints that any prediction of a log compares, numbered from 1."""
-    return [*dict.fromkeys(joint for one in group for joint in one.joints)]
+    joints = chain.from_iterable(prediction.joints for prediction in group)
+    return [*dict.fromkeys(joints)]
 
 
-def _kind(one: Prediction) -> str:
-    return "unseen, not counted" if one.apart else _KINDS[one.unseen]
-
-
-def _numbered(tab: Plot, row: str, count: int) -> Plot:
-    return Plot(
-        f"response_{count}",
-        tab.caption,
-        tab.draw,
-        True,
-        tab.button,
-        row,
-        tab.column,
-        tab.state,
-    )
+def _kind(prediction: Prediction) -> str:
+    if prediction.apart:
+        return "unseen, not counted"
+    return _KINDS[prediction.unseen]
 
 
 def _joint_tab(
@@ -201,29 +215,37 @@ def _joint_tab(
     """Return the tab of one joint in a log: its error, and the response of each model
     that compares it.
     """
-    several = [one for one in group if joint in one.joints]
+    predictions = [prediction for prediction in group if joint in prediction.joints]
     name = arm.joint_names[joint - 1]
     slides = arm.joints[joint - 1].slides
     title = f"{name} in {log}"
-    error = rms_deg([several[0].error(joint)])
-    tolerance = tolerances.get(joint, np.inf)
-    state = "good"
-    if not error <= tolerance:
-        state = "fair" if error <= 2 * tolerance else "bad"
-    size = (
-        f"{two_digits(1e3 * np.radians(error))} mm"
-        if slides
-        else f"{two_digits(error)}°"
-    )
-    drawing = partial(draw_response, title, joint, several, bins, slides=slides)
+    error = rms_deg([predictions[0].error(joint)])
+    draw = partial(draw_response, title, joint, predictions, bins, slides=slides)
     return Plot(
         "",
         title,
-        drawing,
-        button=size if np.isfinite(error) else "diverged",
+        draw,
+        zoom=True,
+        button=_size(error, slides=slides),
         column=name,
-        state=state,
+        state=_state(error, tolerances.get(joint, np.inf)),
     )
+
+
+def _size(error: float, *, slides: bool) -> str:
+    """Write an error [deg], of a joint that slides in mm."""
+    if not np.isfinite(error):
+        return "diverged"
+    if slides:
+        return f"{two_digits(1e3 * np.radians(error))} mm"
+    return f"{two_digits(error)}°"
+
+
+def _state(error: float, tolerance: float) -> str:
+    """Return the state of a button that shows an error; one that is NaN is bad."""
+    if error <= tolerance:
+        return "good"
+    return "fair" if error <= 2 * tolerance else "bad"
 
 
 def _all_tab(
@@ -234,14 +256,14 @@ def _all_tab(
     states = {tab.state for tab in tabs}
     worst = next(state for state in ("bad", "fair", "good") if state in states)
     title = f"All joints in {log}"
-    drawing = partial(draw_joints, title, arm, group, max(LEAST_BINS, bins // 2))
-    return Plot("", title, drawing, button="all", column=ALL, state=worst)
+    draw = partial(draw_joints, title, arm, group, max(LEAST_BINS, bins // 2))
+    return Plot("", title, draw, zoom=True, button="all", column=ALL, state=worst)
 
 
 def draw_response(
     title: str,
     joint: int,
-    several: Sequence[Prediction],
+    predictions: Sequence[Prediction],
     bins: int,
     *,
     slides: bool = False,
@@ -249,110 +271,86 @@ def draw_response(
     """Draw the measured angle of one joint, every model's response and residual,
     command and pressures.
     """
-    log = several[0].log
+    log = predictions[0].log
     column = joint - 1
-    place, unit, factor = display(slides=slides)
-    measured = factor * log.angle[:, column]
-    upper = [
-        Mark(
-            "line",
-            log.time,
-            measured,
-            color="ink",
-            label="measured",
-            width=5,
-            alpha=0.35,
+    shown = display(slides=slides)
+    measured = shown.factor * log.angle[:, column]
+    upper = [reference(log.time, measured, "measured")]
+    middle = [zero_line()]
+    travel = float(np.ptp(measured))
+    colors = cycle(SERIES)
+    for prediction, color in zip(predictions, colors, strict=False):
+        look: Plain = {"color": color, "off": prediction is not predictions[0]}
+        response, residual, band = _response_marks(
+            prediction, joint, shown, travel, look
         )
-    ]
-    middle = [Mark("rule", y=np.zeros(1), color="grey", width=1)]
-    # a response that runs away must not flatten the others
-    far = FAR * max(np.ptp(measured), 1.0)
-    for i, (one, color) in enumerate(zip(several, cycle(SERIES), strict=False)):
-        residual = factor * finite(one.error(joint))
-        name = short_name(one.fit)
-        size = rms(residual)
-        label = (
-            f"{name} ({number(size)} {unit} rms)"
-            if np.isfinite(size)
-            else f"{name} (diverged)"
-        )
-        residual[np.abs(residual) > far] = np.nan
-        angle = factor * one.log.angle[:, column] - residual
-        upper.append(
-            Mark("line", one.log.time, angle, color=color, label=label, off=i > 0)
-        )
-        middle.append(
-            Mark(
-                "line",
-                one.log.time,
-                residual,
-                color=color,
-                label=label,
-                width=1,
-                off=i > 0,
-            )
-        )
-        if band := one.bands.get(joint):
-            half = factor * band.half
-            useless = (
-                ", wider than the motion"
-                if np.mean(2 * half) > np.ptp(measured)
-                else ""
-            )
-            # nor must a band that the parameters leave open
-            half = np.fmin(half, 2.0 * np.nanmax(np.abs(residual), initial=1e-6))
-            label = f"{name}, 95 % band{useless}"
-            drawn = Mark(
-                "band",
-                one.log.time,
-                -half,
-                half,
-                color=color,
-                label=label,
-                alpha=0.18,
-                off=i > 0,
-            )
-            middle.insert(0, drawn)
+        upper.append(response)
+        middle.append(residual)
+        # a band stands behind every line
+        middle[:0] = band
     panels = [
-        Panel("", f"{place} [{unit}]", tuple(upper), title, 200),
-        Panel("", f"residual [{unit}]", tuple(middle), height=130),
+        Panel("", f"{shown.word} [{shown.unit}]", tuple(upper), title, 200),
+        Panel("", f"residual [{shown.unit}]", tuple(middle), height=130),
     ]
-    if pressures := _pressures(several[0], joint):
+    if pressures := _pressures(predictions[0], joint):
         panels.append(Panel("", "pressure [bar]", pressures, height=120))
     command = Mark("step", log.time, log.command[:, column], color="grey")
-    panels.append(
-        Panel("time [s]", "command [%]", (command,), height=130, y_limits=(-108, 108))
-    )
+    panels.append(command_panel(command))
     return Chart(tuple(panels), linked=True, bins=bins)
 
 
-def _pressures(one: Prediction, joint: int) -> tuple[Mark, ...]:
+def _response_marks(
+    prediction: Prediction, joint: int, shown: Display, travel: float, look: Plain
+) -> tuple[Mark, Mark, list[Mark]]:
+    """Draw the response, the residual and, where there is one, the 95 % band of a joint
+    that travelled so far, as it is shown."""
+    time = prediction.log.time
+    measured = shown.factor * prediction.log.angle[:, joint - 1]
+    residual = shown.factor * finite(prediction.error(joint))
+    name = short_name(prediction.fit)
+    size = rms(residual)
+    label = f"{name} (diverged)"
+    if np.isfinite(size):
+        label = f"{name} ({number(size)} {shown.unit} rms)"
+    # a response that runs away must not flatten the others
+    residual[np.abs(residual) > FAR * max(travel, 1.0)] = np.nan
+    response = Mark("line", time, measured - residual, label=label, **look)
+    error = Mark("line", time, residual, label=label, width=1, **look)
+    band = prediction.bands.get(joint)
+    if band is None:
+        return response, error, []
+    half = shown.factor * band.half
+    label = f"{name}, 95 % band"
+    if np.mean(2 * half) > travel:
+        label += ", wider than the motion"
+    # nor must a band that the parameters leave open
+    half = np.fmin(half, 2.0 * np.nanmax(np.abs(residual), initial=1e-6))
+    return (
+        response,
+        error,
+        [Mark("band", time, -half, half, label=label, alpha=0.18, **look)],
+    )
+
+
+def _pressures(prediction: Prediction, joint: int) -> tuple[Mark, ...]:
     """Draw the pressures of both chambers of a joint, as far as they are measured and
     simulated."""
     marks = list[Mark]()
-    log = one.log
+    time = prediction.log.time
+    measured = prediction.log.pressure
+    simulated = prediction.pressure
     for side, color in enumerate(("green", "pink")):
         name = f"chamber {'AB'[side]}"
-        if (
-            log.pressure is not None
-            and np.isfinite(log.pressure[:, joint - 1, side]).any()
-        ):
-            measured = 1e-5 * log.pressure[:, joint - 1, side]
-            mark = Mark(
-                "line", log.time, measured, color=color, label=f"{name}, measured"
-            )
+        if measured is not None:
+            pressure = 1e-5 * measured[:, joint - 1, side]
+            mark = Mark("line", time, pressure, color=color, label=f"{name}, measured")
             marks.append(replace(mark, width=5, alpha=0.35))
-        if (
-            one.pressure is not None
-            and np.isfinite(one.pressure[:, one.joints.index(joint), side]).any()
-        ):
-            simulated = 1e-5 * one.pressure[:, one.joints.index(joint), side]
-            marks.append(
-                Mark(
-                    "line", log.time, simulated, color=color, label=f"{name}, simulated"
-                )
-            )
-    return tuple(marks)
+        if simulated is not None:
+            pressure = 1e-5 * simulated[:, prediction.joints.index(joint), side]
+            label = f"{name}, simulated"
+            marks.append(Mark("line", time, pressure, color=color, label=label))
+    # a chamber without a sensor has a column of NaN
+    return tuple(mark for mark in marks if np.isfinite(mark.y).any())
 
 
 def draw_joints(title: str, arm: Arm, group: Sequence[Prediction], bins: int) -> Chart:
@@ -360,37 +358,23 @@ def draw_joints(title: str, arm: Arm, group: Sequence[Prediction], bins: int) ->
     commands."""
     panels = list[Panel]()
     commands = list[Mark]()
-    for number_of, joint in enumerate(_compared(group)):
-        one = next(prediction for prediction in group if joint in prediction.joints)
+    for joint, color in zip(_compared(group), cycle(COMMAND_COLORS), strict=False):
+        prediction = next(p for p in group if joint in p.joints)
+        time = prediction.log.time
         name = arm.joint_names[joint - 1]
         _, unit, factor = arm.joints[joint - 1].shown
-        measured = factor * one.log.angle[:, joint - 1]
-        simulated = measured - factor * finite(one.error(joint))
-        simulated[np.abs(simulated - measured) > FAR * max(np.ptp(measured), 1.0)] = (
-            np.nan
-        )
+        measured = factor * prediction.log.angle[:, joint - 1]
+        simulated = measured - factor * finite(prediction.error(joint))
+        far = FAR * max(np.ptp(measured), 1.0)
+        simulated[np.abs(simulated - measured) > far] = np.nan
         marks = (
-            Mark(
-                "line",
-                one.log.time,
-                measured,
-                color="ink",
-                label="measured",
-                width=4,
-                alpha=0.35,
-            ),
-            Mark("line", one.log.time, simulated, color="orange", label="simulated"),
+            reference(time, measured, "measured", width=4),
+            Mark("line", time, simulated, color="orange", label="simulated"),
         )
         heading = title if not panels else ""
         panels.append(Panel("", f"{short_name(name)} [{unit}]", marks, heading, 150))
-        color = ("blue", "green", "pink", "yellow", "sky", "grey")[number_of % 6]
-        command = one.log.command[:, joint - 1]
-        commands.append(
-            Mark("step", one.log.time, command, color=color, label=f"command of {name}")
-        )
-    panels.append(
-        Panel(
-            "time [s]", "command [%]", tuple(commands), height=160, y_limits=(-108, 108)
-        )
-    )
+        command = prediction.log.command[:, joint - 1]
+        label = f"command of {name}"
+        commands.append(Mark("step", time, command, color=color, label=label))
+    panels.append(command_panel(*commands, height=160))
     return Chart(tuple(panels), linked=True, bins=bins)

@@ -13,6 +13,9 @@ from hydroid.run.record import Effort, Record
 from hydroid.settings.problem import ObjectiveSettings
 from hydroid.words import two_digits
 
+_NORMS = {1: "mean absolute error", 2: "rms error", "inf": "largest error"}
+"""names of the objective's norms"""
+
 
 def search_section(record: Record) -> Section:
     """Return the section of a run's search, folded.
@@ -23,38 +26,43 @@ def search_section(record: Record) -> Section:
     objective = record.settings.objective
     points = list[str]()
     if len(result.history):
-        _, tried, simulated, diverged = (f"{int(v):,}" for v in result.history[-1, :4])
-        name = record.settings.search.algorithm
+        _, tried, simulated, diverged = map(int, result.history[-1, :4])
         points.append(
-            f"{name}: {tried} candidates, {simulated} simulated, {diverged} of them diverged."
+            f"{record.settings.search.algorithm}: {tried:,} candidates, "
+            f"{simulated:,} simulated, {diverged:,} of them diverged."
         )
-    points += [_refined(record, one) for one in result.refinements]
+    points += [_refined(record, effort) for effort in result.refinements]
     plots = list[Plot]()
     if len(result.history) > 1:
         final = str(record.summary.final)
         segments = {final: result.segments[final], **result.segments}
-        shown = partial(learning, result.history, objective)
-        plots.append(Plot("learning", "Best candidate so far.", shown))
-        front = partial(pareto, result.front[1], segments, objective)
-        plots.append(
-            Plot("pareto", "The Pareto set: lower fits that segment better.", front)
-        )
+        draw = partial(learning, result.history, objective)
+        plots.append(Plot("learning", "Best candidate so far.", draw))
+        draw = partial(pareto, result.front[1], segments, objective)
+        caption = "The Pareto set: lower fits that segment better."
+        plots.append(Plot("pareto", caption, draw))
     if any(len(costs) > 1 for costs in result.starts.values()):
         caption = "Where least squares ended from each start: starts at 0 found the best optimum."
-        drawing = partial(starts, record.settings.arm.joint_names, result.starts)
-        plots.append(Plot("starts", caption, drawing))
-    efforts = sum(one.simulations for one in result.refinements)
-    answer = f"{efforts:,} simulations of the refinement" if efforts else ""
-    title = "How the search went"
+        draw = partial(starts, record.settings.arm.joint_names, result.starts)
+        plots.append(Plot("starts", caption, draw))
+    simulations = sum(effort.simulations for effort in result.refinements)
+    answer = f"{simulations:,} simulations of the refinement" if simulations else ""
     return Section(
-        title, points=tuple(points), plots=tuple(plots), folded=True, answer=answer
+        "How the search went",
+        points=tuple(points),
+        plots=tuple(plots),
+        folded=True,
+        answer=answer,
     )
 
 
-def _refined(record: Record, one: Effort) -> str:
+def _refined(record: Record, effort: Effort) -> str:
     """Say what a refinement took, and what it brought."""
-    said = f"{one.name}: {one.iterations} iterations, {one.simulations:,} simulations; {one.ending}."
-    rise, error = record.summary.estimates[one.name].gained or (None, None)
+    said = (
+        f"{effort.name}: {effort.iterations} iterations, "
+        f"{effort.simulations:,} simulations; {effort.ending}."
+    )
+    rise, error = record.summary.estimates[effort.name].gained or (None, None)
     if rise is None or error is None:
         return said
     better = f"by {two_digits(rise)} ± {two_digits(error)}"
@@ -62,27 +70,23 @@ def _refined(record: Record, one: Effort) -> str:
 
 
 def starts(names: Sequence[str], costs: Mapping[int, Sequence[float]]) -> Chart:
-    """Draw how far above the best optimum each start ended, by joint (from 1.
-
-    0: all joints together).
-    """
+    """Draw how far above the best optimum each start ended, by joint (from 1; 0: all
+    joints together)."""
     rows = list[str]()
     x = list[float]()
     y = list[float]()
     for joint, ended in costs.items():
-        finite_ones = [cost for cost in ended if np.isfinite(cost)]
-        if not finite_ones:
+        reached = [cost for cost in ended if np.isfinite(cost)]
+        if not reached:
             continue
-        x += [cost - min(finite_ones) for cost in finite_ones]
-        y += [float(len(rows))] * len(finite_ones)
+        best = min(reached)
+        x += [cost - best for cost in reached]
+        y += [float(len(rows))] * len(reached)
         rows.append(names[joint - 1] if joint else "all joints")
-    marks = (
-        Mark("points", np.array(x), np.array(y), color="blue", width=8, alpha=0.6),
-    )
+    ends = Mark("points", np.array(x), np.array(y), color="blue", width=8, alpha=0.6)
     label = "negative log-likelihood above the best start's"
-    return Chart(
-        (Panel(label, "", marks, height=80 + 30 * len(rows), rows=tuple(rows)),)
-    )
+    height = 80 + 30 * len(rows)
+    return Chart((Panel(label, "", (ends,), height=height, rows=tuple(rows)),))
 
 
 def learning(history: Array, objective: ObjectiveSettings) -> Chart:
@@ -108,39 +112,31 @@ def pareto(
     `objectives`, shape (n, S + 1), end with that over the whole record; the 100 lowest
     there are drawn.
     """
-    front = _shown(
-        objective, objectives[np.argsort(objectives[:, -1], kind="stable")[:100], :-1]
-    )
+    lowest = np.argsort(objectives[:, -1], kind="stable")[:100]
+    front = _shown(objective, objectives[lowest, :-1])
     at = np.arange(1.0, front.shape[1] + 1)
-    # one line with gaps: a line each would be a legend entry and a glyph each
-    gap = np.full((len(front), 1), np.nan)
-    lines = (
-        np.column_stack([one, gap]).ravel()[:-1]
-        for one in (np.broadcast_to(at, front.shape), front)
-    )
     kind = "points" if len(at) == 1 else "line"
-    marks = [
-        Mark(
-            kind,
-            *lines,
-            color="grey",
-            label=f"Pareto set ({len(objectives)})",
-            width=1,
-            alpha=0.6,
-        )
-    ]
+    x = _with_gaps(np.broadcast_to(at, front.shape))
+    y = _with_gaps(front)
+    label = f"Pareto set ({len(objectives)})"
+    marks = [Mark(kind, x, y, color="grey", label=label, width=1, alpha=0.6)]
     for color, (name, segments) in zip(SERIES, estimates.items(), strict=False):
-        one = _shown(objective, segments)
-        marks.append(Mark("line", at, one, color=color, label=name, width=2))
-        marks.append(Mark("points", at, one, color=color, width=6))
+        values = _shown(objective, segments)
+        marks.append(Mark("line", at, values, color=color, label=name, width=2))
+        marks.append(Mark("points", at, values, color=color, width=6))
     return _chart("segment", objective, *marks)
 
 
+def _with_gaps(rows: Array) -> Array:
+    """Return rows, shape (n, m), as one line with gaps: a line each would be a legend
+    entry and a glyph each."""
+    gap = np.full((len(rows), 1), np.nan)
+    return np.column_stack([rows, gap]).ravel()[:-1]
+
+
 def _chart(x: str, objective: ObjectiveSettings, *marks: Mark) -> Chart:
-    label = {1: "mean absolute error", 2: "rms error", "inf": "largest error"}[
-        objective.norm
-    ]
-    label = f"relative {label} [-]" if objective.relative else f"{label} [deg]"
+    name = _NORMS[objective.norm]
+    label = f"relative {name} [-]" if objective.relative else f"{name} [deg]"
     drawable = any(np.isfinite(mark.y).any() for mark in marks)
     return Chart((Panel(x, label, marks, height=280, log_y=drawable),))
 

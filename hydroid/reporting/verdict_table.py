@@ -2,8 +2,9 @@
 baselines."""
 
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 
@@ -49,27 +50,30 @@ def verdict_table(fits: Verdicts) -> Table:
     Where unseen logs test a joint, its errors stand beside those of the best simple
     model there.
     """
-    every = [one for verdicts in fits.values() for one in verdicts]
-    count = max(one.unseen_logs for one in every)
-    slides = any(one.slides for one in every)
-    unit = "" if slides else " [deg]"
+    every = [*chain.from_iterable(fits.values())]
+    count = max(verdict.unseen_logs for verdict in every)
+    slides = any(verdict.slides for verdict in every)
+    names = ["joint", "verdict"]
+    if len(fits) > 1:
+        names.insert(0, "fit")
+    unit = " [deg]"
+    if slides:
+        # joints differ in their units: each row says its own
+        unit = ""
+        names.append("unit")
     if count:
-        names = ("joint", "verdict", *map(column_of, JUDGED), WHOLE, "fitted")
+        names += [*map(column_of, JUDGED), WHOLE, "fitted"]
         optional = ("fitted", column_of(JUDGED[1]), WHOLE)
         note = _TESTED.format(unit=unit, count=count, s="s" if count > 1 else "")
     else:
-        names = ("joint", "verdict", "fitted", *NAMES)
+        names += ["fitted", *NAMES]
         optional = NAMES[:2]
         note = _FITTED.format(unit=unit)
-    if slides:
-        names = (*names[:2], "unit", *names[2:])
-    if len(fits) > 1:
-        names = ("fit", *names)
-    rows = [
-        _row(one, tested=bool(count)) | {"fit": short_name(fit)}
-        for fit, verdicts in fits.items()
-        for one in verdicts
-    ]
+    rows = list[dict[str, Cell]]()
+    for fit, verdicts in fits.items():
+        for verdict in verdicts:
+            row = _tested_row(verdict) if count else _fitted_row(verdict)
+            rows.append(row | {"fit": short_name(fit)})
     return Table.of("", {name: name for name in names}, rows, note, optional)
 
 
@@ -78,31 +82,46 @@ def column_of(seconds: float) -> str:
     return f"{seconds:g} s"
 
 
-def _row(one: JointVerdict, *, tested: bool) -> dict[str, Cell]:
-    """Return a row of the table of verdicts by columns, where any joint is `tested` or
-    none."""
-    row: dict[str, Cell] = {
-        "joint": one.name,
-        "verdict": f"{one.verdict.sign} {one.text}",
-        "unit": one.shown.unit,
-        "fitted": _shown(one.fitted_deg, one.shown),
+def _row(verdict: JointVerdict) -> dict[str, Cell]:
+    """Return what every row of the table of verdicts has, by columns."""
+    return {
+        "joint": verdict.name,
+        "verdict": f"{verdict.verdict.sign} {verdict.text}",
+        "unit": verdict.shown.unit,
+        "fitted": _shown(verdict.fitted_deg, verdict.shown),
     }
-    if not tested:
-        return row | {
-            name: _shown(error, one.shown) for name, error in one.baselines_deg.items()
-        }
-    if not one.unseen_logs:
-        return row
-    whole = {THE_FIT: one.unseen_deg} | one.baselines_deg
-    # one log, or a few, cannot tell: the numbers stand there alone
-    row[WHOLE] = _beside_best(whole, one.compared_whole, one.shown, least=LEAST_BLOCKS)
-    for i, seconds in enumerate(HORIZONS):
-        errors = {name: errors[i] for name, errors in one.horizons_deg.items()}
-        compared = {name: comparisons[i] for name, comparisons in one.compared.items()}
-        row[column_of(seconds)] = (
-            _beside_best(errors, compared, one.shown) if errors else None
-        )
+
+
+def _fitted_row(verdict: JointVerdict) -> dict[str, Cell]:
+    """Return a row of the table of verdicts where no unseen log tests any joint."""
+    row = _row(verdict)
+    for name, error in verdict.baselines_deg.items():
+        row[name] = _shown(error, verdict.shown)
     return row
+
+
+def _tested_row(verdict: JointVerdict) -> dict[str, Cell]:
+    """Return a row of the table of verdicts where unseen logs test this joint or
+    another."""
+    row = _row(verdict)
+    if not verdict.unseen_logs:
+        return row
+    whole = _whole_errors(verdict)
+    # one log, or a few, cannot tell: the numbers stand there alone
+    row[WHOLE] = _beside_best(
+        whole, verdict.compared_whole, verdict.shown, least=LEAST_BLOCKS
+    )
+    for i, seconds in enumerate(HORIZONS):
+        errors = {name: errors[i] for name, errors in verdict.horizons_deg.items()}
+        compared = {name: outcomes[i] for name, outcomes in verdict.compared.items()}
+        beside = _beside_best(errors, compared, verdict.shown)
+        row[column_of(seconds)] = beside
+    return row
+
+
+def _whole_errors(verdict: JointVerdict) -> dict[str, float | None]:
+    """Return the errors over whole logs [deg], of the fit and of simple models."""
+    return {THE_FIT: verdict.unseen_deg} | verdict.baselines_deg
 
 
 def _beside_best(
@@ -117,21 +136,22 @@ def _beside_best(
     Nothing where the logs are too short for the prediction time; no word of fewer than
     `least` blocks.
     """
-    simple = {
-        name: error
-        for name, error in errors.items()
-        if name in compared and error is not None
-    }
+    simple = dict[str, float]()
+    for name, error in errors.items():
+        if name in compared and error is not None:
+            simple[name] = error
     if not simple:
         return None
     best = min(simple, key=simple.__getitem__)
+    comparison = compared[best]
     fit = errors[THE_FIT]
     scale = shown.of_degrees(1.0)
     if fit is None:
         return f"diverged ({two_digits(scale * simple[best])})"
     ours, theirs = told_apart(scale * fit, scale * simple[best])
-    word = f" {compared[best].outcome}" if compared[best].blocks >= least else ""
-    return f"{ours} ({theirs}){word}"
+    if comparison.blocks < least:
+        return f"{ours} ({theirs})"
+    return f"{ours} ({theirs}) {comparison.outcome}"
 
 
 def _shown(error: float | None, shown: Display) -> Cell:
@@ -180,18 +200,9 @@ def horizon_section(fits: Verdicts) -> Section | None:
     baselines, if known."""
     rows = list[dict[str, Cell]]()
     for fit, verdicts in fits.items():
-        for one in verdicts:
-            whole = {THE_FIT: one.unseen_deg} | one.baselines_deg
-            for name, errors in one.horizons_deg.items():
-                of = short_name(fit) if name == THE_FIT and len(fits) > 1 else name
-                row: dict[str, Cell] = {
-                    "joint": one.name,
-                    "of": of,
-                    "unit": one.shown.unit,
-                }
-                for seconds, error in zip(HORIZONS, errors, strict=True):
-                    row[column_of(seconds)] = _shown(error, one.shown)
-                row[WHOLE] = _shown(whole[name], one.shown)
+        fit_name = short_name(fit) if len(fits) > 1 else THE_FIT
+        for verdict in verdicts:
+            for row in _horizon_rows(verdict, fit_name):
                 # the simple models of fits to the same logs are the same
                 if row not in rows:
                     rows.append(row)
@@ -208,45 +219,61 @@ def horizon_section(fits: Verdicts) -> Section | None:
     return Section(table.title, tables={"horizons": table}, folded=True, answer=answer)
 
 
+def _horizon_rows(verdict: JointVerdict, fit_name: str) -> Iterator[dict[str, Cell]]:
+    """Yield a joint's errors by prediction time: of the fit, and of each simple
+    model."""
+    whole = _whole_errors(verdict)
+    for name, errors in verdict.horizons_deg.items():
+        row: dict[str, Cell] = {
+            "joint": verdict.name,
+            "of": fit_name if name == THE_FIT else name,
+            "unit": verdict.shown.unit,
+        }
+        for seconds, error in zip(HORIZONS, errors, strict=True):
+            row[column_of(seconds)] = _shown(error, verdict.shown)
+        row[WHOLE] = _shown(whole[name], verdict.shown)
+        yield row
+
+
 def ordered(fits: Verdicts) -> Verdicts:
     """Return the fits, the smallest errors first: in parts of the tolerances of the
     joints that all compare.
 
     Where there is no such joint, each fit counts by the mean of its own ones.
     """
-    shared = set.intersection(
-        *({one.joint for one in verdicts} for verdicts in fits.values())
-    )
+    joints = [_joints(verdicts) for verdicts in fits.values()]
+    shared = set.intersection(*joints)
 
-    def size(verdicts: Sequence[JointVerdict]) -> float:
-        return float(
-            np.mean(
-                [_size(one) for one in verdicts if one.joint in shared or not shared]
-            )
-        )
+    def size(fit: str) -> float:
+        verdicts = fits[fit]
+        compared = shared or _joints(verdicts)
+        sizes = [_size(verdict) for verdict in verdicts if verdict.joint in compared]
+        return float(np.mean(sizes))
 
-    return dict(sorted(fits.items(), key=lambda fit: size(fit[1])))
+    return {fit: fits[fit] for fit in sorted(fits, key=size)}
 
 
-def _error(one: JointVerdict) -> float:
+def _joints(verdicts: Sequence[JointVerdict]) -> set[int]:
+    return {verdict.joint for verdict in verdicts}
+
+
+def _error(verdict: JointVerdict) -> float:
     """Return the error on the unseen logs, or of a joint that they do not test on the
-    fitted ones [deg].
-    """
-    error = one.unseen_deg if one.unseen_logs else one.fitted_deg
-    return np.inf if error is None else error  # it diverged
+    fitted ones [deg]; infinite where the simulation diverged."""
+    error = verdict.unseen_deg if verdict.unseen_logs else verdict.fitted_deg
+    return np.inf if error is None else error
 
 
-def _size(one: JointVerdict) -> float:
+def _size(verdict: JointVerdict) -> float:
     """Return the error in parts of the tolerance.
 
     0 of a joint that no log drives, which has none.
     """
-    driven = (
-        one.unseen_logs
-        or one.fitted_deg is not None
-        or one.verdict is not Verdict.UNTESTED
-    )
-    return _error(one) / one.tolerance_deg if driven else 0.0
+    is_fitted = verdict.fitted_deg is not None
+    is_tested = verdict.verdict is not Verdict.UNTESTED
+    if verdict.unseen_logs or is_fitted or is_tested:
+        return _error(verdict) / verdict.tolerance_deg
+    return 0.0
 
 
 def verdict_lines(fits: Verdicts) -> list[Table | str]:
@@ -267,14 +294,16 @@ def lead(fits: Verdicts) -> str:
     others, and the worst.
     """
     name, verdicts = next(iter(fits.items()))
-    of = f"{short_name(name)} is best. " if len(fits) > 1 else ""
-    by_word: dict[str, list[str]] = {}
-    for one in verdicts:
-        by_word.setdefault(one.text, []).append(one.name)
+    best = f"{short_name(name)} is best. " if len(fits) > 1 else ""
+    by_word = dict[str, list[str]]()
+    for verdict in verdicts:
+        by_word.setdefault(verdict.text, []).append(verdict.name)
     said = "; ".join(f"{listed(names)}: {word}" for word, names in by_word.items())
-    count = max(one.unseen_logs for one in verdicts)
-    over = f", over {count} unseen log{'s' if count > 1 else ''}" if count else ""
-    return f"{of}{said}{over}. {worst(verdicts)}".strip()
+    count = max(verdict.unseen_logs for verdict in verdicts)
+    over = ""
+    if count:
+        over = f", over {count} unseen log{'s' if count > 1 else ''}"
+    return f"{best}{said}{over}. {worst(verdicts)}".strip()
 
 
 def outside(verdicts: Sequence[JointVerdict]) -> tuple[str, ...]:
@@ -282,17 +311,16 @@ def outside(verdicts: Sequence[JointVerdict]) -> tuple[str, ...]:
 
     Nothing where all hold their samples.
     """
-    # a right model's hold somewhat less than 95 % where the start of a log is off
-    missed = [
-        f"{part:.0f} % of the {one.name}'s"
-        for one in verdicts
-        if (part := one.inside_percent) is not None and part < 80
-    ]
-    return (
-        (f"The 95 % bands hold only {listed(missed)} unseen samples.",)
-        if missed
-        else ()
-    )
+    missed = list[str]()
+    for verdict in verdicts:
+        percent = verdict.inside_percent
+        # a right model's bands hold somewhat less than 95 % where the start of a log is
+        # off
+        if percent is not None and percent < 80:
+            missed.append(f"{percent:.0f} % of the {verdict.name}'s")
+    if not missed:
+        return ()
+    return (f"The 95 % bands hold only {listed(missed)} unseen samples.",)
 
 
 def worst(verdicts: Sequence[JointVerdict]) -> str:
@@ -300,21 +328,19 @@ def worst(verdicts: Sequence[JointVerdict]) -> str:
     joint."""
     if len(verdicts) < 2:
         return ""
-    one = max(verdicts, key=_size)
-    if not np.isfinite(_error(one)):
-        return f"Worst: {one.name}, whose simulation diverges."
-    scale = one.shown.of_degrees(1.0)
-    unit = one.shown.unit
-    good = (
-        f"{two_digits(scale * one.tolerance_deg)} {unit} (by default 2 % of its travel)"
-    )
+    verdict = max(verdicts, key=_size)
+    if not np.isfinite(_error(verdict)):
+        return f"Worst: {verdict.name}, whose simulation diverges."
+    scale = verdict.shown.of_degrees(1.0)
+    unit = verdict.shown.unit
+    tolerance = two_digits(scale * verdict.tolerance_deg)
     # a joint without simple models has no logs either, and nothing beside it
-    error, least = told_apart(
-        scale * _error(one), scale * min(one.baselines_deg.values(), default=0.0)
-    )
+    simple = min(verdict.baselines_deg.values(), default=0.0)
+    error, least = told_apart(scale * _error(verdict), scale * simple)
     return (
-        f"Worst: {one.name}, {error} {unit}; good is up to {good}, and simple models err by {least} {unit} "
-        "or more."
+        f"Worst: {verdict.name}, {error} {unit}; good is up to {tolerance} {unit} "
+        "(by default 2 % of its travel), and simple models err by "
+        f"{least} {unit} or more."
     )
 
 
@@ -327,42 +353,50 @@ def next_step(
     """Return what to do after a fit in a run folder, which made `fitted` of its logs,
     with the command."""
     run = shlex.quote(folder)
-    files = shlex.join(dict.fromkeys(str(log_file(one.log.source)) for one in fitted))
-    joints = [one.name for one in verdicts if one.verdict is Verdict.UNTESTED]
+    sources = [str(log_file(prediction.log.source)) for prediction in fitted]
+    files = shlex.join(dict.fromkeys(sources))
+    untested = _named(verdicts, lambda v: v.verdict is Verdict.UNTESTED)
     if summary.ending == Ending.TIME.value:
-        kind = "go on"
-        command = f"hydroid fit-{summary.stage} {files} --config {run}/config.yaml --out {run} --resume"
-    elif summary.stage == "mech":
-        kind = "fit the hydraulics"
-        command = f"hydroid fit-hyd {files} --mech {run}"
-    elif joints:
-        kind = "predict unseen"
-        command = f"hydroid validate OTHER.csv --fit {run}"
-    elif all(one.verdict is Verdict.PREDICTS for one in verdicts):
-        kind = "use the machine"
-        command = f"hydroid simulate COMMANDS.csv --fit {run}"
-    elif joints := [one.name for one in verdicts if _worse_than_expected(one)]:
-        kind = "machine changed"
-        command = f"hydroid adapt UNSEEN.csv --fit {run}"
-    elif joints := _too_short(verdicts):
-        kind = "test longer"
-        command = f"hydroid validate OTHER.csv --fit {run}"
-    else:
-        kind = "look for terms"
-        command = f"hydroid suggest --fit {run}"
-    return Finding(kind, "note", tuple(joints), {"command": command})
+        stage = summary.stage
+        command = f"fit-{stage} {files} --config {run}/config.yaml --out {run} --resume"
+        return _step("go on", untested, command)
+    if summary.stage == "mech":
+        return _step("fit the hydraulics", untested, f"fit-hyd {files} --mech {run}")
+    if untested:
+        return _step("predict unseen", untested, f"validate OTHER.csv --fit {run}")
+    return _step_after_tests(verdicts, run)
 
 
-def _worse_than_expected(one: JointVerdict) -> bool:
+def _step_after_tests(verdicts: Sequence[JointVerdict], run: str) -> Finding:
+    """Return what to do once unseen logs have tested all joints of a run."""
+    if all(verdict.verdict is Verdict.PREDICTS for verdict in verdicts):
+        return _step("use the machine", [], f"simulate COMMANDS.csv --fit {run}")
+    if worse := _named(verdicts, _worse_than_expected):
+        return _step("machine changed", worse, f"adapt UNSEEN.csv --fit {run}")
+    if untold := _too_short(verdicts):
+        return _step("test longer", untold, f"validate OTHER.csv --fit {run}")
+    return _step("look for terms", [], f"suggest --fit {run}")
+
+
+def _step(kind: str, joints: Sequence[str], command: str) -> Finding:
+    return Finding(kind, "note", tuple(joints), {"command": f"hydroid {command}"})
+
+
+def _named(
+    verdicts: Sequence[JointVerdict], chosen: Callable[[JointVerdict], bool]
+) -> list[str]:
+    """Return the names of the joints whose verdicts are chosen."""
+    return [verdict.name for verdict in verdicts if chosen(verdict)]
+
+
+def _worse_than_expected(verdict: JointVerdict) -> bool:
     """Return whether a fit fails unseen logs by more than its fitted logs let
     expect."""
-    if (
-        one.verdict is Verdict.PREDICTS
-        or one.unseen_deg is None
-        or not one.expected_deg
-    ):
+    if verdict.verdict is Verdict.PREDICTS:
         return False
-    return one.unseen_deg > WORSE * one.expected_deg
+    if verdict.unseen_deg is None or not verdict.expected_deg:
+        return False
+    return verdict.unseen_deg > WORSE * verdict.expected_deg
 
 
 def _too_short(verdicts: Sequence[JointVerdict]) -> list[str]:
@@ -370,12 +404,16 @@ def _too_short(verdicts: Sequence[JointVerdict]) -> list[str]:
 
     None where any joint is known to fail.
     """
-    if any(one.verdict.fails for one in verdicts):
+    if any(verdict.verdict.fails for verdict in verdicts):
         return []
-    untold = [one for one in verdicts if one.verdict is Verdict.UNTOLD]
-    return [
-        one.name
-        for one in untold
-        if min((at.blocks for at in one.compared.get(one.beside or "", ())), default=0)
-        < LEAST_BLOCKS
-    ]
+    return _named(
+        verdicts, lambda v: v.verdict is Verdict.UNTOLD and _has_few_blocks(v)
+    )
+
+
+def _has_few_blocks(verdict: JointVerdict) -> bool:
+    """Return whether unseen logs are too short to compare a joint with its best simple
+    model over every prediction time."""
+    comparisons = verdict.compared.get(verdict.beside or "", ())
+    blocks = [comparison.blocks for comparison in comparisons]
+    return min(blocks, default=0) < LEAST_BLOCKS

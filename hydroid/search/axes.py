@@ -43,7 +43,7 @@ class Box:
     scale: Array
     varied: Mask
 
-    def of(self, kept: Mask) -> "Box":
+    def restricted(self, kept: Mask) -> "Box":
         """Return it with only some of the p coordinates varied, shape (p,)."""
         varied = self.varied.copy()
         varied[varied] = kept
@@ -196,11 +196,11 @@ def _fitted(directions: Array, wanted: Array, room: Array) -> Axes:
     below, above = room
     ahead = _longest(directions, above, below)
     behind = _longest(directions, below, above)
-    both = np.minimum(wanted, np.minimum(ahead, behind))
-    one = np.minimum(wanted, np.maximum(ahead, behind) / 2)
-    balanced = (both >= UNBALANCED * wanted) | (both >= one)
-    towards_more_room = np.where(ahead >= behind, one, -one)
-    first = np.where(balanced, both, towards_more_room)
+    to_both = np.minimum(wanted, np.minimum(ahead, behind))
+    to_one = np.minimum(wanted, np.maximum(ahead, behind) / 2)
+    balanced = (to_both >= UNBALANCED * wanted) | (to_both >= to_one)
+    towards_more_room = np.where(ahead >= behind, to_one, -to_one)
+    first = np.where(balanced, to_both, towards_more_room)
     second = np.where(balanced, -first, 2 * first)
     return Axes(directions, np.stack([first, second], axis=1))
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from hydroid.arrays import record
+from hydroid.arrays import Array, record
 from hydroid.settings.linkage import (
     DIGITS,
     Cylinder,
@@ -49,10 +49,13 @@ class LinearActuator:
         return self._cylinder(angle)[1]
 
     def _cylinder(self, angle: Any) -> tuple[Any, Any]:
-        sides, bars = self.triangle, self.settings.four_bar
-        psi, first, _ = (angle, 1.0, 0.0) if bars is None else four_bar(angle, bars)
-        length, arm, _ = triangle(psi, sides.a, sides.b, math.radians(sides.theta0))
-        return length, arm * first
+        sides = self.triangle
+        crank = angle
+        slope = 1.0
+        if self.settings.four_bar is not None:
+            crank, slope, _ = four_bar(angle, self.settings.four_bar)
+        length, arm, _ = triangle(crank, sides.a, sides.b, math.radians(sides.theta0))
+        return length, arm * slope
 
 
 def make_cylinder(
@@ -69,35 +72,15 @@ def make_cylinder(
     MuJoCo's `data` has all joints of the arm at 0; a cylinder whose triangle is given
     needs none, nor one that lies along its joint and has no pivots.
     """
-    sides, pivots = settings.triangle, None
+    sides = settings.triangle
+    pivots = None
     if slides:
-        if settings.triangle or settings.four_bar:
-            raise ValueError(
-                "its joint slides, so it lies along it: give neither triangle nor four_bar"
-            )
-        # along the joint b is 0; by default the rod runs out forward
-        given, way = settings.pivots, 1.0
-        if given is not None:
-            way = np.subtract(given.child, given.parent) @ data.joint(joint).xaxis
-        sides = Triangle.model_construct(
-            a=1.0, b=0.0, theta0=90.0 if way > 0 else -90.0
-        )
+        sides = _along_joint(settings, data, joint)
     elif sides is None:
         sides, pivots = _pinned(settings.pivots, data, joint)
     sides = sides.changed({"a": max(sides.a, sides.b), "b": min(sides.a, sides.b)})
     cylinder = LinearActuator(settings, sides, 0.0, pivots)
-    angles = np.linspace(*limits, 181)
-    with np.errstate(all="ignore"):
-        arm = cylinder.moment_arm(angles)
-        bars = (
-            four_bar(angles, settings.four_bar)[1] if settings.four_bar else np.ones(1)
-        )
-    # beyond a dead centre the moment arm has another sign
-    if not ((bars * bars[0] > 0).all() and (arm * arm[0] > 0).all()):
-        what = "does not reach all of its range, or has a dead centre in it"
-        raise ValueError(
-            f"its {'four-bar linkage' if settings.four_bar else 'cylinder'} {what}"
-        )
+    _refuse_dead_centre(cylinder, limits)
     needed = 1e3 * float(np.ptp(cylinder.length(np.array(limits))))
     stroke = settings.stroke or round(needed, 3)
     if stroke < 0.98 * needed:  # catalogues round: the cylinder then stops first
@@ -107,31 +90,54 @@ def make_cylinder(
     return replace(cylinder, stroke=stroke)
 
 
+def _along_joint(settings: Cylinder, data: Any, joint: str) -> Triangle:
+    """Return the triangle of a cylinder that lies along its sliding joint."""
+    if settings.triangle or settings.four_bar:
+        raise ValueError(
+            "its joint slides, so it lies along it: give neither triangle nor four_bar"
+        )
+    pivots = settings.pivots
+    is_forward = True
+    if pivots is not None:
+        rod = np.subtract(pivots.child, pivots.parent)
+        is_forward = rod @ data.joint(joint).xaxis > 0
+    # with b = 0 and a = 1 the length is the sine of theta0 times the way
+    return Triangle.model_construct(a=1.0, b=0.0, theta0=90.0 if is_forward else -90.0)
+
+
+def _refuse_dead_centre(cylinder: LinearActuator, limits: tuple[float, float]) -> None:
+    """Raise ValueError where a cylinder or its linkage does not reach all of a range,
+    or has a dead centre in it."""
+    bars = cylinder.settings.four_bar
+    angles = np.linspace(*limits, 181)
+    with np.errstate(all="ignore"):
+        arms = cylinder.moment_arm(angles)
+        slopes = four_bar(angles, bars)[1] if bars else np.ones(1)
+    # beyond a dead centre the moment arm has another sign
+    if _keeps_sign(arms) and _keeps_sign(slopes):
+        return
+    which = "four-bar linkage" if bars else "cylinder"
+    what = "does not reach all of its range, or has a dead centre in it"
+    raise ValueError(f"its {which} {what}")
+
+
+def _keeps_sign(values: Array) -> bool:
+    """Return whether all values have the sign of the first; false of one that is
+    NaN."""
+    return bool((values * values[0] > 0).all())
+
+
 def _pinned(
     given: Pivots | None, data: Any, joint: str
 ) -> tuple[Triangle, tuple[Vector, Vector]]:
     """The triangle of a cylinder's pivots, and these in the frames of parent and moved
     body [m]."""
-    if given is not None:
-        ends = np.array([given.parent, given.child])
-    else:
-        try:
-            ends = np.array(
-                [data.site(f"{joint}_pivot_{end}").xpos for end in ("parent", "child")]
-            )
-        except KeyError as error:
-            name = str(error).split("'")[1]
-            raise ValueError(
-                f"the model has no site {name}; add it, or give pivots"
-            ) from None
-    at, child = data.joint(joint), data.model.joint(joint).bodyid[0]
-    bodies = data.model.body_parentid[child], child
-    local = [
-        data.xmat[b].reshape(3, 3).T @ (e - data.xpos[b])
-        for b, e in zip(bodies, ends, strict=True)
-    ]
-    parent, moved = (tuple(place.round(DIGITS).tolist()) for place in local)
-    ends, axis = ends - at.xanchor, at.xaxis
+    ends = _pivot_ends(given, data, joint)
+    child = data.model.joint(joint).bodyid[0]
+    parent = data.model.body_parentid[child]
+    in_bodies = _in_body(data, parent, ends[0]), _in_body(data, child, ends[1])
+    axis = data.joint(joint).xaxis
+    ends = ends - data.joint(joint).xanchor
     heights = ends @ axis
     near, far = flat = ends - np.outer(heights, axis)
     a, b = np.linalg.norm(flat, axis=1).tolist()
@@ -140,17 +146,35 @@ def _pinned(
         raise ValueError(
             f"the pivot on the {which} lies on the joint's axis, so it has no moment arm"
         )
-    length, skew = np.linalg.norm(near - far), np.ptp(heights)
+    length = np.linalg.norm(near - far)
+    skew = np.ptp(heights)
     # the triangle is flat, and errs by half the square of this part
     if skew > 0.1 * length:
         raise ValueError(
             f"its pivots lie {skew:.4g} m apart along the joint's axis and {length:.4g} m across it; "
             "a cylinder must lie across the axis"
         )
-    turn = round(
-        math.degrees(math.atan2(np.cross(near, far) @ axis, near @ far)), DIGITS
-    )
-    return Triangle(a=round(a, DIGITS), b=round(b, DIGITS), theta0=turn), (
-        parent,
-        moved,
-    )
+    angle = math.degrees(math.atan2(np.cross(near, far) @ axis, near @ far))
+    theta0 = round(angle, DIGITS)
+    return Triangle(a=round(a, DIGITS), b=round(b, DIGITS), theta0=theta0), in_bodies
+
+
+def _pivot_ends(given: Pivots | None, data: Any, joint: str) -> Array:
+    """Return where a joint's pivots are [m], shape (2, 3): as given, or at the model's
+    sites."""
+    if given is not None:
+        return np.array([given.parent, given.child])
+    names = [f"{joint}_pivot_{end}" for end in ("parent", "child")]
+    try:
+        return np.array([data.site(name).xpos for name in names])
+    except KeyError as error:
+        name = str(error).split("'")[1]
+        what = f"the model has no site {name}; add it, or give pivots"
+        raise ValueError(what) from None
+
+
+def _in_body(data: Any, body: int, point: Array) -> Vector:
+    """Return a point of the world [m], (3,), in the frame of a body, rounded as files
+    state it."""
+    turned = data.xmat[body].reshape(3, 3).T @ (point - data.xpos[body])
+    return tuple(turned.round(DIGITS).tolist())

@@ -69,7 +69,8 @@ def actuator_values(
         name: q.default for name, q in QUANTITIES.items()
     } | settings.model_dump()
     if isinstance(actuator, LinearActuator):
-        one, sides = actuator.settings, actuator.triangle
+        one = actuator.settings
+        sides = actuator.triangle
         values |= dict.fromkeys(TARGETS["opening"], one.max_opening)
         values |= {
             "area_a": one.area_a,

@@ -8,20 +8,20 @@ def quantity_and_side(settings: FitSettings, name: str) -> tuple[str, str]:
     """Return what a parameter is, in words, and the side of the actuator that it
     belongs to, if any.
     """
-    plain, _, side = CHOICES[settings.parameters[name].quantity].plain.partition(
-        ", side "
-    )
-    return plain, side
+    quantity = CHOICES[settings.parameters[name].quantity]
+    words, _, side = quantity.plain.partition(", side ")
+    return words, side
 
 
-def place(settings: FitSettings, name: str) -> str:
+def belongs_to(settings: FitSettings, name: str) -> str:
     """Return the link or the joints that a parameter belongs to; empty where all share
     it."""
-    own = settings.parameters[name]
-    if own.link is not None:
-        return own.link
-    where = ", ".join(settings.arm.joint_names[joint - 1] for joint in own.joints or ())
-    return f"{where} ({own.per})" if own.per else where
+    parameter = settings.parameters[name]
+    if parameter.link is not None:
+        return parameter.link
+    every = settings.arm.joint_names
+    joints = ", ".join(every[number - 1] for number in parameter.joints or ())
+    return f"{joints} ({parameter.per})" if parameter.per else joints
 
 
 def named(settings: FitSettings, name: str, detail: str = "") -> str:
@@ -32,7 +32,11 @@ def named(settings: FitSettings, name: str, detail: str = "") -> str:
     """
     if name not in settings.parameters:
         return f"{name} ({detail})" if detail else name
-    what, side = quantity_and_side(settings, name)
-    where = f"{place(settings, name)} {side}".strip()
-    symbol = f"{where}: {name}" if where else name
-    return f"{what} ({symbol}; {detail})" if detail else f"{what} ({symbol})"
+    words, side = quantity_and_side(settings, name)
+    where = f"{belongs_to(settings, name)} {side}".strip()
+    inside = name
+    if where:
+        inside = f"{where}: {name}"
+    if detail:
+        inside = f"{inside}; {detail}"
+    return f"{words} ({inside})"

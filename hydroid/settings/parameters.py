@@ -4,6 +4,7 @@ bounds and starts."""
 import math
 import re
 from collections.abc import Collection, Mapping, Sequence
+from itertools import count
 from typing import Any
 
 from hydroid.files import Plain
@@ -176,31 +177,45 @@ def with_curves(parameters: Mapping[str, Any], priors: Any) -> tuple[Plain, Any]
     result: Plain = {}
     smooth: Plain = {}
     for name, entry in parameters.items():
-        side = (
-            CURVES.get(str(entry.get("quantity"))) if isinstance(entry, dict) else None
-        )
-        if side is None:
-            result[name] = (
-                result.get(name, {}) | entry if isinstance(entry, dict) else entry
-            )
+        if not _is_curve(entry):
+            _add(result, name, entry)
             continue
-        if entry.get("per") is not None:
-            raise ValueError(f"parameters.{name}: a curve has no effect per group")
-        starts = entry.get("start", [1.0] * len(CURVE))
-        if not isinstance(starts, list | tuple) or len(starts) != len(CURVE):
-            what = f"start: a curve has a list of {len(CURVE)} factors"
-            raise ValueError(f"parameters.{name}: {what}, of which 1 is the power law")
-        shared = {"bounds": CURVE_BOUNDS} | entry
-        sd = shared.pop("sd", CURVE_SD)
-        factors = [f"{name}_{part}" for part in range(1, len(CURVE) + 1)]
-        for factor, quantity, start in zip(factors, CURVE, starts, strict=True):
-            own = shared | {"quantity": f"{quantity}{side}", "start": start}
-            result[factor] = own | result.get(factor, {})
+        factors = _factors(name, entry)
+        for factor, settings in factors.items():
+            result[factor] = settings | result.get(factor, {})
         if entry.get("fixed") is None:
-            smooth[name] = {"smooth": factors, "sd": sd}
+            sd = entry.get("sd", CURVE_SD)
+            smooth[name] = {"smooth": [*factors], "sd": sd}
     if not smooth or not isinstance(priors, dict | None):
         return result, priors
     return result, smooth | (priors or {})
+
+
+def _is_curve(entry: Any) -> bool:
+    return isinstance(entry, dict) and str(entry.get("quantity")) in CURVES
+
+
+def _factors(name: str, entry: Plain) -> dict[str, Plain]:
+    """Return the settings of a curve's factors by their names.
+
+    Raises ValueError: an effect per group, or a start that is no list of as many
+    numbers.
+    """
+    if entry.get("per") is not None:
+        raise ValueError(f"parameters.{name}: a curve has no effect per group")
+    starts = entry.get("start", [1.0] * len(CURVE))
+    if not isinstance(starts, list | tuple) or len(starts) != len(CURVE):
+        what = f"start: a curve has a list of {len(CURVE)} factors"
+        raise ValueError(f"parameters.{name}: {what}, of which 1 is the power law")
+    side = CURVES[str(entry["quantity"])]
+    shared = {"bounds": CURVE_BOUNDS} | entry
+    # it is the scatter of neighbours, and no factor has one of its own
+    shared.pop("sd", None)
+    factors = dict[str, Plain]()
+    for part, quantity, start in zip(count(1), CURVE, starts, strict=False):
+        own_settings = {"quantity": f"{quantity}{side}", "start": start}
+        factors[f"{name}_{part}"] = shared | own_settings
+    return factors
 
 
 def nominal_value(

@@ -30,24 +30,26 @@ BEHIND_VALVE = [
         "lever_bend",
         "compensation",
     ),
-    *("oil_frequency", "oil_damping", "ring_cosine", "ring_sine"),
+    *("oil_frequency", "oil_damping", "oil_damping_share"),
+    *("ring_cosine", "ring_sine"),
     *("pump_flow", "pump_droop", "pump_limit", "supply_pressure", "relief"),
 ]
 BEHIND_PORT = ["area", "draw", "return_"]
 """what a valve's opening does not depend on, of a joint and of its sides; the others
 are taken to matter"""
 
+ValveKey = tuple[int, bytes]
+"""a joint, and what its opening depends on"""
+
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _open(valve: Plugin, rest, commands, opening, source: int = SOURCE) -> None:
     """Write the mean opening of one joint's valve in each step, (steps,), from its
     state at rest, (1,)."""
-    c, z, w, past = (
-        valve.coefficients[0],
-        rest[0],
-        np.zeros(1, SCRATCH)[0],
-        commands.size - opening.size,
-    )
+    c = valve.coefficients[0]
+    z = rest[0]
+    w = np.zeros(1, SCRATCH)[0]
+    past = commands.size - opening.size
     for k in range(opening.size):
         opening[k] = mean_opening(c, z, w, commands, past + k, valve)
 
@@ -61,17 +63,30 @@ def valve_openings(
     `states` are those of the start, shape (n, J), and `commands` those of a `Course`.
     `run` is that of a pool. No bit depends on the other candidates.
     """
+    candidates, joints = plugin.coefficients.shape
     alike = plugin.coefficients.copy()
-    alike[BEHIND_VALVE] = alike["a"][BEHIND_PORT] = alike["b"][BEHIND_PORT] = 0.0
-    keys = [[(j, valve.tobytes()) for j, valve in enumerate(row)] for row in alike]
-    owners = {key: i for i, row in enumerate(keys) for key in row}
-    curves = {key: np.zeros(len(commands) - plugin.past) for key in owners}
+    alike[BEHIND_VALVE] = 0.0
+    alike["a"][BEHIND_PORT] = 0.0
+    alike["b"][BEHIND_PORT] = 0.0
+    # a joint and the bytes of its valve, of every candidate
+    keys: list[list[ValveKey]] = []
+    # the last candidate that has a valve
+    owners: dict[ValveKey, int] = {}
+    for i in range(candidates):
+        row = [(j, alike[i, j].tobytes()) for j in range(joints)]
+        keys.append(row)
+        owners |= dict.fromkeys(row, i)
+    steps = len(commands) - plugin.past
+    openings = {key: np.zeros(steps) for key in owners}
 
-    def open_one(key: tuple[int, bytes]) -> None:
-        i, j = owners[key], key[0]
+    def open_valve(key: ValveKey) -> None:
+        i = owners[key]
+        j = key[0]
         valve = plugin._replace(coefficients=plugin.coefficients[i, j : j + 1])
-        _open(valve, states[i, j : j + 1].copy(), commands[:, j], curves[key])
+        _open(valve, states[i, j : j + 1].copy(), commands[:, j], openings[key])
 
     driven = set(plugin.order[plugin.idle :].tolist())
-    deque(run(open_one, (key for key in curves if key[0] in driven)), maxlen=0)
-    return [np.column_stack([curves[key] for key in row]) for row in keys]
+    wanted = [key for key in openings if key[0] in driven]
+    # the deque takes what the pool returns, so that errors are raised here
+    deque(run(open_valve, wanted), maxlen=0)
+    return [np.column_stack([openings[key] for key in row]) for row in keys]

@@ -1,10 +1,10 @@
-"""The compiled rollout: one candidate through its whole record, MuJoCo's steps
+"""The compiled rollout: one candidate through its whole log, MuJoCo's steps
 included.
 
 `mujoco.batch` has a rollout, but nothing can be done between its steps; and where
 Python does something at every step, threads wait for the interpreter. So the compiled
 loop calls `mj_step` of MuJoCo's own library itself, on an MjModel and MjData of the
-bindings, and no thread needs Python before the record's end. The bits are those of
+bindings, and no thread needs Python before the log's end. The bits are those of
 `mujoco.batch`. Only an error of MuJoCo's, not a divergence, would end the process
 instead of raising; a model that gets through `SteppedArm.start` has none to expect.
 """
@@ -69,7 +69,7 @@ class Handles(NamedTuple):
     armature: Array
     warnings: NDArray[np.int32]
     columns: Index  # joints with actuators and those they couple with, (J,)
-    own: Array  # the arm's own armature of these [kg·m²], (J,)
+    bare_armature: Array  # the arm's own, without oil, of these [kg·m²], (J,)
     pushed: Index  # the other joints, (P,)
     steps: int  # in one sample
     # torques that hold the arm, where a rollout asks for them [N·m], (V,)
@@ -94,7 +94,7 @@ class Course(NamedTuple):
     opening: Array = np.empty((0, 0))
 
 
-class Record(NamedTuple):
+class Trace(NamedTuple):
     """What a rollout writes: angles of moving joints [rad], (T, V); states, (T, J) of
     JOINT_STATE, or ()."""
 
@@ -129,26 +129,31 @@ class SteppedArm:
         rollout: Callable[..., None] | None = None,
         copies: int = 1,
     ) -> None:
-        self._roll, self.copies = rollout or roll, copies
-        self.model, self.data = m, d = copy(model), mujoco.MjData(model)
-        self._armature = own = model.dof_armature.copy()
+        self._roll = rollout or roll
+        self.copies = copies
+        self.model = copy(model)
+        self.data = mujoco.MjData(model)
+        self._armature = model.dof_armature.copy()
         self._inertia = model.stat.meaninertia
+        m = self.model
+        d = self.data
+        # addresses of the bindings: compiled code calls MuJoCo without them
         self._handles = Handles(
-            m._address,  # pyright: ignore[reportPrivateUsage]  # of the bindings: no callback is needed
-            d._address,  # pyright: ignore[reportPrivateUsage]
-            d.qpos,
-            d.qvel,
-            d.M,
-            d.qfrc_applied,
-            m.dof_armature,
-            d.warning.number,
-            columns,
-            own[columns],
-            np.setdiff1d(np.arange(m.nv), columns),
-            steps,
-            d.qfrc_bias,
-            m.qpos_spring,
-            np.where(m.jnt_limited[:, None], m.jnt_range, [-np.inf, np.inf]),
+            model=m._address,  # pyright: ignore[reportPrivateUsage]
+            data=d._address,  # pyright: ignore[reportPrivateUsage]
+            angle=d.qpos,
+            velocity=d.qvel,
+            mass=d.M,
+            applied=d.qfrc_applied,
+            armature=m.dof_armature,
+            warnings=d.warning.number,
+            columns=columns,
+            bare_armature=self._armature[columns],
+            pushed=np.setdiff1d(np.arange(m.nv), columns),
+            steps=steps,
+            gravity=d.qfrc_bias,
+            slack=m.qpos_spring,
+            limits=np.where(m.jnt_limited[:, None], m.jnt_range, [-np.inf, np.inf]),
         )
 
     def start(
@@ -183,20 +188,18 @@ class SteppedArm:
     @property
     def healthy(self) -> bool:
         """Whether the arm is finite and drew no warning of MuJoCo's since its start."""
-        return (
-            bool(np.isfinite([self.data.qpos, self.data.qvel]).all())
-            and not self.data.warning.number.any()
-        )
+        finite = np.isfinite([self.data.qpos, self.data.qvel]).all()
+        return bool(finite) and not self.data.warning.number.any()
 
     def roll(
-        self, plugin: Plugin, state: Structs, course: Course, record: Record
+        self, plugin: Plugin, state: Structs, course: Course, trace: Trace
     ) -> None:
         """Step one candidate up to the first warning of MuJoCo's; call it within
         `quiet_mujoco`.
 
         `state` is its actuators', (J,) of JOINT_STATE: steps change it.
         """
-        self._roll(self._handles, plugin, state, course, record)
+        self._roll(self._handles, plugin, state, course, trace)
 
     @property
     def handles(self) -> Handles:
@@ -204,10 +207,10 @@ class SteppedArm:
         return self._handles
 
     def bind(
-        self, plugin: Plugin, state: Structs, course: Course, record: Record
+        self, plugin: Plugin, state: Structs, course: Course, trace: Trace
     ) -> Callable[[], object]:
         """Return a call of `roll` with these arrays, whatever they hold by then."""
-        return bind(self._roll, self._handles, plugin, state, course, record)
+        return bind(self._roll, self._handles, plugin, state, course, trace)
 
 
 def bind(compiled: Any, *arguments: Any) -> Callable[[], object]:
@@ -223,21 +226,23 @@ def bind(compiled: Any, *arguments: Any) -> Callable[[], object]:
 
 
 @compilable
-def write_sample(arm, record, state, k: int) -> None:
-    """Record the sample that step k ends, if it ends one."""
+def write_sample(arm, trace, state, k: int) -> None:
+    """Write the sample that step k ends, if it ends one."""
     if (k + 1) % arm.steps == 0:
-        record.angle[k // arm.steps] = arm.angle
-        if record.states.size:
-            record.states[k // arm.steps] = state
+        trace.angle[k // arm.steps] = arm.angle
+        if trace.states.size:
+            trace.states[k // arm.steps] = state
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def roll(arm, plugin: Plugin, state, course, record, source: int = SOURCE) -> None:
+def roll(arm, plugin: Plugin, state, course, trace, source: int = SOURCE) -> None:
     """Roll one candidate out as `SteppedArm.roll` does; `source` is the kernel's, for
     numba's cache."""
     commands, torque, taken, _ = course
-    pad, past = make_pad(state.size), commands.shape[0] - torque.shape[0]
-    for k in range(torque.shape[0]):
+    steps = torque.shape[0]
+    past = commands.shape[0] - steps
+    pad = make_pad(state.size)
+    for k in range(steps):
         if taken.size:
             pad.line[0].taken = taken[k]
         if state.size:
@@ -248,7 +253,7 @@ def roll(arm, plugin: Plugin, state, course, record, source: int = SOURCE) -> No
         if arm.warnings.any():
             return
         take_over(plugin, state, arm, pad)
-        write_sample(arm, record, state, k)
+        write_sample(arm, trace, state, k)
 
 
 class _Announcement(event.Listener):
@@ -274,9 +279,8 @@ def compile_rollout() -> None:
         "<mujoco><worldbody><body><joint/><geom size='1'/></body></worldbody></mujoco>"
     )
     nothing = np.empty((0, 1))
-    course, record = (
-        Course(nothing, nothing),
-        Record(nothing, np.empty((0, 1), JOINT_STATE)),
-    )
+    course = Course(nothing, nothing)
+    trace = Trace(nothing, np.empty((0, 1), JOINT_STATE))
+    no_state = np.empty(0, JOINT_STATE)
     with event.install_listener("numba:compile", _Announcement()):
-        SteppedArm(model).roll(NO_ACTUATORS, np.empty(0, JOINT_STATE), course, record)
+        SteppedArm(model).roll(NO_ACTUATORS, no_state, course, trace)

@@ -59,7 +59,8 @@ class Prescribed:
         model.qpos_spring[columns] = 0.0
         model.jnt_limited[columns] = False  # the machine's own stops are in the log
         self.columns = columns
-        self.damping, self.stiffness = 2 * SERVO * armature, SERVO**2 * armature
+        self.damping = 2 * SERVO * armature
+        self.stiffness = SERVO**2 * armature
         step = log.period / settings.steps
         motion = smooth(log.posed[:, joints], settings.measured_cutoff_hz * log.period)
         samples = np.arange((len(motion) - 1) * settings.steps + 1) * step
@@ -84,12 +85,9 @@ def smooth(angle: Array, cutoff: float) -> Array:
     sample."""
     if cutoff >= 0.5 or len(angle) < 16 or not angle.size:
         return angle
-    return sosfiltfilt(
-        butter(2, 2 * cutoff, output="sos"),
-        angle,
-        axis=0,
-        padlen=min(len(angle) - 1, 100),
-    )
+    low_pass = butter(2, 2 * cutoff, output="sos")
+    # forwards and backwards, so that no phase is lost
+    return sosfiltfilt(low_pass, angle, axis=0, padlen=min(len(angle) - 1, 100))
 
 
 @record
@@ -113,8 +111,12 @@ class Candidates:
 def distinct(*tables: Any) -> tuple[Index, Index]:
     """Return which of n rows differ in any table, m of them, and which of these each
     row is, shape (n,)."""
-    each = [b"".join(one.tobytes() for one in row) for row in zip(*tables, strict=True)]
-    return np.unique(each, return_index=True, return_inverse=True)[1:]
+    rows = [
+        b"".join(part.tobytes() for part in parts)
+        for parts in zip(*tables, strict=True)
+    ]
+    _, first, alike = np.unique(rows, return_index=True, return_inverse=True)
+    return first, alike
 
 
 @record
@@ -157,7 +159,8 @@ class Scenario:
         outputs: list[int],
         settings: SimulationSettings,
     ) -> None:
-        self.settings, self.machine = settings, arm
+        self.settings = settings
+        self.machine = arm
         self.active = log.driven.copy()
         self.active[outputs] = True
         moving = self.active | (settings.other_joints != "locked")
@@ -180,13 +183,15 @@ class Scenario:
         the log. Springs are slack where they were.
         """
         other = copy(self)
-        other.arm, other.command = replace(self.arm, pose=start), command
+        other.arm = replace(self.arm, pose=start)
+        other.command = command
         return other
 
     def values(self, candidates: Candidates) -> dict[str, Array]:
         """Return what candidates change in the model, the prescribed joints' servo
         included."""
-        values, columns = model_values(self.arm, candidates), self.prescribed.columns
+        values = model_values(self.arm, candidates)
+        columns = self.prescribed.columns
         values["dof_damping"][:, columns] = self.prescribed.damping
         values["jnt_stiffness"][:, columns] = self.prescribed.stiffness
         values["dof_frictionloss"][:, columns] = 0.0
@@ -224,7 +229,8 @@ class Chain:
         self, arm: Arm, locked: LockedArm, active: Mask, substeps: int, pushed: Index
     ) -> None:
         self.columns = np.setdiff1d(np.arange(len(locked.columns)), pushed)
-        self.joints, self.pushed = locked.columns[self.columns], pushed
+        self.joints = locked.columns[self.columns]
+        self.pushed = pushed
         self._pushed = locked.columns[pushed]
         self._idle = ~active[self.joints]
         for joint in self.joints[active[self.joints]].tolist():
@@ -239,10 +245,14 @@ class Chain:
         model = locked.model
         # of M[i, j] in MuJoCo's sparse mass matrix
         entries = np.zeros((model.nv, model.nv), np.intp)
-        rows, columns = np.repeat(np.arange(model.nv), model.M_rownnz), model.M_colind
-        entries[rows, columns] = entries[columns, rows] = np.arange(model.nC)
+        rows = np.repeat(np.arange(model.nv), model.M_rownnz)
+        columns = model.M_colind
+        entries[rows, columns] = np.arange(model.nC)
+        # MuJoCo stores one half of the symmetric matrix
+        entries[columns, rows] = np.arange(model.nC)
         self._entries = entries[np.ix_(self.columns, self.columns)]
-        self._period, self._substeps = model.opt.timestep, substeps
+        self._period = model.opt.timestep
+        self._substeps = substeps
 
     def start(
         self,
@@ -260,18 +270,11 @@ class Chain:
         their own.
         """
         joints: Records = candidates.joints[:, self.joints]  # pyright: ignore[reportAssignmentType]
-        away = np.min(abs(self._range - pose[self.columns]), axis=0) > STOP_REACH
-        joints.trapped_pressure[:, away] = np.inf
+        to_stop = np.min(abs(self._range - pose[self.columns]), axis=0)
+        # nothing is trapped at a stop that the joint does not touch
+        joints.trapped_pressure[:, to_stop > STOP_REACH] = np.inf
         if pressure is not None:
-            trapped, level = pressure[self.columns].T
-            asked = np.isinf(joints.start_pressure) & np.isfinite(
-                pressure[self.columns]
-            ).all(axis=1)
-            rests = asked & np.isfinite(joints.trapped_pressure)
-            joints["trapped_pressure"] = np.where(
-                rests, trapped, joints.trapped_pressure
-            )
-            joints["start_pressure"] = np.where(asked, level, joints.start_pressure)
+            _take_measured(joints, pressure[self.columns])
         joints.kind[:, self._idle] = NONE
         plugin = make_plugin(joints, self._entries, self._period, self._substeps)
         angle = np.tile(pose[self.columns], (len(balance), 1))
@@ -283,6 +286,19 @@ class Chain:
         joints: Records = candidates.joints[:, self._pushed]  # pyright: ignore[reportAssignmentType]
         if not self.joints.size or np.isinf(joints.pump_flow).all():
             return np.empty((len(candidates), 0))
-        first, place = distinct(joints)  # mostly held, so that they are alike
-        each: Records = coefficients(joints[first])[:, None]  # pyright: ignore
-        return swallowed(each, motion.angle, motion.velocity).sum(axis=2)[place]
+        first, alike = distinct(joints)  # mostly held, so that they are alike
+        some: Records = coefficients(joints[first])[:, None]  # pyright: ignore
+        flow = swallowed(some, motion.angle, motion.velocity).sum(axis=2)
+        return flow[alike]
+
+
+def _take_measured(joints: Records, pressure: Array) -> None:
+    """Let candidates' joints, (n, J), start with measured pressures of chambers A and B
+    [Pa], (J, 2), where they have none of their own."""
+    pressure_a, pressure_b = pressure.T
+    measured = np.isfinite(pressure).all(axis=1)
+    asked = np.isinf(joints.start_pressure) & measured
+    rests = asked & np.isfinite(joints.trapped_pressure)
+    # balance gives the pressure of A, but at a stop, which may carry a part of the load
+    joints["trapped_pressure"] = np.where(rests, pressure_a, joints.trapped_pressure)
+    joints["start_pressure"] = np.where(asked, pressure_b, joints.start_pressure)

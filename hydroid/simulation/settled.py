@@ -20,14 +20,21 @@ import numpy as np
 from numba import njit
 
 from hydroid.arrays import Array
+from hydroid.hydraulics.cylinder import weigh
 from hydroid.hydraulics.elementwise import compilable
 from hydroid.hydraulics.kernel import Plugin, make_pad, source_key
 from hydroid.hydraulics.pump import delivery, lowest
-from hydroid.simulation import quasi_static as quasi_static_laws, rollout, steady
-from hydroid.simulation.quasi_static import LEAST_LEVER, rod_speed, weigh
-from hydroid.simulation.steady import balanced_speed, steady_opening, surplus
+from hydroid.hydraulics.seals import joint_friction
+from hydroid.hydraulics.valve import rod_speed
+from hydroid.simulation.steady import (
+    balanced_speed,
+    false_position,
+    illinois,
+    steady_opening,
+    surplus,
+)
 
-SOURCE = source_key(rollout.__file__, quasi_static_laws.__file__, steady.__file__)
+SOURCE = source_key(balanced_speed)
 FULL_COMMAND = 100.0  # [%]
 HALVINGS = 32
 """of the full command: to 2e-8 %"""
@@ -58,7 +65,7 @@ def fast_enough(c, w, wished: float, supply: float, quasi: bool) -> bool:
     if quasi:
         return sign * w.travel > 0.0 and rod_speed(c, w, supply)[0] >= abs(wished)
     left = surplus(wished, supply, c, w, (c.a.area, c.b.area))[0]
-    return sign * left >= c.friction / max(abs(w.arm), LEAST_LEVER)
+    return sign * left >= joint_friction(c, w.arm)
 
 
 @compilable
@@ -67,7 +74,9 @@ def least_command(c, w, wished: float, supply: float, quasi: bool) -> float:
     where none is enough."""
     if wished == 0.0:
         return 0.0
-    sign, low, high = 1.0 if wished > 0.0 else -1.0, 0.0, FULL_COMMAND
+    sign = 1.0 if wished > 0.0 else -1.0
+    low = 0.0
+    high = FULL_COMMAND
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         w.travel = steady_opening(sign * middle, c)
@@ -88,14 +97,16 @@ def nearest_command(
     A valve that opens with a jump has a slowest speed.
     """
     w.travel = steady_opening(command, c)
-    over = abs(settled_rod(c, w, supply, quasi)[0] - wished)
+    beyond = abs(settled_rod(c, w, supply, quasi)[0] - wished)
+    # two of the last halvings: surely on the other side of a jump
     below = command - np.sign(command) * 2.0 * FULL_COMMAND * 0.5**HALVINGS
     if below * command <= 0.0:
         below = 0.0
     w.travel = steady_opening(below, c)
     reached = settled_rod(c, w, supply, quasi)[0]
-    if abs(reached - wished) >= over:
+    if abs(reached - wished) >= beyond:
         return command
+    # no command at all rather than one that moves nothing
     return 0.0 if reached == 0.0 else below
 
 
@@ -117,7 +128,7 @@ class Rods(NamedTuple):
     speed: Any
 
 
-class Places(NamedTuple):
+class Poses(NamedTuple):
     """Where S poses have the joints [rad], and what holds them there [N·m], shape (S,
     J) each."""
 
@@ -132,12 +143,12 @@ def drawn_at(plugin: Plugin, rods: Rods, law: Law, pressure: float) -> float:
     drawn = 0.0
     for a in range(plugin.idle, plugin.order.size):
         j = plugin.order[a]
-        c, w = plugin.coefficients[j], rods.work[j]
+        c = plugin.coefficients[j]
+        w = rods.work[j]
         supply = min(pressure, c.supply_pressure)
         if law.inverse:
-            rods.command[j] = least_command(
-                c, w, rods.wished[j] * w.arm, supply, law.quasi
-            )
+            wished = rods.wished[j] * w.arm
+            rods.command[j] = least_command(c, w, wished, supply, law.quasi)
         w.travel = steady_opening(rods.command[j], c)
         rods.speed[j], flow = settled_rod(c, w, supply, law.quasi)
         drawn += flow
@@ -152,62 +163,70 @@ def shared_pressure(plugin: Plugin, rods: Rods, law: Law) -> float:
     Regula falsi by the Illinois rule: what joints draw at wished speeds hardly depends
     on the pressure.
     """
-    some = plugin.coefficients[plugin.order[plugin.order.size - 1]]
-    if some.pump_flow == np.inf:
+    pump = plugin.coefficients[plugin.order[plugin.order.size - 1]]
+    if pump.pump_flow == np.inf:
         return np.inf
-    low, high, last = lowest(some), some.relief, 0
+    low = lowest(pump)
+    high = pump.relief
     over = drawn_at(plugin, rods, law, high)
     if over <= 0.0:
         return high
     # where the pump gives this flow; at less pressure no more is drawn
-    if over < some.pump_flow:
-        low = max(low, high - some.pump_droop * over / some.pump_flow)
-    under = drawn_at(plugin, rods, law, low) - delivery(low, 1.0, some)[0]
-    if abs(under) <= SETTLED * some.pump_flow or under >= 0.0:
+    if over < pump.pump_flow:
+        low = max(low, high - pump.pump_droop * over / pump.pump_flow)
+    under = drawn_at(plugin, rods, law, low) - delivery(low, 1.0, pump)[0]
+    left = SETTLED * pump.pump_flow
+    if under >= -left:
         return low
+    last = 0
     for count in range(MOST_PRESSURES):
         # a pump without a droop gives any flow there
-        if high - low <= CLOSE * some.relief:
+        if high - low <= CLOSE * pump.relief:
             break
-        pressure = low - under * (high - low) / (over - under)
+        pressure = false_position(low, high, under, over)
+        # where the rule creeps
         if count % 4 == 3:
             pressure = 0.5 * (low + high)
-        excess = (
-            drawn_at(plugin, rods, law, pressure) - delivery(pressure, 1.0, some)[0]
-        )
-        if abs(excess) <= SETTLED * some.pump_flow:
+        drawn = drawn_at(plugin, rods, law, pressure)
+        excess = drawn - delivery(pressure, 1.0, pump)[0]
+        if abs(excess) <= left:
             return pressure
         if excess > 0.0:
-            high, over = pressure, excess
-            under *= 0.5 if last > 0 else 1.0
+            high = pressure
+            over = excess
+            under = illinois(under, last > 0)
+            last = 1
         else:
-            low, under = pressure, excess
-            over *= 0.5 if last < 0 else 1.0
-        last = 1 if excess > 0.0 else -1
+            low = pressure
+            under = excess
+            over = illinois(over, last < 0)
+            last = -1
     return 0.5 * (low + high)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _settle(
-    plugin: Plugin, places: Places, law: Law, command, velocity, source: int = SOURCE
+    plugin: Plugin, poses: Poses, law: Law, command, velocity, source: int = SOURCE
 ) -> None:
     """Replace velocities [rad/s], (S, J), by the settled ones; inversely commands by
     those that do it."""
     joints = plugin.order.size
-    work, speed, wished = make_pad(joints).joints, np.zeros(joints), np.zeros(joints)
-    for k in range(places.angle.shape[0]):
+    work = make_pad(joints).joints
+    speed = np.zeros(joints)
+    wished = np.zeros(joints)
+    for k in range(poses.angle.shape[0]):
         for a in range(plugin.idle, joints):
             j = plugin.order[a]
-            weigh(
-                plugin.coefficients[j], work[j], places.angle[k, j], places.load[k, j]
-            )
+            c = plugin.coefficients[j]
+            weigh(c, work[j], poses.angle[k, j], poses.load[k, j])
         wished[:] = velocity[k]
         rods = Rods(work, command[k], wished, speed)
         pressure = shared_pressure(plugin, rods, law)
         drawn_at(plugin, rods, law, pressure)
         for a in range(plugin.idle, joints):
             j = plugin.order[a]
-            c, w = plugin.coefficients[j], work[j]
+            c = plugin.coefficients[j]
+            w = work[j]
             if law.inverse and wished[j] != 0.0:
                 supply = min(pressure, c.supply_pressure)
                 command[k, j] = nearest_command(
@@ -236,9 +255,8 @@ def settled_speeds(
     actuator has 0.
     """
     velocity = np.zeros(angle.shape)
-    _settle(
-        plugin, Places(angle, load), Law(False, quasi_static), command.copy(), velocity
-    )
+    law = Law(False, quasi_static)
+    _settle(plugin, Poses(angle, load), law, command.copy(), velocity)
     return velocity
 
 
@@ -251,6 +269,7 @@ def settled_commands(
     Where a wish cannot be had it is the nearest of what the joint can do beside the
     others. Arguments are as of `settled_speeds`.
     """
-    command, reached = np.zeros(angle.shape), velocity.copy()
-    _settle(plugin, Places(angle, load), Law(True, quasi_static), command, reached)
+    command = np.zeros(angle.shape)
+    reached = velocity.copy()
+    _settle(plugin, Poses(angle, load), Law(True, quasi_static), command, reached)
     return command, reached

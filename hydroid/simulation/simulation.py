@@ -24,7 +24,7 @@ from hydroid.hydraulics.records import JOINT_STATE, has_force_curve
 from hydroid.mjcf import quiet_mujoco
 from hydroid.simulation.openings import valve_openings
 from hydroid.simulation.quasi_static import roll_quasi_static
-from hydroid.simulation.rollout import Course, Record, SteppedArm, compile_rollout, roll
+from hydroid.simulation.rollout import Course, SteppedArm, Trace, compile_rollout, roll
 from hydroid.simulation.scenario import Candidates, Chain, Response, Scenario, distinct
 
 Follow = Callable[[SteppedArm, Index], tuple[Array, Array | None]]
@@ -56,11 +56,10 @@ class Simulation:
         compile_rollout()
         self.scenario = scenario
         self._quasi_static = bool(substeps) and scenario.settings.model != "dynamic"
-        pushed = (
-            scenario.prescribed.columns
-            if substeps
-            else np.arange(len(scenario.arm.columns))
-        )
+        # in stage 1 a gain pushes every joint
+        pushed = np.arange(len(scenario.arm.columns))
+        if substeps:
+            pushed = scenario.prescribed.columns
         self._chain = Chain(
             scenario.machine, scenario.arm, scenario.active, substeps or 1, pushed
         )
@@ -74,12 +73,14 @@ class Simulation:
         The first is the start. One without a force-stroke curve, or that diverged, has
         NaN throughout.
         """
-        scenario, n, wanted = self.scenario, len(candidates), self._pressures
+        scenario = self.scenario
+        n = len(candidates)
+        wanted = self._pressures
         samples = 1 + len(scenario.command) // scenario.settings.steps
         angle = np.full((n, samples, len(scenario.outputs)), np.nan)
         pressure = np.full((n, samples, len(wanted), 2), np.nan)
         # those that differ in effects of other groups of logs are simulated once
-        first, place = distinct(candidates.joints, candidates.mass)
+        first, alike = distinct(candidates.joints, candidates.mass)
         exists = has_force_curve(candidates.joints[:, self.joints])
         rows = np.intersect1d(np.flatnonzero(exists), first)
         threads = min(scenario.settings.threads or os.cpu_count() or 1, rows.size)
@@ -89,18 +90,17 @@ class Simulation:
         sensors = candidates.joints[:, scenario.arm.columns[scenario.outputs]]
 
         def simulate(some: Index) -> None:
+            """Simulate some of the candidates on an arm that is free, and write what
+            its sensors read to their rows."""
             arm = free.pop()
             followed, chambers = follow(arm, np.resize(some, arm.copies))
             if arm.healthy:
-                for place, seen in zip(
-                    some, followed[:, :, scenario.outputs].swapaxes(0, 1), strict=False
-                ):
-                    read = (
-                        reading(seen, sensors[place], scenario.period)
-                        if self.joints.size
-                        else seen
-                    )
-                    angle[rows[place]] = read
+                outputs = followed[:, :, scenario.outputs].swapaxes(0, 1)
+                # copies beyond `some` only fill the arm
+                for candidate, turned in zip(some, outputs, strict=False):
+                    if self.joints.size:
+                        turned = reading(turned, sensors[candidate], scenario.period)
+                    angle[rows[candidate]] = turned
                 if chambers is not None:
                     pressure[rows[some[0]]] = chambers[:, wanted]
             free.append(arm)
@@ -109,18 +109,15 @@ class Simulation:
             copies = self._copies(candidates, threads)
             free = deque(self._stepped(copies) for _ in range(threads))
             follow = self._follower(candidates, free[0], pool.map)
-            deque(
-                pool.map(
-                    simulate, np.array_split(range(rows.size), -(-rows.size // copies))
-                ),
-                maxlen=0,
-            )
+            shares = np.array_split(range(rows.size), -(-rows.size // copies))
+            # a deque takes what the pool returns, so that errors are raised here
+            deque(pool.map(simulate, shares), maxlen=0)
             if copies > 1:  # one that diverges stops those beside it
                 free = deque(self._stepped() for _ in range(threads))
                 left = np.flatnonzero(np.isnan(angle[rows, -1]).any(axis=1))
                 deque(pool.map(simulate, left[:, None]), maxlen=0)
         if len(first) < n:
-            angle, pressure = angle[first[place]], pressure[first[place]]
+            return Response(angle[first[alike]], pressure[first[alike]])
         return Response(angle, pressure)
 
     def _copies(self, candidates: Candidates, threads: int) -> int:
@@ -129,20 +126,22 @@ class Simulation:
         Actuators need an arm of their own; MuJoCo integrates one without any damping
         otherwise.
         """
-        damped = (
-            (self.scenario.values(candidates)["dof_damping"] > 0.0).any(axis=1).all()
-        )
-        if self.joints.size or not damped:
+        damped = (self.scenario.values(candidates)["dof_damping"] > 0.0).any(axis=1)
+        if self.joints.size or not damped.all():
             return 1
-        most, n = TOGETHER // len(self.scenario.arm.columns), len(candidates)
-        return -(-n // max(threads, -(-n // most)))
+        n = len(candidates)
+        most = TOGETHER // len(self.scenario.arm.columns)
+        # groups of equal size, so that all threads have something to do to the end
+        groups = max(threads, -(-n // most))
+        return -(-n // groups)
 
     def _stepped(self, copies: int = 1) -> SteppedArm:
-        scenario, chain = self.scenario, self._chain
-        steps, model = scenario.settings.steps, scenario.arm.model
+        model = self.scenario.arm.model
+        if copies > 1:
+            model = repeat(model, copies)
         rollout = roll_quasi_static if self._quasi_static else roll
-        model = repeat(model, copies) if copies > 1 else model
-        return SteppedArm(model, chain.columns, steps, rollout, copies)
+        steps = self.scenario.settings.steps
+        return SteppedArm(model, self._chain.columns, steps, rollout, copies)
 
     def _follower(
         self,
@@ -155,62 +154,71 @@ class Simulation:
 
         `run` is that of a pool.
         """
-        scenario, chain, n, observed = (
-            self.scenario,
-            self._chain,
-            len(candidates),
-            self._pressures.size,
-        )
-        values, pose, servo = (
-            scenario.values(candidates),
-            scenario.arm.pose,
-            scenario.prescribed,
-        )
+        scenario = self.scenario
+        chain = self._chain
+        n = len(candidates)
+        observed = bool(self._pressures.size)
+        values = scenario.values(candidates)
+        pose = scenario.arm.pose
         samples = len(scenario.command) // scenario.settings.steps
-        starts = [
-            np.resize(range(first, n), arm.copies) for first in range(0, n, arm.copies)
-        ]
-        balance = np.concatenate(
-            [arm.start(values, some, np.tile(pose, arm.copies)) for some in starts]
-        )
-        balance = balance.reshape(-1, len(pose))[:n]
+        balance = _balance(arm, values, pose, n)
         plugin, states = chain.start(candidates, pose, balance, scenario.pressure)
         before = np.zeros((plugin.past, len(chain.columns)))
         commands = np.concatenate([before, scenario.command[:, chain.columns]])
-        taken, openings = chain.taken(candidates, servo), [np.empty((0, 0))] * n
+        taken = chain.taken(candidates, scenario.prescribed)
+        openings = [np.empty((0, 0))] * n
         # what the valves do is seen in their states alone
         if self._quasi_static and not observed:
             openings = valve_openings(plugin, states, commands, run)
         gain = candidates.joints.gain[:, scenario.arm.columns[chain.pushed]]
-        served = np.searchsorted(chain.pushed, servo.columns)
 
         def follow(arm: SteppedArm, some: Index) -> tuple[Array, Array | None]:
-            start, row = np.tile(pose, arm.copies), some[0]
+            row = some[0]
+            start = np.tile(pose, arm.copies)
             arm.start(values, some, start)
-            torque = (
-                gain[some] * scenario.command[:, None, chain.pushed]
-                + balance[some][:, chain.pushed]
-            )
-            if served.size:
-                torque[:, :, served] = (
-                    servo.angle if self._quasi_static else servo.torque
-                )[:, None]
-            one, state = plugin.candidate(row), states[row]
+            torque = self._pushing(gain[some], balance[some])
+            actuators = plugin.candidate(row)
+            state = states[row]
             angle = np.full((1 + samples, start.size), np.nan)
-            record = np.zeros((1 + samples if observed else 1, len(state)), JOINT_STATE)
-            angle[0], record[0] = start, state
-            course = Course(
-                commands, torque.reshape(len(torque), -1), taken[row], openings[row]
-            )
-            arm.roll(one, state, course, Record(angle[1:], record[1:]))
-            seen = (
-                pressures(one.coefficients, record, angle[:, chain.columns])
-                if observed
-                else None
-            )
-            return angle.reshape(len(angle), arm.copies, -1), seen
+            kept = 1 + samples if observed else 1
+            history = np.zeros((kept, len(state)), JOINT_STATE)
+            angle[0] = start
+            history[0] = state
+            course = Course(commands, torque, taken[row], openings[row])
+            arm.roll(actuators, state, course, Trace(angle[1:], history[1:]))
+            chambers = None
+            if observed:
+                turned = angle[:, chain.columns]
+                chambers = pressures(actuators.coefficients, history, turned)
+            return angle.reshape(len(angle), arm.copies, -1), chambers
 
         return follow
+
+    def _pushing(self, gain: Array, balance: Array) -> Array:
+        """Return what drives the pushed joints of some candidates in each step, shape
+        (steps, copies P): torques [N·m] of their gains, (copies, P), and balance,
+        (copies, V); of those that follow the log, its motion."""
+        scenario = self.scenario
+        pushed = self._chain.pushed
+        servo = scenario.prescribed
+        torque = gain * scenario.command[:, None, pushed] + balance[:, pushed]
+        served = np.searchsorted(pushed, servo.columns)
+        if served.size:
+            # without inertia a joint is put where the log has it
+            motion = servo.angle if self._quasi_static else servo.torque
+            torque[:, :, served] = motion[:, None]
+        return torque.reshape(len(torque), -1)
+
+
+def _balance(arm: SteppedArm, values: dict[str, Array], pose: Array, n: int) -> Array:
+    """Return what holds n candidates, of `values`, in a pose, (V,) [N·m], shape (n,
+    V)."""
+    held: list[Array] = []
+    for first in range(0, n, arm.copies):
+        # the last group is filled with candidates that are there twice
+        some = np.resize(range(first, n), arm.copies)
+        held.append(arm.start(values, some, np.tile(pose, arm.copies)))
+    return np.concatenate(held).reshape(-1, len(pose))[:n]
 
 
 def reading(angle: Array, sensors: Structs, period: float) -> Array:
@@ -221,7 +229,8 @@ def reading(angle: Array, sensors: Structs, period: float) -> Array:
     Between samples an angle is taken for a straight line. A reading starts at the
     angle, at rest. With scale 1 and no lag it is the angle, to the bit.
     """
-    scale, lag = sensors["sensor_scale"], sensors["sensor_lag"]
+    scale = sensors["sensor_scale"]
+    lag = sensors["sensor_lag"]
     if np.all(scale == 1.0) and np.all(lag == 0.0):
         return angle
     turned = scale * (angle - angle[0])

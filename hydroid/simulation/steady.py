@@ -17,7 +17,7 @@ more. With the steady pressures at both sides of the pose, ṗ = v dp/dx, which 
 a change of the area that oil has to fill. What is left out is of second order: the
 joint's acceleration on the way.
 
-In the quasi-static model the speed is that of `quasi_static.rod_speed`.
+In the quasi-static model the speed is that of `valve.rod_speed`.
 """
 
 # pyright: reportMissingParameterType=false
@@ -29,31 +29,26 @@ import numpy as np
 from numba import njit
 
 from hydroid.arrays import Array
-from hydroid.hydraulics.cylinder import friction_damping, volume
+from hydroid.hydraulics.cylinder import rod_way, weigh
 from hydroid.hydraulics.elementwise import compilable
 from hydroid.hydraulics.joint import open_share, opened
-from hydroid.hydraulics.kernel import Plugin, make_pad, source_key
-from hydroid.hydraulics.pump import delivery, lowest
+from hydroid.hydraulics.kernel import make_pad, source_key
+from hydroid.hydraulics.oil import volume
+from hydroid.hydraulics.pump import delivery, line_pressure, lowest
 from hydroid.hydraulics.records import LINEAR, Records, coefficients, has_force_curve
+from hydroid.hydraulics.seals import LEAST_LEVER, friction_damping, joint_friction
 from hydroid.hydraulics.solenoid import (
     beyond_dead_band,
     drive,
     resting_stroke,
     side_voltage,
 )
-from hydroid.hydraulics.valve import port_flow
-from hydroid.simulation import quasi_static, rollout
-from hydroid.simulation.quasi_static import (
-    LEAST_LEVER,
-    line_pressure,
-    linkage,
-    rod_speed,
-    weigh,
-)
+from hydroid.hydraulics.valve import port_flow, rod_speed
 
-SOURCE = source_key(rollout.__file__, quasi_static.__file__)
-FIRST_SPEED, MOST_SPEED = 1e-6, 1e3
-"""a rod's speeds between which the steady one is sought [m/s], or [rad/s]"""
+SOURCE = source_key()
+# a rod's speeds between which the steady one is sought [m/s], or [rad/s]
+FIRST_SPEED = 1e-6
+MOST_SPEED = 1e3
 MOST_PRESSURE = 1e12  # of a chamber from which nothing can leave [Pa]
 # how far from the pose pressures are compared with those in it [rad], or [m]
 NEAR = 1e-2
@@ -62,6 +57,23 @@ LEAST_AREA = 0.1
 yields on the way"""
 PRECISE = 1e-13  # relative error at which a search ends
 HALVINGS = 60  # of the line's pressure: to rounding
+
+
+@compilable
+def false_position(low: float, high: float, under: float, over: float) -> float:
+    """Where a line through values at both ends of a bracket is 0."""
+    return low + (high - low) * under / (under - over)
+
+
+@compilable
+def illinois(value: float, again: bool) -> float:
+    """Value at the end of a bracket that stays, after the other one moved, `again` or
+    not.
+
+    By the Illinois rule it counts for half where the other end moved twice in a row:
+    else a curved function would keep that end for ever.
+    """
+    return 0.5 * value if again else value
 
 
 @compilable
@@ -94,13 +106,17 @@ def chamber_pressure(
     into, _, pumped, _ = port_flow(0.0, supply, pump_area, tank_area, c)
     if into <= flow:
         return 0.0, pumped
-    low, high = 0.0, max(supply, c.tank_pressure)
+    low = 0.0
+    high = max(supply, c.tank_pressure)
+    # a load may press beyond both
     while (
         high < MOST_PRESSURE
         and port_flow(high, supply, pump_area, tank_area, c)[0] > flow
     ):
-        low, high = high, 2.0 * high
-    pressure, change = 0.5 * (low + high), high - low
+        low = high
+        high = 2.0 * high
+    pressure = 0.5 * (low + high)
+    change = high - low
     # Newton's method, or a halving where its steps do not halve: at an edge without a
     # drop
     while True:
@@ -109,7 +125,9 @@ def chamber_pressure(
             low = pressure
         else:
             high = pressure
-        after = pressure + (into - flow) / fall if fall > 0.0 else low
+        after = low
+        if fall > 0.0:
+            after = pressure + (into - flow) / fall
         if not low < after < high or abs(after - pressure) > 0.5 * change:
             after = 0.5 * (low + high)
         change = abs(after - pressure)
@@ -126,14 +144,14 @@ def oil_at(speed: float, supply: float, c, w, takes) -> Any:
     `w` has the valve's net opening `travel` [m²]. The chambers take in oil as pistons
     of the areas that `takes` has [m²] do.
     """
-    a, b = max(w.travel, 0.0), max(-w.travel, 0.0)
-    return_a, return_b = c.leakage + b * c.a.return_, c.leakage + a * c.b.return_
-    pressure_a, pumped_a = chamber_pressure(
-        takes[0] * speed, supply, c.leakage + a, return_a, c
-    )
-    pressure_b, pumped_b = chamber_pressure(
-        -takes[1] * speed, supply, c.leakage + b, return_b, c
-    )
+    a = max(w.travel, 0.0)
+    b = max(-w.travel, 0.0)
+    return_a = c.leakage + b * c.a.return_
+    return_b = c.leakage + a * c.b.return_
+    flow_a = takes[0] * speed
+    flow_b = -takes[1] * speed
+    pressure_a, pumped_a = chamber_pressure(flow_a, supply, c.leakage + a, return_a, c)
+    pressure_b, pumped_b = chamber_pressure(flow_b, supply, c.leakage + b, return_b, c)
     return pressure_a, pressure_b, c.a.draw * pumped_a + c.b.draw * pumped_b
 
 
@@ -154,20 +172,28 @@ def balanced_speed(supply: float, c, w, takes) -> Any:
     """Speed [m/s] of the rod at which no force is left, and flow from the pump [m³/s],
     at a supply [Pa]."""
     left, drawn = surplus(0.0, supply, c, w, takes)
-    held = c.friction / max(abs(w.arm), LEAST_LEVER)
+    held = joint_friction(c, w.arm)
     if abs(left) <= held:
         return 0.0, drawn
     sign = 1.0 if left > 0.0 else -1.0
-    low, high, force_low = 0.0, FIRST_SPEED, abs(left) - held
+    # the force beyond friction is above 0 at `low`, and below it at `high`
+    low = 0.0
+    force_low = abs(left) - held
+    high = FIRST_SPEED
     force_high = sign * surplus(sign * high, supply, c, w, takes)[0] - held
     while force_high > 0.0 and high < MOST_SPEED:
-        low, force_low, high = high, force_high, 4.0 * high
+        low = high
+        force_low = force_high
+        high = 4.0 * high
         force_high = sign * surplus(sign * high, supply, c, w, takes)[0] - held
-    speed, last, count = high, 0, 0
-    # regula falsi by the Illinois rule, now and then a halving
+    speed = high
+    last = 0
+    count = 0
     while high - low > PRECISE * high:
-        before, count = speed, count + 1
-        speed = low + (high - low) * force_low / (force_low - force_high)
+        before = speed
+        count += 1
+        speed = false_position(low, high, force_low, force_high)
+        # where the rule creeps, a halving now and then
         if count % 8 == 0 or not low < speed < high:
             speed = 0.5 * (low + high)
         left, drawn = surplus(sign * speed, supply, c, w, takes)
@@ -175,12 +201,15 @@ def balanced_speed(supply: float, c, w, takes) -> Any:
         if force == 0.0 or abs(speed - before) <= PRECISE * speed:
             break
         if force > 0.0:
-            low, force_low = speed, force
-            force_high *= 0.5 if last > 0 else 1.0
+            low = speed
+            force_low = force
+            force_high = illinois(force_high, last > 0)
+            last = 1
         else:
-            high, force_high = speed, force
-            force_low *= 0.5 if last < 0 else 1.0
-        last = 1 if force > 0.0 else -1
+            high = speed
+            force_high = force
+            force_low = illinois(force_low, last < 0)
+            last = -1
     return sign * speed, drawn
 
 
@@ -190,7 +219,9 @@ def fed_speed(c, w, takes) -> Any:
     supply [Pa] there."""
     if c.pump_flow == np.inf:
         return balanced_speed(c.supply_pressure, c, w, takes)[0], c.supply_pressure
-    low, high, pressure = lowest(c), c.relief, c.relief
+    low = lowest(c)
+    high = c.relief
+    pressure = c.relief
     # what is drawn rises with the line's pressure, and what is given falls
     for _ in range(HALVINGS):
         _, drawn = balanced_speed(min(pressure, c.supply_pressure), c, w, takes)
@@ -213,67 +244,68 @@ def areas_on_the_way(c, w, angle: float, load, command: float) -> Any:
     `load` holds the joint [N·m] at the `angle` [rad] and NEAR before and behind it,
     (3,).
     """
-    areas, seen = (c.a.area, c.b.area), np.empty((2, 2))
+    areas = (c.a.area, c.b.area)
     w.travel = steady_opening(command, c)
-    for i in range(2):
-        weigh(c, w, angle + (2 * i - 1) * NEAR, load[2 * i])
-        speed, supply = fed_speed(c, w, areas)
-        seen[i, 0], seen[i, 1], _ = oil_at(speed, supply, c, w, areas)
-    travel, arm = linkage(c, angle)
+    weigh(c, w, angle - NEAR, load[0])
+    speed, supply = fed_speed(c, w, areas)
+    before_a, before_b, _ = oil_at(speed, supply, c, w, areas)
+    weigh(c, w, angle + NEAR, load[2])
+    speed, supply = fed_speed(c, w, areas)
+    behind_a, behind_b, _ = oil_at(speed, supply, c, w, areas)
+    travel, arm = rod_way(c, angle)
     volume_a = volume_b = c.dead_volume
     if c.kind == LINEAR:
         volume_a = volume(travel, c.a.area, c.dead_volume)
         volume_b = volume(c.stroke - travel, c.b.area, c.dead_volume)
+    # near a dead centre the rod hardly moves, whatever the joint does
     way = 2.0 * NEAR * (arm if abs(arm) > LEAST_LEVER else LEAST_LEVER)
-    a = c.a.area + volume_a / c.bulk_modulus * (seen[1, 0] - seen[0, 0]) / way
-    b = c.b.area - volume_b / c.bulk_modulus * (seen[1, 1] - seen[0, 1]) / way
+    a = c.a.area + volume_a / c.bulk_modulus * (behind_a - before_a) / way
+    b = c.b.area - volume_b / c.bulk_modulus * (behind_b - before_b) / way
     return max(a, LEAST_AREA * c.a.area), max(b, LEAST_AREA * c.b.area)
 
 
 @compilable
-def _quasi_static(plugin: Plugin, pad) -> float:
-    c, w, supply = (
-        plugin.coefficients[0],
-        pad.joints[0],
-        plugin.coefficients[0].supply_pressure,
-    )
+def _quasi_static_speed(coefficients, driven, pad) -> float:
+    """Speed [m/s] of the rod of a quasi-static joint, the only one of the `driven`."""
+    c = coefficients[0]
+    w = pad.joints[0]
+    line = pad.line[0]
+    supply = c.supply_pressure
     if c.pump_flow < np.inf:
-        pad.line[0].pressure = c.relief
-        supply = min(supply, line_pressure(plugin, pad.joints, pad.line[0], 1.0, c))
+        # where the search for the line's pressure begins
+        line.pressure = c.relief
+        shared = line_pressure(coefficients, driven, pad.joints, line, 1.0)
+        supply = min(supply, shared)
     speed = rod_speed(c, w, supply)[0]
     return speed if w.travel > 0.0 else -speed
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _steady(
-    plugin: Plugin, angle, load, commands, quasi: bool, velocity, source: int = SOURCE
-) -> None:
-    """Write the velocities [rad/s] of n candidates' joint under m commands [%], (n, m);
-    loads are (n, 3)."""
+    coefficients, angle, load, commands, quasi: bool, source: int = SOURCE
+) -> Array:
+    """Return the velocities [rad/s] of n candidates' joint under m commands [%], (n, m);
+    loads are (n, 3), COEFFICIENTS (n,)."""
     pad = make_pad(1)
     w = pad.joints[0]
-    for i in range(velocity.shape[0]):
-        one = Plugin(
-            plugin.coefficients[i : i + 1],
-            plugin.order,
-            plugin.entries,
-            0,
-            plugin.period,
-            1,
-        )
-        c = one.coefficients[0]
+    driven = np.zeros(1, np.intp)
+    velocity = np.empty((coefficients.size, commands.size))
+    for i in range(coefficients.size):
+        c = coefficients[i]
         for k in range(commands.size):
             w.travel = steady_opening(commands[k], c)
-            speed, shut = 0.0, w.travel == 0.0 and c.leakage == 0.0
+            shut = w.travel == 0.0 and c.leakage == 0.0
             takes = (c.a.area, c.b.area)
             if not (quasi or shut):
                 takes = areas_on_the_way(c, w, angle, load[i], commands[k])
             weigh(c, w, angle, load[i, 1])
+            speed = 0.0
             if quasi:
-                speed = _quasi_static(one, pad)
+                speed = _quasi_static_speed(coefficients[i : i + 1], driven, pad)
             elif not shut:
                 speed = fed_speed(c, w, takes)[0]
             velocity[i, k] = speed / w.arm
+    return velocity
 
 
 def steady_velocity(
@@ -293,15 +325,7 @@ def steady_velocity(
     force-stroke curve exists.
     """
     alone: Records = joint[:, None]  # pyright: ignore[reportAssignmentType]
-    table, place = coefficients(alone)[:, 0].view(np.ndarray), np.zeros(1, np.intp)
-    velocity = np.empty((len(joint), len(commands)))
-    _steady(
-        Plugin(table, place, place[None], 0, 1.0, 1),
-        angle,
-        load,
-        commands,
-        quasi_static,
-        velocity,
-    )
+    table = coefficients(alone)[:, 0].view(np.ndarray)
+    velocity: Array = _steady(table, angle, load, commands, quasi_static)
     velocity[~has_force_curve(alone)] = np.nan
     return velocity

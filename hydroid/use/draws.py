@@ -36,15 +36,19 @@ from hydroid.posterior.posterior import NORMAL, Posterior, stored_posterior
 from hydroid.problem.problem import Problem
 from hydroid.run.record import record_of
 
-FORGOTTEN, BETWEEN = 20, 4
-"""motions before the first draw, and between two: with bounds, one alone does not
-forget where it began"""
-MOST_BOUNCES = 10_000  # of one motion
+FORGOTTEN = 20
+"""motions before the first draw"""
+BETWEEN = 4
+"""motions between two draws: with bounds, one alone does not forget where it began"""
+MOST_BOUNCES = 10_000
+"""of one motion"""
 WIDE_OPEN = 0.1
 """relative standard deviation from which on a direction is one in which no model is
 linear"""
-HALVINGS = 6  # of a draw's part: to 2 %
-TOUCHING = 1e-9  # of a period, within which a wall is the one that was just met
+HALVINGS = 6
+"""of the part of its way that a draw keeps: to 2 %"""
+TOUCHING = 1e-9
+"""phase within which a wall is the one that was just met [rad]"""
 
 
 @record
@@ -112,73 +116,81 @@ def draw(
         RunError: the model holds no covariance of its parameters: it is no fit.
         SettingsError: n is below 1.
     """
-    known = stored_posterior(model)
-    if known is None:
+    posterior = stored_posterior(model)
+    if posterior is None:
         hint = "name the folder of a fit, with the settings that it used"
         raise RunError("holds no covariance of these parameters", model.source, hint)
     if n < 1:
         raise SettingsError("needs one draw at least", "draws")
-    changes = within(known, n, np.random.default_rng(seed))
-    record = None if problem is not None else record_of(model)
-    if record is not None:
-        problem = Problem(model.settings, [p.log for p in record.fitted])
+    changes = within(posterior, n, np.random.default_rng(seed))
+    if problem is None:
+        fit = record_of(model)
+        if fit is not None:
+            problem = Problem(model.settings, [p.log for p in fit.fitted])
     if problem is not None:
-        changes = on_their_level(known, changes, problem)
-    return Draws(model, known.box.points(changes), known)
+        changes = on_their_level(posterior, changes, problem)
+    return Draws(model, posterior.box.points(changes), posterior)
 
 
-def on_their_level(known: Posterior, changes: Array, problem: Problem) -> Array:
+def on_their_level(posterior: Posterior, changes: Array, problem: Problem) -> Array:
     """Return changes, (n, p), moved back until logs and priors are as likely as the
     Gaussian has it there."""
-    likelihood, wide = likelihood_at(problem, known.box.at), known.quantile / NORMAL
-    level = 0.5 * np.sum((changes @ known.root.T / wide) ** 2, axis=1)
-    least = 0.5 * float(np.sum(likelihood.rows(known.box.at[None]) ** 2))
+    box = posterior.box
+    likelihood = likelihood_at(problem, box.at)
+    widening = posterior.quantile / NORMAL
+    gaussian = 0.5 * np.sum((changes @ posterior.root.T / widening) ** 2, axis=1)
+    least = 0.5 * float(np.sum(likelihood.rows(box.at[None]) ** 2))
 
-    def too_unlikely(some: Array, rows: Index) -> Mask:
-        cost = (
-            0.5 * np.sum(likelihood.rows(known.box.points(some)) ** 2, axis=1) - least
-        )
-        return np.nan_to_num(cost, nan=np.inf) > wide**2 * level[rows]
+    def too_unlikely(candidates: Array, rows: Index) -> Mask:
+        cost = 0.5 * np.sum(likelihood.rows(box.points(candidates)) ** 2, axis=1)
+        # a simulation that diverged is as unlikely as can be
+        increase = np.nan_to_num(cost - least, nan=np.inf)
+        return increase > widening**2 * gaussian[rows]
 
-    variances, axes = np.linalg.eigh(known.covariance)
-    close = axes[:, np.sqrt(variances) < WIDE_OPEN]
-    inner = np.clip(changes @ close @ close.T, -known.box.room[0], known.box.room[1])
-    every = np.arange(len(changes))
-    left = every[too_unlikely(changes, every)]
-    hopeless = left[too_unlikely(inner[left], left)]
-    found = changes.copy()
-    for rows, base in (
-        (np.setdiff1d(left, hopeless), inner),
-        (hopeless, np.zeros_like(inner)),
-    ):
-        away = (inner if rows is hopeless else changes)[rows] - base[rows]
-        part, step = np.zeros(len(rows)), 0.5
+    def moved_back(start: Array, end: Array, rows: Index) -> Array:
+        """Return how far rows may go from a start towards an end, by halving."""
+        way = end[rows] - start[rows]
+        part = np.zeros(len(rows))
+        step = 0.5
         for _ in range(HALVINGS if len(rows) else 0):
             tried = part + step
-            far = too_unlikely(base[rows] + tried[:, None] * away, rows)
+            far = too_unlikely(start[rows] + tried[:, None] * way, rows)
             part = np.where(far, part, tried)
             step *= 0.5
-        found[rows] = base[rows] + part[:, None] * away
-    return found
+        return start[rows] + part[:, None] * way
+
+    # the same changes without the directions that the logs leave wide open
+    variances, axes = np.linalg.eigh(posterior.covariance)
+    narrow = axes[:, np.sqrt(variances) < WIDE_OPEN]
+    narrowed = np.clip(changes @ narrow @ narrow.T, -box.room[0], box.room[1])
+    every = np.arange(len(changes))
+    unlikely = every[too_unlikely(changes, every)]
+    still_unlikely = unlikely[too_unlikely(narrowed[unlikely], unlikely)]
+    likely_again = np.setdiff1d(unlikely, still_unlikely)
+    kept = changes.copy()
+    kept[likely_again] = moved_back(narrowed, changes, likely_again)
+    estimate = np.zeros_like(narrowed)
+    kept[still_unlikely] = moved_back(estimate, narrowed, still_unlikely)
+    return kept
 
 
-def within(known: Posterior, n: int, rng: Generator) -> Array:
+def within(posterior: Posterior, n: int, rng: Generator) -> Array:
     """Return n draws of relative changes of the p parameters that vary, inside their
     bounds, (n, p).
 
     They are as wide as the intervals, which are Student's.
     """
     # with z standard normal, a change is `spread` z
-    spread = (
-        known.quantile / NORMAL * solve_triangular(known.root, np.eye(len(known.root)))
-    )
+    inverse = solve_triangular(posterior.root, np.eye(len(posterior.root)))
+    spread = posterior.quantile / NORMAL * inverse
     walls = np.concatenate([spread, -spread])
-    gaps = known.box.room.ravel()
-    point, drawn = np.zeros(len(spread)), np.empty((n, len(spread)))
+    gaps = posterior.box.room.ravel()
+    point = np.zeros(len(spread))
+    points = np.empty((n, len(spread)))
     for motion in range(FORGOTTEN + BETWEEN * n):
         _move(point, rng.normal(size=len(point)), walls, gaps)
-        drawn[max(motion - FORGOTTEN, 0) // BETWEEN] = point
-    return drawn @ spread.T
+        points[max(motion - FORGOTTEN, 0) // BETWEEN] = point
+    return points @ spread.T
 
 
 @njit(cache=True)
@@ -187,18 +199,21 @@ def _move(point: Array, speed: Array, walls: Array, gaps: Array) -> None:
     (m, p) and (m,)."""
     left = 0.5 * np.pi
     for _ in range(MOST_BOUNCES):
-        towards, there = walls @ speed, walls @ point
-        first, met = left, -1
+        towards = walls @ speed
+        there = walls @ point
+        first = left
+        met = -1
         for k in range(len(gaps)):
+            # along a wall's normal the point swings between -reach and reach
             reach = np.sqrt(towards[k] ** 2 + there[k] ** 2)
             if reach <= gaps[k]:
                 continue
             phase = np.arctan2(-towards[k], there[k])
-            time = (np.arccos(min(max(-gaps[k] / reach, -1.0), 1.0)) - phase) % (
-                2.0 * np.pi
-            )
+            turn = np.arccos(min(max(-gaps[k] / reach, -1.0), 1.0))
+            time = (turn - phase) % (2.0 * np.pi)
             if TOUCHING < time < first:
-                first, met = time, k
+                first = time
+                met = k
         moved = speed * np.sin(first) + point * np.cos(first)
         speed[:] = speed * np.cos(first) - point * np.sin(first)
         point[:] = moved
@@ -222,11 +237,15 @@ class DriftingAngles:
 
     def __init__(self, numbers: Array, n: int, period: float) -> None:
         sensor, rate, way, lasting, time = numbers.T
-        self._sensor, self._way = np.sqrt(sensor), way
+        self._sensor = np.sqrt(sensor)
+        self._way = way
         self._grown = rate * period
+        # a first-order process keeps this part of itself from step to step, and so much
+        # is added that its variance stays
         self._kept = np.exp(-period / np.where(time > 0.0, time, 1.0))
         self._lasting = np.sqrt(lasting * (1.0 - self._kept**2))
-        self._drift, self._passing = np.zeros((2, n, len(numbers)))
+        self._drift = np.zeros((n, len(numbers)))
+        self._passing = np.zeros((n, len(numbers)))
 
     def reset(self, rows: Array | slice = slice(None)) -> None:
         """Begin again without any error."""
@@ -250,9 +269,9 @@ def error_numbers(model: IdentifiedModel) -> Array:
     """Return the numbers of each joint's error in rad and s, (J, 5); 0 where a fit did
     not compare it."""
     errors = model.summarise().errors
-    joints = model.settings.arm.joint_names
-    rows = [
-        errors[f"q{joint}"].numbers if f"q{joint}" in errors else (0.0,) * 5
-        for joint in range(1, 1 + len(joints))
-    ]
-    return np.array(rows)
+    numbers = np.zeros((len(model.settings.arm.joint_names), 5))
+    for column in range(len(numbers)):
+        error = errors.get(f"q{column + 1}")
+        if error is not None:
+            numbers[column] = error.numbers
+    return numbers

@@ -38,13 +38,15 @@ except ImportError:
 
 Floats = NDArray[np.float32]
 
-POSES = 16
-"""random poses in which episodes begin: to be put into one that is ready takes a
-hundredth of a reset"""
+POSES, LEAST_POSES = 256, 4
+"""random poses in which episodes begin, of all machines together, and at least of each:
+to be put into one that is ready takes a hundredth of a reset"""
 ENDLESS = np.pi
 """end of the range of a joint that turns without end [rad]"""
-LARGEST = 10.0  # of an observation
-MARGIN = 0.1  # part of a range that starts and targets keep from its ends
+LARGEST = 10.0
+"""of an observation, whose machine may diverge"""
+MARGIN = 0.1
+"""part of a range that starts and targets keep from its ends"""
 DECISION = 0.05
 """time that an action is held, about [s]"""
 
@@ -69,26 +71,33 @@ class _Machines:
         decision: float,
         threads: int | None,
     ) -> None:
-        settings, arm = model.settings, model.settings.arm
+        settings = model.settings
+        arm = model.settings.arm
         self.joints = Plant(model).joints
-        period = max(round(decision / settings.log.period_s), 1) * settings.log.period_s
-        bare = [replace(model, theta=theta, summary=None) for theta in thetas]
-        plants = [Plant(one, joints=self.joints, period=period) for one in bare]
-        self.batch, self.period = PlantBatch(plants, threads=threads), period
+        sample = settings.log.period_s
+        self.period = max(round(decision / sample), 1) * sample
+        plants = list[Plant]()
+        for theta in thetas:
+            machine = replace(model, theta=theta, summary=None)
+            plants.append(Plant(machine, joints=self.joints, period=self.period))
+        self.batch = PlantBatch(plants, threads=threads)
         self._columns = np.array(self.joints) - 1
         low, high = np.clip([arm.lower, arm.upper], -ENDLESS, ENDLESS)[:, self._columns]
-        self._middle, self._half = 0.5 * (low + high), 0.5 * (high - low)
+        self._middle = 0.5 * (low + high)
+        self._half = 0.5 * (high - low)
         self._pose = arm.pose(settings.start_pose)
         numbers = error_numbers(model)[self._columns]
-        self._drift = DriftingAngles(
-            numbers if errors else np.zeros_like(numbers), len(thetas), period
-        )
-        self._ready: dict[tuple[int, int], RowState] = {}
-        reach = np.random.default_rng(0).uniform(-1.0, 1.0, (POSES, len(self.joints)))
-        self._starts = self._middle + (1.0 - 2.0 * MARGIN) * self._half * reach
+        if not errors:
+            numbers = np.zeros_like(numbers)
         n = len(thetas)
+        self._drift = DriftingAngles(numbers, n, self.period)
+        self._ready: dict[tuple[int, int], RowState] = {}
+        poses = n, max(POSES // n, LEAST_POSES), len(self.joints)
+        reach = np.random.default_rng(0).uniform(-1.0, 1.0, poses)
+        self._starts = self._middle + (1.0 - 2.0 * MARGIN) * self._half * reach
         self.target = np.tile(self._middle, (n, 1))
-        self._angle, self._true = self.target.copy(), self.target.copy()
+        self._angle = self.target.copy()
+        self._true = self.target.copy()
         self._speed = np.zeros_like(self._angle)
 
     def begin(self, row: int, rng: Generator, options: dict[str, Any]) -> None:
@@ -96,25 +105,24 @@ class _Machines:
         if (pose := options.get("pose")) is not None:
             self.batch.reset(pose, rows=[row])
         else:
-            number = int(rng.integers(POSES))
+            number = int(rng.integers(self._starts.shape[1]))
             if (row, number) not in self._ready:
                 start = self._pose.copy()
-                start[self._columns] = self._starts[number]
+                start[self._columns] = self._starts[row, number]
                 self.batch.reset(start, rows=[row])
                 self._ready[row, number] = self.batch.state(row)
             self.batch.restore(row, self._ready[row, number])
         reach = (1.0 - 2.0 * MARGIN) * rng.uniform(-1.0, 1.0, len(self.joints))
-        wished = options.get("target")
-        target = (
-            self._middle + self._half * reach
-            if wished is None
-            else np.asarray(wished, float)
-        )
+        target = self._middle + self._half * reach
+        if options.get("target") is not None:
+            target = np.asarray(options["target"], float)
         if target.shape != self._middle.shape:
             raise ValueError(f"a target needs {len(self.joints)} angles [rad]")
         self.target[row] = target
         angle = self.batch.angle[row, self._columns]
-        self._angle[row], self._true[row], self._speed[row] = angle, angle, 0.0
+        self._angle[row] = angle
+        self._true[row] = angle
+        self._speed[row] = 0.0
         self._drift.reset(np.array([row]))
 
     def step(self, action: Any, rng: Generator) -> None:
@@ -130,21 +138,18 @@ class _Machines:
     def observe(self, rng: Generator) -> Floats:
         """Return what the sensors read, (n, 3 K)."""
         noise = self._drift.noise(rng)
-        parts = (
-            self._angle + noise - self._middle,
-            self.target - self._angle - noise,
-            self._speed,
-        )
-        seen = np.nan_to_num(np.hstack([part / self._half for part in parts]))
-        return seen.clip(-LARGEST, LARGEST).astype(np.float32)
+        from_middle = (self._angle + noise - self._middle) / self._half
+        to_target = (self.target - self._angle - noise) / self._half
+        speed = self._speed / self._half
+        observation = np.nan_to_num(np.hstack([from_middle, to_target, speed]))
+        return observation.clip(-LARGEST, LARGEST).astype(np.float32)
 
     @property
     def reward(self) -> Array:
         """Minus the mean distance to the targets in halves of the range, (n,)."""
-        return -np.mean(
-            np.abs(np.nan_to_num(self.target - self._angle, nan=10.0)) / self._half,
-            axis=1,
-        )
+        # a machine that diverged counts as 10 rad away
+        away = np.abs(np.nan_to_num(self.target - self._angle, nan=10.0))
+        return -np.mean(away / self._half, axis=1)
 
     @property
     def diverged(self) -> Any:
@@ -154,11 +159,9 @@ class _Machines:
 
 def _opened(source: Any) -> IdentifiedModel:
     """Return the model of a run folder, of the result of a fit, or itself."""
-    return (
-        load_identified(source)
-        if isinstance(source, str | Path)
-        else getattr(source, "model", source)
-    )
+    if isinstance(source, str | Path):
+        return load_identified(source)
+    return getattr(source, "model", source)
 
 
 def _spaces(joints: int) -> tuple[Any, Any]:
@@ -202,14 +205,14 @@ class Env(gymnasium.Env[Floats, Floats]):
         decision_s: float = DECISION,
         errors: bool = True,
     ) -> None:
-        self._model, self._seconds = _opened(source), seconds
-        drawn = (
-            draw(self._model, draws, seed).theta
-            if draws
-            else np.empty((0, len(self._model.theta)))
-        )
-        self._thetas = np.vstack([self._model.theta, drawn])
-        self._errors, self._decision = errors, decision_s
+        self._model = _opened(source)
+        self._seconds = seconds
+        self._thetas = self._model.theta[None]
+        if draws:
+            drawn = draw(self._model, draws, seed).theta
+            self._thetas = np.vstack([self._thetas, drawn])
+        self._errors = errors
+        self._decision = decision_s
         self._made: dict[int, _Machines] = {}
         self._now = self._machine(0)
         self.joints = self._now.joints
@@ -221,18 +224,14 @@ class Env(gymnasium.Env[Floats, Floats]):
         """Begin an episode; `info` names the draw."""
         super().reset(seed=seed)
         options = options or {}
-        number = options.get("draw")
-        number = (
-            int(self.np_random.integers(len(self._thetas)))
-            if number is None
-            else int(number)
-        )
-        if not 0 <= number < len(self._thetas):
-            raise SettingsError(
-                f"is {number}",
-                "draw",
-                f"0 to {len(self._thetas) - 1}: name more with draws=",
-            )
+        count = len(self._thetas)
+        given = options.get("draw")
+        if given is None:
+            given = self.np_random.integers(count)
+        number = int(given)
+        if not 0 <= number < count:
+            hint = f"0 to {count - 1}: name more with draws="
+            raise SettingsError(f"is {number}", "draw", hint)
         self._now = self._machine(number)
         self._now.begin(0, self.np_random, options)
         return self._now.observe(self.np_random)[0], {"draw": number}
@@ -297,16 +296,14 @@ class VectorEnv(GymnasiumVectorEnv[Floats, Floats, Any]):
         self._machines = _Machines(
             model, thetas, errors=errors, decision=decision_s, threads=threads
         )
-        self._seconds, self.num_envs, self.joints = (
-            seconds,
-            num_envs,
-            self._machines.joints,
-        )
-        self.single_observation_space, self.single_action_space = _spaces(
-            len(self.joints)
-        )
-        self.observation_space = batch_space(self.single_observation_space, num_envs)
-        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._seconds = seconds
+        self.num_envs = num_envs
+        self.joints = self._machines.joints
+        observations, actions = _spaces(len(self.joints))
+        self.single_observation_space = observations
+        self.single_action_space = actions
+        self.observation_space = batch_space(observations, num_envs)
+        self.action_space = batch_space(actions, num_envs)
         self._over = np.zeros(num_envs, dtype=bool)
 
     def reset(
@@ -320,16 +317,17 @@ class VectorEnv(GymnasiumVectorEnv[Floats, Floats, Any]):
         if seed is not None:
             self._np_random = np.random.default_rng(seed)  # pyright: ignore[reportArgumentType]
         options = options or {}
-        for row in np.flatnonzero(
-            options.get("reset_mask", np.ones(self.num_envs, dtype=bool))
-        ).tolist():
+        every = np.ones(self.num_envs, dtype=bool)
+        for row in np.flatnonzero(options.get("reset_mask", every)).tolist():
             self._machines.begin(row, self.np_random, options)
         self._over[:] = False
         return self._machines.observe(self.np_random), {}
 
     def step(self, actions: Floats) -> tuple[Floats, Array, Any, Any, dict[str, Any]]:
         """Hold the actions, (n, K), for one decision."""
-        machines, began = self._machines, self._over
+        machines = self._machines
+        # what was over has no step: its action is not taken, and it begins anew
+        began = self._over
         machines.step(actions, self.np_random)
         for row in np.flatnonzero(began).tolist():
             machines.begin(row, self.np_random, {})

@@ -10,7 +10,7 @@ learning control*, 2006). No measurement is needed for that: a model errs the sa
 every time.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -28,17 +28,21 @@ MOST_TURNS = 15
 """simulations in which commands are learnt"""
 GAINED = 0.02
 """part by which an error must fall for another turn to be worth it"""
-TURNS_WITHOUT = 3  # in a row before learning ends
+TURNS_WITHOUT = 3
+"""turns in a row without such a gain before learning ends"""
 PASSED = 0.25
 """of the speeds that are missing, what is slower than so much over a joint's lags is
 learnt [cycles]"""
-FASTEST = 0.2  # of that, at most so much of a sample's rate
+FASTEST = 0.2
+"""cutoff of what is learnt, at most [cycles per sample]"""
 QUIET = 0.005
 """part of a joint's largest wished speed below which it stands: no valve should chatter
 on its dead band"""
-AWAY, AWAY_SLOW = 0.02, 0.1
+AWAY = 0.02
 """part of its largest wished speed by which a joint must miss a wish for a span to be
-named; the second of wishes that are slow, which every path has where it turns round"""
+named"""
+AWAY_SLOW = 0.1
+"""the same for wishes that are slow, which every path has where it turns round"""
 
 
 @record
@@ -103,7 +107,7 @@ def follow(model: IdentifiedModel, path: Log, *, payload: float = 0.0) -> Follow
     Args:
         model: of stage 2.
         path: angles over time [rad]; joints that it does not hold rest in its `pose`.
-        payload: mass in the gripper [kg].
+        payload: mass at the tip [kg].
 
     Raises:
         LogError: a joint that takes no commands should move, or an angle is missing.
@@ -117,16 +121,14 @@ def follow(model: IdentifiedModel, path: Log, *, payload: float = 0.0) -> Follow
         )
     _refuse_unmoved(plant, path)
     lags = joint_lags(plant)
-    wished, missed = _within_range(
-        plant, _with_rest(path, float(lags.max(initial=0.0)))
-    )
+    rested = _with_rest(path, float(lags.max(initial=0.0)))
+    wished, missed = _within_range(plant, rested)
     tracker = _Tracker(plant, wished, lags)
     missed += tracker.missed()
     command, angle, turns = tracker.learn()
     log = replace(wished, command=command)
-    bands = prediction_bands(
-        model, log, angle[:, [j - 1 for j in model.settings.outputs]]
-    )
+    outputs = [joint - 1 for joint in model.settings.outputs]
+    bands = prediction_bands(model, log, angle[:, outputs])
     half = {joint: band.half for joint, band in bands.items() if joint in plant.joints}
     lead = (len(log.time) - len(path.time)) * path.period
     return Followed(log, angle, half, tuple(missed), lead, plant.joints, turns)
@@ -135,13 +137,22 @@ def follow(model: IdentifiedModel, path: Log, *, payload: float = 0.0) -> Follow
 def joint_lags(plant: Plant) -> Array:
     """Return by how much joints are late [s], shape (J,): delay and lags, the mean of
     both sides."""
-    own, lags = plant.actuators, np.zeros(len(plant.names))
-    late = own["opening_lag"] + 0.5 * (own["delay_a"] + own["delay_b"])
-    late = late + 0.5 * (own["pilot_lag_a"] + own["pilot_lag_b"])
+    actuators = plant.actuators
+
+    def mean(quantity: str) -> Array:
+        """Return the mean of both sides of a quantity, by joint."""
+        return 0.5 * (actuators[f"{quantity}_a"] + actuators[f"{quantity}_b"])
+
+    late = actuators["opening_lag"] + mean("delay")
+    late = late + mean("pilot_lag")
     # at half its stroke the solenoid adds as much stiffness as the spring has
-    damping = 0.5 * (own["plunger_damping_a"] + own["plunger_damping_b"])
-    late = late + 0.5 * damping / own["plunger_stiffness"]
-    late = late + 2.0 * own["oil_damping"] / (2.0 * np.pi * own["oil_frequency"])
+    late = late + 0.5 * mean("plunger_damping") / actuators["plunger_stiffness"]
+    # a slow motion is late behind an oscillator by twice the damping per frequency that
+    # acts on the joint
+    frequency = 2.0 * np.pi * actuators["oil_frequency"]
+    held_back = actuators["oil_damping"] * (1.0 - actuators["oil_damping_share"])
+    late = late + 2.0 * held_back / frequency
+    lags = np.zeros(len(plant.names))
     driven = [joint - 1 for joint in plant.joints]
     lags[driven] = late[driven]
     return lags
@@ -155,16 +166,19 @@ def _refuse_unmoved(plant: Plant, path: Log) -> None:
     still = np.ptp(path.posed, axis=0) < LEAST_SPEED
     for joint in np.flatnonzero(~still).tolist():
         if joint + 1 not in plant.joints:
-            named = ", ".join(plant.names[j - 1] for j in plant.joints)
-            what = f"joint {plant.names[joint]} should move, but the fit gives commands to {named} only"
-            raise LogError(
-                what, path.source, "leave its column out, or fit a log that drives it"
+            driven = ", ".join(plant.names[number - 1] for number in plant.joints)
+            name = plant.names[joint]
+            what = (
+                f"joint {name} should move, but the fit gives commands to {driven} only"
             )
+            hint = "leave its column out, or fit a log that drives it"
+            raise LogError(what, path.source, hint)
 
 
 def _with_rest(path: Log, lag: float) -> Log:
     """Return a path whose first motion leaves time for commands that come before it."""
-    angle, period = path.posed, path.period
+    angle = path.posed
+    period = path.period
     moves = np.flatnonzero(np.any(np.abs(angle - angle[0]) > LEAST_SPEED, axis=1))
     rests = int(moves[0]) - 1 if len(moves) else len(angle)
     more = max(int(np.ceil(lag / period)) + 1 - rests, 0)
@@ -196,55 +210,74 @@ def _named(limit: Limit | None, away: float) -> bool:
     return away > (AWAY_SLOW if limit in (Limit.SLOWEST, Limit.LEAKS) else AWAY)
 
 
+def _rates(values: Array, period: float) -> Array:
+    """Return the rates of values, (T, J), until the next sample; 0 after the last."""
+    last = np.zeros((1, values.shape[1]))
+    return np.concatenate([np.diff(values, axis=0), last]) / period
+
+
+def _runs(rows: Index) -> Iterator[Index]:
+    """Yield the runs of rows that follow each other."""
+    for run in np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1):
+        if len(run):
+            yield run
+
+
 class _Tracker:
     """Learns commands along a path of one plant."""
 
     def __init__(self, plant: Plant, path: Log, lags: Array) -> None:
-        self._plant, self._path, self._lags = plant, path, lags
+        self._plant = plant
+        self._path = path
+        self._lags = lags
         plant.reset(path.angle[0])
         self._steady = plant.steady()
         angle = path.angle
         self._pose = np.concatenate([0.5 * (angle[1:] + angle[:-1]), angle[-1:]])
-        self._speed = (
-            np.concatenate([np.diff(angle, axis=0), np.zeros((1, path.joints))])
-            / path.period
-        )
+        self._speed = _rates(angle, path.period)
         self._load = self._steady.weighing.loads(self._pose)
         self._driven: Index = np.array(plant.joints) - 1
 
     def missed(self) -> list[Missed]:
         """Return the spans in which the wished speeds cannot be had as settled ones."""
-        speed, pose, time = self._speed, self._pose, self._path.time
+        speed = self._speed
+        pose = self._pose
+        time = self._path.time
         command, reached = self._steady.commands(speed, pose, self._load)
         rows = np.flatnonzero(np.any(np.abs(reached - speed) > self._quiet(), axis=1))
         limits = self._steady.limits(
             speed[rows], reached[rows], command[rows], pose[rows]
         )
         by_row = dict(zip(rows.tolist(), limits, strict=True))
-        found = list[Missed]()
+        missed = list[Missed]()
         for joint in self._driven.tolist():
             largest = max(float(np.abs(speed[:, joint]).max()), LEAST_SPEED)
             away = np.abs(reached - speed)[:, joint] / largest
-            at = [row for row in by_row if _named(by_row[row].get(joint), away[row])]
-            for span in np.split(
-                np.array(at, int), np.flatnonzero(np.diff(at) > 1) + 1
-            ):
-                if len(span):
-                    worst = int(span[np.argmax(away[span])])
-                    speeds = float(speed[worst, joint]), float(reached[worst, joint])
-                    times = float(time[span[0]]), float(time[span[-1]])
-                    found.append(Missed(joint, by_row[worst][joint], *times, *speeds))
-        return found
+            named = [row for row in by_row if _named(by_row[row].get(joint), away[row])]
+            for span in _runs(np.array(named, int)):
+                worst = int(span[np.argmax(away[span])])
+                missed.append(
+                    Missed(
+                        joint,
+                        by_row[worst][joint],
+                        from_s=float(time[span[0]]),
+                        to_s=float(time[span[-1]]),
+                        wished=float(speed[worst, joint]),
+                        had=float(reached[worst, joint]),
+                    )
+                )
+        return missed
 
     def learn(self) -> tuple[Array, Array, int]:
         """Return commands [%] and the angles that they give [rad], (T, J), and the
         simulations it took."""
         wish = self._speed.copy()
         command = self._commands(wish)
-        best = command, self._simulate(command)
-        least = self._size(best[1])
-        turns, without = 1, 0
-        angle = best[1]
+        angle = self._simulate(command)
+        best = (command, angle)
+        least = self._size(angle)
+        turns = 1
+        without = 0
         while turns < MOST_TURNS and without < TURNS_WITHOUT:
             wish = wish + self._learnable(self._path.angle - angle)
             command = self._commands(wish)
@@ -253,7 +286,8 @@ class _Tracker:
             turns += 1
             without = 0 if size < (1.0 - GAINED) * least else without + 1
             if size < least:
-                best, least = (command, angle), size
+                best = (command, angle)
+                least = size
         return *best, turns
 
     def _size(self, angle: Array) -> float:
@@ -267,11 +301,15 @@ class _Tracker:
     def _commands(self, wish: Array) -> Array:
         """Commands [%] for wished speeds [rad/s], (T, J), earlier by the joints'
         lags."""
-        time, period = self._path.time, self._path.period
-        ahead, pose, load = np.zeros_like(wish), self._pose.copy(), self._load.copy()
+        time = self._path.time
+        period = self._path.period
+        ahead = np.zeros_like(wish)
+        pose = self._pose.copy()
+        load = self._load.copy()
         for joint in self._driven.tolist():
             lag = float(self._lags[joint])
             ahead[:, joint] = np.interp(time + lag, time, wish[:, joint], right=0.0)
+            # the command acts when the joint is where it will be then
             row = np.minimum(np.arange(len(time)) + round(lag / period), len(time) - 1)
             pose[:, joint] = self._pose[row, joint]
             load[:, joint] = self._load[row, joint]
@@ -289,10 +327,7 @@ class _Tracker:
         """Speeds that are missing [rad/s] where angles err [rad], both (T, J), as far
         as lags let them."""
         period = self._path.period
-        missing = (
-            np.concatenate([np.diff(error, axis=0), np.zeros((1, error.shape[1]))])
-            / period
-        )
+        missing = _rates(error, period)
         slow = np.zeros_like(missing)
         for joint in self._driven.tolist():
             lag = max(float(self._lags[joint]), period)

@@ -18,23 +18,30 @@ times what speed falls per load.
 """
 
 import json
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
+from scipy.signal import StateSpace, lsim
 
 from hydroid.arrays import Array, Index, record
 from hydroid.errors import SettingsError
-from hydroid.hydraulics.cylinder import volume
+from hydroid.hydraulics.cylinder import rod_way
+from hydroid.hydraulics.oil import volume
 from hydroid.hydraulics.records import LINEAR, coefficients
 from hydroid.hydraulics.solenoid import drive, resting_stroke, side_voltage
 from hydroid.plant import Plant
-from hydroid.simulation.quasi_static import linkage
 from hydroid.simulation.settled import settled_speeds
 
-NEAR_COMMAND, NEAR_ANGLE = 0.5, 1e-3
-"""half a difference of commands [%], and of angles [rad]"""
-SHORT = 1e-4  # lag that is none [s]
+NEAR_COMMAND = 0.5
+"""half a difference of commands [%], over which a slope is taken"""
+NEAR_ANGLE = 1e-3
+"""half a difference of angles [rad], over which a slope is taken"""
+SHORT = 1e-4
+"""lag that is none [s]"""
+COMMAND = -1
+"""the command's column in the rates of a valve's states"""
 
 
 @record
@@ -63,15 +70,32 @@ class LinearArm:
     angle: Array
     speed: Array
 
+    def step(self, k: int, time: Array) -> Array:
+        """Return the change of a joint's speed [rad/s] after its command, the k-th, has
+        risen by 1 % at time 0, shape (T,); times are equally spaced [s], shape (T,)."""
+        given = np.zeros((len(time), len(self.joints)))
+        given[:, k] = 1.0
+        system = StateSpace(self.a, self.b, self.c, self.d)
+        speed = lsim(system, given, time - time[0])[1][:, len(self.joints) + k]
+        return np.interp(time - self.delay[k], time, speed, left=0.0)
+
+    def response(self, k: int, frequency: Array) -> Array:
+        """Return by how much a joint's speed swings per 1 % of its command, the k-th:
+        complex [rad/s], shape (F,), at frequencies [Hz], shape (F,)."""
+        own = len(self.joints) + k
+        swing = 2j * np.pi * frequency
+        matrices = swing[:, None, None] * np.eye(len(self.a)) - self.a
+        states = np.linalg.solve(matrices, self.b[:, k, None].astype(complex))[..., 0]
+        return (states @ self.c[own] + self.d[own, k]) * np.exp(-swing * self.delay[k])
+
     def text(self) -> str:
         """Return it as JSON."""
-        named = {
-            key.upper() if len(key) == 1 else key: value
-            for key, value in vars(self).items()
-        }
-        return json.dumps(
-            {key: np.asarray(value).tolist() for key, value in named.items()}, indent=1
-        )
+        plain = dict[str, Any]()
+        for key, value in vars(self).items():
+            # matrices bear their usual names in the file: A, B, C, D
+            name = key.upper() if len(key) == 1 else key
+            plain[name] = np.asarray(value).tolist()
+        return json.dumps(plain, indent=1)
 
 
 def linearise(plant: Plant, command: Array) -> LinearArm:
@@ -83,60 +107,65 @@ def linearise(plant: Plant, command: Array) -> LinearArm:
             slope.
     """
     columns: Index = np.array(plant.joints) - 1
-    names = tuple(plant.names[column] for column in columns.tolist())
-    for joint in columns.tolist():
+    joints: list[int] = columns.tolist()
+    names = tuple(plant.names[joint] for joint in joints)
+    for joint in joints:
         _refuse_without_slope(plant, joint, command)
-    valves = [_valve(plant, joint, float(command[joint])) for joint in columns.tolist()]
-    oils = [_oil(plant, joint, command) for joint in columns.tolist()]
-    count = len(columns)
-    valve_ends = np.cumsum([len(states) for states, *_ in valves])
-    ringing = [k for k, oil in enumerate(oils) if oil is not None]
-    first_oil = int(valve_ends[-1])
-    first_angle = first_oil + 2 * len(ringing)
-    total = first_angle + count
-    a, b = np.zeros((total, total)), np.zeros((total, count))
-    opened, direct = np.zeros((count, total)), np.zeros((count, count))
-    states: list[str] = []
-    for k, (labels, matrix, vector) in enumerate(valves):
-        part = slice(int(valve_ends[k]) - len(labels), int(valve_ends[k]))
-        a[part, part], b[part, k] = matrix, vector
-        if labels:
-            opened[k, part.stop - 1] = 1.0
-        else:
-            direct[k, k] = 1.0
-        states += [f"{names[k]} {label}" for label in labels]
+    valves = [_valve(plant, joint, command) for joint in joints]
+    oils = [_oil(plant, joint, command) for joint in joints]
     gain, turn, speed = _slopes(plant, command, columns)
-    moved, fed = gain @ opened, gain @ direct
-    moved[:, first_angle:] += turn
-    for place, k in enumerate(ringing):
-        pace, ratio = oils[k] or (0.0, 0.0)
-        one, two = first_oil + 2 * place, first_oil + 2 * place + 1
-        a[one, two] = 1.0
-        a[two], b[two] = pace**2 * moved[k], pace**2 * fed[k]
-        a[two, one] -= pace**2
-        a[two, two] -= 2.0 * ratio * pace
-        moved[k], fed[k] = 0.0, 0.0
-        moved[k, one] = 1.0
-        states += [f"{names[k]} speed", f"{names[k]} acceleration"]
-    a[first_angle:], b[first_angle:] = moved, fed
-    states += [f"{name} angle" for name in names]
-    angles = np.eye(total)[first_angle:]
-    c, d = np.vstack([angles, moved]), np.vstack([np.zeros_like(fed), fed])
-    delay = np.array(
-        [_side(plant, joint, command)["delay"] for joint in columns.tolist()]
-    )
+
+    # what states and commands do, side by side: to the states' rates, to openings and
+    # to speeds
+    states = _state_names(names, valves, oils)
+    count = len(joints)
+    total = len(states)
+    first_angle = total - count
+    rates = np.zeros((total, total + count))
+    openings = np.zeros((count, total + count))
+    first = 0
+    for k, valve in enumerate(valves):
+        _put_valve(valve, k, first, rates, openings)
+        first += len(valve.states)
+    opened = openings[:, :total]
+    direct = openings[:, total:]
+    speeds = np.hstack([gain @ opened, gain @ direct])
+    speeds[:, first_angle:total] += turn
+    for k, oil in enumerate(oils):
+        if oil is not None:
+            _put_oil(oil, k, first, rates, speeds)
+            first += 2
+    rates[first_angle:] = speeds
+
+    outputs = np.vstack([np.eye(total, total + count)[first_angle:], speeds])
+    delays = [_side(plant, joint, command)["delay"] for joint in joints]
     return LinearArm(
-        a,
-        b,
-        c,
-        d,
-        delay,
-        names,
-        tuple(states),
-        command[columns],
-        plant.angle[columns],
-        speed,
+        a=rates[:, :total],
+        b=rates[:, total:],
+        c=outputs[:, :total],
+        d=outputs[:, total:],
+        delay=np.array(delays),
+        joints=names,
+        states=states,
+        command=command[columns],
+        angle=plant.angle[columns],
+        speed=speed,
     )
+
+
+def _state_names(
+    names: Sequence[str], valves: "Sequence[_Valve]", oils: "Sequence[_Oil | None]"
+) -> tuple[str, ...]:
+    """Return the names of all states: those of all valves, then of all oils, then the
+    angles."""
+    states = list[str]()
+    for name, valve in zip(names, valves, strict=True):
+        states += [f"{name} {state}" for state in valve.states]
+    for name, oil in zip(names, oils, strict=True):
+        if oil is not None:
+            states += [f"{name} speed", f"{name} acceleration"]
+    states += [f"{name} angle" for name in names]
+    return tuple(states)
 
 
 def _refuse_without_slope(plant: Plant, joint: int, command: Array) -> None:
@@ -159,73 +188,125 @@ def _refuse_without_slope(plant: Plant, joint: int, command: Array) -> None:
         raise SettingsError(what, "--at", hint)
 
 
+def _put_valve(
+    valve: "_Valve", joint: int, first: int, rates: Array, openings: Array
+) -> None:
+    """Fill in the rates of a valve's states, from the first on, and its joint's
+    opening."""
+    total = len(rates)
+    rows = slice(first, first + len(valve.states))
+    rates[rows, rows] = valve.matrix
+    rates[rows, total + joint] = valve.vector
+    if valve.states:
+        openings[joint, rows.stop - 1] = 1.0
+    else:
+        openings[joint, total + joint] = 1.0
+
+
+def _put_oil(oil: "_Oil", joint: int, first: int, rates: Array, speeds: Array) -> None:
+    """Let a joint's speed follow the settled one through two states, from the first
+    on."""
+    speed = first
+    acceleration = first + 1
+    drag = 2.0 * oil.damping * oil.frequency
+    # the second state is the acceleration without what passes the oil at once, as in
+    # `overshoot`
+    passed = oil.share * drag
+    rates[speed] = passed * speeds[joint]
+    rates[speed, acceleration] += 1.0
+    rates[acceleration] = (oil.frequency**2 - drag * passed) * speeds[joint]
+    rates[acceleration, speed] -= oil.frequency**2
+    rates[acceleration, acceleration] -= drag
+    speeds[joint] = 0.0
+    speeds[joint, speed] = 1.0
+
+
 def _side(plant: Plant, joint: int, command: Array) -> dict[str, float]:
     """Return the quantities of the side that a joint (0-based) is driven towards."""
-    one, end = plant.actuators[joint], "a" if command[joint] > 0.0 else "b"
+    actuator = plant.actuators[joint]
+    end = "a" if command[joint] > 0.0 else "b"
     keys = ("delay", "pilot_lag", "plunger_damping", "dead_band", "onset")
-    return {key: float(one[f"{key}_{end}"]) for key in keys}
+    return {key: float(actuator[f"{key}_{end}"]) for key in keys}
 
 
 def _slopes(plant: Plant, command: Array, columns: Index) -> tuple[Array, Array, Array]:
-    """Slopes of the K settled speeds by commands and by angles, (K, K) each, and the
-    speeds, (K,)."""
-    steady, count = plant.steady(), len(columns)
-    commands, poses = (
-        np.tile(command, (4 * count + 1, 1)),
-        np.tile(plant.angle, (4 * count + 1, 1)),
-    )
+    """Return slopes of the K settled speeds by commands and by angles, (K, K) each, and
+    the speeds, (K,)."""
+    count = len(columns)
+    # four rows a joint: its command more and less, its angle more and less; the last
+    # row is the point itself
+    commands = np.tile(command, (4 * count + 1, 1))
+    poses = np.tile(plant.angle, (4 * count + 1, 1))
     for k, joint in enumerate(columns.tolist()):
         commands[[4 * k, 4 * k + 1], joint] += [NEAR_COMMAND, -NEAR_COMMAND]
         poses[[4 * k + 2, 4 * k + 3], joint] += [NEAR_ANGLE, -NEAR_ANGLE]
     # at full command the slope is that from below
     commands = commands.clip(-100.0, 100.0)
-    own = np.arange(count)
-    apart = commands[4 * own, columns] - commands[4 * own + 1, columns]
-    speeds = steady.speeds(commands, poses)[:, columns]
+    more = 4 * np.arange(count)
+    apart = commands[more, columns] - commands[more + 1, columns]
+    speeds = plant.steady().speeds(commands, poses)[:, columns]
     gain = (speeds[0:-1:4] - speeds[1:-1:4]).T / apart
     turn = (speeds[2:-1:4] - speeds[3:-1:4]).T / (2.0 * NEAR_ANGLE)
     return gain, turn, speeds[-1]
 
 
-def _valve(plant: Plant, joint: int, command: float) -> tuple[list[str], Array, Array]:
-    """States from a joint's command to its opening, each as a part of it: names, their
-    matrix and input."""
-    one = plant.actuators[joint]
-    side = _side(
-        plant, joint, np.where(np.arange(len(plant.names)) == joint, command, 0.0)
-    )
-    c = _coefficients(plant, joint)
-    beyond = abs(command) - side["dead_band"]
-    pull = drive(
-        side_voltage(max(beyond, 0.0), 1.0, side["onset"], side["dead_band"]), c
-    )
-    stroke = float(resting_stroke(pull, c.gap, c.plunger_stiffness))
-    stiffness = float(c.plunger_stiffness * (1.0 + 2.0 * stroke / (stroke + c.gap)))
-    damping, mass = side["plunger_damping"], float(one["plunger_mass"])
-    names, lags = list[str](), list[float]()
+@record
+class _Valve:
+    """The S states from a joint's command to its opening, the opening last: their
+    names, and their rates by themselves, (S, S), and by the command, (S,)."""
+
+    states: tuple[str, ...]
+    matrix: Array
+    vector: Array
+
+
+def _valve(plant: Plant, joint: int, command: Array) -> _Valve:
+    """Return the states of a joint's valve (0-based), each as a part of its own final
+    value."""
+    actuator = plant.actuators[joint]
+    side = _side(plant, joint, command)
+    # from a command on, each state follows the one before it: `source` is its row
+    states = list[str]()
+    rates = np.zeros((4, 5))
+    source = COMMAND
     if side["pilot_lag"] > SHORT:
-        names.append("pilot stage")
-        lags.append(side["pilot_lag"])
-    size = len(names) + 2 + (one["opening_lag"] > SHORT)
-    matrix, vector = np.zeros((size, size)), np.zeros(size)
-    if lags:
-        matrix[0, 0], vector[0] = -1.0 / lags[0], 1.0 / lags[0]
+        _put_lag(rates, len(states), source, side["pilot_lag"])
+        source = len(states)
+        states.append("pilot stage")
+
     # the plunger's acceleration first: its stroke is what goes on
-    fast, at = len(names), len(names) + 1
-    names += ["plunger speed", "plunger"]
-    matrix[at, fast] = 1.0
-    matrix[fast, fast], matrix[fast, at] = -damping / mass, -stiffness / mass
-    if lags:
-        matrix[fast, 0] = stiffness / mass
-    else:
-        vector[fast] = stiffness / mass
-    if one["opening_lag"] > SHORT:
-        names.append("opening")
-        matrix[at + 1, at], matrix[at + 1, at + 1] = (
-            1.0 / one["opening_lag"],
-            -1.0 / one["opening_lag"],
-        )
-    return names, matrix, vector
+    speed = len(states)
+    stroke = speed + 1
+    states += ["plunger speed", "plunger"]
+    stiffness = _plunger_stiffness(plant, joint, side, float(command[joint]))
+    mass = float(actuator["plunger_mass"])
+    rates[stroke, speed] = 1.0
+    rates[speed, speed] = -side["plunger_damping"] / mass
+    rates[speed, stroke] = -stiffness / mass
+    rates[speed, source] = stiffness / mass
+    if actuator["opening_lag"] > SHORT:
+        _put_lag(rates, len(states), stroke, actuator["opening_lag"])
+        states.append("opening")
+    size = len(states)
+    return _Valve(tuple(states), rates[:size, :size], rates[:size, COMMAND])
+
+
+def _put_lag(rates: Array, state: int, source: int, lag: float) -> None:
+    """Let a state follow another, or the command, with a lag [s]."""
+    rates[state, source] = 1.0 / lag
+    rates[state, state] = -1.0 / lag
+
+
+def _plunger_stiffness(
+    plant: Plant, joint: int, side: Mapping[str, float], command: float
+) -> float:
+    """Return the stiffness of spring and solenoid against the plunger where a command
+    holds it [N/m]."""
+    c = _coefficients(plant, joint)
+    beyond = max(abs(command) - side["dead_band"], 0.0)
+    voltage = side_voltage(beyond, 1.0, side["onset"], side["dead_band"])
+    stroke = float(resting_stroke(drive(voltage, c), c.gap, c.plunger_stiffness))
+    return float(c.plunger_stiffness * (1.0 + 2.0 * stroke / (stroke + c.gap)))
 
 
 def _coefficients(plant: Plant, joint: int) -> Any:
@@ -233,48 +314,70 @@ def _coefficients(plant: Plant, joint: int) -> Any:
     return coefficients(alone)[0, 0]
 
 
-def _oil(plant: Plant, joint: int, command: Array) -> tuple[float, float] | None:
-    """Natural frequency [rad/s] and damping ratio of a joint on its oil; None where it
-    has none."""
-    one = plant.actuators[joint]
-    if plant.quasi_static:
-        if np.isinf(one["oil_frequency"]):
-            return None
-        return 2.0 * np.pi * float(one["oil_frequency"]), float(one["oil_damping"])
+class _Oil(NamedTuple):
+    """A joint on its oil: natural frequency [rad/s], damping ratio, and the share of
+    the damping between valve and joint."""
+
+    frequency: float
+    damping: float
+    share: float = 0.0
+
+
+def _oil(plant: Plant, joint: int, command: Array) -> _Oil | None:
+    """Return how a joint (0-based) rings on its oil; None where it has none."""
+    if not plant.quasi_static:
+        stiffness = _oil_stiffness(plant, joint)
+        inertia = _inertia(plant, joint)
+        yielding = _yielding(plant, joint, command)
+        return _Oil(
+            float(np.sqrt(stiffness / inertia)),
+            0.5 * yielding * float(np.sqrt(stiffness * inertia)),
+        )
+    actuator = plant.actuators[joint]
+    if np.isinf(actuator["oil_frequency"]):
+        return None
+    frequency = 2.0 * np.pi * float(actuator["oil_frequency"])
+    damping = float(actuator["oil_damping"])
+    return _Oil(frequency, damping, float(actuator["oil_damping_share"]))
+
+
+def _oil_stiffness(plant: Plant, joint: int) -> float:
+    """Return the stiffness of the oil in both chambers against a joint (0-based)
+    [N·m/rad]."""
     c = _coefficients(plant, joint)
-    travel, arm = linkage(c, float(plant.angle[joint]))
-    stiffness = 2.0 * (arm * c.a.area) ** 2 * c.bulk_modulus / c.dead_volume
-    if c.kind == LINEAR:
-        side_a = c.a.area**2 / volume(travel, c.a.area, c.dead_volume)
-        side_b = c.b.area**2 / volume(c.stroke - travel, c.b.area, c.dead_volume)
-        stiffness = arm**2 * c.bulk_modulus * (side_a + side_b)
-    inertia = _inertia(plant, joint)
+    travel, arm = rod_way(c, float(plant.angle[joint]))
+    if c.kind != LINEAR:
+        return 2.0 * (arm * c.a.area) ** 2 * c.bulk_modulus / c.dead_volume
+    side_a = c.a.area**2 / volume(travel, c.a.area, c.dead_volume)
+    side_b = c.b.area**2 / volume(c.stroke - travel, c.b.area, c.dead_volume)
+    return arm**2 * c.bulk_modulus * (side_a + side_b)
+
+
+def _yielding(plant: Plant, joint: int, command: Array) -> float:
+    """Return how much settled speed a joint (0-based) loses per load
+    [rad/s per N·m]."""
     steady = plant.steady()
-    columns, pose = steady.columns, plant.angle[None]
+    columns = steady.columns
+    column = int(np.flatnonzero(columns == joint)[0])
+    pose = plant.angle[None]
     load = steady.weighing.loads(pose)[:, columns]
-    place, change = (
-        int(np.flatnonzero(columns == joint)[0]),
-        0.01 * max(float(np.abs(load).max()), 1.0),
-    )
+    change = 0.01 * max(float(np.abs(load).max()), 1.0)
+    poses = np.repeat(pose[:, columns], 2, axis=0)
     loads = np.repeat(load, 2, axis=0)
-    loads[:, place] += [change, -change]
-    two = (
-        np.repeat(pose[:, columns], 2, axis=0),
-        loads,
-        np.repeat(command[None, columns], 2, axis=0),
-    )
-    speeds = settled_speeds(steady.plugin, *two, quasi_static=False)[:, place]
-    yielding = float(speeds[1] - speeds[0]) / (2.0 * change)
-    pace = float(np.sqrt(stiffness / inertia))
-    return pace, 0.5 * yielding * float(np.sqrt(stiffness * inertia))
+    loads[:, column] += [change, -change]
+    commands = np.repeat(command[None, columns], 2, axis=0)
+    speeds = settled_speeds(steady.plugin, poses, loads, commands, quasi_static=False)
+    return float(speeds[1, column] - speeds[0, column]) / (2.0 * change)
 
 
 def _inertia(plant: Plant, joint: int) -> float:
-    """Inertia of a joint (0-based) in the plant's pose, the others at rest [kg·m²]."""
-    model, data = plant.model, mujoco.MjData(plant.model)
+    """Return the inertia of a joint (0-based) in the plant's pose, the others at rest
+    [kg·m²]."""
+    model = plant.model
+    data = mujoco.MjData(model)
     data.qpos[:] = plant.data.qpos
     mujoco.mj_forward(model, data)
     full = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, full)
-    place = int(np.flatnonzero(plant.parts.columns == joint)[0])
-    return float(full[place, place])
+    row = int(np.flatnonzero(plant.parts.columns == joint)[0])
+    return float(full[row, row])

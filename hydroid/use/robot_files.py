@@ -22,7 +22,7 @@ from hydroid.mjcf import mjcf_text
 from hydroid.plant import Plant
 from hydroid.robot_xml import read_robot
 from hydroid.use.follow import joint_lags
-from hydroid.use.tables import COMMANDS, ENDLESS
+from hydroid.use.tables import COMMANDS, joint_range, speeds_alone
 
 ANGLES = 15
 """of a joint in its table of speeds"""
@@ -138,29 +138,29 @@ def write_moving(plant: Plant, folder: Path) -> list[Path]:
     inertia = spec.compile().dof_M0
     for body in spec.bodies[1:]:
         body.gravcomp = 1.0
-    for joint, own in zip(spec.joints, inertia.tolist(), strict=True):
-        joint.damping, joint.stiffness, joint.frictionloss = [0.0] * 3, [0.0] * 3, 0.0
+    for joint, joint_inertia in zip(spec.joints, inertia.tolist(), strict=True):
+        # speeds are those of the table: what would slow the joint is in them already
+        joint.damping = [0.0] * 3
+        joint.stiffness = [0.0] * 3
+        joint.frictionloss = 0.0
         motor = spec.add_actuator(
             name=joint.name, target=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT
         )
-        motor.set_to_velocity(kv=SERVO * own)
+        motor.set_to_velocity(kv=SERVO * joint_inertia)
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    rows = [
-        [name, *(f"{cell:.9g}" for cell in row)]
-        for name, table in speed_grids(plant).items()
-        for row in table.tolist()
-    ]
-    lags = joint_lags(plant)
-    late = [
-        [plant.names[joint - 1], f"{lags[joint - 1]:.6g}"] for joint in plant.joints
-    ]
-    names = ", ".join(name for name, _ in late)
+    speeds: list[Sequence[str]] = [("joint", "angle", "command_pct", "speed")]
+    for name, grid in speed_grids(plant).items():
+        for row in grid.tolist():
+            speeds.append([name, *map("{:.9g}".format, row)])
+    names = [plant.names[joint - 1] for joint in plant.joints]
+    every_lag = joint_lags(plant)
+    lags = [f"{every_lag[joint - 1]:.6g}" for joint in plant.joints]
     content = {
         "moving.xml": mjcf_text(spec),
-        "speeds.csv": csv_text([("joint", "angle", "command_pct", "speed"), *rows]),
-        "lags.csv": csv_text([("joint", "lag_s"), *late]),
+        "speeds.csv": csv_text(speeds),
+        "lags.csv": csv_text([("joint", "lag_s"), *zip(names, lags, strict=True)]),
         "drive.py": fill_template("use/drive.py.j2"),
-        "MOVING.txt": fill_template("use/moving.txt.j2", joints=names),
+        "MOVING.txt": fill_template("use/moving.txt.j2", joints=", ".join(names)),
     }
     for name, text in content.items():
         write_atomic(model / name, text)
@@ -170,21 +170,12 @@ def write_moving(plant: Plant, folder: Path) -> list[Path]:
 def speed_grids(plant: Plant) -> dict[str, Array]:
     """Return rows of angle [rad], command [%] and settled speed [rad/s] by joint, each
     joint alone."""
-    arm, start, steady = plant.identified.settings.arm, plant.angle, plant.steady()
-    grids: dict[str, Array] = {}
-    for joint in plant.joints:
-        column = joint - 1
-        low, high = np.clip([arm.lower[column], arm.upper[column]], -ENDLESS, ENDLESS)
-        angle, command = np.meshgrid(
-            np.linspace(low, high, ANGLES), COMMANDS, indexing="ij"
-        )
-        pose, given = (
-            np.tile(start, (angle.size, 1)),
-            np.zeros((angle.size, len(start))),
-        )
-        pose[:, column], given[:, column] = angle.ravel(), command.ravel()
-        speed = steady.speeds(given, pose)[:, column]
-        grids[plant.names[column]] = np.column_stack(
-            [angle.ravel(), command.ravel(), speed]
-        )
+    grids = dict[str, Array]()
+    for column in [joint - 1 for joint in plant.joints]:
+        low, high = joint_range(plant, column)
+        angles = np.linspace(low, high, ANGLES)
+        angle = np.repeat(angles, len(COMMANDS))
+        command = np.tile(COMMANDS, ANGLES)
+        speed = speeds_alone(plant, column, angle, command)
+        grids[plant.names[column]] = np.column_stack([angle, command, speed])
     return grids

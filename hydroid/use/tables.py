@@ -1,18 +1,29 @@
 """Tables for other programs: settled speeds for a PLC, draws of the parameters, and
 their ranges."""
 
+from operator import attrgetter
+
 import numpy as np
 
+from hydroid.arrays import Array
 from hydroid.files import csv_text
 from hydroid.plant import Plant
 from hydroid.use.draws import Draws
 
 COMMANDS = np.concatenate([np.arange(-100.0, 0.0, 5.0), np.arange(0.0, 101.0, 5.0)])
 """of a table of speeds [%]"""
-PLACES = (0.1, 0.3, 0.5, 0.7, 0.9)
-"""of a joint in its range, at which a table has its speeds"""
+PARTS = (0.1, 0.3, 0.5, 0.7, 0.9)
+"""of a joint's range, at which a table has its speeds"""
 ENDLESS = np.pi
 """end of the range of a joint that turns without end [rad]"""
+ERROR_COLUMNS = (
+    "sensor_deg",
+    "drift_per_s",
+    "drift_per_way",
+    "lasting_deg",
+    "lasting_s",
+)
+"""of the table of errors: attributes of an `AngleError`"""
 
 RANGES_NOTE = """\
 draws.csv   machines that the logs do not rule out, one per row: all parameters together
@@ -32,29 +43,46 @@ def speed_tables(plant: Plant) -> dict[str, str]:
 
     Each joint moves alone; the others stand where the plant does.
     """
-    files: dict[str, str] = {}
-    arm, start, steady = plant.identified.settings.arm, plant.angle, plant.steady()
-    for joint in plant.joints:
-        column, name = joint - 1, plant.names[joint - 1]
-        slides = arm.joints[column].slides
-        factor, unit = (1e3, "mm") if slides else (float(np.degrees(1.0)), "deg")
-        low, high = np.clip([arm.lower[column], arm.upper[column]], -ENDLESS, ENDLESS)
-        places = low + np.array(PLACES) * (high - low)
-        header = [
-            "command_pct",
-            *(f"{unit}_per_s_at_{factor * place:.4g}_{unit}" for place in places),
-        ]
+    files = dict[str, str]()
+    arm = plant.identified.settings.arm
+    for column in [joint - 1 for joint in plant.joints]:
+        unit = "deg"
+        factor = float(np.degrees(1.0))
+        if arm.joints[column].slides:
+            unit = "mm"
+            factor = 1e3
+        low, high = joint_range(plant, column)
+        header = ["command_pct"]
         columns = [COMMANDS]
-        for place in places:
-            pose, command = (
-                np.tile(start, (len(COMMANDS), 1)),
-                np.zeros((len(COMMANDS), len(start))),
-            )
-            pose[:, column], command[:, column] = place, COMMANDS
-            columns.append(factor * steady.speeds(command, pose)[:, column])
-        rows = [[f"{cell:.6g}" for cell in row] for row in np.column_stack(columns)]
-        files[f"speeds_{name}.csv"] = csv_text([header, *rows])
+        for angle in low + np.array(PARTS) * (high - low):
+            header.append(f"{unit}_per_s_at_{factor * angle:.4g}_{unit}")
+            angles = np.full(len(COMMANDS), angle)
+            columns.append(factor * speeds_alone(plant, column, angles, COMMANDS))
+        rows = [header]
+        for row in np.column_stack(columns):
+            rows.append([f"{cell:.6g}" for cell in row])
+        files[f"speeds_{plant.names[column]}.csv"] = csv_text(rows)
     return files
+
+
+def joint_range(plant: Plant, column: int) -> Array:
+    """Return the ends of a joint's range [rad, m], shape (2,); `column` is its number
+    from 0."""
+    arm = plant.identified.settings.arm
+    return np.clip([arm.lower[column], arm.upper[column]], -ENDLESS, ENDLESS)
+
+
+def speeds_alone(plant: Plant, column: int, angles: Array, commands: Array) -> Array:
+    """Return the settled speeds [rad/s] of a joint at n angles [rad] and commands [%],
+    all of shape (n,).
+
+    The others stand where the plant does, at commands of 0.
+    """
+    poses = np.tile(plant.angle, (len(angles), 1))
+    poses[:, column] = angles
+    given = np.zeros_like(poses)
+    given[:, column] = commands
+    return plant.steady().speeds(given, poses)[:, column]
 
 
 def parameter_files(draws: Draws) -> dict[str, str]:
@@ -63,24 +91,14 @@ def parameter_files(draws: Draws) -> dict[str, str]:
     settings = draws.model.settings
     units = [settings.parameters[name].unit for name in draws.names]
     low, high = np.quantile(draws.theta, [0.025, 0.975], axis=0)
-    ranges = zip(
-        draws.names,
-        units,
-        draws.model.theta.tolist(),
-        low.tolist(),
-        high.tolist(),
-        strict=True,
-    )
-    keys = ("sensor_deg", "drift_per_s", "drift_per_way", "lasting_deg", "lasting_s")
-    errors = [
-        [name, *(getattr(one, key) for key in keys)]
-        for name, one in draws.errors.items()
-    ]
+    numbers = (draws.model.theta.tolist(), low.tolist(), high.tolist())
+    ranges = zip(draws.names, units, *numbers, strict=True)
+    header = ("parameter", "unit", "estimate", "lower", "upper")
+    of_errors = attrgetter(*ERROR_COLUMNS)
+    errors = [(angle, *of_errors(error)) for angle, error in draws.errors.items()]
     return {
         "draws.csv": csv_text([draws.names, *draws.theta.tolist()]),
-        "ranges.csv": csv_text(
-            [("parameter", "unit", "estimate", "lower", "upper"), *ranges]
-        ),
-        "errors.csv": csv_text([("angle", *keys), *errors]),
+        "ranges.csv": csv_text([header, *ranges]),
+        "errors.csv": csv_text([("angle", *ERROR_COLUMNS), *errors]),
         "README.txt": RANGES_NOTE.format(apart=f"{draws.apart:.3g}"),
     }

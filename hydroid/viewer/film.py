@@ -37,11 +37,14 @@ def rendered(
     """Yield a machine at times [s], a text above each, in a size [px]: RGB, shape
     (height, width, 3).
     """
-    replay, (width, height), camera = Replay(motion), size, mujoco.MjvCamera()
+    replay = Replay(motion)
+    width, height = size
     look = replay.model.vis
-    look.global_.offwidth, look.global_.offheight = width, height
+    look.global_.offwidth = width
+    look.global_.offheight = height
     # the map covers what the camera sees, or its border shows as dots on the floor
-    look.map.shadowclip, look.quality.shadowsize = 3.0, 4096
+    look.map.shadowclip = 3.0
+    look.quality.shadowsize = 4096
     try:
         with warnings.catch_warnings():
             # glfw says in warnings what the error says as well
@@ -51,17 +54,18 @@ def rendered(
         how = f"MUJOCO_GL={os.environ.get('MUJOCO_GL')}: {' '.join(str(error).split())}"
         hint = "install libegl1 or libosmesa6, and set MUJOCO_GL=egl or osmesa before Python starts"
         raise RunError(f"no picture can be rendered ({how})", hint=hint) from None
+    camera = mujoco.MjvCamera()
     look_at(camera, replay.model, replay.region)
     letters = height // 30
+    font = ImageFont.load_default(letters)
+    corner = (letters, letters // 2)
     with renderer:
         for time, text in frames:
             replay.advance(time)
             renderer.update_scene(replay.data, camera)
             add_ghost(replay, renderer.scene, camera)
-            picture, place = Image.fromarray(renderer.render()), (letters, letters // 2)
-            ImageDraw.Draw(picture).text(
-                place, text, "black", ImageFont.load_default(letters)
-            )
+            picture = Image.fromarray(renderer.render())
+            ImageDraw.Draw(picture).text(corner, text, "black", font)
             yield np.asarray(picture)
 
 
@@ -74,7 +78,8 @@ def render_motion(
     """Return the content of a film of a motion in a span [s], or of a picture of its
     beginning (.png).
     """
-    begin, end = max(span[0], 0.0), min(span[1], motion.time[-1])
+    begin = max(span[0], 0.0)
+    end = min(span[1], motion.time[-1])
     if not begin < end:
         what = f"{span[0]:g}:{span[1]:g} s holds nothing of a motion of {motion.time[-1]:g} s"
         raise SettingsError(what, "--span", "write FROM:TO in seconds")
@@ -88,7 +93,10 @@ def render_motion(
             time = begin + k / max(rate, 1.0)
             yield time, f"{time:.1f} s{error}"
 
-    return (_mp4 if kind == ".mp4" else _still)(rendered(motion, size, frames()), kind)
+    pictures = rendered(motion, size, frames())
+    if kind == ".mp4":
+        return _mp4(pictures)
+    return _gif(pictures) if kind == ".gif" else _png(pictures)
 
 
 def look_at(camera: mujoco.MjvCamera, model: mujoco.MjModel, region: Region) -> None:
@@ -96,7 +104,8 @@ def look_at(camera: mujoco.MjvCamera, model: mujoco.MjModel, region: Region) -> 
     picture."""
     camera.lookat[:] = region.centre
     camera.distance = region.radius / np.sin(np.radians(model.vis.global_.fovy) / 2)
-    camera.azimuth, camera.elevation = 125.0, -18.0  # [deg]
+    camera.azimuth = 125.0  # [deg]
+    camera.elevation = -18.0  # [deg]
 
 
 def add_ghost(
@@ -110,45 +119,62 @@ def add_ghost(
     """
     if playback.ghost is None:
         return
-    first, dynamic = scene.ngeom, mujoco.mjtCatBit.mjCAT_DYNAMIC
-    option, perturb = mujoco.MjvOption(), mujoco.MjvPerturb()
-    mujoco.mjv_addGeoms(playback.model, playback.ghost, option, perturb, dynamic, scene)
+    first = scene.ngeom
+    mujoco.mjv_addGeoms(
+        playback.model,
+        playback.ghost,
+        mujoco.MjvOption(),
+        mujoco.MjvPerturb(),
+        mujoco.mjtCatBit.mjCAT_DYNAMIC,  # what stands still is the same for both
+        scene,
+    )
     for geom in scene.geoms[first : scene.ngeom]:
-        geom.rgba[:], geom.matid, geom.transparent = (0.12, 0.44, 0.82, 0.42), -1, 1
+        geom.rgba[:] = (0.12, 0.44, 0.82, 0.42)
+        geom.matid = -1  # a material's colour would hide this one
+        geom.transparent = 1
         geom.pos[:] += 0.004 * sight(camera.azimuth, camera.elevation)[2]
 
 
-def _still(pictures: Iterable[Picture], kind: str) -> bytes:
-    content, pause = io.BytesIO(), round(1e3 / KINDS[".gif"][1])  # [ms]
-    if kind == ".png":
-        Image.fromarray(next(iter(pictures))).save(content, "PNG", optimize=True)
-    else:
-        first, *rest = (
-            Image.fromarray(one).quantize(96, dither=Image.Dither.NONE)
-            for one in pictures
-        )
-        first.save(
-            content,
-            "GIF",
-            save_all=True,
-            append_images=rest,
-            duration=pause,
-            loop=0,
-            optimize=True,
-        )
+def _png(pictures: Iterable[Picture]) -> bytes:
+    """Return the first of some pictures as a file."""
+    content = io.BytesIO()
+    Image.fromarray(next(iter(pictures))).save(content, "PNG", optimize=True)
     return content.getvalue()
 
 
-def _mp4(pictures: Iterable[Picture], kind: str) -> bytes:
+def _gif(pictures: Iterable[Picture]) -> bytes:
+    # dithering would flicker from picture to picture
+    few_colours = [
+        Image.fromarray(picture).quantize(96, dither=Image.Dither.NONE)
+        for picture in pictures
+    ]
+    pause = round(1e3 / KINDS[".gif"][1])  # [ms]
+    content = io.BytesIO()
+    few_colours[0].save(
+        content,
+        "GIF",
+        save_all=True,
+        append_images=few_colours[1:],
+        duration=pause,
+        loop=0,
+        optimize=True,
+    )
+    return content.getvalue()
+
+
+def _mp4(pictures: Iterable[Picture]) -> bytes:
     try:
         import av
     except ImportError:
         hint = "pip install 'hydroid[film]', or write a .gif"
         raise RunError("an mp4 needs the package av", hint=hint) from None
-    content, ((width, height), rate) = io.BytesIO(), KINDS[kind]
+    content = io.BytesIO()
+    (width, height), rate = KINDS[".mp4"]
     with av.open(content, "w", format="mp4") as file:
         stream: Any = file.add_stream("libx264", rate=round(rate))
-        stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
+        stream.width = width
+        stream.height = height
+        stream.pix_fmt = "yuv420p"
         stream.options = {"crf": "20", "preset": "fast"}
         for picture in pictures:
             file.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
@@ -156,8 +182,10 @@ def _mp4(pictures: Iterable[Picture], kind: str) -> bytes:
     return content.getvalue()
 
 
-FRAME = 1 / 60  # between two pictures of the viewer [s]
-LATE = 0.1  # a machine too slow by this [s] shows slow motion instead of jumps
+FRAME = 1 / 60
+"""time between two pictures of the viewer [s]"""
+LATE = 0.1
+"""a machine too slow by this shows slow motion instead of jumps [s]"""
 
 
 def play(playback: Playback, viewer: Any) -> None:

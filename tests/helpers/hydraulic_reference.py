@@ -21,7 +21,7 @@ from hydroid.hydraulics.records import JOINT, JOINT_STATE, LINEAR, ROTARY, Recor
 from hydroid.mjcf import quiet_mujoco
 from hydroid.quantity_table import QUANTITIES, TARGETS
 from hydroid.settings.hydraulics import HydraulicSettings, actuator_values
-from hydroid.simulation.rollout import Course, Record, SteppedArm
+from hydroid.simulation.rollout import Course, SteppedArm, Trace
 
 INERTIA, DAMPING, STIFFNESS, MASS, CENTRE, TILT = (
     23.6,
@@ -163,7 +163,7 @@ def simulate(
                 :, None
             ]
             course = Course(held, np.empty((samples * steps, 0)))
-            arm.roll(one, state[i], course, Record(angle[i, 1:], states[i]))
+            arm.roll(one, state[i], course, Trace(angle[i, 1:], states[i]))
     if observe is not None:
         for t in range(samples):
             seen = observed(plugin.coefficients, states[:, t], angle[:, t + 1])

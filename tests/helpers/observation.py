@@ -10,7 +10,7 @@ from hydroid.hydraulics.records import JOINT_STATE, Records
 from hydroid.mjcf import quiet_mujoco
 from hydroid.simulation import Candidates
 from hydroid.simulation.quasi_static import roll_quasi_static
-from hydroid.simulation.rollout import Course, Record, SteppedArm, roll
+from hydroid.simulation.rollout import Course, SteppedArm, Trace, roll
 from hydroid.simulation.scenario import Chain, Scenario
 
 
@@ -65,5 +65,5 @@ def trace(scenario: Scenario, substeps: int, candidates: Candidates) -> Observat
             [np.zeros((one.past, len(states[0]))), scenario.command[:, chain.columns]]
         )
         course = Course(commands, np.empty((len(scenario.command), 0)))
-        arm.roll(one, states[0], course, Record(angle[1:], record[1:]))
+        arm.roll(one, states[0], course, Trace(angle[1:], record[1:]))
     return observe(one.coefficients, record, angle[:, chain.columns])

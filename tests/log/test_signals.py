@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hydroid.log import guess_columns, open_table
-from hydroid.log.signals import SIGNALS, CommandRange, Signal, likely_range
+from hydroid.log.signals import SIGNALS, CommandRange, CommandSignal, likely_range
 from hydroid.settings.log import LogSettings
 
 PAGE = Path(__file__).parents[2] / "docs" / "logs.md"
@@ -15,13 +15,13 @@ STEPS = np.repeat([0.0, 100, 0, -100, 40, 0, -70, 0, 100, 0], 200)
 """a command [%] that begins with rest and is given whole both ways"""
 
 
-def cells(signal: Signal) -> np.ndarray:
+def cells(signal: CommandSignal) -> np.ndarray:
     return signal.middle + signal.half * STEPS / 100
 
 
 @pytest.mark.parametrize("signal", SIGNALS, ids=lambda signal: signal.name)
 def test_each_signal_is_recognised_and_brought_to_percent(
-    signal: Signal, tmp_path: Path
+    signal: CommandSignal, tmp_path: Path
 ) -> None:
     likely = likely_range(cells(signal), unit=signal.unit)
     assert isinstance(likely, CommandRange)
@@ -40,7 +40,9 @@ UNITS = {
 
 
 @pytest.mark.parametrize("signal", SIGNALS, ids=lambda signal: signal.name)
-def test_init_writes_its_scale_and_offset(signal: Signal, tmp_path: Path) -> None:
+def test_init_writes_its_scale_and_offset(
+    signal: CommandSignal, tmp_path: Path
+) -> None:
     unit = UNITS.get(signal.name, "")
     name = f"cmd_boom_{unit}" if unit else "cmd_boom"
     path = tmp_path / "log.csv"
@@ -63,7 +65,7 @@ def test_the_page_has_each_signal() -> None:
         assert row(signal) in page
 
 
-def row(signal: Signal) -> str:
+def row(signal: CommandSignal) -> str:
     _, scale, offset = signal.range
     rest = f", {signal.middle:g} at rest" if signal.low >= 0 else ""
     return f"| {signal.name}{rest} | {scale:.6g} | {f'{offset:.6g}'.replace('-', '−') if offset else ''} |\n"

@@ -7,7 +7,7 @@ from made_logs import HYDRAULIC, step_log
 
 from hydroid import load_settings
 from hydroid.identified_model import identified
-from hydroid.posterior.bench import actuator, make_bench
+from hydroid.posterior.bench import Direction, actuator, make_bench
 from hydroid.posterior.curves import (
     OPENING_COMMANDS,
     frequency_response,
@@ -69,7 +69,7 @@ def test_a_step_is_shown_up_to_the_end_of_the_range_and_slow_commands_are_follow
     bench, estimate = shoulder()
     step = bench.movement(50.0, 3.0)
     speeds = step.speeds(estimate)
-    curves = step_curves(step, estimate, "positive", "raising")(speeds)
+    curves = step_curves(step, estimate, Direction(1.0, "positive", "raising"))(speeds)
     points = [(column, float(value[0])) for column, value in curves]
     times = np.array(
         [column.at for column, _ in points if column.name == "step_positive"]

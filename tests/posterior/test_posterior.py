@@ -86,7 +86,7 @@ def test_a_measurement_adds_its_information_and_some_of_the_parameters_keep_thei
     before, row = known(), np.array([[3.0, -1.0, 2.0]])
     expected = np.linalg.inv(np.linalg.inv(before.covariance) + row.T @ row)
     np.testing.assert_allclose(before.add(row).covariance, expected, rtol=1e-9)
-    some = before.of(np.array([True, False, True]))
+    some = before.marginal(np.array([True, False, True]))
     np.testing.assert_allclose(some.covariance, before.covariance[::2, ::2], rtol=1e-9)
 
 

@@ -17,7 +17,7 @@ import mujoco
 import numpy as np
 
 from hydroid.arrays import record
-from hydroid.cad.loops import close_loops
+from hydroid.cad.loops import SAME, close_loops
 from hydroid.cad.pins import (
     Pin,
     closed_pins,
@@ -33,6 +33,10 @@ from hydroid.files import Plain
 from hydroid.settings.linkage import FourBar, four_bar
 
 ENDS = "parent", "child"  # of the sites that show where a cylinder is pinned
+TWIN = "two cylinders move it: they are taken for one, whose areas are those of both"
+ANOTHER = (
+    "a second cylinder with other pins moves it, which hydroid does not model: left out"
+)
 LETTERS = ("E", "F", "G", "H")
 """sites of a bucket's linkage, from the foot of its cylinder to the bucket"""
 
@@ -53,6 +57,7 @@ def take_cylinders(spec: mujoco.MjSpec, notes: Notes) -> dict[str, Plain]:
     pins = pins_of(spec, data)
     pins += closed_pins(spec, pins, cylinder_pairs, data, notes)
     held = set[str]()
+    taken = dict[str, _Linkage]()
     cylinders = dict[str, Plain]()
     for made in _linkages(pins, cylinder_pairs, data, notes):
         held |= {made.tube, made.rod, *made.bars}
@@ -65,6 +70,12 @@ def take_cylinders(spec: mujoco.MjSpec, notes: Notes) -> dict[str, Plain]:
                 "without limits: the file's cylinder that moves it is not taken",
                 joint.name,
             )
+            continue
+        first = taken.setdefault(joint.name, made)
+        if first is not made:
+            is_twin = _on_one_bolt(first.foot, made.foot, data.joint(joint.name))
+            is_twin &= _on_one_bolt(first.eye, made.eye, data.joint(joint.name))
+            notes.add(TWIN if is_twin else ANOTHER, joint.name)
             continue
         cylinders[joint.name] = made.settings
         if not made.bars:
@@ -194,7 +205,7 @@ class _Linkage:
     """A cylinder, how it is pinned, the joint that it moves, and the settings that say
     so.
 
-    `foot` pins the tube to a link, `eye` the rod to another; `bars` are the rocker and
+    `foot` pins the tube to a link, `eye` the rod to another; `bars` are the rockers and
     the coupler between rod and moved link, if there are any. `joint` None: of a linkage
     that is held.
     """
@@ -220,21 +231,55 @@ def _linkage(
     tube, rod = cylinder
     base = foot.other(tube)
     moved = eye.other(rod)
-    for pinned in _rockers(pins, base, moved, rod):
-        coupler = pinned.coupler.other(moved)
-        child = pinned.child.other(coupler)
-        joint = _joint(pins, base, child)
-        if not joint or child == base:
-            continue
-        places = (pinned.rocker, pinned.coupler, pinned.child, foot, eye)
-        settings = _four_bar(data.joint(joint.name), places)
-        if settings is None:
-            return None
-        return _Linkage(tube, rod, foot, eye, joint, settings, (moved, coupler))
+    for rocker in (moved, *_on_one_pin(pins, eye, moved, data)):
+        for pinned in _rockers(pins, base, rocker, rod):
+            coupler = pinned.coupler.other(rocker)
+            child = pinned.child.other(coupler)
+            joint = _joint(pins, base, child)
+            if not joint or child == base:
+                continue
+            # a second rocker beside the first is not what they move
+            if _on_one_bolt(pinned.child, pinned.coupler, data.joint(joint.name)):
+                continue
+            places = (pinned.rocker, pinned.coupler, pinned.child, foot, eye)
+            settings = _four_bar(data.joint(joint.name), places)
+            if settings is None:
+                return None
+            # a rocker on either side is as good as one
+            twins = [
+                pin.other(coupler)
+                for pin in pins_at(pins, coupler, rocker, rod, child)
+                if _joint(pins, base, pin.other(coupler))
+            ]
+            bars = (rocker, coupler, *twins)
+            return _Linkage(tube, rod, foot, eye, joint, settings, bars)
     joint = _joint(pins, base, moved)
     if not joint:
         return None
     return _Linkage(tube, rod, foot, eye, joint, {"kind": "linear"})
+
+
+def _on_one_pin(
+    pins: Sequence[Pin], eye: Pin, coupler: str, data: mujoco.MjData
+) -> list[str]:
+    """Return the bodies that turn on a coupler where the rod's eye does, beside it on
+    one bolt: its rockers, where the rod is pinned to the coupler."""
+    found = list[str]()
+    for hinge in pins_at(pins, coupler):
+        if not hinge.joint:
+            continue
+        joint = data.joint(hinge.joint.name)
+        for pin in pins_at(pins, coupler):
+            if pin is not eye and _on_one_bolt(pin, eye, joint):
+                found.append(pin.other(coupler))
+    return found
+
+
+def _on_one_bolt(first: Pin, second: Pin, joint: Any) -> bool:
+    """Return whether two pins lie on one line along a joint's axis."""
+    way = first.at - second.at
+    across = way - joint.xaxis * (joint.xaxis @ way)
+    return bool(np.linalg.norm(across) < SAME)
 
 
 class _FourBarPins(NamedTuple):

@@ -17,6 +17,7 @@ from hydroid.commands.inputs import (
 from hydroid.errors import SettingsError
 from hydroid.files import write_atomic
 from hydroid.identified_model import IdentifiedModel
+from hydroid.progress import LOGGER
 from hydroid.words import listed
 
 if TYPE_CHECKING:
@@ -112,7 +113,11 @@ def _files(
         from hydroid.use.robot_files import fitted_urdf
 
         path = Path(robot or "")
-        return {path.name: fitted_urdf(plant, path)[0]}
+        text, without = fitted_urdf(plant, path)
+        if without:
+            what = "warning: %s: states no mass of %s: the fit's is not in the export"
+            LOGGER.warning(what, path, listed(without))
+        return {path.name: text}
     if to == "linear":
         from hydroid.use.linear import linearise
 

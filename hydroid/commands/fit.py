@@ -11,7 +11,7 @@ from hydroid.arrays import record
 from hydroid.commands.console import Printed
 from hydroid.commands.inputs import LogSource, LogSources, ModelSource, Source
 from hydroid.commands.logs import earlier_logs, read_log, read_logs, refuse_undriven
-from hydroid.errors import RunError, SettingsError
+from hydroid.errors import LogError, RunError, SettingsError
 from hydroid.estimate import NAME, FitSummary
 from hydroid.identified_model import IdentifiedModel
 from hydroid.settings.fit import FitSettings
@@ -176,6 +176,7 @@ def fit(
             diverged.
     """
     read = read_logs(logs, settings)
+    _refuse_copies(read)
     files = [*dict.fromkeys(log_file(log.source) for log in read)]
     _refuse_wrong_payloads(settings, files)
     refuse_undriven(read, settings)
@@ -200,6 +201,23 @@ def fit(
         result = _result(problem, run_fit(problem, progress, checkpoints), folder.path)
         _store(folder, result)
     return result
+
+
+def _refuse_copies(logs: "Sequence[Log]") -> None:
+    """Refuse a log that is given twice, in whatever file: it would count twice, and
+    intervals would be too narrow.
+
+    Raises LogError.
+    """
+    from hydroid.run.folder import samples
+
+    first = dict[bytes, str]()
+    for log in logs:
+        digest = samples(log)
+        if digest in first:
+            what = f"holds the same samples as {first[digest]}"
+            raise LogError(what, log.source, "leave one of them out")
+        first[digest] = log.source
 
 
 def _refuse_wrong_payloads(settings: FitSettings, files: Sequence[Path]) -> None:

@@ -287,7 +287,7 @@ def _limits(value: str, value_type: Any) -> Plain:
 
 
 def names(given: str | list[str] | tuple[str, ...] | None) -> list[str]:
-    """Return names that stand in a list, or in a text such as `K,D`."""
+    """Return names that stand in a list, or in a text such as `K,D`, each once."""
     parts = given.split(",") if isinstance(given, str) else given or ()
     stripped = (part.strip() for part in parts)
-    return [name for name in stripped if name]
+    return [*dict.fromkeys(name for name in stripped if name)]

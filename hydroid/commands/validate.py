@@ -6,7 +6,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hydroid.arrays import record
+from hydroid.arrays import record, rms
 from hydroid.commands.console import Result, written
 from hydroid.commands.inputs import (
     LogSources,
@@ -25,6 +25,10 @@ from hydroid.log import Log
 from hydroid.log.overlap import KNOWN, overlap
 from hydroid.progress import LOGGER, NOTE
 from hydroid.words import listed, numbered
+
+OWN = "is what the fit itself simulates: that tests nothing"
+OWN_ERROR = 2e-7
+"""rms error of every joint [rad, m] below which a log is the fit's own simulation"""
 
 if TYPE_CHECKING:
     from hydroid.advice.loads import Load
@@ -145,7 +149,7 @@ def _by_fit(fits: Iterable[str], tested: "Mapping[str, _Tested]") -> "list[Predi
 
 def _fitted_lines(predictions: "Sequence[Prediction]") -> list[str]:
     """Return which logs test nothing, because the fit was made with them."""
-    fitted = [p.log.source for p in predictions if p.unseen is False]
+    fitted = [p.log.source for p in predictions if p.unseen is False and not _is_own(p)]
     if not fitted:
         return []
     what = f"was made with {listed(fitted, 3)}"
@@ -207,13 +211,24 @@ def _test(
             # another day's log may have the name of one that was fitted
             text = "note: %s: is taken to hold %g kg, by its name (payloads)"
             LOGGER.log(NOTE, text, log.source, load)
-        predictions.append(predicted(model, log, unseen))
+        prediction = predicted(model, log, unseen)
+        if _is_own(prediction):
+            LOGGER.warning("warning: %s: %s", log.source, OWN)
+            prediction = replace(prediction, unseen=False)
+        predictions.append(prediction)
     settings = model.settings
     if tolerance is not None:
         settings = settings.changed({"tolerance_deg": tolerance})
     return _Tested(
         model, fitted, predictions, judge(settings, fitted, baselines, predictions)
     )
+
+
+def _is_own(prediction: "Prediction") -> bool:
+    """Return whether a log is what a fit itself simulates, such as `hydroid simulate`
+    wrote: no sensor is so good."""
+    errors = [rms(prediction.error(joint)) for joint in prediction.joints]
+    return bool(max(errors) < OWN_ERROR)
 
 
 def _keep(test: _Tested, *, apart: bool) -> None:

@@ -10,6 +10,7 @@ out.
 import re
 from collections.abc import Sequence
 from pathlib import Path
+from xml.etree.ElementTree import Element
 
 import mujoco
 import numpy as np
@@ -27,51 +28,96 @@ ANGLES = 15
 """of a joint in its table of speeds"""
 SERVO = 500.0
 """rate at which a velocity actuator takes up an error [1/s]"""
-_LINK = r"<link\b[^>]*?\bname\s*=\s*([\"']){}\1[^>]*?>.*?</link\s*>"
-_MASS = re.compile(r"(<mass\b[^>]*?\bvalue\s*=\s*[\"'])([^\"']*)")
+_COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
+_LINK = re.compile(
+    r"""<link\b((?:[^>"']|"[^"]*"|'[^']*')*?)(?:/>|>.*?</link\s*>)""", re.DOTALL
+)
+_NAME = re.compile(r"""\bname\s*=\s*(["'])(.*?)\1""", re.DOTALL)
+_MASS = re.compile(r"<mass\b[^>]*>")
 _INERTIA = re.compile(r"<inertia\b[^>]*>")
-_MOMENT = re.compile(r"(\bi[xyz]{2}\s*=\s*[\"'])([^\"']*)")
+_NUMBER = re.compile(r"""(\b(?:value|i[xyz]{2})\s*=\s*["'])([^"']*)""")
 
 
 def fitted_urdf(plant: Plant, robot: Path) -> tuple[str, list[str]]:
-    """Return a URDF with the masses of a fit, and the names of the links that it
-    changed.
+    """Return a URDF with the masses of a fit, and the links of the arm of which it
+    states no mass.
 
-    A link's inertia is scaled with its mass, as if its shape stayed and its density
-    changed. All other text stays as it is.
+    A link of the arm may be several of the file, which are fixed to each other or held.
+    Masses and inertias of all of them are scaled alike, as if their shapes stayed and
+    their density changed. All other text stays as it is.
 
     Raises:
         ModelError: the file cannot be read, is no URDF, or has none of the arm's links
             with a mass.
     """
-    if read_robot(robot).tag != "robot":
+    root = read_robot(robot)
+    if root.tag != "robot":
         raise ModelError("is no URDF", robot, "name the URDF that hydroid init read")
-    text = robot.read_text(encoding="utf-8")
-    links = plant.identified.settings.arm.link_names
-    changed = list[str]()
-    for name, mass in zip(links, plant.masses.tolist(), strict=True):
-        link = re.search(_LINK.format(re.escape(name)), text, re.DOTALL)
-        stated = link and _MASS.search(link[0])
-        if not link or not stated or float(stated[2]) <= 0.0:
-            continue
-        heavier = _reweighed(link[0], mass, mass / float(stated[2]))
-        text = text[: link.start()] + heavier + text[link.end() :]
-        changed.append(name)
-    if not changed:
-        raise ModelError(f"has none of the links {', '.join(links)} with a mass", robot)
-    return text, changed
+    try:
+        text = robot.read_bytes().decode("utf-8")
+    except UnicodeDecodeError:
+        raise ModelError("is not UTF-8", robot, "save it as UTF-8") from None
+    names = plant.identified.settings.arm.link_names
+    owners = _owners(root, names)
+    stated = dict.fromkeys(names, 0.0)
+    for link in root.iter("link"):
+        owner = owners.get(link.get("name", ""))
+        if owner:
+            stated[owner] += _mass_of(link)
+    factors = dict[str, float]()
+    for name, mass in zip(names, plant.masses.tolist(), strict=True):
+        if stated[name] > 0.0:
+            factors[name] = mass / stated[name]
+    if not factors:
+        raise ModelError(f"has none of the links {', '.join(names)} with a mass", robot)
+    # a link that was commented out is none
+    plain = _COMMENT.sub(lambda part: " " * len(part[0]), text)
+    # from the end, so that places before it stay
+    for block in reversed([*_LINK.finditer(plain)]):
+        named = _NAME.search(block[1])
+        factor = factors.get(owners.get(named[2], "")) if named else None
+        if factor is not None:
+            text = _reweighed(text, plain, block.span(), factor)
+    return text, [name for name in names if name not in factors]
 
 
-def _reweighed(link: str, mass: float, factor: float) -> str:
-    heavier = _MASS.sub(rf"\g<1>{mass:.9g}", link, count=1)
-    return _INERTIA.sub(lambda inertia: _scaled(inertia[0], factor), heavier, count=1)
+def _owners(root: Element, names: Sequence[str]) -> dict[str, str]:
+    """Return the link of the arm that each link of a URDF is a part of; those of the
+    base are of none."""
+    parents = dict[str, str]()
+    for joint in root.iter("joint"):
+        parent, child = joint.find("parent"), joint.find("child")
+        if parent is not None and child is not None:
+            parents[child.get("link", "")] = parent.get("link", "")
+    owners = dict[str, str]()
+    for link in root.iter("link"):
+        name = link.get("name", "")
+        owner = name
+        while owner and owner not in names:
+            owner = parents.get(owner, "")
+        if owner:
+            owners[name] = owner
+    return owners
 
 
-def _scaled(inertia: str, factor: float) -> str:
-    def scale(moment: re.Match[str]) -> str:
-        return f"{moment[1]}{factor * float(moment[2]):.9g}"
+def _mass_of(link: Element) -> float:
+    """Return the mass that a link states [kg]; 0 where it states none."""
+    mass = link.find("inertial/mass")
+    return 0.0 if mass is None else float(mass.get("value", "0"))
 
-    return _MOMENT.sub(scale, inertia)
+
+def _reweighed(text: str, plain: str, span: tuple[int, int], factor: float) -> str:
+    """Return a text in which the mass and the inertia of the link at a span are scaled;
+    `plain` is the text without its comments."""
+    found = [pattern.search(plain, *span) for pattern in (_MASS, _INERTIA)]
+    parts = [part for part in found if part is not None]
+    # from the end, so that places before it stay
+    for part in sorted(parts, key=lambda part: -part.start()):
+        scaled = _NUMBER.sub(
+            lambda one: f"{one[1]}{factor * float(one[2]):.9g}", part[0]
+        )
+        text = text[: part.start()] + scaled + text[part.end() :]
+    return text
 
 
 def write_moving(plant: Plant, folder: Path) -> list[Path]:

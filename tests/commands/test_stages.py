@@ -150,17 +150,33 @@ def test_fit_validate_and_simulate_walk_through(
             "validate", "sim.csv", "--fit", "run", "--json", "--out", "val2"
         ).out
     )
-    assert done["results"][0]["max_deg"] < 1e-6  # its own prediction
-    assert done["verdict"][0]["verdict"] == "predicts"
-    # and the fit's own report shows it
-    (kept,) = run.glob("validations/sim.csv-*/result.npz")
+    # its own prediction tests nothing, and is not kept
+    assert done["results"][0]["max_deg"] < 1e-6
+    assert done["verdict"][0]["unseen_deg"] is None
+    assert not [*run.glob("validations/*")]
+    rows = (ROOT / "examples" / "logs" / "rig_shoulder_2.csv").read_text().splitlines()
+    (tmp_path / "other.csv").write_text("\n".join(rows[:600]) + "\n")
+    hydroid_cli("validate", "other.csv", "--fit", "run", "--out", "val2")
+    # the fit's own report shows it
+    (kept,) = run.glob("validations/other.csv-*/result.npz")
     assert kept.stat().st_size > 0
     assert sorted(p.name for p in tmp_path.iterdir()) == [
+        "other.csv",
         "run",
         "sim.csv",
         "val",
         "val2",
     ]
+
+
+@pytest.mark.parametrize("name", ["./short.csv", "again.csv"])
+def test_a_log_that_is_given_twice_is_refused(
+    short: Path, hydroid_cli: Run, tmp_path: Path, name: str
+):
+    for file in ("short.csv", name):
+        (tmp_path / file).write_text(short.read_text() + "# saved again\n")
+    done = hydroid_cli("fit-mech", "short.csv", name, *GA, *QUICK, code=2)
+    assert "holds the same samples as short.csv; leave one of them out" in done.err
 
 
 def test_the_logs_of_the_fits_that_a_fit_began_from_are_seen(

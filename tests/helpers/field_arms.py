@@ -456,6 +456,33 @@ def loops_of_sites(folder: Path, reach: float = 0.0) -> Path:
     return mjcf(parts, folder, sites, f"<equality>{closed}</equality>")
 
 
+def in_pairs(folder: Path, apart: complex = 0j) -> Path:
+    """Write an MJCF with two cylinders on the boom and two rockers on the stick, where
+    the bucket's rod is pinned to the coupler between them.
+
+    The pins of the boom's second cylinder are `apart` [m] from the first one's.
+    """
+    left = cylinder("boom_left", "house", BOOM_FOOT, BOOM + BOOM_EYE)
+    foot = BOOM_FOOT + apart
+    right = cylinder("boom_right", "house", foot, BOOM + BOOM_EYE + apart)
+    bucket_tube, bucket_rod, rocker, coupler, *_ = linkage()
+    other = replace(rocker, name="other_rocker", joint="other_rocker_joint")
+    parts = (*ARM, *left, *right, bucket_tube, bucket_rod, rocker, coupler, other)
+    boom = LENGTHS["boom"](0.0) - 0.4
+    bucket = LENGTHS["bucket"](0.0) - 0.4
+    pairs = (
+        ("boom_left_rod", "boom", boom),
+        ("boom_right_rod", "boom", boom),
+        ("bucket_rod", "coupler", bucket),
+        ("other_rocker", "coupler", ROCKER_LENGTH),
+        ("coupler", "bucket", COUPLER_LENGTH),
+    )
+    closed = ""
+    for first, second, reach in pairs:
+        closed += f'<connect body1="{first}" body2="{second}" anchor="{reach} 0 0"/>'
+    return mjcf(parts, folder, more=f"<equality>{closed}</equality>")
+
+
 def loader(folder: Path) -> Path:
     """Write a loader whose tilt cylinder stands on the chassis and turns a bell crank
     on the boom: six bars."""
@@ -588,6 +615,24 @@ FIELD_ARMS = (
         loops,
         lengths=LENGTHS,
         masses=WITH_ROD_PARTS | {"stick": ROD_OF_BUCKET["stick"]},
+    ),
+    FieldArm(
+        "cylinders and rockers in pairs",
+        in_pairs,
+        said="two cylinders move it: they are taken for one",
+        lengths={name: LENGTHS[name] for name in ("boom", "bucket")},
+        masses=MASSES
+        | {
+            "house": MASSES["house"] + 2 * (TUBE + ROD),
+            "stick": ROD_OF_BUCKET["stick"] + BAR,
+        },
+    ),
+    FieldArm(
+        "two cylinders of other pins on the boom",
+        lambda folder: in_pairs(folder, -0.3 + 0j),
+        said="a second cylinder with other pins moves it",
+        lengths={name: LENGTHS[name] for name in ("boom", "bucket")},
+        masses={"bucket": MASSES["bucket"]},
     ),
     FieldArm(
         "open cylinders whose pins meet as drawn",

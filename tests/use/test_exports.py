@@ -5,6 +5,7 @@ import csv
 import subprocess
 import sys
 from pathlib import Path
+from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
@@ -122,6 +123,78 @@ def test_a_urdf_comes_back_with_the_masses_and_no_other_change(tmp_path):
     )
     back = load_plant(tmp_path / "again" / "fit.yaml")
     np.testing.assert_allclose(back.masses, plant.masses)
+
+
+LINK = """<link name="{}"><inertial><inertia ixx="{m}" ixy="0" ixz="0" iyy="{m}"
+  iyz="0" izz="{m}"/><mass value="{m}"/></inertial>
+  <visual><geometry><box size="{} 0.3 0.3"/></geometry></visual></link>"""
+JOINT = """<joint name="{0}_joint" type="{kind}"><parent link="{1}"/><child link="{0}"/>
+  <origin xyz="{2} 0 0"/><axis xyz="0 -1 0"/>
+  <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>"""
+
+
+def machine(*before: str) -> str:
+    """A boom with a tank welded to it and a rod that turns on it and carries nothing, and
+    a stick."""
+    parts = [
+        '<link name="base"/>',
+        *before,
+        LINK.format("boom", 3, m=300.0),
+        LINK.format("tank", 0.5, m=60.0),
+        LINK.format("boom_rod", 0.5, m=40.0),
+        LINK.format("stick", 2, m=150.0),
+        JOINT.format("boom", "base", 0, kind="revolute"),
+        JOINT.format("tank", "boom", 1, kind="fixed"),
+        JOINT.format("boom_rod", "boom", 1, kind="revolute"),
+        JOINT.format("stick", "boom", 3, kind="revolute"),
+    ]
+    return f"<robot name='two'>{''.join(parts)}</robot>"
+
+
+@pytest.mark.parametrize(
+    "before",
+    ["", f"<!-- {LINK.format('boom', 3, m=7.0)} -->", "<link name='idle'/>"],
+    ids=["plain", "a link that was commented out", "an empty link before it"],
+)
+def test_all_links_of_a_urdf_that_are_one_link_of_the_arm_share_its_mass(
+    tmp_path: Path, before: str
+):
+    """The boom's mass is that of the boom, the tank and the rod: written to the boom
+    alone, the machine would be 100 kg too heavy."""
+    fixed = JOINT.format("idle", "base", 0, kind="fixed") if "idle" in before else ""
+    (tmp_path / "robot.urdf").write_text(machine(before, fixed))
+    hydroid.init(tmp_path / "mine", arm=tmp_path / "robot.urdf")
+    changes = {"parameters.M_boom.fixed": 500.0, "parameters.M_stick.fixed": 100.0}
+    plant = load_plant(tmp_path / "mine" / "fit.yaml", overrides=changes)
+    hydroid.export(
+        plant.identified, to="urdf", robot=tmp_path / "robot.urdf", out=tmp_path / "out"
+    )
+    text = (tmp_path / "out" / "robot.urdf").read_text()
+    links = {
+        link.get("name"): link.find("inertial/mass")
+        for link in ElementTree.fromstring(text).iter("link")
+    }
+    masses = {
+        name: float(mass.get("value"))
+        for name, mass in links.items()
+        if mass is not None
+    }
+    assert masses == pytest.approx(
+        {"boom": 375.0, "tank": 75.0, "boom_rod": 50.0, "stick": 100.0}
+    )
+    assert text.count('ixx="7.0"') == before.count('ixx="7.0"')
+
+
+def test_a_link_without_a_mass_is_named(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+):
+    stick = LINK.format("stick", 2, m=150.0)
+    text = machine().replace(stick, '<link name="stick"/>')
+    (tmp_path / "robot.urdf").write_text(text)
+    hydroid.init(tmp_path / "mine", arm=tmp_path / "robot.urdf")
+    plant = load_plant(tmp_path / "mine" / "fit.yaml")
+    hydroid.export(plant.identified, to="urdf", robot=tmp_path / "robot.urdf")
+    assert "robot.urdf: states no mass of stick: the fit's is not" in caplog.text
 
 
 def test_plain_mujoco_moves_the_mjcf_as_the_plant_moves(model, tmp_path):

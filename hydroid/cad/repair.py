@@ -102,26 +102,21 @@ def weigh(
     """
     model = compiled(spec, notes.path)
     links = [body for body in spec.bodies[1:] if body.joints]
-    what = "MASSES THAT NO MACHINE HAS"
-    if not any(body.mass for body in links):
-        what = "no masses in the file"
-    replaced = list[str]()
-    densities = set[float]()
     stated = {body.name: body.mass for body in links}
     every = _likely(links, model, hull_model(spec, notes.path), lost)
+    what = "MASSES THAT NO MACHINE HAS"
     are_water = _are_water(every)
     if are_water:
         what = "MASSES OF SHAPES FULL OF WATER"
+    elif not any(stated.values()):
+        what = "no masses in the file"
+    replaced = list[str]()
+    densities = set[float]()
     for body, likely in every:
-        usual = likely.usual
-        density = USUAL * body.mass / usual.mass
-        if likely.least <= density <= likely.most and not are_water:
-            continue
-        mass = likely.density / USUAL * usual.mass
-        was = f"{float(f'{body.mass:.2g}'):g}" if body.mass else "none"
-        replaced.append(f"{body.name} {was} -> {mass:.3g}")
-        set_inertia(body, mass, usual.centre, likely.density / USUAL * usual.tensor)
-        densities.add(likely.density)
+        density = USUAL * body.mass / likely.usual.mass
+        if are_water or not likely.least <= density <= likely.most:
+            replaced.append(_replace_mass(body, likely))
+            densities.add(likely.density)
     if replaced:
         taken = " and ".join(f"{density:.0f}" for density in sorted(densities))
         notes.add(
@@ -132,6 +127,16 @@ def weigh(
         _doubt_light(links, model, stated, notes)
     else:
         _scale_masses(links, total, notes)
+
+
+def _replace_mass(body: mujoco.MjsBody, likely: "_Likely") -> str:
+    """Give a link its likely mass; return what changed."""
+    usual = likely.usual
+    scale = likely.density / USUAL
+    mass = scale * usual.mass
+    was = f"{float(f'{body.mass:.2g}'):g}" if body.mass else "none"
+    set_inertia(body, mass, usual.centre, scale * usual.tensor)
+    return f"{body.name} {was} -> {mass:.3g}"
 
 
 def _doubt_light(

@@ -40,6 +40,24 @@ def boxes_urdf(joints: Sequence[str], lengths: Sequence[float]) -> str:
 
     Raises SettingsError: not a length for each joint, or one that no link has.
     """
+    _check(joints, lengths)
+    reach = sum(lengths)
+    parent = "base"
+    at = "0 0 1"
+    parts = ['<link name="base"/>']
+    for joint, length in zip(joints, lengths, strict=True):
+        upright = length == UPRIGHT
+        size = reach / SLENDER if upright else length
+        own = f"{joint}_link"
+        parts.append(_link(own, size, reach if upright else length, cube=upright))
+        parts.append(_joint(joint, parent, at, upright=upright))
+        parent = own
+        at = f"{length:g} 0 0"
+    return f'<robot name="boxes">{"".join(parts)}</robot>'
+
+
+def _check(joints: Sequence[str], lengths: Sequence[float]) -> None:
+    """Raise SettingsError as `boxes_urdf` says."""
     if not joints or len(joints) != len(lengths):
         what = f"{len(lengths)} lengths are given for {len(joints)} joints"
         raise SettingsError(
@@ -54,24 +72,12 @@ def boxes_urdf(joints: Sequence[str], lengths: Sequence[float]) -> str:
     if len({*joints}) < len(joints):
         raise SettingsError("holds a name twice", "--joints")
     wrong = [length for length in lengths if not 0 <= length <= LONGEST]
-    if wrong or not any(lengths):
-        what = (
-            f"{wrong[0]:g} is no length of a link" if wrong else "no link has a length"
-        )
-        raise SettingsError(
-            what, "--lengths", f"0 to {LONGEST:g} m; 0 for a joint that slews"
-        )
-    reach, parent, at = sum(lengths), "base", "0 0 1"
-    parts = ['<link name="base"/>']
-    for joint, length in zip(joints, lengths, strict=True):
-        upright = length == UPRIGHT
-        size = reach / SLENDER if upright else length
-        parts += [
-            _link(f"{joint}_link", size, reach if upright else length, cube=upright)
-        ]
-        parts += [_joint(joint, parent, at, upright=upright)]
-        parent, at = f"{joint}_link", f"{length:g} 0 0"
-    return f'<robot name="boxes">{"".join(parts)}</robot>'
+    allowed = f"0 to {LONGEST:g} m; 0 for a joint that slews"
+    if wrong:
+        what = f"{wrong[0]:g} is no length of a link"
+        raise SettingsError(what, "--lengths", allowed)
+    if not any(lengths):
+        raise SettingsError("no link has a length", "--lengths", allowed)
 
 
 def _link(name: str, size: float, length: float, *, cube: bool) -> str:

@@ -27,11 +27,7 @@ def guessed_section(table: Table, arm: Arm, order: Sequence[str]) -> ColumnGuess
     arm's order.
     """
     names = arm.joint_names
-    for name in order:
-        if name not in names:
-            hint = f"the arm's joints: {', '.join(names)}"
-            raise SettingsError(f"no joint {name!r}", "--joints", hint)
-    places = [names.index(name) for name in order or names]
+    places = _places(names, order)
     slides = list[int]()
     own_rods = dict[int, Rod]()
     ranges = dict[int, tuple[float, float]]()
@@ -64,6 +60,15 @@ def guessed_section(table: Table, arm: Arm, order: Sequence[str]) -> ColumnGuess
     }
     section["joints"] = dict(sorted(entries.items()))
     return ColumnGuess(section, reasons, unused)
+
+
+def _places(names: Sequence[str], order: Sequence[str]) -> list[int]:
+    """Return the places among the arm's joints of those of an order, or of all."""
+    for name in order:
+        if name not in names:
+            hint = f"the arm's joints: {', '.join(names)}"
+            raise SettingsError(f"no joint {name!r}", "--joints", hint)
+    return [names.index(name) for name in order or names]
 
 
 def _period(period: float) -> float:

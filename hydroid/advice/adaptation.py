@@ -4,23 +4,31 @@ all others held at its estimate.
 Which few is found by trying: the one whose fit foretells parts of the logs left out
 best is freed, then the next, until none foretells them clearly better
 (`fitting.left_out`). Candidates are what all joints share, such as the pump and the
-masses, and the effects of the logs' groups: what a load, a slower engine or another day
-changes.
+masses, the effects of the logs' groups, and a load at the tip: what a load, a slower
+engine or another day changes.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
 
 from hydroid.errors import SettingsError
 from hydroid.files import Plain
 from hydroid.findings import Finding
-from hydroid.fitting.left_out import LeftOut, gain, is_better, refit
+from hydroid.fitting.left_out import LeftOut, gain, is_better, not_fitted, refit
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
 from hydroid.problem.problem import Problem
 from hydroid.progress import Progress
+from hydroid.settings.arm import TIP_LOAD
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.problem import ParameterSettings
 from hydroid.settings.search import MultistartSettings, RefinementSettings
+
+LEAST_LOAD = 1e-9
+"""part of the arm's mass that is no load: a mass must be above 0"""
+FIRST_LOAD = 0.03  # part of the arm's mass from which a load is sought
 
 
 def adapted(
@@ -34,6 +42,8 @@ def adapted(
 
     Raises SettingsError: a name that is none of a parameter with bounds or a prior.
     """
+    if TIP_LOAD in free:
+        model = carrying(model)
     settings = model.settings
     _refuse_unknown(free, settings)
     parameters: dict[str, ParameterSettings] = {}
@@ -41,7 +51,8 @@ def adapted(
         value = model.values[name]
         changes: Plain = {"term": None, "fixed": value}
         if name in free:
-            changes |= {"fixed": None, "start": value}
+            start = first_guess(model) if name == TIP_LOAD else value
+            changes |= {"fixed": None, "start": start}
             if parameter.has_prior:
                 changes["nominal"] = value
         parameters[name] = parameter.changed(changes)
@@ -65,6 +76,28 @@ def adapted(
     )
 
 
+def carrying(model: IdentifiedModel) -> IdentifiedModel:
+    """Return a model that can carry a load at its tip: its last parameter is the mass
+    of it, held at next to nothing."""
+    settings = model.settings
+    if TIP_LOAD in settings.parameters:
+        return model
+    most = float(settings.arm.masses.sum())
+    none = LEAST_LOAD * most
+    load = ParameterSettings(
+        quantity="mass", link=TIP_LOAD, bounds=(none, most), fixed=none
+    )
+    loaded = settings.changed({"arm.load": none}).with_parameters({TIP_LOAD: load})
+    return replace(
+        model, settings=loaded, theta=np.append(model.theta, none), summary=None
+    )
+
+
+def first_guess(model: IdentifiedModel) -> float:
+    """Return the load from which one is sought [kg]."""
+    return FIRST_LOAD * float(model.settings.arm.masses.sum())
+
+
 def _refuse_unknown(names: Sequence[str], settings: FitSettings) -> None:
     """Refuse names of no parameter that could be free."""
     possible = [name for name, p in settings.parameters.items() if p.can_be_free]
@@ -83,7 +116,9 @@ def steps(
     `free` are those to be freed; without any, those that pay.
     Errors are those of parts of the logs left out.
     """
-    pool = list(free) or _candidates(model.settings, logs)
+    pool = list(free) or [*_candidates(model.settings, logs), TIP_LOAD]
+    if TIP_LOAD in pool:
+        model = carrying(model)
     problem = Problem(adapted(model, pool, logs), logs)
     taken = list[str]()
     last = _as_it_is(problem, model)
@@ -97,7 +132,10 @@ def steps(
         for trial in pool[:1] if free else pool:
             progress(f"freeing {trial}", len(taken), len(taken) + len(pool))
             freed = problem.varied(adapted(model, [*taken, trial], logs))
-            trials[trial] = refit(freed, last.theta)
+            begin = last.theta.copy()
+            if trial == TIP_LOAD:
+                begin[-1] = first_guess(model)
+            trials[trial] = refit(freed, begin)
             rises[trial], _ = gain(trials[trial], last)
         name = max(rises, key=rises.__getitem__, default="")
         if not name:
@@ -126,7 +164,7 @@ def _candidates(settings: FitSettings, logs: Sequence[Log]) -> list[str]:
 def _as_it_is(problem: Problem, model: IdentifiedModel) -> LeftOut:
     """Return what a model that is not fitted to them makes of the parts of the logs."""
     errors = problem.output_errors(model.theta[None])[0]
-    return LeftOut(problem, model.theta, model.theta[None], errors)
+    return not_fitted(problem, model.theta, errors)
 
 
 def load_findings(settings: FitSettings) -> tuple[Finding, ...]:

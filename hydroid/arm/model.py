@@ -15,10 +15,11 @@ from itertools import product
 import mujoco
 import numpy as np
 
+from hydroid.arm.tip import tip_of
 from hydroid.arrays import Array, Mask, record
 from hydroid.errors import ModelError, SettingsError
-from hydroid.mjcf import mujoco_errors, read_mjcf
-from hydroid.settings.arm import Arm
+from hydroid.mjcf import mujoco_errors, quiet_mujoco, read_mjcf
+from hydroid.settings.arm import TIP_LOAD, Arm
 
 ALONE = "alone"  # the name of the arm that is not one of two
 SIDES = ("right", "left")
@@ -27,35 +28,34 @@ the names of their parts begin with these and `_`"""
 
 
 def load_model(arm: Arm) -> mujoco.MjSpec:
-    """Read the arm's MJCF, which compiles."""
+    """Read the arm's MJCF, which compiles, with the load that it always carries."""
     spec = read_mjcf(arm.model)
     with mujoco_errors(arm.model):
         spec.compile()
-    return spec
+    return add_payload(spec, arm, arm.load, TIP_LOAD) if arm.load else spec
 
 
-def add_payload(spec: mujoco.MjSpec, arm: Arm, mass: float) -> mujoco.MjSpec:
-    """Return a copy of the arm's model that carries `mass` [kg] at the site of its
-    payload."""
-    if arm.payload is None:
-        hint = (
-            "name the site of the model that holds it in the arm's file, payload: SITE"
-        )
-        raise SettingsError(f"{arm.name} has no place for a payload", "payloads", hint)
+def add_payload(
+    spec: mujoco.MjSpec, arm: Arm, mass: float, name: str = "payload"
+) -> mujoco.MjSpec:
+    """Return a copy of the arm's model that carries `mass` [kg] at its tip, as a body
+    of this name."""
+    with quiet_mujoco():
+        model = spec.compile()
+    tip = tip_of(model, arm)
     loaded = spec.copy()
-    site = loaded.site(arm.payload)
     # of a ball of 5 cm: its own inertia is small beside what its distance makes
     moment = 0.4 * mass * 0.05**2
-    body = site.parent.add_body(
-        name="payload",
-        pos=site.pos,
+    link = model.body(tip.body).name
+    carrier = loaded.body(link) if link else loaded.joint(arm.joint_names[-1]).parent
+    carrier.add_body(
+        name=name,
+        pos=tip.at,
         explicitinertial=True,
         mass=mass,
         ipos=[0.0] * 3,
         inertia=[moment] * 3,
     )
-    if site.frame is not None:
-        body.set_frame(site.frame)
     return loaded
 
 

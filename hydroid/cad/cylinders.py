@@ -17,6 +17,7 @@ import mujoco
 import numpy as np
 
 from hydroid.arrays import record
+from hydroid.cad.loops import close_loops
 from hydroid.cad.pins import (
     Pin,
     closed_pins,
@@ -47,7 +48,8 @@ def take_cylinders(spec: mujoco.MjSpec, notes: Notes) -> dict[str, Plain]:
     cylinder_pairs = [*sliding_rods(spec), *hinged_rods(spec)]
     if not cylinder_pairs:
         return {}
-    _, data = bare_model(spec, notes.path)
+    model, data = bare_model(spec, notes.path)
+    close_loops(model, data, notes)
     pins = pins_of(spec, data)
     pins += closed_pins(spec, pins, cylinder_pairs, data, notes)
     held = set[str]()

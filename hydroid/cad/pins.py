@@ -15,6 +15,7 @@ import mujoco
 import numpy as np
 
 from hydroid.arrays import Array, record
+from hydroid.cad.loops import SAME
 from hydroid.cad.source import Notes
 
 PARTS = {
@@ -32,8 +33,6 @@ PARTS = {
 """words in the names of a cylinder's links and joints"""
 PINS = {"eye", "pin", "end", "mount", "pivot", "link", "joint", "frame"}
 """words in the names of frames at which rods are pinned"""
-SAME = 0.002
-"""distance up to which two pins are one [m]"""
 
 
 @record
@@ -81,6 +80,9 @@ def pins_of(spec: mujoco.MjSpec, data: mujoco.MjData) -> list[Pin]:
             continue
         if equality.objtype == mujoco.mjtObj.mjOBJ_SITE:
             at = data.site(equality.name1).xpos
+            # a loop that closes at no pose shows no pin
+            if np.linalg.norm(data.site(equality.name2).xpos - at) > SAME:
+                continue
         else:
             body = data.body(equality.name1)
             at = body.xpos + body.xmat.reshape(3, 3) @ np.array(equality.data[:3])
@@ -190,9 +192,8 @@ def _pin_as_drawn(loose: "_LooseRod", spec: mujoco.MjSpec, notes: Notes) -> Pin 
     # several frames of the rod's name leave open to which of them it is pinned
     if loose.anchors:
         return None
-    below = [
-        link for link in loose.links if spec.body(link).parent.name == loose.carrier
-    ]
+    carried = {body.name for body in spec.body(loose.carrier).bodies}
+    below = [link for link in loose.links if link in carried]
     ends = loose.ends
     if len(ends) != 1 or len(below) != 1:
         return None

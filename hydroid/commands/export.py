@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hydroid.commands.console import Result
+from hydroid.commands.console import Result, written
 from hydroid.commands.inputs import (
     ModelSource,
     SettingChanges,
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from hydroid.plant import Plant
     from hydroid.use.draws import Draws
 
+MACHINES = 40  # drawn for the bands of a linear model's page
 KINDS = ("parameters", "table", "urdf", "mjcf", "linear", "fmu")
 
 
@@ -46,7 +47,7 @@ def export(
     ranges, and the errors of the model. table: settled speed against command of each
     joint, as CSV for a PLC. urdf: your own file with the masses of the fit. mjcf: a
     model that plain MuJoCo steps. linear: A, B, C, D and delays near a pose and
-    opening, as JSON. fmu: FMI 2 for co-simulation.
+    opening, as JSON, and a page with step response and Bode plot. fmu: FMI 2 for co-simulation.
 
     Example: hydroid export runs/hyd --to parameters --draws 100
 
@@ -95,7 +96,8 @@ def export(
         if out is not None:
             files += map(str, write_moving(plant, folder))
         return Result(files, {"files": files}, files)
-    return _written(_files(plant, to, robot, at), folder, write=out is not None)
+    result = _written(_files(plant, to, robot, at), folder, write=out is not None)
+    return _with_page(result, plant, at, out) if to == "linear" else result
 
 
 def _files(
@@ -118,6 +120,28 @@ def _files(
     from hydroid.use.fmu import fmu_bytes
 
     return {f"{plant.identified.settings.arm.name}.fmu": fmu_bytes(plant)}
+
+
+def _with_page(
+    result: Result[list[str]], plant: "Plant", at: str, out: "Source | None"
+) -> Result[list[str]]:
+    """Return the result of a linear model with its page: step response and Bode plot,
+    with bands where the logs leave something open."""
+    from hydroid.posterior.posterior import stored_posterior
+    from hydroid.reporting.linear_page import linear_page
+    from hydroid.use.draws import draw as drawn
+    from hydroid.use.linear import LinearArm, linearise
+
+    command = _commands(plant, at)
+    others = list[LinearArm]()
+    if stored_posterior(plant.identified) is not None:
+        for other in drawn(plant.identified, MACHINES).plants(joints=plant.joints):
+            other.reset(plant.angle)
+            others.append(linearise(other, command))
+    arm = plant.identified.settings.arm
+    page = linear_page(linearise(plant, command), others, arm)
+    files = [*result.result, *written(page, out)]
+    return Result(files, {"files": files}, files, page)
 
 
 def _commands(plant: "Plant", at: str) -> "Array":

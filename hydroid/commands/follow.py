@@ -51,12 +51,13 @@ def follow(
     Args:
         trajectory (TRAJECTORY.csv): Joint angles over time, in the columns and units of
             the fit's logs; or the tip's position over time, in columns x_m, y_m and
-            z_m. Joints without a column, or without commands, rest in the start pose of
-            the settings.
+            z_m. The tip is the site that the arm's file names as payload, or else the
+            end of the last link. Joints without a column, or without commands, rest in
+            the start pose of the settings.
         out (LOG.csv): The commands, in the columns and units of the fit's logs, beside
             the wished angles; the page has the same name [default of the command line:
             runs/follow/commands.csv].
-        payload (0 or more): Mass in the gripper [kg].
+        payload (0 or more): Mass at the tip [kg].
 
     Raises:
         LogError: the trajectory cannot be used, or moves a joint that takes no
@@ -71,7 +72,7 @@ def follow(
         raise SettingsError(
             "a fit of stage 1 has no valves", model.source, "name a fit of stage 2"
         )
-    path = _tip_path(trajectory, model)
+    path, tip = _tip_path(trajectory, model)
     if path is None:
         settings = _without_absent_joints(trajectory, model.settings)
         paths = read_arms(trajectory, settings, None, angles=True, repair=repair)
@@ -84,6 +85,8 @@ def follow(
     name = "commands" if out is None else Path(out).stem
     page = follow_page(name, followed, arm)
     lines = [tracking_table(followed, arm), *missed_lines(followed, arm)]
+    if tip:
+        lines.append(f"The tip is {tip}.")
     if followed.lead_s:
         lines.append(
             f"The path begins {plain(followed.lead_s)} s into the file: "
@@ -95,6 +98,7 @@ def follow(
     content = {
         "out": out and str(out),
         "lead_s": followed.lead_s,
+        "tip": tip or None,
         "joints": [_errors(followed, joint, arm) for joint in followed.joints],
         "missed": [
             {**vars(missed), "joint": arm.joint_names[missed.joint]}
@@ -104,21 +108,24 @@ def follow(
     return Result(lines, content, followed, page)
 
 
-def _tip_path(trajectory: "Source | Log", model: "IdentifiedModel") -> "Log | None":
-    """Return the joint angles along a file's path of the tip; None: it holds no such
-    path."""
+def _tip_path(
+    trajectory: "Source | Log", model: "IdentifiedModel"
+) -> "tuple[Log | None, str]":
+    """Return the joint angles along a file's path of the tip, and what the tip is;
+    None: it holds no such path."""
     if isinstance(trajectory, Log) or not is_file(trajectory):
-        return None
+        return None, ""
     from hydroid.plant import Plant
-    from hydroid.use.tip_path import Tip, holds_tip, tip_path
+    from hydroid.use.tip_path import TipKinematics, holds_tip, tip_path
 
     settings = model.settings
     table = open_table(Path(trajectory), settings.log)
     if not holds_tip(table):
-        return None
-    tip = Tip(settings.arm, Plant(model).joints)
+        return None, ""
+    tip = TipKinematics(settings.arm, Plant(model).joints)
     start = settings.arm.pose(settings.start_pose)
-    return tip_path(table, settings.log.time.column, settings.log.period_s, tip, start)
+    time, period = settings.log.time.column, settings.log.period_s
+    return tip_path(table, time, period, tip, start), tip.tip.what
 
 
 def _without_absent_joints(

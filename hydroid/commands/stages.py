@@ -29,6 +29,7 @@ from hydroid.log import Log
 from hydroid.parallel.cluster import open_workers
 from hydroid.progress import LOGGER, NOTE
 from hydroid.quantity_table import MECHANICAL
+from hydroid.settings.arm import TIP_LOAD
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.parameters import nominal_value
 from hydroid.settings.problem import ParameterSettings
@@ -343,7 +344,8 @@ def adapt(
 
     Use it after a change of the machine: a slower engine, a colder day, another tool.
     For a load of known mass, set the payload of the logs instead: --set
-    'payloads={LOADED.csv: 250}'. Each freed parameter is tested on parts of the logs
+    'payloads={LOADED.csv: 250}'. A load at the tip that nobody has weighed is found like
+    the other parameters, under the name tip_load. Each freed parameter is tested on parts of the logs
     that are left out. The result is a run that every command takes.
 
     Example: hydroid adapt LOADED.csv --fit runs/hyd --free P_flow,P_droop
@@ -353,9 +355,9 @@ def adapt(
 
     Args:
         logs (LOG): The new logs.
-        free (NAME,NAME): Parameters to be freed [default: masses, pump and effects of
-            the logs' groups, one after the other, as long as the error falls on every
-            part of the logs left out].
+        free (NAME,NAME): Parameters to be freed [default: masses, pump, effects of
+            the logs' groups and tip_load, one after the other, as long as the error
+            falls on every part of the logs left out].
         out (DIR): Run folder [default of the command line: runs/adapt].
         set (KEY=VALUE): Replace a setting of the fit, such as
             refinement.iterations=100.
@@ -374,6 +376,7 @@ def adapt(
             raise SettingsError("is none of the logs", f"payloads.{min(stray)}")
     refuse_undriven(read, model.settings)
     from hydroid.advice.adaptation import adapted, load_findings, steps
+    from hydroid.advice.loads import asked_loads, load_finding
     from hydroid.reporting.verdict_table import left_out_table
 
     with Progress() as progress:
@@ -390,7 +393,10 @@ def adapt(
     named = [step | {"parameter": step["parameter"] or "none"} for step in path]
     title = "Parameters freed one after another"
     table = left_out_table(title, {"parameter": "freed"}, named, settings.arm)
-    of_loads = load_findings(settings)
+    # where a load at the tip was tried too, a mass that was freed says more than it
+    of_loads = load_findings(settings) if free else ()
+    if TIP_LOAD in chosen:
+        of_loads = load_finding(asked_loads(model, read))
     findings = [*result.content["findings"], *map(asdict, of_loads)]
     content = {**result.content, "steps": path, "findings": findings}
     lines = [table, *map(str, of_loads), *result.lines]

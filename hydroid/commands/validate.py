@@ -2,7 +2,7 @@
 reports drawn anew."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,6 +27,7 @@ from hydroid.progress import LOGGER, NOTE
 from hydroid.words import listed, numbered
 
 if TYPE_CHECKING:
+    from hydroid.advice.loads import Load
     from hydroid.fitting.validation import Prediction
     from hydroid.fitting.verdict import Baselines
     from hydroid.joint_verdict import JointVerdict
@@ -73,6 +74,7 @@ def validate(
     sources: list[ModelSource] = as_list(fit)
     models = [open_model(source, None, set) for source in sources]
     read = [read_logs(logs, model.settings, repair=repair) for model in models]
+    from hydroid.advice.loads import load_finding
     from hydroid.fitting.verdict import standing_out
     from hydroid.reporting.predictions import validation_page
     from hydroid.reporting.verdict_table import (
@@ -106,11 +108,31 @@ def validate(
         steps.append(step)
         lines += next_lines(step)
     page = validation_page(predictions, fits, arm, *steps)
+    loads = load_finding(_asked_loads(best))
+    lines += map(str, loads)
     lines += map(str, standing_out(best.predictions, best.verdict, str(run or "RUN")))
     lines[1:1] = _fitted_lines(best.predictions)
     lines += written(page, out)
     content = _content(fits, predictions, arm.joint_names)
+    content["findings"] = [asdict(one) for one in loads]
     return Result(lines, content, predictions, page, details=[page.tables["errors"]])
+
+
+def _asked_loads(test: "_Tested") -> "list[Load]":
+    """Return the loads that unseen logs ask for in which a joint errs by more than the
+    fit expects of any log."""
+    from hydroid.advice.loads import asked_loads
+
+    odd = list[Log]()
+    for prediction in test.predictions:
+        errors = prediction.indices
+        beyond = [
+            errors[joint].rms > band.expected
+            for joint, band in prediction.bands.items()
+        ]
+        if prediction.unseen is not False and any(beyond):
+            odd.append(prediction.log)
+    return asked_loads(test.model, odd)
 
 
 def _by_fit(fits: Iterable[str], tested: "Mapping[str, _Tested]") -> "list[Prediction]":

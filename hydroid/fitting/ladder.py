@@ -7,7 +7,7 @@ is shows long before least squares has converged, so that ends early on the way
 (`FIRM`). What is kept at the end is refined to the tolerance of the settings.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Protocol
 
@@ -187,22 +187,25 @@ class Ladder:
         if if_better and (self._late or last.leaves_noise(start.theta)):
             return
         own = whole.varied(whole.settings.of_estimate(step.estimate))
-        theta = _begun(own, last, start.theta) if begun is None else begun
-        likelihood = make_likelihood(own)
         other_model = own.settings.quasi_static != last.settings.quasi_static
+        # what a search, or another model, ended at may be far from an optimum
+        far = not if_better or other_model or bool(_new_curves(own, last))
+        renewed = list[int]()
+        if begun is None:
+            begun = _begun(own, last, start.theta)
+            renewed = _renewed(own, last, begun)
+            begun = self._each_alone(own, renewed, begun, settings, step)
+        likelihood = make_likelihood(own)
         if other_model:
             # there is nothing for a model that is slow to simulate
             if self._is_white():
                 return
-            theta = self._nearer(likelihood, theta, settings, step)
-            if own.rms(own.output_errors(theta[None]))[0] > start.rms:
+            begun = self._nearer(likelihood, begun, settings, step)
+            if own.rms(own.output_errors(begun[None]))[0] > start.rms:
                 return
-        # what a search, or another model, ended at may be far from an optimum
-        far = not if_better or other_model or bool(_new_curves(own, last))
         how = refine_from_afar if far else refine
-        result = self._refined(
-            likelihood, theta, settings, step.changed(phase="on the way"), how
-        )
+        on_the_way = step.changed(phase="on the way")
+        result = self._refined(likelihood, begun, settings, on_the_way, how)
         if self._late and if_better:
             return
         new = self._measured(own, result, step)
@@ -214,7 +217,30 @@ class Ladder:
         gained = gain(with_it, without)
         self.estimates[step.estimate] = new = replace(new, gained=gained)
         if not self._late and is_clear(*gained):
-            self._keep(own, new, step, from_afar=far)
+            self._keep(
+                own, new, step, from_afar=far or (self._from_afar and bool(renewed))
+            )
+
+    def _each_alone(
+        self,
+        problem: Problem,
+        joints: Sequence[int],
+        theta: Array,
+        settings: RefinementSettings,
+        step: Step,
+    ) -> Array:
+        """Return what some joints, each alone, lead to from theta, (P,).
+
+        A joint whose errors are large weighs little beside the others, and together
+        with them least squares ends before it has moved.
+        """
+        for joint in joints:
+            own = alone(problem, joint, theta)
+            lone_step = step.changed(joint=joint, phase="at first")
+            end = self._refined(make_likelihood(own), theta, settings, lone_step)
+            reached = own.parameters.from_unit(end.point)
+            theta = np.where(problem.parameters.free, reached, theta)
+        return theta
 
     def _nearer(
         self,
@@ -377,6 +403,21 @@ def _begun(problem: Problem, last: Problem, theta: Array) -> Array:
     for joint in _new_curves(problem, last):
         begun = by_speeds(problem, joint, begun)
     return begun
+
+
+def _renewed(problem: Problem, last: Problem, theta: Array) -> list[int]:
+    """The joints, from 1, that begin alone: all that is new in the model is of single
+    joints, and of these.
+
+    None where joints share a pump: what those that follow their logs take from it is
+    not known well enough.
+    """
+    new = {*problem.settings.parameters} - {*last.settings.parameters}
+    own = {j: new & problem.settings.acting_on(j) for j in lone_joints(problem)}
+    pump_flow = problem.bindings.candidates(theta[None]).joints.pump_flow
+    if np.isfinite(pump_flow).any() or new != set[str]().union(*own.values()):
+        return []
+    return [joint for joint, names in own.items() if names]
 
 
 def _new_curves(problem: Problem, last: Problem) -> list[int]:

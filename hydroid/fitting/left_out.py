@@ -28,9 +28,9 @@ BLOCK = 5.0
 LEAST_BLOCKS = 8
 """that all logs together have; those of short logs are shorter: from a few, a standard
 error is a guess"""
-RANK = 1e-12
-"""relative size of an eigenvalue of the normal equations below which nothing is known
-of its direction"""
+BOX = 12.0
+"""what a parameter's bounds tell of it: 1 over the variance of what is as likely
+anywhere in the unit box"""
 LEVEL = 0.05
 """probability that a gain without a reason counts as one"""
 LEAST_GAIN = 3.0
@@ -51,12 +51,18 @@ class LeftOut:
         thetas: of the fit without each part, shape (G, P).
         errors: weighted output errors of each part in the fit without it [rad], shape
             (R,).
+        judged: the same, no larger than what the other parts leave open lets them count
+            (R,).
+        open: by how much that spreads the prediction of each part, as half the
+            logarithm of a determinant, shape (G,).
     """
 
     problem: Problem
     theta: Array
     thetas: Array
     errors: Array
+    judged: Array
+    open: Array
 
     @property
     def by_joint(self) -> dict[str, float | None]:
@@ -67,6 +73,15 @@ class LeftOut:
             names[j - 1]: finite(np.degrees(rms(self.errors[None], [j])[0]))
             for j in settings.outputs
         }
+
+
+def not_fitted(problem: Problem, theta: Array, errors: Array) -> LeftOut:
+    """Return the parts of logs as a model predicts them that was fitted to none.
+
+    theta: the model's, shape (P,). errors: its weighted output errors [rad], (R,).
+    """
+    nothing = np.zeros(int(blocks(problem).max()) + 1)
+    return LeftOut(problem, theta, theta[None], errors, errors, nothing)
 
 
 def refit(problem: Problem, theta: Array) -> LeftOut:
@@ -88,6 +103,13 @@ def predict_blocks(likelihood: Likelihood, end: Refinement) -> LeftOut:
     They follow to first order from the normal equations without the block's rows (R. D.
     Cook, 1977), within the bounds. All logs keep a share in each fit: one of two logs
     alone may leave a parameter open, and then tells nothing of a model.
+
+    What only this block tells of may then be anywhere, and its errors very large. That
+    is no fault of the model: the prediction is as uncertain. With J the block's slopes,
+    C the covariance of the parameters without it and r its residual in the fit to all,
+    the residual left out is S r with S = 1 + J C Jᵀ, and S is also its covariance. So
+    its density has rᵀ S r and log |S| (G. A. F. Seber and A. J. Lee, *Linear Regression
+    Analysis*, 2003, chapter 10), and neither needs a matrix of the block's size.
     """
     problem = likelihood.problem
     weighing = replace(likelihood, shown=replace(likelihood.shown, numbers=end.numbers))
@@ -106,44 +128,62 @@ def predict_blocks(likelihood: Likelihood, end: Refinement) -> LeftOut:
     errors = problem.output_errors(theta[None])[0]
     innovations = weighing.errors.innovations(errors[None])[0]
     by_error = weighing.errors.errors(slopes[: errors.size].T)
-    normal = slopes.T @ slopes
+    normal = slopes.T @ slopes + BOX * np.eye(end.point.size)
     number = blocks(problem)
     thetas = np.empty((int(number.max()) + 1, theta.size))
+    spread = np.empty(len(thetas))
     predicted = errors.copy()
+    judged = errors.copy()
     for block in range(len(thetas)):
         own = np.flatnonzero(number == block)
         of_block = slopes[own]
-        others = np.linalg.pinv(
-            normal - of_block.T @ of_block, rcond=RANK, hermitian=True
-        )
-        change = others @ (of_block.T @ innovations[own])
+        inner = of_block.T @ of_block
+        gradient = of_block.T @ innovations[own]
+        change = np.linalg.solve(normal - inner, gradient)
         change = np.clip(end.point + change, 0.0, 1.0) - end.point
         thetas[block] = problem.parameters.from_unit(end.point + change)
-        predicted[own] += change @ by_error[:, own]
-    return LeftOut(problem, theta, thetas, predicted)
+        effect = change @ by_error[:, own]
+        predicted[own] += effect
+        judged[own] += effect * _share(gradient @ change, change @ inner @ change)
+        spread[block] = 0.5 * (_log_size(normal) - _log_size(normal - inner))
+    return LeftOut(problem, theta, thetas, predicted, judged, spread)
+
+
+def _share(along: float, squared: float) -> float:
+    """Return the part t of a change of a block's residual r, for which |r + t J d|² is
+    rᵀ S r: `along` is rᵀ J d, and `squared` is |J d|²."""
+    if along <= 0.0:
+        return 0.0
+    return along / (along + np.sqrt(along * (along + squared)))
+
+
+def _log_size(matrix: Array) -> float:
+    """Logarithm of the determinant of a positive definite matrix."""
+    return float(np.linalg.slogdet(matrix).logabsdet)
 
 
 def gain(after: LeftOut, before: LeftOut) -> tuple[float, float]:
     """Return by how much one model foretells the parts better than another, and the
     standard error of that.
 
-    It is a difference of log-likelihoods by blocks, half by the weights that the errors
-    of the one show on the parts, half by those of the other. By the weights of one
-    alone, the other's errors would seem impossible wherever it errs a little more. The
+    It is a difference of predictive log-likelihoods by blocks, half by the weights that
+    the errors of the one show on the parts, half by those of the other. By the weights
+    of one alone, the other's errors would seem impossible wherever it errs a little
+    more. The
     standard error is infinite where there is one block only, or where either model
     cannot be simulated.
     """
     problem = before.problem
-    able = [bool(np.isfinite(one.errors).all()) for one in (after, before)]
+    able = [bool(np.isfinite(one.judged).all()) for one in (after, before)]
     if not all(able):
         return float(np.inf if able[0] else -np.inf), np.inf
-    errors = np.stack([before.errors, after.errors])
+    errors = np.stack([before.judged, after.judged])
     change = np.zeros(problem.measured.size)
     for of_one in errors:
         weighing = make_likelihood(problem).estimated(of_one).errors
         squares = weighing.innovations(errors) ** 2
         change += 0.25 * (squares[0] - squares[1])
-    sums = np.bincount(blocks(problem), change)
+    sums = np.bincount(blocks(problem), change) + before.open - after.open
     if len(sums) < 2:
         return float(np.sum(sums)), np.inf
     return float(sums.sum()), float(np.sqrt(len(sums) * np.var(sums, ddof=1)))

@@ -114,7 +114,8 @@ JOINT_STATE = np.dtype(
             # torque e that is neither oil nor damping; torque that held the start [N·m]
             "external hold "
             "angle velocity "  # at the start of the step [rad]; at its end [rad/s]
-            # on ringing oil: velocity [rad/s], and how it changes [rad/s²]
+            # on ringing oil: velocity [rad/s], and how it changes without what passes
+            # the oil at once [rad/s²]
             "turning surge "
             "opening "  # of the valve, as a share of the full one; below 0 towards B
             # of the spool [m], NaN before the first; the share without a lag

@@ -193,6 +193,10 @@ def _lacks_columns(
 ) -> LogError:
     """Return the error about all columns that a file lacks, misspelt ones first."""
     lacking = [signal for signal in wanted if signal.name not in table.names]
+    if len(lacking) == len(wanted) and not misspelt and not table.holds_numbers:
+        return LogError(
+            "holds no table of numbers", table.source, "name a log, such as a CSV file"
+        )
     # only two are named, and those say most
     lacking.sort(key=lambda signal: signal.name not in misspelt)
     descriptions = list[str]()

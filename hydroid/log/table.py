@@ -100,6 +100,15 @@ class Table:
             return cell
         return ""
 
+    @property
+    def holds_numbers(self) -> bool:
+        """Whether any column has a number in every other row: a text has none."""
+        for cells in self.columns.values():
+            numbers, _ = _as_numbers(cells)
+            if len(numbers) and np.mean(np.isfinite(numbers)) >= 0.5:
+                return True
+        return False
+
     def read(self, signals: Sequence[Signal]) -> "Recording":
         """Read the columns of signals; a number that is too large counts as none."""
         first = signals[0].name

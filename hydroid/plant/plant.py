@@ -70,7 +70,7 @@ class Plant:
             `reset` puts them.
         period: how long one command is held [s], a multiple of MuJoCo's step; by
             default the logs' period.
-        payload: mass in the gripper [kg].
+        payload: mass at the tip [kg].
 
     Attributes:
         joints: those that take commands.
@@ -80,8 +80,8 @@ class Plant:
         data: its state.
 
     Raises:
-        SettingsError: a joint that does not exist, a period that is no multiple, a
-            payload without a place, or parameters without a force-stroke curve.
+        SettingsError: a joint that does not exist, a period that is no multiple,
+            or parameters without a force-stroke curve.
     """
 
     def __init__(

@@ -34,9 +34,13 @@ LONGEST_DELAY = 0.9  # to start at [s]
 LONGEST_LAG = 0.5  # to start at [s]
 # part of the torque at the pump's pressure that damping takes at full speed
 DRAG = 0.02
+# part of that torque that dry friction takes: it shows where a pump's pressure falls
+FRICTION = 0.1
 USUAL_SPEED = 0.5  # of a joint of which no log tells its own [rad/s, m/s]
 # torque of a joint at the pump's pressure, over the largest that gravity asks of it
 LIFT = 2.0
+TURNING = {"damping": "N·m·s/rad", "friction": "N·m"}
+SLIDING = {"damping": "N·s/m", "friction": "N"}
 
 
 class JointSize(NamedTuple):
@@ -254,15 +258,20 @@ def fit_text(
         size = sizes[joint - 1]
         flows[joint] = 0.06 * size.displacement * size.speed
     usual_flow = np.median([*flows.values()])
+    drawn = 0.0  # from the pump by all of them [L/min]
     joints = list[Plain]()
     volumes = list[float]()  # of the chambers of stand-ins [cm³]
     for number in layout.outputs:
         joint = arm.joints[number - 1]
         size = sizes[number - 1]
-        if not isinstance(joint.actuator, LinearActuator):
+        # a stand-in's size is a guess, but the valves of one machine let like flows
+        # through
+        stand_in = not isinstance(joint.actuator, LinearActuator)
+        draw = usual_flow / flows[number] if stand_in else 1.0
+        drawn += draw * flows[number]
+        if stand_in:
             low, high = joint.range
             volumes.append(size.displacement * math.radians(high - low) / 2)
-        draw = usual_flow / flows[number]
         valve = layout.valves.get(number)
         joints.append(_joint_text(joint, size, layout.motions.get(number), valve, draw))
     period = layout.section.get("period_s", 0.01)
@@ -280,7 +289,7 @@ def fit_text(
         steps=steps,
         substeps=math.ceil(period / steps / VALVE_STEP - 1e-9),
         volume=short(min(volumes, default=50.0)),
-        most=short(4 * sum(flows.values())),  # so large that it limits no flow
+        most=short(4 * drawn),  # so large that it limits no flow
         joints=joints,
     )
 
@@ -295,9 +304,10 @@ def _joint_text(
     """Return what the settings of a fit say of a joint, and of its motion and valve
     where a log shows them.
 
-    `draw` is the usual flow of the machine's joints over that of this one.
+    `draw` is what it takes from the pump, over what its actuator takes in.
     """
     linear = isinstance(joint.actuator, LinearActuator)
+    torque = size.damping * size.speed
     delay = 0.0
     lag = UNKNOWN_LAG
     if valve:
@@ -311,16 +321,18 @@ def _joint_text(
         "linear": linear,
         "lever": joint.has("lever_slope"),
         "sides": _sides(joint, valve, motion, size.speed),
+        # none is claimed; a log whose pump or oil is not modelled yet would bend the
+        # valve's curve by what damping there is
         "damping": short(DRAG * size.damping),
         # at least none: on the logarithm of `within`, least squares does not get there,
         # and what is left of the damping bends the valve's curve
         "most_damping": short(10 * DRAG * size.damping),
         "delay": min(delay, LONGEST_DELAY),
         "lag": min(lag, LONGEST_LAG),
-        "unit": "N·s/m" if joint.slides else "N·m·s/rad",
-        # a stand-in's size is a guess, but the valves of one machine let like flows
-        # through
-        "draw": 1 if linear else short(draw),
+        "friction": short(FRICTION * torque),
+        "most_friction": short(5 * FRICTION * torque),
+        "unit": SLIDING if joint.slides else TURNING,
+        "draw": short(draw),
     }
 
 

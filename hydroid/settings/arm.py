@@ -19,7 +19,7 @@ from hydroid.files import find_config
 from hydroid.quantity_table import CHOICES
 from hydroid.settings.cylinder import LinearActuator, make_cylinder
 from hydroid.settings.linkage import DIGITS, Cylinder, RotaryActuator
-from hydroid.settings.load import Settings, load
+from hydroid.settings.load import NotNegative, Settings, load
 from hydroid.units import Display, display
 
 Actuator: TypeAlias = LinearActuator | RotaryActuator
@@ -27,6 +27,7 @@ Actuator: TypeAlias = LinearActuator | RotaryActuator
 FARTHEST_BY_CYLINDER = 200.0
 """how far a cylinder turns a joint at most, with a linkage such as a bucket's [deg];
 slewing gears and rotators turn farther"""
+TIP_LOAD = "tip_load"  # name of the link that is a load at the tip
 SLIDE = 2  # MuJoCo's number of a joint that slides
 
 
@@ -104,8 +105,12 @@ class Arm(Settings):
     ] = {}
     """what moves the joints, by name; a joint that stage 2 does not drive needs none"""
     payload: str | None = None
-    """site of the model where the gripper holds a payload's centre of mass; null:
-    logs have no payloads"""
+    """site of the model that is the arm's tip: where the gripper holds a payload's
+    centre of mass; null: the end of the last link, which is the farthest point of its
+    shapes in the direction of its centre of mass"""
+    load: NotNegative = 0.0
+    """mass that the arm carries at its tip in every log [kg]: a link `tip_load`, whose
+    mass a parameter can be; payloads of logs come on top"""
     pair: Beside | None = None
     """MJCF of a machine with two of these arms, whose joints are named right_JOINT and
     left_JOINT; null: the arm stands alone"""
@@ -171,15 +176,16 @@ class Arm(Settings):
     def mass_of(self) -> dict[str, float]:
         """Nominal masses of the links, the bodies that move [kg], by name.
 
-        Those of the joints come in their order, then parts that are fixed to them, L in
-        all.
+        Those of the joints come in their order, then parts that are fixed to them, then
+        a load at the tip; L in all.
         """
         model = self._model
         bodies = [model.body(b) for b in range(1, model.nbody) if model.body_weldid[b]]
         links = [body for body in bodies if body.name and body.mass[0]]
         # the sort is stable: those of the joints come first, in their order
         links.sort(key=lambda body: not body.jntnum[0])
-        return {body.name: float(body.mass[0]) for body in links}
+        masses = {body.name: float(body.mass[0]) for body in links}
+        return masses | ({TIP_LOAD: self.load} if self.load else {})
 
     @cached_property
     def poses(self) -> dict[str, tuple[float, ...]]:

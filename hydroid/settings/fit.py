@@ -58,8 +58,8 @@ class FitSettings(Settings):
     priors: dict[str, PriorSettings] = {}
     """what is known besides the logs, each under a name of your choice"""
     payloads: dict[str, Positive] = {}
-    """mass that the gripper holds, by the log's file name, or the end of its path where
-    several have one name, as in {day2/log.csv: 250} [kg]"""
+    """mass that the arm carries at its tip, by the log's file name, or the end of its
+    path where several have one name, as in {day2/log.csv: 250} [kg]"""
     log: LogSettings = LogSettings()
     simulation: SimulationSettings = SimulationSettings()
     objective: ObjectiveSettings = ObjectiveSettings()

@@ -30,7 +30,8 @@ BEHIND_VALVE = [
         "lever_bend",
         "compensation",
     ),
-    *("oil_frequency", "oil_damping", "ring_cosine", "ring_sine"),
+    *("oil_frequency", "oil_damping", "oil_damping_share"),
+    *("ring_cosine", "ring_sine"),
     *("pump_flow", "pump_droop", "pump_limit", "supply_pressure", "relief"),
 ]
 BEHIND_PORT = ["area", "draw", "return_"]

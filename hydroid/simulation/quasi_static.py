@@ -53,16 +53,22 @@ def overshoot(c, z, wanted: float) -> float:
     """Advance a joint on its oil over a step; how much further than at `wanted` [rad/s]
     it turns [rad].
 
-    Its velocity v follows that of the rod without oil, u, as v̈ + 2ζω v̇ + ω²(v − u) =
-    0 with ω and ζ constant (H. E. Merritt, "Hydraulic Control Systems", 1967): exact
-    where u is constant.
+    Its velocity v follows that of the rod without oil, u, as v̈ + 2ζω (v̇ − σu̇) +
+    ω²(v − u) = 0 with ω, ζ and the share σ of the damping that acts between valve and
+    joint constant. σ = 0 is a joint with leakage or friction (H. E. Merritt, "Hydraulic
+    Control Systems", 1967), σ = 1 one on hoses that damp. Exact where u is constant;
+    the state is v̇ − 2ζωσu, which does not jump where u does.
     """
     pace = 2.0 * np.pi * c.oil_frequency
-    drag, lack, surge = 2.0 * c.oil_damping * pace, z.turning - wanted, z.surge
+    drag = 2.0 * c.oil_damping * pace
+    passed = c.oil_damping_share * drag * wanted
+    lack = z.turning - wanted
+    surge = z.surge + passed
     left = (c.ring_cosine + drag * c.ring_sine) * lack + c.ring_sine * surge
-    z.surge = c.ring_cosine * surge - pace * pace * c.ring_sine * lack
+    after = c.ring_cosine * surge - pace * pace * c.ring_sine * lack
     z.turning = wanted + left
-    return (surge - z.surge + drag * (lack - left)) / (pace * pace)
+    z.surge = after - passed
+    return (surge - after + drag * (lack - left)) / (pace * pace)
 
 
 @compilable

@@ -38,9 +38,9 @@ except ImportError:
 
 Floats = NDArray[np.float32]
 
-POSES = 16
-"""random poses in which episodes begin: to be put into one that is ready takes a
-hundredth of a reset"""
+POSES, LEAST_POSES = 256, 4
+"""random poses in which episodes begin, of all machines together, and at least of each:
+to be put into one that is ready takes a hundredth of a reset"""
 ENDLESS = np.pi
 """end of the range of a joint that turns without end [rad]"""
 LARGEST = 10.0
@@ -92,7 +92,8 @@ class _Machines:
         n = len(thetas)
         self._drift = DriftingAngles(numbers, n, self.period)
         self._ready: dict[tuple[int, int], RowState] = {}
-        reach = np.random.default_rng(0).uniform(-1.0, 1.0, (POSES, len(self.joints)))
+        poses = n, max(POSES // n, LEAST_POSES), len(self.joints)
+        reach = np.random.default_rng(0).uniform(-1.0, 1.0, poses)
         self._starts = self._middle + (1.0 - 2.0 * MARGIN) * self._half * reach
         self.target = np.tile(self._middle, (n, 1))
         self._angle = self.target.copy()
@@ -104,10 +105,10 @@ class _Machines:
         if (pose := options.get("pose")) is not None:
             self.batch.reset(pose, rows=[row])
         else:
-            number = int(rng.integers(POSES))
+            number = int(rng.integers(self._starts.shape[1]))
             if (row, number) not in self._ready:
                 start = self._pose.copy()
-                start[self._columns] = self._starts[number]
+                start[self._columns] = self._starts[row, number]
                 self.batch.reset(start, rows=[row])
                 self._ready[row, number] = self.batch.state(row)
             self.batch.restore(row, self._ready[row, number])

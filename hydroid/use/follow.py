@@ -107,7 +107,7 @@ def follow(model: IdentifiedModel, path: Log, *, payload: float = 0.0) -> Follow
     Args:
         model: of stage 2.
         path: angles over time [rad]; joints that it does not hold rest in its `pose`.
-        payload: mass in the gripper [kg].
+        payload: mass at the tip [kg].
 
     Raises:
         LogError: a joint that takes no commands should move, or an angle is missing.
@@ -147,9 +147,11 @@ def joint_lags(plant: Plant) -> Array:
     late = late + mean("pilot_lag")
     # at half its stroke the solenoid adds as much stiffness as the spring has
     late = late + 0.5 * mean("plunger_damping") / actuators["plunger_stiffness"]
-    # a slow motion is late behind an oscillator by twice its damping per frequency
+    # a slow motion is late behind an oscillator by twice the damping per frequency that
+    # acts on the joint
     frequency = 2.0 * np.pi * actuators["oil_frequency"]
-    late = late + 2.0 * actuators["oil_damping"] / frequency
+    held_back = actuators["oil_damping"] * (1.0 - actuators["oil_damping_share"])
+    late = late + 2.0 * held_back / frequency
     lags = np.zeros(len(plant.names))
     driven = [joint - 1 for joint in plant.joints]
     lags[driven] = late[driven]

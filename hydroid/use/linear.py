@@ -23,6 +23,7 @@ from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
+from scipy.signal import StateSpace, lsim
 
 from hydroid.arrays import Array, Index, record
 from hydroid.errors import SettingsError
@@ -68,6 +69,24 @@ class LinearArm:
     command: Array
     angle: Array
     speed: Array
+
+    def step(self, k: int, time: Array) -> Array:
+        """Return the change of a joint's speed [rad/s] after its command, the k-th, has
+        risen by 1 % at time 0, shape (T,); times are equally spaced [s], shape (T,)."""
+        given = np.zeros((len(time), len(self.joints)))
+        given[:, k] = 1.0
+        system = StateSpace(self.a, self.b, self.c, self.d)
+        speed = lsim(system, given, time - time[0])[1][:, len(self.joints) + k]
+        return np.interp(time - self.delay[k], time, speed, left=0.0)
+
+    def response(self, k: int, frequency: Array) -> Array:
+        """Return by how much a joint's speed swings per 1 % of its command, the k-th:
+        complex [rad/s], shape (F,), at frequencies [Hz], shape (F,)."""
+        own = len(self.joints) + k
+        swing = 2j * np.pi * frequency
+        matrices = swing[:, None, None] * np.eye(len(self.a)) - self.a
+        states = np.linalg.solve(matrices, self.b[:, k, None].astype(complex))[..., 0]
+        return (states @ self.c[own] + self.d[own, k]) * np.exp(-swing * self.delay[k])
 
     def text(self) -> str:
         """Return it as JSON."""
@@ -189,10 +208,15 @@ def _put_oil(oil: "_Oil", joint: int, first: int, rates: Array, speeds: Array) -
     on."""
     speed = first
     acceleration = first + 1
-    rates[speed, acceleration] = 1.0
-    rates[acceleration] = oil.frequency**2 * speeds[joint]
+    drag = 2.0 * oil.damping * oil.frequency
+    # the second state is the acceleration without what passes the oil at once, as in
+    # `overshoot`
+    passed = oil.share * drag
+    rates[speed] = passed * speeds[joint]
+    rates[speed, acceleration] += 1.0
+    rates[acceleration] = (oil.frequency**2 - drag * passed) * speeds[joint]
     rates[acceleration, speed] -= oil.frequency**2
-    rates[acceleration, acceleration] -= 2.0 * oil.damping * oil.frequency
+    rates[acceleration, acceleration] -= drag
     speeds[joint] = 0.0
     speeds[joint, speed] = 1.0
 
@@ -291,10 +315,12 @@ def _coefficients(plant: Plant, joint: int) -> Any:
 
 
 class _Oil(NamedTuple):
-    """A joint on its oil: natural frequency [rad/s] and damping ratio."""
+    """A joint on its oil: natural frequency [rad/s], damping ratio, and the share of
+    the damping between valve and joint."""
 
     frequency: float
     damping: float
+    share: float = 0.0
 
 
 def _oil(plant: Plant, joint: int, command: Array) -> _Oil | None:
@@ -311,7 +337,8 @@ def _oil(plant: Plant, joint: int, command: Array) -> _Oil | None:
     if np.isinf(actuator["oil_frequency"]):
         return None
     frequency = 2.0 * np.pi * float(actuator["oil_frequency"])
-    return _Oil(frequency, float(actuator["oil_damping"]))
+    damping = float(actuator["oil_damping"])
+    return _Oil(frequency, damping, float(actuator["oil_damping_share"]))
 
 
 def _oil_stiffness(plant: Plant, joint: int) -> float:

@@ -12,8 +12,9 @@ import mujoco
 import numpy as np
 
 from hydroid.arm.model import load_model
+from hydroid.arm.tip import tip_of
 from hydroid.arrays import Array
-from hydroid.errors import LogError, SettingsError
+from hydroid.errors import LogError
 from hydroid.log import Log
 from hydroid.log.table import Signal, Table
 from hydroid.settings.arm import Arm
@@ -33,26 +34,21 @@ LARGEST_TURN = 0.2
 """of a joint in one step [rad], of one that slides [m]"""
 
 
-class Tip:
-    """The tip of an arm: the site of its payload.
+class TipKinematics:
+    """The tip of an arm, and the joints that lead it (`arm.tip`).
 
     Args:
         arm: whose MJCF is read.
         joints: that may move, numbered from 1; the others keep their angle.
 
-    Raises:
-        SettingsError: the arm's file names no site.
+    Attributes:
+        tip: which point of the arm it is.
     """
 
     def __init__(self, arm: Arm, joints: Sequence[int]) -> None:
-        if arm.payload is None:
-            hint = "add a site to the model, and name it: payload: SITE"
-            raise SettingsError(
-                "the arm's file does not say where its tip is", arm.where, hint
-            )
         self._model = load_model(arm).compile()
         self._data = mujoco.MjData(self._model)
-        self._site = self._model.site(arm.payload).id
+        self.tip = tip_of(self._model, arm)
         self._moving = np.array(joints) - 1
         self._low = arm.lower
         self._high = arm.upper
@@ -60,10 +56,11 @@ class Tip:
     def place(self, angle: Array) -> Array:
         """Return where the tip is [m], shape (3,), at angles of all joints [rad], shape
         (J,)."""
-        self._data.qpos[:] = angle
-        mujoco.mj_kinematics(self._model, self._data)
-        mujoco.mj_comPos(self._model, self._data)
-        return self._data.site_xpos[self._site].copy()
+        data, tip = self._data, self.tip
+        data.qpos[:] = angle
+        mujoco.mj_kinematics(self._model, data)
+        mujoco.mj_comPos(self._model, data)
+        return data.xpos[tip.body] + data.xmat[tip.body].reshape(3, 3) @ tip.at
 
     def angles(self, points: Array, start: Array) -> tuple[Array, Array]:
         """Return angles [rad], shape (T, J), and how far the tip stays off [m], shape
@@ -100,14 +97,14 @@ class Tip:
                 damping = max(0.3 * damping, 1e-9)
             else:
                 damping *= 4.0
-                self.place(pose)  # the next step's slopes are those of this pose
         return pose, off
 
     def _step(self, missing: Array, pose: Array, damping: float) -> Array:
         """Return the pose after a step towards a point; joints at an end of their range
         stay within."""
         slopes = np.empty((3, self._model.nv))
-        mujoco.mj_jacSite(self._model, self._data, slopes, None, self._site)
+        at = self.place(pose)
+        mujoco.mj_jac(self._model, self._data, slopes, None, at, self.tip.body)
         free = self._moving
         next_pose = pose.copy()
         for _ in range(len(self._moving)):
@@ -145,7 +142,9 @@ def holds_tip(table: Table) -> bool:
     return False
 
 
-def tip_path(table: Table, time: str, period: float, tip: Tip, start: Array) -> Log:
+def tip_path(
+    table: Table, time: str, period: float, tip: TipKinematics, start: Array
+) -> Log:
     """Return the joint angles along a path of the tip, without commands.
 
     Args:

@@ -7,7 +7,9 @@ from arms import BOOM, CHILD, CYLINDER, FOUR_BAR, PARENT, posed, write_arm
 from hypothesis import given, strategies as st
 
 from hydroid.arm.model import add_payload, load_model
+from hydroid.cad.importer import import_arm
 from hydroid.errors import HydroidError
+from hydroid.project.boxes import boxes_urdf
 from hydroid.settings.arm import load_arm
 from hydroid.settings.cylinder import LinearActuator
 from hydroid.settings.linkage import triangle
@@ -193,8 +195,39 @@ def test_a_payload_hangs_on_its_site(tmp_path):
     loaded = add_payload(load_model(arm), arm, 70.0).compile()
     assert loaded.body("payload").mass[0] == 70.0
     np.testing.assert_allclose(loaded.body("payload").pos, [1, 0, 2])
-    with pytest.raises(HydroidError, match=r"no place for a payload; name the site"):
-        add_payload(load_model(arm), write_arm(tmp_path), 1.0)
+
+
+TELESCOPE = """
+<mujoco>
+  <worldbody>
+    <body name="boom" pos="0 0 1">
+      <joint name="lift" axis="0 -1 0" range="-20 60"/>
+      <geom type="box" size="1 .1 .1" pos="1 0 0"/>
+      <body name="telescope" pos="1 0 0">
+        <joint name="slide" type="slide" axis="1 0 0" range="0 2"/>
+        <geom type="box" size="1 .1 .1" pos=".2 0 0"/>
+      </body>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
+
+def test_without_a_site_the_tip_is_the_end_of_the_last_link(tmp_path):
+    boxes = boxes_urdf(["swing", "boom", "stick"], [0, 3.0, 1.5])
+    (tmp_path / "boxes.urdf").write_text(boxes)
+    imported = import_arm(tmp_path / "boxes.urdf")
+    cases = [
+        (imported.mjcf, "stick_link", [1.5, 0, 0]),
+        (TELESCOPE, "telescope", [1.2, 0, 0]),
+        (BOOM, "bar", [2, 0, -2]),
+    ]
+    for text, link, at in cases:
+        arm = write_arm(tmp_path, text)
+        loaded = add_payload(load_model(arm), arm, 70.0).compile()
+        payload = loaded.body("payload")
+        assert loaded.body(payload.parentid[0]).name == link
+        np.testing.assert_allclose(payload.pos, at, atol=1e-9)
 
 
 def cylinder(**changes) -> dict[str, object]:

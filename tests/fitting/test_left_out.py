@@ -16,6 +16,7 @@ from hydroid.fitting.left_out import (
     blocks,
     gain,
     is_better,
+    not_fitted,
     predict_blocks,
     refit,
 )
@@ -115,7 +116,7 @@ def test_the_gain_is_that_of_the_weighed_squares_and_its_error_that_of_the_block
     rng = np.random.default_rng(0)
     theta = problem.parameters.start
     before, after = (
-        LeftOut(problem, theta, theta[None], rng.normal(0.0, sd, problem.measured.size))
+        not_fitted(problem, theta, rng.normal(0.0, sd, problem.measured.size))
         for sd in (0.01, 0.007)
     )
     levels = np.zeros(blocks(problem).max() + 1)
@@ -135,9 +136,7 @@ def test_what_diverges_is_worse_and_one_that_does_not_is_better():
     problem = Problem(ONE, [log])
     theta = problem.parameters.start
     noise = np.random.default_rng(1).normal(0.0, 0.01, len(log.time))
-    low, lost = (
-        LeftOut(problem, theta, theta[None], factor * noise) for factor in (1.0, np.inf)
-    )
+    low, lost = (not_fitted(problem, theta, factor * noise) for factor in (1.0, np.inf))
     assert is_better(low, lost)
     assert not is_better(lost, low)
     assert not is_better(lost, lost)

@@ -15,6 +15,7 @@ import mujoco
 import numpy as np
 import robots
 import trimesh
+from printed import follow
 from robots import LIMIT
 from worlds import World, write_log
 
@@ -400,6 +401,61 @@ def at_rest(*parts: Part) -> tuple[Part, ...]:
     )
 
 
+FAR = {"boom": 0.8, "stick": -1.5, "bucket": -1.0}
+"""angles of a pose [rad] that is far from the one in which all joints are at 0"""
+
+
+def drawn_far(folder: Path) -> Path:
+    """Write an MJCF that is drawn in another pose, whose angles `ref` states."""
+    parts = tuple(replace(part, turn=FAR.get(part.name, 0.0)) for part in ARM)
+    pin = ("bucket_pivot_rod", "stick", rocker_pin(FAR["bucket"]))
+    bars = [pin if site[0] == pin[0] else site for site in LINKAGE_SITES]
+    path = mjcf(parts, folder, sites=(*SITES, *bars))
+    text = path.read_text()
+    for name, angle in FAR.items():
+        joint = f'<joint name="{name}_joint"'
+        text = text.replace(joint, f'{joint} ref="{angle}"')
+    path.write_text(text)
+    return path
+
+
+def cylinders_of_far() -> tuple[Part, ...]:
+    """Return tubes, rods and their eyes as they stand in another pose than the links
+    are drawn in."""
+    parts = list[Part]()
+    for name, carrier, joint, foot, eye in (
+        ("boom", "house", BOOM, BOOM_FOOT, BOOM_EYE),
+        ("stick", "boom", STICK, STICK_FOOT, STICK_EYE),
+    ):
+        parts += cylinder(name, carrier, foot, joint + turned(eye, FAR[name]))
+        reach = LENGTHS[name](FAR[name]) - 0.4
+        parts.append(frame(f"{name}_rod_eye", f"{name}_rod", reach + 0j))
+    return tuple(parts)
+
+
+def loops_of_sites(folder: Path, reach: float = 0.0) -> Path:
+    """Write an MJCF whose loops are open as drawn: constraints between sites pull them
+    together. The boom's rod is longer by `reach` [m]."""
+    drawn = (*ARM, *at_rest(*open_cylinders(), *linkage()[:2]), *linkage()[2:4])
+    parts = [
+        replace(part, turn=part.turn + 0.2) if part.name == "rocker" else part
+        for part in drawn
+    ]
+    ends = {part.name: part.at for part in (*rod_ends(), *linkage()[4:])}
+    pairs = (
+        ("boom_rod", ends["boom_rod_eye"] + reach, "boom", BOOM_EYE),
+        ("stick_rod", ends["stick_rod_eye"], "stick", STICK_EYE),
+        ("bucket_rod", ends["bucket_rod_eye"], "rocker", ROCKER_LENGTH + 0j),
+        ("coupler", ends["coupler_end"], "bucket", COUPLER_END),
+    )
+    sites = list[tuple[str, str, complex]]()
+    closed = ""
+    for first, at, second, place in pairs:
+        sites += [(f"{first}_end", first, at), (f"{second}_eye", second, place)]
+        closed += f'<connect site1="{first}_end" site2="{second}_eye"/>'
+    return mjcf(parts, folder, sites, f"<equality>{closed}</equality>")
+
+
 def loader(folder: Path) -> Path:
     """Write a loader whose tilt cylinder stands on the chassis and turns a bell crank
     on the boom: six bars."""
@@ -554,6 +610,28 @@ FIELD_ARMS = (
         masses=WITH_ROD_PARTS,
     ),
     FieldArm(
+        "cylinders that stand as in another pose than the links",
+        as_urdf(*ARM, *cylinders_of_far(), *anchors()),
+        said="meet at another pose than drawn: -85.7 deg of stick_joint",
+        lengths=BOTH,
+        masses=WITH_ROD_PARTS,
+    ),
+    FieldArm("drawn far from where angles are 0", drawn_far, lengths=LENGTHS),
+    FieldArm(
+        "loops of sites that are drawn open",
+        loops_of_sites,
+        said="moved until they close",
+        lengths=LENGTHS,
+        masses=WITH_ROD_PARTS | {"stick": ROD_OF_BUCKET["stick"]},
+    ),
+    FieldArm(
+        "a loop among others that closes in no pose",
+        lambda folder: loops_of_sites(folder, 9.0),
+        said="part of a cylinder that the file pins at one end",
+        lengths={name: LENGTHS[name] for name in ("stick", "bucket")},
+        masses=WITH_ROD_PARTS | {"stick": ROD_OF_BUCKET["stick"]},
+    ),
+    FieldArm(
         "open cylinders without a pin",
         as_urdf(*ARM, *open_cylinders()),
         said="part of a cylinder that the file pins at one end",
@@ -696,6 +774,37 @@ def outcome(arm: FieldArm, folder: Path) -> Outcome:
     if arm.said and not told:
         return Outcome("wrong", f"nobody says {arm.said!r}")
     return Outcome("said" if told else "right", told)
+
+
+def followed(arm: FieldArm, folder: Path, budget: str) -> Outcome:
+    """Write an arm that is taken as it should be and two logs of it, and follow the
+    commands that `init` prints: check, a fit of a budget, and validation on the second.
+
+    Right: the fit predicts the second log.
+    """
+    found = outcome(arm, folder)
+    if found.verdict not in ("right", "said"):
+        return found
+    taken = load_arm(folder / "mine" / "arm.yaml")
+    names = [name.removesuffix("_joint") for name in taken.joint_names]
+    columns = dict[str, tuple[str, str]]()
+    parts = list[Any]()
+    for number, (name, ends) in enumerate(
+        zip(names, taken.ranges.values(), strict=True), 1
+    ):
+        unit = "m" if number in taken.slides else "deg"
+        columns[name] = (f"{name}_cmd_V", f"{name}_{unit}")
+        parts.append((name, "", name, "", (0.0, 0.0, 0.0), "{} {}".format(*ends)))
+    world = World(names, parts, columns)
+    write_log(world, folder / "log.csv", 60.0, 1)
+    write_log(world, folder / "other.csv", 60.0, 2)
+    words = ["followed", "--log", "log.csv"]
+    for option, value in arm.options.items():
+        words += [f"--{option}", str(value)]
+    for robot in (*folder.glob("arm.urdf"), *folder.glob("arm.xml")):
+        words += ["--arm", robot.name]
+    ended = follow(folder, words, "other.csv", budget)
+    return Outcome(ended.verdict, ended.line)
 
 
 def faults(arm: FieldArm, taken: Arm) -> list[str]:

@@ -121,6 +121,27 @@ def test_the_edge_of_what_a_cell_may_hold(
     assert faults(edited(tmp_path, cell(40, column, text))) == []
 
 
+PROSE = """# A machine
+
+It has a boom, and a stick, which we measured.
+The boom, says its owner, weighs half a ton, more or less.
+
+- its bucket, its teeth, its paint
+- its log, which is elsewhere
+"""
+
+
+@pytest.mark.parametrize("text", [PROSE, "a: 1\nb: [x, y]\nc: {d: e}\n"])
+def test_a_text_that_is_no_log_is_refused_without_its_words(
+    text: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "README.md"
+    path.write_text(text)
+    (fault,) = faults(path)
+    assert fault.what == "holds no table of numbers"
+    assert len(str(fault)) < 120 + len(str(path))
+
+
 def test_one_column_is_one_signal(tmp_path: Path) -> None:
     copied = LogSettings.model_validate(
         {"joints": {2: {"angle": {"column": "q1_deg"}}}}

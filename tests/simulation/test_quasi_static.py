@@ -308,22 +308,34 @@ def test_a_load_beyond_the_supply_is_held_and_never_sinks(simulated):
     assert np.ptp(angle) == 0.0
 
 
+@pytest.mark.parametrize("share", [0.0, 0.4, 1.0])
 @pytest.mark.parametrize("ratio", [0.0, 0.3, 0.9])
-def test_a_joint_rings_on_its_oil_as_the_exact_solution_whatever_the_step(ratio):
+def test_a_joint_rings_on_its_oil_as_the_exact_solution_whatever_the_step(ratio, share):
     """Start at rest under a constant velocity without oil: the known step response."""
-    pace, wanted, ends = 2 * np.pi * 1.7, 0.6, []
+    pace = 2 * np.pi * 1.7
+    wanted = 0.6
+    ends = []
     for steps in (1, 40):
         cosine, sine = ringing(np.array(1.7), np.array(ratio), 0.8 / steps)
         c = SimpleNamespace(
-            oil_frequency=1.7, oil_damping=ratio, ring_cosine=cosine, ring_sine=sine
+            oil_frequency=1.7,
+            oil_damping=ratio,
+            oil_damping_share=share,
+            ring_cosine=cosine,
+            ring_sine=sine,
         )
         z = SimpleNamespace(turning=0.0, surge=0.0)
-        ends.append(
-            (sum(overshoot(c, z, wanted) for _ in range(steps)), z.turning, z.surge)
-        )
+        way = sum(overshoot(c, z, wanted) for _ in range(steps))
+        ends.append((way, z.turning, z.surge))
     np.testing.assert_allclose(ends[0], ends[1], rtol=1e-9)
-    _, response = signal.step(([pace**2], [1, 2 * ratio * pace, pace**2]), T=[0, 0.8])
+    drag = 2 * ratio * pace
+    system = np.trim_zeros([share * drag, pace**2], "f"), [1, drag, pace**2]
+    _, response = signal.step(system, T=[0, 0.8])
     assert ends[0][1] == pytest.approx(wanted * response[-1], rel=1e-9)
+    way = np.polymul(system[1], [1, 0])
+    _, response = signal.step((system[0], way), T=[0, 0.8])
+    # what the joint is further on than at the wanted velocity
+    assert ends[0][0] == pytest.approx(wanted * (response[-1] - 0.8), rel=1e-9)
 
 
 def test_the_dynamic_model_rings_as_frequency_and_damping_ratio_say(

@@ -9,6 +9,8 @@ from scipy.signal import StateSpace, lsim
 
 from hydroid.errors import SettingsError
 from hydroid.plant import Plant
+from hydroid.reporting.linear_page import linear_page
+from hydroid.reporting.page_file import write_page
 from hydroid.use.linear import linearise
 
 HELD = {"shoulder": 40.0, "elbow": -50.0}
@@ -51,6 +53,7 @@ def response(plant: Plant, change: dict[str, float], seconds: float) -> np.ndarr
             {
                 "oil_frequency": 3.0,
                 "oil_damping": 0.3,
+                "oil_damping_share": 0.6,
                 "pump_flow": 5.0,
                 "pump_droop": 100.0,
             },
@@ -123,3 +126,42 @@ def test_the_slope_at_full_command_is_that_from_below():
     column = full.states.index("shoulder plunger")
     assert full.a[row, column] == pytest.approx(below.a[row, column], rel=0.02)
     assert full.a[row, column] > 0.0
+
+
+def test_step_and_bode_are_those_of_the_system():
+    """A step is late by delay and lag, and a sine of the command comes out as Bode's
+    plot says."""
+    plant = made("quasi-static", opening_lag=0.1)
+    command = np.array([HELD.get(one, 0.0) for one in plant.names])
+    linear = linearise(plant, command)
+    time = np.linspace(0.0, 4.0, 4001)
+    system = StateSpace(linear.a, linear.b, linear.c, linear.d)
+    for k in range(2):
+        step = linear.step(k, time)
+        delay = linear.delay[k]
+        assert not step[time < delay - 1e-9].any()
+        # three time constants after the delay 95 % of the speed is there
+        late = np.searchsorted(time, delay + 0.3)
+        assert step[late] / np.abs(step).max() == pytest.approx(0.95, abs=0.05)
+        given = np.zeros((len(time), 2))
+        given[:, k] = np.sin(2.0 * np.pi * 2.0 * time)
+        speed = lsim(system, given, time)[1][:, 2 + k]
+        # over the last whole second, two periods
+        last = slice(3000, 4000)
+        wave = np.exp(-2j * np.pi * 2.0 * (time + delay))
+        swing = 2j * np.mean(speed[last] * wave[last])
+        assert linear.response(k, np.array([2.0]))[0] == pytest.approx(swing, rel=0.03)
+
+
+def test_its_page_draws_both_with_bands(tmp_path):
+    plant = made("quasi-static", opening_lag=0.1)
+    command = np.array([HELD.get(one, 0.0) for one in plant.names])
+    linear = linearise(plant, command)
+    other = linearise(made("quasi-static", opening_lag=0.2), command)
+    page = linear_page(linear, [other, linear], plant.identified.settings.arm)
+    plots = [plot.draw() for plot in page.plots]
+    assert len(plots) == 2
+    for chart in plots:
+        for panel in chart.panels:
+            assert [mark.kind for mark in panel.marks] == ["band", "line"]
+    assert write_page(page, tmp_path).is_file()

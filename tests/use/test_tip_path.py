@@ -9,8 +9,8 @@ from made_models import EARLY, EARLY_SETTINGS, made_model
 
 import hydroid
 from hydroid.errors import LogError
-from hydroid.identified_model import IdentifiedModel
-from hydroid.use.tip_path import Tip
+from hydroid.identified_model import IdentifiedModel, identified
+from hydroid.use.tip_path import TipKinematics
 
 
 def model() -> IdentifiedModel:
@@ -20,6 +20,7 @@ def model() -> IdentifiedModel:
 
 def forward(arm, angle):
     """Where the payload's site is [m], by MuJoCo alone."""
+    assert arm.payload is not None
     mjcf = mujoco.MjModel.from_xml_path(str(arm.model))
     data = mujoco.MjData(mjcf)
     data.qpos[:] = angle
@@ -44,7 +45,7 @@ def test_the_tip_is_where_the_path_is(by):
     one = model()
     arm, start = one.settings.arm, one.settings.arm.pose("study")
     points = line(forward(arm, start), by)[:, 1:]
-    angle, off = Tip(arm, [2, 3]).angles(points, start)
+    angle, off = TipKinematics(arm, [2, 3]).angles(points, start)
     np.testing.assert_allclose(
         [forward(arm, pose) for pose in angle], points, atol=1e-5
     )
@@ -63,7 +64,7 @@ def test_with_more_joints_than_needed_angles_return_to_where_they_began():
     one = model()
     arm, start = one.settings.arm, one.settings.arm.pose("study")
     points = np.tile(forward(arm, start), (5, 1))
-    angle, _ = Tip(arm, range(1, 8)).angles(points, start)
+    angle, _ = TipKinematics(arm, range(1, 8)).angles(points, start)
     np.testing.assert_allclose(angle, np.tile(start, (5, 1)), atol=1e-6)
 
 
@@ -76,6 +77,21 @@ def test_commands_lead_the_tip_along_a_line(tmp_path: Path):
     played = hydroid.simulate(tmp_path / "commands.csv", fit=one).log
     end = forward(arm, played.angle[-1])
     np.testing.assert_allclose(end, wished[-1, 1:], atol=2e-3)
+
+
+def test_an_arm_without_a_site_is_led_by_the_end_of_its_last_link(tmp_path: Path):
+    one = model()
+    settings = one.settings.changed({"arm.payload": None, "outputs": [2, 3]})
+    bare = identified(settings, one.values, "test")
+    arm, start = settings.arm, settings.arm.pose("study")
+    tip = TipKinematics(arm, [2, 3])
+    wished = line(tip.place(start), [0.03, 0.0, 0.05], seconds=6.0)
+    file = write(tmp_path / "tip.csv", wished)
+    followed = hydroid.follow(file, fit=bare, out=tmp_path / "commands.csv")
+    assert followed.content["tip"] == "the end of jaw_left"
+    assert "The tip is the end of jaw_left." in followed.lines
+    played = hydroid.simulate(tmp_path / "commands.csv", fit=bare).log
+    np.testing.assert_allclose(tip.place(played.angle[-1]), wished[-1, 1:], atol=2e-3)
 
 
 def beyond(place):

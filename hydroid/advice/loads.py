@@ -1,0 +1,111 @@
+"""Loads that logs ask for: a mass at the tip that explains what a fit made without it
+errs by.
+
+A load is asked for where a model that carries one foretells parts of a log left out
+clearly better. Its estimate and interval count with all other parameters as uncertain
+as the fit left them: one Gauss-Newton step of the load and of these together, with the
+fit's posterior as their prior. Where the fit compares pressures, they count too.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hydroid.advice.adaptation import adapted, carrying, first_guess
+from hydroid.arrays import Array, record
+from hydroid.findings import Finding
+from hydroid.fitting.left_out import is_better, not_fitted, refit
+from hydroid.identified_model import IdentifiedModel
+from hydroid.log import Log
+from hydroid.posterior.error_model import likelihood_at
+from hydroid.posterior.posterior import NORMAL, STEP, stored_posterior
+from hydroid.problem.problem import Problem
+from hydroid.search.axes import differentiate
+from hydroid.settings.arm import TIP_LOAD
+from hydroid.settings.log import log_file
+
+PART = 0.1
+"""change of a load over which its effect is taken for linear, as a part of the load"""
+
+
+@record
+class Load:
+    """A load at the tip that a log asks for.
+
+    Attributes:
+        log: name of the file.
+        mass: beyond the payload that the settings state [kg].
+        low, high: its 95 % interval [kg].
+    """
+
+    log: str
+    mass: float
+    low: float
+    high: float
+
+    def __str__(self) -> str:
+        return f"{self.log}: {self.mass:.3g} kg ({self.low:.3g} to {self.high:.3g})"
+
+
+def asked_loads(model: IdentifiedModel, logs: Sequence[Log]) -> list[Load]:
+    """Return the loads of those logs that ask for one."""
+    able = carrying(model)
+    loads = list[Load]()
+    for log in logs:
+        problem = Problem(adapted(able, [TIP_LOAD], [log]), [log])
+        errors = problem.output_errors(able.theta[None])[0]
+        before = not_fitted(problem, able.theta, errors)
+        begin = able.theta.copy()
+        begin[-1] = first_guess(able)
+        after = refit(problem, begin)
+        if is_better(after, before, len(logs)):
+            loads.append(load_of(model, log, problem, after.theta))
+    return loads
+
+
+def load_of(model: IdentifiedModel, log: Log, problem: Problem, theta: Array) -> Load:
+    """Return the load of a log with its interval.
+
+    Args:
+        model: without the load.
+        log: it alone is the problem's.
+        problem: its last parameter is the load.
+        theta: where all others are the model's, shape (P + 1,).
+    """
+    likelihood = likelihood_at(problem, theta)
+    mass = float(theta[-1])
+
+    def with_load(points: Array, load: float) -> Array:
+        """Return innovations of the model's parameters, (n, P), with a load."""
+        loads = np.full(len(points), load)
+        return likelihood.innovations(np.column_stack([points, loads]))
+
+    change = PART * max(mass, first_guess(model))
+    at = theta[None, :-1]
+    heavier = with_load(at, mass + change)[0]
+    here = with_load(at, mass)[0]
+    slopes = [heavier - here]
+    prior = np.zeros((0, 1))
+    quantile = NORMAL
+    if (known := stored_posterior(model)) is not None:
+        others = differentiate(
+            lambda points: with_load(points, mass), known.box, known.axes(STEP), here
+        )
+        slopes += [*others]
+        prior = np.column_stack([np.zeros(len(known.root)), known.root])
+        quantile = known.quantile
+    rows = np.vstack([np.column_stack(slopes), prior])
+    aim = np.append(-here, np.zeros(len(prior)))
+    inverse = np.linalg.pinv(rows.T @ rows, hermitian=True)
+    mass = max(mass + change * float((inverse @ (rows.T @ aim))[0]), 0.0)
+    half = change * quantile * float(np.sqrt(inverse[0, 0]))
+    return Load(log_file(log.source).name, mass, max(mass - half, 0.0), mass + half)
+
+
+def load_finding(loads: Sequence[Load]) -> list[Finding]:
+    """Return what is said of loads that logs ask for; nothing without any."""
+    if not loads:
+        return []
+    stated = ", ".join(f"{one.log}: {one.mass:.3g}" for one in loads)
+    numbers = {"stated": f"{{{stated}}}"}
+    return [Finding("load asked for", "note", tuple(map(str, loads)), numbers)]

@@ -97,8 +97,7 @@ def validate(
     best = tested[next(iter(fits))]
     run = run_of(best.model)
     if out is not None:
-        for test in tested.values():
-            _keep(test, apart=apart)
+        _keep(tested.values(), apart=apart)
         if run and set:
             # with other settings it is another model than the run's
             text = "note: what --set gives does not go into %s and its report"
@@ -231,17 +230,17 @@ def _is_own(prediction: "Prediction") -> bool:
     return bool(max(errors) < OWN_ERROR)
 
 
-def _keep(test: _Tested, *, apart: bool) -> None:
-    """Store what a fit makes of unseen logs in its own run, whose report shows them
+def _keep(tested: Iterable[_Tested], *, apart: bool) -> None:
+    """Store what fits make of unseen logs in their own runs, whose reports show them
     from now on."""
     from hydroid.reporting.predictions import draw
     from hydroid.run.record import keep_validation
 
-    run = keep_validation(
-        test.model, [replace(p, apart=apart) for p in test.predictions]
-    )
-    if run:
-        draw(run)
+    for test in tested:
+        predictions = [replace(p, apart=apart) for p in test.predictions]
+        run = keep_validation(test.model, predictions)
+        if run:
+            draw(run)
 
 
 def _unseen(log: Log, fitted: Sequence[Log]) -> bool:

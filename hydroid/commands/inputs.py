@@ -42,7 +42,7 @@ SHARED = f"""
     log (LOG): A log. Formats: {FORMATS}.
     fit (RUN|YAML): An estimate: the folder of a run or of Plant.save (Python), an
         estimate.yaml, or a YAML file that gives parameters values.
-    out (DIR): Folder for the page and its tables [default: runs/COMMAND; in Python
+    out (DIR): Folder for the tables [default: runs/COMMAND; in Python
         nothing is written].
     config (YAML): Settings: the fit.yaml that `hydroid init` wrote for your machine, or
         the name of a shipped config, for the shipped arm. With the folder of a run it
@@ -287,7 +287,7 @@ def _limits(value: str, value_type: Any) -> Plain:
 
 
 def names(given: str | list[str] | tuple[str, ...] | None) -> list[str]:
-    """Return names that stand in a list, or in a text such as `K,D`, each once."""
+    """Return names that stand in a list, or in a text such as `K,D`, in their order."""
     parts = given.split(",") if isinstance(given, str) else given or ()
     stripped = (part.strip() for part in parts)
-    return [*dict.fromkeys(name for name in stripped if name)]
+    return [name for name in stripped if name]

@@ -380,7 +380,7 @@ def adapt(
     from hydroid.reporting.verdict_table import left_out_table
 
     with Progress() as progress:
-        path = steps(model, read, names(free), progress)
+        path = steps(model, read, [*dict.fromkeys(names(free))], progress)
     chosen = [step["parameter"] for step in path[1:]]
     if not chosen:
         hint = "name parameters with --free, or fit anew with --start RUN"

@@ -70,7 +70,7 @@ WRONG = [
     (
         "fit-mech {root}/README.md",
         "log",
-        "(command of joint azimuth) and 13 more; unused: ",
+        "holds no table of numbers; name a log",
     ),
     ("validate {log}", "usage", "--fit"),
     ("validate {log} --fit nowhere", "settings", "nowhere"),

@@ -317,7 +317,7 @@ WRONG = (
     ),
     Wrong(
         "a log of 50 Hz, read at 100 Hz",
-        "note: commands change on a line",
+        "note: commands follow a line between samples",
         lambda: of("", lambda values: values[::2]),
     ),
     Wrong(

@@ -81,7 +81,8 @@ def test_the_kept_precision_gives_the_intervals_of_the_fit(fitted):
 
 def test_other_values_or_free_parameters_are_not_the_fits(fitted):
     changed = hydroid.load_identified(
-        fitted.folder, overrides={"parameters.A_A.fixed": 900}
+        fitted.folder,
+        overrides={"parameters.A_A.fixed": fitted.summary.values["A_A"]},
     )
     assert stored_posterior(changed) is None
     with pytest.raises(RunError, match="holds no covariance of these parameters"):

@@ -36,7 +36,7 @@ from hydroid.hydraulics.cylinder import weigh
 from hydroid.hydraulics.elementwise import compilable
 from hydroid.hydraulics.joint import mean_opening
 from hydroid.hydraulics.kernel import Plugin, make_pad, source_key
-from hydroid.hydraulics.oil import store_oil
+from hydroid.hydraulics.oil import overshoot, store_oil
 from hydroid.hydraulics.pump import begin_line, come_up, line_pressure
 from hydroid.hydraulics.valve import rod_speed
 from hydroid.simulation.rollout import mujoco_function, write_sample
@@ -46,29 +46,6 @@ _com_pos = mujoco_function("mj_comPos", types.intp, types.intp)
 _rne = mujoco_function("mj_rne", types.intp, types.intp, types.int32, types.intp)
 
 SOURCE = source_key(write_sample)
-
-
-@compilable
-def overshoot(c, z, wanted: float) -> float:
-    """Advance a joint on its oil over a step; how much further than at `wanted` [rad/s]
-    it turns [rad].
-
-    Its velocity v follows that of the rod without oil, u, as v̈ + 2ζω (v̇ − σu̇) +
-    ω²(v − u) = 0 with ω, ζ and the share σ of the damping that acts between valve and
-    joint constant. σ = 0 is a joint with leakage or friction (H. E. Merritt, "Hydraulic
-    Control Systems", 1967), σ = 1 one on hoses that damp. Exact where u is constant;
-    the state is v̇ − 2ζωσu, which does not jump where u does.
-    """
-    pace = 2.0 * np.pi * c.oil_frequency
-    drag = 2.0 * c.oil_damping * pace
-    passed = c.oil_damping_share * drag * wanted
-    lack = z.turning - wanted
-    surge = z.surge + passed
-    left = (c.ring_cosine + drag * c.ring_sine) * lack + c.ring_sine * surge
-    after = c.ring_cosine * surge - pace * pace * c.ring_sine * lack
-    z.turning = wanted + left
-    z.surge = after - passed
-    return (surge - after + drag * (lack - left)) / (pace * pace)
 
 
 @compilable

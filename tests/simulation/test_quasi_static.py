@@ -13,12 +13,12 @@ from observation import trace
 from scipy import signal
 
 from hydroid.hydraulics.elementwise import ringing
+from hydroid.hydraulics.oil import overshoot
 from hydroid.hydraulics.records import JOINT, nominal_joints
 from hydroid.hydraulics.valve import DENSITY, rod_speed
 from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.problem import SimulationSettings
 from hydroid.simulation import Simulation
-from hydroid.simulation.quasi_static import overshoot
 from hydroid.simulation.scenario import Scenario
 
 SHOULDER, ROLL = 1, 3

@@ -30,7 +30,8 @@ def start(
         (cwd / "mech.yaml").write_text(STAGE_1)
     # under nohup the tests ignore SIGHUP, and so would the run
     code = "import signal; signal.signal(signal.SIGHUP, signal.SIG_DFL); "
-    code += "import hydroid.commands.app as a, hydroid.fitting.checkpoints as s; s.SAVE_EVERY = 0; a.main()"
+    code += "import hydroid.commands.app as a, hydroid.fitting.checkpoints as s; s.SAVE_EVERY = 0; "
+    code += "print('imported', flush=True); a.main()"
     words = [command, "log.csv", *map(str, options), "--out", out, "--resume"]
     return subprocess.Popen(
         [sys.executable, "-c", code, *words],
@@ -42,7 +43,7 @@ def start(
 
 
 def finish(process: "subprocess.Popen[str]", code: int = 0) -> str:
-    out, errors = process.communicate(timeout=120)
+    out, errors = process.communicate(timeout=300)
     assert process.returncode == code, out + errors
     return errors
 
@@ -121,6 +122,9 @@ def test_killed_runs_end_the_same(tmp_path: Path, kind: str):
     while hits < int(os.environ.get("KILLS", "4")):
         end = ENDS[hits % len(ENDS)]
         process = start(killed, *SEARCHES[kind], out="run", command=command)
+        # what a signal does before, test_files tells of the command itself
+        assert process.stdout is not None
+        process.stdout.readline()
         if rng.random() < 0.5:
             time.sleep(took * rng.random())
         else:  # while a file is written

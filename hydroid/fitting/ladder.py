@@ -187,9 +187,7 @@ class Ladder:
         how = refine if self._from_afar else refine_from_afar
         likelihood = make_likelihood(self.problem)
         last = self._refined(likelihood, kept.theta, settings, self._step, how)
-        new = self._measured(self.problem, last, self._step)
-        self.kept = replace(new, gained=kept.gained)
-        self.estimates[kept.name] = self.kept
+        self.kept = self._measured(self.problem, last, self._step)
 
     def known(self, theta: Array) -> Uncertainty:
         """Return how well the logs determine theta, (P,): the estimate that is kept, or
@@ -223,7 +221,7 @@ class Ladder:
         """
         last = self.problem
         start = self.kept
-        if if_better and (self._late or last.leaves_noise(start.theta)):
+        if if_better and self._is_at_end():
             return
         own = whole.varied(whole.settings.of_estimate(step.estimate))
         begin = self._beginning(own, begun, settings, step)
@@ -237,15 +235,12 @@ class Ladder:
         if self._late and if_better:
             return
         new = self._measured(own, result, step)
-        if step.estimate == start.name:
-            new = replace(new, gained=start.gained)
-            self.estimates[start.name] = new
         if if_better:
             without = self._left_out_of(last, self.refinements[start.name])
             gained = gain(self._left_out_of(own, result), without)
             new = replace(new, gained=gained)
             self.estimates[step.estimate] = new
-            if self._late or not is_clear(*gained):
+            if not is_clear(*gained):
                 return
         from_afar = how is refine_from_afar or (self._from_afar and begin.alone)
         self._keep(own, new, step, from_afar=from_afar)
@@ -423,6 +418,10 @@ class Ladder:
         if not self._late and not is_better(with_it, without):
             self._keep(own, self._measured(own, result, step), step)
 
+    def _is_at_end(self) -> bool:
+        """Whether there is no time left, or nothing but noise to explain."""
+        return self._late or self.problem.leaves_noise(self.kept.theta)
+
     def _is_white(self) -> bool:
         """Whether the errors of the estimate that is kept leave innovations that are
         white."""
@@ -462,13 +461,16 @@ class Ladder:
         return result
 
     def _measured(self, problem: Problem, end: Refinement, step: Step) -> Estimate:
-        """Measure an end of least squares, and list it."""
+        """Measure an end of least squares, and list it; one of the model that is kept
+        gained what that has gained."""
         name = step.estimate
-        self.estimates |= measured(
-            problem, {name: problem.parameters.from_unit(end.point)}
-        )
+        theta = problem.parameters.from_unit(end.point)
+        new = measured(problem, {name: theta})[name]
+        if name == self.kept.name:
+            new = replace(new, gained=self.kept.gained)
+        self.estimates[name] = new
         self.refinements[name] = end
-        return self.estimates[name]
+        return new
 
 
 def _begun(problem: Problem, last: Problem, theta: Array) -> Array:

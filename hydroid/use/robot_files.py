@@ -51,12 +51,7 @@ def fitted_urdf(plant: Plant, robot: Path) -> tuple[str, list[str]]:
             with a mass.
     """
     root = read_robot(robot)
-    if root.tag != "robot":
-        raise ModelError("is no URDF", robot, "name the URDF that hydroid init read")
-    try:
-        text = robot.read_bytes().decode("utf-8")
-    except UnicodeDecodeError:
-        raise ModelError("is not UTF-8", robot, "save it as UTF-8") from None
+    text = _urdf_text(root, robot)
     names = plant.identified.settings.arm.link_names
     owners = _owners(root, names)
     stated = dict.fromkeys(names, 0.0)
@@ -79,6 +74,16 @@ def fitted_urdf(plant: Plant, robot: Path) -> tuple[str, list[str]]:
         if factor is not None:
             text = _reweighed(text, plain, block.span(), factor)
     return text, [name for name in names if name not in factors]
+
+
+def _urdf_text(root: Element, robot: Path) -> str:
+    """Return the text of a file whose root this is, if it is a URDF."""
+    if root.tag != "robot":
+        raise ModelError("is no URDF", robot, "name the URDF that hydroid init read")
+    try:
+        return robot.read_bytes().decode("utf-8")
+    except UnicodeDecodeError:
+        raise ModelError("is not UTF-8", robot, "save it as UTF-8") from None
 
 
 def _owners(root: Element, names: Sequence[str]) -> dict[str, str]:

@@ -311,11 +311,13 @@ class Ladder:
         have the drift of the last model's errors.
         """
         few = settings.changed({"iterations": FIRST})
-        output_errors = replace(likelihood, memory=np.inf)
         parameters = likelihood.problem.parameters
         ends = [
             self._refined(
-                output_errors, begun, few, step.changed(phase="at first", start=number)
+                likelihood.from_afar,
+                begun,
+                few,
+                step.changed(phase="at first", start=number),
             )
             for number, begun in enumerate((theta, parameters.start))
         ]

@@ -31,7 +31,7 @@ from numba import njit
 from hydroid.arrays import Array
 from hydroid.hydraulics.cylinder import rod_way, weigh
 from hydroid.hydraulics.elementwise import compilable
-from hydroid.hydraulics.joint import open_share, opened
+from hydroid.hydraulics.joint import open_share
 from hydroid.hydraulics.kernel import make_pad, source_key
 from hydroid.hydraulics.oil import volume
 from hydroid.hydraulics.pump import delivery, line_pressure, lowest
@@ -90,8 +90,8 @@ def steady_opening(command: float, c) -> float:
     B."""
     travel = steady_stroke(command, c.a, c) - steady_stroke(-command, c.b, c)
     if travel > 0.0:
-        return opened(c, open_share(c.a, travel))
-    return opened(c, -open_share(c.b, -travel))
+        return c.a.opening * open_share(c.a, travel)
+    return -c.b.opening * open_share(c.b, -travel)
 
 
 @compilable

@@ -147,7 +147,11 @@ class Ladder:
             on_the_way = refinement.changed({"gain_tolerance": tolerance})
         lone = self._lone_terms(settings)
         self._climb_model(whole, "refined", lone, on_the_way)
+        before = self._step.terms
         self._add_lone_terms(whole, lone, on_the_way)
+        if self._step.terms != before:
+            # errors of a valve may have hidden a pump
+            self._add_terms(whole, lone, on_the_way)
         if has_dynamic:
             self._climb_model(whole, "dynamic", lone, on_the_way)
         if self._step.model == "dynamic":
@@ -172,10 +176,15 @@ class Ladder:
         terms = tuple(term for term in possible if term in self._step.terms)
         if_better = model == "dynamic"
         self._rung(whole, Step(model, terms), settings, if_better=if_better)
-        if self._step.model != model:
-            return
-        for term in possible:
-            if term not in terms and term not in lone:
+        if self._step.model == model:
+            self._add_terms(whole, lone, settings)
+
+    def _add_terms(
+        self, whole: Problem, lone: Collection[str], settings: RefinementSettings
+    ) -> None:
+        """Try each term that the kept model lacks, besides those of `lone`."""
+        for term in whole.settings.terms(self._step.model):
+            if term not in self._step.terms and term not in lone:
                 with_term = self._step.changed(terms=(*self._step.terms, term))
                 self._rung(whole, with_term, settings, if_better=True)
 
@@ -237,10 +246,11 @@ class Ladder:
         new = self._measured(own, result, step)
         if if_better:
             without = self._left_out_of(last, self.refinements[start.name])
-            gained = gain(self._left_out_of(own, result), without)
+            with_it = self._left_out_of(own, result)
+            gained = gain(with_it, without)
             new = replace(new, gained=gained)
             self.estimates[step.estimate] = new
-            if not is_clear(*gained):
+            if not is_clear(*gained, len(with_it.open)):
                 return
         from_afar = how is refine_from_afar or (self._from_afar and begin.alone)
         self._keep(own, new, step, from_afar=from_afar)

@@ -167,6 +167,7 @@ LINE = np.dtype(
         # of the step: state, whether there is a command, decay of φ, flow into joints
         # that follow a log
         "pressure share demand demanded decay taken "
+        "centre "  # part of the valves' open centre that is left
         # of a sub-step: as `pump` sums them; change of pressure
         "drawn softness swept change"
     )

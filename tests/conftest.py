@@ -1,9 +1,16 @@
 """What several tests share: the shipped arm, and small logs made by simulation."""
 
-# ruff: noqa: E402  # MuJoCo asks for OpenGL when it is imported
+# ruff: noqa: E402  # MuJoCo asks for OpenGL, and NumPy for threads, when it is imported
 
+import os
+
+from hydroid.commands.app import ONE_THREAD
 from hydroid.viewer import choose_platform
 
+# as the command line has it: threads of linear algebra that wait for each other take
+# several times the processor's time, and more where other tests run beside
+for variable in ONE_THREAD:
+    os.environ.setdefault(variable, "1")
 choose_platform()
 
 from collections.abc import Sequence

@@ -23,6 +23,7 @@ from made_logs import step_log
 from hydroid.arm.model import load_model
 from hydroid.hydraulics.records import nominal_joints
 from hydroid.log import Log
+from hydroid.rungs import rungs_of
 from hydroid.settings.arm import Arm, load_arm
 from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.problem import SimulationSettings
@@ -94,8 +95,10 @@ def simulation(
     **settings,
 ) -> Simulation:
     """Of some joints, from 0, in the stage `kind`."""
-    scenario = Scenario(spec, arm, log, list(outputs), SimulationSettings(**settings))
-    return Simulation(scenario, HydraulicSettings().substeps if kind == "hyd" else None)
+    how = SimulationSettings(**settings)
+    (rung, *_) = rungs_of(kind, how.model)
+    stepping = rung.stepping(how.steps_per_sample, HydraulicSettings().substeps)
+    return Simulation(Scenario(spec, arm, log, list(outputs), how, stepping))
 
 
 def replaced(candidates: Candidates, **joints: np.ndarray | float) -> Candidates:

@@ -79,6 +79,7 @@ QUASI_STATIC = Rung(
         "gain",
         "leakage",
         "anticavitation",
+        "transition_pressure",
         "bulk_modulus",
         "dead_volume",
         "line_volume",

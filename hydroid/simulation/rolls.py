@@ -6,14 +6,14 @@ from hydroid.rungs import DYNAMIC, GAIN, QUASI_STATIC, Rung
 from hydroid.simulation.quasi_static import roll_quasi_static
 from hydroid.simulation.rollout import roll
 
-# a gain pushes the joints of the same steps
-_ROLLS: dict[Rung, Callable[..., None]] = {
+ROLLS: dict[Rung, Callable[..., None]] = {
     GAIN: roll,
     QUASI_STATIC: roll_quasi_static,
     DYNAMIC: roll,
 }
+"""with the arguments of `roll`; a gain pushes joints, which are stepped as under oil"""
 
 
 def roll_of(rung: Rung) -> Callable[..., None]:
-    """Return the compiled rollout of a rung, which takes the arguments of `roll`."""
-    return _ROLLS[rung]
+    """Return the compiled rollout of a rung."""
+    return ROLLS[rung]

@@ -33,11 +33,13 @@ from hydroid.posterior.posterior import Posterior, regular
 from hydroid.posterior.uncertainty import uncertainty
 from hydroid.problem.bindings import Bindings
 from hydroid.problem.priors import Priors
-from hydroid.problem.problem import Problem, make_simulation
+from hydroid.problem.problem import Problem
 from hydroid.progress import Progress
 from hydroid.search.axes import differentiate
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.search import DesignSettings
+from hydroid.simulation import make_simulation
+from hydroid.simulation.roles import roles
 from hydroid.words import listed
 
 PRIOR_SD = 1.0
@@ -215,9 +217,10 @@ class ExperimentSimulator:
         """Return all joints' angles [rad] of candidates, (n, P) -> (n, T, J);
         NaN of what moves if one diverged."""
         log = experiment.log(self._settings)
-        passive = self._settings.simulation.other_joints == "passive"
         is_output = np.isin(np.arange(log.joints), self._outputs)
-        moving = np.flatnonzero(log.driven | passive | is_output)
+        others = self._settings.simulation.other_joints
+        of_joints = roles(log.driven | is_output, others)
+        moving = np.flatnonzero(of_joints.simulated)
         simulation = make_simulation(self._spec, log, moving.tolist(), self._settings)
         angle = np.tile(log.angle, (len(theta), 1, 1))
         angle[:, :, moving] = simulation.simulate(

@@ -39,6 +39,7 @@ TRUTH = {
     "lag": 2.0,
     "size": 1.2,
     "D": 0.7,
+    "slow": 0.0,
 }
 """factors between the machine's values and those of a project, by the beginning of
 their names"""

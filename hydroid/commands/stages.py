@@ -348,7 +348,7 @@ def adapt(
     the other parameters, under the name tip_load. Each freed parameter is tested on parts of the logs
     that are left out. The result is a run that every command takes.
 
-    Example: hydroid adapt LOADED.csv --fit runs/hyd --free P_flow,P_droop
+    Example: hydroid adapt LOADED.csv --fit runs/hyd --free P_flow
 
         adapted = hydroid.adapt("b.csv", fit="runs/a", free="M3")
         print(adapted.summary.values)

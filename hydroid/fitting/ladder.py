@@ -329,6 +329,7 @@ class Ladder:
         have the drift of the last model's errors.
         """
         few = settings.changed({"iterations": FIRST})
+        output_errors = replace(likelihood, memory=np.inf)
         parameters = likelihood.problem.parameters
         ends = [
             self._refined(

@@ -111,14 +111,15 @@ def refine_from_afar(
     """Improve an estimate that may be far off, as `refine` does.
 
     There a model of the errors takes what the parameters have not explained yet for
-    drift. So a rough least squares of independent output errors comes first
-    (`Likelihood.from_afar`).
+    drift. Output errors know no drift. So a rough least squares of output errors comes
+    first.
     """
     if np.isinf(likelihood.memory):
         return refine(likelihood, theta, settings, progress, checkpoints, what)
     rough = settings.changed({"gain_tolerance": max(settings.gain_tolerance, ROUGH)})
+    output_errors = replace(likelihood, memory=np.inf)
     afar = what.changed(phase="from afar")
-    first = refine(likelihood.from_afar, theta, rough, progress, checkpoints, afar)
+    first = refine(output_errors, theta, rough, progress, checkpoints, afar)
     if first.ending is Ending.TIME:
         return first
     near = likelihood.problem.parameters.from_unit(first.point)

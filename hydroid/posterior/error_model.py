@@ -235,17 +235,6 @@ class ErrorModel:
             numbers[i] = _most_likely(pairs, least, float(self.given[i]))
         return replace(self, numbers=numbers)
 
-    def independent(self, errors: Array) -> "ErrorModel":
-        """Return the error model whose noise makes weighted output errors, (R,), most
-        likely, without a drift or what lasts."""
-        numbers = np.zeros_like(self.numbers)
-        numbers[:, 4] = SHORTEST
-        for i, signal in enumerate(self.signals):
-            least = LEAST_NOISE[signal.quantity] ** 2
-            pairs = [(c, errors[c.rows] / c.weight) for c in self.courses_of(i)]
-            numbers[i, 0] = max(_mean_square(pairs), least)
-        return replace(self, numbers=numbers)
-
     def weighing(self, memory: float, *, alike: bool) -> "ErrorModel":
         """Return the model by which least squares weighs output errors that are as
         here.
@@ -379,30 +368,17 @@ class Likelihood:
         memory: within which least squares takes an error for drift, at the fastest [s];
             inf in stage 1, which is fitted by output errors as in the article, and on
             the way from afar.
-        is_far: whether it is on that way.
     """
 
     problem: Problem
     shown: ErrorModel
     memory: float
-    is_far: bool = False
 
     @cached_property
     def errors(self) -> ErrorModel:
         """The model that weighs the errors (`ErrorModel.weighing`)."""
         alike = self.problem.settings.stage == "mech"  # as in the article
         return self.shown.weighing(self.memory, alike=alike)
-
-    @property
-    def from_afar(self) -> "Likelihood":
-        """The likelihood of independent output errors, by which a start comes near to an
-        optimum.
-
-        How long errors last tells nothing there: what parameters have still to explain
-        lasts. Taken for a drift, it tells so little that the priors keep the parameters
-        where they are.
-        """
-        return replace(self, memory=np.inf, is_far=True)
 
     def innovations(self, theta: Array) -> Array:
         """Return innovations [1] of theta, shape (n, P): (n, R); NaN where a simulation
@@ -440,9 +416,7 @@ class Likelihood:
     def estimated(self, errors: Array) -> "Likelihood":
         """Return the likelihood for what weighted output errors, (R,), show of their
         model."""
-        shown = self.shown
-        new = shown.independent(errors) if self.is_far else shown.estimated(errors)
-        return replace(self, shown=new)
+        return replace(self, shown=self.shown.estimated(errors))
 
 
 def make_likelihood(problem: Problem) -> Likelihood:
@@ -513,7 +487,10 @@ def _most_likely(
     that (NaN: it is not). The search is over logarithms. It starts from a guess that is
     mostly noise, and from one that is mostly drift.
     """
-    square = max(_mean_square(pairs), least)
+    square = float(
+        np.mean(np.concatenate([error[course.used] for course, error in pairs]) ** 2)
+    )
+    square = max(square, least)
     seconds = sum(course.period * len(error) for course, error in pairs) / len(pairs)
     way = max(sum(float(course.way.sum()) for course, _ in pairs) / len(pairs), 1e-3)
     lower = np.array([least, NONE * square, NONE * square, NONE * square, SHORTEST])
@@ -539,12 +516,6 @@ def _most_likely(
             minimize(cost, begin, method="L-BFGS-B", bounds=bounds, options=options)
         )
     return np.exp(min(ended, key=lambda one: one.fun).x)
-
-
-def _mean_square(pairs: Sequence[tuple[Course, Array]]) -> float:
-    """Return the mean square of one signal's errors, with their courses."""
-    used = np.concatenate([error[course.used] for course, error in pairs])
-    return float(np.mean(used**2))
 
 
 def _negative_log_likelihood(course: Course, error: Array, numbers: Array) -> float:

@@ -333,7 +333,7 @@ class Ladder:
         parameters = likelihood.problem.parameters
         ends = [
             self._refined(
-                likelihood.from_afar,
+                output_errors,
                 begun,
                 few,
                 step.changed(phase="at first", start=number),

@@ -139,7 +139,7 @@ def run_study(
         total = len(results) + len(missing)
         LOGGER.log(NOTE, "%d of %d runs found, goes on", len(results), total)
     _perform_all(missing, results, executor, progress)
-    return tuple(map(measured, tasks, [results[file] for file in files]))
+    return tuple(map(measures_of, tasks, [results[file] for file in files]))
 
 
 def _perform_all(
@@ -199,7 +199,7 @@ def make_tasks(
     return tasks
 
 
-def measured(task: Task, result: Result) -> Row:
+def measures_of(task: Task, result: Result) -> Row:
     """Return the measures of one run (docs/studies.md)."""
     values = {name: float(value) for name, value in result.get("measures", {}).items()}
     values |= {

@@ -53,7 +53,7 @@ def forecast(posterior: Posterior) -> Posterior:
     return posterior.add(np.eye(len(posterior.root)) / PRIOR_SD)
 
 
-def measured(
+def information(
     settings: DesignSettings, signals: Sequence[Array], period: float
 ) -> Array:
     """Return rows N of the information N' N that signals of the joints' angles give,
@@ -84,7 +84,7 @@ counts"""
 class Trial(NamedTuple):
     """A simulated experiment that keeps the limits.
 
-    experiment: its commands. gained: rows of its information (`measured`), shape (p,
+    experiment: its commands. gained: rows of its information (`information`), shape (p,
     p). log: its commands with the simulated angles.
     """
 
@@ -209,7 +209,9 @@ class ExperimentSimulator:
             return DIVERGED
         of_angles = slopes.reshape(len(slopes), -1, len(self._outputs))
         signals = [*np.moveaxis(of_angles, -1, 0)]
-        gained = measured(self._settings.design, signals, self._settings.log.period_s)
+        gained = information(
+            self._settings.design, signals, self._settings.log.period_s
+        )
         log = replace(experiment.log(self._settings), angle=angle)
         return Trial(experiment, gained, log)
 
@@ -359,7 +361,7 @@ def _random_trials(
     kept = list[Trial]()
     broken = list[Broken]()
     for drawn in range(1, _random_effort(effort) + 1):
-        trial = simulator.trial(experiments.draw())
+        trial = simulator.trial(experiments.random())
         if isinstance(trial, Trial):
             kept.append(trial)
         else:

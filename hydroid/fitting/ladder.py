@@ -63,7 +63,7 @@ class Estimate:
         return bool(np.isfinite(self.rms))
 
 
-def measured(problem: Problem, candidates: Mapping[str, Array]) -> dict[str, Estimate]:
+def simulated(problem: Problem, candidates: Mapping[str, Array]) -> dict[str, Estimate]:
     """Simulate candidates by name, each of shape (P,), and measure them; those that
     diverged come last."""
     theta = np.array(list(candidates.values()))
@@ -486,7 +486,7 @@ class Ladder:
         gained what that has gained."""
         name = step.estimate
         theta = problem.parameters.from_unit(end.point)
-        new = measured(problem, {name: theta})[name]
+        new = simulated(problem, {name: theta})[name]
         if name == self.kept.name:
             new = replace(new, gained=self.kept.gained)
         self.estimates[name] = new

@@ -200,7 +200,7 @@ def lone_joints(problem: Problem) -> tuple[int, ...]:
     There are none if there are fewer than two, or if a log does not measure how a
     driven joint moves.
     """
-    measured = all(log.measured[log.driven].all() for log in problem.logs)
+    measured = all(log.has_angle[log.driven].all() for log in problem.logs)
     settings = problem.settings
     joints = tuple(
         j for j in settings.outputs if problem.driven[j - 1] and settings.acting_on(j)

@@ -199,7 +199,7 @@ def make_bench(settings: FitSettings, logs: Sequence[Log], joint: int) -> Bench:
     arm = settings.arm
     pose = logs[0].start
     period = logs[0].period
-    shown = [log for log in logs if log.measured[joint - 1]] or logs
+    shown = [log for log in logs if log.has_angle[joint - 1]] or logs
     angles = np.concatenate([log.posed[:, joint - 1] for log in shown])
     middle = (angles.min() + angles.max()) / 2
     # in whole degrees or millimetres, as words say it

@@ -108,7 +108,7 @@ class Problem:
         1."""
         compared = np.isin(np.arange(log.joints), self.outputs)
         of_joints = roles(log.driven | compared, self.settings.simulation.other_joints)
-        return (np.flatnonzero(log.measured & ~of_joints.following) + 1).tolist()
+        return (np.flatnonzero(log.has_angle & ~of_joints.following) + 1).tolist()
 
     def theta(self, unit: Array) -> Array:
         """Return candidates, (n, P), from points of the search's unit box, moved to

@@ -12,8 +12,3 @@ ROLLS: dict[Rung, Callable[..., None]] = {
     DYNAMIC: roll,
 }
 """with the arguments of `roll`; a gain pushes joints, which are stepped as under oil"""
-
-
-def roll_of(rung: Rung) -> Callable[..., None]:
-    """Return the compiled rollout of a rung."""
-    return ROLLS[rung]

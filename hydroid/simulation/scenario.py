@@ -21,7 +21,7 @@ from hydroid.settings.arm import Arm
 from hydroid.settings.problem import SimulationSettings
 from hydroid.simulation.roles import Roles, roles
 from hydroid.simulation.rollout import SteppedArm
-from hydroid.simulation.rolls import roll_of
+from hydroid.simulation.rolls import ROLLS
 
 ARMATURE = 1e6
 """[kg·m²], against about 10 for the whole arm: the arm's torques move it by less than
@@ -276,7 +276,7 @@ class Chain:
     def stepped(self, model: mujoco.MjModel, steps: int, copies: int = 1) -> SteppedArm:
         """Return the arm of a model, or several copies of it, to be rolled out as its
         rung is, with a sample after so many steps."""
-        roll = roll_of(self._stepping.rung)
+        roll = ROLLS[self._stepping.rung]
         return SteppedArm(model, self.columns, steps, roll, copies)
 
     def start(

@@ -50,10 +50,11 @@ def follow(
 
     Args:
         trajectory (TRAJECTORY.csv): Joint angles over time, in the columns and units of
-            the fit's logs; or the tip's position over time, in columns x_m, y_m and
-            z_m. The tip is the site that the arm's file names as payload, or else the
-            end of the last link. Joints without a column, or without commands, rest in
-            the start pose of the settings.
+            the fit's logs; or the tip's position over time, in columns time_s, x_m, y_m
+            and z_m, or, from where the tip starts, dx_m, dy_m and dz_m. The tip is the
+            site that the arm's file names as payload, or else the end of the last link.
+            Joints without a column, or without commands, rest in the start pose of the
+            settings.
         out (LOG.csv): The commands, in the columns and units of the fit's logs, beside
             the wished angles; the page has the same name [default of the command line:
             runs/follow/commands.csv].
@@ -93,7 +94,7 @@ def follow(
             "delay and lags need commands that early."
         )
     if out is not None:
-        write_log(Path(out), followed.log, model.settings.log, arm=arm)
+        write_log(Path(out), followed.recording, model.settings.log, arm=arm)
         lines += [str(out), *written(page, Path(out).parent)]
     content = {
         "out": out and str(out),
@@ -124,8 +125,7 @@ def _tip_path(
         return None, ""
     tip = TipKinematics(settings.arm, Plant(model).joints)
     start = settings.arm.pose(settings.start_pose)
-    time, period = settings.log.time.column, settings.log.period_s
-    return tip_path(table, time, period, tip, start), tip.tip.what
+    return tip_path(table, settings.log, tip, start), tip.tip.what
 
 
 def _without_absent_joints(

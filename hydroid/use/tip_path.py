@@ -24,7 +24,7 @@ from hydroid.units import UNITS
 COLUMNS = ("x_m", "y_m", "z_m")
 """columns of a file that hold the tip's position [m], in the axes of the arm's model"""
 FROM_START = ("dx_m", "dy_m", "dz_m")
-"""the same, from where the tip is in the start pose"""
+"""the same, from where the tip starts"""
 TIME = "time_s"
 """column of times [s] that a path may have instead of that of the logs"""
 REACHED = 1e-6
@@ -227,7 +227,7 @@ def _unreached(
         f"the tip cannot reach {_spelt(points[worst])} at {time[worst]:.4g} s: "
         f"it stays {off[worst]:.3g} m off, the most of {missed} such samples"
     )
-    hint = f"only joints with commands move; in the start pose the tip is at {_spelt(first)}"
+    hint = f"only joints with commands move; the tip starts at {_spelt(first)}"
     return LogError(what, source, hint)
 
 

@@ -89,7 +89,18 @@ def test_an_arm_without_a_site_is_led_by_the_end_of_its_last_link(tmp_path: Path
     file = write(tmp_path / "tip.csv", wished)
     followed = hydroid.follow(file, fit=bare, out=tmp_path / "commands.csv")
     assert followed.content["tip"] == "the end of jaw_left"
-    assert "The tip is the end of jaw_left." in followed.lines
+    (line_,) = [one for one in followed.lines if str(one).startswith("The tip is ")]
+    away = followed.content["tip_away_mm"]
+    assert line_ == (
+        "The tip is the end of jaw_left. By the model it stays within "
+        f"{away:.3g} mm of the path."
+    )
+    along = followed.result
+    wish = np.array([tip.place(pose) for pose in along.log.angle])
+    had = np.array([tip.place(pose) for pose in along.angle])
+    off = np.linalg.norm(wish - had, axis=1)
+    assert away == pytest.approx(1e3 * off.max())
+    assert 0.0 < away < 5.0
     played = hydroid.simulate(tmp_path / "commands.csv", fit=bare).log
     np.testing.assert_allclose(tip.place(played.angle[-1]), wished[-1, 1:], atol=2e-3)
 

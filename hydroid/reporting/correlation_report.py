@@ -29,8 +29,9 @@ LARGEST = 760
 """height of all rows together, at most [px]"""
 
 _TEXT = (
-    "Two parameters that are correlated trade against each other: the logs know a combination of them better "
-    "than either. Blue: both may grow together; orange: one grows while the other falls."
+    "Where two parameters are correlated, one can make up for the other: the logs determine "
+    "them together better than each alone. Blue: both may be larger together. Orange: one may"
+    " be larger if the other is smaller."
 )
 
 

@@ -68,8 +68,8 @@ def quantity_section(settings: FitSettings, summary: FitSummary) -> Section | No
             header = ("quantity", "value", "unit", "interval")
             cards[f"known_{name}"] = Table(name, header, tuple(rows))
     text = (
-        "With 95 % intervals, which are right only if the model is right. "
-        "All quantities stand further down."
+        "The best known quantities of each joint, with 95 % intervals. Intervals are right "
+        "only if the model is right. All quantities stand further down."
     )
     return Section("What is known", text, cards=cards) if cards else None
 
@@ -139,12 +139,12 @@ def error_section(settings: FitSettings, summary: FitSummary) -> Section | None:
     if not rows:
         return None
     text = (
-        "Even with exact parameters a prediction is uncertain, because more than the commands moves a joint. "
-        "The uncertainty grows with the time."
+        "Even with exact parameters a prediction is uncertain, because more than the commands"
+        " moves a joint. The uncertainty grows with the time."
     )
     note = (
-        "Standard deviations; after 10 s: at the mean speed of the logs. An error that lasts is the model's, "
-        "not the sensor's; empty: none lasts."
+        "Standard deviations; after 10 s: at the mean speed of the logs. An error that lasts "
+        "is the model's, not the sensor's; empty: none lasts."
     )
     table = Table.of("", {name: name for name in rows[0]}, rows, note)
     return Section(

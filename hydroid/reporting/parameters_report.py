@@ -32,12 +32,12 @@ Row = dict[str, Cell]  # by the names of columns
 Intervals = Mapping[str, tuple[float, float]]
 
 _NOTE = (
-    "from, to: 95 % interval; empty: no limit. data: share of the information from the logs. by log: from "
-    "the differences between logs."
+    "from, to: 95 % interval; empty: no limit. data: share of the information from the logs. "
+    "by log: from the differences between logs."
 )
 _PRIORS = (
-    "What was known before the logs, and what they made of it: bars are 95 % intervals, points the "
-    "estimates. Where a bar is as wide as the grey one, the logs added nothing."
+    "Grey: what was expected before the fit (95 %). Blue: what is known after it (95 %); "
+    "points: the estimates. Where blue is as wide as grey, the logs added nothing."
 )
 
 

@@ -52,12 +52,13 @@ ALL = "joints"
 """column of the responses of all joints together"""
 
 _MATRIX = (
-    "Rms error of each joint. Green: within its tolerance; amber: within twice that; red: beyond. Choose one "
-    "to see its response and the arm in motion."
+    "Rms error of each joint in each log. Green: good; amber: up to twice what is good; red: "
+    "worse. Choose one to see its response and the arm in motion."
 )
 _MOTION = (
-    "Orange: simulated. Grey: measured, hidden where both agree. The picture begins where they differ most, "
-    "and turns with the machine. Other joints replay their measured angles."
+    "Orange: simulated. Grey: measured, hidden where both agree. The picture begins where "
+    "they differ most. The view from the side turns with the machine. Joints that are not "
+    "compared show their measured angles."
 )
 _NOTE = "fit: 100 % is perfect, 0 % as bad as a constant. expected: the rms error that the fit predicts."
 _KINDS = {True: "unseen", False: "fitted", None: ""}

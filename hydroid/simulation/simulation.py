@@ -13,6 +13,7 @@ import os
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -22,6 +23,7 @@ from hydroid.arm.locked import repeat
 from hydroid.arm.model import add_payload
 from hydroid.arrays import Array, Index, Structs
 from hydroid.hydraulics.actuator import pressures
+from hydroid.hydraulics.kernel import Plugin
 from hydroid.hydraulics.records import JOINT_STATE, has_force_curve
 from hydroid.log import Log
 from hydroid.mjcf import quiet_mujoco
@@ -30,10 +32,23 @@ from hydroid.simulation.openings import valve_openings
 from hydroid.simulation.rollout import Course, SteppedArm, Trace, compile_rollout
 from hydroid.simulation.scenario import Candidates, Chain, Response, Scenario, distinct
 
-Follow = Callable[[SteppedArm, Index], tuple[Array, Array | None]]
+
+class Oil(NamedTuple):
+    """What the oil of one candidate does at its samples.
+
+    pressure: of chambers A and B [Pa], shape (1 + T, J, 2). flow: into them [m³/s], of
+    the same shape. line: pressure of the pump's line [Pa], shape (1 + T,); NaN without
+    a pump.
+    """
+
+    pressure: Array
+    flow: Array
+    line: Array
+
+
+Follow = Callable[[SteppedArm, Index], tuple[Array, Oil | None]]
 """simulates some of n candidates, one for each copy of an arm: angles of the moving
-joints [rad], (1 + T, copies, V), and the chamber pressures of a single one [Pa], (1 +
-T, J, 2), where they are wanted"""
+joints [rad], (1 + T, copies, V), and the oil of a single one, where it is wanted"""
 TOGETHER = 56
 """joints of all arms stepped at once: MuJoCo computes with sparse matrices from 60"""
 
@@ -43,7 +58,7 @@ class Simulation:
     have hydraulics.
 
     Args:
-        pressures: active joints whose chamber pressures are wanted in the response,
+        pressures: active joints whose pressures and flows are wanted in the response,
             0-based.
 
     Attributes:
@@ -62,8 +77,8 @@ class Simulation:
         self._pressures = np.searchsorted(self.joints, np.array(pressures, int))
 
     def simulate(self, candidates: Candidates) -> Response:
-        """Return what n candidates' sensors read, and the pressures asked for, at the
-        log's samples.
+        """Return what n candidates' sensors read, and the pressures and flows asked
+        for, at the log's samples.
 
         The first is the start. One without a force-stroke curve, or that diverged, has
         NaN throughout.
@@ -74,13 +89,16 @@ class Simulation:
         samples = 1 + len(scenario.command) // scenario.stepping.steps
         angle = np.full((n, samples, len(scenario.outputs)), np.nan)
         pressure = np.full((n, samples, len(wanted), 2), np.nan)
+        flow = np.full(pressure.shape, np.nan)
+        line = np.full((n, samples if len(wanted) else 0), np.nan)
+        response = Response(angle, pressure, flow, line)
         # those that differ in effects of other groups of logs are simulated once
         first, alike = distinct(candidates.joints, candidates.mass)
         exists = has_force_curve(candidates.joints[:, self.joints])
         rows = np.intersect1d(np.flatnonzero(exists), first)
         threads = min(scenario.settings.threads or os.cpu_count() or 1, rows.size)
         if not threads:
-            return Response(angle, pressure)
+            return response
         candidates = candidates[rows]
         sensors = candidates.joints[:, scenario.arm.columns[scenario.outputs]]
 
@@ -88,7 +106,7 @@ class Simulation:
             """Simulate some of the candidates on an arm that is free, and write what
             its sensors read to their rows."""
             arm = free.pop()
-            followed, chambers = follow(arm, np.resize(some, arm.copies))
+            followed, oil = follow(arm, np.resize(some, arm.copies))
             if arm.healthy:
                 outputs = followed[:, :, scenario.outputs].swapaxes(0, 1)
                 # copies beyond `some` only fill the arm
@@ -96,8 +114,11 @@ class Simulation:
                     if self.joints.size:
                         turned = reading(turned, sensors[candidate], scenario.period)
                     angle[rows[candidate]] = turned
-                if chambers is not None:
-                    pressure[rows[some[0]]] = chambers[:, wanted]
+                if oil is not None:
+                    row = rows[some[0]]
+                    pressure[row] = oil.pressure[:, wanted]
+                    flow[row] = oil.flow[:, wanted]
+                    line[row] = oil.line
             free.append(arm)
 
         with quiet_mujoco(), ThreadPoolExecutor(threads) as pool:
@@ -112,8 +133,9 @@ class Simulation:
                 left = np.flatnonzero(np.isnan(angle[rows, -1]).any(axis=1))
                 deque(pool.map(simulate, left[:, None]), maxlen=0)
         if len(first) < n:
-            return Response(angle[first[alike]], pressure[first[alike]])
-        return Response(angle, pressure)
+            every = first[alike]
+            return Response(angle[every], pressure[every], flow[every], line[every])
+        return response
 
     def _copies(self, candidates: Candidates, threads: int) -> int:
         """How many arms can be stepped at once without changing a bit of any.
@@ -165,7 +187,7 @@ class Simulation:
             openings = valve_openings(plugin, states, commands, run)
         gain = candidates.joints.gain[:, scenario.arm.columns[chain.pushed]]
 
-        def follow(arm: SteppedArm, some: Index) -> tuple[Array, Array | None]:
+        def follow(arm: SteppedArm, some: Index) -> tuple[Array, Oil | None]:
             row = some[0]
             start = np.tile(pose, arm.copies)
             arm.start(values, some, start)
@@ -179,11 +201,10 @@ class Simulation:
             history[0] = state
             course = Course(commands, torque, taken[row], openings[row])
             arm.roll(actuators, state, course, Trace(angle[1:], history[1:]))
-            chambers = None
+            oil = None
             if observed:
-                turned = angle[:, chain.columns]
-                chambers = pressures(actuators.coefficients, history, turned)
-            return angle.reshape(len(angle), arm.copies, -1), chambers
+                oil = _oil(actuators, history, angle[:, chain.columns])
+            return angle.reshape(len(angle), arm.copies, -1), oil
 
         return follow
 
@@ -229,6 +250,19 @@ def make_simulation(
     `pressures`, 0-based.
     """
     return Simulation(make_scenario(spec, log, outputs, settings), pressures)
+
+
+def _oil(actuators: Plugin, history: Structs, angle: Array) -> Oil:
+    """Return what the oil of a candidate does in its states, (1 + T, J) of JOINT_STATE,
+    at angles [rad], (1 + T, J)."""
+    coefficients = actuators.coefficients
+    flow = np.stack([history["a"]["flow"], history["b"]["flow"]], axis=-1)
+    # the last in order is driven, and has the pump of all
+    last = actuators.order[-1]
+    line = history["line"][:, last].copy()
+    if np.isinf(coefficients["pump_flow"][last]):
+        line[:] = np.nan
+    return Oil(pressures(coefficients, history, angle), flow, line)
 
 
 def _balance(arm: SteppedArm, values: dict[str, Array], pose: Array, n: int) -> Array:

@@ -17,7 +17,8 @@ import robots
 import trimesh
 from printed import follow
 from robots import LIMIT
-from worlds import World, write_log
+from truths import judged
+from worlds import World, speeds_of, write_log
 
 import hydroid
 from hydroid.arm.model import load_model
@@ -825,7 +826,7 @@ def followed(arm: FieldArm, folder: Path, budget: str) -> Outcome:
     """Write an arm that is taken as it should be and two logs of it, and follow the
     commands that `init` prints: check, a fit of a budget, and validation on the second.
 
-    Right: the fit predicts the second log.
+    Right: the fit predicts the second log and has the joints' speeds.
     """
     found = outcome(arm, folder)
     if found.verdict not in ("right", "said"):
@@ -849,6 +850,8 @@ def followed(arm: FieldArm, folder: Path, budget: str) -> Outcome:
     for robot in (*folder.glob("arm.urdf"), *folder.glob("arm.xml")):
         words += ["--arm", robot.name]
     ended = follow(folder, words, "other.csv", budget)
+    speeds = dict(zip(taken.joint_names, speeds_of(world).values(), strict=True))
+    ended = judged(ended, folder / "followed" / "runs" / "fit", speeds)
     return Outcome(ended.verdict, ended.line)
 
 

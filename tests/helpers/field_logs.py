@@ -7,10 +7,12 @@ takes them alone.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from printed import follow
+from truths import judged
 
 import hydroid
 from hydroid.errors import HydroidError
@@ -68,11 +70,16 @@ def make_truth(steps: tuple[float, ...]) -> Truth:
     return Truth(PERIOD * np.arange(len(command["boom"])), command, angle)
 
 
+def settled(name: str, command: float) -> float:
+    """Return the speed of a joint [deg/s] that a command [%] settles at."""
+    return float(SPEEDS[name] * np.sign(command) * max(abs(command) - DEAD, 0.0))
+
+
 def _moved(command: np.ndarray, name: str) -> np.ndarray:
     low, high = RANGES[name]
     angle, speed, angles = (low + high) / 2, 0.0, list[float]()
     for u in command:
-        wanted = SPEEDS[name] * np.sign(u) * max(abs(u) - DEAD, 0.0)
+        wanted = settled(name, u)
         speed += (wanted - speed) * PERIOD / 0.1
         angle = float(np.clip(angle + speed * PERIOD, low + 1, high - 1))
         angles.append(angle)
@@ -342,7 +349,8 @@ def followed(log: FieldLog, folder: Path, arm: Arm, budget: str) -> Outcome:
     """Write two logs, and follow the commands that `init` prints for the first,
     validated on the second.
 
-    Right: it is read rightly, and the fit predicts the second.
+    Right: it is read rightly, and the fit predicts the second and has the joints'
+    speeds.
     """
     read = outcome(log, folder, arm)
     if read.verdict != "right":
@@ -350,6 +358,8 @@ def followed(log: FieldLog, folder: Path, arm: Arm, budget: str) -> Outcome:
     other = replace(log, steps=tuple(-step for step in log.steps[::-1]))
     (folder / "other.csv").write_text(other.write(make_truth(other.steps), arm))
     found = follow(folder, ["followed", "--log", "log.csv"], "other.csv", budget)
+    speeds = {name: partial(settled, name) for name in JOINTS}
+    found = judged(found, folder / "followed" / "runs" / "fit", speeds)
     return Outcome(found.verdict, found.line)
 
 

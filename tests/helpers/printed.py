@@ -7,7 +7,7 @@ import json
 import math
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -35,12 +35,14 @@ class Followed:
         lines: all that was printed.
         errors: unseen error and that of standing still [deg], by joint.
         blamed: joints whose verdict is that the fit fails.
+        wrong: how joints move otherwise than what made the logs, by joint.
     """
 
     refused: str
     lines: list[str]
     errors: dict[str, tuple[float, float]]
     blamed: tuple[str, ...] = ()
+    wrong: Mapping[str, str] = field(default_factory=dict[str, str])
 
     @property
     def verdict(self) -> str:
@@ -48,24 +50,24 @@ class Followed:
         wrong."""
         if self.refused:
             return "refused"
-        missed = {
-            name
-            for name, (unseen, still) in self.errors.items()
-            if not unseen <= PREDICTED * still
-        }
+        missed = {*self.wrong}
+        for name, (unseen, still) in self.errors.items():
+            if not unseen <= PREDICTED * still:
+                missed.add(name)
         if not missed and self.errors:
             return "right"
         return "named" if missed and missed <= {*self.blamed} else "wrong"
 
     @property
     def line(self) -> str:
-        """Why it was refused, or the errors, and those of standing still in
-        brackets."""
-        pairs = [
-            f"{name} {unseen:.2g} ({still:.2g})"
-            for name, (unseen, still) in self.errors.items()
-        ]
-        return self.refused or ", ".join(pairs)
+        """Why it was refused; or what is wrong, and the errors with those of standing
+        still in brackets."""
+        if self.refused:
+            return self.refused
+        parts = [f"{name} {fault}" for name, fault in self.wrong.items()]
+        for name, (unseen, still) in self.errors.items():
+            parts.append(f"{name} {unseen:.2g} ({still:.2g})")
+        return ", ".join(parts)
 
 
 def follow(folder: Path, init: Sequence[str], unseen: str, budget: str) -> Followed:

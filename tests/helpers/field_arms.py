@@ -18,7 +18,7 @@ import trimesh
 from printed import follow
 from robots import LIMIT
 from truths import judged
-from worlds import World, speeds_of, write_log
+from worlds import SECONDS, World, speeds_of, write_log
 
 import hydroid
 from hydroid.arm.model import load_model
@@ -842,8 +842,8 @@ def followed(arm: FieldArm, folder: Path, budget: str) -> Outcome:
         columns[name] = (f"{name}_cmd_V", f"{name}_{unit}")
         parts.append((name, "", name, "", (0.0, 0.0, 0.0), "{} {}".format(*ends)))
     world = World(names, parts, columns)
-    write_log(world, folder / "log.csv", 60.0, 1)
-    write_log(world, folder / "other.csv", 60.0, 2)
+    write_log(world, folder / "log.csv", SECONDS, 1)
+    write_log(world, folder / "other.csv", SECONDS, 2)
     words = ["followed", "--log", "log.csv"]
     for option, value in arm.options.items():
         words += [f"--{option}", str(value)]
@@ -851,7 +851,7 @@ def followed(arm: FieldArm, folder: Path, budget: str) -> Outcome:
         words += ["--arm", robot.name]
     ended = follow(folder, words, "other.csv", budget)
     speeds = dict(zip(taken.joint_names, speeds_of(world).values(), strict=True))
-    ended = judged(ended, folder / "followed" / "runs" / "fit", speeds)
+    ended = judged(ended, speeds)
     return Outcome(ended.verdict, ended.line)
 
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 from printed import Followed
@@ -17,11 +16,11 @@ WEAKEST = 60.0
 """command from which speeds are compared [%]: the logs drive beyond it"""
 
 
-def judged(found: Followed, run: Path, speeds: Mapping[str, Speed]) -> Followed:
+def judged(found: Followed, speeds: Mapping[str, Speed]) -> Followed:
     """Return what became of printed commands, beside what made the logs, by joint."""
-    if found.refused:
+    if found.run is None:
         return found
-    record = load_record(run)
+    record = load_record(found.run)
     wrong = dict[str, str]()
     for joint, speed in speeds.items():
         fault = next(_faults(record, joint, speed), None)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 from arms import MODELS
-from printed import follow
+from printed import Known, follow
 from robots import LIMIT, body, joint
 from truths import Speed, judged
 
@@ -219,6 +219,8 @@ NOISE_DEG, NOISE_M = 0.05, 0.001
 """of the angles and places in a log"""
 STEP = 0.005
 """of the machine's simulation [s]"""
+SECONDS = 40.0
+"""duration of a log that is followed"""
 
 
 @dataclass(frozen=True)
@@ -339,18 +341,19 @@ def write_log(world: World, path: Path, seconds: float = 30.0, number: int = 0) 
     return path
 
 
-def followed(world: World, folder: Path, budget: str) -> tuple[str, str]:
+def followed(
+    world: World, folder: Path, budget: str, known: Known | None = None
+) -> tuple[str, str]:
     """Write an arm and two logs, and follow the commands that `init` prints, validated
     on the second log.
 
     Returns the outcome, and unseen errors (and those of standing still) [deg], or why
-    it was refused.
+    it was refused. What is `known` is not fitted again.
     """
     robot = world.write(world, folder)
-    write_log(world, folder / "log.csv", 60.0, 1)
-    write_log(world, folder / "other.csv", 60.0, 2)
-    found = follow(
-        folder, ["mine", "--arm", robot.name, "--log", "log.csv"], "other.csv", budget
-    )
-    found = judged(found, folder / "mine" / "runs" / "fit", speeds_of(world))
+    write_log(world, folder / "log.csv", SECONDS, 1)
+    write_log(world, folder / "other.csv", SECONDS, 2)
+    words = ["mine", "--arm", robot.name, "--log", "log.csv"]
+    found = follow(folder, words, "other.csv", budget, known)
+    found = judged(found, speeds_of(world))
     return found.verdict, found.line

@@ -14,15 +14,20 @@ lasts 20 s. It is followed
 
 Errors are rms over all samples and the joints that a path moves.
 
+Machines can be run in parts, by --first, and be printed together with --stored, which
+plays nothing again.
+
 --boom RUN: the virtual boom of examples/boom instead (played_boom.py), with the run of
 its README: a pump that comes up late, oil trapped and with air, Stribeck friction. It
 has one joint, and no path of a tip.
 """
 
+import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from common import options, row, table
@@ -53,6 +58,8 @@ FILTER = 0.2
 UNFELT = 2.0
 """error that a controller leaves alone, in standard deviations of the sensor's noise:
 valves should not chatter on it"""
+STORE = "feed_forward.json"
+"""in a machine's folder: what its paths gave"""
 LARGE = 1.0
 """rms error from which on a path counts as one that is not followed [deg]"""
 QUIET = 0.01
@@ -351,11 +358,17 @@ def rms_of(angle: Array, wished: Log) -> float:
 @dataclass(frozen=True)
 class Played:
     """Errors on a path of a machine [deg]: open loop and with feedback, of each of WAYS;
-    open loop without feed-forward is the feedback alone."""
+    open loop without feed-forward is the feedback alone.
 
+    said: spans that `follow` says cannot be had. pid: the controller's gains.
+    """
+
+    machine: str
+    path: str
     opened: Sequence[float]
     closed: Sequence[float]
     said: int
+    pid: Sequence[float]
 
     @property
     def over_best(self) -> float:
@@ -366,6 +379,16 @@ class Played:
     def over_alone(self) -> float:
         """Error with feedback over that of the feedback alone."""
         return self.closed[0] / self.closed[-1]
+
+    def show(self) -> None:
+        """Print the path's row."""
+        errors = [
+            " ".join(f"{error:.2f}" for error in of)
+            for of in (self.opened[:3], self.closed)
+        ]
+        ratios = f"{self.over_best:.2f}", f"{self.over_alone:.2f}"
+        gains = " ".join(f"{gain:.2f}" for gain in self.pid)
+        row(self.machine, self.path, *errors, *ratios, self.said, gains)
 
 
 def make_case(machine: Machine | PlayedBoom, run_folder: Path) -> Case:
@@ -404,44 +427,66 @@ def run(name: str, case: Case, seed: int) -> list[Played]:
         closed = [
             rms_of(play(case, wished, commands[way], pid, rng), wished) for way in WAYS
         ]
-        one = Played([*opened, closed[-1]], closed, len(found.missed))
-        rows.append(one)
-        cells = [
-            " ".join(f"{error:.2f}" for error in errors) for errors in (opened, closed)
-        ]
-        parts = f"{one.over_best:.2f}", f"{one.over_alone:.2f}"
-        gains = f"{pid.gain:.1f} {pid.integral:.2f} {pid.derivative:.2f}"
-        row(name, kind, *cells, *parts, one.said, gains)
+        gains = pid.gain, pid.integral, pid.derivative
+        said = len(found.missed)
+        rows.append(Played(name, kind, [*opened, closed[-1]], closed, said, gains))
+        rows[-1].show()
     return rows
 
 
-def main() -> None:
-    given = options(
-        __doc__, machines=3, first=0, seed=1, folder="build/strangers", boom=""
+def run_or_read(given: Any, number: int) -> list[Played]:
+    """Follow the paths of a random machine, or take what lies in its folder."""
+    folder = Path(given.folder)
+    store = folder / f"{number:02d}" / STORE
+    if given.stored:
+        rows = [Played(**one) for one in json.loads(store.read_text())]
+        for one in rows:
+            one.show()
+        return rows
+    rows = run(str(number), stranger(folder, given.seed, number), given.seed)
+    store.write_text(json.dumps([vars(one) for one in rows]))
+    return rows
+
+
+def show_totals(rows: Sequence[Played]) -> None:
+    """Print medians by path and over all, and whether what went wrong was said."""
+    table(
+        "path | number | open loop [deg] | over the best: median | 90th percentile | "
+        "with PID [deg] | over PID alone: median | 90th percentile"
     )
+    for kind in (*PATHS, "all"):
+        some = [one for one in rows if kind in (one.path, "all")]
+        if not some:
+            continue
+        best = np.quantile([one.over_best for one in some], [0.5, 0.9])
+        alone = np.quantile([one.over_alone for one in some], [0.5, 0.9])
+        opened = np.median([one.opened[0] for one in some])
+        closed = np.median([one.closed[0] for one in some])
+        numbers = [f"{one:.2f}" for one in (opened, *best, closed, *alone)]
+        row(kind, len(some), *numbers)
+    lost = [one for one in rows if one.opened[0] > LARGE]
+    said = sum(one.said > 0 for one in lost)
+    print(f"\nopen loop above {LARGE:g} deg: {len(lost)}, of which {said} were said")
+
+
+def main() -> None:
+    numbers = {"machines": 3, "first": 0, "seed": 1}
+    given = options(__doc__, **numbers, stored=False, folder="build/strangers", boom="")
     judged = "over the best | over PID alone | spans that cannot be had | gains"
     print(f"open loop: {', '.join(WAYS[:3])}; with PID: {', '.join(WAYS)}")
     table(f"machine | path | open loop [deg] | with PID [deg] | {judged}")
     rows = list[Played]()
     if given.boom:
         rows += run("boom", make_case(PlayedBoom(), Path(given.boom)), given.seed)
-    numbers = range(given.first, given.first + given.machines)
-    for number in () if given.boom else numbers:
-        if (Path(given.folder) / f"{number:02d}").is_dir():
-            case = stranger(Path(given.folder), given.seed, number)
-            rows += run(str(number), case, given.seed)
+    machines = range(given.first, given.first + given.machines)
+    for number in () if given.boom else machines:
+        folder = Path(given.folder) / f"{number:02d}"
+        if (folder / STORE if given.stored else folder).exists():
+            rows += run_or_read(given, number)
         else:
             print(f"machine {number} is not in {given.folder}")
-    best = np.median([one.over_best for one in rows])
-    alone = np.median([one.over_alone for one in rows])
-    middle = np.median([one.opened[0] for one in rows])
-    closed = np.median([one.closed[0] for one in rows])
-    lost = [one for one in rows if one.opened[0] > LARGE]
-    said = sum(one.said > 0 for one in lost)
-    print(f"\nmedian of {len(rows)} paths: open loop {middle:.2f} deg,")
-    print(f"{best:.2f} of the best of the others and of PID alone;")
-    print(f"with PID {closed:.2f} deg, {alone:.2f} of PID alone")
-    print(f"open loop above {LARGE:g} deg: {len(lost)}, of which {said} were said")
+    if rows:
+        show_totals(rows)
 
 
 if __name__ == "__main__":

@@ -13,15 +13,25 @@ lasts 20 s. It is followed
   last path and alone. It smooths errors, and leaves alone what is within the noise.
 
 Errors are rms over all samples and the joints that a path moves.
+
+Machines can be run in parts, by --first, and be printed together with --stored, which
+plays nothing again.
+
+--boom RUN: the virtual boom of examples/boom instead (played_boom.py), with the run of
+its README: a pump that comes up late, oil trapped and with air, Stribeck friction. It
+has one joint, and no path of a tip.
 """
 
+import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from common import options, row, table
+from played_boom import BoomRun, PlayedBoom
 from scipy.optimize import least_squares
 from stranger import STEP, Machine
 
@@ -48,6 +58,8 @@ FILTER = 0.2
 UNFELT = 2.0
 """error that a controller leaves alone, in standard deviations of the sensor's noise:
 valves should not chatter on it"""
+STORE = "feed_forward.json"
+"""in a machine's folder: what its paths gave"""
 LARGE = 1.0
 """rms error from which on a path counts as one that is not followed [deg]"""
 QUIET = 0.01
@@ -98,7 +110,7 @@ class Controller:
 class Case:
     """A machine, its fit, and the simple models of its joints by name."""
 
-    machine: Machine
+    machine: Machine | PlayedBoom
     model: IdentifiedModel
     simple: dict[str, list[Baseline]]
 
@@ -121,6 +133,41 @@ class Case:
         return np.array(
             [one.delay + one.numbers[3].mean() for one in self.simple["nine numbers"]]
         )
+
+
+class StrangerRun:
+    """One run of a machine of `stranger`, at rest at angles [rad], (J,), in steps of a
+    period [s]."""
+
+    def __init__(
+        self, machine: Machine, start: Array, period: float, samples: int
+    ) -> None:
+        self._machine = machine
+        self._carry = machine.at_rest(start)
+        self._count = round(period / STEP)
+        self._given = np.zeros((samples * self._count, machine.joints))
+        self._first = 0
+
+    @property
+    def angle(self) -> Array:
+        """[rad], shape (J,)."""
+        return self._carry[0].copy()
+
+    def hold(self, command: Array) -> None:
+        """Hold commands [%], (J,), for a period."""
+        first = self._first
+        self._first += self._count
+        self._given[first : self._first] = command
+        self._machine.go_on(self._given[: self._first], self._carry, first)
+
+
+def begun(case: Case, wished: Log) -> StrangerRun | BoomRun:
+    """The true machine at rest where a path begins."""
+    start = wished.angle[0]
+    samples = len(wished.time)
+    if isinstance(case.machine, PlayedBoom):
+        return case.machine.play(start, case.period, samples)
+    return StrangerRun(case.machine, start, case.period, samples)
 
 
 def smooth(time: Array, begin: float, seconds: float) -> Array:
@@ -164,6 +211,7 @@ def together(time: Array, case: Case) -> Array:
 def tip(time: Array, case: Case) -> Array:
     """The end of boom and arm goes up and down a line, as a sine; other joints rest."""
     machine = case.machine
+    assert isinstance(machine, Machine)
     pair = [machine.names.index("boom"), machine.names.index("arm")]
     middle, length = machine.ends.mean(axis=1)[pair], machine.length[pair]
 
@@ -257,24 +305,16 @@ def play(
     case: Case, wished: Log, command: Array, pid: Pid, rng: np.random.Generator
 ) -> Array:
     """Angles of the true machine [rad], (T, J), under commands [%] and feedback."""
-    machine, count = case.machine, round(case.period / STEP)
+    run = begun(case, wished)
     controller = Controller(pid, case)
-    carry, given = (
-        machine.at_rest(wished.angle[0]),
-        np.zeros((len(command) * count, machine.joints)),
-    )
+    machine = case.machine
     angle = np.empty_like(command)
     forward = ahead(wished, case.late) if command.any() else np.zeros_like(command)
     for k, one in enumerate(command):
-        angle[k] = carry[0]
-        error = (
-            wished.angle[k] - angle[k] - rng.normal(0.0, machine.noise, machine.joints)
-        )
-        at = slice(k * count, (k + 1) * count)
-        given[at] = np.clip(
-            one + correction(case, forward[k], controller.speed(error)), -100.0, 100.0
-        )
-        machine.go_on(given[: at.stop], carry, at.start)
+        angle[k] = run.angle
+        noise = rng.normal(0.0, machine.noise, machine.joints)
+        more = controller.speed(wished.angle[k] - angle[k] - noise)
+        run.hold(np.clip(one + correction(case, forward[k], more), -100.0, 100.0))
     return angle
 
 
@@ -318,11 +358,17 @@ def rms_of(angle: Array, wished: Log) -> float:
 @dataclass(frozen=True)
 class Played:
     """Errors on a path of a machine [deg]: open loop and with feedback, of each of WAYS;
-    open loop without feed-forward is the feedback alone."""
+    open loop without feed-forward is the feedback alone.
 
+    said: spans that `follow` says cannot be had. pid: the controller's gains.
+    """
+
+    machine: str
+    path: str
     opened: Sequence[float]
     closed: Sequence[float]
     said: int
+    pid: Sequence[float]
 
     @property
     def over_best(self) -> float:
@@ -334,66 +380,113 @@ class Played:
         """Error with feedback over that of the feedback alone."""
         return self.closed[0] / self.closed[-1]
 
+    def show(self) -> None:
+        """Print the path's row."""
+        errors = [
+            " ".join(f"{error:.2f}" for error in of)
+            for of in (self.opened[:3], self.closed)
+        ]
+        ratios = f"{self.over_best:.2f}", f"{self.over_alone:.2f}"
+        gains = " ".join(f"{gain:.2f}" for gain in self.pid)
+        row(self.machine, self.path, *errors, *ratios, self.said, gains)
 
-def run(folder: Path, seed: int, number: int) -> list[Played]:
-    """Follow every path on a machine, and print its rows."""
-    run_folder = folder / f"{number:02d}" / "mine" / "runs" / "fit"
-    machine = Machine(np.random.default_rng([seed, number]), number)
+
+def make_case(machine: Machine | PlayedBoom, run_folder: Path) -> Case:
+    """Return a machine with its fit."""
     baselines = load_record(run_folder).result.baselines
-    names = WAYS[1:3]
     simple = {
-        name: [baselines[joint][name] for joint in sorted(baselines)] for name in names
+        name: [baselines[joint][name] for joint in sorted(baselines)]
+        for name in WAYS[1:3]
     }
-    case = Case(machine, load_identified(run_folder), simple)
+    return Case(machine, load_identified(run_folder), simple)
+
+
+def stranger(folder: Path, seed: int, number: int) -> Case:
+    """Return a random machine with its fit."""
+    machine = Machine(np.random.default_rng([seed, number]), number)
+    return make_case(machine, folder / f"{number:02d}" / "mine" / "runs" / "fit")
+
+
+def run(name: str, case: Case, seed: int) -> list[Played]:
+    """Follow every path on a machine, and print its rows."""
     pid, none, rows = tuned(case), Pid(0.0, 0.0, 0.0), list[Played]()
     for kind in PATHS:
-        wished, rng = path(case, kind), np.random.default_rng([seed, number, 1])
+        if kind == "tip on a line" and case.machine.joints < 2:
+            continue
+        wished, rng = path(case, kind), np.random.default_rng(seed)
         found = follow(case.model, wished)
         commands = {
             WAYS[0]: found.log.command[-len(wished.time) :],
-            **{name: simple_commands(case, wished, name) for name in names},
+            **{way: simple_commands(case, wished, way) for way in WAYS[1:3]},
             WAYS[3]: np.zeros_like(wished.angle),
         }
         opened = [
-            rms_of(play(case, wished, commands[name], none, rng), wished)
-            for name in WAYS[:3]
+            rms_of(play(case, wished, commands[way], none, rng), wished)
+            for way in WAYS[:3]
         ]
         closed = [
-            rms_of(play(case, wished, commands[name], pid, rng), wished)
-            for name in WAYS
+            rms_of(play(case, wished, commands[way], pid, rng), wished) for way in WAYS
         ]
-        one = Played([*opened, closed[-1]], closed, len(found.missed))
-        rows.append(one)
-        cells = [
-            " ".join(f"{error:.2f}" for error in errors) for errors in (opened, closed)
-        ]
-        parts = f"{one.over_best:.2f}", f"{one.over_alone:.2f}"
-        gains = f"{pid.gain:.1f} {pid.integral:.2f} {pid.derivative:.2f}"
-        row(number, kind, *cells, *parts, one.said, gains)
+        gains = pid.gain, pid.integral, pid.derivative
+        said = len(found.missed)
+        rows.append(Played(name, kind, [*opened, closed[-1]], closed, said, gains))
+        rows[-1].show()
     return rows
 
 
+def run_or_read(given: Any, number: int) -> list[Played]:
+    """Follow the paths of a random machine, or take what lies in its folder."""
+    folder = Path(given.folder)
+    store = folder / f"{number:02d}" / STORE
+    if given.stored:
+        rows = [Played(**one) for one in json.loads(store.read_text())]
+        for one in rows:
+            one.show()
+        return rows
+    rows = run(str(number), stranger(folder, given.seed, number), given.seed)
+    store.write_text(json.dumps([vars(one) for one in rows]))
+    return rows
+
+
+def show_totals(rows: Sequence[Played]) -> None:
+    """Print medians by path and over all, and whether what went wrong was said."""
+    table(
+        "path | number | open loop [deg] | over the best: median | 90th percentile | "
+        "with PID [deg] | over PID alone: median | 90th percentile"
+    )
+    for kind in (*PATHS, "all"):
+        some = [one for one in rows if kind in (one.path, "all")]
+        if not some:
+            continue
+        best = np.quantile([one.over_best for one in some], [0.5, 0.9])
+        alone = np.quantile([one.over_alone for one in some], [0.5, 0.9])
+        opened = np.median([one.opened[0] for one in some])
+        closed = np.median([one.closed[0] for one in some])
+        numbers = [f"{one:.2f}" for one in (opened, *best, closed, *alone)]
+        row(kind, len(some), *numbers)
+    lost = [one for one in rows if one.opened[0] > LARGE]
+    said = sum(one.said > 0 for one in lost)
+    print(f"\nopen loop above {LARGE:g} deg: {len(lost)}, of which {said} were said")
+
+
 def main() -> None:
-    given = options(__doc__, machines=3, first=0, seed=1, folder="build/strangers")
+    numbers = {"machines": 3, "first": 0, "seed": 1}
+    given = options(__doc__, **numbers, stored=False, folder="build/strangers", boom="")
     judged = "over the best | over PID alone | spans that cannot be had | gains"
     print(f"open loop: {', '.join(WAYS[:3])}; with PID: {', '.join(WAYS)}")
     table(f"machine | path | open loop [deg] | with PID [deg] | {judged}")
     rows = list[Played]()
-    for number in range(given.first, given.first + given.machines):
-        if (Path(given.folder) / f"{number:02d}").is_dir():
-            rows += run(Path(given.folder), given.seed, number)
+    if given.boom:
+        rows += run("boom", make_case(PlayedBoom(), Path(given.boom)), given.seed)
+    machines = range(given.first, given.first + given.machines)
+    for number in () if given.boom else machines:
+        folder = Path(given.folder) / f"{number:02d}"
+        if (folder / STORE if given.stored else folder).exists():
+            rows += run_or_read(given, number)
         else:
             print(f"machine {number} is not in {given.folder}")
-    best = np.median([one.over_best for one in rows])
-    alone = np.median([one.over_alone for one in rows])
-    opened = np.median([one.opened[0] for one in rows])
-    closed = np.median([one.closed[0] for one in rows])
-    lost = [one for one in rows if one.opened[0] > LARGE]
-    said = sum(one.said > 0 for one in lost)
-    print(f"\nmedian of {len(rows)} paths: open loop {opened:.2f} deg,")
-    print(f"{best:.2f} of the best of the others and of PID alone;")
-    print(f"with PID {closed:.2f} deg, {alone:.2f} of PID alone")
-    print(f"open loop above {LARGE:g} deg: {len(lost)}, of which {said} were said")
+    if rows:
+        show_totals(rows)
 
 
 if __name__ == "__main__":

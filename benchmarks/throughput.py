@@ -29,6 +29,8 @@ from hydroid.use.environment import VectorEnv
 CANDIDATES, REPEATS = 70, 9
 MACHINES = 64
 """plants, and environments, in one call"""
+HELD = 5
+"""steps for which an environment holds an action"""
 EPISODE = 101
 """actions after which every machine has begun anew once"""
 ALL = list(range(1, 8))
@@ -131,9 +133,10 @@ def plant_steps(joints: list[int], steps: int = 2000) -> tuple[float, float]:
     return min(in_turn({"plant": run})["plant"]) / steps, plant.period
 
 
-def together(model: str) -> tuple[float, float, float]:
+def together(model: str) -> tuple[float, float, float, float]:
     """Return the steps per second of 64 plants in one call, those of 64 environments
-    (use.environment), and the latter per second of CPU time.
+    (use.environment), the latter per second of CPU time, and the part of this time that
+    the same plants take by themselves.
 
     Two threads; an action is held for five steps, which count as one of an environment.
     In each round every machine begins one episode anew, once all have been in all poses
@@ -144,43 +147,57 @@ def together(model: str) -> tuple[float, float, float]:
         overrides={"start_pose": "study", "simulation.model": model},
         joints=[2],
     )
-    batch = PlantBatch(
-        [Plant(plant.identified, joints=[2]) for _ in range(MACHINES)], threads=2
+    batch, held = (
+        PlantBatch(
+            [
+                Plant(plant.identified, joints=[2], period=steps * plant.period)
+                for _ in range(MACHINES)
+            ],
+            threads=2,
+        )
+        for steps in (1, HELD)
     )
     envs = VectorEnv(plant.identified, MACHINES, draws=False, threads=2)
     envs.reset(seed=0)
     for _ in range(100):
         envs.reset()
     rng = np.random.default_rng(0)
-    commands = 30.0 * rng.uniform(-1.0, 1.0, (EPISODE, MACHINES, 1)) * np.isin(ALL, [2])
-    of_envs = EPISODE, MACHINES, len(envs.joints)
-    actions = rng.uniform(-0.3, 0.3, of_envs).astype(np.float32)
-    cpu = list[float]()
+    shape = EPISODE, MACHINES, 1
+    commands = 30.0 * rng.uniform(-1.0, 1.0, shape)
+    actions = rng.uniform(-0.3, 0.3, shape).astype(np.float32)
+    cpu = dict[str, list[float]]()
 
-    def step() -> None:
-        for command in commands:
-            batch.step(command)
+    def timed(name: str, step: Callable[[np.ndarray], object], given: np.ndarray):
+        def run() -> None:
+            began = time.process_time()
+            for one in given:
+                step(one)
+            cpu.setdefault(name, []).append(time.process_time() - began)
 
-    def act() -> None:
-        began = time.process_time()
-        for action in actions:
-            envs.step(action)
-        cpu.append(time.process_time() - began)
+        return run
 
-    took = in_turn({"batch": step, "envs": act})
+    calls = {
+        "batch": timed("batch", batch.hold, commands),
+        "held": timed("held", held.hold, commands),
+        "envs": timed("envs", envs.step, actions),
+    }
+    took = in_turn(calls)
     each = MACHINES * EPISODE
-    return each / min(took["batch"]), each / min(took["envs"]), each / min(cpu)
+    least = {name: min(times) for name, times in cpu.items()}
+    simulated = least["held"] / least["envs"]
+    rates = each / min(took["batch"]), each / min(took["envs"]), each / least["envs"]
+    return *rates, simulated
 
 
 if __name__ == "__main__":
     if "--together" in sys.argv[1:]:
         table(
             "model | steps/s of 64 plants in a call | actions/s of 64 environments | "
-            "per second of CPU time"
+            "per second of CPU time | of it the simulation"
         )
         for name in ("quasi-static", "dynamic"):
-            plants, envs, cpu = together(name)
-            row(f"{name} | {plants:.0f} | {envs:.0f} | {cpu:.0f}")
+            plants, envs, cpu, part = together(name)
+            row(f"{name} | {plants:.0f} | {envs:.0f} | {cpu:.0f} | {100 * part:.0f} %")
         raise SystemExit
     problems = {
         name: make_problem("article-mech", [2], name) for name in ("passive", "locked")

@@ -97,4 +97,7 @@ def main(source: str) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1] if len(sys.argv) > 1 else "article-hyd")
+    try:
+        main(sys.argv[1] if len(sys.argv) > 1 else "article-hyd")
+    except hydroid.HydroidError as error:
+        sys.exit(f"pid.py: {error}")

@@ -54,6 +54,8 @@ class LinearArm:
         delay: of each command [s], (K,).
         joints: their names.
         states: names of the states.
+        inputs, outputs: names of u and y, with their units: m and m/s of joints that
+            slide.
         command, angle: about which it is linear [%], [rad], (K,).
         speed: at which the joints move there [rad/s], (K,): the changes are against
             this motion.
@@ -66,6 +68,8 @@ class LinearArm:
     delay: Array
     joints: tuple[str, ...]
     states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
     command: Array
     angle: Array
     speed: Array
@@ -155,6 +159,8 @@ def linearise(plant: Plant, command: Array) -> LinearArm:
         delay=np.array(delays),
         joints=names,
         states=states,
+        inputs=tuple(f"{name} command [%]" for name in names),
+        outputs=_output_names(plant, joints),
         command=command[columns],
         angle=plant.angle[columns],
         speed=speed,
@@ -174,6 +180,18 @@ def _state_names(
             states += [f"{name} speed", f"{name} acceleration"]
     states += [f"{name} angle" for name in names]
     return tuple(states)
+
+
+def _output_names(plant: Plant, joints: Sequence[int]) -> tuple[str, ...]:
+    """Return the names of joints' (0-based) angles, then of their speeds, with units."""
+    angles = list[str]()
+    speeds = list[str]()
+    for joint in joints:
+        name = plant.names[joint]
+        unit = "m" if plant.identified.settings.arm.joints[joint].slides else "rad"
+        angles.append(f"{name} angle [{unit}]")
+        speeds.append(f"{name} speed [{unit}/s]")
+    return (*angles, *speeds)
 
 
 def _refuse_without_slope(plant: Plant, joint: int, command: Array) -> None:

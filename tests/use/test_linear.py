@@ -90,6 +90,13 @@ def test_it_reads_as_json_with_names_and_units():
     command = np.array([HELD.get(one, 0.0) for one in plant.names])
     read = json.loads(linearise(plant, command).text())
     assert read["joints"] == ["shoulder", "elbow"]
+    assert read["inputs"] == ["shoulder command [%]", "elbow command [%]"]
+    assert read["outputs"] == [
+        "shoulder angle [rad]",
+        "elbow angle [rad]",
+        "shoulder speed [rad/s]",
+        "elbow speed [rad/s]",
+    ]
     states = len(read["states"])
     assert np.shape(read["A"]) == (states, states)
     assert np.shape(read["B"]) == (states, 2)

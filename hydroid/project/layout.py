@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from hydroid.log import (
     ColumnGuess,
     JointMotion,
     Log,
+    LogFinding,
     Reading,
     Table,
     check_log,
@@ -49,8 +51,10 @@ class Layout:
 
     `outputs` are joints that a log drives and measures, `motions` how the measured ones
     move, by number from 1, and `valves` those by which the outputs follow commands of
-    the sign that these have in the section; `reasons` have a line for each column that
-    is not `unused`; `followed`: a joint that no command drives moves. `missing` says
+    the sign that these have in the section; `left_out` are further logs that cannot be
+    read by it; `reach`: the ends of what joints do in the others [rad, m]; `reasons`
+    have a line for each column that is not `unused`; `followed`: a joint that no
+    command drives moves. `missing` says
     which columns a person must name, in a section that is then no more than a start;
     `candidates` are lines about what each could be.
     """
@@ -62,9 +66,22 @@ class Layout:
     motions: Mapping[int, JointMotion]
     followed: bool
     valves: Mapping[int, JointStart] = field(default_factory=dict[int, JointStart])
+    left_out: tuple[Path, ...] = ()
+    reach: Mapping[int, tuple[float, float]] = field(
+        default_factory=dict[int, tuple[float, float]]
+    )
     origin: str = GUESSED
     missing: str = ""
     candidates: tuple[str, ...] = ()
+
+
+class Others(NamedTuple):
+    """Logs beside the first: those that are fitted, and one that is validated on."""
+
+    fitted: Sequence[Path]
+    unseen: Path | None
+    in_range: bool
+    """whether they must be within the arm's ranges, if the first one is"""
 
 
 def find_layout(
@@ -74,6 +91,8 @@ def find_layout(
     *,
     given: LogSettings | None = None,
     others: Sequence[Path] = (),
+    unseen: Path | None = None,
+    in_range: bool = True,
 ) -> Layout:
     """Guess the columns of a log, turn commands that act against the angle,
     and see how fast joints are.
@@ -85,7 +104,9 @@ def find_layout(
             arm's order.
         given: what a person says of the columns, which are not guessed then.
         others: further logs of the same columns; a joint that one of them drives can be
-            fitted.
+            fitted. One that cannot be read by the columns of the first is left out.
+        unseen: a log to validate on, of which no more is asked.
+        in_range: False: the arm's ranges are guesses, which logs may leave.
 
     Raises:
         SettingsError: no joint has one of the names.
@@ -97,24 +118,32 @@ def find_layout(
         return Layout(
             {"period_s": 0.01, "joints": {}}, every, (), (), {}, followed=False
         )
+    more = Others(others, unseen, in_range)
     if given is not None:
         guess = _given(table, arm, given)
-        return _seen(table, arm, guess, others, GIVEN)
+        return _seen(table, arm, guess, more, GIVEN)
     guess = guessed_section(table, arm, order)
     missing = missing_column(guess.log, targets=_has_targets(table))
     if missing:
         return _skeleton(table, arm, guess, missing)
-    return _seen(table, arm, guess, others, GUESSED)
+    return _seen(table, arm, guess, more, GUESSED)
 
 
 def _seen(
-    table: Table, arm: Arm, guess: ColumnGuess, others: Sequence[Path], origin: str
+    table: Table, arm: Arm, guess: ColumnGuess, others: Others, origin: str
 ) -> Layout:
     """Return the layout of columns, with what the logs show of the joints' motion."""
     entries = guess.log["joints"]
     reasons = [*guess.reasons]
-    logs = _read(table, guess.log, arm, others, reasons, strict=origin == GIVEN)
+    settings = validate(guess.log, LogSettings, table.source)
+    logs = _read_first(table, settings, arm, reasons, strict=origin == GIVEN)
     measured = [joint for joint, entry in entries.items() if entry["angle"]]
+    left_out = list[Path]()
+    reach = dict[int, tuple[float, float]]()
+    if logs:
+        fitted, unseen, left_out = _read_others(table, settings, arm, others, reasons)
+        logs += fitted
+        reach = _reach([*logs, *unseen], measured)
     driven = [joint for joint in measured if entries[joint]["command"] is not None]
     motions = dict[int, JointMotion]()
     if logs:
@@ -132,6 +161,8 @@ def _seen(
         motions,
         followed=any(motion.travel > FOLLOWED for motion in undriven),
         valves=_valves(logs, driven, wrong),
+        left_out=tuple(left_out),
+        reach=reach,
         origin=origin,
     )
 
@@ -245,38 +276,79 @@ def _skeleton(table: Table, arm: Arm, guess: ColumnGuess, missing: str) -> Layou
     )
 
 
-def _read(
+def _read_first(
     table: Table,
-    section: Plain,
+    settings: LogSettings,
     arm: Arm,
-    others: Sequence[Path],
     reasons: list[str],
     *,
     strict: bool,
 ) -> list[Log]:
-    """Read logs by a section; an error of the first one is a reason,
-    or ends the command if `strict`."""
-    no_limits = dict.fromkeys(arm.joint_names, (-np.inf, np.inf))
-    settings = validate(section, LogSettings, table.source)
-    first = Path(table.source)
-    logs = list[Log]()
-    for path in (first, *others):
-        log, findings = check_log(path, settings, no_limits, Reading(arm=arm))
+    """Read the first log; an error is a reason, or ends the command if `strict`."""
+    path = Path(table.source)
+    log, findings = check_log(path, settings, _no_limits(arm), Reading(arm=arm))
+    if log is None:
+        if strict:
+            raise findings[0].error()
+        reasons.append(f"the log cannot be used as it is: {findings[0]}")
+        repaired = Reading(arm=arm, repair=True)
+        log, _ = check_log(path, settings, _no_limits(arm), repaired)
+    reasons += _said(findings)
+    # of one that cannot be read, what its joints do is not known
+    return [] if log is None else [log]
+
+
+def _read_others(
+    table: Table, settings: LogSettings, arm: Arm, others: Others, reasons: list[str]
+) -> tuple[list[Log], list[Log], list[Path]]:
+    """Read the other logs; return those that are fitted, the unseen one, and those that
+    cannot be read as the first one is: by its columns, units and ranges."""
+    fitted = list[Log]()
+    unseen = list[Log]()
+    left_out = list[Path]()
+    paths = [*others.fitted]
+    if others.unseen is not None:
+        paths.append(others.unseen)
+    if not paths:
+        return fitted, unseen, left_out
+    reading = Reading(arm=arm)
+    limits = arm.ranges
+    first, _ = check_log(Path(table.source), settings, limits, reading)
+    if first is None or not others.in_range:
+        limits = _no_limits(arm)
+    for path in paths:
+        log, findings = check_log(path, settings, limits, reading)
         if log is None:
-            if strict:
-                raise findings[0].error()
-            reasons.append(f"the log cannot be used as it is: {findings[0]}")
-            repaired = Reading(arm=arm, repair=True)
-            log, _ = check_log(path, settings, no_limits, repaired)
-        for finding in findings:
-            if finding.level == "warning" and finding.kind in SAID:
-                reasons.append(str(finding))
-        if log is not None:
-            logs.append(log)
-        elif path == first:
-            # what its joints do is not known
-            return []
-    return logs
+            left_out.append(path)
+            reasons.append(f"left out of the commands below: {findings[0]}")
+        elif path == others.unseen:
+            unseen.append(log)
+        else:
+            fitted.append(log)
+            reasons += _said(findings)
+    return fitted, unseen, left_out
+
+
+def _reach(
+    logs: Sequence[Log], joints: Sequence[int]
+) -> dict[int, tuple[float, float]]:
+    """Return the ends of what joints (numbers, from 1) do in logs [rad, m]."""
+    reach = dict[int, tuple[float, float]]()
+    for joint in joints:
+        angles = np.concatenate([log.angle[:, joint - 1] for log in logs])
+        reach[joint] = float(np.nanmin(angles)), float(np.nanmax(angles))
+    return reach
+
+
+def _no_limits(arm: Arm) -> Mapping[str, tuple[float, float]]:
+    return dict.fromkeys(arm.joint_names, (-np.inf, np.inf))
+
+
+def _said(findings: Sequence[LogFinding]) -> Iterator[str]:
+    """Yield the findings that say which part of a log is not read."""
+    for finding in findings:
+        if finding.level == "warning" and finding.kind in SAID:
+            yield str(finding)
 
 
 def _refuse_rest(

@@ -12,14 +12,10 @@ from hydroid.log.checks import check_recording
 from hydroid.log.csv import open_csv
 from hydroid.log.lengths import as_angles
 from hydroid.log.log import Log, LogFinding, by_level, log_finding
+from hydroid.log.lost_signals import without_lost_signals
 from hydroid.log.mapping import Ranges, map_signals, match_columns, measured_signals
 from hydroid.log.motion_checks import check_motion
-from hydroid.log.repair import (
-    between_gaps,
-    resample,
-    without_bad_rows,
-    without_lost_signals,
-)
+from hydroid.log.repair import between_gaps, resample, without_bad_rows
 from hydroid.log.table import Recording, Table
 from hydroid.progress import Progress, no_progress
 from hydroid.settings.arm import Arm

@@ -18,7 +18,6 @@ import numpy as np
 from hydroid.arrays import Array
 from hydroid.errors import LogError
 from hydroid.log.log import Log, LogFinding
-from hydroid.log.signals import is_lost_signal
 from hydroid.log.table import Recording, Signal, number
 from hydroid.settings.log import LogSettings
 
@@ -141,25 +140,6 @@ def fill(recording: Recording, longest: float, findings: list[LogFinding]) -> Re
             )
         )
     return replace(recording, values=values, rows=recording.rows[timed])
-
-
-def without_lost_signals(recording: Recording) -> Recording:
-    """Return a recording in which commands hold no number where a receiver had no
-    signal.
-
-    It gives 0 then, in a range that does not hold 0. Many such cells are no lost signal,
-    but another range.
-    """
-    values = recording.values
-    for place, signal in enumerate(recording.signals):
-        if signal.kind != "command" or not is_lost_signal(signal.offset):
-            continue
-        lost = values[:, place] == signal.offset
-        if 0 < lost.sum() <= MOST_LEFT_OUT * len(lost):
-            if values is recording.values:
-                values = values.copy()
-            values[lost, place] = np.nan
-    return replace(recording, values=values)
 
 
 def without_bad_rows(

@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -15,15 +14,13 @@ from hydroid.log import (
     ColumnGuess,
     JointMotion,
     Log,
-    LogFinding,
-    Reading,
     Table,
-    check_log,
     motion_of,
 )
 from hydroid.log.clues import column_unit, kind_of
 from hydroid.log.mapping import angle_margin
 from hydroid.project.columns import column_lines
+from hydroid.project.logs import Others, reach_of, read_first, read_others
 from hydroid.project.section import given_section, guessed_section, missing_column
 from hydroid.settings.arm import Arm, Joint
 from hydroid.settings.load import validate
@@ -38,8 +35,6 @@ REVERSED = (
     "follows the angle"
 )
 
-SAID = ("row left out", "cut end", "lost", "gap", "half a command", "unasked", "target")
-"""kinds of findings that say which part of a log is not read, or not told by it"""
 MOVED = 0.5  # travel from which a joint moves [deg]
 FOLLOWED = 1.0  # travel above which a joint that no command drives is followed [deg]
 
@@ -73,15 +68,6 @@ class Layout:
     origin: str = GUESSED
     missing: str = ""
     candidates: tuple[str, ...] = ()
-
-
-class Others(NamedTuple):
-    """Logs beside the first: those that are fitted, and one that is validated on."""
-
-    fitted: Sequence[Path]
-    unseen: Path | None
-    in_range: bool
-    """whether they must be within the arm's ranges, if the first one is"""
 
 
 def find_layout(
@@ -136,14 +122,14 @@ def _seen(
     entries = guess.log["joints"]
     reasons = [*guess.reasons]
     settings = validate(guess.log, LogSettings, table.source)
-    logs = _read_first(table, settings, arm, reasons, strict=origin == GIVEN)
+    logs = read_first(table, settings, arm, reasons, strict=origin == GIVEN)
     measured = [joint for joint, entry in entries.items() if entry["angle"]]
     left_out = list[Path]()
     reach = dict[int, tuple[float, float]]()
     if logs:
-        fitted, unseen, left_out = _read_others(table, settings, arm, others, reasons)
+        fitted, unseen, left_out = read_others(table, settings, arm, others, reasons)
         logs += fitted
-        reach = _reach([*logs, *unseen], measured)
+        reach = reach_of([*logs, *unseen], measured)
     driven = [joint for joint in measured if entries[joint]["command"] is not None]
     motions = dict[int, JointMotion]()
     if logs:
@@ -274,81 +260,6 @@ def _skeleton(table: Table, arm: Arm, guess: ColumnGuess, missing: str) -> Layou
         missing=missing,
         candidates=column_lines(table),
     )
-
-
-def _read_first(
-    table: Table,
-    settings: LogSettings,
-    arm: Arm,
-    reasons: list[str],
-    *,
-    strict: bool,
-) -> list[Log]:
-    """Read the first log; an error is a reason, or ends the command if `strict`."""
-    path = Path(table.source)
-    log, findings = check_log(path, settings, _no_limits(arm), Reading(arm=arm))
-    if log is None:
-        if strict:
-            raise findings[0].error()
-        reasons.append(f"the log cannot be used as it is: {findings[0]}")
-        repaired = Reading(arm=arm, repair=True)
-        log, _ = check_log(path, settings, _no_limits(arm), repaired)
-    reasons += _said(findings)
-    # of one that cannot be read, what its joints do is not known
-    return [] if log is None else [log]
-
-
-def _read_others(
-    table: Table, settings: LogSettings, arm: Arm, others: Others, reasons: list[str]
-) -> tuple[list[Log], list[Log], list[Path]]:
-    """Read the other logs; return those that are fitted, the unseen one, and those that
-    cannot be read as the first one is: by its columns, units and ranges."""
-    fitted = list[Log]()
-    unseen = list[Log]()
-    left_out = list[Path]()
-    paths = [*others.fitted]
-    if others.unseen is not None:
-        paths.append(others.unseen)
-    if not paths:
-        return fitted, unseen, left_out
-    reading = Reading(arm=arm)
-    limits = arm.ranges
-    first, _ = check_log(Path(table.source), settings, limits, reading)
-    if first is None or not others.in_range:
-        limits = _no_limits(arm)
-    for path in paths:
-        log, findings = check_log(path, settings, limits, reading)
-        if log is None:
-            left_out.append(path)
-            reasons.append(f"left out of the commands below: {findings[0]}")
-        elif path == others.unseen:
-            unseen.append(log)
-        else:
-            fitted.append(log)
-            reasons += _said(findings)
-    return fitted, unseen, left_out
-
-
-def _reach(
-    logs: Sequence[Log], joints: Sequence[int]
-) -> dict[int, tuple[float, float]]:
-    """Return the ends of what joints (numbers, from 1) do in logs [rad, m]."""
-    reach = dict[int, tuple[float, float]]()
-    for joint in joints:
-        angles = np.concatenate([log.angle[:, joint - 1] for log in logs])
-        reach[joint] = float(np.nanmin(angles)), float(np.nanmax(angles))
-    return reach
-
-
-def _no_limits(arm: Arm) -> Mapping[str, tuple[float, float]]:
-    return dict.fromkeys(arm.joint_names, (-np.inf, np.inf))
-
-
-def _said(findings: Sequence[LogFinding]) -> Iterator[str]:
-    """Yield the findings that say which part of a log is not read."""
-    for finding in findings:
-        if finding.level == "warning" and finding.kind in SAID:
-            yield str(finding)
 
 
 def _refuse_rest(

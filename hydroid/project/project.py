@@ -3,7 +3,7 @@
 import os
 import shlex
 import tempfile
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -68,15 +68,13 @@ def write_project(
     what is given)."""
     _refuse_replacing(folder, FILES, force=options.pop("force", False))
     lengths = options.pop("lengths", ())
-    boxes = boxes_urdf(joints, lengths) if lengths else ""
-    moves = listed([*map(moves_as, joints, lengths)]) if lengths else ""
     table = open_table(logs[0]) if logs else None
     has_own_file = robot is not None and robot.suffix.lower() in (".yaml", ".yml")
     imported = None
     if robot is not None and not has_own_file:
         imported = import_arm(robot, table.names if table else (), **options)
-    elif boxes:
-        imported = _arm_of_boxes(boxes, moves, options, ())
+    elif lengths:
+        imported = _arm_of_boxes(joints, lengths, options, {})
     # all is written aside and read back, so that the folder has all of a project or
     # nothing
     with _stage(folder) as stage, _of_the_project(stage, folder, robot):
@@ -86,11 +84,10 @@ def write_project(
         else:
             reference = ARM
             arm = _write_arm(stage, imported)
-        layout = _layout(table, arm, joints, logs, in_range=not boxes)
-        wider = _wider(arm, layout) if boxes else {}
-        if imported is not None and wider:
-            urdf = boxes_urdf(joints, lengths, wider)
-            imported = _arm_of_boxes(urdf, moves, options, [*wider])
+        layout = _layout(table, arm, joints, logs, in_range=not lengths)
+        wider = _wider(arm, layout)
+        if lengths and wider:
+            imported = _arm_of_boxes(joints, lengths, options, wider)
             arm = _write_arm(stage, imported)
             layout = _layout(table, arm, joints, logs, in_range=False)
         sizes = _sizes(arm, layout)
@@ -139,19 +136,23 @@ def _wider(arm: Arm, layout: Layout) -> dict[str, tuple[float, float]]:
 
 
 def _arm_of_boxes(
-    urdf: str, moves: str, options: Plain, by_log: Sequence[str]
+    joints: Sequence[str],
+    lengths: Sequence[float],
+    options: Plain,
+    wider: Mapping[str, tuple[float, float]],
 ) -> ImportedArm:
-    """Import an arm of boxes as if a person had drawn it; `moves`: how its joints do;
-    `by_log`: joints whose ranges are those of the logs."""
+    """Import an arm of boxes as if a person had drawn it; `wider`: ranges of joints that
+    the logs tell [rad, m]."""
     with tempfile.TemporaryDirectory() as name:
         path = Path(name) / "boxes.urdf"
-        write_atomic(path, urdf)
+        write_atomic(path, boxes_urdf(joints, lengths, wider))
         imported = import_arm(path, **options)
+    moves = listed([*map(moves_as, joints, lengths)])
     what = f"the arm is made of boxes of these lengths: {moves}"
     notes = [f"{what}. Its masses and ranges are guesses; mend them in arm.xml"]
-    if by_log:
+    if wider:
         sign = "positive angles lift; if yours lower, set scale: -1 at the angle"
-        notes.append(f"{listed(by_log)}: the range is what the logs reach; {sign}")
+        notes.append(f"{listed([*wider])}: the range is what the logs reach; {sign}")
     return replace(imported, notes=(*notes, *imported.notes))
 
 

@@ -28,6 +28,8 @@ MOST_FILES = 20_000
 """below the robot's folder, among which a mesh is looked for by its name"""
 USD = (".usd", ".usda", ".usdc", ".usdz")
 """endings of USD stages"""
+ONCE = "origin axis limit parent child mimic inertial mass inertia geometry"
+"""elements of a URDF of which each parent has one"""
 URDF_OPTIONS = {"discardvisual": "false", "fusestatic": "false", "strippath": "true"}
 """keep what MuJoCo drops from a URDF by default: visuals, and links that no joint
 moves"""
@@ -162,6 +164,7 @@ def _places(path: Path, folder: Path) -> list[Path]:
 def _prepare_urdf(root: ElementTree.Element, notes: Notes) -> dict[str, str]:
     """Let MuJoCo keep all of a URDF, and return what it says of each mesh by a plain
     file name."""
+    _leave_first(root, notes)
     children = {child.get("link") for child in root.iterfind("joint/child")}
     for link in root.iterfind("link"):
         if link.get("name") not in children:
@@ -179,6 +182,20 @@ def _prepare_urdf(root: ElementTree.Element, notes: Notes) -> dict[str, str]:
     compiler = _child(_child(root, "mujoco"), "compiler")
     compiler.attrib.update(URDF_OPTIONS)
     return {name: given for given, name in names.items()}
+
+
+def _leave_first(root: ElementTree.Element, notes: Notes) -> None:
+    """Take out elements that stand again where one is allowed: ROS takes the first,
+    and MuJoCo refuses the file."""
+    for owner in root:
+        for parent in [*owner.iter()]:
+            for tag in ONCE.split():
+                alike = parent.findall(tag)
+                for element in alike[1:]:
+                    parent.remove(element)
+                    if element.attrib != alike[0].attrib:
+                        what = f"has another <{tag}>: the first counts, as in ROS"
+                        notes.add(what, str(owner.get("name")))
 
 
 def _child(element: ElementTree.Element, tag: str) -> ElementTree.Element:

@@ -4,7 +4,7 @@ import re
 from collections.abc import Collection, Sequence
 
 from hydroid.files import read_table
-from hydroid.units import Unit, unit_of
+from hydroid.units import UNITS, Unit, bare, unit_of
 
 CLUES = read_table("log/clues.yaml")
 RAW = ("voltage", "current")
@@ -32,6 +32,12 @@ def column_unit(name: str, given: str) -> Unit | None:
     inside = re.search(r"[\[(<]([^\])>]*)[\])>]\s*$", name)
     in_brackets = inside[1] if inside else ""
     last_word = re.split(r"[_ .]", name)[-1]
+    # elsewhere "in" is a direction
+    may_be_inch = [given, in_brackets]
+    if not {*words(name)}.isdisjoint(CLUES["lengths"]):
+        may_be_inch.append(last_word)
+    if any(bare(text).lower() in ("in", '"') for text in may_be_inch):
+        return UNITS["inch"]
     for text in (given, in_brackets, last_word):
         unit = unit_of(text)
         if unit and unit.quantity != "ambiguous":

@@ -1,32 +1,38 @@
 """The columns of a table that seem to be times, commands, angles or targets."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from hydroid.arrays import Array
 from hydroid.errors import LogError
-from hydroid.log.clues import CLUES, RAW, column_unit, kind_of, words
+from hydroid.log.clues import CLUES, RAW, column_unit, joint_of, kind_of, words
 from hydroid.log.mapping import LENGTHS
 from hydroid.log.signals import CommandRange, likely_range
 from hydroid.log.table import Signal, Table
-from hydroid.units import UNITS, Unit, unit_of
+from hydroid.units import UNITS, Unit, likely_time_unit, unit_of
 
 ANGLES = ("rad", "deg")
+EXCEL_DAYS = 30_000
+"""days from 1900 that a spreadsheet's dates are, at least"""
+KEPT_IN = {"length": "mm", "angle": "deg"}
+"""units of the settings that others, such as inches, are brought to"""
 
 
 class Column(NamedTuple):
     """A column that seems to be a signal.
 
     Its `kind` is time, command, angle or target; the `unit` is empty where the file
-    does not state one; `values` are its cells as they are, shape (R,).
+    does not state one; `values` are its cells, shape (R,), times `scale`, which is 1
+    but for units that settings do not have.
     """
 
     name: str
     kind: str
     unit: str
     values: Array
+    scale: float = 1.0
 
     @property
     def is_raw(self) -> bool:
@@ -40,8 +46,12 @@ class Column(NamedTuple):
         """Whether it holds a length, by its unit or its name."""
         if self.unit in LENGTHS:
             return True
-        turns = self.unit in ANGLES or self._has_word(CLUES["turns"])
-        return not turns and self._has_word(CLUES["lengths"])
+        return not self.turns and self._has_word(CLUES["lengths"])
+
+    @property
+    def turns(self) -> bool:
+        """Whether it holds an angle, whatever else its name says."""
+        return self.unit in ANGLES or self._has_word(CLUES["turns"])
 
     def _has_word(self, of: Sequence[str]) -> bool:
         return not {*words(self.name)}.isdisjoint(of)
@@ -66,6 +76,8 @@ def signal_columns(table: Table, names: Sequence[str]) -> list[Column]:
             column = _read_column(table, name, kind, units[name], names)
             if column is not None:
                 columns.append(column)
+    if not any(column.kind == "time" for column in columns):
+        columns += _time_by_values(table, kinds)
     return columns
 
 
@@ -73,7 +85,7 @@ def _kinds(units: Mapping[str, Unit | None], names: Sequence[str]) -> dict[str, 
     """Return the kinds of the columns that may be signals, by the columns' names.
 
     A column without unit that is called as a joint is, or as what a command moves,
-    holds its angle. Those come last.
+    holds its angle, and so does one of a sensor that names a joint. Those come last.
     """
     kinds = dict[str, str]()
     bare_names = [{*words(name)} - {"joint"} for name in names]
@@ -84,10 +96,36 @@ def _kinds(units: Mapping[str, Unit | None], names: Sequence[str]) -> dict[str, 
         if kind == "command":
             bare_names.append({*words(name)} - {*CLUES["kinds"]["command"]})
     others = [name for name in units if name not in kinds]
+    sensors = {*CLUES["sensors"], *CLUES["counts"]}
     for name in others:
-        if {*words(name)} - {"joint"} in bare_names:
+        of_a_sensor = not sensors.isdisjoint(words(name))
+        names_a_joint = any(joint_of(name, [joint]) for joint in names)
+        if (of_a_sensor and names_a_joint) or {*words(name)} - {"joint"} in bare_names:
             kinds[name] = "angle"
     return kinds
+
+
+def _time_by_values(table: Table, known: Collection[str]) -> Iterator[Column]:
+    """Yield the first column of dates, or else of numbers that rise in even steps, as a
+    time; a counter of samples is none.
+
+    `known`: columns that are something else.
+    """
+    for name in table.names:
+        cells = table.columns.get(name)
+        if not name or name in known or cells is None or not len(cells):
+            continue
+        values = table.read([Signal(name, "time")]).time
+        steps = np.diff(values[np.isfinite(values)])
+        if not rises(values):
+            continue
+        is_date = cells.dtype.kind == "M" or values[0] > EXCEL_DAYS
+        unit = likely_time_unit(float(np.median(steps)))
+        # what takes minutes or days from one sample to the next is rather no time
+        is_number = unit in ("s", "ms", "us", "ns") and not (steps == 1).all()
+        if unit and (is_date or is_number):
+            yield Column(name, "time", "", values)
+            return
 
 
 def _read_column(
@@ -102,6 +140,10 @@ def _read_column(
     if not np.isfinite(values).any():
         return None
     stated = unit.name if unit else ""
+    if unit and kind == "angle" and _is_foreign(unit):
+        stated = KEPT_IN[unit.quantity]
+        scale = float(f"{unit.factor / UNITS[stated].factor:.9g}")
+        return Column(name, kind, stated, scale * values, scale)
     if kind == "time" and not rises(values):
         kind = _kind_in_seconds(name, values, stated, names)
         if kind == "angle":
@@ -109,12 +151,18 @@ def _read_column(
     return Column(name, kind, stated, values)
 
 
+def _is_foreign(unit: Unit) -> bool:
+    """Return whether settings have no such unit of angles or lengths."""
+    return unit.quantity in KEPT_IN and unit.name not in (*LENGTHS, *ANGLES)
+
+
 def _kind_in_seconds(
     name: str, values: Array, unit: str, names: Collection[str]
 ) -> str:
     """Return the kind of a column that has a unit of time and does not rise."""
     likely = likely_range(values, unit=unit)
-    if likely and _are_pulses(likely):
+    # nobody measures time in µs that does not pass, but for pulses
+    if unit == "us" or (likely and _are_pulses(likely)):
         return "command"
     # "Boom Ms" may be its measured position
     joint_words = set[str]()

@@ -16,6 +16,7 @@ import numpy as np
 from hydroid.arrays import Array
 from hydroid.errors import LogError
 from hydroid.files import Plain
+from hydroid.log.clues import column_unit, kind_of
 from hydroid.log.columns import Column, rises, signal_columns
 from hydroid.log.joint_columns import JointColumns, Joints, by_joint
 from hydroid.log.mapping import LENGTHS
@@ -81,6 +82,8 @@ def guess_columns(
     unit = time.unit or likely_time_unit(step) or "s"
     step *= UNITS[unit].factor
     reasons = [f"{time.name}: time in {unit}, every {step:.3g} s"]
+    if kind_of(time.name, column_unit(time.name, "")) != "time":
+        reasons[0] += ", by its values: no column is called a time"
     commands = by_joint(_of_kind(columns, "command"), arm, reasons)
     angles = by_joint(_of_kind(columns, "angle"), arm, reasons)
     entries = _joint_entries(table, commands, angles, arm, reasons)
@@ -185,7 +188,7 @@ def _angle(column: Column, joint: int, usual_unit: str, arm: Joints) -> _Entry:
     limits = arm.ranges.get(joint)
     if slides and not column.is_raw:
         return _position(column)
-    if rod is not None:
+    if rod is not None and not column.turns:
         length = _cylinder_length(column, rod, usual_unit)
         if length is not None:
             return length
@@ -198,8 +201,15 @@ def _angle(column: Column, joint: int, usual_unit: str, arm: Joints) -> _Entry:
     unit = usual_unit
     if column.unit and not column.is_raw:
         unit = column.unit
+    return _Entry(_scaled(column, unit), f"{column.name}: angle in {unit}")
+
+
+def _scaled(column: Column, unit: str) -> Plain:
+    """Return the settings of a column whose cells, times its scale, are in a unit."""
     settings: Plain = {"column": column.name, "unit": unit}
-    return _Entry(settings, f"{column.name}: angle in {unit}")
+    if column.scale != 1:
+        settings["scale"] = column.scale
+    return settings
 
 
 def _position(column: Column) -> _Entry:
@@ -208,8 +218,7 @@ def _position(column: Column) -> _Entry:
     if not unit:
         largest = float(np.nanmax(np.abs(column.values)))
         unit = "mm" if largest > LARGEST_METRES else "m"
-    settings: Plain = {"column": column.name, "unit": unit}
-    return _Entry(settings, f"{column.name}: position in {unit}")
+    return _Entry(_scaled(column, unit), f"{column.name}: position in {unit}")
 
 
 def _may_be_angles(column: Column, unit: str) -> bool:
@@ -229,7 +238,7 @@ def _cylinder_length(column: Column, rod: Rod, angle_unit: str) -> _Entry | None
         shortest, longest = rod.ends
         ends = 1e3 * shortest, 1e3 * longest
         return _over_the_range(column, ends, "mm", "stroke of its cylinder")
-    if column.unit and column.unit not in LENGTHS:
+    if column.is_raw or (column.unit and column.unit not in LENGTHS):
         return None
     if not column.is_length and _may_be_angles(column, angle_unit):
         return None
@@ -239,7 +248,7 @@ def _cylinder_length(column: Column, rod: Rod, angle_unit: str) -> _Entry | None
     # lengths that its cylinder cannot have: who reads them says which
     in_doubt = column.unit or rod.nearest_unit(column.values), 0.0
     unit, offset = reading or in_doubt
-    settings: Plain = {"column": column.name, "unit": unit}
+    settings = _scaled(column, unit)
     # without an offset the sensor measures from pin to pin
     if not offset:
         return _Entry(settings, f"{column.name}: length of the cylinder in {unit}")
@@ -283,6 +292,10 @@ class _Cells(NamedTuple):
     values: Array
     likely: CommandRange | None
 
+    @property
+    def changes(self) -> bool:
+        return bool(np.nanmax(self.values) > np.nanmin(self.values))
+
 
 def _cells(table: Table, columns: Sequence[Column]) -> _Cells:
     # a bag holds 0 for a command before its first message; but the range that the
@@ -294,8 +307,8 @@ def _cells(table: Table, columns: Sequence[Column]) -> _Cells:
 
 
 def _usual_range(commands: Sequence[_Cells]) -> CommandRange | None:
-    """Return the range that more than half of a log's commands are in, if it has a
-    positive middle."""
+    """Return the range that more than half of a log's commands that change are in, if
+    it has a positive middle."""
     ranges = dict[str, CommandRange]()
     names = list[str]()
     # one of a middle of 0 needs no offset, and is recognised anyway
@@ -304,7 +317,7 @@ def _usual_range(commands: Sequence[_Cells]) -> CommandRange | None:
             names.append(cells.likely.name)
             ranges.setdefault(cells.likely.name, cells.likely)
     most = max(names, key=names.count, default="")
-    if names.count(most) <= len(commands) / 2:
+    if names.count(most) <= sum(cells.changes for cells in commands) / 2:
         return None
     return ranges[most]
 

@@ -12,6 +12,7 @@ from hydroid.log.checks import check_recording
 from hydroid.log.csv import open_csv
 from hydroid.log.lengths import as_angles
 from hydroid.log.log import Log, LogFinding, by_level, log_finding
+from hydroid.log.lost_signals import without_lost_signals
 from hydroid.log.mapping import Ranges, map_signals, match_columns, measured_signals
 from hydroid.log.motion_checks import check_motion
 from hydroid.log.repair import between_gaps, resample, without_bad_rows
@@ -162,7 +163,7 @@ def _read(
     del table  # with the columns that are not used
     for remark in recording.table.remarks:
         findings.append(log_finding("note", "layout", str(path), what=remark))
-    recording = as_angles(recording, findings)
+    recording = as_angles(without_lost_signals(recording), findings)
     recording = without_bad_rows(recording, settings, findings, repair=reading.repair)
     findings += check_recording(recording, settings)
     return recording

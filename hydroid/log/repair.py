@@ -18,7 +18,7 @@ import numpy as np
 from hydroid.arrays import Array
 from hydroid.errors import LogError
 from hydroid.log.log import Log, LogFinding
-from hydroid.log.table import Recording, Signal
+from hydroid.log.table import Recording, Signal, number
 from hydroid.settings.log import LogSettings
 
 GAP = 1.95
@@ -36,6 +36,8 @@ MOST_LEFT_OUT = 0.05
 MOST_AGAIN = 0.005
 """part of the rows that may stand at a time which has been: more are a clock that was
 set back"""
+NO_COMMAND = 1e-3
+"""below which a command is none [%]"""
 FINER = 0.8
 """part of a log's period up to which a grid is finer than the log"""
 
@@ -168,13 +170,25 @@ def without_bad_rows(
         what = f"does not hold {len(recording.table.names)} cells with numbers"
         if not empty[rows[0]].all():
             signal = recording.signals[int(empty[rows[0]].argmax())]
-            cell = recording.table.text(signal.name, int(recording.rows[rows[0]]))
-            what = f"{cell[:30]!r} is not a number" if cell else "no value is there"
+            what = _fault(signal, recording, int(recording.rows[rows[0]]))
         findings.append(
             recording.finding("warning", "row left out", rows, signal, what=what)
         )
         recording = recording.kept(np.flatnonzero(~bad))
     return _in_order(recording, findings)
+
+
+def _fault(signal: Signal, recording: Recording, row: int) -> str:
+    """Return why the cell of a signal in a row of the table holds no value."""
+    table = recording.table
+    cell = table.text(signal.name, row)
+    # a text format keeps the text of its cells, others keep numbers
+    value = number(cell)
+    if not cell and signal.name in table.columns:
+        value = table.columns[signal.name][row]
+    if value == 0:
+        return "0 is no command in this range, but a lost signal"
+    return f"{cell[:30]!r} is not a number" if cell else "no value is there"
 
 
 def _in_order(recording: Recording, findings: list[LogFinding]) -> Recording:
@@ -305,6 +319,8 @@ def resample(recording: Recording, settings: LogSettings, joints: int) -> Log:
     command = np.zeros((len(grid), joints))
     at = grid - settings.delay_s
     for joint, values in commands.items():
+        # a scale and an offset in a few digits do not give 0 at rest
+        values = np.where(np.abs(values) < NO_COMMAND, 0.0, values)
         # amplifiers and converters overshoot
         values = values.clip(-100, 100)
         command[:, joint] = _resampled(time, values, at, period)

@@ -1,6 +1,7 @@
 """What the numbers of a command are in: one table of signals serves `init`, `check` and
 the docs."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +19,8 @@ FARTHEST_REST = 0.3
 """part of half a range by which a command may rest beside the middle"""
 COMMON = 0.05
 """part of the samples that makes 0 a command that is really given"""
+EXACT = 0.02
+"""part of half a range within which a command rests in its middle, and nowhere else"""
 
 
 class CommandRange(NamedTuple):
@@ -37,9 +40,16 @@ class CommandRange(NamedTuple):
             scale += f" and log.command.offset: {offset:g}"
         return {"range": self.name, "scale": scale}
 
+    @property
+    def excludes_zero(self) -> bool:
+        """Whether a cell of 0 is no command, but a lost signal."""
+        return is_lost_signal(self.offset)
+
     def with_overshoot(self, values: Array) -> "CommandRange":
         """Return a range in which no cell is beyond 100 %, for converters that
-        overshoot."""
+        overshoot; 0 does not count where it is a lost signal."""
+        if self.excludes_zero:
+            values = np.where(values == 0, np.nan, values)
         percent = np.abs(self.scale * values + self.offset)
         most = float(np.nanmax(percent)) / 100
         if most <= 1 + 1e-8:
@@ -49,6 +59,12 @@ class CommandRange(NamedTuple):
         scale = float(f"{self.scale / smaller:.6g}")
         offset = float(f"{self.offset / smaller:.6g}")
         return self._replace(scale=scale, offset=offset)
+
+
+def is_lost_signal(offset: float) -> bool:
+    """Return whether a cell of 0, which reads as the offset of its settings [%], is
+    farther from rest than any command."""
+    return abs(offset) > 100 * (1 + SLACK)
 
 
 class CommandSignal(NamedTuple):
@@ -106,7 +122,9 @@ def likely_range(
 
     Converters overshoot, and joysticks do not rest exactly in the middle. A range with
     a positive middle must be used on both sides of it, and rest there: first or most of
-    the time. `unit`: of the cells, if stated.
+    the time; or be used on one side, and rest exactly there. Receivers without a signal
+    give 0 for a while. A command that never changes tells no range. `unit`: of the
+    cells, if stated.
     """
     if negative is not None:
         both = np.stack([values, negative])
@@ -117,12 +135,29 @@ def likely_range(
             return ON_EACH_SIDE
         values = both[0] - both[1]
     values = values[~np.isnan(values)]
-    if not values.any():
+    if not len(values) or np.ptp(values) == 0:
+        return None
+    received = values[values != 0]
+    if 0 < len(values) - len(received) < COMMON * len(values):
+        found = _first_range(
+            [signal for signal in SIGNALS if signal.range.excludes_zero], received, unit
+        )
+        if found is not None:
+            return found
+    return _first_range(SIGNALS, values, unit)
+
+
+def _first_range(
+    signals: Sequence[CommandSignal], values: Array, unit: str
+) -> CommandRange | None:
+    """Return the range of the first signal that fits cells, shape (R,), in a unit; None:
+    none does."""
+    if not len(values):
         return None
     low = values.min()
     high = values.max()
     rests = values[0], _most_frequent(values)
-    for signal in SIGNALS:
+    for signal in signals:
         if not _fits(signal, low, high, unit):
             continue
         # 0 is the middle of a range from below 0, and needs no proof
@@ -139,7 +174,8 @@ def resting_range(
 
     Cells are in the `likely` range, or in the `usual` one of the log's other commands,
     whose whole it does not leave. None: it rests in the middle, or the log does not
-    tell: it begins at rest and rests most of the time.
+    tell: it begins at rest and rests most of the time. A command that is never given
+    rests in the middle of the usual range, too.
     """
     values = values[~np.isnan(values)]
     if not len(values) or values[0] != _most_frequent(values):
@@ -155,7 +191,10 @@ def resting_range(
         percent = scale * values + command_range.offset
         percent_at_rest = scale * rest + command_range.offset
         is_within = np.abs(percent).max() <= 100 * (1 + SLACK)
-        if is_within and 0 < abs(percent_at_rest) <= 100 * FARTHEST_REST:
+        known_to_rest = likely is not None and percent_at_rest == 0
+        if known_to_rest:
+            continue
+        if is_within and abs(percent_at_rest) <= 100 * FARTHEST_REST:
             offset = float(f"{-scale * rest:.6g}")
             return rest, command_range._replace(offset=offset)
     return None
@@ -197,8 +236,8 @@ def _fits(signal: CommandSignal, low: float, high: float, unit: str) -> bool:
 def _rests_in_the_middle(
     signal: CommandSignal, values: Array, rests: tuple[float, float]
 ) -> bool:
-    """Return whether cells rest in the middle of a signal, and lie on both sides of
-    it.
+    """Return whether cells rest in the middle of a signal, and lie on both sides of it,
+    or on one side if they rest exactly there.
 
     `rests`: the first cell, and the most frequent one.
     """
@@ -208,4 +247,7 @@ def _rests_in_the_middle(
     enough = all(near) if zero_is_given else any(near)
     below = values.min() < signal.middle - USED * signal.half
     above = values.max() > signal.middle + USED * signal.half
+    exactly = all(abs(rest - signal.middle) <= EXACT * signal.half for rest in rests)
+    if signal.range.excludes_zero and not signal.full and exactly:
+        return bool(below or above)
     return bool(enough and below and above)

@@ -1,7 +1,8 @@
 """An arm of boxes from the names of its joints and the lengths of its links, for a
 machine without CAD."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 
 from hydroid.errors import SettingsError
 from hydroid.log.clues import words
@@ -22,6 +23,10 @@ CALLED = {
     "dipper": "stick",
     "tool": "bucket",
 }
+TELESCOPES = ("telescope", "extension", "slide")
+"""words of a joint that slides along its link"""
+SLID = 0.9
+"""part of its length by which a telescope slides out"""
 OTHERS = (-90, 90)
 MASS = 45.0
 """of a link over the square of its length [kg/m²]; ours, as of excavators of 1 to 20
@@ -34,9 +39,19 @@ LONGEST = 100.0
 """of a link [m]"""
 
 
-def boxes_urdf(joints: Sequence[str], lengths: Sequence[float]) -> str:
+NO_RANGES: Mapping[str, tuple[float, float]] = {}
+
+
+def boxes_urdf(
+    joints: Sequence[str],
+    lengths: Sequence[float],
+    ranges: Mapping[str, tuple[float, float]] = NO_RANGES,
+) -> str:
     """Return a URDF of an arm whose links are boxes; a joint of length 0 turns its link
-    about the vertical.
+    about the vertical, and one called a telescope slides out of the link before.
+
+    `ranges` of joints [rad, m]; those without have what machines have whose joints are
+    called so.
 
     Raises SettingsError: not a length for each joint, or one that no link has.
     """
@@ -44,16 +59,36 @@ def boxes_urdf(joints: Sequence[str], lengths: Sequence[float]) -> str:
     reach = sum(lengths)
     parent = "base"
     at = "0 0 1"
+    before = 0.0
     parts = ['<link name="base"/>']
     for joint, length in zip(joints, lengths, strict=True):
         upright = length == UPRIGHT
         size = reach / SLENDER if upright else length
         own = f"{joint}_link"
+        if is_telescope(joint):
+            # drawn in, it ends where the link does that it slides in
+            at = f"{max(before - length, 0):g} 0 0"
         parts.append(_link(own, size, reach if upright else length, cube=upright))
-        parts.append(_joint(joint, parent, at, upright=upright))
+        limits = ranges.get(joint) or _usual_range(joint, length)
+        parts.append(_joint(joint, parent, at, length, limits))
         parent = own
+        before = length
         at = f"{length:g} 0 0"
     return f'<robot name="boxes">{"".join(parts)}</robot>'
+
+
+def is_telescope(joint: str) -> bool:
+    """Return whether a joint is called as one that slides."""
+    return not {*words(joint)}.isdisjoint(TELESCOPES)
+
+
+def moves_as(joint: str, length: float) -> str:
+    """Return how a joint of a length moves, in words."""
+    if is_telescope(joint):
+        return f"{joint} slides by {SLID * length:g} m"
+    if length == UPRIGHT:
+        return f"{joint} slews"
+    return f"{joint} lifts"
 
 
 def _check(joints: Sequence[str], lengths: Sequence[float]) -> None:
@@ -65,10 +100,10 @@ def _check(joints: Sequence[str], lengths: Sequence[float]) -> None:
             "--lengths",
             "as in --joints swing,boom,arm,bucket --lengths 0,3.7,1.6,0.9",
         )
-    if odd := [joint for joint in joints if not joint.isidentifier()]:
-        raise SettingsError(
-            f"{odd[0]!r} is no name of a joint", "--joints", "letters, digits and _"
-        )
+    odd = [joint for joint in joints if not (joint.isascii() and joint.isidentifier())]
+    if odd:
+        what = f"{odd[0]!r} is no name of a joint"
+        raise SettingsError(what, "--joints", "letters from a to z, digits and _")
     if len({*joints}) < len(joints):
         raise SettingsError("holds a name twice", "--joints")
     wrong = [length for length in lengths if not 0 <= length <= LONGEST]
@@ -76,6 +111,9 @@ def _check(joints: Sequence[str], lengths: Sequence[float]) -> None:
     if wrong:
         what = f"{wrong[0]:g} is no length of a link"
         raise SettingsError(what, "--lengths", allowed)
+    for joint, length in zip(joints, lengths, strict=True):
+        if is_telescope(joint) and length == UPRIGHT:
+            raise SettingsError(f"the telescope {joint} has none", "--lengths", allowed)
     if not any(lengths):
         raise SettingsError("no link has a length", "--lengths", allowed)
 
@@ -95,15 +133,32 @@ def _link(name: str, size: float, length: float, *, cube: bool) -> str:
     )
 
 
-def _joint(name: str, parent: str, at: str, *, upright: bool) -> str:
+def _usual_range(name: str, length: float) -> tuple[float, float]:
+    """Return the range of a joint that is called so [rad, m]."""
+    if is_telescope(name):
+        return 0.0, SLID * length
     called = [CALLED.get(word, word) for word in words(name)]
-    low, high = next((RANGES[word] for word in called if word in RANGES), OTHERS)
-    if upright:
-        low, high = RANGES["swing"]
-    axis = "0 0 1" if upright else "0 -1 0"  # positive angles lift
-    radians = [f"{end * 0.017453292519943295:.6g}" for end in (low, high)]
+    ends = next((RANGES[word] for word in called if word in RANGES), OTHERS)
+    if length == UPRIGHT:
+        ends = RANGES["swing"]
+    low, high = ends
+    return math.radians(low), math.radians(high)
+
+
+def _joint(
+    name: str, parent: str, at: str, length: float, limits: tuple[float, float]
+) -> str:
+    kind = "revolute"
+    # positive angles lift
+    axis = "0 -1 0"
+    if is_telescope(name):
+        kind = "prismatic"
+        axis = "1 0 0"
+    elif length == UPRIGHT:
+        axis = "0 0 1"
+    low, high = limits
     return (
-        f'<joint name="{name}" type="revolute"><parent link="{parent}"/><child link="{name}_link"/>'
+        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{name}_link"/>'
         f'<origin xyz="{at}"/><axis xyz="{axis}"/>'
-        f'<limit lower="{radians[0]}" upper="{radians[1]}" effort="0" velocity="0"/></joint>'
+        f'<limit lower="{low:.9g}" upper="{high:.9g}" effort="0" velocity="0"/></joint>'
     )

@@ -14,14 +14,13 @@ from hydroid.log import (
     ColumnGuess,
     JointMotion,
     Log,
-    Reading,
     Table,
-    check_log,
     motion_of,
 )
 from hydroid.log.clues import column_unit, kind_of
 from hydroid.log.mapping import angle_margin
 from hydroid.project.columns import column_lines
+from hydroid.project.logs import Others, reach_of, read_first, read_others
 from hydroid.project.section import given_section, guessed_section, missing_column
 from hydroid.settings.arm import Arm, Joint
 from hydroid.settings.load import validate
@@ -36,8 +35,6 @@ REVERSED = (
     "follows the angle"
 )
 
-SAID = ("row left out", "cut end", "lost", "gap", "half a command", "unasked", "target")
-"""kinds of findings that say which part of a log is not read, or not told by it"""
 MOVED = 0.5  # travel from which a joint moves [deg]
 FOLLOWED = 1.0  # travel above which a joint that no command drives is followed [deg]
 
@@ -49,8 +46,10 @@ class Layout:
 
     `outputs` are joints that a log drives and measures, `motions` how the measured ones
     move, by number from 1, and `valves` those by which the outputs follow commands of
-    the sign that these have in the section; `reasons` have a line for each column that
-    is not `unused`; `followed`: a joint that no command drives moves. `missing` says
+    the sign that these have in the section; `left_out` are further logs that cannot be
+    read by it; `reach`: the ends of what joints do in the others [rad, m]; `reasons`
+    have a line for each column that is not `unused`; `followed`: a joint that no
+    command drives moves. `missing` says
     which columns a person must name, in a section that is then no more than a start;
     `candidates` are lines about what each could be.
     """
@@ -62,6 +61,10 @@ class Layout:
     motions: Mapping[int, JointMotion]
     followed: bool
     valves: Mapping[int, JointStart] = field(default_factory=dict[int, JointStart])
+    left_out: tuple[Path, ...] = ()
+    reach: Mapping[int, tuple[float, float]] = field(
+        default_factory=dict[int, tuple[float, float]]
+    )
     origin: str = GUESSED
     missing: str = ""
     candidates: tuple[str, ...] = ()
@@ -74,6 +77,8 @@ def find_layout(
     *,
     given: LogSettings | None = None,
     others: Sequence[Path] = (),
+    unseen: Path | None = None,
+    in_range: bool = True,
 ) -> Layout:
     """Guess the columns of a log, turn commands that act against the angle,
     and see how fast joints are.
@@ -85,7 +90,9 @@ def find_layout(
             arm's order.
         given: what a person says of the columns, which are not guessed then.
         others: further logs of the same columns; a joint that one of them drives can be
-            fitted.
+            fitted. One that cannot be read by the columns of the first is left out.
+        unseen: a log to validate on, of which no more is asked.
+        in_range: False: the arm's ranges are guesses, which logs may leave.
 
     Raises:
         SettingsError: no joint has one of the names.
@@ -97,24 +104,32 @@ def find_layout(
         return Layout(
             {"period_s": 0.01, "joints": {}}, every, (), (), {}, followed=False
         )
+    more = Others(others, unseen, in_range)
     if given is not None:
         guess = _given(table, arm, given)
-        return _seen(table, arm, guess, others, GIVEN)
+        return _seen(table, arm, guess, more, GIVEN)
     guess = guessed_section(table, arm, order)
     missing = missing_column(guess.log, targets=_has_targets(table))
     if missing:
         return _skeleton(table, arm, guess, missing)
-    return _seen(table, arm, guess, others, GUESSED)
+    return _seen(table, arm, guess, more, GUESSED)
 
 
 def _seen(
-    table: Table, arm: Arm, guess: ColumnGuess, others: Sequence[Path], origin: str
+    table: Table, arm: Arm, guess: ColumnGuess, others: Others, origin: str
 ) -> Layout:
     """Return the layout of columns, with what the logs show of the joints' motion."""
     entries = guess.log["joints"]
     reasons = [*guess.reasons]
-    logs = _read(table, guess.log, arm, others, reasons, strict=origin == GIVEN)
+    settings = validate(guess.log, LogSettings, table.source)
+    logs = read_first(table, settings, arm, reasons, strict=origin == GIVEN)
     measured = [joint for joint, entry in entries.items() if entry["angle"]]
+    left_out = list[Path]()
+    reach = dict[int, tuple[float, float]]()
+    if logs:
+        fitted, unseen, left_out = read_others(table, settings, arm, others, reasons)
+        logs += fitted
+        reach = reach_of([*logs, *unseen], measured)
     driven = [joint for joint in measured if entries[joint]["command"] is not None]
     motions = dict[int, JointMotion]()
     if logs:
@@ -132,6 +147,8 @@ def _seen(
         motions,
         followed=any(motion.travel > FOLLOWED for motion in undriven),
         valves=_valves(logs, driven, wrong),
+        left_out=tuple(left_out),
+        reach=reach,
         origin=origin,
     )
 
@@ -243,40 +260,6 @@ def _skeleton(table: Table, arm: Arm, guess: ColumnGuess, missing: str) -> Layou
         missing=missing,
         candidates=column_lines(table),
     )
-
-
-def _read(
-    table: Table,
-    section: Plain,
-    arm: Arm,
-    others: Sequence[Path],
-    reasons: list[str],
-    *,
-    strict: bool,
-) -> list[Log]:
-    """Read logs by a section; an error of the first one is a reason,
-    or ends the command if `strict`."""
-    no_limits = dict.fromkeys(arm.joint_names, (-np.inf, np.inf))
-    settings = validate(section, LogSettings, table.source)
-    first = Path(table.source)
-    logs = list[Log]()
-    for path in (first, *others):
-        log, findings = check_log(path, settings, no_limits, Reading(arm=arm))
-        if log is None:
-            if strict:
-                raise findings[0].error()
-            reasons.append(f"the log cannot be used as it is: {findings[0]}")
-            repaired = Reading(arm=arm, repair=True)
-            log, _ = check_log(path, settings, no_limits, repaired)
-        for finding in findings:
-            if finding.level == "warning" and finding.kind in SAID:
-                reasons.append(str(finding))
-        if log is not None:
-            logs.append(log)
-        elif path == first:
-            # what its joints do is not known
-            return []
-    return logs
 
 
 def _refuse_rest(

@@ -3,7 +3,7 @@
 import os
 import shlex
 import tempfile
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -14,8 +14,9 @@ from hydroid.cad.importer import ImportedArm, import_arm
 from hydroid.cad.meshes import MESHES
 from hydroid.errors import HydroidError, SettingsError
 from hydroid.files import Plain, fill_template, undisturbed, write_atomic, writing
-from hydroid.log import open_table
-from hydroid.project.boxes import boxes_urdf
+from hydroid.log import Table, open_table
+from hydroid.log.mapping import angle_margin
+from hydroid.project.boxes import boxes_urdf, moves_as
 from hydroid.project.layout import Layout, find_layout
 from hydroid.project.texts import JointSize, arm_text, fit_text, joint_sizes
 from hydroid.reporting.figure import arm_picture
@@ -32,6 +33,8 @@ PICTURE = "arm.png"
 FIT = "fit.yaml"
 STEPS = "next-steps.md"
 OLD = "fit.old.yaml"
+BEYOND = 0.05
+"""part of what logs reach, by which a range that nobody has given goes beyond"""
 FILES = (ARM, MODEL, PICTURE, FIT, STEPS, OLD, MESHES)
 
 
@@ -65,14 +68,13 @@ def write_project(
     what is given)."""
     _refuse_replacing(folder, FILES, force=options.pop("force", False))
     lengths = options.pop("lengths", ())
-    boxes = boxes_urdf(joints, lengths) if lengths else ""
     table = open_table(logs[0]) if logs else None
     has_own_file = robot is not None and robot.suffix.lower() in (".yaml", ".yml")
     imported = None
     if robot is not None and not has_own_file:
         imported = import_arm(robot, table.names if table else (), **options)
-    elif boxes:
-        imported = _arm_of_boxes(boxes, options)
+    elif lengths:
+        imported = _arm_of_boxes(joints, lengths, options, {})
     # all is written aside and read back, so that the folder has all of a project or
     # nothing
     with _stage(folder) as stage, _of_the_project(stage, folder, robot):
@@ -82,7 +84,12 @@ def write_project(
         else:
             reference = ARM
             arm = _write_arm(stage, imported)
-        layout = find_layout(table, arm, joints, others=_fitted(logs)[1:])
+        layout = _layout(table, arm, joints, logs, in_range=not lengths)
+        wider = _wider(arm, layout)
+        if lengths and wider:
+            imported = _arm_of_boxes(joints, lengths, options, wider)
+            arm = _write_arm(stage, imported)
+            layout = _layout(table, arm, joints, logs, in_range=False)
         sizes = _sizes(arm, layout)
         notes = list[str]()
         if imported is not None:
@@ -95,15 +102,58 @@ def write_project(
         return _finished(stage, folder, arm.name, layout, notes, steps)
 
 
-def _arm_of_boxes(urdf: str, options: Plain) -> ImportedArm:
-    """Import an arm of boxes as if a person had drawn it."""
+def _layout(
+    table: Table | None,
+    arm: Arm,
+    joints: Sequence[str],
+    logs: Sequence[Path],
+    *,
+    in_range: bool,
+) -> Layout:
+    """Return what logs hold, the first of which is the table."""
+    return find_layout(
+        table,
+        arm,
+        joints,
+        others=_fitted(logs)[1:],
+        unseen=_unseen(logs),
+        in_range=in_range,
+    )
+
+
+def _wider(arm: Arm, layout: Layout) -> dict[str, tuple[float, float]]:
+    """Return the ranges [rad, m] of joints whose logs leave what is guessed: what the
+    logs reach, and a little more."""
+    wider = dict[str, tuple[float, float]]()
+    for number, (low, high) in layout.reach.items():
+        joint = arm.joints[number - 1]
+        least, most = joint.limits
+        margin = angle_margin(least, most)
+        if low < least - margin or high > most + margin:
+            more = BEYOND * (high - low)
+            wider[joint.name] = low - more, high + more
+    return wider
+
+
+def _arm_of_boxes(
+    joints: Sequence[str],
+    lengths: Sequence[float],
+    options: Plain,
+    wider: Mapping[str, tuple[float, float]],
+) -> ImportedArm:
+    """Import an arm of boxes as if a person had drawn it; `wider`: ranges of joints that
+    the logs tell [rad, m]."""
     with tempfile.TemporaryDirectory() as name:
         path = Path(name) / "boxes.urdf"
-        write_atomic(path, urdf)
+        write_atomic(path, boxes_urdf(joints, lengths, wider))
         imported = import_arm(path, **options)
-    what = "the arm is made of boxes of these lengths"
-    guessed = f"{what}: its masses and ranges are guesses; mend them in arm.xml"
-    return replace(imported, notes=(guessed, *imported.notes))
+    moves = listed([*map(moves_as, joints, lengths)])
+    what = f"the arm is made of boxes of these lengths: {moves}"
+    notes = [f"{what}. Its masses and ranges are guesses; mend them in arm.xml"]
+    if wider:
+        sign = "positive angles lift; if yours lower, set scale: -1 at the angle"
+        notes.append(f"{listed([*wider])}: the range is what the logs reach; {sign}")
+    return replace(imported, notes=(*notes, *imported.notes))
 
 
 def _sizes(arm: Arm, layout: Layout) -> tuple[JointSize, ...]:
@@ -143,7 +193,13 @@ def go_on(
     replaces_config = config.resolve() == (folder / FIT).resolve()
     _refuse_replacing(folder, (FIT, STEPS, PICTURE), force=force or replaces_config)
     table = open_table(logs[0], settings.log)
-    layout = find_layout(table, arm, given=settings.log, others=_fitted(logs)[1:])
+    layout = find_layout(
+        table,
+        arm,
+        given=settings.log,
+        others=_fitted(logs)[1:],
+        unseen=_unseen(logs),
+    )
     steps = _steps(folder, logs, layout)
     reference = _seen_from(folder, Path(arm.where))
     text = fit_text(
@@ -172,8 +228,14 @@ def _fitted(logs: Sequence[Path]) -> Sequence[Path]:
     return logs[:-1] or logs
 
 
+def _unseen(logs: Sequence[Path]) -> Path | None:
+    """Return the log that is kept to validate on; None: there is one log only."""
+    return logs[-1] if len(logs) > 1 else None
+
+
 def _steps(folder: Path, logs: Sequence[Path], layout: Layout) -> tuple[str, ...]:
-    """Return the commands that come next."""
+    """Return the commands that come next, of logs that can be read."""
+    logs = [log for log in logs if log not in layout.left_out]
     names = [shlex.quote(str(log)) for log in logs or ("LOG.csv", "OTHER.csv")]
     home = shlex.quote(str(folder))
     config = f"--config {home}/fit.yaml"

@@ -129,6 +129,11 @@ TRAPS = [
         [800, 290],
     ),
     (stick(kind="prismatic"), "track: root link", [800, 200, 90]),
+    (
+        stick(limit=LIMIT.format(-1, 1) + '<origin xyz="9 0 0"/>'),
+        "stick_joint: has another <origin>: the first counts, as in ROS",
+        [800, 200, 90],
+    ),
     (stick(kind="floating"), "stick: free to float in the file: fixed", [800, 290]),
     (
         stick(kind="planar"),

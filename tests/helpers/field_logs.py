@@ -254,6 +254,34 @@ def _still(columns: Columns) -> Columns:
     return {name: 0 * own if "cmd" in name else own for name, own in columns.items()}
 
 
+def _received(command: np.ndarray) -> np.ndarray:
+    """Return pulses, and 0 while a receiver has no signal."""
+    pulses = 1500 + 5 * command
+    pulses[500:530] = 0
+    return pulses
+
+
+def _thousandths(columns: Columns) -> Columns:
+    return {
+        name.replace("deg", "mdeg"): 1e3 * own if "angle" in name else own
+        for name, own in columns.items()
+    }
+
+
+def _logged_at(columns: Columns) -> Columns:
+    return {
+        "logged at" if name == "stamp" else name: own
+        for name, own in _stamps(columns).items()
+    }
+
+
+def _encoders(columns: Columns) -> Columns:
+    return {
+        name.replace("angle_counts", "enc"): own
+        for name, own in _counts(columns).items()
+    }
+
+
 FIELD_LOGS = (
     FieldLog("pulses of 1000 to 2000 µs", commands("us", lambda u: 1500 + 5 * u)),
     FieldLog("duty of 0 to 100 % around 50", commands("duty", lambda u: 50 + 0.5 * u)),
@@ -283,6 +311,19 @@ FIELD_LOGS = (
     ),
     FieldLog("dates and times past midnight", changed(_stamps)),
     FieldLog("time in ns", changed(lambda columns: _renamed(columns, 1e9, "time_ns"))),
+    FieldLog("pulses of 900 to 2100 µs", commands("us", lambda u: 1500 + 6 * u)),
+    FieldLog(
+        "channels of a receiver", commands("cmd", lambda u: np.round(992 + 8.19 * u))
+    ),
+    FieldLog("a receiver that loses its signal", commands("pwm", _received), lost=0.7),
+    FieldLog("cylinder lengths in inches", lengths("cyl_in", 1 / 0.0254)),
+    FieldLog("angles in thousandths of a degree", changed(_thousandths)),
+    FieldLog("dates under another name", changed(_logged_at)),
+    FieldLog(
+        "pulses without their lower half",
+        commands("us", lambda u: 1500 + 5 * u.clip(0)),
+        "lacks half of the command",
+    ),
     FieldLog(
         "a joystick without its lowering half",
         changed(_half),
@@ -290,6 +331,7 @@ FIELD_LOGS = (
     ),
     FieldLog("targets in place of commands", changed(_targets), "targets of positions"),
     FieldLog("encoder counts", changed(_counts), "taken for the whole range"),
+    FieldLog("encoders called enc", changed(_encoders), "taken for the whole range"),
     FieldLog("draw wires in mA", wires("wire_mA", 4, 20), "taken for the whole stroke"),
     FieldLog("draw wires in V", wires("wire_V", 0, 10), "taken for the whole stroke"),
     FieldLog(

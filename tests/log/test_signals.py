@@ -71,6 +71,40 @@ def row(signal: CommandSignal) -> str:
     return f"| {signal.name}{rest} | {scale:.6g} | {f'{offset:.6g}'.replace('-', '−') if offset else ''} |\n"
 
 
+PULSES = 1500 + 5 * STEPS
+
+
+@pytest.mark.parametrize(
+    "pulses",
+    [
+        np.where((T > 9) & (T < 9.5), 0, PULSES),
+        1500 + 5 * STEPS.clip(0),
+        1500 + 5 * STEPS.clip(max=0),
+    ],
+    ids=["0 without a signal", "up alone", "down alone"],
+)
+def test_pulses_are_known_in_half_and_with_lost_signals(pulses: np.ndarray) -> None:
+    likely = likely_range(pulses)
+    assert likely is not None
+    assert likely.name == "1000 to 2000 µs"
+    # a lost signal makes the range no wider
+    assert likely.with_overshoot(pulses) == likely
+
+
+def test_a_command_that_never_changes_has_the_range_of_the_others(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "log.csv"
+    angle = 20 * np.sin(0.4 * T)
+    table = np.stack([T, PULSES, 0 * T + 1500, angle, angle], axis=1)
+    names = "time_s,cmd_boom,cmd_stick,angle_boom,angle_stick"
+    np.savetxt(path, table, delimiter=",", header=names, comments="")
+    section = guess_columns(open_table(path), ["boom", "stick"]).log
+    command = LogSettings.model_validate(section).columns("command", 2)
+    assert command is not None
+    assert command.scale * 1500 + command.offset == 0
+
+
 @pytest.mark.parametrize(
     "steps", [STEPS.clip(0), STEPS / 2, np.zeros(2000)], ids=["one way", "half", "none"]
 )

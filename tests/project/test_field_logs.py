@@ -1,10 +1,11 @@
 """Logs as machines record them are read rightly by what `init` writes, or a line says
 what is wrong."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from field_logs import FIELD_LOGS, FieldLog, outcome
+from field_logs import FIELD_LOGS, Columns, FieldLog, make_truth, outcome, table, text
 
 import hydroid
 from hydroid.settings.arm import Arm, load_arm
@@ -24,3 +25,44 @@ def test_a_log_is_read_rightly_or_its_fault_is_said(
 ) -> None:
     found = outcome(log, tmp_path, arm)
     assert found.verdict == ("said" if log.said else "right"), found.line
+
+
+@pytest.mark.parametrize(
+    ("place", "change"),
+    [
+        (1, lambda columns: {k: v for k, v in columns.items() if "stick" not in k}),
+        (1, lambda columns: columns | {"time_s": 1e3 * columns["time_s"]}),
+        (
+            2,
+            lambda columns: (
+                columns | {"boom_cmd_pct": 1500 + 5 * columns["boom_cmd_pct"]}
+            ),
+        ),
+    ],
+    ids=["a joint is missing", "ms", "pulses in the log to validate on"],
+)
+def test_a_log_that_differs_from_the_first_is_left_out_of_the_commands(
+    place: int, change: Callable[[Columns], Columns], tmp_path: Path
+) -> None:
+    columns = table(make_truth((70, -60, 100)))
+    logs = [tmp_path / name for name in ("first.csv", "second.csv", "third.csv")]
+    for number, log in enumerate(logs):
+        log.write_text(text(change(columns) if number == place else columns))
+    made = hydroid.init(tmp_path / "mine", log=logs).result
+    (reason,) = [one for one in made.columns if "left out of the commands" in one]
+    assert str(logs[place]) in reason
+    assert made.commands
+    for command in made.commands:
+        assert str(logs[place]) not in command
+
+
+def test_rows_without_a_signal_are_left_out(arm: Arm, tmp_path: Path) -> None:
+    (log,) = [
+        log for log in FIELD_LOGS if log.name == "a receiver that loses its signal"
+    ]
+    outcome(log, tmp_path, arm)
+    config = tmp_path / "mine" / "fit.yaml"
+    lines = [
+        str(line) for line in hydroid.check(tmp_path / "log.csv", config=config).lines
+    ]
+    assert any("a lost signal" in line and "29 more" in line for line in lines)

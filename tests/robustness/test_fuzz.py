@@ -7,12 +7,18 @@ FUZZ=50 in the environment reads fifty times as many.
 import os
 import time
 from pathlib import Path
+from random import Random
 
 import pytest
-from fuzz import KINDS as FILES, logs, run, run_kinds
+from field_logs import FIELD_LOGS, make_truth
+from fuzz import KINDS as FILES, damage, logs, run, run_kinds
 from fuzz_formats import FORMATS, bounded
 
-from hydroid.errors import SettingsError
+import hydroid
+from hydroid.errors import HydroidError, SettingsError
+from hydroid.log import open_table
+from hydroid.project.layout import find_layout
+from hydroid.settings.arm import Arm, load_arm
 from hydroid.settings.document import read_document
 
 TIMES = int(os.environ.get("FUZZ", "1"))
@@ -64,6 +70,51 @@ def test_a_format_is_read_or_refused_in_one_line_whatever_its_columns(
     assert FORMATS[name].read(tmp_path, plain)
     for data in {*odd}:
         FORMATS[name].read(tmp_path, data)
+
+
+ROWS = 300
+"""of logs that are damaged: rest and some steps"""
+
+
+@pytest.mark.slow
+def test_damaged_logs_of_machines_are_understood_or_refused_in_one_line(
+    tmp_path: Path,
+) -> None:
+    """What `init` makes of them: pulses, counts, lengths of cylinders, dates."""
+    hydroid.init(tmp_path / "mine")
+    arm = load_arm(tmp_path / "mine" / "arm.yaml")
+    texts = dict[str, bytes]()
+    for log in FIELD_LOGS:
+        lines = log.write(make_truth(log.steps, arm), arm).splitlines(keepends=True)
+        texts[log.name] = "".join(lines[:ROWS]).encode()
+    path = tmp_path / "log.csv"
+    refused = 0
+    files = 2_000 * TIMES
+    for seed in range(files):
+        rng = Random(f"machine {seed}")
+        name = rng.choice([*texts])
+        data = damage(rng, texts[name])
+        path.write_bytes(data)
+        try:
+            with bounded(len(data)):
+                line = _refusal(path, arm)
+        except Exception as error:
+            error.add_note(f"the damaged {name} of seed {seed}")
+            raise
+        if line is not None:
+            refused += 1
+            assert line.isprintable(), seed
+    assert 0 < refused < files / 2
+
+
+def _refusal(path: Path, arm: Arm) -> str | None:
+    """Return why a log was refused; None: something was made of it."""
+    try:
+        layout = find_layout(open_table(path), arm)
+    except HydroidError as refusal:
+        return str(refusal)
+    assert layout.missing or layout.section["joints"]
+    return None
 
 
 @pytest.mark.slow

@@ -1,0 +1,99 @@
+"""The logs of a project, read by the columns of the first: those that cannot be are left
+out."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from hydroid.log import Log, LogFinding, Reading, Table, check_log
+from hydroid.settings.arm import Arm
+from hydroid.settings.log import LogSettings
+
+SAID = ("row left out", "cut end", "lost", "gap", "half a command", "unasked", "target")
+"""kinds of findings that say which part of a log is not read, or not told by it"""
+
+
+class Others(NamedTuple):
+    """Logs beside the first: those that are fitted, and one that is validated on."""
+
+    fitted: Sequence[Path]
+    unseen: Path | None
+    in_range: bool
+    """whether they must be within the arm's ranges, if the first one is"""
+
+
+def read_first(
+    table: Table,
+    settings: LogSettings,
+    arm: Arm,
+    reasons: list[str],
+    *,
+    strict: bool,
+) -> list[Log]:
+    """Read the first log; an error is a reason, or ends the command if `strict`."""
+    path = Path(table.source)
+    log, findings = check_log(path, settings, _no_limits(arm), Reading(arm=arm))
+    if log is None:
+        if strict:
+            raise findings[0].error()
+        reasons.append(f"the log cannot be used as it is: {findings[0]}")
+        repaired = Reading(arm=arm, repair=True)
+        log, _ = check_log(path, settings, _no_limits(arm), repaired)
+    reasons += _said(findings)
+    # of one that cannot be read, what its joints do is not known
+    return [] if log is None else [log]
+
+
+def read_others(
+    table: Table, settings: LogSettings, arm: Arm, others: Others, reasons: list[str]
+) -> tuple[list[Log], list[Log], list[Path]]:
+    """Read the other logs; return those that are fitted, the unseen one, and those that
+    cannot be read as the first one is: by its columns, units and ranges."""
+    fitted = list[Log]()
+    unseen = list[Log]()
+    left_out = list[Path]()
+    paths = [*others.fitted]
+    if others.unseen is not None:
+        paths.append(others.unseen)
+    if not paths:
+        return fitted, unseen, left_out
+    reading = Reading(arm=arm)
+    limits = arm.ranges
+    first, _ = check_log(Path(table.source), settings, limits, reading)
+    if first is None or not others.in_range:
+        limits = _no_limits(arm)
+    for path in paths:
+        log, findings = check_log(path, settings, limits, reading)
+        if log is None:
+            left_out.append(path)
+            reasons.append(f"left out of the commands below: {findings[0]}")
+        elif path == others.unseen:
+            unseen.append(log)
+        else:
+            fitted.append(log)
+            reasons += _said(findings)
+    return fitted, unseen, left_out
+
+
+def reach_of(
+    logs: Sequence[Log], joints: Sequence[int]
+) -> dict[int, tuple[float, float]]:
+    """Return the ends of what joints (numbers, from 1) do in logs [rad, m]."""
+    reach = dict[int, tuple[float, float]]()
+    for joint in joints:
+        angles = np.concatenate([log.angle[:, joint - 1] for log in logs])
+        reach[joint] = float(np.nanmin(angles)), float(np.nanmax(angles))
+    return reach
+
+
+def _no_limits(arm: Arm) -> Mapping[str, tuple[float, float]]:
+    return dict.fromkeys(arm.joint_names, (-np.inf, np.inf))
+
+
+def _said(findings: Sequence[LogFinding]) -> Iterator[str]:
+    """Yield the findings that say which part of a log is not read."""
+    for finding in findings:
+        if finding.level == "warning" and finding.kind in SAID:
+            yield str(finding)

@@ -196,12 +196,8 @@ class Sysid:
             spec.delete(geom)
         spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
         spec.option.timestep = log.period
-        for name in arm.joint_names:
-            motor = spec.add_actuator()
-            motor.name = motor.target = name
-            motor.trntype = mujoco.mjtTrn.mjTRN_JOINT
-            motor.biastype = mujoco.mjtBias.mjBIAS_AFFINE
         self._model = spec.compile()
+        self._model.actuator_biastype[:] = mujoco.mjtBias.mjBIAS_AFFINE
         self._model.qpos_spring[:] = self._pose
         # the state, not a sensor: MuJoCo evaluates a sensor at the beginning of a step
         angles = [

@@ -11,8 +11,8 @@ from hydroid.errors import RunError
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
 from hydroid.problem.bindings import Bindings
-from hydroid.problem.problem import make_simulation
-from hydroid.simulation import Response
+from hydroid.simulation import Response, make_simulation
+from hydroid.simulation.roles import roles
 
 
 @record
@@ -70,11 +70,10 @@ def predict_log(model: IdentifiedModel, log: Log) -> Log:
     maps columns.
     """
     settings = model.settings
-    passive = settings.simulation.other_joints == "passive"
-    moving = [j for j in range(log.joints) if passive or log.driven[j]]
+    of_joints = roles(log.driven, settings.simulation.other_joints)
+    moving = np.flatnonzero(of_joints.simulated).tolist()
     angle = log.posed.copy()
-    if settings.simulation.other_joints == "locked":
-        angle[:] = log.start
+    angle[:, ~of_joints.moving] = log.start[~of_joints.moving]
     hydraulic = log.driven & (settings.stage == "hyd")
     measured = [
         j

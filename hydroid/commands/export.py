@@ -65,7 +65,7 @@ def export(
         pose (NAME): The pose where the plant starts, by its name in the arm's file
             [default: the start pose of the settings].
         at (JOINT=PCT,...): With --to linear: the commands about which the model is
-            linear, such as boom=30,arm=-40.
+            linear, such as boom=30,arm=-40; joints that it does not name stand.
 
     Raises:
         SettingsError: another kind, an option that is missing, or a fit of stage 1,

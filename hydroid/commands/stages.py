@@ -349,7 +349,7 @@ def adapt(
     out, and keeps a parameter free only if the error falls there. The result is a run
     that every command takes.
 
-    Example: hydroid adapt LOADED.csv --fit runs/hyd --free P_flow,P_droop
+    Example: hydroid adapt LOADED.csv --fit runs/hyd --free P_flow
 
         adapted = hydroid.adapt("b.csv", fit="runs/a", free="M3")
         print(adapted.summary.values)

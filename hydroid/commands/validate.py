@@ -233,14 +233,14 @@ def _is_own(prediction: "Prediction") -> bool:
 def _keep(tested: Iterable[_Tested], *, apart: bool) -> None:
     """Store what fits make of unseen logs in their own runs, whose reports show them
     from now on."""
-    from hydroid.reporting.predictions import draw
+    from hydroid.reporting.predictions import write_report
     from hydroid.run.record import keep_validation
 
     for test in tested:
         predictions = [replace(p, apart=apart) for p in test.predictions]
         run = keep_validation(test.model, predictions)
         if run:
-            draw(run)
+            write_report(run)
 
 
 def _unseen(log: Log, fitted: Sequence[Log]) -> bool:
@@ -289,11 +289,11 @@ def report(
     folders = as_list(runs)
     if merge:
         return _merged([str(folder) for folder in folders], out)
-    from hydroid.reporting.predictions import draw
+    from hydroid.reporting.predictions import write_report
 
     for folder in folders:
         warn_of_changes(Path(folder))
-    files = [str(draw(folder, figures=figures)) for folder in folders]
+    files = [str(write_report(folder, figures=figures)) for folder in folders]
     return Result(files, {"files": files}, ())
 
 

@@ -82,7 +82,7 @@ def _measured_cloud(logs: Sequence[Log], joint: int, dead_times: list[float]) ->
     late = float(np.mean(dead_times)) if dead_times else 0.0
     pairs = [np.empty((2, 0))]
     for log in logs:
-        if log.measured[joint - 1]:
+        if log.has_angle[joint - 1]:
             pairs.append(np.array(measured_speeds(log, joint, late)))
     return np.hstack(pairs)
 

@@ -15,18 +15,21 @@ from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
+import mujoco
 import numpy as np
 from scipy.signal import lfilter
 
 from hydroid.arm.locked import repeat
+from hydroid.arm.model import add_payload
 from hydroid.arrays import Array, Index, Structs
 from hydroid.hydraulics.actuator import pressures
 from hydroid.hydraulics.kernel import Plugin
 from hydroid.hydraulics.records import JOINT_STATE, has_force_curve
+from hydroid.log import Log
 from hydroid.mjcf import quiet_mujoco
+from hydroid.settings.fit import FitSettings
 from hydroid.simulation.openings import valve_openings
-from hydroid.simulation.quasi_static import roll_quasi_static
-from hydroid.simulation.rollout import Course, SteppedArm, Trace, compile_rollout, roll
+from hydroid.simulation.rollout import Course, SteppedArm, Trace, compile_rollout
 from hydroid.simulation.scenario import Candidates, Chain, Response, Scenario, distinct
 
 
@@ -51,12 +54,10 @@ TOGETHER = 56
 
 
 class Simulation:
-    """Simulates candidates on one log; in stage 2 the scenario's active joints have
-    hydraulics.
+    """Simulates candidates on one log; but for stage 1 the scenario's active joints
+    have hydraulics.
 
     Args:
-        substeps: of valves and oil in one MuJoCo step; None: stage 1, without
-            hydraulics.
         pressures: active joints whose pressures and flows are wanted in the response,
             0-based.
 
@@ -65,18 +66,12 @@ class Simulation:
             0-based.
     """
 
-    def __init__(
-        self, scenario: Scenario, substeps: int | None, pressures: Sequence[int] = ()
-    ) -> None:
+    def __init__(self, scenario: Scenario, pressures: Sequence[int] = ()) -> None:
         compile_rollout()
         self.scenario = scenario
-        self._quasi_static = bool(substeps) and scenario.settings.model != "dynamic"
-        # in stage 1 a gain pushes every joint
-        pushed = np.arange(len(scenario.arm.columns))
-        if substeps:
-            pushed = scenario.prescribed.columns
+        self._at_once = scenario.stepping.rung.at_once
         self._chain = Chain(
-            scenario.machine, scenario.arm, scenario.active, substeps or 1, pushed
+            scenario.machine, scenario.arm, scenario.roles, scenario.stepping
         )
         self.joints = self._chain.joints
         self._pressures = np.searchsorted(self.joints, np.array(pressures, int))
@@ -91,7 +86,7 @@ class Simulation:
         scenario = self.scenario
         n = len(candidates)
         wanted = self._pressures
-        samples = 1 + len(scenario.command) // scenario.settings.steps
+        samples = 1 + len(scenario.command) // scenario.stepping.steps
         angle = np.full((n, samples, len(scenario.outputs)), np.nan)
         pressure = np.full((n, samples, len(wanted), 2), np.nan)
         flow = np.full(pressure.shape, np.nan)
@@ -161,9 +156,7 @@ class Simulation:
         model = self.scenario.arm.model
         if copies > 1:
             model = repeat(model, copies)
-        rollout = roll_quasi_static if self._quasi_static else roll
-        steps = self.scenario.settings.steps
-        return SteppedArm(model, self._chain.columns, steps, rollout, copies)
+        return self._chain.stepped(model, self.scenario.stepping.steps, copies)
 
     def _follower(
         self,
@@ -182,7 +175,7 @@ class Simulation:
         observed = bool(self._pressures.size)
         values = scenario.values(candidates)
         pose = scenario.arm.pose
-        samples = len(scenario.command) // scenario.settings.steps
+        samples = len(scenario.command) // scenario.stepping.steps
         balance = _balance(arm, values, pose, n)
         plugin, states = chain.start(candidates, pose, balance, scenario.pressure)
         before = np.zeros((plugin.past, len(chain.columns)))
@@ -190,7 +183,7 @@ class Simulation:
         taken = chain.taken(candidates, scenario.prescribed)
         openings = [np.empty((0, 0))] * n
         # what the valves do is seen in their states alone
-        if self._quasi_static and not observed:
+        if self._at_once and not observed:
             openings = valve_openings(plugin, states, commands, run)
         gain = candidates.joints.gain[:, scenario.arm.columns[chain.pushed]]
 
@@ -226,9 +219,37 @@ class Simulation:
         served = np.searchsorted(pushed, servo.columns)
         if served.size:
             # without inertia a joint is put where the log has it
-            motion = servo.angle if self._quasi_static else servo.torque
+            motion = servo.angle if self._at_once else servo.torque
             torque[:, :, served] = motion[:, None]
         return torque.reshape(len(torque), -1)
+
+
+def make_scenario(
+    spec: mujoco.MjSpec, log: Log, outputs: list[int], settings: FitSettings
+) -> Scenario:
+    """Return a log made ready for the model of some settings, which says what moves,
+    from where and how; `outputs` are the joints whose angles are wanted, 0-based."""
+    payload = settings.payload_of(log.source)
+    if payload:
+        spec = add_payload(spec, settings.arm, payload)
+    return Scenario(
+        spec, settings.arm, log, outputs, settings.simulation, settings.stepping
+    )
+
+
+def make_simulation(
+    spec: mujoco.MjSpec,
+    log: Log,
+    outputs: list[int],
+    settings: FitSettings,
+    pressures: Sequence[int] = (),
+) -> Simulation:
+    """Return the simulation of one log by the model of some settings.
+
+    Its response has the angles of the joints `outputs` and the chamber pressures of
+    `pressures`, 0-based.
+    """
+    return Simulation(make_scenario(spec, log, outputs, settings), pressures)
 
 
 def _oil(actuators: Plugin, history: Structs, angle: Array) -> Oil:

@@ -340,7 +340,7 @@ def test_a_validation_of_several_fits_shows_the_best_first_in_shared_charts():
     (tab,) = next(
         section for section in page.sections if section.title == "Response"
     ).tabs
-    labels = {mark.label for panel in tab.draw().panels for mark in panel.marks}
+    labels = {mark.label for panel in tab.make().panels for mark in panel.marks}
     assert {label.partition(" (")[0] for label in labels} >= {"good", "bad", "measured"}
 
 
@@ -365,7 +365,7 @@ def test_a_joint_that_only_a_later_fit_compares_is_shown():
     ]
     labels = {
         mark.label.partition(" (")[0]
-        for panel in tabs[1].draw().panels
+        for panel in tabs[1].make().panels
         for mark in panel.marks
     }
     assert "two" in labels

@@ -1,7 +1,7 @@
 """Least squares of other programs on hydroid's problems: how many starts reach the
 optimum, simulations, time.
 
-    python benchmarks/others.py [--problems 27 9 10] [--starts 3] [--most 4000]
+    python benchmarks/others.py [--problems 27 9 10] [--starts 3] [--most 4000] [--write]
 
 27  gain, damping and spring of each joint and six masses, from a simulated log of 30 s
     in which all joints move, with noise. mujoco.sysid fits it too, with its own
@@ -14,7 +14,8 @@ either side, or those of the settings. Apart from mujoco.sysid all see one funct
 output errors over parameters scaled to the unit box, and take derivatives by
 differences. A run ends where its program ends it, or after so many simulations. A start
 has reached the optimum if its rms error is within 1 % of the lowest that any program
-found. What is not installed is left out: pip install pypesto.
+found. What is not installed is left out: pip install pypesto. With --write the rows go
+to docs/figures.yaml, and `python docs/figures.py --pages` puts them on their page.
 """
 
 import copy
@@ -26,7 +27,8 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from common import EXAMPLES, Clock, options, row, table, true_log
+import yaml
+from common import EXAMPLES, ROOT, Clock, options, row, table, true_log
 from made_logs import TRUTH
 from mujoco import minimize
 from scipy.optimize import least_squares as scipy_least_squares
@@ -35,6 +37,7 @@ import hydroid
 from hydroid import load_settings
 from hydroid.arm.model import load_model
 from hydroid.arrays import Array, rms
+from hydroid.files import write_atomic
 from hydroid.problem.problem import Problem
 from hydroid.search.least_squares import least_squares
 from hydroid.settings.search import RefinementSettings
@@ -47,6 +50,7 @@ MANY |= {name: TRUTH[name] for name in MASSES}
 QUANTITIES = {"K": "gain", "D": "damping", "S": "stiffness"}
 FACTOR = 10.0
 """of the bounds beside the truth, both ways"""
+FIGURES = ROOT / "docs" / "figures.yaml"
 NOISE_DEG = 0.1
 SECONDS = 30.0
 REACHED = 0.01
@@ -192,12 +196,8 @@ class Sysid:
             spec.delete(geom)
         spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
         spec.option.timestep = log.period
-        for name in arm.joint_names:
-            motor = spec.add_actuator()
-            motor.name = motor.target = name
-            motor.trntype = mujoco.mjtTrn.mjTRN_JOINT
-            motor.biastype = mujoco.mjtBias.mjBIAS_AFFINE
         self._model = spec.compile()
+        self._model.actuator_biastype[:] = mujoco.mjtBias.mjBIAS_AFFINE
         self._model.qpos_spring[:] = self._pose
         # the state, not a sensor: MuJoCo evaluates a sensor at the beginning of a step
         angles = [
@@ -304,7 +304,7 @@ def programs() -> list[str]:
 
 
 def main() -> None:
-    given = options(__doc__, problems=[*PROBLEMS], starts=3, most=4000)
+    given = options(__doc__, problems=[*PROBLEMS], starts=3, most=4000, write=False)
     table("parameters | program | reached the optimum | simulations | CPU time, median")
     for count in given.problems:
         problem = PROBLEMS[count]()
@@ -316,14 +316,38 @@ def main() -> None:
                 ran.append(run(name, problem, point, given.most))
             if count == len(MANY) and find_spec("absl"):
                 ran.append(run_sysid(problem, point))
-        best = min(error for _, error, _, _ in ran)
-        for name in dict.fromkeys(one[0] for one in ran):
-            own = [one for one in ran if one[0] == name]
-            reached = sum(error <= (1 + REACHED) * best for _, error, _, _ in own)
-            took = [simulations for _, _, simulations, _ in own]
-            spent = f"{np.median([seconds for *_, seconds in own]):.0f} s"
-            many_or_few = f"{min(took):,} to {max(took):,}"
-            row(count, name, f"{reached} of {len(own)}", many_or_few, spent)
+        rows = shown(ran)
+        for name, cells in rows.items():
+            row(count, name, *cells)
+        if given.write:
+            write(count, rows)
+
+
+def shown(ran: list[Ran]) -> dict[str, list[str]]:
+    """Return what the table says of each program: how many starts reached the optimum,
+    simulations, CPU time."""
+    best = min(error for _, error, _, _ in ran)
+    rows = dict[str, list[str]]()
+    for name in dict.fromkeys(one[0] for one in ran):
+        own = [one for one in ran if one[0] == name]
+        reached = sum(error <= (1 + REACHED) * best for _, error, _, _ in own)
+        took = [simulations for _, _, simulations, _ in own]
+        rows[name] = [
+            f"{reached} of {len(own)}",
+            f"{min(took):,} to {max(took):,}",
+            f"{np.median([seconds for *_, seconds in own]):.0f} s",
+        ]
+    return rows
+
+
+def write(count: int, rows: dict[str, list[str]]) -> None:
+    """Write the rows of a problem to the file of figures."""
+    text = FIGURES.read_text(encoding="utf-8")
+    head = text[: text.index("\n") + 1]
+    figures = yaml.safe_load(text)
+    figures.setdefault("others", {})[count] = rows
+    content = yaml.safe_dump(figures, sort_keys=False, allow_unicode=True, width=110)
+    write_atomic(FIGURES, head + content)
 
 
 if __name__ == "__main__":

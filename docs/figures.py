@@ -80,6 +80,8 @@ def collected(runs: Path, former: Figures) -> Figures:
         "rig": rig,
         "excavator": excavator,
         "machines": _machines(runs, former.get("machines", {})),
+        # of `make bench B=others`
+        "others": former.get("others", {}),
         "quantities": quantities,
         "parameters": parameters,
     }
@@ -256,12 +258,24 @@ def machines(figures: Figures) -> str:
     return _table(lines)
 
 
+def others(figures: Figures) -> str:
+    """Return the table of least squares of other programs, of the problems that were
+    measured."""
+    head = ["parameters", "program", "reached the optimum", "simulations", "CPU time"]
+    lines = [head, ["---"] * len(head)]
+    for count, rows in figures["others"].items():
+        for name, row in rows.items():
+            lines.append([str(count), name, *row])
+    return _table(lines)
+
+
 PARTS: dict[str, Callable[[Figures], str]] = {
     "at a glance": at_a_glance,
     "ahead": ahead,
     "not better": not_better,
     "quantities": quantities,
     "machines": machines,
+    "others": others,
 }
 
 

@@ -163,7 +163,7 @@ def open_model(
             raise SettingsError(
                 "stage 1 (mech) does not model the actuators", model.source, hint
             )
-        which = ", ".join(model.nominal) if fit else "all parameters"
+        which = ", ".join(model.nominal) if fit else "all parameters: no fit is given"
         LOGGER.log(NOTE, "note: nominal values for %s", which)
     return model
 

@@ -178,8 +178,8 @@ class FitOptions:
             return None
         budget = seconds(self.budget)
         if not budget:
-            hint = "such as 90s, 5min or 2h"
-            raise SettingsError(f"is no time: {self.budget!r}", "--budget", hint)
+            hint = "write it as 90s, 5min or 2h"
+            raise SettingsError(f"{self.budget!r} is no time", "--budget", hint)
         return budget
 
 

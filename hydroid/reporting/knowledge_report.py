@@ -1,10 +1,12 @@
 """What a fit knows of the machine, what it does not know, and how sure a prediction can
 be."""
 
+from collections.abc import Sequence
 from typing import Any
 
 from hydroid.estimate import FitSummary, QuantityEstimate
 from hydroid.findings import Finding
+from hydroid.joint_verdict import JointVerdict
 from hydroid.reporting.page import Cell, Section, Table
 from hydroid.reporting.parameters_report import in_words
 from hydroid.settings.fit import FitSettings
@@ -17,6 +19,8 @@ MOST_KNOWN = 5
 """quantities of a joint that a page shows"""
 MOST_UNKNOWN = 6
 MOST_WARNINGS = 3
+INSIDE = "unseen samples inside the 95 % bands [%]"
+"""name of a column"""
 ELSEWHERE = ("combination", "error lasts")
 """findings that another section of the page shows better"""
 
@@ -93,8 +97,8 @@ def every_quantity_section(
     header = ("joint", "quantity", "value", "unit", "from", "to")
     note = "from, to: 95 % interval; empty: no limit."
     text = (
-        "Speeds, gains, dead bands, dead times, time constants, flows, frequencies and "
-        "loads of the joints."
+        "What follows from the parameters of each joint. What is itself a parameter, such as "
+        "the dead band of a pilot stage, stands with the parameters."
     )
     tables = {"quantities": Table("", header, tuple(rows), note)}
     answer = f"{len(rows)}, with intervals"
@@ -110,11 +114,15 @@ def _within(quantity: QuantityEstimate) -> str:
     return f"± {100 * quantity.within:.2g} %"
 
 
-def error_section(settings: FitSettings, summary: FitSummary) -> Section | None:
-    """Return the folded section with the error model of each compared joint.
+def error_section(
+    settings: FitSettings, summary: FitSummary, verdicts: Sequence[JointVerdict] = ()
+) -> Section | None:
+    """Return the folded section with the error model of each compared joint, and how
+    often the bands held what was measured in unseen logs.
 
     None where the run has none.
     """
+    inside = {verdict.joint: verdict.inside_percent for verdict in verdicts}
     rows = list[dict[str, Any]]()
     after = list[str]()
     for joint in settings.outputs:
@@ -134,6 +142,7 @@ def error_section(settings: FitSettings, summary: FitSummary) -> Section | None:
                 "sensor's noise": factor * error.sensor_deg,
                 "uncertain after 10 s": ahead,
                 "an error lasts [s]": error.lasts_s or None,
+                INSIDE: inside.get(joint),
             }
         )
     if not rows:
@@ -146,7 +155,11 @@ def error_section(settings: FitSettings, summary: FitSummary) -> Section | None:
         "Standard deviations; after 10 s: at the mean speed of the logs. An error that lasts "
         "is the model's, not the sensor's; empty: none lasts."
     )
-    table = Table.of("", {name: name for name in rows[0]}, rows, note)
+    columns = {name: name for name in rows[0]}
+    if not any(row[INSIDE] for row in rows):
+        # no unseen log tells
+        del columns[INSIDE]
+    table = Table.of("", columns, rows, note)
     return Section(
         "How sure can a prediction be?",
         text,

@@ -16,7 +16,7 @@ from hydroid.reporting.chart import Chart, Mark, Panel
 from hydroid.reporting.page import Cell, Given, Plot, Section, Table
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.naming import belongs_to, named, quantity_and_side
-from hydroid.words import interval_words, listed, number
+from hydroid.words import interval_words, listed, three_digits
 
 WHAT_IT_IS = ("joint", "side", "quantity", "symbol", "value", "unit")
 """columns with which every table of parameters begins"""
@@ -53,7 +53,7 @@ def parameter_section(
     tells_pressure = "supply_pressure" in free or settings.objective.pressure_weight
     if settings.stage == "hyd" and not tells_pressure:
         # without pressures in the log only their product with the areas is known
-        supply = number(settings.hydraulics.supply_pressure)
+        supply = three_digits(settings.hydraulics.supply_pressure)
         text = (
             "Areas, masses, torques and flows hold only for the supply pressure of the "
             f"settings, {supply} bar."

@@ -40,6 +40,8 @@ _TESTED = (
 )
 WHOLE = "whole logs"
 """name of a column"""
+GOOD = "good up to"
+"""name of the column of tolerances"""
 
 _LEFT_OUT = "By joint: the rms error [deg] on parts of the logs, each predicted by a fit without it."
 
@@ -64,8 +66,8 @@ def verdict_table(fits: Verdicts) -> Table:
         unit = ""
         names.append("unit")
     if count:
-        names += [*map(column_of, JUDGED), WHOLE, "fitted"]
-        optional = ("fitted", column_of(JUDGED[1]), WHOLE)
+        names += [*map(column_of, JUDGED), WHOLE, "fitted", GOOD]
+        optional = (GOOD, "fitted", column_of(JUDGED[1]), WHOLE)
         note = _TESTED.format(unit=unit, count=count, s="s" if count > 1 else "")
     else:
         names += ["fitted", *NAMES]
@@ -91,6 +93,7 @@ def _row(verdict: JointVerdict) -> dict[str, Cell]:
         "verdict": f"{verdict.verdict.sign} {verdict.text}",
         "unit": verdict.shown.unit,
         "fitted": _shown(verdict.fitted_deg, verdict.shown),
+        GOOD: _shown(verdict.tolerance_deg, verdict.shown),
     }
 
 

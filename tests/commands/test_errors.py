@@ -35,7 +35,7 @@ WRONG = [
     (
         "fit-mech {log} --budget soon",
         "settings",
-        "--budget: is no time: 'soon'; such as 90s, 5min or 2h",
+        "--budget: 'soon' is no time; write it as 90s, 5min or 2h",
     ),
     ("fit-mech {log} --out .", "run", "holds no run"),
     (

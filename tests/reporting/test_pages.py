@@ -248,6 +248,7 @@ def test_the_verdict_shows_each_time_beside_the_best_simple_model_and_digits_tha
         "10 s": "diverged (5)",
         "whole logs": "3.0 (2.0)",  # two logs tell nothing
         "fitted": "1",
+        "good up to": "1",
     }
     assert lead({"a": [one]}).startswith(
         "boom: cannot be told from nine numbers (2 unseen logs)"

@@ -9,6 +9,7 @@ at a time as there are threads; candidates are independent, and no number of thr
 changes a bit.
 """
 
+import math
 import os
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
@@ -127,7 +128,8 @@ class Simulation:
                 self._write(response, rows, some, ready, arm)
                 free.append(arm)
 
-            shares = np.array_split(range(rows.size), -(-rows.size // copies))
+            groups = math.ceil(rows.size / copies)
+            shares = np.array_split(range(rows.size), groups)
             # a deque takes what the pool returns, so that errors are raised here
             deque(pool.map(simulate, shares), maxlen=0)
             if copies > 1:  # one that diverges stops those beside it
@@ -170,8 +172,9 @@ class Simulation:
         n = len(candidates)
         most = TOGETHER // len(self.scenario.arm.columns)
         # groups of equal size, so that all threads have something to do to the end
-        groups = max(threads, -(-n // most))
-        return -(-n // groups)
+        needed = math.ceil(n / most)
+        groups = max(threads, needed)
+        return math.ceil(n / groups)
 
     def _stepped(self, copies: int = 1) -> SteppedArm:
         model = self.scenario.arm.model
@@ -296,8 +299,10 @@ def _balance(arm: SteppedArm, values: dict[str, Array], pose: Array, n: int) -> 
     for first in range(0, n, arm.copies):
         # the last group is filled with candidates that are there twice
         some = np.resize(range(first, n), arm.copies)
-        held.append(arm.start(values, some, np.tile(pose, arm.copies)))
-    return np.concatenate(held).reshape(-1, len(pose))[:n]
+        start = np.tile(pose, arm.copies)
+        held.append(arm.start(values, some, start))
+    balances = np.concatenate(held).reshape(-1, len(pose))
+    return balances[:n]
 
 
 def reading(angle: Array, sensors: Structs, period: float) -> Array:

@@ -127,7 +127,8 @@ def test_what_the_pages_show_runs(tmp_path: Path):
     # shorter logs and searches than the pages show: that each command and flag works is
     # the statement here
     hydroid = f"""hydroid() {{ case $1 in
-      fit-*) set -- "$@" --set refinement.iterations=5 --set search.multistart.starts=1;;
+      fit-*) set -- "$@" --set refinement.iterations=5 --set search.multistart.starts=1 \
+        --set simulation.model=quasi-static;;
       design) set -- "$@" --set design.effort=20;;
     esac; "{sys.executable}" -m hydroid "$@"; }}
 """

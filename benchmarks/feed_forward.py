@@ -7,18 +7,18 @@ lasts 20 s. It is followed
 
 - open loop: by `hydroid follow`, and by the inverses of nine numbers and of a table of
   speeds, which are fitted to the same logs and look ahead by their own delay and lag;
-- with a proportional controller of the measured angles beside them, and by that
-  controller alone. It asks for speeds, which nine numbers turn into commands, dead band
-  included; its gain is the best of six by the fit's own plant with the noise of the
-  logs, on the last path and alone.
+- with a PID controller of the measured angles beside them, and by that controller
+  alone. It asks for speeds, which nine numbers turn into commands, dead band included;
+  its gains are the best of 18 by the fit's own plant with the noise of the logs, on the
+  last path and alone. It smooths errors, and leaves alone what is within the noise.
 
 Errors are rms over all samples and the joints that a path moves.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from common import options, row, table
@@ -40,10 +40,58 @@ REACH = 0.3
 """part of a range that a path keeps to, to either side of its middle"""
 GAINS = (0.1, 0.2, 0.3, 0.45, 0.6, 0.8)
 """speed per error, times delay and lag"""
+PARTS = ((0.0, 0.0), (0.3, 0.0), (0.3, 0.3))
+"""rate of the integral part, by the gain; time of the derivative part, by delay and
+lag: P, PI and PID"""
+FILTER = 0.2
+"""time over which errors are smoothed, by delay and lag"""
+UNFELT = 2.0
+"""error that a controller leaves alone, in standard deviations of the sensor's noise:
+valves should not chatter on it"""
+LARGE = 1.0
+"""rms error from which on a path counts as one that is not followed [deg]"""
 QUIET = 0.01
 """part of a top speed below which a controller asks for nothing: dead bands would
 chatter"""
 WAYS = ("the fit", "nine numbers", "speed tables", "no feed-forward")
+"""of commands; without feed-forward the controller is alone"""
+
+
+@dataclass(frozen=True)
+class Pid:
+    """Gains of a controller that asks for speeds: of the error [1/s], of its integral
+    [1/s], of its derivative [s]."""
+
+    gain: float
+    integral: float
+    derivative: float
+
+
+class Controller:
+    """The controller of one play of a case."""
+
+    def __init__(self, pid: Pid, case: "Case") -> None:
+        self._pid = pid
+        self._period = case.period
+        self._top = case.top
+        self._unfelt = UNFELT * case.machine.noise
+        smoothed = FILTER * float(case.late.max())
+        self._taken = case.period / (case.period + smoothed)
+        self._smooth = np.zeros_like(case.top)
+        self._sum = np.zeros_like(case.top)
+
+    def speed(self, error: Array) -> Array:
+        """Return the speeds that are asked for where angles err [rad], both (J,)."""
+        pid = self._pid
+        step = self._taken * (error - self._smooth)
+        self._smooth = self._smooth + step
+        felt = self._smooth - self._smooth.clip(-self._unfelt, self._unfelt)
+        self._sum = self._sum + pid.integral * felt * self._period
+        # no joint makes up for more than its top speed: what is beyond would wind up
+        most = self._top / max(pid.gain, 1e-9)
+        self._sum = self._sum.clip(-most, most)
+        change = np.where(felt == 0.0, 0.0, step / self._period)
+        return pid.gain * (felt + self._sum + pid.derivative * change)
 
 
 @dataclass(frozen=True)
@@ -206,11 +254,11 @@ def simple_commands(case: Case, wished: Log, name: str) -> Array:
 
 
 def play(
-    case: Case, wished: Log, command: Array, gain: float, rng: np.random.Generator
+    case: Case, wished: Log, command: Array, pid: Pid, rng: np.random.Generator
 ) -> Array:
-    """Angles of the true machine [rad], (T, J), under commands [%] and feedback with a
-    gain [1/s]."""
+    """Angles of the true machine [rad], (T, J), under commands [%] and feedback."""
     machine, count = case.machine, round(case.period / STEP)
+    controller = Controller(pid, case)
     carry, given = (
         machine.at_rest(wished.angle[0]),
         np.zeros((len(command) * count, machine.joints)),
@@ -224,7 +272,7 @@ def play(
         )
         at = slice(k * count, (k + 1) * count)
         given[at] = np.clip(
-            one + correction(case, forward[k], gain * error), -100.0, 100.0
+            one + correction(case, forward[k], controller.speed(error)), -100.0, 100.0
         )
         machine.go_on(given[: at.stop], carry, at.start)
     return angle
@@ -242,21 +290,23 @@ def correction(case: Case, forward: Array, more: Array) -> Array:
     )
 
 
-def tuned_gain(case: Case) -> float:
-    """The gain [1/s] with which the controller alone follows the last path best, on the
+def tuned(case: Case) -> Pid:
+    """The gains with which the controller alone follows the last path best, on the
     fit's own plant."""
     wished, plant = path(case, [*PATHS][-1]), Plant(case.model)
-    late, found = float(case.late.max()), dict[float, float]()
-    for part in GAINS:
+    late = float(case.late.max())
+    still = np.zeros(case.machine.joints)
+    found = dict[Pid, float]()
+    for part, (integral, derivative) in product(GAINS, PARTS):
+        pid = Pid(part / late, integral * part / late, derivative * late)
+        controller = Controller(pid, case)
         angle, rng = [plant.reset(wished.angle[0])], np.random.default_rng(0)
         for k in range(len(wished.time) - 1):
             read = angle[-1] + rng.normal(0.0, case.machine.noise, case.machine.joints)
-            error = part / late * (wished.angle[k] - read)
-            angle.append(
-                plant.step(np.clip(correction(case, 0.0 * error, error), -100.0, 100.0))
-            )
-        found[part / late] = rms_of(np.array(angle), wished)
-    return min(found, key=lambda gain: found[gain])
+            more = correction(case, still, controller.speed(wished.angle[k] - read))
+            angle.append(plant.step(np.clip(more, -100.0, 100.0)))
+        found[pid] = rms_of(np.array(angle), wished)
+    return min(found, key=lambda pid: found[pid])
 
 
 def rms_of(angle: Array, wished: Log) -> float:
@@ -265,9 +315,28 @@ def rms_of(angle: Array, wished: Log) -> float:
     return float(np.degrees(np.sqrt(np.mean((angle - wished.angle)[:, moves] ** 2))))
 
 
-def run(folder: Path, seed: int, number: int) -> list[Any]:
-    """Follow every path on a machine; rows of a path with its errors, open loop and
-    with feedback [deg]."""
+@dataclass(frozen=True)
+class Played:
+    """Errors on a path of a machine [deg]: open loop and with feedback, of each of WAYS;
+    open loop without feed-forward is the feedback alone."""
+
+    opened: Sequence[float]
+    closed: Sequence[float]
+    said: int
+
+    @property
+    def over_best(self) -> float:
+        """Error open loop over the best of all others."""
+        return self.opened[0] / min(self.opened[1:])
+
+    @property
+    def over_alone(self) -> float:
+        """Error with feedback over that of the feedback alone."""
+        return self.closed[0] / self.closed[-1]
+
+
+def run(folder: Path, seed: int, number: int) -> list[Played]:
+    """Follow every path on a machine, and print its rows."""
     run_folder = folder / f"{number:02d}" / "mine" / "runs" / "fit"
     machine = Machine(np.random.default_rng([seed, number]), number)
     baselines = load_record(run_folder).result.baselines
@@ -276,7 +345,7 @@ def run(folder: Path, seed: int, number: int) -> list[Any]:
         name: [baselines[joint][name] for joint in sorted(baselines)] for name in names
     }
     case = Case(machine, load_identified(run_folder), simple)
-    gain, rows = tuned_gain(case), list[Any]()
+    pid, none, rows = tuned(case), Pid(0.0, 0.0, 0.0), list[Played]()
     for kind in PATHS:
         wished, rng = path(case, kind), np.random.default_rng([seed, number, 1])
         found = follow(case.model, wished)
@@ -286,39 +355,45 @@ def run(folder: Path, seed: int, number: int) -> list[Any]:
             WAYS[3]: np.zeros_like(wished.angle),
         }
         opened = [
-            rms_of(play(case, wished, commands[name], 0.0, rng), wished)
+            rms_of(play(case, wished, commands[name], none, rng), wished)
             for name in WAYS[:3]
         ]
         closed = [
-            rms_of(play(case, wished, commands[name], gain, rng), wished)
+            rms_of(play(case, wished, commands[name], pid, rng), wished)
             for name in WAYS
         ]
-        rows.append((number, kind, opened, closed, len(found.missed)))
+        one = Played([*opened, closed[-1]], closed, len(found.missed))
+        rows.append(one)
         cells = [
-            " ".join(f"{one:.2f}" for one in errors) for errors in (opened, closed)
+            " ".join(f"{error:.2f}" for error in errors) for errors in (opened, closed)
         ]
-        parts = f"{opened[0] / min(opened[1:]):.2f}", f"{closed[0] / closed[3]:.2f}"
-        row(number, kind, *cells, *parts, len(found.missed), f"{gain:.1f}")
+        parts = f"{one.over_best:.2f}", f"{one.over_alone:.2f}"
+        gains = f"{pid.gain:.1f} {pid.integral:.2f} {pid.derivative:.2f}"
+        row(number, kind, *cells, *parts, one.said, gains)
     return rows
 
 
 def main() -> None:
     given = options(__doc__, machines=3, first=0, seed=1, folder="build/strangers")
-    judged = "over the best | over P alone | spans that cannot be had | gain [1/s]"
-    print(f"open loop: {', '.join(WAYS[:3])}; with P: {', '.join(WAYS)}")
-    table(f"machine | path | open loop [deg] | with P [deg] | {judged}")
-    rows = list[Any]()
+    judged = "over the best | over PID alone | spans that cannot be had | gains"
+    print(f"open loop: {', '.join(WAYS[:3])}; with PID: {', '.join(WAYS)}")
+    table(f"machine | path | open loop [deg] | with PID [deg] | {judged}")
+    rows = list[Played]()
     for number in range(given.first, given.first + given.machines):
-        rows += run(Path(given.folder), given.seed, number)
-    opened = np.array([one for _, _, one, _, _ in rows])
-    closed = np.array([one for _, _, _, one, _ in rows])
-    best = np.median(opened[:, 0] / opened[:, 1:].min(axis=1))
-    alone = np.median(closed[:, 0] / closed[:, 3])
-    middle = np.median(opened[:, 0]), np.median(closed[:, 0])
-    print(
-        f"\nmedian of {len(rows)} paths: open loop {middle[0]:.2f} deg, {best:.2f} of the best other;"
-    )
-    print(f"with P {middle[1]:.2f} deg, {alone:.2f} of P alone")
+        if (Path(given.folder) / f"{number:02d}").is_dir():
+            rows += run(Path(given.folder), given.seed, number)
+        else:
+            print(f"machine {number} is not in {given.folder}")
+    best = np.median([one.over_best for one in rows])
+    alone = np.median([one.over_alone for one in rows])
+    opened = np.median([one.opened[0] for one in rows])
+    closed = np.median([one.closed[0] for one in rows])
+    lost = [one for one in rows if one.opened[0] > LARGE]
+    said = sum(one.said > 0 for one in lost)
+    print(f"\nmedian of {len(rows)} paths: open loop {opened:.2f} deg,")
+    print(f"{best:.2f} of the best of the others and of PID alone;")
+    print(f"with PID {closed:.2f} deg, {alone:.2f} of PID alone")
+    print(f"open loop above {LARGE:g} deg: {len(lost)}, of which {said} were said")
 
 
 if __name__ == "__main__":

@@ -91,6 +91,20 @@ def test_the_policy_of_the_environment_works_on_any_run(name, joint, runs):
     assert np.median(errors) < 0.1
 
 
+def test_a_path_of_the_tip_starts_where_the_fitted_log_begins(runs, tmp_path: Path):
+    """Not in the arm's home pose, in which no machine may ever have stood; unless the
+    user says so."""
+    path = tmp_path / "still.csv"
+    path.write_text("time_s,dx_m,dy_m,dz_m\n0,0,0,0\n1,0,0,0\n")
+    (log,) = hydroid.read_logs(
+        [EXAMPLES / "boom" / "fit_up_60.csv"],
+        hydroid.load_settings(EXAMPLES / "boom" / "fit.yaml"),
+    )
+    for changes, expected in (({}, log.start[0]), ({"start_pose": "home"}, 0.0)):
+        found = hydroid.follow(path, fit=runs["boom"], set=changes).result
+        np.testing.assert_allclose(found.log.angle[:, 0], expected, atol=1e-4)
+
+
 class Topics:
     """A stub of rclpy's node: it keeps what is made and published."""
 

@@ -1,5 +1,6 @@
 """`hydroid follow`: commands that lead the arm along angles over time."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,6 +12,7 @@ from hydroid.commands.inputs import (
     command,
     open_model,
     refuse_overwriting,
+    setting_changes,
 )
 from hydroid.commands.logs import read_arms
 from hydroid.errors import SettingsError
@@ -19,10 +21,12 @@ from hydroid.log import Log, open_table, write_log
 from hydroid.words import plain
 
 if TYPE_CHECKING:
+    from hydroid.arrays import Array
     from hydroid.identified_model import IdentifiedModel
     from hydroid.settings.arm import Arm
     from hydroid.settings.fit import FitSettings
     from hydroid.use.follow import Followed
+    from hydroid.use.tip_path import TipKinematics
 
 
 @command
@@ -35,13 +39,13 @@ def follow(
     set: "SettingChanges" = None,
     repair: bool = False,
 ) -> "Result[Followed]":
-    """Find commands that lead the arm along joint angles over time, or its tip along a
-    path.
+    """Find the commands that move the joints along given angles, or the tip along a
+    given path.
 
     The commands are a feed-forward: play them without feedback. They allow for dead
-    band, valve curve, load, pump, delay and lags. Where a joint cannot move as wished,
-    the command says so and takes the nearest speed. It predicts the tracking error with
-    its band. A page shows the arm in motion.
+    band, valve curve, load, pump, delay and lags. Where a joint cannot be as fast as
+    asked, hydroid says so and takes the nearest speed. It also predicts the error with
+    a band, and writes a page with the arm in motion.
 
     Example: hydroid follow TRAJECTORY.csv --fit runs/hyd --out commands.csv
 
@@ -50,13 +54,14 @@ def follow(
 
     Args:
         trajectory (TRAJECTORY.csv): Joint angles over time, in the columns and units of
-            the fit's logs; or the tip's position over time, in columns x_m, y_m and
-            z_m. The tip is the site that the arm's file names as payload, or else the
-            end of the last link. Joints without a column, or without commands, rest in
-            the start pose of the settings.
-        out (LOG.csv): The commands, in the columns and units of the fit's logs, beside
-            the wished angles; the page has the same name [default of the command line:
-            runs/follow/commands.csv].
+            the fit's logs; or the tip's position over time, in columns time_s, x_m, y_m
+            and z_m, or, from where the tip starts, dx_m, dy_m and dz_m. The tip is the
+            site that the arm's file names as payload, or else the end of the last link.
+            Joints without a column, or without commands, rest where the first log of
+            the fit begins, or in the start_pose that --set gives.
+        out (LOG.csv): The commands and the angles asked for, in the columns and units
+            of the fit's logs; the page has the same name [default:
+            runs/follow/commands.csv; in Python nothing is written].
         payload (0 or more): Mass at the tip [kg].
 
     Raises:
@@ -72,11 +77,14 @@ def follow(
         raise SettingsError(
             "a fit of stage 1 has no valves", model.source, "name a fit of stage 2"
         )
-    path, tip = _tip_path(trajectory, model)
+    standing = _standing(model, given=set)
+    path, tip = _tip_path(trajectory, model, standing)
     if path is None:
         settings = _without_absent_joints(trajectory, model.settings)
         paths = read_arms(trajectory, settings, None, angles=True, repair=repair)
         (path,) = paths.values()
+        if not isinstance(trajectory, Log):
+            path = replace(path, pose=standing)
     from hydroid.reporting.follow_page import follow_page, missed_lines, tracking_table
     from hydroid.use.follow import follow as find_commands
 
@@ -85,20 +93,25 @@ def follow(
     name = "commands" if out is None else Path(out).stem
     page = follow_page(name, followed, arm)
     lines = [tracking_table(followed, arm), *missed_lines(followed, arm)]
-    if tip:
-        lines.append(f"The tip is {tip}.")
+    if tip is not None:
+        away = _away(tip, followed)
+        lines.append(
+            f"The tip is {tip.tip.what}. By the model it stays within {away:.3g} mm of "
+            "the path."
+        )
     if followed.lead_s:
         lines.append(
             f"The path begins {plain(followed.lead_s)} s into the file: "
             "delay and lags need commands that early."
         )
     if out is not None:
-        write_log(Path(out), followed.log, model.settings.log, arm=arm)
+        write_log(Path(out), followed.recording, model.settings.log, arm=arm)
         lines += [str(out), *written(page, Path(out).parent)]
     content = {
         "out": out and str(out),
         "lead_s": followed.lead_s,
-        "tip": tip or None,
+        "tip": tip and tip.tip.what,
+        "tip_away_mm": tip and _away(tip, followed),
         "joints": [_errors(followed, joint, arm) for joint in followed.joints],
         "missed": [
             {**vars(missed), "joint": arm.joint_names[missed.joint]}
@@ -108,24 +121,51 @@ def follow(
     return Result(lines, content, followed, page)
 
 
+def _standing(model: "IdentifiedModel", given: "SettingChanges") -> "Array":
+    """Return where joints stand that a path does not move [rad], shape (J,).
+
+    That is where the first log of the fit begins; of a model that is no fit, or where
+    the user gives a `start_pose`, it is the start pose of the settings.
+    """
+    import numpy as np
+
+    from hydroid.run.record import record_of
+
+    settings = model.settings
+    pose = settings.arm.pose(settings.start_pose)
+    fit = record_of(model)
+    if fit is None or "start_pose" in setting_changes(given):
+        return pose
+    start = fit.fitted[0].log.start
+    return np.where(np.isnan(start), pose, start)
+
+
 def _tip_path(
-    trajectory: "Source | Log", model: "IdentifiedModel"
-) -> "tuple[Log | None, str]":
-    """Return the joint angles along a file's path of the tip, and what the tip is;
-    None: it holds no such path."""
+    trajectory: "Source | Log", model: "IdentifiedModel", standing: "Array"
+) -> "tuple[Log | None, TipKinematics | None]":
+    """Return the joint angles along a file's path of the tip, and its kinematics; None:
+    it holds no such path."""
     if isinstance(trajectory, Log) or not is_file(trajectory):
-        return None, ""
+        return None, None
     from hydroid.plant import Plant
     from hydroid.use.tip_path import TipKinematics, holds_tip, tip_path
 
     settings = model.settings
     table = open_table(Path(trajectory), settings.log)
     if not holds_tip(table):
-        return None, ""
+        return None, None
     tip = TipKinematics(settings.arm, Plant(model).joints)
-    start = settings.arm.pose(settings.start_pose)
-    time, period = settings.log.time.column, settings.log.period_s
-    return tip_path(table, time, period, tip, start), tip.tip.what
+    return tip_path(table, settings.log, tip, standing), tip
+
+
+def _away(tip: "TipKinematics", followed: "Followed") -> float:
+    """Return how far the tip is from where it should be by then, at most, as the model
+    predicts [mm]."""
+    import numpy as np
+
+    pairs = zip(followed.log.angle, followed.angle, strict=True)
+    distances = [np.linalg.norm(tip.place(a) - tip.place(b)) for a, b in pairs]
+    return 1e3 * float(max(distances))
 
 
 def _without_absent_joints(

@@ -147,8 +147,13 @@ class Ladder:
             tolerance = max(FIRM, refinement.gain_tolerance)
             on_the_way = refinement.changed({"gain_tolerance": tolerance})
         lone = self._lone_terms(settings)
-        self._climb_model(whole, settings.rung, lone, on_the_way)
+        first = settings.rung
+        self._climb_model(whole, first, lone, on_the_way)
+        before = self._step.terms
         self._add_lone_terms(whole, lone, on_the_way)
+        if self._step.terms != before:
+            # errors of a valve may have hidden a pump
+            self._add_terms(whole, first, lone, on_the_way)
         for rung in further:
             self._climb_model(whole, rung, lone, on_the_way)
         if self._step.model in {rung.name for rung in further}:
@@ -175,10 +180,19 @@ class Ladder:
         # the first one is refined in any case, and its estimate is called so
         model = rung.name if if_better else "refined"
         self._rung(whole, Step(model, terms), settings, if_better=if_better)
-        if self._step.model != model:
-            return
-        for term in possible:
-            if term not in terms and term not in lone:
+        if self._step.model == model:
+            self._add_terms(whole, rung, lone, settings)
+
+    def _add_terms(
+        self,
+        whole: Problem,
+        rung: Rung,
+        lone: Collection[str],
+        settings: RefinementSettings,
+    ) -> None:
+        """Try each term that the kept model lacks on a rung, besides those of `lone`."""
+        for term in whole.settings.terms(rung):
+            if term not in self._step.terms and term not in lone:
                 with_term = self._step.changed(terms=(*self._step.terms, term))
                 self._rung(whole, with_term, settings, if_better=True)
 
@@ -240,10 +254,11 @@ class Ladder:
         new = self._measured(own, result, step)
         if if_better:
             without = self._left_out_of(last, self.refinements[start.name])
-            gained = gain(self._left_out_of(own, result), without)
+            with_it = self._left_out_of(own, result)
+            gained = gain(with_it, without)
             new = replace(new, gained=gained)
             self.estimates[step.estimate] = new
-            if not is_clear(*gained):
+            if not is_clear(*gained, len(with_it.open)):
                 return
         from_afar = how is refine_from_afar or (self._from_afar and begin.alone)
         self._keep(own, new, step, from_afar=from_afar)
@@ -318,7 +333,10 @@ class Ladder:
         parameters = likelihood.problem.parameters
         ends = [
             self._refined(
-                output_errors, begun, few, step.changed(phase="at first", start=number)
+                output_errors,
+                begun,
+                few,
+                step.changed(phase="at first", start=number),
             )
             for number, begun in enumerate((theta, parameters.start))
         ]

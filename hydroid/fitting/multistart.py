@@ -226,7 +226,7 @@ def by_numbers(problem: Problem, joint: int, theta: Array) -> Array:
     alone: nine numbers."""
     ends = [*problem.settings.arm.ranges.values()][joint - 1]
     found = fit_baselines(problem.logs, joint, ends)[NAMES[-1]]
-    values = {"delay": found.delay, "pilot_lag": 0.0}
+    values = {"delay": found.delay, "pilot_lag": 0.0, "lag_of_speed": 1.0}
     rows = {"dead_band": 0, "opening_exponent": 1, "opening_lag": 3}
     for name, row in rows.items():
         values |= _sided(name, *found.numbers[row].tolist())

@@ -129,12 +129,15 @@ class Response:
     """Simulated angles [rad], shape (n, T, K), of the K output joints; NaN throughout
     where one diverged.
 
-    `pressure` [Pa], shape
-    (n, T, L, 2), are those of chambers A and B of the L joints that were asked for.
+    Of the L joints whose oil was asked for, chambers A and B have `pressure` [Pa] and
+    take in `flow` [m³/s], the mean of the last step, both of shape (n, T, L, 2).
+    `line` [Pa], shape (n, T), is the pressure of the pump's line; NaN without a pump.
     """
 
     angle: Array
     pressure: Array
+    flow: Array
+    line: Array
 
 
 class Scenario:

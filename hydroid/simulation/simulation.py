@@ -14,6 +14,7 @@ import os
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -31,6 +32,20 @@ from hydroid.settings.fit import FitSettings
 from hydroid.simulation.openings import valve_openings
 from hydroid.simulation.rollout import Course, SteppedArm, Trace, compile_rollout
 from hydroid.simulation.scenario import Candidates, Chain, Response, Scenario, distinct
+
+
+class Oil(NamedTuple):
+    """What the oil of one candidate does at its samples.
+
+    pressure: of chambers A and B [Pa], shape (1 + T, J, 2). flow: into them [m³/s], of
+    the same shape. line: pressure of the pump's line [Pa], shape (1 + T,); NaN without
+    a pump.
+    """
+
+    pressure: Array
+    flow: Array
+    line: Array
+
 
 TOGETHER = 56
 """joints of all arms stepped at once: MuJoCo computes with sparse matrices from 60"""
@@ -68,7 +83,7 @@ class Simulation:
     have hydraulics.
 
     Args:
-        pressures: active joints whose chamber pressures are wanted in the response,
+        pressures: active joints whose pressures and flows are wanted in the response,
             0-based.
 
     Attributes:
@@ -87,8 +102,8 @@ class Simulation:
         self._pressures = np.searchsorted(self.joints, np.array(pressures, int))
 
     def simulate(self, candidates: Candidates) -> Response:
-        """Return what n candidates' sensors read, and the pressures asked for, at the
-        log's samples.
+        """Return what n candidates' sensors read, and the pressures and flows asked
+        for, at the log's samples.
 
         The first is the start. One without a force-stroke curve, or that diverged, has
         NaN throughout.
@@ -96,9 +111,12 @@ class Simulation:
         scenario = self.scenario
         n = len(candidates)
         samples = 1 + len(scenario.command) // scenario.stepping.steps
+        wanted = len(self._pressures)
         response = Response(
-            np.full((n, samples, len(scenario.outputs)), np.nan),
-            np.full((n, samples, len(self._pressures), 2), np.nan),
+            angle=np.full((n, samples, len(scenario.outputs)), np.nan),
+            pressure=np.full((n, samples, wanted, 2), np.nan),
+            flow=np.full((n, samples, wanted, 2), np.nan),
+            line=np.full((n, samples if wanted else 0), np.nan),
         )
         # those that differ in effects of other groups of logs are simulated once
         first, alike = distinct(candidates.joints, candidates.mass)
@@ -109,8 +127,13 @@ class Simulation:
             return response
         self._fill(response, rows, candidates[rows], threads)
         if len(first) < n:
-            which = first[alike]
-            return Response(response.angle[which], response.pressure[which])
+            every = first[alike]
+            return Response(
+                response.angle[every],
+                response.pressure[every],
+                response.flow[every],
+                response.line[every],
+            )
         return response
 
     def _fill(
@@ -148,7 +171,7 @@ class Simulation:
         """Simulate some of the candidates that are ready, on an arm that is free, and
         write what their sensors read."""
         scenario = self.scenario
-        followed, chambers = self._follow(ready, arm, np.resize(some, arm.copies))
+        followed, oil = self._follow(ready, arm, np.resize(some, arm.copies))
         if not arm.healthy:
             return
         outputs = followed[:, :, scenario.outputs].swapaxes(0, 1)
@@ -157,8 +180,11 @@ class Simulation:
             if self.joints.size:
                 turned = reading(turned, ready.sensors[candidate], scenario.period)
             response.angle[rows[candidate]] = turned
-        if chambers is not None:
-            response.pressure[rows[some[0]]] = chambers[:, self._pressures]
+        if oil is not None:
+            row = rows[some[0]]
+            response.pressure[row] = oil.pressure[:, self._pressures]
+            response.flow[row] = oil.flow[:, self._pressures]
+            response.line[row] = oil.line
 
     def _copies(self, candidates: Candidates, threads: int) -> int:
         """How many arms can be stepped at once without changing a bit of any.
@@ -219,12 +245,12 @@ class Simulation:
 
     def _follow(
         self, ready: "_Ready", arm: SteppedArm, some: Index
-    ) -> tuple[Array, Array | None]:
+    ) -> tuple[Array, Oil | None]:
         """Roll some candidates out, one for each copy of an arm.
 
         Returns:
-            Angles of the moving joints [rad], (1 + T, copies, V), and the chamber
-            pressures of a single candidate [Pa], (1 + T, J, 2), where any are wanted.
+            Angles of the moving joints [rad], (1 + T, copies, V), and the oil of a
+            single candidate, where it is wanted.
         """
         scenario = self.scenario
         row = some[0]
@@ -242,11 +268,10 @@ class Simulation:
         history[0] = state
         course = Course(ready.commands, torque, ready.taken[row], ready.openings[row])
         arm.roll(actuators, state, course, Trace(angle[1:], history[1:]))
-        chambers = None
+        oil = None
         if observed:
-            turned = angle[:, self._chain.columns]
-            chambers = pressures(actuators.coefficients, history, turned)
-        return angle.reshape(len(angle), arm.copies, -1), chambers
+            oil = _oil(actuators, history, angle[:, self._chain.columns])
+        return angle.reshape(len(angle), arm.copies, -1), oil
 
     def _pushing(self, gain: Array, balance: Array) -> Array:
         """Return what drives the pushed joints of some candidates in each step, shape
@@ -290,6 +315,19 @@ def make_simulation(
     `pressures`, 0-based.
     """
     return Simulation(make_scenario(spec, log, outputs, settings), pressures)
+
+
+def _oil(actuators: Plugin, history: Structs, angle: Array) -> Oil:
+    """Return what the oil of a candidate does in its states, (1 + T, J) of JOINT_STATE,
+    at angles [rad], (1 + T, J)."""
+    coefficients = actuators.coefficients
+    flow = np.stack([history["a"]["flow"], history["b"]["flow"]], axis=-1)
+    # the last in order is driven, and has the pump of all
+    last = actuators.order[-1]
+    line = history["line"][:, last].copy()
+    if np.isinf(coefficients["pump_flow"][last]):
+        line[:] = np.nan
+    return Oil(pressures(coefficients, history, angle), flow, line)
 
 
 def _balance(arm: SteppedArm, values: dict[str, Array], pose: Array, n: int) -> Array:

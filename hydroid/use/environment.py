@@ -11,7 +11,7 @@ A machine is the fit's own estimate, or a draw (`use.draws`); its angles drift f
 model's as the fit's error model says.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -37,6 +37,7 @@ except ImportError:
     ) from None
 
 Floats = NDArray[np.float32]
+Options = Mapping[str, Any]
 
 POSES, LEAST_POSES = 256, 4
 """random poses in which episodes begin, of all machines together, and at least of each:
@@ -100,61 +101,75 @@ class _Machines:
         self._true = self.target.copy()
         self._speed = np.zeros_like(self._angle)
 
-    def begin(self, row: int, rng: Generator, options: dict[str, Any]) -> None:
-        """Put a machine into a random pose, or that of the options, with a target."""
-        if (pose := options.get("pose")) is not None:
-            self.batch.reset(pose, rows=[row])
-        else:
-            number = int(rng.integers(self._starts.shape[1]))
-            if (row, number) not in self._ready:
-                start = self._pose.copy()
-                start[self._columns] = self._starts[row, number]
-                self.batch.reset(start, rows=[row])
-                self._ready[row, number] = self.batch.state(row)
-            self.batch.restore(row, self._ready[row, number])
-        reach = (1.0 - 2.0 * MARGIN) * rng.uniform(-1.0, 1.0, len(self.joints))
-        target = self._middle + self._half * reach
-        if options.get("target") is not None:
-            target = np.asarray(options["target"], float)
-        if target.shape != self._middle.shape:
-            raise ValueError(f"a target needs {len(self.joints)} angles [rad]")
-        self.target[row] = target
-        angle = self.batch.angle[row, self._columns]
-        self._angle[row] = angle
-        self._true[row] = angle
-        self._speed[row] = 0.0
-        self._drift.reset(np.array([row]))
+    def begin(self, rows: Sequence[int], rng: Generator, options: Options) -> None:
+        """Put m machines into random poses, or that of the options, with targets."""
+        if not rows:
+            return
+        pose = options.get("pose")
+        numbers = rng.integers(self._starts.shape[1], size=len(rows)).tolist()
+        for row, number in zip(rows, numbers, strict=True):
+            if pose is None:
+                self._take_start(row, number)
+            else:
+                self.batch.reset(pose, rows=[row])
+        reach = rng.uniform(-1.0, 1.0, (len(rows), len(self.joints)))
+        target = self._middle + (1.0 - 2.0 * MARGIN) * self._half * reach
+        wished = options.get("target")
+        if wished is not None:
+            if np.shape(wished) != self._middle.shape:
+                raise ValueError(f"a target needs {len(self.joints)} angles [rad]")
+            target[:] = wished
+        angle = self.batch.driven_angle[rows]
+        self.target[rows] = target
+        self._angle[rows] = angle
+        self._true[rows] = angle
+        self._speed[rows] = 0.0
+        self._drift.reset(np.asarray(rows))
+
+    def _take_start(self, row: int, number: int) -> None:
+        """Put a machine into one of its random poses."""
+        if (row, number) not in self._ready:
+            start = self._pose.copy()
+            start[self._columns] = self._starts[row, number]
+            self.batch.reset(start, rows=[row])
+            self._ready[row, number] = self.batch.state(row)
+        self.batch.restore(row, self._ready[row, number])
 
     def step(self, action: Any, rng: Generator) -> None:
-        """Hold actions, (n, K), for a decision."""
-        command = np.zeros((len(self.batch), len(self._pose)))
-        command[:, self._columns] = 100.0 * np.clip(action, -1.0, 1.0)
-        after = self.batch.step(command)[:, self._columns]
+        """Hold actions, (n, K), for a decision; actions beyond 1 are full commands."""
+        command = 100.0 * np.asarray(action, float)
+        if command.shape != self._angle.shape or not np.isfinite(command).all():
+            joints = len(self.joints)
+            raise ValueError(f"an action needs {joints} finite numbers per machine")
+        self.batch.hold(command)
+        after = self.batch.driven_angle
         error = self._drift.step(after - self._true, rng)
         self._true = after
-        self._speed = (after + error - self._angle) / self.period
-        self._angle = after + error
+        read = after + error
+        self._speed = (read - self._angle) / self.period
+        self._angle = read
 
     def observe(self, rng: Generator) -> Floats:
         """Return what the sensors read, (n, 3 K)."""
-        noise = self._drift.noise(rng)
-        from_middle = (self._angle + noise - self._middle) / self._half
-        to_target = (self.target - self._angle - noise) / self._half
-        speed = self._speed / self._half
-        observation = np.nan_to_num(np.hstack([from_middle, to_target, speed]))
-        return observation.clip(-LARGEST, LARGEST).astype(np.float32)
+        read = self._angle + self._drift.noise(rng)
+        seen = np.empty((len(read), 3, len(self.joints)))
+        seen[:, 0] = read - self._middle
+        seen[:, 1] = self.target - read
+        seen[:, 2] = self._speed
+        seen /= self._half
+        if self.batch.failed.any():
+            np.nan_to_num(seen, copy=False)
+        seen.clip(-LARGEST, LARGEST, out=seen)
+        return seen.reshape(len(read), -1).astype(np.float32)
 
     @property
     def reward(self) -> Array:
         """Minus the mean distance to the targets in halves of the range, (n,)."""
-        # a machine that diverged counts as 10 rad away
-        away = np.abs(np.nan_to_num(self.target - self._angle, nan=10.0))
-        return -np.mean(away / self._half, axis=1)
-
-    @property
-    def diverged(self) -> Any:
-        """Machines whose simulation diverged, (n,)."""
-        return np.isnan(self._true).any(axis=1)
+        away = np.abs(self.target - self._angle)
+        if self.batch.failed.any():
+            # a machine that diverged counts as 10 rad away
+            np.nan_to_num(away, copy=False, nan=10.0)
+        return away @ (-1.0 / (len(self.joints) * self._half))
 
 
 def _opened(source: Any) -> IdentifiedModel:
@@ -233,16 +248,16 @@ class Env(gymnasium.Env[Floats, Floats]):
             hint = f"0 to {count - 1}: name more with draws="
             raise SettingsError(f"is {number}", "draw", hint)
         self._now = self._machine(number)
-        self._now.begin(0, self.np_random, options)
+        self._now.begin([0], self.np_random, options)
         return self._now.observe(self.np_random)[0], {"draw": number}
 
     def step(self, action: Floats) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
         """Hold an action for one decision."""
         now = self._now
-        now.step(action[None], self.np_random)
+        now.step(np.asarray(action)[None], self.np_random)
         over = bool(now.batch.time[0] >= self._seconds - 1e-9)
         observation = now.observe(self.np_random)[0]
-        return observation, float(now.reward[0]), bool(now.diverged[0]), over, {}
+        return observation, float(now.reward[0]), bool(now.batch.failed[0]), over, {}
 
     @property
     def plant(self) -> Plant:
@@ -318,8 +333,8 @@ class VectorEnv(GymnasiumVectorEnv[Floats, Floats, Any]):
             self._np_random = np.random.default_rng(seed)  # pyright: ignore[reportArgumentType]
         options = options or {}
         every = np.ones(self.num_envs, dtype=bool)
-        for row in np.flatnonzero(options.get("reset_mask", every)).tolist():
-            self._machines.begin(row, self.np_random, options)
+        rows = np.flatnonzero(options.get("reset_mask", every)).tolist()
+        self._machines.begin(rows, self.np_random, options)
         self._over[:] = False
         return self._machines.observe(self.np_random), {}
 
@@ -329,10 +344,9 @@ class VectorEnv(GymnasiumVectorEnv[Floats, Floats, Any]):
         # what was over has no step: its action is not taken, and it begins anew
         began = self._over
         machines.step(actions, self.np_random)
-        for row in np.flatnonzero(began).tolist():
-            machines.begin(row, self.np_random, {})
+        machines.begin(np.flatnonzero(began).tolist(), self.np_random, {})
         reward = np.where(began, 0.0, machines.reward)
-        terminated = machines.diverged & ~began
+        terminated = machines.batch.failed & ~began
         truncated = (machines.batch.time >= self._seconds - 1e-9) & ~began
         self._over = terminated | truncated
         return machines.observe(self.np_random), reward, terminated, truncated, {}

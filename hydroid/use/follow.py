@@ -68,7 +68,7 @@ class Followed:
 
     Attributes:
         log: the commands [%], with the wished angles; it may begin with a rest of
-            `lead_s`.
+            `lead_s`. A simulation of it starts where the path begins.
         angle: that the commands give [rad], shape (T, J).
         half: of the 95 % band of this angle [rad], shape (T,), by joint (number, from
             1).
@@ -86,6 +86,18 @@ class Followed:
     lead_s: float
     joints: tuple[int, ...]
     turns: int
+
+    @property
+    def recording(self) -> Log:
+        """The log as a file has it: until the first command the joints stand where the
+        path begins.
+
+        A file's start pose is the mean of its angles before the first command; a path
+        that begins slowly is already on its way by then.
+        """
+        angle = self.log.angle.copy()
+        angle[: self.log.first_command + 1] = angle[0]
+        return replace(self.log, angle=angle)
 
     def error(self, joint: int) -> Array:
         """Return wished minus predicted angle of a joint (number, from 1) [rad], shape
@@ -126,7 +138,7 @@ def follow(model: IdentifiedModel, path: Log, *, payload: float = 0.0) -> Follow
     tracker = _Tracker(plant, wished, lags)
     missed += tracker.missed()
     command, angle, turns = tracker.learn()
-    log = replace(wished, command=command)
+    log = replace(wished, command=command, rest=0)
     outputs = [joint - 1 for joint in model.settings.outputs]
     bands = prediction_bands(model, log, angle[:, outputs])
     half = {joint: band.half for joint, band in bands.items() if joint in plant.joints}

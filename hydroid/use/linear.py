@@ -102,12 +102,20 @@ def linearise(plant: Plant, command: Array) -> LinearArm:
     """Return a plant of stage 2 where it stands, as a linear system about commands that
     are held [%], (J,).
 
+    Joints without a command stand, and are no part of it.
+
     Raises:
-        SettingsError: a command is beyond 100 %, or within a dead band, which has no
-            slope.
+        SettingsError: no joint has a command, or one is beyond 100 % or within a dead
+            band, which has no slope.
     """
-    columns: Index = np.array(plant.joints) - 1
-    joints: list[int] = columns.tolist()
+    joints = [joint - 1 for joint in plant.joints if command[joint - 1] != 0.0]
+    if not joints:
+        what = "no joint has a command: around 0 is the dead band, which has no slope"
+        hint = (
+            "name the commands of joints that move, such as boom=30; the others stand"
+        )
+        raise SettingsError(what, "--at", hint)
+    columns: Index = np.array(joints)
     names = tuple(plant.names[joint] for joint in joints)
     for joint in joints:
         _refuse_without_slope(plant, joint, command)
@@ -169,16 +177,9 @@ def _state_names(
 
 
 def _refuse_without_slope(plant: Plant, joint: int, command: Array) -> None:
-    """Refuse the command of a joint (0-based) that is none, or about which its speed
-    has no slope."""
+    """Refuse the command of a joint (0-based) about which its speed has no slope."""
     name = plant.names[joint]
     value = float(command[joint])
-    if value == 0.0:
-        what = (
-            f"{name} has no command: around 0 is the dead band, where nothing is linear"
-        )
-        hint = "name a command of every joint, such as boom=30"
-        raise SettingsError(what, "--at", hint)
     # NaN is not within them either
     if not abs(value) <= 100.0:
         what = f"the command of {name} is {value:g} %"

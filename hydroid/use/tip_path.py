@@ -18,9 +18,15 @@ from hydroid.errors import LogError
 from hydroid.log import Log
 from hydroid.log.table import Signal, Table
 from hydroid.settings.arm import Arm
+from hydroid.settings.log import LogSettings
+from hydroid.units import UNITS
 
 COLUMNS = ("x_m", "y_m", "z_m")
 """columns of a file that hold the tip's position [m], in the axes of the arm's model"""
+FROM_START = ("dx_m", "dy_m", "dz_m")
+"""the same, from where the tip starts"""
+TIME = "time_s"
+"""column of times [s] that a path may have instead of that of the logs"""
 REACHED = 1e-6
 """distance from a point at which the tip counts as there [m]"""
 UNREACHED = 1e-3
@@ -129,28 +135,28 @@ class TipKinematics:
 
 
 def holds_tip(table: Table) -> bool:
-    """Whether a file holds the tip's position.
+    """Whether a file holds positions of the tip, in `COLUMNS` or `FROM_START`.
 
-    Raises LogError: it holds some of its columns only.
+    Raises LogError: it holds some of these columns only.
     """
-    missing = [name for name in COLUMNS if name not in table.names]
-    if not missing:
-        return True
-    if len(missing) < len(COLUMNS):
-        hint = f"a path of the tip takes {', '.join(COLUMNS)}"
-        raise LogError(f"column {missing[0]} is missing", table.source, hint)
+    for columns in (COLUMNS, FROM_START):
+        missing = [name for name in columns if name not in table.names]
+        if not missing:
+            return True
+        if len(missing) < len(columns):
+            hint = f"a path of the tip takes {', '.join(columns)}"
+            raise LogError(f"column {missing[0]} is missing", table.source, hint)
     return False
 
 
-def tip_path(
-    table: Table, time: str, period: float, tip: TipKinematics, start: Array
-) -> Log:
+def tip_path(table: Table, logs: LogSettings, tip: TipKinematics, start: Array) -> Log:
     """Return the joint angles along a path of the tip, without commands.
 
     Args:
-        table: with a column of times [s] and `COLUMNS`.
-        time: name of the column of times.
-        period: of the samples [s]; the tip moves on a line between two rows.
+        table: with `COLUMNS` or `FROM_START`, and times in `TIME` or as the logs have
+            them.
+        logs: how the logs of the arm have their times, and the period of the samples;
+            the tip moves on a line between two rows.
         tip: of the arm.
         start: pose from which the first point is sought [rad], shape (J,).
 
@@ -158,13 +164,39 @@ def tip_path(
         LogError: a column of times is missing, a cell holds no number, times do not
             increase, or a point cannot be reached.
     """
+    first = tip.place(start)
+    absolute = COLUMNS[0] in table.names
+    positions = COLUMNS if absolute else FROM_START
+    since, values = _rows(table, logs, positions)
+    period = logs.period_s
+    samples = int(np.floor((since[-1] - since[0]) / period + 1e-6)) + 1
+    at = np.arange(samples, dtype=float) * period
+    points = np.empty((samples, 3))
+    for axis in range(3):
+        points[:, axis] = np.interp(at, since - since[0], values[:, axis])
+    if not absolute:
+        points += first
+    angle, off = tip.angles(points, start)
+    if off.max() > UNREACHED:
+        raise _unreached(table.source, at + since[0], points, off, first)
+    return Log(str(table.source), at, np.zeros_like(angle), angle, period)
+
+
+def _rows(
+    table: Table, logs: LogSettings, positions: Sequence[str]
+) -> tuple[Array, Array]:
+    """Return the times of a path [s], shape (n,), and its positions [m], shape (n,
+    3)."""
+    time = TIME
+    factor = 1.0
+    if TIME not in table.names:
+        time = logs.time.column
+        factor = UNITS[logs.time.unit].factor
     if time not in table.names:
-        raise LogError(
-            f"column {time} is missing",
-            table.source,
-            "a path of the tip takes times [s]",
-        )
-    signals = [Signal(time, "time"), *(Signal(name, "position") for name in COLUMNS)]
+        hint = "a path of the tip takes times [s]"
+        raise LogError(f"column {TIME} is missing", table.source, hint)
+    signals = [Signal(time, "time", gain=factor)]
+    signals += [Signal(name, "position") for name in positions]
     recording = table.read(signals)
     values = recording.values
     lines = np.arange(len(values)) + 1 if table.lines is None else table.lines
@@ -177,23 +209,11 @@ def tip_path(
     back = np.flatnonzero(np.diff(recording.time) <= 0)
     if len(back):
         where = f"{table.source}, {word} {lines[back[0] + 1]}, column {time}"
-        raise LogError(
-            "times do not increase", where, "each row must be later than the row before"
-        )
+        hint = "each row must be later than the row before"
+        raise LogError("times do not increase", where, hint)
     if len(values) < 2:
         raise LogError("holds no path", table.source, "give two rows at least")
-    since = recording.time - recording.time[0]
-    samples = int(np.floor(since[-1] / period + 1e-6)) + 1
-    at = np.arange(samples, dtype=float) * period
-    points = np.empty((samples, 3))
-    for axis in range(3):
-        points[:, axis] = np.interp(at, since, values[:, 1 + axis])
-    angle, off = tip.angles(points, start)
-    if off.max() > UNREACHED:
-        raise _unreached(
-            table.source, at + recording.time[0], points, off, tip.place(start)
-        )
-    return Log(str(table.source), at, np.zeros_like(angle), angle, period)
+    return recording.time, values[:, 1:]
 
 
 def _unreached(
@@ -207,7 +227,7 @@ def _unreached(
         f"the tip cannot reach {_spelt(points[worst])} at {time[worst]:.4g} s: "
         f"it stays {off[worst]:.3g} m off, the most of {missed} such samples"
     )
-    hint = f"only joints with commands move; in the start pose the tip is at {_spelt(first)}"
+    hint = f"only joints with commands move; the tip starts at {_spelt(first)}"
     return LogError(what, source, hint)
 
 

@@ -177,9 +177,37 @@ def test_correlations_are_those_of_the_covariance_and_the_strongest_pair_is_name
     section = correlation_section(SETTINGS, SUMMARY.changed({"covariance": known}))
     assert section is not None
     assert section.answer.startswith("strongest: ")
-    drawn(section.plots[0].make())
+    drawn(section.tabs[0].make())
     alone = known.changed({"parameters": ("K",), "root": ((1.0,),), "scale": (1.0,)})
     assert correlation_section(SETTINGS, SUMMARY.changed({"covariance": alone})) is None
+
+
+def test_too_many_parameters_for_one_map_have_one_for_each_joint():
+    """With those of other joints that they trade with."""
+    count = 42
+    names = tuple(f"p{i}" for i in range(count))
+    joints = [2 if i < 21 else 3 for i in range(count)]
+    rows = np.random.default_rng(1).normal(size=(2000, count))
+    rows[:, 30] = rows[:, 5] + 0.3 * rows[:, 30]
+    root = np.linalg.qr(rows, mode="r")
+    known = Covariance(
+        parameters=names,
+        scale=(1.0,) * count,
+        root=tuple(map(tuple, root.tolist())),
+        quantile=2.0,
+    )
+    stated = SETTINGS.parameters["K"]
+    parameters = {
+        name: stated.changed({"joints": (joint,)})
+        for name, joint in zip(names, joints, strict=True)
+    }
+    settings = SETTINGS.changed({"parameters": parameters})
+    section = correlation_section(settings, SUMMARY.changed({"covariance": known}))
+    assert section is not None
+    assert [tab.button for tab in section.tabs] == ["shoulder", "elbow"]
+    (panel,) = section.tabs[0].make().panels
+    assert set(panel.rows) == {*names[:21], "p30"}
+    drawn(section.tabs[0].make())
 
 
 def test_a_parameter_is_one_line_of_words_with_its_interval():

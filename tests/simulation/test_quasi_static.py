@@ -76,6 +76,8 @@ def test_without_load_the_speed_is_opening_times_root_of_the_pressure(simulated)
         PUMP,
         PUMP | {"pump_limit": 8e5},
         PUMP | {"draw_a": 0.3, "draw_b": 0.8},
+        PUMP | {"pump_exponent": 3.0},
+        PUMP | {"pump_bypass": 0.8},
         {"compensation": 1.0},
         PUMP | {"compensation": 0.5},
     ],

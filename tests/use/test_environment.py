@@ -83,6 +83,31 @@ def test_a_vector_of_machines_is_one_call(model):
     np.testing.assert_array_equal(several.reset(seed=3)[0], first)
 
 
+def test_a_machine_that_diverges_ends_its_episode(model):
+    """No observation is NaN, and the next episode is as any other."""
+    env = Env(model)
+    env.reset(seed=0)
+    action = np.zeros(2, np.float32)
+    env.plant.data.qpos[:] = np.nan
+    observation, reward, terminated, truncated, _ = env.step(action)
+    assert (terminated, truncated) == (True, False)
+    assert env.observation_space.contains(observation)
+    assert reward < -1.0
+    env.reset()
+    observation, reward, terminated, *_ = env.step(action)
+    assert not terminated
+    assert env.observation_space.contains(observation)
+    assert -1.0 < reward <= 0.0
+
+
+@pytest.mark.parametrize("action", [[[np.nan, 0.0]], [[0.5]], [0.5, 0.5]])
+def test_an_action_that_is_none_is_refused(model, action):
+    one = VectorEnv(model, 1, draws=False)
+    one.reset(seed=0)
+    with pytest.raises(ValueError, match="2 finite numbers per machine"):
+        one.step(np.array(action, np.float32))
+
+
 def test_draws_need_a_fit(model):
     with pytest.raises(RunError, match="no covariance"):
         Env(model, draws=2)

@@ -254,7 +254,7 @@ def test_an_fmu_steps_as_the_plant_does(model, tmp_path):
         ({"to": "urdf"}, "--robot robot.urdf"),
         ({"to": "urdf", "robot": "no.urdf"}, r"no\.urdf"),
         ({"to": "urdf", "robot": "other.urdf"}, "none of the links"),
-        ({"to": "linear"}, "shoulder has no command: around 0 is the dead band"),
+        ({"to": "linear"}, "no joint has a command: around 0 is the dead band"),
         ({"to": "linear", "at": "boom=3"}, "no joint 'boom'"),
         ({"to": "linear", "at": "shoulder=x"}, "is no command"),
         ({"to": "linear", "at": "shoulder=nan"}, "is nan %; allowed are -100 to 100"),

@@ -118,6 +118,12 @@ def test_the_command_line_writes_a_log_that_simulates_to_the_path(tmp_path: Path
     np.testing.assert_allclose(
         again.angle[:, [1, 2]], wished.angle[:, [1, 2]], atol=np.radians(0.1)
     )
+    # as a log and as a file it starts where the path begins, to the last digit written
+    for commands in (out, result.result.log):
+        played = hydroid.simulate(commands, fit=one).log
+        np.testing.assert_allclose(
+            played.angle[:, [1, 2]], result.result.angle[:, [1, 2]], atol=1e-6
+        )
     rows = result.plain()["joints"]
     assert [row["name"] for row in rows] == ["shoulder", "elbow"]
     assert max(row["rms_deg"] for row in rows) < 0.1

@@ -102,7 +102,6 @@ def test_it_reads_as_json_with_names_and_units():
 @pytest.mark.parametrize(
     ("shoulder", "says"),
     [
-        (0.0, "shoulder has no command"),
         (20.0, "shoulder at 20 % is within its dead band.*beyond 25.5 % it moves"),
         (-25.2, "shoulder at -25.2 % is within its dead band"),
         (100.1, "the command of shoulder is 100.1 %; allowed are -100 to 100 %"),
@@ -114,6 +113,21 @@ def test_a_command_about_which_no_speed_has_a_slope(shoulder: float, says: str):
     plant = made("quasi-static", dead_band=25.0)
     with pytest.raises(SettingsError, match=says):
         linearise(plant, np.array([0, shoulder, 40.0, 0, 0, 0, 0]))
+
+
+def test_joints_without_a_command_stand():
+    """The others are a system of their own, with the slopes that the plant has so."""
+    plant = made("quasi-static", opening_lag=0.1)
+    command = np.array([0, 0, 40.0, 0, 0, 0, 0])
+    linear = linearise(plant, command)
+    assert linear.joints == ("elbow",)
+    assert linear.b.shape == (len(linear.states), 1)
+    more = plant.speeds({"elbow": 40.5})[2]
+    less = plant.speeds({"elbow": 39.5})[2]
+    slope = linear.response(0, np.array([0.05]))[0]
+    assert abs(slope) == pytest.approx(abs(more - less), rel=0.03)
+    with pytest.raises(SettingsError, match="no joint has a command"):
+        linearise(plant, np.zeros(7))
 
 
 def test_the_slope_at_full_command_is_that_from_below():

@@ -89,9 +89,41 @@ def test_an_arm_without_a_site_is_led_by_the_end_of_its_last_link(tmp_path: Path
     file = write(tmp_path / "tip.csv", wished)
     followed = hydroid.follow(file, fit=bare, out=tmp_path / "commands.csv")
     assert followed.content["tip"] == "the end of jaw_left"
-    assert "The tip is the end of jaw_left." in followed.lines
+    (line_,) = [one for one in followed.lines if str(one).startswith("The tip is ")]
+    away = followed.content["tip_away_mm"]
+    assert line_ == (
+        "The tip is the end of jaw_left. By the model it stays within "
+        f"{away:.3g} mm of the path."
+    )
+    along = followed.result
+    wish = np.array([tip.place(pose) for pose in along.log.angle])
+    had = np.array([tip.place(pose) for pose in along.angle])
+    off = np.linalg.norm(wish - had, axis=1)
+    assert away == pytest.approx(1e3 * off.max())
+    assert 0.0 < away < 5.0
     played = hydroid.simulate(tmp_path / "commands.csv", fit=bare).log
     np.testing.assert_allclose(tip.place(played.angle[-1]), wished[-1, 1:], atol=2e-3)
+
+
+@pytest.mark.parametrize("relative", [True, False])
+@pytest.mark.parametrize(
+    ("time", "unit", "factor"), [("time_s", "s", 1.0), ("t", "ms", 1e3)]
+)
+def test_a_path_counts_from_the_start_or_from_the_base_in_the_logs_time_or_seconds(
+    tmp_path: Path, relative: bool, time: str, unit: str, factor: float
+):
+    changes = {"outputs": [2, 3], "log.time": {"column": "t", "unit": unit}}
+    one = made_model(EARLY, changes, hydraulics=EARLY_SETTINGS)
+    arm, start = one.settings.arm, one.settings.arm.pose("study")
+    place, by = forward(arm, start), np.array([0.03, 0.0, 0.05])
+    rows = line(0.0 * place if relative else place, by, seconds=6.0)
+    rows[:, 0] *= factor if time == "t" else 1.0
+    names = "dx_m,dy_m,dz_m" if relative else "x_m,y_m,z_m"
+    file = write(tmp_path / "tip.csv", rows, f"{time},{names}")
+    path = hydroid.follow(file, fit=one).result.log
+    assert path.time[-1] == pytest.approx(6.0, abs=0.3)
+    np.testing.assert_allclose(forward(arm, path.angle[0]), place, atol=1e-5)
+    np.testing.assert_allclose(forward(arm, path.angle[-1]), place + by, atol=1e-5)
 
 
 def beyond(place):
@@ -125,6 +157,7 @@ def without_number(place):
         ),
         (without_number, "time_s,x_m,y_m,z_m", "line 6, column y_m: holds no number"),
         (beyond, "time_s,x_m,y_m,height", "column z_m is missing"),
+        (beyond, "time_s,dx_m,dy_m,height", "column dz_m is missing"),
         (beyond, "seconds,x_m,y_m,z_m", "column time_s is missing"),
     ],
 )

@@ -16,7 +16,7 @@ from pathlib import Path
 from numpy.random import Generator
 
 import hydroid
-from hydroid.run.record import Record, load_record
+from hydroid.run.record import FinishedRun, load_record
 
 LEAVABLE = ("pilot", "lag", "slope", "bend", "compensation", "D")
 """parameters of a joint in the settings that `hydroid init` writes; one that is not
@@ -58,7 +58,7 @@ def followed(folder: Path, rng: Generator) -> Iterator[Followed]:
         yield Followed(**json.loads(store.read_text()))
 
 
-def clear_terms(complete: Record) -> list[str]:
+def clear_terms(complete: FinishedRun) -> list[str]:
     """Names of the terms that a complete fit has found."""
     estimate = complete.summary.estimate
     every = [f"{kind}_{joint.name}" for joint in complete.verdict for kind in LEAVABLE]

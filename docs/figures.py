@@ -27,7 +27,7 @@ from hydroid.fitting.validation import HORIZONS, Prediction
 from hydroid.fitting.verdict import JUDGED, THE_FIT
 from hydroid.joint_verdict import Outcome
 from hydroid.reporting.verdict_table import WHOLE, column_of, verdict_table
-from hydroid.run.record import Record, load_record
+from hydroid.run.record import FinishedRun, load_record
 from hydroid.words import listed, number
 
 ROOT = Path(__file__).parents[1]
@@ -105,7 +105,7 @@ def _machines(runs: Path, former: Figures) -> Figures:
     return machines
 
 
-def _joints(record: Record) -> Figures:
+def _joints(record: FinishedRun) -> Figures:
     """Return what the verdict says of each joint, and the mean absolute errors
     [deg]."""
     joints, fitted, unseen = (

@@ -28,8 +28,8 @@ class Quantity(NamedTuple):
             quantity that is not free.
         limits: least and largest value; None: from 0 where 0 is the default, or else
             above 0.
-        of: the kind of actuator that alone has it, as `Joint.has` tells them apart; "":
-            all have.
+        of: what alone has it: the pump that all actuators share, or a kind of actuator,
+            as `Joint.has` tells them apart; "": all have.
         optional: whether null is allowed beside a number; where it is the default, it
             is.
     """
@@ -41,7 +41,7 @@ class Quantity(NamedTuple):
     note: str = ""
     span: tuple[float, float] | None = None
     limits: tuple[float, float] | None = None
-    of: Literal["", "cylinder", "stand-in"] = ""
+    of: Literal["", "pump", "cylinder", "stand-in"] = ""
     optional: bool = False
 
     @property
@@ -68,7 +68,7 @@ class Quantity(NamedTuple):
     @property
     def of_the_pump(self) -> bool:
         """Whether all actuators share it, since they have one pump."""
-        return self.name.startswith("pump_") or self.name == "line_volume"
+        return self.of == "pump"
 
     def each(self) -> Iterator["Quantity"]:
         """Yield the quantity itself, or its two sides."""

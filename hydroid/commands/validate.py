@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from hydroid.fitting.validation import Prediction
     from hydroid.fitting.verdict import Baselines
     from hydroid.joint_verdict import JointVerdict
-    from hydroid.run.record import Record
+    from hydroid.run.record import FinishedRun
 
 
 @command
@@ -261,7 +261,7 @@ def report(
     merge: bool = False,
     figures: bool = False,
     out: "Source | None" = None,
-) -> "Result[tuple[Record, ...]]":
+) -> "Result[tuple[FinishedRun, ...]]":
     """Draw the reports of finished runs anew, or merge runs of one fit with different
     seeds.
 
@@ -299,7 +299,7 @@ def report(
 
 def _merged(
     folders: Sequence[str], out: "Source | None"
-) -> "Result[tuple[Record, ...]]":
+) -> "Result[tuple[FinishedRun, ...]]":
     """Return median and spread of the estimates of one fit with different seeds."""
     from hydroid.reporting.merged_report import merged_tables
     from hydroid.run.record import read_runs

@@ -1,5 +1,5 @@
 """Channels, the signals that are compared, one of one log each; and objectives: norms
-of their errors (article 3.1) over segments of the record (3.2 and figure 18).
+of their errors (article 3.1) over segments of the log (3.2 and figure 18).
 
 The error of equation (17), ε = y - ŷ, is an array (n, T): n candidates, T samples.
 Equation (18) is a *mean* norm, (1/N Σ|ε|^p)^(1/p): the mean absolute error for p = 1,
@@ -9,7 +9,7 @@ Equation (19) divides by "the p-norm of the measured data". We take the same mea
 (18) of y, so that (19) has no unit and means the same for short and long segments. A
 sum without 1/N would differ by a constant factor N^(-1/p) per segment.
 
-A segment is a pair of sample indices [first, end). Segments cover the record without
+A segment is a pair of sample indices [first, end). Segments cover the log without
 overlap, and none is empty.
 """
 
@@ -184,7 +184,7 @@ def segment_objectives(
 
 
 def segment_bounds(samples: int, segments: int) -> Ints:
-    """Cut a record of so many samples into segments of equal length: [first, end) of
+    """Cut a log of so many samples into segments of equal length: [first, end) of
     each, shape (S, 2)."""
     if segments > samples:
         raise SettingsError(

@@ -8,7 +8,7 @@ import numpy as np
 from hydroid.joint_verdict import JointVerdict
 from hydroid.reporting.page import Cell, Table
 from hydroid.reporting.parameters_report import status
-from hydroid.run.record import Record
+from hydroid.run.record import FinishedRun
 
 SPREAD = (
     "name",
@@ -22,7 +22,7 @@ SPREAD = (
 )
 
 
-def merged_tables(runs: Sequence[Record]) -> dict[str, Table]:
+def merged_tables(runs: Sequence[FinishedRun]) -> dict[str, Table]:
     """Return the tables `spread` and `runs` of runs that differ in their seeds only,
     the best run first.
 
@@ -72,7 +72,7 @@ def _error_name(verdict: JointVerdict) -> str:
     return f"error of {verdict.name}"
 
 
-def _errors(run: Record) -> dict[str, float | None]:
+def _errors(run: FinishedRun) -> dict[str, float | None]:
     """Return each joint's error on the fitted logs [deg], of one that slides [mm].
 
     None: there is none.

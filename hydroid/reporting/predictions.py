@@ -42,7 +42,7 @@ from hydroid.reporting.verdict_table import (
     outside,
     verdict_sections,
 )
-from hydroid.run.record import Record, load_record
+from hydroid.run.record import FinishedRun, load_record
 from hydroid.settings.arm import Arm
 from hydroid.words import listed
 
@@ -108,38 +108,38 @@ def write_report(run: str | Path, *, figures: bool = False) -> Path:
     return folder / f"{page.name}.html"
 
 
-def fit_page(record: Record) -> Page:
+def fit_page(run: FinishedRun) -> Page:
     """Return the page of a fit, with the unseen logs that it was validated on."""
-    settings = record.settings
-    fits = {str(record.summary.final): record.verdict}
-    shown = [*record.validations.values(), *record.result.fitted]
+    settings = run.settings
+    fits = {str(run.summary.final): run.verdict}
+    shown = [*run.validations.values(), *run.result.fitted]
     versions = {
-        name: str(record.identity[name]) for name in SOFTWARE if name in record.identity
+        name: str(run.identity[name]) for name in SOFTWARE if name in run.identity
     }
     return Page(
         "report",
         title=f"Fit of {settings.arm.name}, stage {2 if settings.stage == 'hyd' else 1}",
         lead=lead(fits),
-        sections=_fit_sections(record, fits, shown),
-        warnings=_fit_warnings(record),
+        sections=_fit_sections(run, fits, shown),
+        warnings=_fit_warnings(run),
         versions=versions,
-        data=_search_data(record),
+        data=_search_data(run),
         files={
-            "parameters": parameter_table(settings, record.summary),
+            "parameters": parameter_table(settings, run.summary),
             "errors": error_table(shown, settings.arm, one_fit=True),
         },
-        made_from=_made_from(record),
+        made_from=_made_from(run),
     )
 
 
 def _fit_sections(
-    record: Record, fits: Verdicts, shown: Sequence[Prediction]
+    run: FinishedRun, fits: Verdicts, shown: Sequence[Prediction]
 ) -> tuple[Section, ...]:
     """Return the sections of the page of a fit, those that are folded last."""
-    settings = record.settings
-    summary = record.summary
-    fitted = record.result.fitted
-    step = next_step(summary, record.verdict, record.folder, fitted)
+    settings = run.settings
+    summary = run.summary
+    fitted = run.result.fitted
+    step = next_step(summary, run.verdict, run.folder, fitted)
     sections = (
         *verdict_sections(fits, step),
         *prediction_sections(shown, settings.arm, fits),
@@ -153,51 +153,51 @@ def _fit_sections(
         parameter_section(settings, summary, *further_findings(summary)),
         prior_section(settings, summary),
         correlation_section(settings, summary),
-        search_section(record),
+        search_section(run),
     )
     return tuple(sorted(filter(None, sections), key=lambda section: section.folded))
 
 
-def _fit_warnings(record: Record) -> tuple[str, ...]:
+def _fit_warnings(run: FinishedRun) -> tuple[str, ...]:
     """Return what must be read before the estimate of a fit is used."""
     warned = list[str]()
-    unseen = [*record.validations.values()]
+    unseen = [*run.validations.values()]
     apart = [Path(p.log.source).name for p in unseen if p.apart]
     if apart:
         what = f"The verdict does not count {listed(apart)}: validated with --apart."
         warned.append(what)
-    warned += map(str, standing_out(unseen, record.verdict, record.folder))
-    warned += outside(record.verdict)
-    for finding in warnings(record.summary):
-        warned.append(str(in_words(finding, record.settings)))
+    warned += map(str, standing_out(unseen, run.verdict, run.folder))
+    warned += outside(run.verdict)
+    for finding in warnings(run.summary):
+        warned.append(str(in_words(finding, run.settings)))
     return tuple(warned)
 
 
-def _search_data(record: Record) -> dict[str, str]:
+def _search_data(run: FinishedRun) -> dict[str, str]:
     """Return the history and the Pareto set of the search as CSV with every bit, in its
     units: rad unless relative."""
-    theta, objectives = record.result.front
-    unit = "" if record.settings.objective.relative else "_rad"
-    names = [*next(iter(record.summary.estimates.values())).values]
+    theta, objectives = run.result.front
+    unit = "" if run.settings.objective.relative else "_rad"
+    names = [*next(iter(run.summary.estimates.values())).values]
     names += [f"segment_{number}{unit}" for number in range(1, objectives.shape[1])]
     names.append(f"overall{unit}")
     candidates = np.column_stack([theta, objectives]).tolist()
     return {
-        "history.csv": csv_text([HISTORY, *record.result.history.tolist()]),
+        "history.csv": csv_text([HISTORY, *run.result.history.tolist()]),
         "pareto.csv": csv_text([names, *candidates]),
     }
 
 
-def _made_from(record: Record) -> tuple[str, ...]:
+def _made_from(run: FinishedRun) -> tuple[str, ...]:
     """Return the logs, settings, seed and date of a fit, for the foot of its page."""
-    logs = [prediction.log.source for prediction in record.result.fitted]
-    settings = f"settings: config.yaml in {record.folder}, model {record.summary.final}"
-    if record.settings.stage == "hyd":
-        settings += f" ({record.settings.simulation.model})"
-    seconds = sum(prediction.log.duration for prediction in record.result.fitted)
-    sampled = f"{seconds:.0f} s at {1.0 / record.settings.log.period_s:.3g} Hz"
+    logs = [prediction.log.source for prediction in run.result.fitted]
+    settings = f"settings: config.yaml in {run.folder}, model {run.summary.final}"
+    if run.settings.stage == "hyd":
+        settings += f" ({run.settings.simulation.model})"
+    seconds = sum(prediction.log.duration for prediction in run.result.fitted)
+    sampled = f"{seconds:.0f} s at {1.0 / run.settings.log.period_s:.3g} Hz"
     fitted_to = f"Fitted to {_log_list(logs)}: {sampled}"
-    made_from = [fitted_to, settings, f"seed {record.seed}"]
-    if date := record.identity.get("finished"):
+    made_from = [fitted_to, settings, f"seed {run.seed}"]
+    if date := run.identity.get("finished"):
         made_from.append(str(date))
     return tuple(made_from)

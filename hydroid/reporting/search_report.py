@@ -9,7 +9,7 @@ import numpy as np
 from hydroid.arrays import Array
 from hydroid.reporting.chart import SERIES, Chart, Mark, Panel, finite
 from hydroid.reporting.page import Plot, Section
-from hydroid.run.record import Effort, Record
+from hydroid.run.record import Effort, FinishedRun
 from hydroid.settings.problem import ObjectiveSettings
 from hydroid.words import two_digits
 
@@ -17,24 +17,24 @@ _NORMS = {1: "mean absolute error", 2: "rms error", "inf": "largest error"}
 """names of the objective's norms"""
 
 
-def search_section(record: Record) -> Section:
+def search_section(run: FinishedRun) -> Section:
     """Return the section of a run's search, folded.
 
     Only a search over generations has curves of it.
     """
-    result = record.result
-    objective = record.settings.objective
+    result = run.result
+    objective = run.settings.objective
     points = list[str]()
     if len(result.history):
         _, tried, simulated, diverged = map(int, result.history[-1, :4])
         points.append(
-            f"{record.settings.search.algorithm}: {tried:,} candidates, "
+            f"{run.settings.search.algorithm}: {tried:,} candidates, "
             f"{simulated:,} simulated, {diverged:,} of them diverged."
         )
-    points += [_refined(record, effort) for effort in result.refinements]
+    points += [_refined(run, effort) for effort in result.refinements]
     plots = list[Plot]()
     if len(result.history) > 1:
-        final = str(record.summary.final)
+        final = str(run.summary.final)
         segments = {final: result.segments[final], **result.segments}
         draw = partial(learning, result.history, objective)
         plots.append(Plot("learning", "Best candidate so far.", draw))
@@ -45,7 +45,7 @@ def search_section(record: Record) -> Section:
         caption = (
             "Where each start of the search ended: those at 0 found the best result."
         )
-        draw = partial(starts, record.settings.arm.joint_names, result.starts)
+        draw = partial(starts, run.settings.arm.joint_names, result.starts)
         plots.append(Plot("starts", caption, draw))
     simulations = sum(effort.simulations for effort in result.refinements)
     answer = f"{simulations:,} simulations of the refinement" if simulations else ""
@@ -58,13 +58,13 @@ def search_section(record: Record) -> Section:
     )
 
 
-def _refined(record: Record, effort: Effort) -> str:
+def _refined(run: FinishedRun, effort: Effort) -> str:
     """Say what a refinement took, and what it brought."""
     said = (
         f"{effort.name}: {effort.iterations} iterations, "
         f"{effort.simulations:,} simulations; {effort.ending}."
     )
-    rise, error = record.summary.estimates[effort.name].gained or (None, None)
+    rise, error = run.summary.estimates[effort.name].gained or (None, None)
     if rise is None or error is None:
         return said
     better = f"by {two_digits(rise)} ± {two_digits(error)}"
@@ -111,7 +111,7 @@ def pareto(
     """Draw each candidate of the Pareto set, and the estimates, as a line over the
     segments' objectives.
 
-    `objectives`, shape (n, S + 1), end with that over the whole record; the 100 lowest
+    `objectives`, shape (n, S + 1), end with that over all logs; the 100 lowest
     there are drawn.
     """
     lowest = np.argsort(objectives[:, -1], kind="stable")[:100]

@@ -90,7 +90,7 @@ class FitRecord:
 
 
 @record
-class Record:
+class FinishedRun:
     """A finished run: its folder, as a command takes it, the versions and the hashes of
     its logs, and what it has found.
 
@@ -225,7 +225,7 @@ def record_of(model: IdentifiedModel) -> FitRecord | None:
     return None if folder is None else _read(folder / RESULT, FitRecord)
 
 
-def load_record(folder: str | Path) -> Record:
+def load_record(folder: str | Path) -> FinishedRun:
     """Read a finished run. A validation that cannot be read is left out, with a
     warning.
 
@@ -238,7 +238,7 @@ def load_record(folder: str | Path) -> Record:
     unseen = _validations(path)
     fitted = _with_distinct_names([*result.fitted, *unseen.values()])
     count = len(result.fitted)
-    return Record(
+    return FinishedRun(
         folder=str(folder),
         identity=identity,
         settings=model.settings,
@@ -299,7 +299,7 @@ def _adapter(kind: type[Any]) -> TypeAdapter[Any]:
     return TypeAdapter(in_tuple, config=ConfigDict(arbitrary_types_allowed=True))
 
 
-def read_runs(names: Sequence[str], out: str | Path | None) -> tuple[Record, ...]:
+def read_runs(names: Sequence[str], out: str | Path | None) -> tuple[FinishedRun, ...]:
     """Read finished runs that differ in nothing but their seeds, in their order,
     and leave out the others.
 
@@ -310,7 +310,7 @@ def read_runs(names: Sequence[str], out: str | Path | None) -> tuple[Record, ...
     """
     if out is not None and RunFolder(Path(out)).exists:
         raise RunError("is a run itself", out, "name another folder")
-    runs = list[Record]()
+    runs = list[FinishedRun]()
     for path in _matching(names):
         try:
             runs.append(_finished_run(path))
@@ -341,7 +341,7 @@ def _matching(names: Sequence[str]) -> list[str]:
     return sorted(paths)
 
 
-def _finished_run(path: str) -> Record:
+def _finished_run(path: str) -> FinishedRun:
     """Read a finished run that can be merged with others."""
     folder = RunFolder(Path(path))
     status = folder.identity().get("status")

@@ -115,7 +115,8 @@ def differentiate(
             shorter = Axes(axes.directions[curved], SHORTER * axes.steps[curved])
             short, _ = _slopes(function, at, shorter, centre)
             mostly_curvature = _far_below(short, slopes[curved])
-            slopes[np.flatnonzero(curved)[mostly_curvature]] = short[mostly_curvature]
+            replaced = np.flatnonzero(curved)[mostly_curvature]
+            slopes[replaced] = short[mostly_curvature]
     failed = ~np.isfinite(slopes).all(axis=1)
     if expected is not None:
         slopes[failed] = expected[failed]
@@ -155,7 +156,8 @@ def covariance_axes(at: Box, root: Array, step: float) -> Axes:
         directions[: len(inner), inner] = axes
         # the change of the others that keeps a coordinate at its bound as short as can
         # be
-        follow = axes.T @ ((left.T @ root[:, at_bound]) / values[:, None])
+        pulled = (left.T @ root[:, at_bound]) / values[:, None]
+        follow = axes.T @ pulled
         directions[len(inner) :, inner] = -follow.T
     lengths = np.linalg.norm(root @ directions.T, axis=0)
     return _fitted(directions, step / lengths, room)
@@ -173,32 +175,42 @@ def _slopes(
     """Return slopes along each axis, (p, R), and where both sides differ more than they
     have in common, (p,)."""
     steps = axes.steps.T[:, :, None]
-    changes = (steps * axes.directions).reshape(-1, axes.directions.shape[1])
-    rows = function(at.points(changes)).reshape(*steps.shape[:2], -1)
+    changes = steps * axes.directions
+    # the points of all differences in one batch
+    points = at.points(changes.reshape(-1, axes.directions.shape[1]))
+    rows = function(points).reshape(*steps.shape[:2], -1)
     with np.errstate(all="ignore"):
         first = (rows[0] - value) / steps[0]
         if len(steps) == 1:
             return first, np.zeros(len(first), dtype=bool)
         second = (rows[1] - value) / steps[1]
         # the slope at the point of the parabola through all three
-        parabola = (first * steps[1] - second * steps[0]) / (steps[1] - steps[0])
-        curved = np.linalg.norm(first - parabola, axis=1) > np.linalg.norm(
-            parabola, axis=1
-        )
+        weighed = first * steps[1] - second * steps[0]
+        parabola = weighed / (steps[1] - steps[0])
+        difference = np.linalg.norm(first - parabola, axis=1)
+        in_common = np.linalg.norm(parabola, axis=1)
+        curved = difference > in_common
+    # where one of two steps fails, the other one tells the slope
     line = np.where(np.isfinite(first), first, second)
-    return np.where(np.isfinite(parabola), parabola, line), curved
+    slopes = np.where(np.isfinite(parabola), parabola, line)
+    return slopes, curved
 
 
 def _fitted(directions: Array, wanted: Array, room: Array) -> Axes:
     """Return steps of wanted lengths, (p,), shortened to LARGEST and to the room, (2,
     p)."""
-    wanted = np.minimum(wanted, LARGEST / np.abs(directions).max(axis=1))
+    largest = np.abs(directions).max(axis=1)
+    wanted = np.minimum(wanted, LARGEST / largest)
     below, above = room
     ahead = _longest(directions, above, below)
     behind = _longest(directions, below, above)
-    to_both = np.minimum(wanted, np.minimum(ahead, behind))
-    to_one = np.minimum(wanted, np.maximum(ahead, behind) / 2)
-    balanced = (to_both >= UNBALANCED * wanted) | (to_both >= to_one)
+    nearer = np.minimum(ahead, behind)
+    farther = np.maximum(ahead, behind)
+    to_both = np.minimum(wanted, nearer)
+    # of two steps to one side, the second one is twice as long
+    to_one = np.minimum(wanted, farther / 2)
+    is_long_enough = to_both >= UNBALANCED * wanted
+    balanced = is_long_enough | (to_both >= to_one)
     towards_more_room = np.where(ahead >= behind, to_one, -to_one)
     first = np.where(balanced, to_both, towards_more_room)
     second = np.where(balanced, -first, 2 * first)

@@ -57,9 +57,8 @@ class GrayCoding:
 
     def altered(self, chromosomes: Genes, rng: Generator) -> Genes:
         """Flip one random bit of every element."""
-        flips = rng.integers(
-            0, BITS, (len(chromosomes), self.parameters, 1)
-        ) == np.arange(BITS)
+        which = rng.integers(0, BITS, (len(chromosomes), self.parameters, 1))
+        flips = which == np.arange(BITS)
         return chromosomes ^ flips.reshape(chromosomes.shape).astype(np.uint8)
 
 
@@ -129,9 +128,12 @@ def pointwise_swaps(pairs: int, length: int, points: int, rng: Generator) -> Mas
     a string has no more than length - 1 of them.
     """
     order = rng.random((pairs, length - 1)).argsort(axis=1)
+    # a stretch starts behind each cut, and gene 0 starts none
+    first_genes = 1 + order[:, :points]
     starts = np.zeros((pairs, length), dtype=bool)
-    np.put_along_axis(starts, 1 + order[:, :points], values=True, axis=1)
-    return np.cumsum(starts, axis=1) % 2 == 1
+    np.put_along_axis(starts, first_genes, values=True, axis=1)
+    stretch = np.cumsum(starts, axis=1)
+    return stretch % 2 == 1
 
 
 def crossover(parents: Genes, settings: GeneticSettings, rng: Generator) -> Genes:

@@ -202,19 +202,24 @@ def derivatives(residuals: Function, point: Array, row: Array) -> Array:
     """
 
     def quotients(which: Ints, width: float) -> Array:
-        inwards = np.where(point + abs(width) <= 1.0, width, -width)
+        has_room = point + abs(width) <= 1.0
+        inwards = np.where(has_room, width, -width)
         steps = inwards[which]
         points = np.tile(point, (len(which), 1))
         points[np.arange(len(which)), which] += steps
+        # rounding leads out of the box
+        moved = np.clip(points, 0.0, 1.0)
         with np.errstate(all="ignore"):
-            return (residuals(np.clip(points, 0.0, 1.0)) - row) / steps[:, None]
+            return (residuals(moved) - row) / steps[:, None]
 
     columns = quotients(np.arange(point.size), WIDTH)
-    failed = np.flatnonzero(~np.isfinite(columns).all(axis=1))
+    has_failed = ~np.isfinite(columns).all(axis=1)
+    failed = np.flatnonzero(has_failed)
     if len(failed):
         columns[failed] = quotients(failed, -WIDTH)
     length = np.linalg.norm(columns, axis=1)
-    suspect = np.flatnonzero((length > 0) & (length < SUSPECT * length.max()))
+    is_weak = (length > 0) & (length < SUSPECT * length.max())
+    suspect = np.flatnonzero(is_weak)
     if len(suspect):
         # a derivative does not depend on the step; rounding noise divided by a wider
         # step becomes smaller

@@ -62,6 +62,19 @@ def _open(valve: Plugin, rest, commands, opening, source: int = SOURCE) -> None:
         opening[k] = mean_opening(c, z, w, commands, past + k, valve)
 
 
+def _valve_keys(coefficients: Structs) -> list[list[ValveKey]]:
+    """Return what the openings of every candidate's joints depend on, of COEFFICIENTS,
+    (n, J)."""
+    alike = coefficients.copy()
+    alike[BEHIND_VALVE] = 0.0
+    alike["a"][BEHIND_PORT] = 0.0
+    alike["b"][BEHIND_PORT] = 0.0
+    keys: list[list[ValveKey]] = []
+    for candidate in alike:
+        keys.append([(j, valve.tobytes()) for j, valve in enumerate(candidate)])
+    return keys
+
+
 def valve_openings(
     plugin: Plugin, states: Structs, commands: Array, run: Callable[..., Iterable[None]]
 ) -> list[Array]:
@@ -71,18 +84,10 @@ def valve_openings(
     `states` are those of the start, shape (n, J), and `commands` those of a `Course`.
     `run` is that of a pool. No bit depends on the other candidates.
     """
-    candidates, joints = plugin.coefficients.shape
-    alike = plugin.coefficients.copy()
-    alike[BEHIND_VALVE] = 0.0
-    alike["a"][BEHIND_PORT] = 0.0
-    alike["b"][BEHIND_PORT] = 0.0
-    # a joint and the bytes of its valve, of every candidate
-    keys: list[list[ValveKey]] = []
+    keys = _valve_keys(plugin.coefficients)
     # the last candidate that has a valve
     owners: dict[ValveKey, int] = {}
-    for i in range(candidates):
-        row = [(j, alike[i, j].tobytes()) for j in range(joints)]
-        keys.append(row)
+    for i, row in enumerate(keys):
         owners |= dict.fromkeys(row, i)
     steps = len(commands) - plugin.past
     openings = {key: np.zeros(steps) for key in owners}

@@ -9,6 +9,7 @@ at a time as there are threads; candidates are independent, and no number of thr
 changes a bit.
 """
 
+import math
 import os
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
@@ -21,7 +22,7 @@ from scipy.signal import lfilter
 
 from hydroid.arm.locked import repeat
 from hydroid.arm.model import add_payload
-from hydroid.arrays import Array, Index, Structs
+from hydroid.arrays import Array, Index, Structs, record
 from hydroid.hydraulics.actuator import pressures
 from hydroid.hydraulics.kernel import Plugin
 from hydroid.hydraulics.records import JOINT_STATE, has_force_curve
@@ -46,11 +47,35 @@ class Oil(NamedTuple):
     line: Array
 
 
-Follow = Callable[[SteppedArm, Index], tuple[Array, Oil | None]]
-"""simulates some of n candidates, one for each copy of an arm: angles of the moving
-joints [rad], (1 + T, copies, V), and the oil of a single one, where it is wanted"""
 TOGETHER = 56
 """joints of all arms stepped at once: MuJoCo computes with sparse matrices from 60"""
+
+
+@record
+class _Ready:
+    """What the rollouts of n candidates need.
+
+    Attributes:
+        values: what they change in mjModel.
+        balance: what holds them in the start pose [N·m], (n, V).
+        gain: of the pushed joints [N·m/%], (n, P).
+        sensors: of JOINT, of the outputs, (n, K).
+        plugin: their actuators.
+        states: of these at the start, (n, J) of JOINT_STATE.
+        commands: those of a `Course`.
+        taken: flow from the pump into joints that follow the log [m³/s], (n, steps).
+        openings: of the valves, where they are known before, of each candidate.
+    """
+
+    values: dict[str, Array]
+    balance: Array
+    gain: Array
+    sensors: Structs
+    plugin: Plugin
+    states: Structs
+    commands: Array
+    taken: Array
+    openings: list[Array]
 
 
 class Simulation:
@@ -85,13 +110,14 @@ class Simulation:
         """
         scenario = self.scenario
         n = len(candidates)
-        wanted = self._pressures
         samples = 1 + len(scenario.command) // scenario.stepping.steps
-        angle = np.full((n, samples, len(scenario.outputs)), np.nan)
-        pressure = np.full((n, samples, len(wanted), 2), np.nan)
-        flow = np.full(pressure.shape, np.nan)
-        line = np.full((n, samples if len(wanted) else 0), np.nan)
-        response = Response(angle, pressure, flow, line)
+        wanted = len(self._pressures)
+        response = Response(
+            angle=np.full((n, samples, len(scenario.outputs)), np.nan),
+            pressure=np.full((n, samples, wanted, 2), np.nan),
+            flow=np.full((n, samples, wanted, 2), np.nan),
+            line=np.full((n, samples if wanted else 0), np.nan),
+        )
         # those that differ in effects of other groups of logs are simulated once
         first, alike = distinct(candidates.joints, candidates.mass)
         exists = has_force_curve(candidates.joints[:, self.joints])
@@ -99,43 +125,66 @@ class Simulation:
         threads = min(scenario.settings.threads or os.cpu_count() or 1, rows.size)
         if not threads:
             return response
-        candidates = candidates[rows]
-        sensors = candidates.joints[:, scenario.arm.columns[scenario.outputs]]
+        self._fill(response, rows, candidates[rows], threads)
+        if len(first) < n:
+            every = first[alike]
+            return Response(
+                response.angle[every],
+                response.pressure[every],
+                response.flow[every],
+                response.line[every],
+            )
+        return response
 
-        def simulate(some: Index) -> None:
-            """Simulate some of the candidates on an arm that is free, and write what
-            its sensors read to their rows."""
-            arm = free.pop()
-            followed, oil = follow(arm, np.resize(some, arm.copies))
-            if arm.healthy:
-                outputs = followed[:, :, scenario.outputs].swapaxes(0, 1)
-                # copies beyond `some` only fill the arm
-                for candidate, turned in zip(some, outputs, strict=False):
-                    if self.joints.size:
-                        turned = reading(turned, sensors[candidate], scenario.period)
-                    angle[rows[candidate]] = turned
-                if oil is not None:
-                    row = rows[some[0]]
-                    pressure[row] = oil.pressure[:, wanted]
-                    flow[row] = oil.flow[:, wanted]
-                    line[row] = oil.line
-            free.append(arm)
-
+    def _fill(
+        self, response: Response, rows: Index, candidates: Candidates, threads: int
+    ) -> None:
+        """Write what candidates do to their rows of a response."""
         with quiet_mujoco(), ThreadPoolExecutor(threads) as pool:
             copies = self._copies(candidates, threads)
+            # arms that no thread steps
             free = deque(self._stepped(copies) for _ in range(threads))
-            follow = self._follower(candidates, free[0], pool.map)
-            shares = np.array_split(range(rows.size), -(-rows.size // copies))
+            ready = self._ready(candidates, free[0], pool.map)
+
+            def simulate(some: Index) -> None:
+                arm = free.pop()
+                self._write(response, rows, some, ready, arm)
+                free.append(arm)
+
+            groups = math.ceil(rows.size / copies)
+            shares = np.array_split(range(rows.size), groups)
             # a deque takes what the pool returns, so that errors are raised here
             deque(pool.map(simulate, shares), maxlen=0)
             if copies > 1:  # one that diverges stops those beside it
                 free = deque(self._stepped() for _ in range(threads))
-                left = np.flatnonzero(np.isnan(angle[rows, -1]).any(axis=1))
+                left = np.flatnonzero(np.isnan(response.angle[rows, -1]).any(axis=1))
                 deque(pool.map(simulate, left[:, None]), maxlen=0)
-        if len(first) < n:
-            every = first[alike]
-            return Response(angle[every], pressure[every], flow[every], line[every])
-        return response
+
+    def _write(
+        self,
+        response: Response,
+        rows: Index,
+        some: Index,
+        ready: "_Ready",
+        arm: SteppedArm,
+    ) -> None:
+        """Simulate some of the candidates that are ready, on an arm that is free, and
+        write what their sensors read."""
+        scenario = self.scenario
+        followed, oil = self._follow(ready, arm, np.resize(some, arm.copies))
+        if not arm.healthy:
+            return
+        outputs = followed[:, :, scenario.outputs].swapaxes(0, 1)
+        # copies beyond `some` only fill the arm
+        for candidate, turned in zip(some, outputs, strict=False):
+            if self.joints.size:
+                turned = reading(turned, ready.sensors[candidate], scenario.period)
+            response.angle[rows[candidate]] = turned
+        if oil is not None:
+            row = rows[some[0]]
+            response.pressure[row] = oil.pressure[:, self._pressures]
+            response.flow[row] = oil.flow[:, self._pressures]
+            response.line[row] = oil.line
 
     def _copies(self, candidates: Candidates, threads: int) -> int:
         """How many arms can be stepped at once without changing a bit of any.
@@ -149,8 +198,9 @@ class Simulation:
         n = len(candidates)
         most = TOGETHER // len(self.scenario.arm.columns)
         # groups of equal size, so that all threads have something to do to the end
-        groups = max(threads, -(-n // most))
-        return -(-n // groups)
+        needed = math.ceil(n / most)
+        groups = max(threads, needed)
+        return math.ceil(n / groups)
 
     def _stepped(self, copies: int = 1) -> SteppedArm:
         model = self.scenario.arm.model
@@ -158,55 +208,70 @@ class Simulation:
             model = repeat(model, copies)
         return self._chain.stepped(model, self.scenario.stepping.steps, copies)
 
-    def _follower(
+    def _ready(
         self,
         candidates: Candidates,
         arm: SteppedArm,
         run: Callable[..., Iterable[None]],
-    ) -> Follow:
-        """Return what simulates some of n candidates; all are balanced here, one by
-        one, on one arm.
+    ) -> "_Ready":
+        """Make n candidates ready: all are balanced here, one by one, on one arm.
 
         `run` is that of a pool.
         """
         scenario = self.scenario
         chain = self._chain
         n = len(candidates)
-        observed = bool(self._pressures.size)
         values = scenario.values(candidates)
         pose = scenario.arm.pose
-        samples = len(scenario.command) // scenario.stepping.steps
         balance = _balance(arm, values, pose, n)
         plugin, states = chain.start(candidates, pose, balance, scenario.pressure)
         before = np.zeros((plugin.past, len(chain.columns)))
         commands = np.concatenate([before, scenario.command[:, chain.columns]])
-        taken = chain.taken(candidates, scenario.prescribed)
         openings = [np.empty((0, 0))] * n
         # what the valves do is seen in their states alone
-        if self._at_once and not observed:
+        if self._at_once and not self._pressures.size:
             openings = valve_openings(plugin, states, commands, run)
-        gain = candidates.joints.gain[:, scenario.arm.columns[chain.pushed]]
+        return _Ready(
+            values=values,
+            balance=balance,
+            gain=candidates.joints.gain[:, scenario.arm.columns[chain.pushed]],
+            sensors=candidates.joints[:, scenario.arm.columns[scenario.outputs]],
+            plugin=plugin,
+            states=states,
+            commands=commands,
+            taken=chain.taken(candidates, scenario.prescribed),
+            openings=openings,
+        )
 
-        def follow(arm: SteppedArm, some: Index) -> tuple[Array, Oil | None]:
-            row = some[0]
-            start = np.tile(pose, arm.copies)
-            arm.start(values, some, start)
-            torque = self._pushing(gain[some], balance[some])
-            actuators = plugin.candidate(row)
-            state = states[row]
-            angle = np.full((1 + samples, start.size), np.nan)
-            kept = 1 + samples if observed else 1
-            history = np.zeros((kept, len(state)), JOINT_STATE)
-            angle[0] = start
-            history[0] = state
-            course = Course(commands, torque, taken[row], openings[row])
-            arm.roll(actuators, state, course, Trace(angle[1:], history[1:]))
-            oil = None
-            if observed:
-                oil = _oil(actuators, history, angle[:, chain.columns])
-            return angle.reshape(len(angle), arm.copies, -1), oil
+    def _follow(
+        self, ready: "_Ready", arm: SteppedArm, some: Index
+    ) -> tuple[Array, Oil | None]:
+        """Roll some candidates out, one for each copy of an arm.
 
-        return follow
+        Returns:
+            Angles of the moving joints [rad], (1 + T, copies, V), and the oil of a
+            single candidate, where it is wanted.
+        """
+        scenario = self.scenario
+        row = some[0]
+        start = np.tile(scenario.arm.pose, arm.copies)
+        arm.start(ready.values, some, start)
+        torque = self._pushing(ready.gain[some], ready.balance[some])
+        actuators = ready.plugin.candidate(row)
+        state = ready.states[row]
+        samples = len(scenario.command) // scenario.stepping.steps
+        observed = bool(self._pressures.size)
+        kept = 1 + samples if observed else 1
+        angle = np.full((1 + samples, start.size), np.nan)
+        history = np.zeros((kept, len(state)), JOINT_STATE)
+        angle[0] = start
+        history[0] = state
+        course = Course(ready.commands, torque, ready.taken[row], ready.openings[row])
+        arm.roll(actuators, state, course, Trace(angle[1:], history[1:]))
+        oil = None
+        if observed:
+            oil = _oil(actuators, history, angle[:, self._chain.columns])
+        return angle.reshape(len(angle), arm.copies, -1), oil
 
     def _pushing(self, gain: Array, balance: Array) -> Array:
         """Return what drives the pushed joints of some candidates in each step, shape
@@ -272,8 +337,10 @@ def _balance(arm: SteppedArm, values: dict[str, Array], pose: Array, n: int) -> 
     for first in range(0, n, arm.copies):
         # the last group is filled with candidates that are there twice
         some = np.resize(range(first, n), arm.copies)
-        held.append(arm.start(values, some, np.tile(pose, arm.copies)))
-    return np.concatenate(held).reshape(-1, len(pose))[:n]
+        start = np.tile(pose, arm.copies)
+        held.append(arm.start(values, some, start))
+    balances = np.concatenate(held).reshape(-1, len(pose))
+    return balances[:n]
 
 
 def reading(angle: Array, sensors: Structs, period: float) -> Array:

@@ -56,6 +56,12 @@ def head(path: Path, samples: int) -> Path:
     return path
 
 
+def halve(path: Path, most: int = 1500) -> None:
+    """Keep the first half of a CSV log, so many samples at most."""
+    header, *rows = path.read_text().splitlines(keepends=True)
+    path.write_text("".join([header, *rows[: min(len(rows) // 2, most)]]))
+
+
 def read(
     path: Path,
     settings: LogSettings = SETTINGS,

@@ -17,7 +17,7 @@ from hydroid.posterior.linear import Linear, estimate_box
 from hydroid.posterior.quantities import Quantities
 from hydroid.posterior.uncertainty import Uncertainty, uncertainty_from
 from hydroid.problem.problem import Problem
-from hydroid.run.record import Record, fit_record
+from hydroid.run.record import FinishedRun, fit_record
 from hydroid.search.descent import Descent, Ending
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.problem import ParameterSettings
@@ -154,12 +154,12 @@ def make_record(
     fit: Fit,
     unseen: Mapping[str, Prediction] | None = None,
     folder: str = "RUN",
-) -> Record:
+) -> FinishedRun:
     logs = {log.source: "f" * 64 for log in problem.logs}
     identity = {"hydroid": "0", "mujoco": "4", "logs": logs}
     predictions, baselines = fitted(fit), baselines_of(problem.settings, problem.logs)
     result = fit_record(fit, predictions, baselines)
-    return Record(
+    return FinishedRun(
         folder,
         identity,
         problem.settings,

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from printed import Followed
 
-from hydroid.run.record import Record, load_record
+from hydroid.run.record import FinishedRun, load_record
 
 Speed = Callable[[float], float]
 """speed of a joint [deg/s, mm/s] that a command [%] of the log settles at"""
@@ -29,7 +29,7 @@ def judged(found: Followed, speeds: Mapping[str, Speed]) -> Followed:
     return replace(found, wrong=wrong)
 
 
-def _faults(record: Record, joint: str, speed: Speed) -> Iterator[str]:
+def _faults(record: FinishedRun, joint: str, speed: Speed) -> Iterator[str]:
     """Yield the speeds of a joint that are not the truth's."""
     settings = record.settings
     number = settings.arm.joint_names.index(joint) + 1

@@ -8,6 +8,8 @@ import pytest
 from made_logs import step_log
 from recovery import STOPPED, assert_recovered, recover, settings_of
 
+from hydroid.quantity_table import CHOICES
+
 DUTIES = [60, -40, 90, -80, 40, 0, -30, 70, -60, 30]
 ROTARY = 4
 """the roll: a rotary actuator turns it"""
@@ -119,11 +121,7 @@ def test_a_term_is_recovered(name):
     settings = settings_of(
         {
             q: {"quantity": q, "bounds": [low, high]}
-            | (
-                {}
-                if q.startswith("pump_") or q == "line_volume"
-                else {"joints": list(joints)}
-            )
+            | ({} if CHOICES[q].of_the_pump else {"joints": list(joints)})
             for q, (low, high, _, _) in case.rows.items()
         },
         **case.hydraulics,

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 import robots
 from arms import MODELS
+from log_files import halve
 from robots import LIMIT, link, write_robot
 from typer.testing import CliRunner
 
@@ -115,6 +116,8 @@ def test_from_cad_and_log_to_a_validated_fit(
 ):
     """Every command of the next steps, as they stand; the last log was not fitted."""
     shutil.copytree(URDF, tmp_path / "urdf")
+    for log in (tmp_path / "urdf").glob("log_*.csv"):
+        halve(log)
     monkeypatch.chdir(tmp_path / "urdf")
     command = ["init", "new", "--arm", "robot.urdf", "--json"]
     for name in sorted(Path().glob("log_*.csv")):

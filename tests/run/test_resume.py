@@ -108,8 +108,8 @@ STOPPED = 130
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", SEARCHES)
 def test_killed_runs_end_the_same(tmp_path: Path, kind: str):
-    """Every run is ended at moments drawn at random, and resumed; KILLS in the
-    environment asks for more."""
+    """Every run is ended at moments drawn at random, twice, and resumed; KILLS in the
+    environment asks for more. Each signal ends runs of three kinds."""
     rng = random.Random(kind)
     command = "fit-hyd" if kind == "ladder" else "fit-mech"
     # the report's commands name the run's folder
@@ -119,8 +119,9 @@ def test_killed_runs_end_the_same(tmp_path: Path, kind: str):
     hits, began = 0, time.monotonic()
     finish(start(whole, *SEARCHES[kind], out="run", command=command))
     took = time.monotonic() - began
-    while hits < int(os.environ.get("KILLS", "4")):
-        end = ENDS[hits % len(ENDS)]
+    first = 2 * [*SEARCHES].index(kind)
+    while hits < int(os.environ.get("KILLS", "2")):
+        end = ENDS[(first + hits) % len(ENDS)]
         process = start(killed, *SEARCHES[kind], out="run", command=command)
         # what a signal does before, test_files tells of the command itself
         assert process.stdout is not None

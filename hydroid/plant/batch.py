@@ -22,11 +22,14 @@ from numpy.typing import ArrayLike
 
 from hydroid.arrays import Array, Ints, Mask, Structs
 from hydroid.errors import SettingsError
-from hydroid.hydraulics.kernel import Plugin
+from hydroid.hydraulics.kernel import Plugin, source_key
 from hydroid.mjcf import quiet_mujoco
 from hydroid.plant.plant import PHYSICS, Plant
-from hydroid.simulation.quasi_static import SOURCE, roll_quasi_static
-from hydroid.simulation.rollout import Course, Handles, Trace, bind, roll
+from hydroid.simulation.quasi_static import roll_quasi_static, share_pump
+from hydroid.simulation.rollout import Course, Handles, Trace, bind, roll, write_sample
+
+# both rungs' files are in the key of numba's cache
+SOURCE = source_key(write_sample, share_pump)
 
 
 def _typed_pointer(typing: Any, address: Any) -> Any:

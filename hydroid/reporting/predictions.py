@@ -144,7 +144,7 @@ def _fit_sections(
         *verdict_sections(fits, step),
         *prediction_sections(shown, settings.arm, fits),
         quantity_section(settings, summary),
-        error_section(settings, summary, record.verdict),
+        error_section(settings, summary, run.verdict),
         unknown_section(settings, summary),
         residual_section(settings, summary, fitted),
         speed_section(settings, summary, [prediction.log for prediction in fitted]),

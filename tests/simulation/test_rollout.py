@@ -11,6 +11,7 @@ import mujoco
 import pytest
 
 from hydroid.hydraulics import kernel
+from hydroid.plant import batch
 from hydroid.settings import linkage
 from hydroid.simulation import openings, quasi_static, rollout, settled, steady
 from hydroid.simulation.rollout import SteppedArm
@@ -58,6 +59,8 @@ def inlined(function: FunctionType, seen: set[FunctionType]) -> Iterator[Path]:
         assert not of_a_module, (
             f"{function.__name__} calls functions of {name}: follow them here"
         )
+        # what is compiled by itself is taken in, too
+        used = getattr(used, "py_func", used)
         if isinstance(used, FunctionType) and used.__module__.startswith("hydroid"):
             yield from inlined(used, seen)
 
@@ -69,6 +72,7 @@ def inlined(function: FunctionType, seen: set[FunctionType]) -> Iterator[Path]:
         (quasi_static.roll_quasi_static, [rollout.write_sample]),
         (openings._open, []),  # pyright: ignore[reportPrivateUsage]
         (steady._steady, []),  # pyright: ignore[reportPrivateUsage]
+        (batch._roll_some, [rollout.write_sample, quasi_static.share_pump]),  # pyright: ignore[reportPrivateUsage]
         (settled._settle, [steady.balanced_speed]),  # pyright: ignore[reportPrivateUsage]
     ],
 )

@@ -254,11 +254,10 @@ class Ladder:
         new = self._measured(own, result, step)
         if if_better:
             without = self._left_out_of(last, self.refinements[start.name])
-            with_it = self._left_out_of(own, result)
-            gained = gain(with_it, without)
+            gained = gain(self._left_out_of(own, result), without)
             new = replace(new, gained=gained)
             self.estimates[step.estimate] = new
-            if not is_clear(*gained, len(with_it.open)):
+            if not is_clear(*gained):
                 return
         from_afar = how is refine_from_afar or (self._from_afar and begin.alone)
         self._keep(own, new, step, from_afar=from_afar)

@@ -92,18 +92,11 @@ def follow(
     arm = model.settings.arm
     name = "commands" if out is None else Path(out).stem
     page = follow_page(name, followed, arm)
-    lines = [tracking_table(followed, arm), *missed_lines(followed, arm)]
-    if tip is not None:
-        away = _away(tip, followed)
-        lines.append(
-            f"The tip is {tip.tip.what}. By the model it stays within {away:.3g} mm of "
-            "the path."
-        )
-    if followed.lead_s:
-        lines.append(
-            f"The path begins {plain(followed.lead_s)} s into the file: "
-            "delay and lags need commands that early."
-        )
+    lines = [
+        tracking_table(followed, arm),
+        *missed_lines(followed, arm),
+        *_path_lines(followed, tip),
+    ]
     if out is not None:
         write_log(Path(out), followed.recording, model.settings.log, arm=arm)
         lines += [str(out), *written(page, Path(out).parent)]
@@ -119,6 +112,23 @@ def follow(
         ],
     }
     return Result(lines, content, followed, page)
+
+
+def _path_lines(followed: "Followed", tip: "TipKinematics | None") -> list[str]:
+    """Return what is said of the tip's path, and of when the path begins."""
+    lines = list[str]()
+    if tip is not None:
+        away = _away(tip, followed)
+        lines.append(
+            f"The tip is {tip.tip.what}. By the model it stays within {away:.3g} mm of "
+            "the path."
+        )
+    if followed.lead_s:
+        lines.append(
+            f"The path begins {plain(followed.lead_s)} s into the file: "
+            "delay and lags need commands that early."
+        )
+    return lines
 
 
 def _standing(model: "IdentifiedModel", given: "SettingChanges") -> "Array":

@@ -194,14 +194,22 @@ def _angle(column: Column, joint: int, usual_unit: str, arm: Joints) -> _Entry:
             return length
     is_counts = not column.unit and not _may_be_angles(column, usual_unit)
     if limits and (column.is_raw or is_counts):
-        if slides:
-            return _over_the_range(column, limits, "m", "range")
-        low, high = np.degrees(limits)
-        return _over_the_range(column, (float(low), float(high)), "deg", "range")
+        return _over_the_joint(column, limits, slides=slides)
     unit = usual_unit
     if column.unit and not column.is_raw:
         unit = column.unit
     return _Entry(_scaled(column, unit), f"{column.name}: angle in {unit}")
+
+
+def _over_the_joint(
+    column: Column, limits: tuple[float, float], *, slides: bool
+) -> _Entry:
+    """Return the settings of a position in V, mA or counts, over a joint's range [rad,
+    m]."""
+    if slides:
+        return _over_the_range(column, limits, "m", "range")
+    low, high = np.degrees(limits)
+    return _over_the_range(column, (float(low), float(high)), "deg", "range")
 
 
 def _scaled(column: Column, unit: str) -> Plain:
@@ -227,6 +235,14 @@ def _may_be_angles(column: Column, unit: str) -> bool:
     return bool(largest * UNITS[unit].factor <= LARGEST_ANGLE)
 
 
+def _may_be_length(column: Column, angle_unit: str) -> bool:
+    """Return whether a column may hold lengths of a cylinder, by its unit, name and
+    size."""
+    if column.is_raw or (column.unit and column.unit not in LENGTHS):
+        return False
+    return column.is_length or not _may_be_angles(column, angle_unit)
+
+
 def _cylinder_length(column: Column, rod: Rod, angle_unit: str) -> _Entry | None:
     """Return the settings of a column that holds the length of a joint's cylinder;
     None: it does not.
@@ -238,9 +254,7 @@ def _cylinder_length(column: Column, rod: Rod, angle_unit: str) -> _Entry | None
         shortest, longest = rod.ends
         ends = 1e3 * shortest, 1e3 * longest
         return _over_the_range(column, ends, "mm", "stroke of its cylinder")
-    if column.is_raw or (column.unit and column.unit not in LENGTHS):
-        return None
-    if not column.is_length and _may_be_angles(column, angle_unit):
+    if not _may_be_length(column, angle_unit):
         return None
     reading = rod.reading(column.values, column.unit)
     if reading is None and not column.is_length:

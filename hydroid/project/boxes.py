@@ -106,6 +106,11 @@ def _check(joints: Sequence[str], lengths: Sequence[float]) -> None:
         raise SettingsError(what, "--joints", "letters from a to z, digits and _")
     if len({*joints}) < len(joints):
         raise SettingsError("holds a name twice", "--joints")
+    _check_lengths(joints, lengths)
+
+
+def _check_lengths(joints: Sequence[str], lengths: Sequence[float]) -> None:
+    """Raise SettingsError where joints' links cannot have these lengths [m]."""
     wrong = [length for length in lengths if not 0 <= length <= LONGEST]
     allowed = f"0 to {LONGEST:g} m; 0 for a joint that slews"
     if wrong:

@@ -112,17 +112,9 @@ def linearise(plant: Plant, command: Array) -> LinearArm:
         SettingsError: no joint has a command, or one is beyond 100 % or within a dead
             band, which has no slope.
     """
-    joints = [joint - 1 for joint in plant.joints if command[joint - 1] != 0.0]
-    if not joints:
-        what = "no joint has a command: around 0 is the dead band, which has no slope"
-        hint = (
-            "name the commands of joints that move, such as boom=30; the others stand"
-        )
-        raise SettingsError(what, "--at", hint)
+    joints = _moving(plant, command)
     columns: Index = np.array(joints)
     names = tuple(plant.names[joint] for joint in joints)
-    for joint in joints:
-        _refuse_without_slope(plant, joint, command)
     valves = [_valve(plant, joint, command) for joint in joints]
     oils = [_oil(plant, joint, command) for joint in joints]
     gain, turn, speed = _slopes(plant, command, columns)
@@ -165,6 +157,21 @@ def linearise(plant: Plant, command: Array) -> LinearArm:
         angle=plant.angle[columns],
         speed=speed,
     )
+
+
+def _moving(plant: Plant, command: Array) -> list[int]:
+    """Return the joints with a command [%], 0-based; raises SettingsError as
+    `linearise` does."""
+    joints = [joint - 1 for joint in plant.joints if command[joint - 1] != 0.0]
+    if not joints:
+        what = "no joint has a command: around 0 is the dead band, which has no slope"
+        hint = (
+            "name the commands of joints that move, such as boom=30; the others stand"
+        )
+        raise SettingsError(what, "--at", hint)
+    for joint in joints:
+        _refuse_without_slope(plant, joint, command)
+    return joints
 
 
 def _state_names(

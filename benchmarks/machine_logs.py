@@ -8,9 +8,11 @@ The logs are written for the purpose (tests/helpers/field_logs.py). Without --fo
 they are read by what `hydroid init` writes. With it, the commands that `init` prints
 are followed: check, a fit of that budget, and validation on a second log; and then for
 twelve arms (tests/helpers/worlds.py), whose fits have three times the budget. A log is
-right if it is read rightly, and if the fit errs on the second log by at most a third of
-what standing still does (shown in brackets) [deg]. With another version of hydroid on
-PYTHONPATH the table is that of this version.
+right if it is read rightly, if the fit errs on the second log by at most a third of
+what standing still does (shown in brackets) [deg], and if its speeds from 60 % of
+command are those that made the log, within 10 % of the largest, in the same direction.
+Many logs hold the same once they are read: what holds the same is fitted once. With
+another version of hydroid on PYTHONPATH the table is that of this version.
 """
 
 import argparse
@@ -25,6 +27,7 @@ sys.path.append(str(Path(__file__).parents[1] / "tests" / "helpers"))
 import field_logs
 import worlds
 from field_logs import FIELD_LOGS
+from printed import Known
 from worlds import WORLDS
 
 import hydroid
@@ -43,6 +46,7 @@ def main() -> None:
     given = parser.parse_args()
     logging.getLogger("hydroid").setLevel(logging.CRITICAL)
     counts = Counter[str]()
+    known: Known = {}
     with tempfile.TemporaryDirectory() as name:
         home = Path(name)
         hydroid.init(home / "template")
@@ -62,7 +66,8 @@ def main() -> None:
             folder = home / str(number)
             folder.mkdir()
             if given.follow:
-                found = field_logs.followed(log, folder, arm, f"{given.follow}s")
+                budget = f"{given.follow}s"
+                found = field_logs.followed(log, folder, arm, budget, known)
             else:
                 found = field_logs.outcome(log, folder, arm)
             show(log.name, found.verdict, found.line, folder)
@@ -71,7 +76,8 @@ def main() -> None:
                 continue
             folder = home / f"arm_{number}"
             folder.mkdir()
-            show(name, *worlds.followed(world, folder, f"{3 * given.follow}s"), folder)
+            found = worlds.followed(world, folder, f"{3 * given.follow}s", known)
+            show(name, *found, folder)
     print(
         ", ".join(f"{verdict}: {count}" for verdict, count in counts.items()),
         f"of {counts.total()}",

@@ -19,6 +19,12 @@ STEP = 0.002
 """of the integration [s]"""
 GRAVITY = 9.81
 NAMES = ("swing", "boom", "arm", "bucket", "wrist", "tool")
+KNOTS = np.array([0.0, 0.15, 0.4, 0.7, 1.0])
+"""parts of a command beyond the dead band between which a valve that is odd opens
+evenly"""
+FALLS, SATURATES, OPEN_CENTRE = 0, 1, 2
+"""of a shared pump: its pressure falls with the flow; it holds its pressure up to a
+flow; what no joint takes runs through the valves' open centres"""
 
 
 class Machine:
@@ -34,9 +40,16 @@ class Machine:
     without a shared pump. draw: flow of each direction at full speed, as a part of the
     pump's, (J, 2). stiff: square of the frequency of oil and inertia [rad²/s²], (J,),
     0: unseen; ratio: its damping ratio. noise [rad], rate [Hz]: of the logs.
+
+    An odd one also has: curve: part of the opening that the power law gives at KNOTS,
+    (J, 2, 5). neutral: command at which a spool rests [%], (J,). slow: whether the
+    speed lags, and not the valve, (J,). on_off: whether a joint's commands are all or
+    nothing, (J,). line: what its shared pump does.
     """
 
-    def __init__(self, rng: Generator, number: int) -> None:
+    def __init__(
+        self, rng: Generator, number: int, odd: Generator | None = None
+    ) -> None:
         joints = int(rng.integers(3, 7))
         swings = joints > 3 or rng.random() < 0.5
         chain = slice(0 if swings else 1, joints + (not swings))
@@ -94,6 +107,29 @@ class Machine:
         self.ratio = rng.uniform(0.1, 0.6, joints)
         self.noise = np.radians(10 ** rng.uniform(np.log10(0.02), np.log10(0.2)))
         self.rate = float(rng.choice([10, 20, 50, 100]))
+        self.curve = np.tile(KNOTS, (joints, 2, 1))
+        self.neutral = np.zeros(joints)
+        self.slow = np.zeros(joints, dtype=bool)
+        self.on_off = np.zeros(joints, dtype=bool)
+        self.line = FALLS
+        if odd is not None:
+            self._make_odd(odd)
+
+    def _make_odd(self, rng: Generator) -> None:
+        """Give the joints valves that no exponent describes, and the machine another
+        pump."""
+        joints = self.joints
+        kind = rng.choice(["bends", "all at once", "power law"], joints)
+        bends = np.cumsum(rng.gamma(1.0, size=(joints, 2, len(KNOTS) - 1)), axis=2)
+        self.curve[kind == "bends", :, 1:] = (bends / bends[:, :, -1:])[kind == "bends"]
+        sudden = 0.6 + 0.4 * KNOTS[1:]
+        self.curve[kind == "all at once", :, 1:] = sudden
+        off_centre = rng.random(joints) < 0.4
+        self.neutral = np.where(off_centre, rng.uniform(-25, 25, joints), 0.0)
+        self.slow = ~self.early & (rng.random(joints) < 0.5)
+        self.on_off = rng.random(joints) < 0.2
+        if self.droop:
+            self.line = int(rng.choice([SATURATES, OPEN_CENTRE]))
 
     @property
     def terms(self) -> Any:
@@ -133,7 +169,8 @@ class Machine:
         )
         numbers = np.array([*single, self.stiff, self.ratio, *sided], float)
         late = np.round(self.delay / STEP).astype(np.int64)
-        how = late, self.vertical, numbers, self.droop
+        valves = self.neutral, self.curve, self.slow
+        how = late, self.vertical, numbers, valves, self.droop, self.line
         return integrate(np.ascontiguousarray(command), carry, first, *how)
 
 
@@ -154,11 +191,36 @@ def gravity_torque(angle: Array, vertical: Any, length: Array, mass: Array) -> A
 
 
 @njit(cache=True)
-def opening(signal: float, dead: Array, exponent: Array) -> float:
+def opening(
+    signal: float, dead: Array, exponent: Array, neutral: float, curve: Array
+) -> float:
     """Part of the full speed, with its sign, that a signal [%] asks for."""
-    side = 0 if signal >= 0 else 1
-    beyond = max(abs(signal) - dead[side], 0.0) / (100.0 - dead[side])
-    return np.sign(signal) * beyond ** exponent[side]
+    side = 0 if signal >= neutral else 1
+    edge = dead[side] + (neutral if side == 0 else -neutral)
+    beyond = max(abs(signal) - max(edge, 0.0), 0.0) / (100.0 - max(edge, 0.0))
+    if (signal > 0) != (side == 0):  # between neutral and zero command
+        beyond = 0.0
+    part = beyond ** exponent[side]
+    bent = curve[side]
+    for k in range(len(KNOTS) - 1):
+        if KNOTS[k] < part <= KNOTS[k + 1]:
+            steep = (bent[k + 1] - bent[k]) / (KNOTS[k + 1] - KNOTS[k])
+            if steep != 1.0:
+                part = bent[k] + steep * (part - KNOTS[k])
+            break
+    return (1.0 if side == 0 else -1.0) * part
+
+
+@njit(cache=True)
+def is_too_high(supply: float, taken: float, part: Array, droop: float, line: int):
+    """Whether a shared pump cannot hold a supply pressure under which joints with these
+    openings take a flow."""
+    if line == SATURATES:
+        return taken > 1.0 - droop
+    if line == OPEN_CENTRE:
+        past = 2.0 * (1.0 - np.max(np.abs(part))) * np.sqrt(supply)
+        return taken + past > 1.0
+    return 1.0 - droop * taken <= supply
 
 
 @njit(cache=True)
@@ -178,13 +240,16 @@ def integrate(
     late: Any,
     vertical: Any,
     numbers: Array,
+    valves: Any,
     droop: float,
+    line: int,
 ) -> Array:
     """Angles [rad] from step `first` on, under commands of STEP [s] and %, (T, J).
 
-    `carry` has angle, held signal, speed and force, (4, J); `numbers` as in
-    `Machine.go_on`.
+    `carry` has angle, held signal, speed and force, (4, J); `numbers` and `valves` as
+    in `Machine.go_on`.
     """
+    neutral, curve, slow = valves
     steps, joints = command.shape
     length, mass, lag, early, load, friction, lever, stiff, ratio, lower, upper = (
         numbers[:11]
@@ -203,11 +268,13 @@ def integrate(
         torque = gravity_torque(angle, vertical, length, mass)
         for j in range(joints):
             u = command[k - late[j], j] if k >= late[j] else 0.0
-            target = u if early[j] else opening(u, dead[:, j], exponent[:, j])
-            held[j] += (target - held[j]) * (1.0 - np.exp(-STEP / lag[j]))
-            part[j] = (
-                opening(held[j], dead[:, j], exponent[:, j]) if early[j] else held[j]
-            )
+            valve = dead[:, j], exponent[:, j], neutral[j], curve[j]
+            target = u if early[j] else opening(u, *valve)
+            if slow[j]:
+                part[j] = target
+            else:
+                held[j] += (target - held[j]) * (1.0 - np.exp(-STEP / lag[j]))
+                part[j] = opening(held[j], *valve) if early[j] else held[j]
             middle = (angle[j] - 0.5 * (lower[j] + upper[j])) / (upper[j] - lower[j])
             turn[j] = 1.0 / (1.0 - lever[j] * (2.0 * middle) ** 2)
             lift[j] = torque[j] * turn[j] / load[j]  # what turns faster holds less
@@ -219,12 +286,16 @@ def integrate(
                 for j in range(joints):
                     rate = part_of_speed(supply, part[j], lift[j], friction[j], turn[j])
                     taken += rate / turn[j] * draw[0 if part[j] >= 0 else 1, j]
-                low, high = (
-                    (supply, high) if 1.0 - droop * taken > supply else (low, supply)
-                )
+                if is_too_high(supply, taken, part, droop, line):
+                    high = supply
+                else:
+                    low = supply
         for j in range(joints):
             rate = part_of_speed(supply, part[j], lift[j], friction[j], turn[j])
             wanted = np.sign(part[j]) * full[0 if part[j] >= 0 else 1, j] * rate
+            if slow[j]:
+                held[j] += (wanted - held[j]) * (1.0 - np.exp(-STEP / lag[j]))
+                wanted = held[j]
             # oil: a spring between what the valve lets through and the arm
             if stiff[j] > 0:
                 force[j] += STEP * stiff[j] * (wanted - speed[j])
@@ -271,6 +342,9 @@ def stick(rng: Generator, m: Machine, seconds: float) -> tuple[Array, Array]:
                         else 0.0
                     )
                     ramp = min(round(rng.uniform(0.05, 0.5) / STEP), hold)
+                    if m.on_off[j]:
+                        level = 100.0 * np.sign(level)
+                        ramp = 1
                     end = min(k + hold, last)
                     part = np.minimum(np.arange(1, end - k + 1) / max(ramp, 1), 1.0)
                     trial[k:end, j] = trial[k - 1, j] + (level - trial[k - 1, j]) * part
@@ -281,7 +355,9 @@ def stick(rng: Generator, m: Machine, seconds: float) -> tuple[Array, Array]:
                     (moved < lower + margin) | (moved > upper - margin), axis=0
                 )
                 if again and bad.any():
-                    trial[first:last, bad] *= rng.uniform(-1.0, 0.6)
+                    factor = rng.uniform(-1.0, 0.6)
+                    trial[first:last, bad & ~m.on_off] *= factor
+                    trial[first:last, bad & m.on_off] *= -1.0 if factor < -0.2 else 0.0
             if not bad.any():
                 break
         command, angle[:last] = trial, moved

@@ -10,7 +10,9 @@ Terms (y) are a pump, oil, and of each joint a lag before the dead band.
 
 --exact N: also fits the own equations of the first N of these machines, from the truth
 (exact_fit.py). --follow N: also leaves a term out of the first N, and follows what
-`hydroid suggest` says (followed.py). --worlds --machines 12: the arms of
+`hydroid suggest` says (followed.py). --odd: the machines have valves that no exponent
+describes, some off centre, some on or off, speeds that lag, and pumps that hold their
+pressure up to a flow or stand on open centres. --worlds --machines 12: the arms of
 tests/helpers/worlds.py instead, which have no floor. --stored fits nothing again: it
 takes what lies in --folder, of the same --seed. So machines can be run in parts, by
 --first, and be printed together.
@@ -139,10 +141,11 @@ def run_commands(folder: Path, robot: Path) -> None:
     np.savetxt(folder / "seconds.txt", clock.seconds)
 
 
-def stranger(seed: int, number: int, folder: Path, *, stored: bool) -> Case:
+def stranger(seed: int, number: int, folder: Path, *, odd: bool, stored: bool) -> Case:
     """Run a random machine."""
     rng = np.random.default_rng([seed, number])
-    machine = Machine(rng, number)
+    oddities = np.random.default_rng([seed, number, 2]) if odd else None
+    machine = Machine(rng, number, oddities)
     if not stored:
         write_machine(folder, machine, rng)
         run_commands(folder, folder / "robot.urdf")
@@ -176,7 +179,7 @@ def run(given: Any, number: int) -> Found:
     if given.worlds:
         case = world(number, folder, stored=given.stored)
     else:
-        case = stranger(given.seed, number, folder, stored=given.stored)
+        case = stranger(given.seed, number, folder, odd=given.odd, stored=given.stored)
     end = Ending(folder)
     if case.machine is None:
         return Found(case, end, np.full(len(case.good), np.nan))
@@ -343,7 +346,12 @@ def show_case(one: Found, case: Followed) -> str:
 def main() -> None:
     numbers = {"machines": 40, "first": 0, "seed": 1, "exact": 0, "follow": 0}
     given = options(
-        __doc__, **numbers, worlds=False, stored=False, folder="build/strangers"
+        __doc__,
+        **numbers,
+        odd=False,
+        worlds=False,
+        stored=False,
+        folder="build/strangers",
     )
     if given.worlds and (given.exact or given.follow):
         raise SystemExit("--exact and --follow are of random machines, not of --worlds")

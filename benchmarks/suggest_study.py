@@ -17,9 +17,10 @@ from hydroid.advice.suggestions import advice
 from hydroid.arm.model import load_model
 from hydroid.log import Log
 from hydroid.problem.bindings import Bindings
-from hydroid.problem.problem import Problem, make_simulation
+from hydroid.problem.problem import Problem
 from hydroid.progress import no_progress
 from hydroid.settings.fit import FitSettings
+from hydroid.simulation import make_simulation
 
 TRUTH = {
     "A_A": 1000.0,
@@ -70,7 +71,7 @@ def largest_flow(truth: FitSettings, log: Log) -> float:
         Bindings(truth),
     )
     one = stage.candidates(truth.parameter_set().vector(TRUTH, "truth")[None])
-    flow = trace(simulation.scenario, truth.substeps, one).flow[:, 0]
+    flow = trace(simulation.scenario, one).flow[:, 0]
     return 6e4 * float(np.quantile(np.maximum(flow[:, 0], -flow[:, 1]), 0.99))
 
 

@@ -6,13 +6,30 @@ from dataclasses import replace
 import numpy as np
 
 from hydroid.arm.model import load_model
-from hydroid.arrays import Array
+from hydroid.arrays import Array, record
 from hydroid.errors import RunError
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
 from hydroid.problem.bindings import Bindings
-from hydroid.problem.problem import make_simulation
-from hydroid.simulation import Response
+from hydroid.simulation import Response, make_simulation
+from hydroid.simulation.roles import roles
+
+
+@record
+class OilTrace:
+    """What the oil of a log's K compared joints does in a simulation of T samples.
+
+    Attributes:
+        pressure: of chambers A and B [Pa], shape (T, K, 2); NaN of joints that the log
+            does not drive.
+        flow: into these chambers [m³/s], a mean over the last step, shape (T, K, 2);
+            below 0 out of them; NaN as the pressures.
+        line: pressure of the pump's line [Pa], shape (T,); None: its flow has no limit.
+    """
+
+    pressure: Array
+    flow: Array
+    line: Array | None
 
 
 def predict(model: IdentifiedModel, log: Log, joints: Sequence[int]) -> Array:
@@ -21,23 +38,27 @@ def predict(model: IdentifiedModel, log: Log, joints: Sequence[int]) -> Array:
     return _respond(model, log, [j - 1 for j in joints]).angle[0]
 
 
-def predict_with_pressures(
+def predict_with_oil(
     model: IdentifiedModel, log: Log, joints: Sequence[int]
-) -> tuple[Array, Array | None]:
-    """Return angles as `predict` does, and the chambers' pressures [Pa], shape (T, K,
-    2).
+) -> tuple[Array, OilTrace | None]:
+    """Return angles as `predict` does, and what the oil does; None of a model without
+    hydraulics.
 
-    The angles are the same to the bit. Pressures are NaN of joints that the log does
-    not drive, and None of a model without hydraulics.
+    The angles are the same to the bit.
     """
     if model.settings.stage != "hyd":
         return predict(model, log, joints), None
     columns = [joint - 1 for joint in joints]
     driven = [column for column in columns if log.driven[column]]
     response = _respond(model, log, columns, driven)
-    pressures = np.full((len(log.time), len(joints), 2), np.nan)
-    pressures[:, [columns.index(column) for column in driven]] = response.pressure[0]
-    return response.angle[0], pressures
+    places = [columns.index(column) for column in driven]
+    pressure = np.full((len(log.time), len(joints), 2), np.nan)
+    pressure[:, places] = response.pressure[0]
+    flow = np.full(pressure.shape, np.nan)
+    flow[:, places] = response.flow[0]
+    line = response.line[0] if driven else np.empty(0)
+    has_pump = np.isfinite(line).any()
+    return response.angle[0], OilTrace(pressure, flow, line if has_pump else None)
 
 
 def predict_log(model: IdentifiedModel, log: Log) -> Log:
@@ -49,11 +70,10 @@ def predict_log(model: IdentifiedModel, log: Log) -> Log:
     maps columns.
     """
     settings = model.settings
-    passive = settings.simulation.other_joints == "passive"
-    moving = [j for j in range(log.joints) if passive or log.driven[j]]
+    of_joints = roles(log.driven, settings.simulation.other_joints)
+    moving = np.flatnonzero(of_joints.simulated).tolist()
     angle = log.posed.copy()
-    if settings.simulation.other_joints == "locked":
-        angle[:] = log.start
+    angle[:, ~of_joints.moving] = log.start[~of_joints.moving]
     hydraulic = log.driven & (settings.stage == "hyd")
     measured = [
         j

@@ -124,8 +124,7 @@ def run_study(
     of all, by seed."""
     study = load(path, StudySettings)
     cells = cell_settings(study, path)
-    any_cell = next(iter(cells.values()))
-    logs = read([path.parent / name for name in study.logs], any_cell)
+    logs = read_cells([path.parent / name for name in study.logs], cells, read)
     tasks = make_tasks(cells, study.seeds, logs)
     files = [folder / "runs" / f"{task.key()}.json" for task in tasks]
     results = {file: _read(file) for file in files if file.is_file()}
@@ -139,7 +138,7 @@ def run_study(
         total = len(results) + len(missing)
         LOGGER.log(NOTE, "%d of %d runs found, goes on", len(results), total)
     _perform_all(missing, results, executor, progress)
-    return tuple(map(measured, tasks, [results[file] for file in files]))
+    return tuple(map(measures_of, tasks, [results[file] for file in files]))
 
 
 def _perform_all(
@@ -186,20 +185,38 @@ def _ended(future: Future[Result], task: Task) -> tuple[Result, bool]:
         return {"failed": words}, lasting
 
 
+def read_cells(
+    paths: Sequence[Path], cells: Mapping[str, FitSettings], read: Read
+) -> dict[str, Sequence[Log]]:
+    """Return the logs as each cell's settings read them, by the cell's name.
+
+    A cell may name another column, delay or period. Cells that read alike share logs.
+    """
+    logs = dict[str, Sequence[Log]]()
+    for name, settings in cells.items():
+        alike = [
+            other
+            for other in logs
+            if cells[other].log == settings.log and cells[other].arm == settings.arm
+        ]
+        logs[name] = logs[alike[0]] if alike else read(paths, settings)
+    return logs
+
+
 def make_tasks(
-    cells: Mapping[str, FitSettings], seeds: int, logs: Sequence[Log]
+    cells: Mapping[str, FitSettings], seeds: int, logs: Mapping[str, Sequence[Log]]
 ) -> list[Task]:
     """Return all runs of a study, seed by seed, with one thread:
-    the runs are what is shared out."""
+    the runs are what is shared out. `logs` are those of each cell."""
     tasks = list[Task]()
     for seed in range(1, seeds + 1):
         for name, settings in cells.items():
             changes = {"search.seed": seed, "simulation.threads": 1}
-            tasks.append(Task(name, seed, settings.changed(changes), tuple(logs)))
+            tasks.append(Task(name, seed, settings.changed(changes), tuple(logs[name])))
     return tasks
 
 
-def measured(task: Task, result: Result) -> Row:
+def measures_of(task: Task, result: Result) -> Row:
     """Return the measures of one run (docs/studies.md)."""
     values = {name: float(value) for name, value in result.get("measures", {}).items()}
     values |= {

@@ -102,13 +102,13 @@ def told_apart(first: float, second: float) -> tuple[str, str]:
     """Write two numbers beside each other: two significant digits, three where two
     would tie."""
     for digits in (2, 3):
-        pair = (_significant(first, digits), _significant(second, digits))
+        pair = (significant(first, digits), significant(second, digits))
         if pair[0] != pair[1]:
             break
     return pair
 
 
-def _significant(value: float, digits: int) -> str:
+def significant(value: float, digits: int) -> str:
     """Write significant digits, zeros among them, or all before the point."""
     if abs(value) >= 10**digits:
         return f"{value:.0f}"

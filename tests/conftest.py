@@ -1,9 +1,16 @@
 """What several tests share: the shipped arm, and small logs made by simulation."""
 
-# ruff: noqa: E402  # MuJoCo asks for OpenGL when it is imported
+# ruff: noqa: E402  # MuJoCo asks for OpenGL, and NumPy for threads, when it is imported
 
+import os
+
+from hydroid.commands.app import ONE_THREAD
 from hydroid.viewer import choose_platform
 
+# as the command line has it: threads of linear algebra that wait for each other take
+# several times the processor's time, and more where other tests run beside
+for variable in ONE_THREAD:
+    os.environ.setdefault(variable, "1")
 choose_platform()
 
 from collections.abc import Sequence
@@ -16,6 +23,7 @@ from made_logs import step_log
 from hydroid.arm.model import load_model
 from hydroid.hydraulics.records import nominal_joints
 from hydroid.log import Log
+from hydroid.rungs import rungs_of
 from hydroid.settings.arm import Arm, load_arm
 from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.problem import SimulationSettings
@@ -87,8 +95,10 @@ def simulation(
     **settings,
 ) -> Simulation:
     """Of some joints, from 0, in the stage `kind`."""
-    scenario = Scenario(spec, arm, log, list(outputs), SimulationSettings(**settings))
-    return Simulation(scenario, HydraulicSettings().substeps if kind == "hyd" else None)
+    how = SimulationSettings(**settings)
+    (rung, *_) = rungs_of(kind, how.model)
+    stepping = rung.stepping(how.steps_per_sample, HydraulicSettings().substeps)
+    return Simulation(Scenario(spec, arm, log, list(outputs), how, stepping))
 
 
 def replaced(candidates: Candidates, **joints: np.ndarray | float) -> Candidates:

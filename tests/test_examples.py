@@ -265,7 +265,7 @@ def test_all_logs_of_the_excavator_are_read_without_repair_and_its_boom_rises_as
     logs = hydroid.read_logs(
         files, hydroid.load_settings(EXAMPLES / "excavator" / "fit.yaml")
     )
-    assert all(log.driven.all() and log.measured.all() for log in logs)
+    assert all(log.driven.all() and log.has_angle.all() for log in logs)
     assert {log.period for log in logs} == {0.05}
     assert "moves against" not in caplog.text
 

@@ -21,7 +21,7 @@ LAYERS = [
         "quantity_table",
         "robot_xml",
     }
-    | {"joint_verdict", "settings", "units", "words"},
+    | {"joint_verdict", "rungs", "settings", "units", "words"},
     {"estimate"},
     {"identified_model"},
     {"log", "arm", "hydraulics"},

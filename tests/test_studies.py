@@ -22,7 +22,7 @@ from hydroid.errors import HydroidError, RunError
 from hydroid.progress import no_progress
 from hydroid.settings.fit import StudySettings, cell_settings
 from hydroid.settings.load import load
-from hydroid.studies import Row, make_tasks, run_study
+from hydroid.studies import Row, make_tasks, read_cells, run_study
 
 
 def content(**changes: Any) -> dict[str, Any]:
@@ -103,13 +103,26 @@ def test_a_run_is_the_same_wherever_the_arm_s_files_lie(tmp_path: Path):
     """A checkout that is moved keeps its runs: paths decide nothing."""
     file = written(tmp_path)
     cells = cell_settings(load(file, StudySettings), file)
-    (task, *_) = make_tasks(
-        cells, 1, read_logs([tmp_path / "short.csv"], cells["mean"])
-    )
+    logs = read_cells([tmp_path / "short.csv"], cells, read_logs)
+    (task, *_) = make_tasks(cells, 1, logs)
     arm = task.settings.arm
     moved = arm.changed({"pair": tmp_path / "other.xml"})
     other = replace(task, settings=task.settings.model_copy(update={"arm": moved}))
     assert other.key() == task.key()
+
+
+def test_each_cell_reads_the_logs_by_its_own_settings(tmp_path: Path):
+    periods = {
+        "fine": {"log.period_s": 0.01},
+        "again": {"log.period_s": 0.01},
+        "coarse": {"log.period_s": 0.02},
+    }
+    file = written(tmp_path, axes={"period": periods})
+    cells = cell_settings(load(file, StudySettings), file)
+    logs = read_cells([tmp_path / "short.csv"], cells, read_logs)
+    found = {name: log.period for name, (log,) in logs.items()}
+    assert found == {"fine": 0.01, "again": 0.01, "coarse": 0.02}
+    assert logs["fine"] is logs["again"]
 
 
 def test_a_run_that_fails_is_shown_and_the_others_count(tmp_path: Path, monkeypatch):

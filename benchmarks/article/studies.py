@@ -21,7 +21,7 @@ from hydroid.log import Log
 from hydroid.problem.problem import Problem
 from hydroid.settings.fit import Changes, FitSettings, StudySettings, cell_settings
 from hydroid.settings.load import Settings, load
-from hydroid.studies import Result, Task, measured
+from hydroid.studies import Result, Task, measures_of
 
 FOLDER = Path(__file__).parent
 SECONDS, QUICK_SECONDS = 75.0, 15.0
@@ -174,7 +174,7 @@ class Plan:
 
     def row(self, cell: str, seed: int, result: Result) -> dict[str, Any]:
         """Return a run with all its measures, as it is kept."""
-        made = measured(self.task(cell, seed), result)
+        made = measures_of(self.task(cell, seed), result)
         row: dict[str, Any] = {"cell": cell, "seed": seed} | dict(made.values)
         if made.failed:
             return row | {"failed": made.failed}

@@ -39,6 +39,10 @@ TRUTH = {
     "lag": 2.0,
     "size": 1.2,
     "D": 0.7,
+    "slow": 0.0,
+    "P_flow": 30.0,
+    "P_power": 1.0 / 1.2,
+    "P_past": 0.0,
 }
 """factors between the machine's values and those of a project, by the beginning of
 their names"""

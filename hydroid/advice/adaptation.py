@@ -58,14 +58,11 @@ def adapted(
         parameters[name] = parameter.changed(changes)
     names = {settings.payload_name(log.source) for log in logs}
     kept = {name: mass for name, mass in settings.payloads.items() if name in names}
-    kind = settings.simulation.model
-    return settings.changed(
+    # a ladder that kept its first model: the others are not tried again
+    return settings.on(settings.rung).changed(
         {
             "parameters": parameters,
             "payloads": kept,
-            # a ladder that kept the quasi-static model: the dynamic one is not tried
-            # again
-            "simulation.model": "quasi-static" if kind == "ladder" else kind,
             "search.algorithm": "multistart",
             # a search in name only: the refinement goes on from the fit's own estimate
             "search.multistart": MultistartSettings(

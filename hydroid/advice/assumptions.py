@@ -183,7 +183,9 @@ def _motion(settings: FitSettings, logs: Sequence[Log]) -> _Motion:
     pose = settings.arm.pose(settings.start_pose)
     longest = 2 * LATEST + WINDOW
     usable = [
-        log for log in logs if log.duration > longest and log.measured[log.driven].all()
+        log
+        for log in logs
+        if log.duration > longest and log.has_angle[log.driven].all()
     ]
     if not usable:
         return _Motion([], period, pose[None], pose[None], ())
@@ -191,7 +193,7 @@ def _motion(settings: FitSettings, logs: Sequence[Log]) -> _Motion:
     angles = list[Array]()
     commands = list[Array]()
     for log in usable:
-        angle = np.where(log.measured, log.angle, pose)
+        angle = np.where(log.has_angle, log.angle, pose)
         begin = angle[:-width:step]
         end = angle[width::step]
         speeds.append((end - begin) / (width * log.period))
@@ -200,7 +202,7 @@ def _motion(settings: FitSettings, logs: Sequence[Log]) -> _Motion:
         total = np.cumsum(np.pad(log.command, ((1, 0), (0, 0))), axis=0)
         commands.append((total[width:-1:step] - total[: -width - 1 : step]) / width)
     driven = np.any([log.driven for log in usable], axis=0)
-    measured = np.all([log.measured for log in usable], axis=0)
+    measured = np.all([log.has_angle for log in usable], axis=0)
     joints = np.flatnonzero(driven & measured).tolist()
     return _Motion(
         joints, period, np.concatenate(speeds), np.concatenate(angles), tuple(commands)

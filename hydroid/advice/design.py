@@ -33,11 +33,13 @@ from hydroid.posterior.posterior import Posterior, regular
 from hydroid.posterior.uncertainty import uncertainty
 from hydroid.problem.bindings import Bindings
 from hydroid.problem.priors import Priors
-from hydroid.problem.problem import Problem, make_simulation
+from hydroid.problem.problem import Problem
 from hydroid.progress import Progress
 from hydroid.search.axes import differentiate
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.search import DesignSettings
+from hydroid.simulation import make_simulation
+from hydroid.simulation.roles import roles
 from hydroid.words import listed
 
 PRIOR_SD = 1.0
@@ -51,7 +53,7 @@ def forecast(posterior: Posterior) -> Posterior:
     return posterior.add(np.eye(len(posterior.root)) / PRIOR_SD)
 
 
-def measured(
+def information(
     settings: DesignSettings, signals: Sequence[Array], period: float
 ) -> Array:
     """Return rows N of the information N' N that signals of the joints' angles give,
@@ -82,7 +84,7 @@ counts"""
 class Trial(NamedTuple):
     """A simulated experiment that keeps the limits.
 
-    experiment: its commands. gained: rows of its information (`measured`), shape (p,
+    experiment: its commands. gained: rows of its information (`information`), shape (p,
     p). log: its commands with the simulated angles.
     """
 
@@ -207,7 +209,9 @@ class ExperimentSimulator:
             return DIVERGED
         of_angles = slopes.reshape(len(slopes), -1, len(self._outputs))
         signals = [*np.moveaxis(of_angles, -1, 0)]
-        gained = measured(self._settings.design, signals, self._settings.log.period_s)
+        gained = information(
+            self._settings.design, signals, self._settings.log.period_s
+        )
         log = replace(experiment.log(self._settings), angle=angle)
         return Trial(experiment, gained, log)
 
@@ -215,9 +219,10 @@ class ExperimentSimulator:
         """Return all joints' angles [rad] of candidates, (n, P) -> (n, T, J);
         NaN of what moves if one diverged."""
         log = experiment.log(self._settings)
-        passive = self._settings.simulation.other_joints == "passive"
         is_output = np.isin(np.arange(log.joints), self._outputs)
-        moving = np.flatnonzero(log.driven | passive | is_output)
+        others = self._settings.simulation.other_joints
+        of_joints = roles(log.driven | is_output, others)
+        moving = np.flatnonzero(of_joints.simulated)
         simulation = make_simulation(self._spec, log, moving.tolist(), self._settings)
         angle = np.tile(log.angle, (len(theta), 1, 1))
         angle[:, :, moving] = simulation.simulate(
@@ -356,7 +361,7 @@ def _random_trials(
     kept = list[Trial]()
     broken = list[Broken]()
     for drawn in range(1, _random_effort(effort) + 1):
-        trial = simulator.trial(experiments.draw())
+        trial = simulator.trial(experiments.random())
         if isinstance(trial, Trial):
             kept.append(trial)
         else:

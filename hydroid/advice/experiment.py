@@ -105,7 +105,7 @@ class RandomExperiments:
             max(1, round(t / period)) for t in limits.dwell_s
         )
 
-    def draw(self) -> Experiment:
+    def random(self) -> Experiment:
         """Draw an experiment: half of them drive all allowed joints,
         the others a random part of them."""
         some = self._rng.random(len(self._joints)) < 0.5

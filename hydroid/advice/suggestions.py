@@ -214,7 +214,7 @@ def _forecasts(
         # no pose that an experiment may start from: hydroid design says so
         return
     simulator = ExperimentSimulator(settings, now)
-    trials = [simulator.trial(draws.draw()) for _ in range(6)]
+    trials = [simulator.trial(draws.random()) for _ in range(6)]
     gained = [trial.gained for trial in trials if isinstance(trial, Trial)]
     if gained:
         best = max(gained, key=lambda rows: np.sum(np.log(np.diag(now.add(rows).root))))

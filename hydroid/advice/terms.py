@@ -18,12 +18,12 @@ from hydroid.posterior.error_model import Likelihood
 from hydroid.problem.problem import Problem
 from hydroid.quantity_table import (
     CHOICES,
-    MECHANICAL,
     QUANTITIES,
     ROWS,
     TARGETS,
     Quantity,
 )
+from hydroid.rungs import stage_has
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.hydraulics import actuator_values
 from hydroid.settings.problem import ParameterSettings
@@ -204,7 +204,7 @@ def _set_by_parameters(settings: FitSettings) -> set[tuple[str, int]]:
 def _may_lack(problem: Problem, row: Quantity) -> bool:
     """Return whether the model of this stage has a quantity, and the logs do not say it
     already."""
-    if problem.settings.stage == "mech" and row.name not in MECHANICAL:
+    if not stage_has(problem.settings.stage, row.name):
         return False
     if row.of_the_pump:
         # the pump of one actuator is no more than its flow limit

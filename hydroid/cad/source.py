@@ -118,9 +118,10 @@ def _found(files: dict[str, str], folder: Path, notes: Notes) -> dict[str, Path]
     """
     by_name: dict[str, Path] = {}
     if files:
-        by_name = {
-            path.name.lower(): path for path in islice(folder.rglob("*"), MOST_FILES)
-        }
+        below = [*islice(folder.rglob("*"), MOST_FILES)]
+        # of several of one name, that in the fewest folders, whatever the disk's order
+        below.sort(key=lambda path: (-len(path.parts), str(path)))
+        by_name = {path.name.lower(): path for path in below}
     found = dict[str, Path]()
     for name, given in files.items():
         path = _plain_path(given)

@@ -340,7 +340,7 @@ def _plain_layout(log: Log) -> LogSettings:
     """Return the default columns of what a log holds: commands, angles, pressures of
     both chambers."""
     columns: dict[int, dict[str, None] | None] = {}
-    for joint, measured in enumerate(log.measured):
+    for joint, measured in enumerate(log.has_angle):
         absent: dict[str, None] = {} if measured else {"angle": None}
         if log.pressure is None or np.isnan(log.pressure[0, joint]).any():
             absent["pressure"] = None

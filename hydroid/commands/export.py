@@ -44,11 +44,12 @@ def export(
 ) -> Result[list[str]]:
     """Write a fitted machine for other programs.
 
-    parameters: draws of all parameters together within what the logs leave open,
-    ranges, and the errors of the model. table: settled speed against command of each
-    joint, as CSV for a PLC. urdf: your own file with the masses of the fit. mjcf: a
-    model that plain MuJoCo steps. linear: A, B, C, D and delays near a pose and
-    opening, as JSON, and a page with step response and Bode plot. fmu: FMI 2 for co-simulation.
+    parameters: many sets of parameter values that the logs allow (draws), their ranges,
+    and the errors of the model. table: steady speed of each joint against its command,
+    as CSV for a PLC. urdf: your own file with the masses of the fit. mjcf: a model that
+    plain MuJoCo steps. linear: A, B, C, D and delays near one pose and
+    command, as JSON, and a page with step response and Bode plot. fmu: FMI 2 for
+    co-simulation.
 
     Example: hydroid export runs/hyd --to parameters --draws 100
 
@@ -57,7 +58,8 @@ def export(
     Args:
         fit (RUN|YAML): A fit: a run folder, or a folder written by Plant.save (Python).
         to (KIND): parameters, table, urdf, mjcf, linear or fmu.
-        out (DIR): Folder of the files [default of the command line: runs/export].
+        out (DIR): Folder of the files [default: runs/export; in Python nothing is
+            written].
         draws (1 to 100000): Number of draws of the parameters.
         robot (URDF): With --to urdf: your robot's URDF, whose masses are replaced.
         pose (NAME): The pose where the plant starts, by its name in the arm's file

@@ -289,7 +289,7 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
 
 def _store(folder: "RunFolder", result: FitResult) -> Path:
     """Write a fit to its run folder, and return its page."""
-    from hydroid.reporting.predictions import draw
+    from hydroid.reporting.predictions import write_report
     from hydroid.run.record import keep_earlier, write_record
 
     began = time.monotonic()
@@ -297,7 +297,7 @@ def _store(folder: "RunFolder", result: FitResult) -> Path:
     write_record(folder.path, result.record)
     keep_earlier(folder.path, result.earlier)
     folder.status("running", finished=date.today().isoformat())
-    page = draw(folder.path)
+    page = write_report(folder.path)
     folder.status(
         "done", seconds={**result.fit.seconds, "report": time.monotonic() - began}
     )

@@ -39,13 +39,13 @@ def follow(
     set: "SettingChanges" = None,
     repair: bool = False,
 ) -> "Result[Followed]":
-    """Find commands that lead the arm along joint angles over time, or its tip along a
-    path.
+    """Find the commands that move the joints along given angles, or the tip along a
+    given path.
 
     The commands are a feed-forward: play them without feedback. They allow for dead
-    band, valve curve, load, pump, delay and lags. Where a joint cannot move as wished,
-    the command says so and takes the nearest speed. It predicts the tracking error with
-    its band. A page shows the arm in motion.
+    band, valve curve, load, pump, delay and lags. Where a joint cannot be as fast as
+    asked, hydroid says so and takes the nearest speed. It also predicts the error with
+    a band, and writes a page with the arm in motion.
 
     Example: hydroid follow TRAJECTORY.csv --fit runs/hyd --out commands.csv
 
@@ -59,9 +59,9 @@ def follow(
             site that the arm's file names as payload, or else the end of the last link.
             Joints without a column, or without commands, rest where the first log of
             the fit begins, or in the start_pose that --set gives.
-        out (LOG.csv): The commands, in the columns and units of the fit's logs, beside
-            the wished angles; the page has the same name [default of the command line:
-            runs/follow/commands.csv].
+        out (LOG.csv): The commands and the angles asked for, in the columns and units
+            of the fit's logs; the page has the same name [default:
+            runs/follow/commands.csv; in Python nothing is written].
         payload (0 or more): Mass at the tip [kg].
 
     Raises:

@@ -26,14 +26,15 @@ def init(
     total_mass: float | None = None,
     force: bool = False,
 ) -> "Result[Project]":
-    """Write a project that runs, from your arm's CAD and your log.
+    """Write a project for your arm and your log: all files that a fit needs.
 
     The project holds the arm's file and model, the settings of a fit, a picture to
     check the arm by, and the commands to run next. Start values and priors come from
     the arm's size.
 
-    If it does not recognise a log's columns, the exit status is 2, and the project's
-    fit.yaml lists them. Say there what they are, then run init again with --config.
+    If it does not recognise the columns of a log, it lists them in the project's
+    fit.yaml, and the exit status is 2. Write there what each column is. Then run init
+    again with --config.
 
     Example: hydroid init mine --arm robot.urdf --log a.csv
 
@@ -44,18 +45,18 @@ def init(
         folder (DIR): Folder of the project, new or not [default: that of --config].
         arm (robot.urdf): URDF or MJCF of the arm, or an arm's YAML file [default: a
             template of boxes].
-        log (LOG): A log; its columns are guessed. Repeat it for several logs: the next
-            steps keep the last to validate on.
+        log (LOG): A log; its columns are guessed. Repeat the option for several logs.
+            The next steps keep the last log for the validation.
         config (YAML): The fit.yaml of an earlier init, whose `log` section you have
             completed. Its columns and its arm stay; all other settings are written
             anew.
         joints (NAME,NAME): Names of the arm's joints in the order of the log's numbers
             (u1, u2, ...) [default: the order in the arm's file].
-        lengths (M,M): Lengths of the links that these joints move [m], in place of
-            --arm: an arm of boxes, as in --joints swing,boom,arm,bucket --lengths
-            0,3.7,1.6,0.9; 0 for a joint that slews.
-        total_mass (KG): Mass of all links that move [kg], to which those of the arm's
-            file are scaled.
+        lengths (M,M): Lengths [m] of the links that these joints move. They take the
+            place of --arm: hydroid makes an arm of boxes. Example: --joints
+            swing,boom,arm,bucket --lengths 0,3.7,1.6,0.9. A joint that slews has 0.
+        total_mass (KG): Mass of all moving links together [kg]. The masses of the arm's
+            file are scaled to it.
         force: Replace the files of an earlier project in the folder.
         tip (LINK): Last link of the arm, if the robot has several branches [default:
             the end of the branch whose joints the log names, or else of the longest

@@ -40,32 +40,32 @@ SettingChanges = Mapping[str, Any] | Sequence[str] | None
 SHARED = f"""
     logs (LOG): Logs of commands and joint angles. Formats: {FORMATS}.
     log (LOG): A log. Formats: {FORMATS}.
-    fit (RUN|YAML): An estimate: the folder of a run or of Plant.save (Python), an
-        estimate.yaml, or a YAML file that gives parameters values.
+    fit (RUN|YAML): A fit: the folder of a run or of Plant.save (Python), an
+        estimate.yaml, or a YAML file with values of the parameters.
     out (DIR): Folder for the tables [default: runs/COMMAND; in Python
         nothing is written].
-    config (YAML): Settings: the fit.yaml that `hydroid init` wrote for your machine, or
-        the name of a shipped config, for the shipped arm. With the folder of a run it
-        is not needed.
+    config (YAML): Settings: the fit.yaml that `hydroid init` wrote for your machine.
+        For the shipped arm: the name of a shipped config. Not needed with the folder of
+        a run.
     set (KEY=VALUE): Replace a setting, such as search.ga.generations=80.
     repair: Fill gaps in the logs up to log.repair_s (0.1 s), and list what was filled. The files
         themselves stay as they are.
     seed (0 or more): Seed of the random numbers. The same seed gives exactly the same result.
     dask (local[:N]|ADDRESS): Simulate in N processes of this machine, or on the workers of the Dask
         scheduler at ADDRESS. The result is the same.
-    arm (right|left|both): Simulate the two-arm machine of the arm's file; the value names the arms
-        that move. Columns such as right_u2_pct and left_q2_deg belong to one arm. All others apply
-        to every arm that moves.
+    arm (right|left|both): For a machine of two arms: which of them move. Columns such
+        as right_u2_pct and left_q2_deg belong to one arm. All other columns apply to
+        every arm that moves.
     pose (NAME): The start pose, by its name in the arm's file [default: the first angles of the
         log].
 
     algorithm (NAME): Search: ga, nsga2, multistart or pymoo (search.pymoo).
-    start (RUN|YAML): Start the search from the values of an estimate.
+    start (RUN|YAML): Start the search from the values of a fit.
     resume: Continue the stopped run in --out; start it if there is none.
     refinement: After the search, refine its estimate by least squares.
-    budget (TIME): Time for search and refinement, such as 90s, 5min or 2h. The best
-        model so far is then kept; its intervals and report take a little longer. To go
-        on, repeat the command with --resume and more time.
+    budget (TIME): Time for search and refinement, such as 90s, 5min or 2h. When it is
+        up, hydroid keeps the best model so far; intervals and report take a little
+        longer. To go on, repeat the command with --resume and more time.
     threads (N): Number of threads (0: one per core, or with --dask one per worker).
 """
 
@@ -200,7 +200,8 @@ def command(function: F) -> F:
     text, raises = _split(inspect.cleandoc(function.__doc__ or ""), "Raises:")
     text, arguments = _split(text, "Args:")
     summary, example = _split(text, "Example:")
-    described = _described(SHARED) | _described(arguments)
+    shared = SHARED.replace("COMMAND", function.__name__.replace("_", "-"))
+    described = _described(shared) | _described(arguments)
     parameters = [*inspect.signature(function).parameters.values()]
     lines = [text, "", "Args:"]
     lines += [f"    {p.name}: {described[p.name].text}" for p in parameters]

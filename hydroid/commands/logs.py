@@ -63,7 +63,7 @@ def read_logs(
     with Progress() as progress:
         for source in as_list(logs):
             if isinstance(source, Log):
-                if source.pose is None and not source.measured.all():
+                if source.pose is None and not source.has_angle.all():
                     source = replace(source, pose=pose)
                 read.append(source)
                 continue

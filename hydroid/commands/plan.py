@@ -56,10 +56,10 @@ def suggest(
 ) -> "Result[tuple[Finding, ...]]":
     """Find what the model lacks, and what to do next.
 
-    First it tests every parameter that is kept fixed, switched off or shared, such as a
-    delay or dry friction: the most promising ones are freed, and judged by the error on
-    parts of the logs that are left out. Then it tests whether the logs contradict the
-    sign of an angle. Last it lists actions, from weighing a link to a new experiment,
+    First it tests every parameter that the fit keeps fixed, switched off or shared,
+    such as a delay or dry friction. It frees the most promising ones, and judges them
+    by the error on parts of the logs that are left out. Then it tests whether the logs
+    contradict the sign of an angle. Last it lists actions, from weighing a link to a new experiment,
     and how much each would reduce the uncertainty.
 
     Example: hydroid suggest --fit runs/hyd

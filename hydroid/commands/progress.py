@@ -123,8 +123,7 @@ class FitProgress(Progress):
         self._total = 1 + getattr(search, search.algorithm).generations
         self._terms = settings.terms()
         self._number = 1
-        is_ladder = settings.simulation.model == "ladder"
-        self._rungs = 2 + len(self._terms) + is_ladder
+        self._rungs = 1 + len(self._terms) + len(settings.rungs)
 
     def generation(self, row: "Array") -> bool:
         """Take a row of `fitting.search.HISTORY`; return whether time is up."""
@@ -155,11 +154,15 @@ class FitProgress(Progress):
         # the last step, in which what is kept is refined
         number = total
         if step.phase or step.start:
-            models = {"start": 1, "refined": 2, "joint": 2, "dynamic": total}
+            models = {"start": 1, "refined": 2, "joint": 2}
+            # the first rung is refined, and its terms are tried; then come the others
+            further = self._settings.rungs[1:]
+            first = total - len(further) + 1
+            models |= {rung.name: first + k for k, rung in enumerate(further)}
             number = models.get(step.model, 1)
-            for rung, term in enumerate(self._terms, 3):
+            for place, term in enumerate(self._terms, 3):
                 if term in step.terms:
-                    number = max(number, rung)
+                    number = max(number, place)
         # a rung is compared with the one below: that leads no step back
         self._number = max(number, self._number)
         words = f"start {step.start}" if step.model == "start" else step.estimate

@@ -64,7 +64,7 @@ def fit_mech(
         print(fitted.summary.values)
 
     Args:
-        out (DIR): Run folder [default of the command line: runs/fit-mech].
+        out (DIR): Run folder [default: runs/fit-mech; in Python nothing is written].
 
     Raises:
         HydroidError: an input or a folder that cannot be used.
@@ -118,7 +118,7 @@ def fit_hyd(
         print(fitted.summary.values)
 
     Args:
-        out (DIR): Run folder [default of the command line: runs/fit-hyd].
+        out (DIR): Run folder [default: runs/fit-hyd; in Python nothing is written].
         mech (RUN|YAML): Stage 1: its run folder, or a YAML file of its values.
 
     Raises:
@@ -344,21 +344,22 @@ def adapt(
 
     Use it after a change of the machine: a slower engine, a colder day, another tool.
     For a load of known mass, set the payload of the logs instead: --set
-    'payloads={LOADED.csv: 250}'. A load at the tip that nobody has weighed is found like
-    the other parameters, under the name tip_load. Each freed parameter is tested on parts of the logs
-    that are left out. The result is a run that every command takes.
+    'payloads={LOADED.csv: 250}'. A load at the tip that nobody has weighed is found
+    like the other parameters; its name is tip_load. hydroid leaves parts of the logs
+    out, and keeps a parameter free only if the error falls there. The result is a run
+    that every command takes.
 
-    Example: hydroid adapt LOADED.csv --fit runs/hyd --free P_flow,P_droop
+    Example: hydroid adapt LOADED.csv --fit runs/hyd --free P_flow
 
         adapted = hydroid.adapt("b.csv", fit="runs/a", free="M3")
         print(adapted.summary.values)
 
     Args:
         logs (LOG): The new logs.
-        free (NAME,NAME): Parameters to be freed [default: masses, pump, effects of
-            the logs' groups and tip_load, one after the other, as long as the error
-            falls on every part of the logs left out].
-        out (DIR): Run folder [default of the command line: runs/adapt].
+        free (NAME,NAME): Parameters to free [default: hydroid tries masses, pump,
+            effects of the groups of logs, and tip_load in turn; it goes on as long as
+            the error falls on every part left out].
+        out (DIR): Run folder [default: runs/adapt; in Python nothing is written].
         set (KEY=VALUE): Replace a setting of the fit, such as
             refinement.iterations=100.
 

@@ -34,7 +34,7 @@ def study(
 
     The file names a config, the settings that vary, and the logs. Every run leaves a
     small file in DIR/runs when it ends. To continue a study that was stopped, give the
-    same command again: it ends with the same bits.
+    same command again. The result is the same to the last bit.
 
     Example: hydroid study my-study.yaml --out runs/my-study
 

@@ -49,8 +49,8 @@ def validate(
     set: "SettingChanges" = None,
     repair: bool = False,
 ) -> "Result[list[Prediction]]":
-    """Test fits on logs that they have not seen: a verdict on each joint,
-    beside the errors of simple models.
+    """Test fits on logs that they were not fitted to. The verdict on each joint
+    compares its error with those of simple models.
 
     Each fit reads the logs with its own settings. The page shows every response with
     its errors (article, table 9). From then on, the report of the fit's own run shows
@@ -64,9 +64,9 @@ def validate(
     Args:
         fit (RUN|YAML): An estimate: the folder of a run or of Plant.save (Python), or a
             YAML file. Repeat the option to compare several.
-        tolerance (0.001 to 90): The rms error that you accept [deg], for every joint;
-            for one per joint, set tolerance_deg in config.yaml [default: the fit's, or
-            else 2 % of a joint's travel].
+        tolerance (0.001 to 90): The rms error that you accept at every joint [deg]. To
+            give each joint its own, set tolerance_deg in config.yaml [default: the
+            fit's, or else 2 % of a joint's travel].
         apart: These logs were recorded under other conditions, such as another load.
             The fit's report shows them, but its verdict does not count them. Repeat
             without --apart to count them again.
@@ -233,14 +233,14 @@ def _is_own(prediction: "Prediction") -> bool:
 def _keep(tested: Iterable[_Tested], *, apart: bool) -> None:
     """Store what fits make of unseen logs in their own runs, whose reports show them
     from now on."""
-    from hydroid.reporting.predictions import draw
+    from hydroid.reporting.predictions import write_report
     from hydroid.run.record import keep_validation
 
     for test in tested:
         predictions = [replace(p, apart=apart) for p in test.predictions]
         run = keep_validation(test.model, predictions)
         if run:
-            draw(run)
+            write_report(run)
 
 
 def _unseen(log: Log, fitted: Sequence[Log]) -> bool:
@@ -265,8 +265,9 @@ def report(
     """Draw the reports of finished runs anew, or merge runs of one fit with different
     seeds.
 
-    Nothing is simulated, and no log is needed: a run stores all that its report shows,
-    which is written again in its folder. `hydroid validate` compares several fits.
+    Nothing is simulated and no log is needed, because a run stores all that its report
+    shows. The report is written into the run's folder again. To compare several fits,
+    use `hydroid validate`.
 
     Example: hydroid report runs/mech runs/hyd
 
@@ -288,11 +289,11 @@ def report(
     folders = as_list(runs)
     if merge:
         return _merged([str(folder) for folder in folders], out)
-    from hydroid.reporting.predictions import draw
+    from hydroid.reporting.predictions import write_report
 
     for folder in folders:
         warn_of_changes(Path(folder))
-    files = [str(draw(folder, figures=figures)) for folder in folders]
+    files = [str(write_report(folder, figures=figures)) for folder in folders]
     return Result(files, {"files": files}, ())
 
 

@@ -70,8 +70,8 @@ def simulate(
     Args:
         commands (COMMANDS.csv): A log of commands. Its angles before the first command
             give the start pose.
-        out (LOG.csv): The log to write [default of the command line:
-            runs/simulated.csv].
+        out (LOG.csv): The log to write [default: runs/simulated.csv; in Python nothing
+            is written].
         noise_deg (0 to 90): Standard deviation of Gaussian noise on the angles [deg].
 
     Raises:
@@ -126,9 +126,9 @@ def view(
     measured one.
 
     Without a log, the sliders in the panel "Control" on the right set the commands in
-    %. Backspace restarts. With -o FILE it writes a film or a picture instead. This
-    needs no display, but OpenGL by EGL or OSMesa. In a program of your own, set
-    MUJOCO_GL to egl or osmesa before anything is imported.
+    %. Backspace restarts. With -o FILE it writes a film or a picture instead. That
+    works without a display, but needs OpenGL (EGL or OSMesa). In your own program, set
+    MUJOCO_GL to egl or osmesa before you import anything.
 
     Example: hydroid view runs/hyd -o arm.mp4
 
@@ -137,14 +137,14 @@ def view(
     Args:
         source (RUN|LOG): A run folder, whose first log drives the arm; or a log, with
             --fit.
-        out (FILE): Write a film (.mp4, .gif) or the beginning of the span (.png)
+        out (FILE): Write a film (.mp4, .gif), or a picture (.png) of its first moment,
             instead of opening a window.
         fit (RUN|YAML): An estimate, as a run folder or a YAML file [default: the arm's
             file and `hydraulics` in the settings].
         span (FROM:TO): Part of the log to film [s], such as 10:20 [default: all].
-        collisions: Show nothing, but find which of the arm's bodies meet each other,
-            the base or the floor along the log's joint angles; with --arm, also the
-            carrier and the other arm. The exit status is 1 if bodies meet.
+        collisions: Show nothing. Find instead where parts of the arm touch each other,
+            the base or the floor at the joint angles of the log. With --arm the carrier
+            and the other arm count too. The exit status is 1 if parts touch.
         config (YAML): Settings [default: config.yaml in the folder of the estimate,
             or else fit-hyd].
 

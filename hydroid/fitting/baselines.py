@@ -133,7 +133,7 @@ def fit_baselines(
     `limits` is its range [rad]. They are by name, the simplest first. A joint that is
     never driven has only that.
     """
-    measured = [log for log in logs if log.measured[joint - 1]]
+    measured = [log for log in logs if log.has_angle[joint - 1]]
     still = Baseline(joint, np.asarray(limits, float))
     if not any(log.driven[joint - 1] for log in measured):
         return {NAMES[0]: still}

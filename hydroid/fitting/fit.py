@@ -8,7 +8,7 @@ import numpy as np
 
 from hydroid.arrays import Array, record
 from hydroid.fitting.checkpoints import Checkpoints
-from hydroid.fitting.ladder import Estimate, Ladder, Watcher, measured
+from hydroid.fitting.ladder import Estimate, Ladder, Watcher, simulated
 from hydroid.fitting.refinement import Refinement
 from hydroid.fitting.search import Searched, search
 from hydroid.posterior.quantities import Quantities, quantities
@@ -78,7 +78,7 @@ def fit(
     times, settings = [time.perf_counter()], problem.settings
     first = problem.varied(settings.of_estimate("best"))
     searched = search(first, watch, checkpoints)
-    estimates = measured(first, _candidates(first, searched))
+    estimates = simulated(first, _candidates(first, searched))
     final = next(iter(estimates))
     ladder = Ladder(first, estimates, watch, checkpoints)
     times.append(time.perf_counter())

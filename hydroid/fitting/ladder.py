@@ -9,7 +9,7 @@ is shows long before least squares has converged, so that ends early on the way
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
-from typing import Literal, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from hydroid.posterior.linear import estimate_box
 from hydroid.posterior.uncertainty import Uncertainty, uncertainty
 from hydroid.posterior.whiteness import lasting
 from hydroid.problem.problem import Problem
+from hydroid.rungs import Rung
 from hydroid.search.descent import Ending
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.search import RefinementSettings
@@ -62,7 +63,7 @@ class Estimate:
         return bool(np.isfinite(self.rms))
 
 
-def measured(problem: Problem, candidates: Mapping[str, Array]) -> dict[str, Estimate]:
+def simulated(problem: Problem, candidates: Mapping[str, Array]) -> dict[str, Estimate]:
     """Simulate candidates by name, each of shape (P,), and measure them; those that
     diverged come last."""
     theta = np.array(list(candidates.values()))
@@ -139,18 +140,23 @@ class Ladder:
         settings = whole.settings
         refinement = settings.refinement
         assert refinement is not None
-        has_dynamic = settings.stage == "hyd" and settings.simulation.model == "ladder"
-        climbs = has_dynamic or bool(settings.terms())
+        further = settings.rungs[1:]
+        climbs = bool(further or settings.terms())
         on_the_way = refinement
         if climbs:
             tolerance = max(FIRM, refinement.gain_tolerance)
             on_the_way = refinement.changed({"gain_tolerance": tolerance})
         lone = self._lone_terms(settings)
-        self._climb_model(whole, "refined", lone, on_the_way)
+        first = settings.rung
+        self._climb_model(whole, first, lone, on_the_way)
+        before = self._step.terms
         self._add_lone_terms(whole, lone, on_the_way)
-        if has_dynamic:
-            self._climb_model(whole, "dynamic", lone, on_the_way)
-        if self._step.model == "dynamic":
+        if self._step.terms != before:
+            # errors of a valve may have hidden a pump
+            self._add_terms(whole, first, lone, on_the_way)
+        for rung in further:
+            self._climb_model(whole, rung, lone, on_the_way)
+        if self._step.model in {rung.name for rung in further}:
             for term in self._step.terms:
                 self._try_without(whole, term, on_the_way)
         if climbs:
@@ -162,20 +168,31 @@ class Ladder:
     def _climb_model(
         self,
         whole: Problem,
-        model: Literal["refined", "dynamic"],
+        rung: Rung,
         lone: Collection[str],
         settings: RefinementSettings,
     ) -> None:
-        """Refine with a model, and then with each of its terms besides; those of `lone`
+        """Refine on a rung, and then with each of its terms besides; those of `lone`
         are another method's."""
-        possible = whole.settings.terms(model)
+        possible = whole.settings.terms(rung)
         terms = tuple(term for term in possible if term in self._step.terms)
-        if_better = model == "dynamic"
+        if_better = rung is not whole.settings.rung
+        # the first one is refined in any case, and its estimate is called so
+        model = rung.name if if_better else "refined"
         self._rung(whole, Step(model, terms), settings, if_better=if_better)
-        if self._step.model != model:
-            return
-        for term in possible:
-            if term not in terms and term not in lone:
+        if self._step.model == model:
+            self._add_terms(whole, rung, lone, settings)
+
+    def _add_terms(
+        self,
+        whole: Problem,
+        rung: Rung,
+        lone: Collection[str],
+        settings: RefinementSettings,
+    ) -> None:
+        """Try each term that the kept model lacks on a rung, besides those of `lone`."""
+        for term in whole.settings.terms(rung):
+            if term not in self._step.terms and term not in lone:
                 with_term = self._step.changed(terms=(*self._step.terms, term))
                 self._rung(whole, with_term, settings, if_better=True)
 
@@ -237,10 +254,11 @@ class Ladder:
         new = self._measured(own, result, step)
         if if_better:
             without = self._left_out_of(last, self.refinements[start.name])
-            gained = gain(self._left_out_of(own, result), without)
+            with_it = self._left_out_of(own, result)
+            gained = gain(with_it, without)
             new = replace(new, gained=gained)
             self.estimates[step.estimate] = new
-            if not is_clear(*gained):
+            if not is_clear(*gained, len(with_it.open)):
                 return
         from_afar = how is refine_from_afar or (self._from_afar and begin.alone)
         self._keep(own, new, step, from_afar=from_afar)
@@ -266,7 +284,7 @@ class Ladder:
             theta = _begun(problem, last, start.theta)
             renewed = _renewed(problem, last, theta)
             theta = self._each_alone(problem, renewed, theta, settings, step)
-        if problem.settings.quasi_static != last.settings.quasi_static:
+        if problem.settings.rung is not last.settings.rung:
             if self._is_white():
                 return None
             far = True
@@ -315,7 +333,10 @@ class Ladder:
         parameters = likelihood.problem.parameters
         ends = [
             self._refined(
-                output_errors, begun, few, step.changed(phase="at first", start=number)
+                output_errors,
+                begun,
+                few,
+                step.changed(phase="at first", start=number),
             )
             for number, begun in enumerate((theta, parameters.start))
         ]
@@ -465,7 +486,7 @@ class Ladder:
         gained what that has gained."""
         name = step.estimate
         theta = problem.parameters.from_unit(end.point)
-        new = measured(problem, {name: theta})[name]
+        new = simulated(problem, {name: theta})[name]
         if name == self.kept.name:
             new = replace(new, gained=self.kept.gained)
         self.estimates[name] = new
@@ -517,10 +538,10 @@ def _new_curves(problem: Problem, last: Problem) -> list[int]:
     """The joints, from 1, whose valves have a curve here and had none in the last
     model.
 
-    None of a dynamic model: without the oil and the inertia, the speeds are no better
-    start.
+    None of a model whose joints have inertia: without that and the oil, the speeds are
+    no better start.
     """
-    if not problem.settings.quasi_static:
+    if not problem.settings.rung.at_once:
         return []
     return [
         j

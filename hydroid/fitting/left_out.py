@@ -12,7 +12,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import norm as normal
+from scipy.stats import t as student
 
 from hydroid.arrays import Array, Ints, record
 from hydroid.estimate import finite
@@ -196,14 +196,14 @@ def is_better(after: LeftOut, before: LeftOut, among: int = 1) -> bool:
     So does one that can be simulated where the other cannot. `among` is the number of
     models that are tried: the best of many seems better by chance.
     """
-    return is_clear(*gain(after, before), among)
+    return is_clear(*gain(after, before), len(after.open), among)
 
 
-def is_clear(rise: float, error: float, among: int = 1) -> bool:
-    """Whether a gain and its standard error, as `gain` returns them, say that a model
-    is better, one `among` several."""
-    # C. E. Bonferroni, 1936
-    certain = float(normal.isf(LEVEL / among))
+def is_clear(rise: float, error: float, parts: int, among: int = 1) -> bool:
+    """Whether a gain and its standard error, as `gain` returns them of so many parts,
+    say that a model is better, one `among` several."""
+    # C. E. Bonferroni, 1936; of few parts the error itself is uncertain (Student, 1908)
+    certain = float(student.isf(LEVEL / among, max(parts - 1, 1)))
     return rise > max(certain * error, LEAST_GAIN) or rise == np.inf
 
 

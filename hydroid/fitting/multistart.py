@@ -200,7 +200,7 @@ def lone_joints(problem: Problem) -> tuple[int, ...]:
     There are none if there are fewer than two, or if a log does not measure how a
     driven joint moves.
     """
-    measured = all(log.measured[log.driven].all() for log in problem.logs)
+    measured = all(log.has_angle[log.driven].all() for log in problem.logs)
     settings = problem.settings
     joints = tuple(
         j for j in settings.outputs if problem.driven[j - 1] and settings.acting_on(j)
@@ -226,7 +226,7 @@ def by_numbers(problem: Problem, joint: int, theta: Array) -> Array:
     alone: nine numbers."""
     ends = [*problem.settings.arm.ranges.values()][joint - 1]
     found = fit_baselines(problem.logs, joint, ends)[NAMES[-1]]
-    values = {"delay": found.delay, "pilot_lag": 0.0}
+    values = {"delay": found.delay, "pilot_lag": 0.0, "lag_of_speed": 1.0}
     rows = {"dead_band": 0, "opening_exponent": 1, "opening_lag": 3}
     for name, row in rows.items():
         values |= _sided(name, *found.numbers[row].tolist())

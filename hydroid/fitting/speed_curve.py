@@ -90,7 +90,7 @@ def measured_speeds(logs: Sequence[Log], joint: int) -> SpeedCurve | None:
 
     None where there are none.
     """
-    own = [log for log in logs if log.driven[joint - 1] and log.measured[joint - 1]]
+    own = [log for log in logs if log.driven[joint - 1] and log.has_angle[joint - 1]]
     if not own:
         return None
     angles = np.concatenate([log.angle[:, joint - 1] for log in own])

@@ -18,7 +18,7 @@ from hydroid.fitting.fit import Fit
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
 from hydroid.posterior.band import Band, fitted_bands, prediction_bands
-from hydroid.prediction import predict, predict_with_pressures
+from hydroid.prediction import OilTrace, predict, predict_with_oil
 from hydroid.progress import LOGGER
 from hydroid.units import display
 from hydroid.words import listed, three_digits
@@ -95,12 +95,11 @@ class Prediction:
         unseen: whether the model was made without this log; None: not known.
         apart: whether a user has said that it is of other conditions than the fit's: no
             verdict counts it.
-        pressure: of both chambers of the joints [Pa], shape (T, K, 2); NaN of those
-            without commands; None: the model has no hydraulics.
         names: of the joints; empty: their numbers stand for them.
         slides: numbers of those joints that slide.
         ahead: `errors_ahead` of the joints [rad], shape (N, HORIZONS, K); none where N
             is 0.
+        oil: pressures and flows of the joints; None: the model has no hydraulics.
     """
 
     fit: str
@@ -113,7 +112,7 @@ class Prediction:
     apart: bool = False
     names: tuple[str, ...] = ()
     slides: tuple[int, ...] = ()
-    pressure: Array | None = None
+    oil: OilTrace | None = None
 
     def __getitem__(self, joint: str | int) -> JointPrediction:
         """Return what is predicted of a joint, by its name or its number from 1.
@@ -232,7 +231,7 @@ def predicted(model: IdentifiedModel, log: Log, unseen: bool | None) -> Predicti
     """Return a model's prediction of a log: NaN, with a warning, where the simulation
     diverges."""
     joints = tuple(model.settings.outputs)
-    response, pressure = predict_with_pressures(model, log, joints)
+    response, oil = predict_with_oil(model, log, joints)
     bands = dict[int, Band]()
     if np.isfinite(response).all():
         bands = prediction_bands(model, log, response)
@@ -257,7 +256,7 @@ def predicted(model: IdentifiedModel, log: Log, unseen: bool | None) -> Predicti
         unseen,
         names=named,
         slides=tuple(arm.slides),
-        pressure=pressure,
+        oil=oil,
     )
     return found if unseen is False else replace(found, ahead=errors_ahead(log, errors))
 
@@ -300,9 +299,7 @@ def fitted(fit: Fit) -> tuple[Prediction, ...]:
             False,
             names=tuple(settings.arm.joint_names[joint - 1] for joint in joints),
             slides=tuple(settings.arm.slides),
-            pressure=predict_with_pressures(model, log, joints)[1]
-            if settings.stage == "hyd"
-            else None,
+            oil=predict_with_oil(model, log, joints)[1],
         )
         predictions.append(one)
     return tuple(predictions)

@@ -172,7 +172,7 @@ class _Following:
         sides: Sequence[ValveStart],
     ) -> None:
         self._logs = [
-            log for log in logs if log.driven[joint - 1] and log.measured[joint - 1]
+            log for log in logs if log.driven[joint - 1] and log.has_angle[joint - 1]
         ]
         self._joint, self._direction, self._sides = joint - 1, direction, sides
         angles = np.concatenate([log.angle[:, joint - 1] for log in self._logs])

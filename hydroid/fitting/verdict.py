@@ -7,25 +7,22 @@ the fit is compared in pairs at JUDGED times ahead (`fitting.comparison`). It is
 of one if it is better at one of these times. The first of these that is true is the
 verdict:
 
-1. predicts: the error on the unseen logs is within the tolerance, whatever the simple
+- predicts: the error on the unseen logs is within the tolerance, whatever the simple
   models do;
-2. does not fit: on the fitted logs the error is outside the tolerance, and a simple
-model's is smaller; where
-   there are unseen logs, the fit is not ahead of each simple model there either;
-3. not tested: no unseen log drives the joint;
-4. predicts no better than a simple model: it is not ahead of that one, and at one of
-these times it is worse;
-   the simplest such is named;
-5. predicts worse than it fits: the error on the unseen logs is more than twice that on
-the fitted ones, or
-   it diverges;
-6. predicts little: the error on the unseen logs is more than half of what standing
-still errs by there;
-7. cannot be told from a simple model: it is not ahead of that one, and at none of these
-times worse; of
-   several such that with the smallest error is named;
-8. predicts roughly: none of these. It is ahead of every simple model, and outside the
-  tolerance.
+- does not fit: on the fitted logs the error is outside the tolerance and a simple
+  model's is smaller; where there are unseen logs, the fit is not ahead of each simple
+  model there either;
+- not tested: no unseen log drives the joint;
+- predicts no better than a simple model: the fit is not ahead of that one, and at one
+  of these times it is worse; the simplest such model is named;
+- predicts worse than it fits: the error on the unseen logs is more than twice that on
+  the fitted ones, or the simulation diverges;
+- predicts little: the error on the unseen logs is more than half of what standing still
+  errs by there;
+- cannot be told from a simple model: the fit is not ahead of that one, and at none of
+  these times worse; of several such models the one with the smallest error is named;
+- predicts roughly: none of these. The fit is ahead of every simple model, and its error
+  is outside the tolerance.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -378,7 +375,10 @@ def standing_out(
 
 def behind(settings: FitSettings, verdicts: Sequence[JointVerdict]) -> list[Finding]:
     """Return that a fit of the hydraulics errs more on its own logs than nine numbers
-    do, which it holds."""
+    do, which it holds.
+
+    The verdicts are those without unseen logs: their baselines are of the fitted ones.
+    """
     if settings.stage != "hyd":
         return []
     joints = list[str]()

@@ -129,14 +129,6 @@ def open_share(side, travel: float) -> float:
 
 
 @compilable
-def opened(c, share: float) -> float:
-    """Opening of a pump edge [m²] at a share of the full opening; both are below 0
-    towards B."""
-    side = c.a if share > 0.0 else c.b
-    return side.opening * share
-
-
-@compilable
 def net_opening(c, z, w, substep: int, step: float) -> float:
     """Advance both plungers over a sub-step; the mean opening [m²], below 0 towards
     B."""
@@ -147,14 +139,16 @@ def net_opening(c, z, w, substep: int, step: float) -> float:
     if z.displacement != displacement:
         z.displacement = displacement
         if displacement > 0.0:
-            z.open = open_share(c.a, displacement)
+            z.open = c.a.lagging * open_share(c.a, displacement)
         else:
-            z.open = -open_share(c.b, -displacement)
-    # shares lag, not areas: a spool passes its neutral when it does, however large the
-    # openings of its two sides are
+            z.open = -c.b.lagging * open_share(c.b, -displacement)
+    # a spool passes its neutral when it does, however large the openings of its two
+    # sides are; a speed that lags, as of a mass, passes 0 by the speeds of both
     left = (z.opening - z.open) * (1.0 - c.opening_keep)
     z.opening -= left
-    return opened(c, z.open + left * c.opening_steps)
+    mean = z.open + left * c.opening_steps
+    side = c.a if mean > 0.0 else c.b
+    return side.opening * (mean / side.lagging)
 
 
 @compilable

@@ -48,6 +48,7 @@ from hydroid.hydraulics.pump import (
     close_line,
     draw_from_line,
     fill,
+    left_open,
     open_line,
 )
 from hydroid.hydraulics.records import LINE, SCRATCH
@@ -277,6 +278,7 @@ def drive_joint(c, z, w, line, substep: int, step: float) -> None:
     load(c, z, w, step)
     if line.pressure < np.inf:
         draw_from_line(line, c, w)
+        line.centre = left_open(line.centre, c, opening)
 
 
 @compilable

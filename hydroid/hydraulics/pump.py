@@ -10,10 +10,16 @@ The rest comes from the other chamber, through a regeneration valve, or from the
 So P falls until the flows, opening times root of what the load leaves of P, add up to
 what the pump gives, and no equation has to be solved for it. The pump gives
 
-    Q_P = φ Q_max min(1, (p_S − P)/droop),
+    Q_P = φ Q_max min(1, (p_S − P)/droop)^(1/n) − past,
 
-so that the pressure falls in proportion to the flow, by no more than `pump_limit`:
-there it gives whatever is taken. It comes up after a demand: φ is `pump_idle` at rest,
+so that the pressure falls with the n-th power of the flow (`pump_exponent`; a large one
+holds the pressure up to a flow), by no more than `pump_limit`: there it gives whatever
+is taken. Where valves have an open centre, oil runs past them back to the tank,
+
+    past = g Q_max (1 − s) √(P/p_S),
+
+s the largest share that one is open, and g `pump_bypass`. The pump
+comes up after a demand: φ is `pump_idle` at rest,
 and from `pump_delay` after the first command on it rises to 1 with the time constant
 `pump_rise`. Every section of the valve has a load check valve: oil never runs back to
 the pump. A joint whose own supply pressure is lower than the line's has a reducing
@@ -52,17 +58,58 @@ from hydroid.hydraulics.valve import rod_speed
 ITERATIONS = 30  # for a quasi-static line's pressure at most; three to five suffice
 # part of the pump's flow, or of its pressure, that may be left when they end
 SETTLED = 1e-9
+LEAST_FALL = (
+    1e-3  # part of the droop below which the slope of a pump's curve counts no more
+)
 
 
 @compilable
 def delivery(pressure: float, share: float, c) -> Any:
-    """Flow Q_P [m³/s] of the pump at a line pressure [Pa], and -dQ_P/dP; `share` is
-    φ."""
+    """Flow [m³/s] of the pump at a line pressure [Pa], and how it falls with the
+    pressure; `share` is φ."""
     full = share * c.pump_flow
     below_relief = c.relief - pressure
-    if below_relief < c.pump_droop:
+    if below_relief >= c.pump_droop:
+        return full, 0.0
+    if c.pump_exponent == 1.0:
         return full * max(below_relief, 0.0) / c.pump_droop, full / c.pump_droop
-    return full, 0.0
+    part = max(below_relief, 0.0) / c.pump_droop
+    flow = full * part ** (1.0 / c.pump_exponent)
+    # no flow has a steeper slope than any number
+    part = max(part, LEAST_FALL)
+    slope = full * part ** (1.0 / c.pump_exponent - 1.0)
+    return flow, slope / (c.pump_exponent * c.pump_droop)
+
+
+@compilable
+def left_open(centre: float, c, opening: float) -> float:
+    """Part of the open centre of all valves that is left of a part when a valve's
+    opening is as it is [m²], below 0 towards B."""
+    side = c.a if opening > 0.0 else c.b
+    if opening == 0.0 or side.opening <= 0.0:
+        return centre
+    return min(centre, max(1.0 - abs(opening) / side.opening, 0.0))
+
+
+@compilable
+def centre_left(coefficients, driven, work) -> float:
+    """Part of the open centre of all valves that the openings `travel` of the driven
+    joints leave."""
+    centre = 1.0
+    for a in range(driven.size):
+        j = driven[a]
+        centre = left_open(centre, coefficients[j], work[j].travel)
+    return centre
+
+
+@compilable
+def past_valves(pressure: float, centre: float, c) -> Any:
+    """Flow [m³/s] through a part of the open centre at a line pressure [Pa], and how it
+    rises with the pressure."""
+    if c.pump_bypass == 0.0 or pressure <= 0.0:
+        return 0.0, 0.0
+    flow = c.pump_bypass * c.pump_flow * centre * np.sqrt(pressure / c.relief)
+    return flow, 0.5 * flow / pressure
 
 
 @compilable
@@ -99,6 +146,7 @@ def begin_line(line, c, z, demanded: bool, step: float) -> None:
     if c.pump_rise > 0.0:
         line.decay = np.exp(-step / c.pump_rise)
     line.drawn = line.taken
+    line.centre = 1.0
 
 
 @compilable
@@ -131,9 +179,10 @@ def draw_from_line(line, c, w) -> None:
 def open_line(line, c, step: float) -> None:
     """Turn the sums of `draw_from_line` into δ at the present speeds, and 1/D."""
     flow, fall = delivery(line.pressure, come_up(line, c, step), c)
+    past, rise = past_valves(line.pressure, line.centre, c)
     stored = c.line_volume / (c.bulk_modulus * step)
-    line.softness = 1.0 / (stored + fall + line.softness)
-    line.change = line.softness * (flow - line.drawn - line.swept)
+    line.softness = 1.0 / (stored + fall + rise + line.softness)
+    line.change = line.softness * (flow - past - line.drawn - line.swept)
     most = c.relief - line.pressure
     least = lowest(c) - line.pressure
     # at a limit the pressure is given: the speeds no longer change it
@@ -161,6 +210,7 @@ def close_line(line, c) -> None:
     line.drawn = line.taken
     line.softness = 0.0
     line.swept = 0.0
+    line.centre = 1.0
 
 
 @compilable
@@ -205,7 +255,9 @@ def taken_beyond(
     pressure [Pa], and its slope."""
     pump = coefficients[driven[driven.size - 1]]
     given, slope = delivery(pressure, share, pump)
-    excess = line.taken - given
+    past, rise = past_valves(pressure, line.centre, pump)
+    excess = line.taken + past - given
+    slope += rise
     for a in range(driven.size):
         j = driven[a]
         c = coefficients[j]

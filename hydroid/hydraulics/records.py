@@ -68,6 +68,7 @@ SIDE = np.dtype(
         ("pilot_keep", np.float64),
         ("pilot_steps", np.float64),  # and its lag in sub-steps
         ("plunger_weight", np.float64),  # of its new state in a sub-step
+        ("lagging", np.float64),  # what lags at full opening, as `lag_of_speed` says
         ("has_curve", np.bool_),
         # parts of the opening that the power law gives where the parts of the valve's
         # curve end
@@ -117,7 +118,7 @@ JOINT_STATE = np.dtype(
             # on ringing oil: velocity [rad/s], and how it changes without what passes
             # the oil at once [rad/s²]
             "turning surge "
-            "opening "  # of the valve, as a share of the full one; below 0 towards B
+            "opening "  # of the valve: what lags of it, 1 or less; below 0 towards B
             # of the spool [m], NaN before the first; the share without a lag
             "displacement open "
             # of the look-ahead: turn [rad], velocity v*, torque, h κ
@@ -166,6 +167,7 @@ LINE = np.dtype(
         # of the step: state, whether there is a command, decay of φ, flow into joints
         # that follow a log
         "pressure share demand demanded decay taken "
+        "centre "  # part of the valves' open centre that is left
         # of a sub-step: as `pump` sums them; change of pressure
         "drawn softness swept change"
     )
@@ -248,12 +250,16 @@ def coefficients(joints: Records, period: float = 0.01, substeps: int = 1) -> Re
     driven = p.kind != NONE
     relief = np.max(p.supply_pressure, axis=1, where=driven, initial=0.0)
     table["relief"] = relief[:, None]
+    both = np.maximum(p.opening_a + p.opening_b, np.finfo(float).tiny)
     for end, side in (("a", table.a), ("b", table.b)):
         for name, field in _SIDE_FIELDS.items():
             side[field] = joints[f"{name}_{end}"]
         steps = side.delay / period
         side["late"] = np.floor(steps)
         side["fresh"] = (steps - side.late) * substeps
+        side["lagging"] = (
+            np.maximum(side.opening, 1e-3 * both) / both
+        ) ** p.lag_of_speed
         side["pilot_steps"] = side.pilot_lag * substeps / period
         side["pilot_keep"] = kept(side["pilot_steps"])
         side["plunger_weight"] = plunger_weight(

@@ -86,7 +86,7 @@ def _read_table(path: Path, encoding: str, file: Iterable[str]) -> Table:
     sample = _sample(lines)
     if not sample:
         raise LogError("is empty", path, IS_CSV)
-    # what the first lines say holds for all: a file is too long to be read twice
+    # the layout follows from the first lines: a log of hours is not held as text
     layout = find_csv_layout(sample, path)
     text_columns = [TextColumn() for _ in layout.names]
     line_numbers = array("q")

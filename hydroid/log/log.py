@@ -64,7 +64,7 @@ class Log:
         return np.any(self.command != 0, axis=0)
 
     @property
-    def measured(self) -> Mask:
+    def has_angle(self) -> Mask:
         """Joints whose angle the log holds, shape (J,)."""
         return ~np.isnan(self.angle[0])
 
@@ -77,7 +77,7 @@ class Log:
     def _with_pose(self, angle: Array) -> Array:
         if self.pose is None:
             return angle
-        return np.where(self.measured, angle, self.pose)
+        return np.where(self.has_angle, angle, self.pose)
 
     @property
     def duration(self) -> float:

@@ -307,5 +307,5 @@ has computed"""
 
 def driven_joints(log: Log) -> dict[int, JointMotion]:
     """Return the motions of the joints that are driven and measured, by number."""
-    joints = (np.flatnonzero(log.driven & log.measured) + 1).tolist()
+    joints = (np.flatnonzero(log.driven & log.has_angle) + 1).tolist()
     return {joint: motion_of(log, joint) for joint in joints}

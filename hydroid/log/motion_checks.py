@@ -215,7 +215,7 @@ def motion_findings(logs: Sequence[Log], arm: Arm) -> Iterator[LogFinding]:
     Where no log passes the angle, it is an end of the joint's travel.
     """
     for joint, name in enumerate(arm.joint_names, 1):
-        motions = [motion_of(log, joint) for log in logs if log.measured[joint - 1]]
+        motions = [motion_of(log, joint) for log in logs if log.has_angle[joint - 1]]
         ends = np.array([motion.reach for motion in motions])
         for motion in motions:
             yield from _stands(motion, name, ends, slides=joint in arm.slides)

@@ -80,7 +80,7 @@ def _moves(log: Log) -> Mask:
 def _holds(known: Log, log: Log, moves: Mask) -> bool:
     """Return whether a log holds a stretch of another, at some time, in all joints that
     move there."""
-    joints = np.flatnonzero(moves & known.measured)
+    joints = np.flatnonzero(moves & known.has_angle)
     grid = np.arange(0.0, log.duration + 1e-9, known.period)
     if not len(joints) or len(grid) > len(known.time):
         return False

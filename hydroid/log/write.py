@@ -76,7 +76,7 @@ def _refuse_incomplete(path: Path, log: Log, signals: Sequence[Signal]) -> None:
             what = f"joint {joint} is driven but no column holds its command"
             hint = f"map a column in log.joints.{joint}.command"
             raise LogError(what, path, hint)
-        if not log.measured[joint - 1] and ("angle", joint) in mapped:
+        if not log.has_angle[joint - 1] and ("angle", joint) in mapped:
             hint = f"set log.joints.{joint}.angle: null"
             raise LogError(f"joint {joint} has no angle to write", path, hint)
 

@@ -80,7 +80,7 @@ def _roll_some(
     shared: Handles,
     plugin: Plugin,
     plants: Population,
-    quasi: bool,
+    at_once: bool,
     source: int = SOURCE,
 ) -> None:
     """Roll some plants out, from rows[0] to before rows[1]; `shared` has what is alike
@@ -123,7 +123,7 @@ def _roll_some(
         )
         course = Course(plants.commands[i], plants.torque[i], nothing, no_openings)
         trace = Trace(plants.angle[i], no_states)
-        if quasi:
+        if at_once:
             roll_quasi_static(handles, actuators, plants.state[i], course, trace)
         else:
             roll(handles, actuators, plants.state[i], course, trace)
@@ -175,7 +175,7 @@ class PlantBatch:
                 plant.joints,
                 plant.period,
                 plant.timestep,
-                plant.quasi_static,
+                plant.rung,
             )
             for plant in plants
         }
@@ -366,7 +366,7 @@ class PlantBatch:
                 parts.arm.handles,
                 parts.plugin,
                 self._population,
-                first.quasi_static,
+                first.rung.at_once,
             )
             self._calls.append(call)
 

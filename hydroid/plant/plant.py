@@ -24,8 +24,9 @@ from hydroid.mjcf import quiet_mujoco, read_mjcf
 from hydroid.plant.steady import SteadyArm, SteadyCommands, Weighing, by_name
 from hydroid.problem.bindings import Bindings
 from hydroid.quantity_table import MECHANICAL, QUANTITIES
-from hydroid.simulation.quasi_static import roll_quasi_static
-from hydroid.simulation.rollout import Course, SteppedArm, Trace, compile_rollout, roll
+from hydroid.rungs import Rung
+from hydroid.simulation.roles import roles
+from hydroid.simulation.rollout import Course, SteppedArm, Trace, compile_rollout
 from hydroid.simulation.scenario import Candidates, Chain, model_values
 
 PHYSICS = mujoco.mjtState.mjSTATE_INTEGRATION.value
@@ -99,8 +100,9 @@ class Plant:
         self.joints = _joint_numbers(wanted, arm.joint_names)
         self._named = [arm.joint_names[joint - 1] for joint in self.joints]
         self._active = np.isin(np.arange(1, 1 + len(arm.joint_names)), self.joints)
-        self._moving = self._active | (settings.simulation.other_joints == "passive")
-        self.timestep = settings.log.period_s / settings.simulation.steps
+        others = settings.simulation.other_joints
+        self._roles = roles(self._active, others, logged=False)
+        self.timestep = settings.log.period_s / settings.stepping.steps
         self.period = settings.log.period_s if period is None else period
         self._steps = _multiple(self.period, self.timestep)
         self._spec = load_model(arm)
@@ -129,9 +131,9 @@ class Plant:
         return self.identified.settings.arm.joint_names
 
     @property
-    def quasi_static(self) -> bool:
-        """Whether the joints' speeds follow valve and load at once."""
-        return self.identified.settings.quasi_static
+    def rung(self) -> Rung:
+        """The model of the arm."""
+        return self.identified.settings.rung
 
     @property
     def past(self) -> int:
@@ -208,7 +210,7 @@ class Plant:
         self._pose = self._posed(pose)
         self._start = self._pose.copy()
         self._weighing: Weighing | None = None  # springs are slack where it starts
-        locked = np.where(self._moving, 0.0, self._pose)
+        locked = np.where(self._roles.moving, 0.0, self._pose)
         if not np.array_equal(locked, self._locked_pose):
             self._lock(locked)
         start_angle = self._pose[self._columns]
@@ -336,7 +338,7 @@ class Plant:
             self._plugin,
             self._chain.joints,
             ranges,
-            settings.quasi_static,
+            settings.rung.at_once,
         )
 
     def state(self) -> PlantState:
@@ -462,7 +464,7 @@ class Plant:
         """Make the arm anew with its locked joints in a pose [rad], shape (J,), which
         is 0 of those that move."""
         settings = self.identified.settings
-        locked = lock(self._spec, settings.arm, self._moving, pose)
+        locked = lock(self._spec, settings.arm, self._roles.moving, pose)
         locked.model.opt.timestep = self.timestep
         model = dressed_model(self._spec, locked)
         self._locked = locked
@@ -470,17 +472,11 @@ class Plant:
         self._columns = locked.columns
         self._values = model_values(locked, self._candidate)
         self._gain = self._candidate.joints.gain[0, self._columns]
-        # in stage 1 a gain pushes every joint
-        pushed = np.arange(0 if settings.stage == "hyd" else len(self._columns))
-        self._chain = Chain(
-            settings.arm, locked, self._active, settings.substeps, pushed
-        )
-        rollout = roll_quasi_static if settings.quasi_static else roll
-        coupled = self._chain.columns
-        self._arm = SteppedArm(model, coupled, self._steps, rollout)
+        self._chain = Chain(settings.arm, locked, self._roles, settings.stepping)
+        self._arm = self._chain.stepped(model, self._steps)
         self.model = self._arm.model
         self.data = self._arm.data
-        no_states = np.empty((0, len(coupled)), JOINT_STATE)
+        no_states = np.empty((0, len(self._chain.columns)), JOINT_STATE)
         self._trace = Trace(np.empty((1, len(self._columns))), no_states)
 
 

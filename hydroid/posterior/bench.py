@@ -20,7 +20,7 @@ from hydroid.log.command_sizes import ONE_SIZE
 from hydroid.mjcf import quiet_mujoco
 from hydroid.settings.cylinder import LinearActuator
 from hydroid.settings.fit import FitSettings
-from hydroid.simulation import Candidates, Simulation
+from hydroid.simulation import Candidates, Simulation, make_scenario
 from hydroid.simulation.rollout import SteppedArm
 from hydroid.simulation.scenario import Scenario
 from hydroid.simulation.steady import NEAR, steady_velocity
@@ -126,9 +126,9 @@ class Bench:
         `loads` are its.
         """
         joint: Records = candidates.joints[:, self.joint - 1]  # pyright: ignore[reportAssignmentType]
-        quasi_static = self.settings.quasi_static
+        at_once = self.settings.rung.at_once
         return self.unit[0] * steady_velocity(
-            joint, self.angle, loads, commands, quasi_static=quasi_static
+            joint, self.angle, loads, commands, quasi_static=at_once
         )
 
     def movement(self, command: float, seconds: float = 1.2) -> "Movement":
@@ -161,10 +161,11 @@ class Movement:
         settings = self.bench.settings
         to_scale = candidates.joints.copy()
         to_scale["sensor_scale"] = 1.0
-        commands = np.full((self.samples * settings.simulation.steps, 1), self.command)
+        steps = self.samples * settings.stepping.steps
+        commands = np.full((steps, 1), self.command)
         scenario = self.bench.scenario.restarted(np.array([self.bench.angle]), commands)
         moved = Candidates(to_scale, candidates.mass)
-        return Simulation(scenario, settings.substeps).simulate(moved).angle[:, :, 0]
+        return Simulation(scenario).simulate(moved).angle[:, :, 0]
 
     def speeds(self, candidates: Candidates) -> Array:
         """Return speeds between samples, shape (n, samples)."""
@@ -198,7 +199,7 @@ def make_bench(settings: FitSettings, logs: Sequence[Log], joint: int) -> Bench:
     arm = settings.arm
     pose = logs[0].start
     period = logs[0].period
-    shown = [log for log in logs if log.measured[joint - 1]] or logs
+    shown = [log for log in logs if log.has_angle[joint - 1]] or logs
     angles = np.concatenate([log.posed[:, joint - 1] for log in shown])
     middle = (angles.min() + angles.max()) / 2
     # in whole degrees or millimetres, as words say it
@@ -209,8 +210,8 @@ def make_bench(settings: FitSettings, logs: Sequence[Log], joint: int) -> Bench:
     command = np.zeros((2, len(pose)))
     still = np.tile(pose, (2, 1))
     rest = Log("a test movement", np.array([0.0, period]), command, still, period)
-    alone = settings.simulation.changed({"other_joints": "locked"})
-    scenario = Scenario(load_model(arm), arm, rest, [joint - 1], alone)
+    alone = settings.changed({"simulation.other_joints": "locked"})
+    scenario = make_scenario(load_model(arm), rest, [joint - 1], alone)
     only = (only_command(logs, joint, 1.0), only_command(logs, joint, -1.0))
     return Bench(settings, joint, float(middle), period, scenario, only)
 

@@ -8,10 +8,9 @@ arrays. Candidates are simulated by threads of this process, or on workers
 from collections.abc import Collection, Sequence
 from functools import cached_property
 
-import mujoco
 import numpy as np
 
-from hydroid.arm.model import add_payload, load_model
+from hydroid.arm.model import load_model
 from hydroid.arrays import Array, Ints, rms
 from hydroid.errors import SettingsError
 from hydroid.log import Log
@@ -26,8 +25,8 @@ from hydroid.problem.channels import (
 )
 from hydroid.problem.priors import Priors
 from hydroid.settings.fit import FitSettings
-from hydroid.simulation import Response, Simulation
-from hydroid.simulation.scenario import Scenario
+from hydroid.simulation import Response, make_simulation
+from hydroid.simulation.roles import roles
 
 CHUNK = 2**23  # residuals that are held in memory at a time, 64 MiB
 
@@ -107,10 +106,9 @@ class Problem:
     def started(self, log: Log) -> list[int]:
         """Joints whose measured angle only their start is simulated from, numbered from
         1."""
-        follows = self.settings.simulation.other_joints == "measured"
         compared = np.isin(np.arange(log.joints), self.outputs)
-        simulated = log.driven | compared | (not follows)
-        return (np.flatnonzero(log.measured & simulated) + 1).tolist()
+        of_joints = roles(log.driven | compared, self.settings.simulation.other_joints)
+        return (np.flatnonzero(log.has_angle & ~of_joints.following) + 1).tolist()
 
     def theta(self, unit: Array) -> Array:
         """Return candidates, (n, P), from points of the search's unit box, moved to
@@ -209,23 +207,3 @@ class Problem:
     def _on_worker(self) -> "Problem":
         threads = {"simulation.threads": self.settings.simulation.threads or 1}
         return Problem(self.settings.changed(threads), self.logs)
-
-
-def make_simulation(
-    spec: mujoco.MjSpec,
-    log: Log,
-    outputs: list[int],
-    settings: FitSettings,
-    pressures: Sequence[int] = (),
-) -> Simulation:
-    """Return the simulation of one log in the settings' stage.
-
-    Its response has the angles of the joints `outputs` and the chamber pressures of
-    `pressures`, 0-based.
-    """
-    payload = settings.payload_of(log.source)
-    if payload:
-        spec = add_payload(spec, settings.arm, payload)
-    scenario = Scenario(spec, settings.arm, log, outputs, settings.simulation)
-    substeps = settings.substeps if settings.stage == "hyd" else None
-    return Simulation(scenario, substeps, pressures)

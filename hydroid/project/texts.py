@@ -289,7 +289,8 @@ def fit_text(
         steps=steps,
         substeps=math.ceil(period / steps / VALVE_STEP - 1e-9),
         volume=short(min(volumes, default=50.0)),
-        most=short(4 * drawn),  # so large that it limits no flow
+        most=short(10 * drawn),  # so large that it hardly matters
+        felt=short(4 * drawn),
         joints=joints,
     )
 

@@ -27,17 +27,18 @@ TOWARDS: dict[str, Color] = {"positive": "blue", "negative": "orange"}
 """endings of curves, as `posterior.quantities` names directions, and their colours"""
 
 _SPEED = (
-    "Speeds of a settled motion through mid travel, and how far the valve opens then, with 95 % intervals. "
-    "Points: measured speeds in all poses and under all loads, against the command one dead time before. "
-    "Grey: commands beyond those of the logs."
+    "Lines: the model's steady speed at mid travel, and how far the valve is open then. "
+    "Bands: 95 % intervals. Points: measured speeds, in any pose and under any load, against "
+    "the command one dead time earlier. Grey: commands that the logs do not contain."
 )
 _SPEED_ALONE = (
-    "Speeds of a settled motion through mid travel, with 95 % intervals. Points: measured speeds in all "
-    "poses and under all loads. Grey: commands beyond those of the logs."
+    "Lines: the model's steady speed at mid travel. Bands: 95 % intervals. Points: measured "
+    "speeds, in any pose and under any load. Grey: commands that the logs do not contain."
 )
 _STEP = (
-    "A step of the command from rest at mid travel, and the frequency response of its start, with 95 % "
-    "intervals: how fast the joint follows, and how late."
+    "How fast and how late the joint follows its command, from rest at mid travel: its speed "
+    "after a step, and its frequency response at the start of the motion. Bands: 95 % "
+    "intervals."
 )
 
 
@@ -81,7 +82,7 @@ def _measured_cloud(logs: Sequence[Log], joint: int, dead_times: list[float]) ->
     late = float(np.mean(dead_times)) if dead_times else 0.0
     pairs = [np.empty((2, 0))]
     for log in logs:
-        if log.measured[joint - 1]:
+        if log.has_angle[joint - 1]:
             pairs.append(np.array(measured_speeds(log, joint, late)))
     return np.hstack(pairs)
 

@@ -110,7 +110,7 @@
       height: panel.height, sizing_mode: "stretch_width", toolbar_location: null, tools: touch ? "" : "xbox_zoom",
       x_range, y_range, x_axis_type: panel.log_x ? "log" : "linear", y_axis_type: panel.log_y ? "log" : "linear",
       x_axis_label: panel.x || null, y_axis_label: panel.y || null,
-      min_border_left: 64, min_border_right: 16, min_border_top: 8, min_border_bottom: 8,
+      min_border_left: 76, min_border_right: 16, min_border_top: 8, min_border_bottom: 8,
     });
     if (width < 480) for (const axis of figure.xaxes) axis.ticker.desired_num_ticks = 4;
     for (const [axis, log] of [[figure.xaxes[0], panel.log_x], [figure.yaxes[0], panel.log_y]])
@@ -136,8 +136,10 @@
     const cells = host.querySelector(".panels");
     cells.replaceChildren();
     let shared = null;
-    const panels = chart.panels.filter((panel) => panel.marks.length).map((panel) => {
+    const panels = chart.panels.filter((panel) => panel.marks.length).map((panel, i, all) => {
       const one = addPanel(panel, shared, shown, host.clientWidth);
+      // panels of one time axis: the last one has its numbers
+      if (chart.linked && i < all.length - 1) one.figure.xaxes[0].major_label_text_font_size = "0px";
       if (chart.linked) {
         if (!shared) {
           const all = chart.panels.map((p) => extent(p, "x", shown));

@@ -1,5 +1,6 @@
 """Which parameters trade against each other: the correlations of their estimates."""
 
+from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
@@ -8,6 +9,7 @@ from hydroid.arrays import Array
 from hydroid.estimate import Covariance, FitSummary
 from hydroid.reporting.chart import Chart, Mark, Panel
 from hydroid.reporting.page import Plot, Section, Table
+from hydroid.reporting.parameters_report import by_joint, first_joint
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.naming import named
 
@@ -15,6 +17,10 @@ FAINT = 0.1
 """correlation below which a cell stays empty"""
 STRONG = 0.9
 """correlation from which two parameters are named"""
+NOTABLE = 0.3
+"""correlation from which the map of a joint shows the parameters of others"""
+READABLE = 40
+"""parameters whose names can be read in one map"""
 MOST = 6
 """pairs that are named"""
 ROW = 18
@@ -23,8 +29,9 @@ LARGEST = 760
 """height of all rows together, at most [px]"""
 
 _TEXT = (
-    "Two parameters that are correlated trade against each other: the logs know a combination of them better "
-    "than either. Blue: both may grow together; orange: one grows while the other falls."
+    "Where two parameters are correlated, one can make up for the other: the logs determine "
+    "them together better than each alone. Blue: both may be larger together. Orange: one may"
+    " be larger if the other is smaller."
 )
 
 
@@ -56,25 +63,44 @@ def correlation_section(settings: FitSettings, summary: FitSummary) -> Section |
     covariance = summary.covariance
     if covariance is None or len(covariance.parameters) < 2:
         return None
-    order = _by_joint(settings, covariance.parameters)
+    names = tuple(by_joint(settings, covariance.parameters))
+    order = [covariance.parameters.index(name) for name in names]
     matrix = correlations(covariance)[np.ix_(order, order)]
-    names = tuple(covariance.parameters[i] for i in order)
     pairs = strongest(matrix, names)
     points = tuple(
         f"{named(settings, first)} and {named(settings, second)}: {_signed(value)}"
         for first, second, value in pairs
-    )
-    plot = Plot(
-        "correlation",
-        "Correlations of the estimates.",
-        partial(correlation_map, matrix, names),
     )
     answer = "no pair is strongly correlated"
     if points:
         first, second, value = pairs[0]
         answer = f"strongest: {first} and {second}, {_signed(value)}"
     title = "Which parameters trade?"
-    return Section(title, _TEXT, points, plots=(plot,), folded=True, answer=answer)
+    tabs = tuple(_maps(settings, matrix, names))
+    return Section(title, _TEXT, points, tabs=tabs, folded=True, answer=answer)
+
+
+def _maps(
+    settings: FitSettings, matrix: Array, names: tuple[str, ...]
+) -> Iterator[Plot]:
+    """Yield the map of all parameters, or, where these are too many to be read, a map
+    for each joint: its parameters, and those of others that trade with them."""
+    if len(names) <= READABLE:
+        draw = partial(correlation_map, matrix, names)
+        yield Plot("correlation", "Correlations of the estimates.", draw)
+        return
+    joints = [first_joint(settings, name) for name in names]
+    for number in sorted(set(joints)):
+        is_own = np.array(joints) == number
+        trades = np.abs(matrix[is_own]).max(axis=0) >= NOTABLE
+        shown = np.flatnonzero(is_own | trades)
+        own = tuple(names[i] for i in shown)
+        draw = partial(correlation_map, matrix[np.ix_(shown, shown)], own)
+        button = "shared by all"
+        if number:
+            button = settings.arm.joint_names[number - 1]
+        caption = f"Correlations of the estimates: {button}"
+        yield Plot(f"correlation_{number}", caption, draw, button=button)
 
 
 def strongest(matrix: Array, names: tuple[str, ...]) -> list[tuple[str, str, float]]:
@@ -92,24 +118,8 @@ def correlation_map(matrix: Array, names: tuple[str, ...]) -> Chart:
     rows, columns = np.nonzero(np.tril(np.abs(matrix) >= FAINT))
     values = np.clip(matrix[rows, columns], -1.0, 1.0)
     cells = Mark("cells", columns.astype(float), rows.astype(float), values)
-    height = 60 + min(ROW * len(names), LARGEST)
-    if len(names) <= 40:
-        height += 60
+    height = 120 + min(ROW * len(names), LARGEST)
     return Chart((Panel("", "", (cells,), height=height, rows=names, columns=names),))
-
-
-def _by_joint(settings: FitSettings, names: tuple[str, ...]) -> list[int]:
-    """Return the places of parameters in the order of their joints, so that those of
-    one stand together.
-    """
-
-    def joint(i: int) -> int:
-        parameter = settings.parameters.get(names[i])
-        if parameter is None or not parameter.joints:
-            return 0
-        return parameter.joints[0]
-
-    return sorted(range(len(names)), key=joint)
 
 
 def _signed(value: float) -> str:

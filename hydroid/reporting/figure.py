@@ -195,7 +195,7 @@ def arm_picture(arm: Arm, title: str) -> tuple[bytes, bytes]:
         every_axes: Any = drawing.subplots(rows, 2, squeeze=False)
         for axes, name in zip(every_axes[0], VIEWS, strict=True):
             view = _View(axes, arm, data, *VIEWS[name])
-            view.draw(outlines, poses)
+            view.show(outlines, poses)
             axes.set(title=name)
         if cylinders:
             _draw_cylinders(every_axes[1, 0], every_axes[1, 1], arm, cylinders)
@@ -243,8 +243,8 @@ class _View:
         axes.set(xlabel="x [m]", ylabel=upwards)
         axes.set_aspect("equal", adjustable="datalim")
 
-    def draw(self, outlines: Sequence[Shape], poses: Array) -> None:
-        """Draw outlines, whose corners are in the world [m], pivots in bodies' poses,
+    def show(self, outlines: Sequence[Shape], poses: Array) -> None:
+        """Show outlines, whose corners are in the world [m], pivots in bodies' poses,
         and the joints' axes."""
         for shape in outlines:
             self._draw_outline(shape)

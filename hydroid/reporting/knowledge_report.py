@@ -8,7 +8,7 @@ from hydroid.findings import Finding
 from hydroid.reporting.page import Cell, Section, Table
 from hydroid.reporting.parameters_report import in_words
 from hydroid.settings.fit import FitSettings
-from hydroid.words import interval_words, listed, two_digits
+from hydroid.words import interval_words, listed, three_digits, two_digits
 
 BEST_WITHIN = 0.3
 """half of a 95 % interval, relative to the value, up to which a property counts as
@@ -17,6 +17,8 @@ MOST_KNOWN = 5
 """quantities of a joint that a page shows"""
 MOST_UNKNOWN = 6
 MOST_WARNINGS = 3
+ELSEWHERE = ("combination", "error lasts")
+"""findings that another section of the page shows better"""
 
 
 def warnings(summary: FitSummary) -> tuple[Finding, ...]:
@@ -29,8 +31,6 @@ def unknown_section(settings: FitSettings, summary: FitSummary) -> Section:
     """Return the section of the other findings.
 
     Those after the first six stand with the parameters.
-
-    Which parameters cannot be told apart, their correlations show.
     """
     named = [in_words(finding, settings) for finding in _others(summary)[:MOST_UNKNOWN]]
     points = tuple(map(str, named))
@@ -46,7 +46,7 @@ def further_findings(summary: FitSummary) -> tuple[str, ...]:
 def _others(summary: FitSummary) -> list[Finding]:
     first = warnings(summary)
     others = [finding for finding in summary.findings if finding not in first]
-    return [finding for finding in others if finding.kind != "combination"]
+    return [finding for finding in others if finding.kind not in ELSEWHERE]
 
 
 def quantity_section(settings: FitSettings, summary: FitSummary) -> Section | None:
@@ -61,15 +61,15 @@ def quantity_section(settings: FitSettings, summary: FitSummary) -> Section | No
         certain.sort(key=lambda quantity: quantity.within)
         rows = list[tuple[Cell, ...]]()
         for quantity in certain[:MOST_KNOWN]:
-            value = f"{quantity.value:.3g}"
+            value = three_digits(quantity.value)
             rows.append((quantity.label, value, quantity.unit, _within(quantity)))
         name = settings.arm.joint_names[joint - 1]
         if rows:
             header = ("quantity", "value", "unit", "interval")
             cards[f"known_{name}"] = Table(name, header, tuple(rows))
     text = (
-        "With 95 % intervals, which are right only if the model is right. "
-        "All quantities stand further down."
+        "The best known quantities of each joint, with 95 % intervals. Intervals are right "
+        "only if the model is right. All quantities stand further down."
     )
     return Section("What is known", text, cards=cards) if cards else None
 
@@ -111,7 +111,7 @@ def _within(quantity: QuantityEstimate) -> str:
 
 
 def error_section(settings: FitSettings, summary: FitSummary) -> Section | None:
-    """Return the section with the error model of each compared joint.
+    """Return the folded section with the error model of each compared joint.
 
     None where the run has none.
     """
@@ -126,28 +126,31 @@ def error_section(settings: FitSettings, summary: FitSummary) -> Section | None:
         unit = shown.unit
         factor = shown.of_degrees(1.0)
         ahead = factor * error.after_10_s_deg
-        which = f" ({name})" if len(settings.outputs) > 1 else ""
-        after.append(f"{two_digits(ahead)} {unit}{which}")
+        after.append(f"{name} {two_digits(ahead)} {unit}")
         rows.append(
             {
                 "joint": name,
                 "unit": unit,
                 "sensor's noise": factor * error.sensor_deg,
                 "uncertain after 10 s": ahead,
-                "what is left lasts [s]": error.lasts_s or None,
+                "an error lasts [s]": error.lasts_s or None,
             }
         )
     if not rows:
         return None
     text = (
-        f"Even with exact parameters a prediction is uncertain by {listed(after)} after 10 s of motion, "
-        "because what else moves a joint, beside its commands, adds up."
+        "Even with exact parameters a prediction is uncertain, because more than the commands"
+        " moves a joint. The uncertainty grows with the time."
     )
     note = (
-        "Standard deviations; after 10 s at the mean speed of the logs. What is left and lasts is the error "
-        "of the model, not the sensor's; empty: nothing lasts."
+        "Standard deviations; after 10 s: at the mean speed of the logs. An error that lasts "
+        "is the model's, not the sensor's; empty: none lasts."
     )
     table = Table.of("", {name: name for name in rows[0]}, rows, note)
     return Section(
-        "How sure a prediction can be", text, tables={"prediction_errors": table}
+        "How sure can a prediction be?",
+        text,
+        tables={"prediction_errors": table},
+        folded=True,
+        answer=f"standard deviation after 10 s: {listed(after)}",
     )

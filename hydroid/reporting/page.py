@@ -236,7 +236,7 @@ class Plot:
 
     name: str
     caption: str
-    draw: Callable[[], Any]
+    make: Callable[[], Any]
     zoom: bool = False
     button: str = ""
     row: str = ""

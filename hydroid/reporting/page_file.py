@@ -58,7 +58,7 @@ def write_figures(page: Page, out: Path) -> list[Path]:
 
     written = list[Path]()
     for plot in page.plots:
-        drawing = plot.draw()
+        drawing = plot.make()
         # an arm in motion is for the page alone
         if not isinstance(drawing, Chart):
             continue
@@ -93,7 +93,7 @@ def _five_digits(value: float) -> float | None:
 
 def html(page: Page) -> str:
     """Return the page as one file."""
-    drawings = {plot.name: plot.draw() for plot in page.plots}
+    drawings = {plot.name: plot.make() for plot in page.plots}
     charts = {name for name, drawing in drawings.items() if isinstance(drawing, Chart)}
     short = (",", ":")
     text = json.dumps(drawings, default=plain, ensure_ascii=False, separators=short)

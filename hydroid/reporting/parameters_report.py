@@ -32,12 +32,12 @@ Row = dict[str, Cell]  # by the names of columns
 Intervals = Mapping[str, tuple[float, float]]
 
 _NOTE = (
-    "from, to: 95 % interval; empty: no limit. data: share of the information from the logs. by log: from "
-    "the differences between logs."
+    "from, to: 95 % interval; empty: no limit. data: share of the information from the logs. "
+    "by log: from the differences between logs."
 )
 _PRIORS = (
-    "What was known before the logs, and what they made of it: bars are 95 % intervals, points the "
-    "estimates. Where a bar is as wide as the grey one, the logs added nothing."
+    "Grey: what was expected before the fit (95 %). Blue: what is known after it (95 %); "
+    "points: the estimates. Where blue is as wide as grey, the logs added nothing."
 )
 
 
@@ -95,7 +95,8 @@ def short_table(settings: FitSettings, summary: FitSummary) -> Table:
         columns.append("by log")
     columns.append("source")
     rows = list[Row]()
-    for name, estimate in summary.estimate.items():
+    for name in by_joint(settings, [*summary.estimate]):
+        estimate = summary.estimate[name]
         source = origin(estimate)
         if estimate.source == Source.BOTH and estimate.data_share:
             source += f" ({100 * estimate.data_share:.0f} %)"
@@ -105,8 +106,25 @@ def short_table(settings: FitSettings, summary: FitSummary) -> Table:
         row["by log"] = interval_words(*estimate.interval_by_log)
         row["source"] = source
         rows.append(row)
-    note = "interval: of 95 %; by log: the same, from the differences between logs."
+    note = "side A: positive commands, side B: negative ones. interval: of 95 %."
+    if summary.left_out_deg:
+        note += " by log: the same, from the differences between logs."
     return Table.of("Parameters", {name: name for name in columns}, rows, note)
+
+
+def first_joint(settings: FitSettings, name: str) -> int:
+    """Return the first joint of a parameter, from 1; 0 of one that none has for
+    itself."""
+    parameter = settings.parameters.get(name)
+    if parameter is None or not parameter.joints:
+        return 0
+    return parameter.joints[0]
+
+
+def by_joint(settings: FitSettings, names: Sequence[str]) -> list[str]:
+    """Return parameters in the order of their joints, so that those of one stand
+    together; first those that no joint has for itself."""
+    return sorted(names, key=partial(first_joint, settings))
 
 
 def parameter_table(
@@ -242,7 +260,7 @@ def prior_chart(settings: FitSettings, summary: FitSummary) -> Chart:
         panels.append(_bars("Beside their priors", x, scores, prior))
     if positions:
         x = "lower bound: 0; upper bound: 1"
-        title = "Without a prior: between their bounds"
+        title = "Without a prior of their own: between their bounds"
         panels.append(_bars(title, x, positions))
     return Chart(tuple(panels))
 

@@ -97,8 +97,8 @@ def prediction_sections(
     return sections
 
 
-def draw(run: str | Path, *, figures: bool = False) -> Path:
-    """Draw the report of a finished run in its folder, from what it stores; return the
+def write_report(run: str | Path, *, figures: bool = False) -> Path:
+    """Write the report of a finished run in its folder, from what it stores; return the
     page."""
     folder = Path(run)
     page = fit_page(load_record(run))

@@ -12,7 +12,7 @@ from hydroid.arrays import Array
 from hydroid.estimate import FitSummary
 from hydroid.fitting.validation import Prediction
 from hydroid.posterior.stored_errors import stored_error_model
-from hydroid.posterior.whiteness import ResidualTest, residual_tests
+from hydroid.posterior.whiteness import FAINT, ResidualTest, residual_tests
 from hydroid.problem.problem import Problem
 from hydroid.reporting.chart import Chart, Mark, Panel, zero_line
 from hydroid.reporting.page import Cell, Plot, Section, Table
@@ -20,15 +20,17 @@ from hydroid.settings.fit import FitSettings
 from hydroid.words import listed, two_digits
 
 _TEXT = (
-    "The test uses innovations: the part of each sample that the log's past does not predict. If the model "
-    "is right, they are white and not correlated with the command, and 95 % of both correlations lie within "
-    "the grey band. With many samples the band is narrow; then look at how large a correlation is."
+    "Tested is the part of each sample that the samples before it do not predict (the "
+    "innovations). If the model is right, it is correlated neither with itself nor with the "
+    "command, and 95 % of the correlations lie in the grey band. With many samples the band "
+    f"is narrow: a correlation of {FAINT:g} or less matters to nobody."
 )
 _HEADER = (
     "joint",
-    "autocorrelations outside [%]",
-    "with the command outside [%]",
+    "largest autocorrelation",
     "largest with the command",
+    "autocorrelations outside the band [%]",
+    "with the command outside the band [%]",
 )
 
 
@@ -46,18 +48,22 @@ def residual_section(
     tests = _tests(settings, summary, usable)
     tabs = list[Plot]()
     rows = list[tuple[Cell, ...]]()
-    lasting = list[str]()
+    coloured = list[str]()
     for joint, test in tests.items():
         name = settings.arm.joint_names[joint - 1]
         draw = partial(_correlations, name, test)
         caption = f"{name}: correlations"
         tabs.append(Plot(f"residual_{len(tabs) + 1}", caption, draw, button=name))
-        largest = float(np.abs(test.with_command).max())
+        in_time = float(np.abs(test.autocorrelation).max())
+        with_command = float(np.abs(test.with_command).max())
         shares = [100 * part for part in test.outside]
-        rows.append((name, *map(two_digits, (*shares, largest))))
-        if seconds := summary.errors[f"q{joint}"].lasts_s:
-            lasting.append(f"{name} (for {two_digits(seconds)} s)")
-    answer = f"an error lasts in {listed(lasting)}" if lasting else "white"
+        rows.append((name, *map(two_digits, (in_time, with_command, *shares))))
+        largest = max(in_time, with_command)
+        if largest > FAINT:
+            coloured.append(f"{name} {two_digits(largest)}")
+    answer = f"yes: no correlation is above {FAINT:g}"
+    if coloured:
+        answer = f"no; largest correlation: {listed(coloured)}"
     title = "Are the residuals white?"
     table = Table("", _HEADER, tuple(rows))
     tables = {"residuals": table}

@@ -28,7 +28,7 @@ from hydroid.reporting.moving_arm import MOST, moving_arm
 from hydroid.reporting.page import Plot, Section, Table, log_names, short_name
 from hydroid.settings.arm import Arm
 from hydroid.units import Display, display
-from hydroid.words import number, two_digits
+from hydroid.words import number, significant
 
 MOTIONS = 8
 """logs that a page shows in motion"""
@@ -42,16 +42,23 @@ FAR = 3.0
 """ranges of the measured angle beyond which a response that runs away is not drawn"""
 COMMAND_COLORS = ("blue", "green", "pink", "yellow", "sky", "grey")
 """of the joints' commands in one panel"""
+BAR = 1e-5
+"""what 1 Pa is in bar"""
+LITRES_PER_MINUTE = 6e4
+"""what 1 m³/s is in L/min"""
+CHAMBER_COLORS = ("green", "pink")
+"""of chambers A and B"""
 ALL = "joints"
 """column of the responses of all joints together"""
 
 _MATRIX = (
-    "Rms error of each joint. Green: within its tolerance; amber: within twice that; red: beyond. Choose one "
-    "to see its response and the arm in motion."
+    "Rms error of each joint in each log. Green: good; amber: up to twice what is good; red: "
+    "worse. Choose one to see its response and the arm in motion."
 )
 _MOTION = (
-    "Orange: simulated. Grey: measured, hidden where both agree. The picture begins where they differ most, "
-    "and turns with the machine. Other joints replay their measured angles."
+    "Orange: simulated. Grey: measured, hidden where both agree. The picture begins where "
+    "they differ most. The view from the side turns with the machine. Joints that are not "
+    "compared show their measured angles."
 )
 _NOTE = "fit: 100 % is perfect, 0 % as bad as a constant. expected: the rms error that the fit predicts."
 _KINDS = {True: "unseen", False: "fitted", None: ""}
@@ -237,8 +244,8 @@ def _size(error: float, *, slides: bool) -> str:
     if not np.isfinite(error):
         return "diverged"
     if slides:
-        return f"{two_digits(1e3 * np.radians(error))} mm"
-    return f"{two_digits(error)}°"
+        return f"{significant(1e3 * np.radians(error), 2)} mm"
+    return f"{significant(error, 2)}°"
 
 
 def _state(error: float, tolerance: float) -> str:
@@ -294,6 +301,8 @@ def draw_response(
     ]
     if pressures := _pressures(predictions[0], joint):
         panels.append(Panel("", "pressure [bar]", pressures, height=120))
+    if flows := _flows(predictions[0], joint):
+        panels.append(Panel("", "flow in [L/min]", flows, height=110))
     command = Mark("step", log.time, log.command[:, column], color="grey")
     panels.append(command_panel(command))
     return Chart(tuple(panels), linked=True, bins=bins)
@@ -338,26 +347,47 @@ def _pressures(prediction: Prediction, joint: int) -> tuple[Mark, ...]:
     marks = list[Mark]()
     time = prediction.log.time
     measured = prediction.log.pressure
-    simulated = prediction.pressure
-    for side, color in enumerate(("green", "pink")):
+    oil = prediction.oil
+    for side, color in enumerate(CHAMBER_COLORS):
         name = f"chamber {'AB'[side]}"
         if measured is not None:
-            pressure = 1e-5 * measured[:, joint - 1, side]
+            pressure = BAR * measured[:, joint - 1, side]
             mark = Mark("line", time, pressure, color=color, label=f"{name}, measured")
             marks.append(replace(mark, width=5, alpha=0.35))
-        if simulated is not None:
-            pressure = 1e-5 * simulated[:, prediction.joints.index(joint), side]
+        if oil is not None:
+            pressure = BAR * oil.pressure[:, prediction.joints.index(joint), side]
             label = f"{name}, simulated"
             marks.append(Mark("line", time, pressure, color=color, label=label))
+    if oil is not None and oil.line is not None:
+        look: Plain = {"color": "grey", "label": "pump's line"}
+        marks.append(Mark("line", time, BAR * oil.line, width=1, **look))
     # a chamber without a sensor has a column of NaN
     return tuple(mark for mark in marks if np.isfinite(mark.y).any())
 
 
+def _flows(prediction: Prediction, joint: int) -> tuple[Mark, ...]:
+    """Draw the simulated flows into both chambers of a joint; none where there are
+    none."""
+    oil = prediction.oil
+    if oil is None:
+        return ()
+    flows = LITRES_PER_MINUTE * oil.flow[:, prediction.joints.index(joint)]
+    if np.isnan(flows).all():
+        return ()
+    marks = [zero_line()]
+    for side, color in enumerate(CHAMBER_COLORS):
+        look: Plain = {"color": color, "label": f"chamber {'AB'[side]}, simulated"}
+        marks.append(Mark("line", prediction.log.time, flows[:, side], **look))
+    return tuple(marks)
+
+
 def draw_joints(title: str, arm: Arm, group: Sequence[Prediction], bins: int) -> Chart:
-    """Draw all joints of a log on one time axis: measured and simulated angles, and all
-    commands."""
+    """Draw all joints of a log on one time axis: measured and simulated angles, the
+    flows that they take in, the pressure of the pump's line, and all commands."""
     panels = list[Panel]()
     commands = list[Mark]()
+    flows = list[Mark]()
+    pump = list[Mark]()
     for joint, color in zip(_compared(group), cycle(COMMAND_COLORS), strict=False):
         prediction = next(p for p in group if joint in p.joints)
         time = prediction.log.time
@@ -374,7 +404,18 @@ def draw_joints(title: str, arm: Arm, group: Sequence[Prediction], bins: int) ->
         heading = title if not panels else ""
         panels.append(Panel("", f"{short_name(name)} [{unit}]", marks, heading, 150))
         command = prediction.log.command[:, joint - 1]
-        label = f"command of {name}"
-        commands.append(Mark("step", time, command, color=color, label=label))
+        commands.append(Mark("step", time, command, color=color, label=name))
+        oil = prediction.oil
+        if oil is None:
+            continue
+        # oil enters one chamber while it leaves the other
+        flow = LITRES_PER_MINUTE * oil.flow[:, prediction.joints.index(joint)]
+        flows.append(Mark("line", time, flow.max(axis=1), color=color, label=name))
+        if oil.line is not None and not pump:
+            pump.append(Mark("line", time, BAR * oil.line, color="grey"))
+    if any(np.isfinite(mark.y).any() for mark in flows):
+        panels.append(Panel("", "flow in [L/min]", tuple(flows), height=130))
+    if pump:
+        panels.append(Panel("", "pump [bar]", tuple(pump), height=110))
     panels.append(command_panel(*commands, height=160))
     return Chart(tuple(panels), linked=True, bins=bins)

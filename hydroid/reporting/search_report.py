@@ -42,7 +42,9 @@ def search_section(record: Record) -> Section:
         caption = "The Pareto set: a lower point fits that segment better."
         plots.append(Plot("pareto", caption, draw))
     if any(len(costs) > 1 for costs in result.starts.values()):
-        caption = "Where least squares ended from each start: starts at 0 found the best optimum."
+        caption = (
+            "Where each start of the search ended: those at 0 found the best result."
+        )
         draw = partial(starts, record.settings.arm.joint_names, result.starts)
         plots.append(Plot("starts", caption, draw))
     simulations = sum(effort.simulations for effort in result.refinements)
@@ -66,7 +68,7 @@ def _refined(record: Record, effort: Effort) -> str:
     if rise is None or error is None:
         return said
     better = f"by {two_digits(rise)} ± {two_digits(error)}"
-    return f"{said} It foretells parts of the logs left out better {better} (log-likelihood)."
+    return f"{said} It predicts parts of the logs that it did not use better {better} (log-likelihood)."
 
 
 def starts(names: Sequence[str], costs: Mapping[int, Sequence[float]]) -> Chart:

@@ -24,17 +24,19 @@ from hydroid.units import Display, display
 from hydroid.words import listed, told_apart, two_digits
 
 _RIVALS = (
-    "Simple models are: standing still; speed tables, the mean speed at each command; and nine numbers a "
-    "joint, which are dead band, exponent, top speed and lag of each direction, and one delay."
+    "The simple models of a joint: standing still; speed tables (its mean speed at each "
+    "command); nine numbers (a delay, and for each direction a dead band, an exponent, a top "
+    "speed and a lag)."
 )
 _FITTED = (
-    "Rms errors{unit} on the fitted logs. No other log tests the fit yet. "
-    "Last three columns: simple models."
+    "Rms errors{unit} on the fitted logs. No other log has tested the fit yet. "
+    "The last three columns are simple models."
 )
 _TESTED = (
-    "Rms errors{unit} on {count} unseen log{s}, which the fit did not use: of the angle's change over 1, 5 "
-    "and 10 s, and of the angle over whole logs. In brackets: the best simple model. The word after it: "
-    "whether the fit is better or worse than that model, or cannot be told from it."
+    "Rms errors{unit} on {count} unseen log{s}, which the fit did not use. After 1, 5 and 10 "
+    "s: of how far the joint has moved in this time. Whole logs: of the angle. In brackets: "
+    "the error of the best simple model. Better, worse: than that model. Cannot be told: the "
+    "difference may be chance."
 )
 WHOLE = "whole logs"
 """name of a column"""
@@ -209,8 +211,9 @@ def horizon_section(fits: Verdicts) -> Section | None:
     names = ("joint", "of", "unit", *map(column_of, HORIZONS), WHOLE)
     columns = {name: name for name in names}
     note = (
-        "Rms error of how far the joint moves in this time, from starts every 2 s of the unseen logs. Each "
-        "is simulated from 2 s before, at the measured angles. Last column: of the angle, over whole logs."
+        "Rms error of how far the joint moves in this time, over starts every 2 s along the "
+        "unseen logs. Each simulation begins 2 s earlier, at the measured angles. Last "
+        "column: of the angle over whole logs."
     )
     table = Table.of("Error by prediction time", columns, rows, note)
     if not rows:
@@ -302,7 +305,7 @@ def lead(fits: Verdicts) -> str:
     count = max(verdict.unseen_logs for verdict in verdicts)
     over = ""
     if count:
-        over = f", over {count} unseen log{'s' if count > 1 else ''}"
+        over = f" ({count} unseen log{'s' if count > 1 else ''})"
     return f"{best}{said}{over}. {worst(verdicts)}".strip()
 
 
@@ -320,7 +323,9 @@ def outside(verdicts: Sequence[JointVerdict]) -> tuple[str, ...]:
             missed.append(f"{percent:.0f} % of the {verdict.name}'s")
     if not missed:
         return ()
-    return (f"The 95 % bands hold only {listed(missed)} unseen samples.",)
+    return (
+        f"The 95 % bands are too narrow: they hold only {listed(missed)} unseen samples.",
+    )
 
 
 def worst(verdicts: Sequence[JointVerdict]) -> str:
@@ -338,9 +343,8 @@ def worst(verdicts: Sequence[JointVerdict]) -> str:
     simple = min(verdict.baselines_deg.values(), default=0.0)
     error, least = told_apart(scale * _error(verdict), scale * simple)
     return (
-        f"Worst: {verdict.name}, {error} {unit}; good is up to {tolerance} {unit} "
-        "(by default 2 % of its travel), and simple models err by "
-        f"{least} {unit} or more."
+        f"Worst: {verdict.name}, with an error of {error} {unit}. Up to {tolerance} {unit} "
+        f"is good (by default 2 % of its travel); the best simple model has {least} {unit}."
     )
 
 

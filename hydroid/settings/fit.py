@@ -13,7 +13,8 @@ from pydantic import Field, ValidationInfo, model_validator
 from hydroid.errors import HydroidError, SettingsError
 from hydroid.files import Plain, find_config
 from hydroid.parameters import ParameterSet
-from hydroid.quantity_table import MECHANICAL, TARGETS
+from hydroid.quantity_table import TARGETS
+from hydroid.rungs import RUNGS, Rung, Stage, Stepping, rungs_of, stage_has
 from hydroid.settings.arm import Arm, load_arm
 from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.load import ByJoint, Joints, Positive, Settings, load, validate
@@ -27,11 +28,17 @@ from hydroid.settings.problem import (
 )
 from hydroid.settings.search import DesignSettings, RefinementSettings, SearchSettings
 
+STAGE_HINTS: dict[Stage, str] = {
+    "mech": "set stage: hyd",
+    "hyd": "the hydraulics take its place",
+}
+"""what to do about a quantity that a stage lacks"""
+
 
 class FitSettings(Settings):
     """All that a fit needs besides its logs."""
 
-    stage: Literal["mech", "hyd"] = "mech"
+    stage: Stage = "mech"
     """mech: the hydraulics are a gain; hyd: the whole chain from command to torque is
     simulated"""
     arm: Arm = "hydrolek"  # pyright: ignore[reportAssignmentType]
@@ -145,48 +152,39 @@ class FitSettings(Settings):
             return validate(arm, Arm, "arm", folder=folder)
         return arm
 
-    @model_validator(mode="before")
-    @classmethod
-    def _one_model_without_hydraulics(cls, values: Any) -> Any:
-        """Take stage 1 for dynamic, whatever `simulation.model` says of stage 2:
-        its steps follow from it."""
-        if not isinstance(values, dict) or values.get("stage", "mech") != "mech":
-            return values
-        simulation = values.get("simulation")
-        if isinstance(simulation, SimulationSettings):
-            simulation = simulation.model_dump()
-        if not isinstance(simulation, dict) or simulation.get("model") not in (
-            "quasi-static",
-            "ladder",
-        ):
-            return values
-        return {**values, "simulation": {**simulation, "model": "dynamic"}}
-
     @model_validator(mode="after")
     def _of_the_stage(self) -> "FitSettings":
-        if self.joint_refinement and self.simulation.model == "ladder":
+        if self.joint_refinement and len(self.rungs) > 1:
             raise ValueError(
                 "joint_refinement: refines one model; set simulation.model to it"
             )
         for name, parameter in self.parameters.items():
             quantity = parameter.quantity
-            if self.stage == "mech" and quantity not in MECHANICAL:
+            if not stage_has(self.stage, quantity):
+                hint = STAGE_HINTS[self.stage]
                 raise ValueError(
-                    f"parameters.{name}: stage mech has no {quantity}; set stage: hyd"
-                )
-            if self.stage == "hyd" and quantity == "gain":
-                raise ValueError(
-                    f"parameters.{name}: stage hyd has no gain; the hydraulics take its place"
+                    f"parameters.{name}: stage {self.stage} has no {quantity}; {hint}"
                 )
         # this raises where a parameter cannot be made
         self.parameter_set()
         return self
 
     @property
-    def quasi_static(self) -> bool:
-        """Whether speeds follow valve and load at once, without oil stiffness and
-        inertia."""
-        return self.stage == "hyd" and self.simulation.model != "dynamic"
+    def rungs(self) -> tuple[Rung, ...]:
+        """The models that a fit climbs, from the poorest to the richest."""
+        return rungs_of(self.stage, self.simulation.model)
+
+    @property
+    def rung(self) -> Rung:
+        """The model that is simulated: of several the first."""
+        return self.rungs[0]
+
+    @property
+    def stepping(self) -> Stepping:
+        """How finely the model steps."""
+        return self.rung.stepping(
+            self.simulation.steps_per_sample, self.hydraulics.substeps
+        )
 
     @property
     def seeded(self) -> bool:
@@ -203,25 +201,14 @@ class FitSettings(Settings):
         """Whether any parameter that is estimated says where a search starts."""
         return any(p.states_start for p in self.parameters.values() if p.fixed is None)
 
-    @property
-    def substeps(self) -> int:
-        """Sub-steps of valves and oil in one step of the model."""
-        simulation = self.simulation
-        return (
-            self.hydraulics.substeps * simulation.steps_per_sample // simulation.steps
-        )
-
-    def terms(self, model: str = "quasi-static") -> tuple[str, ...]:
-        """Names of the terms that a fit may add to a model, in the order of the
-        parameters.
-
-        The oil of a quasi-static model is none of the dynamic one, which has its own.
-        """
-        parameters = self.parameters.values()
-        if model == "dynamic":
-            parameters = [p for p in parameters if not p.quantity.startswith("oil_")]
+    def terms(self, rung: Rung | None = None) -> tuple[str, ...]:
+        """Names of the terms that a fit may add, in the order of the parameters; of a
+        rung those alone that have an effect there."""
         names = (
-            parameter.term for parameter in parameters if parameter.term is not None
+            parameter.term
+            for parameter in self.parameters.values()
+            if parameter.term is not None
+            and (rung is None or rung.has(parameter.quantity))
         )
         return tuple(dict.fromkeys(names))
 
@@ -246,9 +233,15 @@ class FitSettings(Settings):
         settings = self._all_free() if model == "joint" else self
         if self.terms() != tuple(terms):
             settings = settings._with_terms(terms)
-        if model == "dynamic":
-            settings = settings.changed({"simulation.model": model})
+        if model in RUNGS:
+            settings = settings.on(RUNGS[model])
         return settings
+
+    def on(self, rung: Rung) -> "FitSettings":
+        """Return the settings of one rung of their stage alone."""
+        if self.rungs == (rung,):
+            return self
+        return self.changed({"simulation.model": rung.name})
 
     def _all_free(self) -> "FitSettings":
         """Return the settings with every parameter free that can be."""

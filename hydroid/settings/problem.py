@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from hydroid.quantity_table import CHOICES, MECHANICAL
+from hydroid.rungs import Climb
 from hydroid.settings.load import ByJoint, Joints, NotNegative, Positive, Settings
 
 
@@ -258,15 +259,18 @@ class ObjectiveSettings(Settings):
         return self.noise_deg
 
 
+OtherJoints = Literal["locked", "passive", "measured"]
+
+
 class SimulationSettings(Settings):
     """How logs are simulated."""
 
-    model: Literal["dynamic", "quasi-static", "ladder"] = "dynamic"
+    model: Climb = "dynamic"
     """of stage 2. dynamic: oil stiffness, inertia and stops; quasi-static: speed
     follows valve and load at once, one step a sample; ladder: a fit searches and
     refines the quasi-static model, then refines the dynamic one from there, and keeps
     it where it is clearly nearer to the logs"""
-    other_joints: Literal["locked", "passive", "measured"] = "locked"
+    other_joints: OtherJoints = "locked"
     """how to treat joints that have no command in the log and are not compared. locked:
     they stand still, which is the fastest; passive: they move on their own spring and
     damper, as in the article; measured: they follow their logged motion"""
@@ -278,8 +282,3 @@ class SimulationSettings(Settings):
     measured_cutoff_hz: Annotated[float, Field(gt=0, le=50)] = 4.0
     """cutoff of the low-pass filter on motion that joints follow [Hz]; its second
     derivative becomes a torque"""
-
-    @property
-    def steps(self) -> int:
-        """Steps of the model in one sample of the log."""
-        return self.steps_per_sample if self.model == "dynamic" else 1

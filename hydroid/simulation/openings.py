@@ -32,7 +32,15 @@ BEHIND_VALVE = [
     ),
     *("oil_frequency", "oil_damping", "oil_damping_share"),
     *("ring_cosine", "ring_sine"),
-    *("pump_flow", "pump_droop", "pump_limit", "supply_pressure", "relief"),
+    *(
+        "pump_flow",
+        "pump_droop",
+        "pump_limit",
+        "pump_exponent",
+        "pump_bypass",
+        "supply_pressure",
+        "relief",
+    ),
 ]
 BEHIND_PORT = ["area", "draw", "return_"]
 """what a valve's opening does not depend on, of a joint and of its sides; the others

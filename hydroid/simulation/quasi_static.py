@@ -37,7 +37,7 @@ from hydroid.hydraulics.elementwise import compilable
 from hydroid.hydraulics.joint import mean_opening
 from hydroid.hydraulics.kernel import Plugin, make_pad, source_key
 from hydroid.hydraulics.oil import overshoot, store_oil
-from hydroid.hydraulics.pump import begin_line, come_up, line_pressure
+from hydroid.hydraulics.pump import begin_line, centre_left, come_up, line_pressure
 from hydroid.hydraulics.valve import rod_speed
 from hydroid.simulation.rollout import mujoco_function, write_sample
 
@@ -61,6 +61,7 @@ def share_pump(
         return np.inf
     begin_line(line, pump, state[last], demanded, period)
     share = come_up(line, pump, period)
+    line.centre = centre_left(coefficients, driven, pad.joints)
     pressure = line_pressure(coefficients, driven, pad.joints, line, share)
     for j in range(state.size):
         z = state[j]

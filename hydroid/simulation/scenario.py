@@ -10,14 +10,18 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
 from hydroid.arm.locked import LockedArm, lock
-from hydroid.arrays import Array, Index, Mask, Structs, record
+from hydroid.arrays import Array, Index, Structs, record
 from hydroid.errors import SettingsError
 from hydroid.hydraulics.actuator import at_rest, make_plugin, swallowed
 from hydroid.hydraulics.kernel import Plugin
 from hydroid.hydraulics.records import NONE, Records, coefficients
 from hydroid.log import Log
+from hydroid.rungs import GAIN, Stepping
 from hydroid.settings.arm import Arm
 from hydroid.settings.problem import SimulationSettings
+from hydroid.simulation.roles import Roles, roles
+from hydroid.simulation.rollout import SteppedArm
+from hydroid.simulation.rolls import ROLLS
 
 ARMATURE = 1e6
 """[kg·m²], against about 10 for the whole arm: the arm's torques move it by less than
@@ -52,7 +56,8 @@ class Prescribed:
         log: Log,
         joints: Index,
         columns: Index,
-        settings: SimulationSettings,
+        steps: int,
+        cutoff_hz: float,
     ) -> None:
         armature = max(ARMATURE, HEAVIEST * model.dof_M0.max())
         model.dof_armature[columns] = armature
@@ -61,9 +66,9 @@ class Prescribed:
         self.columns = columns
         self.damping = 2 * SERVO * armature
         self.stiffness = SERVO**2 * armature
-        step = log.period / settings.steps
-        motion = smooth(log.posed[:, joints], settings.measured_cutoff_hz * log.period)
-        samples = np.arange((len(motion) - 1) * settings.steps + 1) * step
+        step = log.period / steps
+        motion = smooth(log.posed[:, joints], cutoff_hz * log.period)
+        samples = np.arange((len(motion) - 1) * steps + 1) * step
         fine = np.empty((len(samples), len(joints)))
         for k, angle in enumerate(motion.T):
             fine[:, k] = np.interp(samples, log.time, angle)
@@ -124,12 +129,15 @@ class Response:
     """Simulated angles [rad], shape (n, T, K), of the K output joints; NaN throughout
     where one diverged.
 
-    `pressure` [Pa], shape
-    (n, T, L, 2), are those of chambers A and B of the L joints that were asked for.
+    Of the L joints whose oil was asked for, chambers A and B have `pressure` [Pa] and
+    take in `flow` [m³/s], the mean of the last step, both of shape (n, T, L, 2).
+    `line` [Pa], shape (n, T), is the pressure of the pump's line; NaN without a pump.
     """
 
     angle: Array
     pressure: Array
+    flow: Array
+    line: Array
 
 
 class Scenario:
@@ -137,12 +145,12 @@ class Scenario:
     rests before them.
 
     Joints that the log drives, and `outputs` (0-based), whose angles are wanted, are
-    *active*. A setting says what the others do.
+    *active*. A setting says what the others do (`simulation.roles`).
 
     Attributes:
         machine: the whole arm.
         arm: the arm reduced to its V moving joints, springs slack in the start pose.
-        active: shape (J,).
+        roles: of the arm's joints.
         outputs: columns of the outputs among the moving joints, shape (K,).
         command: held during each step [%], shape (steps, V).
         period: between samples [s].
@@ -158,22 +166,32 @@ class Scenario:
         log: Log,
         outputs: list[int],
         settings: SimulationSettings,
+        stepping: Stepping,
     ) -> None:
         self.settings = settings
+        self.stepping = stepping
         self.machine = arm
-        self.active = log.driven.copy()
-        self.active[outputs] = True
-        moving = self.active | (settings.other_joints != "locked")
+        active = log.driven.copy()
+        active[outputs] = True
+        self.roles = roles(active, settings.other_joints)
+        moving = self.roles.moving
         self.arm: LockedArm = lock(spec, arm, moving, log.start)
-        self.arm.model.opt.timestep = log.period / settings.steps
+        self.arm.model.opt.timestep = log.period / stepping.steps
         self.arm.model.qpos_spring[:] = self.arm.pose
         self.outputs = np.searchsorted(self.arm.columns, outputs)
-        self.command = np.repeat(log.command[:-1, moving], settings.steps, axis=0)
+        self.command = np.repeat(log.command[:-1, moving], stepping.steps, axis=0)
         self.pressure = log.start_pressure[moving]
         self.period = log.period
-        follows = np.flatnonzero(~self.active & (settings.other_joints == "measured"))
+        follows = np.flatnonzero(self.roles.following)
         columns = np.searchsorted(self.arm.columns, follows)
-        self.prescribed = Prescribed(self.arm.model, log, follows, columns, settings)
+        self.prescribed = Prescribed(
+            self.arm.model,
+            log,
+            follows,
+            columns,
+            stepping.steps,
+            settings.measured_cutoff_hz,
+        )
 
     def restarted(self, start: Array, command: Array) -> "Scenario":
         """Return the same moving joints from another pose [rad], shape (V,), under
@@ -213,25 +231,30 @@ STOP_REACH = np.radians(1.0)
 
 
 class Chain:
-    """The actuators of an arm, for any candidates.
+    """What drives the moving joints of an arm, for any candidates: actuators, or given
+    torques.
 
-    `active` says which of the arm's joints have hydraulics, shape (J,), and `substeps`
-    how many of valves and oil there are in a MuJoCo step.
+    `roles` are those of the arm's joints; where a gain stands for the hydraulics, no
+    joint has any.
 
     Attributes:
         columns: the moving joints that couple through their inertia: all but `pushed`.
         joints: the same among the arm's joints, 0-based.
-        pushed: columns of the moving joints whose torques are given instead: in stage 1
-            all.
+        pushed: columns of the moving joints whose torques are given instead: those that
+            follow a log, and with a gain all.
     """
 
     def __init__(
-        self, arm: Arm, locked: LockedArm, active: Mask, substeps: int, pushed: Index
+        self, arm: Arm, locked: LockedArm, roles: Roles, stepping: Stepping
     ) -> None:
-        self.columns = np.setdiff1d(np.arange(len(locked.columns)), pushed)
-        self.joints = locked.columns[self.columns]
-        self.pushed = pushed
-        self._pushed = locked.columns[pushed]
+        moving = locked.columns
+        given = roles.following[moving] | (stepping.rung is GAIN)
+        self.columns = np.flatnonzero(~given)
+        self.joints = moving[self.columns]
+        self.pushed = np.flatnonzero(given)
+        self._pushed = moving[self.pushed]
+        self._stepping = stepping
+        active = roles.active
         self._idle = ~active[self.joints]
         for joint in self.joints[active[self.joints]].tolist():
             if arm.joints[joint].actuator is None:
@@ -252,7 +275,12 @@ class Chain:
         entries[columns, rows] = np.arange(model.nC)
         self._entries = entries[np.ix_(self.columns, self.columns)]
         self._period = model.opt.timestep
-        self._substeps = substeps
+
+    def stepped(self, model: mujoco.MjModel, steps: int, copies: int = 1) -> SteppedArm:
+        """Return the arm of a model, or several copies of it, to be rolled out as its
+        rung is, with a sample after so many steps."""
+        roll = ROLLS[self._stepping.rung]
+        return SteppedArm(model, self.columns, steps, roll, copies)
 
     def start(
         self,
@@ -276,7 +304,8 @@ class Chain:
         if pressure is not None:
             _take_measured(joints, pressure[self.columns])
         joints.kind[:, self._idle] = NONE
-        plugin = make_plugin(joints, self._entries, self._period, self._substeps)
+        substeps = self._stepping.substeps
+        plugin = make_plugin(joints, self._entries, self._period, substeps)
         angle = np.tile(pose[self.columns], (len(balance), 1))
         return plugin, at_rest(plugin, angle, balance[:, self.columns])
 

@@ -23,7 +23,7 @@ from hydroid.arrays import Array
 from hydroid.hydraulics.cylinder import weigh
 from hydroid.hydraulics.elementwise import compilable
 from hydroid.hydraulics.kernel import Plugin, make_pad, source_key
-from hydroid.hydraulics.pump import delivery, lowest
+from hydroid.hydraulics.pump import centre_left, delivery, lowest, past_valves
 from hydroid.hydraulics.seals import joint_friction
 from hydroid.hydraulics.valve import rod_speed
 from hydroid.simulation.steady import (
@@ -156,6 +156,17 @@ def drawn_at(plugin: Plugin, rods: Rods, law: Law, pressure: float) -> float:
 
 
 @compilable
+def taken_at(plugin: Plugin, rods: Rods, law: Law, pressure: float) -> float:
+    """Flow from the line [m³/s] at its pressure [Pa], what runs past the valves
+    included; writes as `drawn_at`."""
+    driven = plugin.order[plugin.idle :]
+    pump = plugin.coefficients[plugin.order[plugin.order.size - 1]]
+    drawn = drawn_at(plugin, rods, law, pressure)
+    centre = centre_left(plugin.coefficients, driven, rods.work)
+    return drawn + past_valves(pressure, centre, pump)[0]
+
+
+@compilable
 def shared_pressure(plugin: Plugin, rods: Rods, law: Law) -> float:
     """Pressure of the line [Pa] at which the pump gives what joints draw; inf where it
     has no limit.
@@ -168,13 +179,14 @@ def shared_pressure(plugin: Plugin, rods: Rods, law: Law) -> float:
         return np.inf
     low = lowest(pump)
     high = pump.relief
-    over = drawn_at(plugin, rods, law, high)
+    over = taken_at(plugin, rods, law, high)
     if over <= 0.0:
         return high
-    # where the pump gives this flow; at less pressure no more is drawn
+    # where the pump gives this flow; at less pressure no more is taken
     if over < pump.pump_flow:
-        low = max(low, high - pump.pump_droop * over / pump.pump_flow)
-    under = drawn_at(plugin, rods, law, low) - delivery(low, 1.0, pump)[0]
+        part = (over / pump.pump_flow) ** pump.pump_exponent
+        low = max(low, high - pump.pump_droop * part)
+    under = taken_at(plugin, rods, law, low) - delivery(low, 1.0, pump)[0]
     left = SETTLED * pump.pump_flow
     if under >= -left:
         return low
@@ -187,8 +199,9 @@ def shared_pressure(plugin: Plugin, rods: Rods, law: Law) -> float:
         # where the rule creeps
         if count % 4 == 3:
             pressure = 0.5 * (low + high)
-        drawn = drawn_at(plugin, rods, law, pressure)
-        excess = drawn - delivery(pressure, 1.0, pump)[0]
+        excess = (
+            taken_at(plugin, rods, law, pressure) - delivery(pressure, 1.0, pump)[0]
+        )
         if abs(excess) <= left:
             return pressure
         if excess > 0.0:

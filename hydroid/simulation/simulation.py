@@ -13,36 +13,52 @@ import os
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from typing import NamedTuple
 
+import mujoco
 import numpy as np
 from scipy.signal import lfilter
 
 from hydroid.arm.locked import repeat
+from hydroid.arm.model import add_payload
 from hydroid.arrays import Array, Index, Structs
 from hydroid.hydraulics.actuator import pressures
+from hydroid.hydraulics.kernel import Plugin
 from hydroid.hydraulics.records import JOINT_STATE, has_force_curve
+from hydroid.log import Log
 from hydroid.mjcf import quiet_mujoco
+from hydroid.settings.fit import FitSettings
 from hydroid.simulation.openings import valve_openings
-from hydroid.simulation.quasi_static import roll_quasi_static
-from hydroid.simulation.rollout import Course, SteppedArm, Trace, compile_rollout, roll
+from hydroid.simulation.rollout import Course, SteppedArm, Trace, compile_rollout
 from hydroid.simulation.scenario import Candidates, Chain, Response, Scenario, distinct
 
-Follow = Callable[[SteppedArm, Index], tuple[Array, Array | None]]
+
+class Oil(NamedTuple):
+    """What the oil of one candidate does at its samples.
+
+    pressure: of chambers A and B [Pa], shape (1 + T, J, 2). flow: into them [m³/s], of
+    the same shape. line: pressure of the pump's line [Pa], shape (1 + T,); NaN without
+    a pump.
+    """
+
+    pressure: Array
+    flow: Array
+    line: Array
+
+
+Follow = Callable[[SteppedArm, Index], tuple[Array, Oil | None]]
 """simulates some of n candidates, one for each copy of an arm: angles of the moving
-joints [rad], (1 + T, copies, V), and the chamber pressures of a single one [Pa], (1 +
-T, J, 2), where they are wanted"""
+joints [rad], (1 + T, copies, V), and the oil of a single one, where it is wanted"""
 TOGETHER = 56
 """joints of all arms stepped at once: MuJoCo computes with sparse matrices from 60"""
 
 
 class Simulation:
-    """Simulates candidates on one log; in stage 2 the scenario's active joints have
-    hydraulics.
+    """Simulates candidates on one log; but for stage 1 the scenario's active joints
+    have hydraulics.
 
     Args:
-        substeps: of valves and oil in one MuJoCo step; None: stage 1, without
-            hydraulics.
-        pressures: active joints whose chamber pressures are wanted in the response,
+        pressures: active joints whose pressures and flows are wanted in the response,
             0-based.
 
     Attributes:
@@ -50,25 +66,19 @@ class Simulation:
             0-based.
     """
 
-    def __init__(
-        self, scenario: Scenario, substeps: int | None, pressures: Sequence[int] = ()
-    ) -> None:
+    def __init__(self, scenario: Scenario, pressures: Sequence[int] = ()) -> None:
         compile_rollout()
         self.scenario = scenario
-        self._quasi_static = bool(substeps) and scenario.settings.model != "dynamic"
-        # in stage 1 a gain pushes every joint
-        pushed = np.arange(len(scenario.arm.columns))
-        if substeps:
-            pushed = scenario.prescribed.columns
+        self._at_once = scenario.stepping.rung.at_once
         self._chain = Chain(
-            scenario.machine, scenario.arm, scenario.active, substeps or 1, pushed
+            scenario.machine, scenario.arm, scenario.roles, scenario.stepping
         )
         self.joints = self._chain.joints
         self._pressures = np.searchsorted(self.joints, np.array(pressures, int))
 
     def simulate(self, candidates: Candidates) -> Response:
-        """Return what n candidates' sensors read, and the pressures asked for, at the
-        log's samples.
+        """Return what n candidates' sensors read, and the pressures and flows asked
+        for, at the log's samples.
 
         The first is the start. One without a force-stroke curve, or that diverged, has
         NaN throughout.
@@ -76,16 +86,19 @@ class Simulation:
         scenario = self.scenario
         n = len(candidates)
         wanted = self._pressures
-        samples = 1 + len(scenario.command) // scenario.settings.steps
+        samples = 1 + len(scenario.command) // scenario.stepping.steps
         angle = np.full((n, samples, len(scenario.outputs)), np.nan)
         pressure = np.full((n, samples, len(wanted), 2), np.nan)
+        flow = np.full(pressure.shape, np.nan)
+        line = np.full((n, samples if len(wanted) else 0), np.nan)
+        response = Response(angle, pressure, flow, line)
         # those that differ in effects of other groups of logs are simulated once
         first, alike = distinct(candidates.joints, candidates.mass)
         exists = has_force_curve(candidates.joints[:, self.joints])
         rows = np.intersect1d(np.flatnonzero(exists), first)
         threads = min(scenario.settings.threads or os.cpu_count() or 1, rows.size)
         if not threads:
-            return Response(angle, pressure)
+            return response
         candidates = candidates[rows]
         sensors = candidates.joints[:, scenario.arm.columns[scenario.outputs]]
 
@@ -93,7 +106,7 @@ class Simulation:
             """Simulate some of the candidates on an arm that is free, and write what
             its sensors read to their rows."""
             arm = free.pop()
-            followed, chambers = follow(arm, np.resize(some, arm.copies))
+            followed, oil = follow(arm, np.resize(some, arm.copies))
             if arm.healthy:
                 outputs = followed[:, :, scenario.outputs].swapaxes(0, 1)
                 # copies beyond `some` only fill the arm
@@ -101,8 +114,11 @@ class Simulation:
                     if self.joints.size:
                         turned = reading(turned, sensors[candidate], scenario.period)
                     angle[rows[candidate]] = turned
-                if chambers is not None:
-                    pressure[rows[some[0]]] = chambers[:, wanted]
+                if oil is not None:
+                    row = rows[some[0]]
+                    pressure[row] = oil.pressure[:, wanted]
+                    flow[row] = oil.flow[:, wanted]
+                    line[row] = oil.line
             free.append(arm)
 
         with quiet_mujoco(), ThreadPoolExecutor(threads) as pool:
@@ -117,8 +133,9 @@ class Simulation:
                 left = np.flatnonzero(np.isnan(angle[rows, -1]).any(axis=1))
                 deque(pool.map(simulate, left[:, None]), maxlen=0)
         if len(first) < n:
-            return Response(angle[first[alike]], pressure[first[alike]])
-        return Response(angle, pressure)
+            every = first[alike]
+            return Response(angle[every], pressure[every], flow[every], line[every])
+        return response
 
     def _copies(self, candidates: Candidates, threads: int) -> int:
         """How many arms can be stepped at once without changing a bit of any.
@@ -139,9 +156,7 @@ class Simulation:
         model = self.scenario.arm.model
         if copies > 1:
             model = repeat(model, copies)
-        rollout = roll_quasi_static if self._quasi_static else roll
-        steps = self.scenario.settings.steps
-        return SteppedArm(model, self._chain.columns, steps, rollout, copies)
+        return self._chain.stepped(model, self.scenario.stepping.steps, copies)
 
     def _follower(
         self,
@@ -160,7 +175,7 @@ class Simulation:
         observed = bool(self._pressures.size)
         values = scenario.values(candidates)
         pose = scenario.arm.pose
-        samples = len(scenario.command) // scenario.settings.steps
+        samples = len(scenario.command) // scenario.stepping.steps
         balance = _balance(arm, values, pose, n)
         plugin, states = chain.start(candidates, pose, balance, scenario.pressure)
         before = np.zeros((plugin.past, len(chain.columns)))
@@ -168,11 +183,11 @@ class Simulation:
         taken = chain.taken(candidates, scenario.prescribed)
         openings = [np.empty((0, 0))] * n
         # what the valves do is seen in their states alone
-        if self._quasi_static and not observed:
+        if self._at_once and not observed:
             openings = valve_openings(plugin, states, commands, run)
         gain = candidates.joints.gain[:, scenario.arm.columns[chain.pushed]]
 
-        def follow(arm: SteppedArm, some: Index) -> tuple[Array, Array | None]:
+        def follow(arm: SteppedArm, some: Index) -> tuple[Array, Oil | None]:
             row = some[0]
             start = np.tile(pose, arm.copies)
             arm.start(values, some, start)
@@ -186,11 +201,10 @@ class Simulation:
             history[0] = state
             course = Course(commands, torque, taken[row], openings[row])
             arm.roll(actuators, state, course, Trace(angle[1:], history[1:]))
-            chambers = None
+            oil = None
             if observed:
-                turned = angle[:, chain.columns]
-                chambers = pressures(actuators.coefficients, history, turned)
-            return angle.reshape(len(angle), arm.copies, -1), chambers
+                oil = _oil(actuators, history, angle[:, chain.columns])
+            return angle.reshape(len(angle), arm.copies, -1), oil
 
         return follow
 
@@ -205,9 +219,50 @@ class Simulation:
         served = np.searchsorted(pushed, servo.columns)
         if served.size:
             # without inertia a joint is put where the log has it
-            motion = servo.angle if self._quasi_static else servo.torque
+            motion = servo.angle if self._at_once else servo.torque
             torque[:, :, served] = motion[:, None]
         return torque.reshape(len(torque), -1)
+
+
+def make_scenario(
+    spec: mujoco.MjSpec, log: Log, outputs: list[int], settings: FitSettings
+) -> Scenario:
+    """Return a log made ready for the model of some settings, which says what moves,
+    from where and how; `outputs` are the joints whose angles are wanted, 0-based."""
+    payload = settings.payload_of(log.source)
+    if payload:
+        spec = add_payload(spec, settings.arm, payload)
+    return Scenario(
+        spec, settings.arm, log, outputs, settings.simulation, settings.stepping
+    )
+
+
+def make_simulation(
+    spec: mujoco.MjSpec,
+    log: Log,
+    outputs: list[int],
+    settings: FitSettings,
+    pressures: Sequence[int] = (),
+) -> Simulation:
+    """Return the simulation of one log by the model of some settings.
+
+    Its response has the angles of the joints `outputs` and the chamber pressures of
+    `pressures`, 0-based.
+    """
+    return Simulation(make_scenario(spec, log, outputs, settings), pressures)
+
+
+def _oil(actuators: Plugin, history: Structs, angle: Array) -> Oil:
+    """Return what the oil of a candidate does in its states, (1 + T, J) of JOINT_STATE,
+    at angles [rad], (1 + T, J)."""
+    coefficients = actuators.coefficients
+    flow = np.stack([history["a"]["flow"], history["b"]["flow"]], axis=-1)
+    # the last in order is driven, and has the pump of all
+    last = actuators.order[-1]
+    line = history["line"][:, last].copy()
+    if np.isinf(coefficients["pump_flow"][last]):
+        line[:] = np.nan
+    return Oil(pressures(coefficients, history, angle), flow, line)
 
 
 def _balance(arm: SteppedArm, values: dict[str, Array], pose: Array, n: int) -> Array:

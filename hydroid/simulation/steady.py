@@ -31,10 +31,17 @@ from numba import njit
 from hydroid.arrays import Array
 from hydroid.hydraulics.cylinder import rod_way, weigh
 from hydroid.hydraulics.elementwise import compilable
-from hydroid.hydraulics.joint import open_share, opened
+from hydroid.hydraulics.joint import open_share
 from hydroid.hydraulics.kernel import make_pad, source_key
 from hydroid.hydraulics.oil import volume
-from hydroid.hydraulics.pump import delivery, line_pressure, lowest
+from hydroid.hydraulics.pump import (
+    centre_left,
+    delivery,
+    left_open,
+    line_pressure,
+    lowest,
+    past_valves,
+)
 from hydroid.hydraulics.records import LINEAR, Records, coefficients, has_force_curve
 from hydroid.hydraulics.seals import LEAST_LEVER, friction_damping, joint_friction
 from hydroid.hydraulics.solenoid import (
@@ -90,8 +97,8 @@ def steady_opening(command: float, c) -> float:
     B."""
     travel = steady_stroke(command, c.a, c) - steady_stroke(-command, c.b, c)
     if travel > 0.0:
-        return opened(c, open_share(c.a, travel))
-    return opened(c, -open_share(c.b, -travel))
+        return c.a.opening * open_share(c.a, travel)
+    return -c.b.opening * open_share(c.b, -travel)
 
 
 @compilable
@@ -223,8 +230,10 @@ def fed_speed(c, w, takes) -> Any:
     high = c.relief
     pressure = c.relief
     # what is drawn rises with the line's pressure, and what is given falls
+    centre = left_open(1.0, c, w.travel)
     for _ in range(HALVINGS):
         _, drawn = balanced_speed(min(pressure, c.supply_pressure), c, w, takes)
+        drawn += past_valves(pressure, centre, c)[0]
         if drawn > delivery(pressure, 1.0, c)[0]:
             high = pressure
         elif pressure == c.relief:
@@ -274,6 +283,7 @@ def _quasi_static_speed(coefficients, driven, pad) -> float:
     if c.pump_flow < np.inf:
         # where the search for the line's pressure begins
         line.pressure = c.relief
+        line.centre = centre_left(coefficients, driven, pad.joints)
         shared = line_pressure(coefficients, driven, pad.joints, line, 1.0)
         supply = min(supply, shared)
     speed = rod_speed(c, w, supply)[0]

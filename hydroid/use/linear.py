@@ -346,7 +346,7 @@ class _Oil(NamedTuple):
 
 def _oil(plant: Plant, joint: int, command: Array) -> _Oil | None:
     """Return how a joint (0-based) rings on its oil; None where it has none."""
-    if not plant.quasi_static:
+    if not plant.rung.at_once:
         stiffness = _oil_stiffness(plant, joint)
         inertia = _inertia(plant, joint)
         yielding = _yielding(plant, joint, command)

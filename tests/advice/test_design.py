@@ -8,7 +8,7 @@ from made_logs import TRUTH, simulate_log
 from two_joints import PARAMETERS, TRUTH as OIL, two_joints
 
 from hydroid import load_settings
-from hydroid.advice.design import Design, design, forecast, measured, typical
+from hydroid.advice.design import Design, design, forecast, information, typical
 from hydroid.advice.experiment import violation
 from hydroid.arm.model import CollisionChecker, load_machine
 from hydroid.errors import SettingsError
@@ -145,14 +145,14 @@ def test_the_information_of_least_squares_has_the_closed_form():
     rows = np.random.default_rng(0).normal(size=(3, samples))
     for drift in 0.0, 0.5:
         settings = DesignSettings(noise_deg=0.1, drift_deg=drift)
-        gained = measured(settings, [rows], period)
+        gained = information(settings, [rows], period)
         at = np.arange(samples)
         grown = np.radians(drift) ** 2 / 10.0 * period * np.minimum(at[:, None], at)
         covariance = np.radians(0.1) ** 2 * np.eye(samples) + grown
-        information = rows @ np.linalg.solve(covariance, rows.T)
-        np.testing.assert_allclose(gained.T @ gained, information, rtol=1e-6)
+        expected = rows @ np.linalg.solve(covariance, rows.T)
+        np.testing.assert_allclose(gained.T @ gained, expected, rtol=1e-6)
     rows[2] = 0.0  # what a signal does not depend on stays unknown, and hides nothing
-    gained = measured(settings, [rows], period)
+    gained = information(settings, [rows], period)
     assert np.linalg.norm(gained[:, 2]) < 1e-3 * np.linalg.norm(gained[:, 0])
 
 

@@ -45,7 +45,7 @@ def read(**changes: object) -> tuple[Log, FitSettings]:
 
 def test_an_unmeasured_joint_is_unmeasured_and_starts_in_the_start_pose() -> None:
     log, fit = read(**UNMEASURED)
-    assert log.measured.tolist() == [joint != 3 for joint in range(1, 8)]
+    assert log.has_angle.tolist() == [joint != 3 for joint in range(1, 8)]
     assert np.isnan(log.angle[:, 2]).all()
     assert log.start[2] == fit.arm.pose("study")[2]
     np.testing.assert_array_equal(log.posed[:, 2], fit.arm.pose("study")[2])
@@ -96,7 +96,7 @@ def test_a_simulation_from_a_named_pose_starts_there_and_writes_all_angles(
     log = simulate(
         RIG / "rig_shoulder_1.csv", fit=truth, pose="study", out=tmp_path / "log.csv"
     ).log
-    assert log.measured.all()
+    assert log.has_angle.all()
     np.testing.assert_allclose(
         log.start, load_settings("fit-hyd").arm.pose("study"), atol=1e-3
     )

@@ -243,7 +243,7 @@ def test_a_log_that_diverges_is_named_and_judged_with_the_others(
 
     monkeypatch.setattr(validation, "predict", lost)
     monkeypatch.setattr(
-        validation, "predict_with_pressures", lambda *given: (lost(*given), None)
+        validation, "predict_with_oil", lambda *given: (lost(*given), None)
     )
     done = hydroid_cli(
         "validate", "good.csv", "lost.csv", "--fit=run", "--out=val", "--json"

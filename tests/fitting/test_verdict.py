@@ -223,7 +223,8 @@ def test_what_nine_numbers_fit_better_is_named_and_what_bands_miss():
     )
     assert finding.subjects == ("shoulder",)
     (line,) = outside([verdict(1, 1).changed({"inside_percent": 7.0})])
-    assert line == "The 95 % bands hold only 7 % of the shoulder's unseen samples."
+    said = "they hold only 7 % of the shoulder's unseen samples."
+    assert line == f"The 95 % bands are too narrow: {said}"
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,8 @@ import robots
 import trimesh
 from printed import follow
 from robots import LIMIT
-from worlds import World, write_log
+from truths import judged
+from worlds import SECONDS, World, speeds_of, write_log
 
 import hydroid
 from hydroid.arm.model import load_model
@@ -825,7 +826,7 @@ def followed(arm: FieldArm, folder: Path, budget: str) -> Outcome:
     """Write an arm that is taken as it should be and two logs of it, and follow the
     commands that `init` prints: check, a fit of a budget, and validation on the second.
 
-    Right: the fit predicts the second log.
+    Right: the fit predicts the second log and has the joints' speeds.
     """
     found = outcome(arm, folder)
     if found.verdict not in ("right", "said"):
@@ -841,14 +842,16 @@ def followed(arm: FieldArm, folder: Path, budget: str) -> Outcome:
         columns[name] = (f"{name}_cmd_V", f"{name}_{unit}")
         parts.append((name, "", name, "", (0.0, 0.0, 0.0), "{} {}".format(*ends)))
     world = World(names, parts, columns)
-    write_log(world, folder / "log.csv", 60.0, 1)
-    write_log(world, folder / "other.csv", 60.0, 2)
+    write_log(world, folder / "log.csv", SECONDS, 1)
+    write_log(world, folder / "other.csv", SECONDS, 2)
     words = ["followed", "--log", "log.csv"]
     for option, value in arm.options.items():
         words += [f"--{option}", str(value)]
     for robot in (*folder.glob("arm.urdf"), *folder.glob("arm.xml")):
         words += ["--arm", robot.name]
     ended = follow(folder, words, "other.csv", budget)
+    speeds = dict(zip(taken.joint_names, speeds_of(world).values(), strict=True))
+    ended = judged(ended, speeds)
     return Outcome(ended.verdict, ended.line)
 
 

@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from printed import follow
+from printed import Known, follow
+from truths import Speed, judged
 
 import hydroid
 from hydroid.errors import HydroidError
@@ -53,8 +54,12 @@ class FieldLog:
     steps: tuple[float, ...] = (70, -60, 100, -100, 45, -80)
 
 
-def make_truth(steps: tuple[float, ...]) -> Truth:
-    """Rest, then steps of both joints in turn, of 2 s with 1 s of rest between."""
+def make_truth(steps: tuple[float, ...], arm: Arm | None = None) -> Truth:
+    """Rest, then steps of both joints in turn, of 2 s with 1 s of rest between.
+
+    With an arm its cylinders have the speeds, which turn the joints by their pins; in
+    the middle of the ranges the joints' speeds are the same.
+    """
     commands = {name: [np.zeros(100)] for name in JOINTS}
     for k, step in enumerate(steps * 2):
         driven = JOINTS[k // len(steps)]
@@ -64,17 +69,35 @@ def make_truth(steps: tuple[float, ...]) -> Truth:
                 np.zeros(50),
             ]
     command = {name: np.concatenate(parts) for name, parts in commands.items()}
-    angle = {name: _moved(command[name], name) for name in JOINTS}
+    angle = {name: _moved(command[name], name, arm) for name in JOINTS}
     return Truth(PERIOD * np.arange(len(command["boom"])), command, angle)
 
 
-def _moved(command: np.ndarray, name: str) -> np.ndarray:
+def settled(name: str, command: float) -> float:
+    """Return the speed of a joint [deg/s] that a command [%] settles at."""
+    return float(SPEEDS[name] * np.sign(command) * max(abs(command) - DEAD, 0.0))
+
+
+def lever(name: str, arm: Arm | None, angles: np.ndarray) -> np.ndarray:
+    """Return how much farther a joint's cylinder moves per angle than in the middle of
+    the joint's range, at angles [deg]."""
+    if arm is None:
+        return np.ones(len(angles))
+    cylinder = arm.joints[JOINTS.index(name)].actuator
+    assert isinstance(cylinder, LinearActuator)
+    middle = cylinder.moment_arm(np.radians([np.mean(RANGES[name])]))
+    return cylinder.moment_arm(np.radians(angles)) / middle
+
+
+def _moved(command: np.ndarray, name: str, arm: Arm | None) -> np.ndarray:
     low, high = RANGES[name]
+    grid = np.linspace(low, high, 200)
+    levers = lever(name, arm, grid)
     angle, speed, angles = (low + high) / 2, 0.0, list[float]()
     for u in command:
-        wanted = SPEEDS[name] * np.sign(u) * max(abs(u) - DEAD, 0.0)
-        speed += (wanted - speed) * PERIOD / 0.1
-        angle = float(np.clip(angle + speed * PERIOD, low + 1, high - 1))
+        speed += (settled(name, u) - speed) * PERIOD / 0.1
+        step = PERIOD * speed / np.interp(angle, grid, levers)
+        angle = float(np.clip(angle + step, low, high))
         angles.append(angle)
     return np.array(angles)
 
@@ -310,7 +333,7 @@ class Outcome:
 
 def outcome(log: FieldLog, folder: Path, arm: Arm) -> Outcome:
     """Write a log, give it to `init`, and compare what is read then with the truth."""
-    truth, path = make_truth(log.steps), folder / "log.csv"
+    truth, path = make_truth(log.steps, arm), folder / "log.csv"
     path.write_text(log.write(truth, arm))
     try:
         result = hydroid.init(folder / "mine", log=path)
@@ -338,19 +361,41 @@ def outcome(log: FieldLog, folder: Path, arm: Arm) -> Outcome:
     return Outcome("right" if is_right(parts, truth, log.lost) else "wrong")
 
 
-def followed(log: FieldLog, folder: Path, arm: Arm, budget: str) -> Outcome:
+def followed(
+    log: FieldLog, folder: Path, arm: Arm, budget: str, known: Known | None = None
+) -> Outcome:
     """Write two logs, and follow the commands that `init` prints for the first,
     validated on the second.
 
-    Right: it is read rightly, and the fit predicts the second.
+    Right: it is read rightly, and the fit predicts the second and has the joints'
+    speeds. Many logs hold the same once they are read: what is `known` is not fitted
+    again.
     """
     read = outcome(log, folder, arm)
     if read.verdict != "right":
         return read
     other = replace(log, steps=tuple(-step for step in log.steps[::-1]))
-    (folder / "other.csv").write_text(other.write(make_truth(other.steps), arm))
-    found = follow(folder, ["followed", "--log", "log.csv"], "other.csv", budget)
+    (folder / "other.csv").write_text(other.write(make_truth(other.steps, arm), arm))
+    words = ["followed", "--log", "log.csv"]
+    found = follow(folder, words, "other.csv", budget, known)
+    speeds = _speeds(make_truth(log.steps, arm), arm)
+    found = judged(found, speeds)
     return Outcome(found.verdict, found.line)
+
+
+def _speeds(truth: Truth, arm: Arm) -> dict[str, Speed]:
+    """Return the speeds of the joints [deg/s] by commands [%], in the middle of the
+    travel that the log shows."""
+    speeds = dict[str, Speed]()
+    for name, angles in truth.angle.items():
+        middle = (angles.min() + angles.max()) / 2
+        (farther,) = lever(name, arm, np.array([middle]))
+
+        def speed(u: float, name: str = name, farther: float = farther) -> float:
+            return settled(name, u) / farther
+
+        speeds[name] = speed
+    return speeds
 
 
 def is_right(parts: list[Log], truth: Truth, lost: float) -> bool:

@@ -6,6 +6,7 @@ from observation import Observation, trace
 
 from hydroid.arm.model import load_model
 from hydroid.hydraulics.records import Records, nominal_joints
+from hydroid.rungs import DYNAMIC
 from hydroid.settings.arm import Arm
 from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.problem import SimulationSettings
@@ -29,16 +30,17 @@ class DrivenArm:
         pose = arm.pose("study")
         log = at_rest(pose, np.concatenate([command, np.zeros((1, command.shape[1]))]))
         chosen = SimulationSettings(steps_per_sample=steps)
-        scenario = Scenario(load_model(arm), arm, log, list(range(len(pose))), chosen)
-        self._scenario, self._substeps = scenario, settings.substeps
+        stepping = DYNAMIC.stepping(steps, settings.substeps)
+        joints_of = list(range(len(pose)))
+        self._scenario = Scenario(
+            load_model(arm), arm, log, joints_of, chosen, stepping
+        )
         self._candidates = Candidates(joints, np.tile(arm.masses, (len(joints), 1)))
 
     def run(self) -> np.ndarray:
         """Angles [rad], (n, T + 1, J); NaN of a candidate that diverged."""
-        return (
-            Simulation(self._scenario, self._substeps).simulate(self._candidates).angle
-        )
+        return Simulation(self._scenario).simulate(self._candidates).angle
 
     def trace(self) -> Observation:
         """What the actuators of the only candidate did, (T + 1, J)."""
-        return trace(self._scenario, self._substeps, self._candidates)
+        return trace(self._scenario, self._candidates)

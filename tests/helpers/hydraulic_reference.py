@@ -267,7 +267,9 @@ def reference(
             if pump < inf:
                 left = v["supply_pressure"] - ps
                 given = (
-                    pump * min(1.0, max(left, 0.0) / v["pump_droop"])
+                    pump
+                    * min(1.0, max(left, 0.0) / v["pump_droop"])
+                    ** (1.0 / v["pump_exponent"])
                     if v["pump_droop"] > 0
                     else pump
                 )
@@ -275,6 +277,9 @@ def reference(
                 if left > v["pump_limit"]:
                     # whatever is taken at 0.01 bar below
                     given += 10 * pump * (left - v["pump_limit"]) / 1e3
+                closed = min((ahead + back) / v[f"opening_{side}"], 1.0)
+                full = max(ps, 0.0) / v["supply_pressure"]
+                given -= v["pump_bypass"] * pump * (1.0 - closed) * sqrt(full)
                 rise = (given - relieved - in_a - in_b) / v["line_volume"]
             speed = r * w
             force = v["area_a"] * pa - v["area_b"] * pb

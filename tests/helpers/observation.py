@@ -9,8 +9,7 @@ from hydroid.hydraulics.actuator import pressures
 from hydroid.hydraulics.records import JOINT_STATE, Records
 from hydroid.mjcf import quiet_mujoco
 from hydroid.simulation import Candidates
-from hydroid.simulation.quasi_static import roll_quasi_static
-from hydroid.simulation.rollout import Course, SteppedArm, Trace, roll
+from hydroid.simulation.rollout import Course, Trace
 from hydroid.simulation.scenario import Chain, Scenario
 
 
@@ -42,19 +41,13 @@ def observe(coefficients: Structs, state: Structs, angle: Array) -> Observation:
     return Observation(pressure, flow, z.a.stroke - z.b.stroke, force, z.line.copy())
 
 
-def trace(scenario: Scenario, substeps: int, candidates: Candidates) -> Observation:
+def trace(scenario: Scenario, candidates: Candidates) -> Observation:
     """Simulate one candidate; what its actuators did at T samples, shape (T, J) or (T,
     J, 2)."""
-    chain = Chain(
-        scenario.machine,
-        scenario.arm,
-        scenario.active,
-        substeps,
-        scenario.prescribed.columns,
-    )
-    steps, pose = scenario.settings.steps, scenario.arm.pose
-    rollout = roll if scenario.settings.model == "dynamic" else roll_quasi_static
-    arm = SteppedArm(scenario.arm.model, chain.columns, steps, rollout)
+    stepping, pose = scenario.stepping, scenario.arm.pose
+    steps = stepping.steps
+    chain = Chain(scenario.machine, scenario.arm, scenario.roles, stepping)
+    arm = chain.stepped(scenario.arm.model, steps)
     with quiet_mujoco():
         balance = arm.start(scenario.values(candidates), [0], pose)
         plugin, states = chain.start(candidates, pose, balance[None], scenario.pressure)

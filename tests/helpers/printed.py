@@ -2,17 +2,21 @@
 in a folder."""
 
 import contextlib
+import hashlib
 import io
 import json
 import math
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import typer
+import yaml
 
+import hydroid
 from hydroid.commands.app import app
 from hydroid.errors import HydroidError
 from hydroid.joint_verdict import Verdict
@@ -35,12 +39,16 @@ class Followed:
         lines: all that was printed.
         errors: unseen error and that of standing still [deg], by joint.
         blamed: joints whose verdict is that the fit fails.
+        wrong: how joints move otherwise than what made the logs, by joint.
+        run: folder of the fit.
     """
 
     refused: str
     lines: list[str]
     errors: dict[str, tuple[float, float]]
     blamed: tuple[str, ...] = ()
+    wrong: Mapping[str, str] = field(default_factory=dict[str, str])
+    run: Path | None = None
 
     @property
     def verdict(self) -> str:
@@ -48,39 +56,55 @@ class Followed:
         wrong."""
         if self.refused:
             return "refused"
-        missed = {
-            name
-            for name, (unseen, still) in self.errors.items()
-            if not unseen <= PREDICTED * still
-        }
+        missed = {*self.wrong}
+        for name, (unseen, still) in self.errors.items():
+            if not unseen <= PREDICTED * still:
+                missed.add(name)
         if not missed and self.errors:
             return "right"
         return "named" if missed and missed <= {*self.blamed} else "wrong"
 
     @property
     def line(self) -> str:
-        """Why it was refused, or the errors, and those of standing still in
-        brackets."""
-        pairs = [
-            f"{name} {unseen:.2g} ({still:.2g})"
-            for name, (unseen, still) in self.errors.items()
-        ]
-        return self.refused or ", ".join(pairs)
+        """Why it was refused; or what is wrong, and the errors with those of standing
+        still in brackets."""
+        if self.refused:
+            return self.refused
+        parts = [f"{name} {fault}" for name, fault in self.wrong.items()]
+        for name, (unseen, still) in self.errors.items():
+            parts.append(f"{name} {unseen:.2g} ({still:.2g})")
+        return ", ".join(parts)
 
 
-def follow(folder: Path, init: Sequence[str], unseen: str, budget: str) -> Followed:
+Known = dict[bytes, Followed]
+"""what became of fits, by what they were fitted to and tested on"""
+
+
+def follow(
+    folder: Path,
+    init: Sequence[str],
+    unseen: str,
+    budget: str,
+    known: Known | None = None,
+) -> Followed:
     """Run `hydroid init` in a folder, and then the commands that it prints, validated
     on an unseen log.
 
-    The fit has a budget, as `init` proposes: it ends at its best model so far.
+    The fit has a budget, as `init` proposes: it ends at its best model so far. What is
+    `known` is not fitted again, and what is found is added.
     """
     lines, errors, blamed = list[str](), dict[str, tuple[float, float]](), list[str]()
+    run, key = folder, b""
     with contextlib.chdir(folder):
         try:
             lines += _run(["init", *init])
             for arguments in [*_printed(lines)]:
                 command = [unseen if word == OTHER else word for word in arguments]
                 if command[0] == "fit-hyd":
+                    run = Path(command[command.index("--out") + 1]).absolute()
+                    key = _content(run.parents[1], [command[1], unseen])
+                    if known and key in known:
+                        return known[key]
                     command += ["--budget", budget, "--quiet"]
                 if command[0] == "validate":
                     command.append("--json")
@@ -95,7 +119,25 @@ def follow(folder: Path, init: Sequence[str], unseen: str, budget: str) -> Follo
                     lines += printed
         except HydroidError as error:
             return Followed(str(error), lines, errors)
-    return Followed("", lines, errors, tuple(blamed))
+    found = Followed("", lines, errors, tuple(blamed), run=run)
+    if known is not None:
+        known[key] = found
+    return found
+
+
+def _content(project: Path, logs: Sequence[str]) -> bytes:
+    """Return a hash of what a fit depends on: logs as they are read, to 0.1 % of a
+    command and 0.001 deg, the arm, and all settings but the columns."""
+    settings = yaml.safe_load((project / "fit.yaml").read_text())
+    del settings["log"]
+    digest = hashlib.sha256(json.dumps(settings).encode())
+    for file in (project / "arm.xml", project / "arm.yaml"):
+        digest.update(file.read_bytes())
+    read = hydroid.read_logs([*logs], hydroid.load_settings(project / "fit.yaml"))
+    for log in read:
+        digest.update(np.rint(log.command / 0.1).tobytes())
+        digest.update(np.rint(np.degrees(log.angle) / 0.001).tobytes())
+    return digest.digest()
 
 
 def _printed(lines: Sequence[str]) -> Iterator[list[str]]:

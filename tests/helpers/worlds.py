@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import trimesh
 from arms import MODELS
-from printed import follow
+from printed import Known, follow
 from robots import LIMIT, body, joint
+from truths import Speed, judged
 
 Joint = tuple[str, str, str, str, tuple[float, float, float], str]
 """joint, parent, child, kind, place on the parent [m], and limits"""
@@ -216,6 +217,74 @@ WORLDS = {
 
 NOISE_DEG, NOISE_M = 0.05, 0.001
 """of the angles and places in a log"""
+STEP = 0.005
+"""of the machine's simulation [s]"""
+SECONDS = 40.0
+"""duration of a log that is followed"""
+
+
+@dataclass(frozen=True)
+class Valves:
+    """How the joints of a world follow their commands, in the order of its columns.
+
+    Attributes:
+        limits: from where to where each can go [rad, m], shape (J, 2).
+        dead: bands [%], of commands above and below 0, shape (J, 2), as the next two.
+        exponent: of the command beyond.
+        full: speeds [rad/s, m/s].
+        delay: before the valve [s], shape (J,).
+        lag: behind it [s], shape (J,).
+    """
+
+    limits: np.ndarray
+    dead: np.ndarray
+    exponent: np.ndarray
+    full: np.ndarray
+    delay: np.ndarray
+    lag: np.ndarray
+
+    def speed(self, u: np.ndarray) -> np.ndarray:
+        """Return the speeds that commands [%], shape (J,), settle at [rad/s, m/s]."""
+        each = np.arange(len(u))
+        side = (u < 0).astype(int)
+        dead = self.dead[each, side]
+        beyond = np.maximum(np.abs(u) - dead, 0) / (100 - dead)
+        return np.sign(u) * beyond ** self.exponent[each, side] * self.full[each, side]
+
+
+def valves_of(world: World) -> Valves:
+    """Return the valves of a world's machine."""
+    rng = np.random.default_rng(3)
+    given = {name: limits or "-1 1" for name, *_, limits in world.parts}
+    limits = np.array([[*map(float, given[name].split())] for name in world.columns])
+    both = limits.shape
+    return Valves(
+        limits,
+        dead=rng.uniform(5, 35, both),
+        exponent=rng.uniform(1, 2.2, both),
+        full=np.ptp(limits, axis=1)[:, None] / rng.uniform(5, 12, both),
+        delay=STEP * np.round(rng.uniform(0.05, 0.3, both[0]) / STEP),
+        lag=rng.uniform(0.03, 0.2, both[0]),
+    )
+
+
+def speeds_of(world: World) -> dict[str, Speed]:
+    """Return the speeds that commands [%] of the joints settle at [deg/s, mm/s]."""
+    valves = valves_of(world)
+    speeds = dict[str, Speed]()
+    for number, name in enumerate(world.columns):
+        slides = world.columns[name][1].endswith("_m")
+
+        def speed(
+            u: float,
+            number: int = number,
+            factor: float = 1e3 if slides else 180 / np.pi,
+        ) -> float:
+            every = np.full(len(valves.lag), u)
+            return float(factor * valves.speed(every)[number])
+
+        speeds[name] = speed
+    return speeds
 
 
 def write_log(world: World, path: Path, seconds: float = 30.0, number: int = 0) -> Path:
@@ -226,40 +295,28 @@ def write_log(world: World, path: Path, seconds: float = 30.0, number: int = 0) 
     full speed in each direction, a lag behind the valve, a delay, and no load that
     slows it. `number` is that of the log.
     """
-    machine, drive = np.random.default_rng(3), np.random.default_rng([3, number])
-    joints, step, every = list(world.columns), 0.005, 4
-    limits = {name: limits for name, *_, limits in world.parts}
-    low, high = np.array(
-        [[float(end) for end in (limits[joint] or "-1 1").split()] for joint in joints]
-    ).T
-    both = len(joints), 2
-    dead, exponent = machine.uniform(5, 35, both), machine.uniform(1, 2.2, both)
-    full = (high - low)[:, None] / machine.uniform(5, 12, both)
-    late = np.round(machine.uniform(0.05, 0.3, both[0]) / step).astype(int)
-    lag = machine.uniform(0.03, 0.2, both[0])
-    steps, each = round(seconds / step), np.arange(both[0])
-    command, place = np.zeros((steps, both[0])), np.empty((steps, both[0]))
-    now = low + (high - low) * drive.uniform(0.3, 0.7, both[0])
-    opening, until = np.zeros(both[0]), np.ones(both[0])
+    valves = valves_of(world)
+    drive = np.random.default_rng([3, number])
+    low, high = valves.limits.T
+    late = np.round(valves.delay / STEP).astype(int)
+    joints, every = len(low), 4
+    steps, each = round(seconds / STEP), np.arange(joints)
+    command, place = np.zeros((steps, joints)), np.empty((steps, joints))
+    now = low + (high - low) * drive.uniform(0.3, 0.7, joints)
+    speed, until = np.zeros(joints), np.ones(joints)
     for k in range(steps):
         command[k] = command[k - 1]
         # a sample shows each change
-        for j in np.flatnonzero(until <= k * step) if k % every == 0 else ():
+        for j in np.flatnonzero(until <= k * STEP) if k % every == 0 else ():
             until[j] += drive.uniform(0.5, 3)
             part = (now[j] - low[j]) / (high[j] - low[j])
             way = -1 if part > 0.7 else 1 if part < 0.3 else drive.choice([-1, 1])
             command[k, j] = way * drive.uniform(40, 100) * (drive.random() < 0.7)
         u = command[k - late, each] * (k >= late)
-        side = (u < 0).astype(int)
-        beyond = np.maximum(np.abs(u) - dead[each, side], 0) / (100 - dead[each, side])
-        opening += (
-            step
-            / lag
-            * (np.sign(u) * beyond ** exponent[each, side] * full[each, side] - opening)
-        )
-        now = np.clip(now + step * opening, low, high)
+        speed += STEP / valves.lag * (valves.speed(u) - speed)
+        now = np.clip(now + STEP * speed, low, high)
         place[k] = now
-    columns = {"time_s": np.arange(0, seconds, every * step)[: len(place[::every])]}
+    columns = {"time_s": np.arange(0, seconds, every * STEP)[: len(place[::every])]}
     names = world.columns.values()
     columns |= {
         c: u / 10 if "V" in c else u
@@ -284,17 +341,19 @@ def write_log(world: World, path: Path, seconds: float = 30.0, number: int = 0) 
     return path
 
 
-def followed(world: World, folder: Path, budget: str) -> tuple[str, str]:
+def followed(
+    world: World, folder: Path, budget: str, known: Known | None = None
+) -> tuple[str, str]:
     """Write an arm and two logs, and follow the commands that `init` prints, validated
     on the second log.
 
     Returns the outcome, and unseen errors (and those of standing still) [deg], or why
-    it was refused.
+    it was refused. What is `known` is not fitted again.
     """
     robot = world.write(world, folder)
-    write_log(world, folder / "log.csv", 60.0, 1)
-    write_log(world, folder / "other.csv", 60.0, 2)
-    found = follow(
-        folder, ["mine", "--arm", robot.name, "--log", "log.csv"], "other.csv", budget
-    )
+    write_log(world, folder / "log.csv", SECONDS, 1)
+    write_log(world, folder / "other.csv", SECONDS, 2)
+    words = ["mine", "--arm", robot.name, "--log", "log.csv"]
+    found = follow(folder, words, "other.csv", budget, known)
+    found = judged(found, speeds_of(world))
     return found.verdict, found.line

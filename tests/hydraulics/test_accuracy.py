@@ -60,6 +60,8 @@ def test_pressures_follow_the_reference_and_refinement_is_first_order_or_better(
         {"pump_flow": 1.0, "line_volume": 50.0},
         {"pump_flow": 2.0, "pump_droop": 60.0},
         {"pump_flow": 1.0, "pump_droop": 60.0, "pump_limit": 25.0},
+        {"pump_flow": 1.0, "pump_droop": 60.0, "pump_exponent": 2.5},
+        {"pump_flow": 2.0, "pump_droop": 60.0, "pump_bypass": 1.0},
     ],
 )
 def test_optional_physics_agrees_too(optional: dict[str, float]):

@@ -34,6 +34,11 @@ CASES = {
         {"pilot_lag": (0.005, 1, 0.15, 0.05), "delay": (0, 0.5, 0.05, 0.1)}, {"dead_band": 20.0}
     ),
     "lag of the opening": Case({"opening_lag": (0.005, 1, 0.12, 0.04), "delay": (0, 0.5, 0.05, 0.1)}),
+    "whether valve or speed lags": Case(
+        {"lag_of_speed": (0, 1, 0.7, 0.2), "opening_lag": (0.005, 1, 0.12, 0.1),
+         "opening_a": (0.05, 2, 0.4, 0.3), "opening_b": (0.05, 2, 0.15, 0.2)},
+        NOTHING, ({2: [70, -70, 90, -90, 60, -80]},),
+    ),
     "lever of a rotary actuator": Case(
         {"lever_slope": (-0.8, 0.8, 0.2, 0.0), "lever_bend": (-0.8, 0.8, -0.3, 0.0)},
         NOTHING, ({ROTARY: [90, 90, -90, -90, -90, 60, -80, 90]},),

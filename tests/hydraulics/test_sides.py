@@ -51,6 +51,17 @@ def test_a_lagging_valve_turns_round_when_its_spool_does(arm: Arm):
     assert turned[0] == pytest.approx(100 + 0.3 * np.log(2) / 0.01, abs=4)
 
 
+def test_a_lagging_speed_turns_round_where_both_speeds_are_out(arm: Arm):
+    """In a time constant T, a speed V to one side has fallen to V/e; the reversal to a
+    speed W takes T ln(1 + V/W)."""
+    command = np.repeat([100.0, -100.0], 100)
+    for opening_b in (0.1, 0.4):
+        values = {"opening_lag": 0.3, "opening_a": 0.4, "opening_b": opening_b}
+        turned = int(np.argmax(wheel(arm, values | {"lag_of_speed": 1.0}, command)))
+        reversal = 0.3 * np.log(1.0 + 0.4 / opening_b)
+        assert turned == pytest.approx(100 + reversal / 0.01, abs=4)
+
+
 @pytest.mark.parametrize(
     "name", ["delay", "plunger_damping", "opening_exponent", "slot_width", "overlap"]
 )

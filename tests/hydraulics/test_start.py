@@ -11,8 +11,8 @@ from recovery import STOPPED, settings_of
 
 from hydroid.arm.model import load_model
 from hydroid.problem.bindings import Bindings
-from hydroid.problem.problem import make_simulation
 from hydroid.settings.hydraulics import HydraulicSettings
+from hydroid.simulation import make_simulation
 
 TIGHT = HydraulicSettings(leakage=0.0, substeps=10)
 TRAPPED = {

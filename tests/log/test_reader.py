@@ -38,7 +38,7 @@ def test_a_shipped_log_reads_fast_and_without_a_finding(name: str) -> None:
     )
     np.testing.assert_allclose(log.time, raw[:, 0], atol=1e-12)
     assert (log.driven == raw[:, 1:8].any(axis=0)).all()
-    assert log.measured.all()
+    assert log.has_angle.all()
 
 
 def cell(row: int, column: int, text: str):
@@ -218,7 +218,7 @@ def test_a_joint_is_undriven_or_unmeasured_only_if_the_config_says_so(
     log, findings = read(path, LogSettings.model_validate(mapping))
     assert findings == []
     assert log.driven.tolist() == [True, False]
-    assert log.measured.tolist() == [False, True]
+    assert log.has_angle.tolist() == [False, True]
     with pytest.raises(LogError, match="output joint 1 has no angle column"):
         read(path, LogSettings.model_validate(mapping), outputs=[1])
     log, _ = read(
@@ -226,7 +226,7 @@ def test_a_joint_is_undriven_or_unmeasured_only_if_the_config_says_so(
         outputs=None,
     )
     assert log.driven.all()
-    assert not log.measured.any()
+    assert not log.has_angle.any()
 
 
 @pytest.mark.parametrize("unused", [0, 5])
@@ -261,7 +261,7 @@ def test_a_joint_that_is_not_compared_may_be_absent(tmp_path: Path) -> None:
     )
     log, (note,) = read(path, outputs=[1])
     assert (note.level, note.what) == ("note", "has no column of joint 2")
-    assert log.driven.tolist() == log.measured.tolist() == [True, False]
+    assert log.driven.tolist() == log.has_angle.tolist() == [True, False]
     (fault,) = faults(path, outputs=[2])
     assert "'u2_pct' (command of joint 2)" in fault.what
     named = LogSettings.model_validate({"joints": {2: {"angle": {"unit": "rad"}}}})

@@ -78,4 +78,4 @@ def test_nothing_is_lost_silently(tmp_path: Path) -> None:
         write_log(path, unmeasured, LogSettings())
     assert list(tmp_path.iterdir()) == []
     write_log(path, unmeasured, LogSettings(angle=None))
-    assert not read(path, LogSettings(angle=None), RANGES)[0].measured.any()
+    assert not read(path, LogSettings(angle=None), RANGES)[0].has_angle.any()

@@ -18,9 +18,8 @@ from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
 from hydroid.plant import Plant, load_plant
 from hydroid.problem.bindings import Bindings
-from hydroid.problem.problem import make_simulation
 from hydroid.settings.fit import FitSettings
-from hydroid.simulation import Response
+from hydroid.simulation import Response, make_simulation
 
 VALUES = (
     TRUTH

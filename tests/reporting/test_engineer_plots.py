@@ -69,7 +69,7 @@ def test_speeds_have_a_tab_for_each_joint_with_what_was_measured():
     assert section is not None
     assert [tab.button for tab in section.tabs] == ["shoulder", "elbow"]
     assert section.answer == "fastest: shoulder 24 deg/s and elbow 24 deg/s"
-    chart = section.tabs[0].draw()
+    chart = section.tabs[0].make()
     labels = {mark.label for panel in chart.panels for mark in panel.marks}
     assert labels >= {"measured", "model, positive command", "model, negative command"}
     drawn(chart)
@@ -99,7 +99,7 @@ def test_step_and_frequency_response_stand_where_a_fit_states_them():
     section = step_section(SETTINGS, SUMMARY.changed({"curves": curves}))
     assert section is not None
     (tab,) = section.tabs
-    chart = tab.draw()
+    chart = tab.make()
     assert [(panel.log_x, panel.log_y) for panel in chart.panels] == [
         (False, False),
         (True, True),
@@ -117,7 +117,7 @@ def test_residuals_are_tested_of_each_joint_and_of_none_that_diverged():
     assert section is not None
     assert [tab.button for tab in section.tabs] == ["shoulder", "elbow"]
     assert [row[0] for row in section.tables["residuals"].rows] == ["shoulder", "elbow"]
-    drawn(section.tabs[0].draw())
+    drawn(section.tabs[0].make())
     lost = [
         replace(one, response=np.full_like(one.response, np.nan)) for one in predictions
     ]
@@ -177,9 +177,37 @@ def test_correlations_are_those_of_the_covariance_and_the_strongest_pair_is_name
     section = correlation_section(SETTINGS, SUMMARY.changed({"covariance": known}))
     assert section is not None
     assert section.answer.startswith("strongest: ")
-    drawn(section.plots[0].draw())
+    drawn(section.tabs[0].make())
     alone = known.changed({"parameters": ("K",), "root": ((1.0,),), "scale": (1.0,)})
     assert correlation_section(SETTINGS, SUMMARY.changed({"covariance": alone})) is None
+
+
+def test_too_many_parameters_for_one_map_have_one_for_each_joint():
+    """With those of other joints that they trade with."""
+    count = 42
+    names = tuple(f"p{i}" for i in range(count))
+    joints = [2 if i < 21 else 3 for i in range(count)]
+    rows = np.random.default_rng(1).normal(size=(2000, count))
+    rows[:, 30] = rows[:, 5] + 0.3 * rows[:, 30]
+    root = np.linalg.qr(rows, mode="r")
+    known = Covariance(
+        parameters=names,
+        scale=(1.0,) * count,
+        root=tuple(map(tuple, root.tolist())),
+        quantile=2.0,
+    )
+    stated = SETTINGS.parameters["K"]
+    parameters = {
+        name: stated.changed({"joints": (joint,)})
+        for name, joint in zip(names, joints, strict=True)
+    }
+    settings = SETTINGS.changed({"parameters": parameters})
+    section = correlation_section(settings, SUMMARY.changed({"covariance": known}))
+    assert section is not None
+    assert [tab.button for tab in section.tabs] == ["shoulder", "elbow"]
+    (panel,) = section.tabs[0].make().panels
+    assert set(panel.rows) == {*names[:21], "p30"}
+    drawn(section.tabs[0].make())
 
 
 def test_a_parameter_is_one_line_of_words_with_its_interval():
@@ -230,9 +258,9 @@ def test_a_profile_is_a_curve_with_the_line_that_ends_its_interval():
         section for section in page.sections if section.title == "Profiles"
     ).tabs
     assert tab.caption == "torque per command (K)"
-    rule, line, _ = tab.draw().panels[0].marks
+    rule, line, _ = tab.make().panels[0].marks
     assert rule.y == pytest.approx([1.96**2], rel=1e-3)
     assert np.array_equal(line.x, values)
-    drawn(tab.draw())
+    drawn(tab.make())
     bare = analysis_page(SETTINGS, SUMMARY, {})
     assert "Profiles" not in [section.title for section in bare.sections]

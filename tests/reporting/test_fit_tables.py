@@ -121,9 +121,8 @@ def test_how_sure_a_prediction_can_be_is_said_of_each_joint():
         problem.settings, summary.changed({"errors": {"q2": one, "q3": two}})
     )
     assert section is not None
-    assert (
-        "uncertain by 1.2 deg (shoulder) and 0.5 deg (elbow) after 10 s" in section.text
-    )
+    said = "standard deviation after 10 s: shoulder 1.2 deg and elbow 0.5 deg"
+    assert section.answer == said
     table = section.tables["prediction_errors"]
     assert table.rows == (
         ("shoulder", "deg", 0.05, 1.234, None),

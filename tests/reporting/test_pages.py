@@ -250,7 +250,7 @@ def test_the_verdict_shows_each_time_beside_the_best_simple_model_and_digits_tha
         "fitted": "1",
     }
     assert lead({"a": [one]}).startswith(
-        "boom: cannot be told from nine numbers, over 2 unseen logs"
+        "boom: cannot be told from nine numbers (2 unseen logs)"
     )
 
 
@@ -297,8 +297,10 @@ def test_the_worst_joint_is_that_which_errs_most_for_its_tolerance():
         for name, e, good in (("boom", 2.0, 1.0), ("swing", 3.0, 4.0))
     )
     said = worst([swing, boom])
-    assert said.startswith("Worst: boom, 2.00 deg; good is up to 1 deg ")
-    assert said.endswith("simple models err by 2.04 deg or more.")
+    assert said.startswith(
+        "Worst: boom, with an error of 2.00 deg. Up to 1 deg is good "
+    )
+    assert said.endswith("the best simple model has 2.04 deg.")
     assert not worst([boom])
     diverged = boom.changed({"unseen_deg": None, "fitted_deg": 0.1})
     assert worst([swing, diverged]) == "Worst: boom, whose simulation diverges."
@@ -319,8 +321,7 @@ def test_a_fit_that_fails_says_so_in_every_place():
     assert "✗ predicts no better than standing still" in text
     assert "✓" not in text
     assert (
-        page.lead
-        == "shoulder: predicts no better than standing still, over 4 unseen logs."
+        page.lead == "shoulder: predicts no better than standing still (4 unseen logs)."
     )
 
 
@@ -334,11 +335,11 @@ def test_a_validation_of_several_fits_shows_the_best_first_in_shared_charts():
     fits = ordered({p.fit: judge(settings, [], {}, [p]) for p in predictions})
     assert list(fits) == ["good", "bad"]
     page = validation_page(predictions, fits, settings.arm)
-    assert page.lead == "good is best. shoulder: predicts, over 1 unseen log."
+    assert page.lead == "good is best. shoulder: predicts (1 unseen log)."
     (tab,) = next(
         section for section in page.sections if section.title == "Response"
     ).tabs
-    labels = {mark.label for panel in tab.draw().panels for mark in panel.marks}
+    labels = {mark.label for panel in tab.make().panels for mark in panel.marks}
     assert {label.partition(" (")[0] for label in labels} >= {"good", "bad", "measured"}
 
 
@@ -363,7 +364,7 @@ def test_a_joint_that_only_a_later_fit_compares_is_shown():
     ]
     labels = {
         mark.label.partition(" (")[0]
-        for panel in tabs[1].draw().panels
+        for panel in tabs[1].make().panels
         for mark in panel.marks
     }
     assert "two" in labels

@@ -8,6 +8,7 @@ import pytest
 from report_fits import make_fit, make_problem
 
 from hydroid.fitting.validation import fitted
+from hydroid.prediction import OilTrace
 from hydroid.reporting.chart import Chart, Mark, Panel
 from hydroid.reporting.figure import figure, saved, style
 from hydroid.reporting.page_file import plain
@@ -123,13 +124,18 @@ def test_a_response_shows_measured_and_simulated_angle_residual_pressures_and_co
         np.full(len(log.time), 50.0)
     )
     assert len(draw_response("one", 2, [one], 1000).panels) == 3  # there are none
-    simulated = replace(one, pressure=np.full((len(one.log.time), 1, 2), 50e5))
-    *_, drawn, _ = draw_response("one", 2, [simulated], 1000).panels
+    simulated = replace(one, oil=steady_oil(len(log.time)))
+    *_, drawn, flows, _ = draw_response("one", 2, [simulated], 1000).panels
     assert [mark.label for mark in drawn.marks] == [
         "chamber A, simulated",
         "chamber B, simulated",
+        "pump's line",
     ]
     assert drawn.marks[0].y == pytest.approx(50.0)
+    assert drawn.marks[2].y == pytest.approx(120.0)
+    into_a, out_of_b = flows.marks[1:]
+    assert into_a.y == pytest.approx(60.0)
+    assert out_of_b.y == pytest.approx(-30.0)
     measured = np.degrees(log.angle[:, 1])
     assert labelled(upper)["measured"].y == pytest.approx(measured)
     simulated = np.degrees(fit.best.responses[0][:, 0])
@@ -141,6 +147,28 @@ def test_a_response_shows_measured_and_simulated_angle_residual_pressures_and_co
     assert np.all(band.end > 0)
     assert np.array_equal(band.y, -band.end)
     assert np.array_equal(lower.marks[0].y, log.command[:, 1])
+
+
+def steady_oil(samples: int) -> OilTrace:
+    """One joint that takes 60 L/min into A and gives 30 L/min out of B, on a pump."""
+    pressure = np.full((samples, 1, 2), 50e5)
+    flow = np.tile([1e-3, -0.5e-3], (samples, 1, 1))
+    return OilTrace(pressure, flow, np.full(samples, 120e5))
+
+
+def test_all_joints_of_a_log_show_what_they_take_from_the_pump():
+    problem = make_problem()
+    fit = make_fit(problem)
+    (one,) = fitted(fit)
+    with_oil = replace(one, oil=steady_oil(len(one.log.time)))
+    arm = problem.settings.arm
+    _, flows, pump, commands = draw_joints("all", arm, [with_oil], 1000).panels
+    # one label for flow and command of a joint: both are hidden together
+    name = arm.joint_names[1]
+    assert flows.marks[0].label == commands.marks[0].label == name
+    assert flows.marks[0].y == pytest.approx(60.0)
+    assert pump.marks[0].y == pytest.approx(120.0)
+    assert len(draw_joints("all", arm, [one], 1000).panels) == 2
 
 
 def test_every_kind_of_mark_can_be_drawn():
@@ -187,7 +215,7 @@ def test_all_joints_of_a_log_share_one_axis_of_time():
         "command [%]",
     ]
     labels = {mark.label for mark in chart.panels[-1].marks}
-    assert labels == {"command of shoulder", "command of elbow"}
+    assert labels == {"shoulder", "elbow"}
     measured, simulated = chart.panels[0].marks
     assert measured.y - simulated.y == pytest.approx(np.degrees(one.error(2)))
     check(chart)

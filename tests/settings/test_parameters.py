@@ -151,7 +151,7 @@ def test_a_start_is_stated_clipped_or_in_the_middle_of_the_scale():
 @pytest.mark.parametrize("model", ["dynamic", "quasi-static", "ladder"])
 def test_stage_1_takes_its_steps_per_sample_whatever_the_model_of_stage_2(model: str):
     changes = {"simulation.model": model, "simulation.steps_per_sample": 4}
-    assert load_settings("fit-mech", changes).simulation.steps == 4
-    assert load_settings("fit-hyd", changes).simulation.steps == (
+    assert load_settings("fit-mech", changes).stepping.steps == 4
+    assert load_settings("fit-hyd", changes).stepping.steps == (
         4 if model == "dynamic" else 1
     )

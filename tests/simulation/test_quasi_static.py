@@ -16,6 +16,7 @@ from hydroid.hydraulics.elementwise import ringing
 from hydroid.hydraulics.oil import overshoot
 from hydroid.hydraulics.records import JOINT, nominal_joints
 from hydroid.hydraulics.valve import DENSITY, rod_speed
+from hydroid.rungs import QUASI_STATIC, RUNGS
 from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.problem import SimulationSettings
 from hydroid.simulation import Simulation
@@ -40,11 +41,13 @@ def simulated(spec, arm):
         one.mass[:], one.joints.stiffness[:] = arm.masses, 0.0
         for name, value in values.items():
             (one.mass if name == "mass" else one.joints[name])[:] = value
-        settings = SimulationSettings(model=model)
-        scenario = Scenario(spec, arm, log, sorted(commands), settings)
+        stepping = RUNGS[model].stepping(1, 10)
+        scenario = Scenario(
+            spec, arm, log, sorted(commands), SimulationSettings(), stepping
+        )
         return (
-            Simulation(scenario, 10).simulate(one).angle[0],
-            trace(scenario, 10, one),
+            Simulation(scenario).simulate(one).angle[0],
+            trace(scenario, one),
             one.joints[0],
         )
 
@@ -73,6 +76,8 @@ def test_without_load_the_speed_is_opening_times_root_of_the_pressure(simulated)
         PUMP,
         PUMP | {"pump_limit": 8e5},
         PUMP | {"draw_a": 0.3, "draw_b": 0.8},
+        PUMP | {"pump_exponent": 3.0},
+        PUMP | {"pump_bypass": 0.8},
         {"compensation": 1.0},
         PUMP | {"compensation": 0.5},
     ],
@@ -378,8 +383,10 @@ def test_valves_that_open_once_for_all_open_as_each_alone(spec, arm):
     for row, name in enumerate(names):
         value = everyone.joints[name][row]
         everyone.joints[name][row] = np.where(np.isfinite(value), 1.01 * value, value)
-    settings = SimulationSettings(model="quasi-static")
-    simulation = Simulation(Scenario(spec, arm, log, [SHOULDER, ROLL], settings), 10)
+    stepping = QUASI_STATIC.stepping(1, 10)
+    simulation = Simulation(
+        Scenario(spec, arm, log, [SHOULDER, ROLL], SimulationSettings(), stepping)
+    )
     together = simulation.simulate(everyone).angle
     alone = [
         simulation.simulate(everyone[row : row + 1]).angle[0]

@@ -35,6 +35,8 @@ LAWS = [
         "friction": 20.0,
     },
     STRAIGHT | SLOPING | {"draw_a": 0.5, "return_b": 0.6, "damping": 300.0},
+    STRAIGHT | SLOPING | {"pump_exponent": 3.0},
+    STRAIGHT | SLOPING | {"pump_bypass": 0.7},
 ]
 both_models = pytest.mark.parametrize(
     "quasi_static", [False, True], ids=["dynamic", "quasi-static"]

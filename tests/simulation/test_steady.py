@@ -6,6 +6,7 @@ import pytest
 from conftest import candidates
 from made_logs import at_rest
 
+from hydroid.rungs import RUNGS
 from hydroid.settings.problem import SimulationSettings
 from hydroid.simulation import Simulation
 from hydroid.simulation.rollout import SteppedArm
@@ -31,18 +32,18 @@ def both(spec, arm):
         one.mass[:], one.joints.stiffness[:] = arm.masses, 0.0
         for name, value in values.items():
             (one.mass if name == "mass" else one.joints[name])[:] = value
-        scenario = Scenario(
-            spec, arm, at_rest(pose, commands), [joint], SimulationSettings(model=model)
-        )
-        angle = Simulation(scenario, 10).simulate(one).angle[0, :, 0]
+        log = at_rest(pose, commands)
+        stepping = RUNGS[model].stepping(1, 10)
+        scenario = Scenario(spec, arm, log, [joint], SimulationSettings(), stepping)
+        angle = Simulation(scenario).simulate(one).angle[0, :, 0]
         settled = (angle[-1] - angle[-3]) / 0.02
         stepped = SteppedArm(scenario.arm.model)
         values = scenario.values(one)
         poses = angle[-2] + NEAR * np.array([[-1.0], [0.0], [1.0]])
         load = np.array([[stepped.start(values, [0], near)[0] for near in poses]])
-        quasi_static = model == "quasi-static"
         args = one.joints[:, joint], float(angle[-2]), load, np.array([command])
-        return settled, float(steady_velocity(*args, quasi_static=quasi_static)[0, 0])
+        at_once = RUNGS[model].at_once
+        return settled, float(steady_velocity(*args, quasi_static=at_once)[0, 0])
 
     return compare
 
@@ -59,6 +60,8 @@ def both(spec, arm):
         PUMP,
         PUMP | {"draw_a": 0.5, "return_b": 0.6},
         PUMP | {"pump_limit": 15e5},
+        PUMP | {"pump_exponent": 4.0},
+        PUMP | {"pump_bypass": 0.7},
         {
             "overlap_a": 0.3e-3,
             "overlap_b": 0.2e-3,

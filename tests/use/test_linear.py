@@ -180,7 +180,7 @@ def test_its_page_draws_both_with_bands(tmp_path):
     linear = linearise(plant, command)
     other = linearise(made("quasi-static", opening_lag=0.2), command)
     page = linear_page(linear, [other, linear], plant.identified.settings.arm)
-    plots = [plot.draw() for plot in page.plots]
+    plots = [plot.make() for plot in page.plots]
     assert len(plots) == 2
     for chart in plots:
         for panel in chart.panels:

@@ -10,7 +10,7 @@ learning control*, 2006). No measurement is needed for that: a model errs the sa
 every time.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -35,6 +35,10 @@ PASSED = 0.25
 learnt [cycles]"""
 FASTEST = 0.2
 """cutoff of what is learnt, at most [cycles per sample]"""
+CATCH_UP = 0.5
+"""time in which a joint that fell behind its path makes up for it, once it can [s]"""
+CAUGHT_UP = 1e-4
+"""distance from its path at which it has [rad]"""
 QUIET = 0.005
 """part of a joint's largest wished speed below which it stands: no valve should chatter
 on its dead band"""
@@ -136,7 +140,12 @@ def follow(model: IdentifiedModel, path: Log, *, payload: float = 0.0) -> Follow
     rested = _with_rest(path, float(lags.max(initial=0.0)))
     wished, missed = _within_range(plant, rested)
     tracker = _Tracker(plant, wished, lags)
-    missed += tracker.missed()
+    too_fast = tracker.missed()
+    missed += too_fast
+    behind = {one.joint for one in too_fast if one.limit in (Limit.FULL, Limit.PUMP)}
+    if behind:
+        reachable = tracker.reachable(sorted(behind))
+        tracker = _Tracker(plant, replace(wished, angle=reachable), lags)
     command, angle, turns = tracker.learn()
     log = replace(wished, command=command, rest=0)
     outputs = [joint - 1 for joint in model.settings.outputs]
@@ -279,6 +288,27 @@ class _Tracker:
                     )
                 )
         return missed
+
+    def reachable(self, joints: Sequence[int]) -> Array:
+        """Return the path [rad], (T, J), with what joints (0-based) can reach of it
+        that fall behind where their speed cannot be had.
+
+        Later they catch up. To learn what a saturated valve misses would only repeat
+        the path beside itself: the error would last until its end.
+        """
+        path = self._path
+        angle = path.angle.copy()
+        _, had = self._steady.commands(self._speed, self._pose, self._load)
+        limited = np.any(np.abs(had - self._speed) > self._quiet(), axis=1)
+        for k in range(len(angle) - 1):
+            away = np.zeros(path.joints)
+            away[joints] = (path.angle[k] - angle[k])[joints]
+            if not limited[k] and np.abs(away).max() < CAUGHT_UP:
+                continue
+            wish = self._speed[k] + away / CATCH_UP
+            _, reached = self._steady.commands(wish[None], angle[k][None])
+            angle[k + 1, joints] = (angle[k] + path.period * reached[0])[joints]
+        return angle
 
     def learn(self) -> tuple[Array, Array, int]:
         """Return commands [%] and the angles that they give [rad], (T, J), and the

@@ -102,6 +102,22 @@ def test_what_cannot_be_had_is_named_and_the_nearest_taken():
     assert found.angle[:, 2].max() <= arm.upper[2] + 1e-3
 
 
+@pytest.mark.parametrize("kind", ["quasi-static", "dynamic"])
+def test_a_joint_that_falls_behind_catches_up(kind):
+    """It is asked for more than its valve gives, there and back, and then rests where
+    it should."""
+    one = model(kind)
+    fast = path(one, speed=2.0, seconds=1.5, joints={"elbow": 2})
+    still = round(3.0 / fast.period)
+    angle = np.concatenate([fast.angle, np.tile(fast.angle[-1], (still, 1))])
+    time = np.arange(len(angle)) * fast.period
+    found = follow(one, Log("path", time, np.zeros_like(angle), angle, fast.period))
+    assert {missed.limit for missed in found.missed} == {Limit.FULL}
+    away = np.degrees(np.abs(found.error(3)))
+    assert away.max() > 5.0
+    assert away[-1] < 0.05
+
+
 def test_the_command_line_writes_a_log_that_simulates_to_the_path(tmp_path: Path):
     one = model()
     settings = one.settings

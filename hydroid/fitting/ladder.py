@@ -15,7 +15,14 @@ import numpy as np
 
 from hydroid.arrays import Array, record
 from hydroid.fitting.checkpoints import Checkpoints
-from hydroid.fitting.left_out import LeftOut, gain, is_better, is_clear, predict_blocks
+from hydroid.fitting.left_out import (
+    LEAST_GAIN,
+    LeftOut,
+    gain,
+    is_better,
+    is_clear,
+    predict_blocks,
+)
 from hydroid.fitting.multistart import alone, by_speeds, has_curve, lone_joints
 from hydroid.fitting.refinement import Refinement, refine, refine_from_afar
 from hydroid.fitting.step import Step, step_of
@@ -34,6 +41,8 @@ FIRST = 10
 simulate"""
 LESS = 0.1
 """part by which the errors of one joint must fall for its model to be refined again"""
+ANEW = 3
+"""number of the start from which the kept estimate is refined again"""
 FIRM = 1e-3  # gain below which least squares ends where another rung may follow
 
 
@@ -161,6 +170,8 @@ class Ladder:
                 self._try_without(whole, term, on_the_way)
         if climbs:
             self._end(refinement)
+        if settings.search.algorithm == "multistart":
+            self._end_anew(refinement)
         if settings.joint_refinement:
             joint = self._step.changed(model="joint")
             self._rung(whole, joint, refinement, if_better=False)
@@ -205,6 +216,37 @@ class Ladder:
         likelihood = make_likelihood(self.problem)
         last = self._refined(likelihood, kept.theta, settings, self._step, how)
         self.kept = self._measured(self.problem, last, self._step)
+
+    def _end_anew(self, settings: RefinementSettings) -> None:
+        """Refine the kept estimate once more, from where output errors lead if they
+        were independent; keep that end where it is likelier, by the errors as they are.
+
+        Errors that last tell little, and then the priors hold the parameters. That is
+        right where the model errs, but not where errors last because parameters are
+        held: an optimum, too, and least squares does not leave it.
+        """
+        if self._late:
+            return
+        problem = self.problem
+        likelihood = make_likelihood(problem)
+        step = self._step.changed(start=ANEW)
+        rough = settings.changed({"gain_tolerance": max(settings.gain_tolerance, FIRM)})
+        far = self._refined(
+            likelihood.of_independent_errors,
+            self.kept.theta,
+            rough,
+            step.changed(phase="from afar"),
+        )
+        end = self._refined(
+            likelihood, problem.parameters.from_unit(far.point), settings, step
+        )
+        if self._late:
+            return
+        theta = problem.parameters.from_unit(end.point)
+        gained = likelihood.log_posterior(theta)
+        gained -= likelihood.log_posterior(self.kept.theta)
+        if gained > LEAST_GAIN:
+            self.kept = self._measured(problem, end, self._step)
 
     def known(self, theta: Array) -> Uncertainty:
         """Return how well the logs determine theta, (P,): the estimate that is kept, or

@@ -235,6 +235,17 @@ class ErrorModel:
             numbers[i] = _most_likely(pairs, least, float(self.given[i]))
         return replace(self, numbers=numbers)
 
+    def independent(self, errors: Array) -> "ErrorModel":
+        """Return the error model whose noise makes weighted output errors, (R,), most
+        likely, without a drift or what lasts."""
+        numbers = np.zeros_like(self.numbers)
+        numbers[:, 4] = SHORTEST
+        for i, signal in enumerate(self.signals):
+            least = LEAST_NOISE[signal.quantity] ** 2
+            pairs = [(c, errors[c.rows] / c.weight) for c in self.courses_of(i)]
+            numbers[i, 0] = max(_mean_square(pairs), least)
+        return replace(self, numbers=numbers)
+
     def weighing(self, memory: float, *, alike: bool) -> "ErrorModel":
         """Return the model by which least squares weighs output errors that are as
         here.
@@ -368,17 +379,36 @@ class Likelihood:
         memory: within which least squares takes an error for drift, at the fastest [s];
             inf in stage 1, which is fitted by output errors as in the article, and on
             the way from afar.
+        independent: whether errors are taken for independent, however they last.
     """
 
     problem: Problem
     shown: ErrorModel
     memory: float
+    independent: bool = False
 
     @cached_property
     def errors(self) -> ErrorModel:
         """The model that weighs the errors (`ErrorModel.weighing`)."""
         alike = self.problem.settings.stage == "mech"  # as in the article
         return self.shown.weighing(self.memory, alike=alike)
+
+    @property
+    def of_independent_errors(self) -> "Likelihood":
+        """The likelihood if output errors were independent: then the logs outweigh the
+        priors."""
+        return replace(self, memory=np.inf, independent=True)
+
+    def log_posterior(self, theta: Array) -> float:
+        """Return the logarithm of the posterior density of theta, (P,), but for a
+        constant, by its errors as they are and the priors; -inf where a simulation
+        diverged."""
+        errors = self.problem.output_errors(theta[None])[0]
+        if not np.isfinite(errors).all():
+            return -np.inf
+        scores = self.problem.priors.scores(theta[None])[0]
+        shown = self.shown.estimated(errors)
+        return shown.log_likelihood(errors) - 0.5 * float(np.sum(scores**2))
 
     def innovations(self, theta: Array) -> Array:
         """Return innovations [1] of theta, shape (n, P): (n, R); NaN where a simulation
@@ -416,7 +446,9 @@ class Likelihood:
     def estimated(self, errors: Array) -> "Likelihood":
         """Return the likelihood for what weighted output errors, (R,), show of their
         model."""
-        return replace(self, shown=self.shown.estimated(errors))
+        shown = self.shown
+        new = shown.independent(errors) if self.independent else shown.estimated(errors)
+        return replace(self, shown=new)
 
 
 def make_likelihood(problem: Problem) -> Likelihood:
@@ -487,10 +519,7 @@ def _most_likely(
     that (NaN: it is not). The search is over logarithms. It starts from a guess that is
     mostly noise, and from one that is mostly drift.
     """
-    square = float(
-        np.mean(np.concatenate([error[course.used] for course, error in pairs]) ** 2)
-    )
-    square = max(square, least)
+    square = max(_mean_square(pairs), least)
     seconds = sum(course.period * len(error) for course, error in pairs) / len(pairs)
     way = max(sum(float(course.way.sum()) for course, _ in pairs) / len(pairs), 1e-3)
     lower = np.array([least, NONE * square, NONE * square, NONE * square, SHORTEST])
@@ -516,6 +545,12 @@ def _most_likely(
             minimize(cost, begin, method="L-BFGS-B", bounds=bounds, options=options)
         )
     return np.exp(min(ended, key=lambda one: one.fun).x)
+
+
+def _mean_square(pairs: Sequence[tuple[Course, Array]]) -> float:
+    """Return the mean square of one signal's errors, with their courses."""
+    used = np.concatenate([error[course.used] for course, error in pairs])
+    return float(np.mean(used**2))
 
 
 def _negative_log_likelihood(course: Course, error: Array, numbers: Array) -> float:

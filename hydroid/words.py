@@ -131,10 +131,19 @@ class _Number(float):
         return super().__format__(spec) if spec else number(self)
 
 
-_ONE = {"is": "is", "has": "has", "s": "", "it": "it", "them": "it", "its": "its"}
+_ONE = {
+    "is": "is",
+    "has": "has",
+    "do": "does",
+    "s": "",
+    "it": "it",
+    "them": "it",
+    "its": "its",
+}
 _MANY = {
     "is": "are",
     "has": "have",
+    "do": "do",
     "s": "s",
     "it": "they",
     "them": "them",

@@ -26,8 +26,8 @@ def test_a_sentence_agrees_with_its_subjects(names: str):
     finding = Finding(
         "at bound", "warning", tuple(names.split()[:-1:2]), {"side": "upper"}
     )
-    assert finding.what.startswith(f"{names} at the upper bound, ")
-    assert str(finding).endswith("If it is not, the model lacks something.")
+    assert finding.what.startswith(f"{names} at the upper bound: ")
+    assert str(finding).endswith("If it does not, the model lacks something.")
 
 
 TAKEN = ("names", "few", "is", "s", "side", "kind", "0")
@@ -37,15 +37,14 @@ TAKEN = ("names", "few", "is", "s", "side", "kind", "0")
 def test_a_subject_may_be_called_as_a_word_of_the_sentence(name: str):
     at = Finding("at bound", "warning", (name,), {"side": "upper"})
     assert (
-        at.what
-        == f"{name} is at the upper bound, and the error would be smaller beyond it."
+        at.what == f"{name} is at the upper bound: a value beyond it would fit better."
     )
     strained = Finding(
         "strained prior", "warning", (name, "K"), details={name: "2.9 above"}
     )
     assert (
-        strained.what
-        == f"Far from the expected value (prior), in standard deviations: {name} (2.9 above) and K."
+        strained.what == f"{name} (2.9 above) and K are far from their priors "
+        "(in brackets: by how many standard deviations)."
     )
 
 

@@ -39,6 +39,13 @@ class Direction(NamedTuple):
     ending: str
     word: str
 
+    @property
+    def when(self) -> str:
+        """Says in a sentence when the joint moves in it."""
+        if self.word == self.ending:  # nothing is raised
+            return f"with {self.word} commands"
+        return f"when {self.word}"
+
 
 @record
 class Bench:

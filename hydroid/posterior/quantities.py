@@ -49,6 +49,7 @@ class Figure(NamedTuple):
     """A quantity of a direction, (n,), with the command that must move the joint [%].
 
     `of_several`: whether it compares commands, so that the logs must tell all of them.
+    `what`: what the label begins with, before the direction.
     """
 
     command: float
@@ -57,6 +58,7 @@ class Figure(NamedTuple):
     unit: str
     value: Array
     of_several: bool = False
+    what: str = ""
 
 
 def quantities(problem: Problem, uncertainty: Uncertainty) -> Quantities:
@@ -261,6 +263,12 @@ class DirectionTest:
         """Size of the command of the step [%]."""
         return abs(self.step.command)
 
+    @property
+    def _place(self) -> str:
+        """The joint and its pose, in words."""
+        names = self.bench.settings.arm.joint_names
+        return f"{names[self.bench.joint - 1]} at {self.bench.pose}"
+
     def measure(self, candidates: Candidates, loads: Array) -> Measured:
         """Measure n candidates with the loads of `Bench.loads`, (n, 3)."""
         bench = self.bench
@@ -296,6 +304,8 @@ class DirectionTest:
             if moved and told:
                 name = f"{figure.name}_{self.direction.ending}"
                 label = f"{figure.label}, {self.direction.word}"
+                if figure.what:
+                    label = f"{figure.what} {self.direction.when}: {figure.label}"
                 yield Column(name, label, figure.unit), figure.value
 
     def _steady_figures(
@@ -305,8 +315,9 @@ class DirectionTest:
         pose = self.bench.pose
         unit = f"{self.bench.unit[1]}/s"
         for command in (50.0, 100.0):
-            label = f"speed at {command:g} % command and {pose}"
-            yield Figure(command, f"speed_{command:g}", label, unit, speed[command])
+            label = f"{command:g} % command, {self._place}"
+            name = f"speed_{command:g}"
+            yield Figure(command, name, label, unit, speed[command], what="speed")
         gain = (speed[60.0] - speed[40.0]) / (60.0 - 40.0)
         label = f"gain between command and speed at {pose}"
         yield Figure(60.0, "gain", label, f"{unit} per %", gain, of_several=True)
@@ -326,8 +337,8 @@ class DirectionTest:
         c, _, arm = actuator(self.bench, candidates)
         side = c.a if self.direction.sign > 0 else c.b
         flow = 6e4 * side.area * np.abs(arm) * speed / self.bench.unit[0]
-        label = f"flow at 100 % command and {self.bench.pose}"
-        yield Figure(100.0, "full_flow", label, "L/min", flow)
+        label = f"100 % command, {self._place}"
+        yield Figure(100.0, "full_flow", label, "L/min", flow, what="flow")
 
 
 def direction_test(

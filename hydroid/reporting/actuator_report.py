@@ -13,6 +13,7 @@ from hydroid.estimate import CurveEstimate, FitSummary
 from hydroid.log import Log
 from hydroid.reporting.chart import Chart, Color, Mark, Panel
 from hydroid.reporting.page import Plot, Section
+from hydroid.reporting.parameters_report import SIDES, direction_word
 from hydroid.settings.fit import FitSettings
 from hydroid.words import listed, two_digits
 
@@ -27,18 +28,20 @@ TOWARDS: dict[str, Color] = {"positive": "blue", "negative": "orange"}
 """endings of curves, as `posterior.quantities` names directions, and their colours"""
 
 _SPEED = (
-    "Lines: the model's steady speed at mid travel, and how far the valve is open then. "
-    "Bands: 95 % intervals. Points: measured speeds, in any pose and under any load, against "
-    "the command one dead time earlier. Grey: commands that the logs do not contain."
+    "Lines: the model's steady speed at mid travel, with the sign of the angle, and how far the "
+    "valve is open then. Bands: 95 % intervals. Points: measured speeds, in any pose and under any "
+    "load, against the command one dead time earlier. Grey: commands that the logs do not "
+    "contain."
 )
 _SPEED_ALONE = (
-    "Lines: the model's steady speed at mid travel. Bands: 95 % intervals. Points: measured "
-    "speeds, in any pose and under any load. Grey: commands that the logs do not contain."
+    "Lines: the model's steady speed at mid travel, with the sign of the angle. Bands: 95 % "
+    "intervals. Points: measured speeds, in any pose and under any load. Grey: "
+    "commands that the logs do not contain."
 )
 _STEP = (
     "How fast and how late the joint follows its command, from rest at mid travel: its speed "
-    "after a step, and its frequency response at the start of the motion. Bands: 95 % "
-    "intervals."
+    "after a step, above 0 in the direction of the command, and the frequency response "
+    "computed from it. Bands: 95 % intervals."
 )
 
 
@@ -61,10 +64,11 @@ def speed_section(
         opens = opens or opening is not None
         cloud = _measured_cloud(logs, joint, _dead_times(name, summary))
         commands = np.concatenate([log.command[:, joint - 1] for log in logs])
-        draw = partial(_speed_chart, name, (speed, opening), commands, cloud)
+        sides = _sides(name, summary)
+        draw = partial(_speed_chart, name, (speed, opening), sides, commands, cloud)
         caption = f"{name}: {speed.label}"
         tabs.append(Plot(f"speed_{len(tabs) + 1}", caption, draw, button=name))
-        fastest.append(f"{name} {two_digits(max(map(abs, speed.value)))} {speed.unit}")
+        fastest.append(f"{name} {_fastest(speed, commands)}")
     if not tabs:
         return None
     title = "Speed against command"
@@ -74,6 +78,28 @@ def speed_section(
         text = _SPEED
     answer = f"fastest: {listed(fastest)}"
     return Section(title, text, tabs=tuple(tabs), folded=True, answer=answer)
+
+
+def _fastest(speed: CurveEstimate, commands: Array) -> str:
+    """Write the highest speed, and whether it lies beyond the commands of the logs."""
+    top = max(range(len(speed.at)), key=lambda i: abs(speed.value[i]))
+    said = f"{two_digits(abs(speed.value[top]))} {speed.unit}"
+    at = speed.at[top]
+    logged = commands.max(initial=0.0) if at > 0 else commands.min(initial=0.0)
+    if abs(at) > abs(logged) + 1.0:
+        said += f" (beyond the logs' {logged:+.0f} %)"
+    return said
+
+
+def _sides(name: str, summary: FitSummary) -> dict[str, str]:
+    """Return what a legend calls the commands of both signs."""
+    sides = dict[str, str]()
+    for side, towards in SIDES.items():
+        word = direction_word(summary, name, towards)
+        sides[towards] = f"side {side}: {towards} commands"
+        if word:
+            sides[towards] += f", {word}"
+    return sides
 
 
 def _measured_cloud(logs: Sequence[Log], joint: int, dead_times: list[float]) -> Array:
@@ -94,6 +120,7 @@ def step_section(settings: FitSettings, summary: FitSummary) -> Section | None:
     """
     tabs = list[Plot]()
     slowest = list[str]()
+    narrowest = list[str]()
     for joint in settings.outputs:
         name = settings.arm.joint_names[joint - 1]
         if not any(f"{name}_step_{towards}" in summary.curves for towards in TOWARDS):
@@ -103,11 +130,34 @@ def step_section(settings: FitSettings, summary: FitSummary) -> Section | None:
         tabs.append(Plot(f"step_{len(tabs) + 1}", caption, draw, button=name))
         if dead_times := _dead_times(name, summary):
             slowest.append(f"{name} {two_digits(max(dead_times))} s")
+        if widths := _bandwidths(name, summary.curves):
+            narrowest.append(f"{name} {two_digits(min(widths))} Hz")
     if not tabs:
         return None
-    answer = f"dead time: {listed(slowest)}" if slowest else ""
+    answers = list[str]()
+    if slowest:
+        answers.append(f"dead time: {listed(slowest)}")
+    if narrowest:
+        answers.append(f"bandwidth (-3 dB): {listed(narrowest)}")
     title = "Step and frequency response"
-    return Section(title, _STEP, tabs=tuple(tabs), folded=True, answer=answer)
+    return Section(
+        title, _STEP, tabs=tuple(tabs), folded=True, answer="; ".join(answers)
+    )
+
+
+def _bandwidths(name: str, curves: Mapping[str, CurveEstimate]) -> list[float]:
+    """Return the frequencies [Hz] at which the speed first falls by 3 dB from that at
+    the lowest one, in both directions; none of a curve that does not fall so far."""
+    widths = list[float]()
+    for curve in _towards(name, "amplitude", curves).values():
+        gain = np.log(np.array(curve.value) / curve.value[0] * np.sqrt(2.0))
+        below = np.flatnonzero(gain < 0.0)
+        if not len(below):
+            continue
+        ends = slice(below[0] - 1, below[0] + 1)
+        at = np.log(curve.at[ends])
+        widths.append(float(np.exp(np.interp(0.0, -gain[ends], at))))
+    return widths
 
 
 def measured_speeds(log: Log, joint: int, late: float) -> tuple[Array, Array]:
@@ -151,6 +201,7 @@ def _dead_times(name: str, summary: FitSummary) -> list[float]:
 def _speed_chart(
     name: str,
     curves: tuple[CurveEstimate, CurveEstimate | None],
+    sides: Mapping[str, str],
     commands: Array,
     measured: Array,
 ) -> Chart:
@@ -171,25 +222,25 @@ def _speed_chart(
         width=5,
         alpha=0.35,
     )
-    marks = (beyond, *_both_sides(speed), cloud)
+    marks = (beyond, *_both_sides(speed, sides), cloud)
     panels = [Panel("", f"speed [{speed.unit}]", marks, f"{name}: {speed.label}", 300)]
     if opening is not None:
         label = f"opening [{opening.unit}]"
         panels.append(
-            Panel("", label, (beyond, *_both_sides(opening)), opening.label, 200)
+            Panel("", label, (beyond, *_both_sides(opening, sides)), opening.label, 200)
         )
     panels[-1] = replace(panels[-1], x="command [%]")
     return Chart(tuple(panels), linked=True)
 
 
-def _both_sides(curve: CurveEstimate) -> list[Mark]:
+def _both_sides(curve: CurveEstimate, sides: Mapping[str, str]) -> list[Mark]:
     """Draw a curve against the command, with the dead band between its two sides."""
     marks = list[Mark]()
     rows = _rows(curve)
     for sign, towards in (1.0, "positive"), (-1.0, "negative"):
         x, y, low, high = rows[:, sign * rows[0] > 0]
         color = TOWARDS[towards]
-        label = f"model, {towards} command"
+        label = f"model, {sides[towards]}"
         marks.append(Mark("band", x, low, high, color=color, label=label, alpha=0.25))
         marks.append(Mark("line", x, y, color=color, label=label))
     return marks

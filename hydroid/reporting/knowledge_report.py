@@ -141,19 +141,19 @@ def error_section(
                 "unit": unit,
                 "sensor's noise": factor * error.sensor_deg,
                 "uncertain after 10 s": ahead,
-                "an error lasts [s]": error.lasts_s or None,
+                "error persists for [s]": error.lasts_s or None,
                 INSIDE: inside.get(joint),
             }
         )
     if not rows:
         return None
     text = (
-        "Even with exact parameters a prediction is uncertain, because more than the commands"
-        " moves a joint. The uncertainty grows with the time."
+        "Even with exact parameters a prediction is uncertain, because other "
+        "influences than the commands add up."
     )
     note = (
-        "Standard deviations; after 10 s: at the mean speed of the logs. An error that lasts "
-        "is the model's, not the sensor's; empty: none lasts."
+        "Standard deviations; after 10 s: at the mean speed of the logs. An error that "
+        "persists comes from the model, not the sensor; empty: none persists."
     )
     columns = {name: name for name in rows[0]}
     if not any(row[INSIDE] for row in rows):

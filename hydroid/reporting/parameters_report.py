@@ -20,6 +20,8 @@ from hydroid.words import interval_words, listed, three_digits
 
 WHAT_IT_IS = ("joint", "side", "quantity", "symbol", "value", "unit")
 """columns with which every table of parameters begins"""
+SIDES = {"A": "positive", "B": "negative"}
+"""signs of the commands that open a side"""
 NO_LIMITS = (None, None)
 """interval without an end"""
 FARTHEST = 5.0
@@ -31,10 +33,8 @@ ROW = 16
 Row = dict[str, Cell]  # by the names of columns
 Intervals = Mapping[str, tuple[float, float]]
 
-_NOTE = (
-    "from, to: 95 % interval; empty: no limit. data: share of the information from the logs. "
-    "by log: from the differences between logs."
-)
+_NOTE = "from, to: 95 % interval; empty: no limit. data: share of the information from the logs."
+_BY_LOG = " by log: 95 %, estimated from how the logs differ."
 _PRIORS = (
     "Grey: what was expected before the fit (95 %). Blue: what is known after it (95 %); "
     "points: the estimates. Where blue is as wide as grey, the logs added nothing."
@@ -60,9 +60,20 @@ def parameter_section(
         )
     tables = {"parameters": short_table(settings, summary)}
     answer = known_of_free(summary)
+    said = (*_at_bounds(summary), *points)
     return Section(
-        "Parameters", text, points, tables, folded=True, answer=answer, printed=True
+        "Parameters", text, said, tables, folded=True, answer=answer, printed=True
     )
+
+
+def _at_bounds(summary: FitSummary) -> tuple[str, ...]:
+    """Say which parameters are at a bound, all in one sentence."""
+    names = list[str]()
+    for name, estimate in summary.estimate.items():
+        if estimate.at_bound:
+            value = three_digits(estimate.value)
+            names.append(f"{name} ({estimate.at_bound}, {value})")
+    return (f"At a bound: {listed(names)}.",) if names else ()
 
 
 def known_of_free(summary: FitSummary) -> str:
@@ -98,17 +109,23 @@ def short_table(settings: FitSettings, summary: FitSummary) -> Table:
     for name in by_joint(settings, [*summary.estimate]):
         estimate = summary.estimate[name]
         source = origin(estimate)
-        if estimate.source == Source.BOTH and estimate.data_share:
-            source += f" ({100 * estimate.data_share:.0f} %)"
+        if estimate.data_share:
+            percent = round(100 * estimate.data_share)
+            shares = f"{percent} % data, {100 - percent} % prior"
+            source = source.replace(Source.BOTH, shares)
         row = _what_it_is(settings, name, estimate)
+        row["side"] = _side_and_word(settings, name, summary)
+        # what a search leaves of 0 is 0
+        if estimate.sd and abs(estimate.value) < 1e-9 * estimate.sd:
+            row["value"] = 0.0
         row["unit"] = estimate.unit
         row["interval"] = interval_words(*estimate.interval)
         row["by log"] = interval_words(*estimate.interval_by_log)
         row["source"] = source
         rows.append(row)
-    note = "side A: positive commands, side B: negative ones. interval: of 95 %."
+    note = "side A: positive commands, side B: negative ones. interval: 95 %."
     if summary.left_out_deg:
-        note += " by log: the same, from the differences between logs."
+        note += _BY_LOG
     return Table.of("Parameters", {name: name for name in columns}, rows, note)
 
 
@@ -155,7 +172,8 @@ def parameter_table(
         rows.append(row)
     optional = ("quantity", "side", "joint", *by_log, "data [%]", "lower", "upper")
     shown = {name: name for name in columns}
-    return Table.of("Parameters", shown, rows, _NOTE, optional)
+    note = _NOTE + _BY_LOG if by_log else _NOTE
+    return Table.of("Parameters", shown, rows, note, optional)
 
 
 def _what_it_is(settings: FitSettings, name: str, estimate: ParameterEstimate) -> Row:
@@ -169,6 +187,25 @@ def _what_it_is(settings: FitSettings, name: str, estimate: ParameterEstimate) -
         "symbol": name,
         "value": estimate.value,
     }
+
+
+def _side_and_word(settings: FitSettings, name: str, summary: FitSummary) -> str:
+    """Return the side of a parameter, with what the joint does then, where the fit
+    knows."""
+    side = quantity_and_side(settings, name)[1]
+    word = ""
+    if side:
+        joint = settings.arm.joint_names[first_joint(settings, name) - 1]
+        word = direction_word(summary, joint, SIDES[side])
+    return f"{side} ({word})" if word else side
+
+
+def direction_word(summary: FitSummary, joint: str, towards: str) -> str:
+    """Return what a command of a sign does with a joint, `raising` or `lowering`;
+    nothing where the fit does not say it."""
+    step = summary.curves.get(f"{joint}_step_{towards}")
+    word = step.label.rpartition(", ")[2] if step else ""
+    return "" if word == towards else word
 
 
 def _bounds(settings: FitSettings, parameter: Parameter) -> Row:
@@ -260,7 +297,10 @@ def prior_chart(settings: FitSettings, summary: FitSummary) -> Chart:
         panels.append(_bars("Beside their priors", x, scores, prior))
     if positions:
         x = "lower bound: 0; upper bound: 1"
-        title = "Without a prior of their own: between their bounds"
+        quantities = [settings.parameters[name].quantity for name in positions]
+        curves = any(quantity.startswith("curve_") for quantity in quantities)
+        shared = " (the parts of a curve share one)" if curves else ""
+        title = f"Without a prior of their own{shared}: between their bounds"
         panels.append(_bars(title, x, positions))
     return Chart(tuple(panels))
 

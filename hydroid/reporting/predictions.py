@@ -195,7 +195,9 @@ def _made_from(run: FinishedRun) -> tuple[str, ...]:
     if run.settings.stage == "hyd":
         settings += f" ({run.settings.simulation.model})"
     seconds = sum(prediction.log.duration for prediction in run.result.fitted)
-    sampled = f"{seconds:.0f} s at {1.0 / run.settings.log.period_s:.3g} Hz"
+    count = len(dict.fromkeys(logs))
+    counted = f"{count} log{'s' if count > 1 else ''}, {seconds:.0f} s of data"
+    sampled = f"{counted} at {1.0 / run.settings.log.period_s:.3g} Hz"
     fitted_to = f"Fitted to {_log_list(logs)}: {sampled}"
     made_from = [fitted_to, settings, f"seed {run.seed}"]
     if date := run.identity.get("finished"):

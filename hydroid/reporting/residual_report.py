@@ -27,10 +27,10 @@ _TEXT = (
 )
 _HEADER = (
     "joint",
-    "largest autocorrelation",
-    "largest with the command",
-    "autocorrelations outside the band [%]",
-    "with the command outside the band [%]",
+    "autocorrelation: largest value",
+    "correlation with the command: largest value",
+    "autocorrelation: outside the band [%]",
+    "correlation with the command: outside the band [%]",
 )
 
 
@@ -63,7 +63,8 @@ def residual_section(
             coloured.append(f"{name} {two_digits(largest)}")
     answer = f"yes: no correlation is above {FAINT:g}"
     if coloured:
-        answer = f"no; largest correlation: {listed(coloured)}"
+        no = "no, in no joint" if len(coloured) == len(tests) else "no"
+        answer = f"{no}; largest correlation: {listed(coloured)}"
     title = "Are the residuals white?"
     table = Table("", _HEADER, tuple(rows))
     tables = {"residuals": table}

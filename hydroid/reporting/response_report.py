@@ -57,9 +57,9 @@ _MATRIX = (
 )
 _MOTION = (
     "Orange: simulated. Grey: measured, hidden where both agree. The picture begins where "
-    "they differ most. The view from the side turns with the machine. Joints that are not "
-    "compared show their measured angles."
+    "they differ most. The view from the side turns with the machine."
 )
+_HELD = " Joints that are not fitted move as measured."
 _NOTE = "fit: 100 % is perfect, 0 % as bad as a constant. expected: the rms error that the fit predicts."
 _KINDS = {True: "unseen", False: "fitted", None: ""}
 _COLUMNS = {
@@ -111,8 +111,16 @@ def response_section(
     if len(tabs) > 1:
         title = "Errors by log"
         text = _MATRIX
-    note = _MOTION if beside else ""
+    note = _motion_note(arm, predictions) if beside else ""
     return Section(title, text, tabs=tuple(tabs), beside=beside, beside_note=note)
+
+
+def _motion_note(arm: Arm, predictions: Sequence[Prediction]) -> str:
+    """Explain the arm in motion."""
+    every = len(arm.joints)
+    if all(len(prediction.joints) == every for prediction in predictions):
+        return _MOTION
+    return _MOTION + _HELD
 
 
 def _log_tabs(

@@ -11,7 +11,7 @@ from hydroid.reporting.chart import SERIES, Chart, Mark, Panel, finite
 from hydroid.reporting.page import Plot, Section
 from hydroid.run.record import Effort, FinishedRun
 from hydroid.settings.problem import ObjectiveSettings
-from hydroid.words import two_digits
+from hydroid.words import listed, two_digits
 
 _NORMS = {1: "mean absolute error", 2: "rms error", "inf": "largest error"}
 """names of the objective's norms"""
@@ -32,6 +32,12 @@ def search_section(run: FinishedRun) -> Section:
             f"{simulated:,} simulated, {diverged:,} of them diverged."
         )
     points += [_refined(run, effort) for effort in result.refinements]
+    names = run.settings.arm.joint_names
+    counts = list[str]()
+    for joint, costs in result.starts.items():
+        counts.append(f"{names[joint - 1] if joint else 'all joints'} {len(costs)}")
+    if counts:
+        points.append(f"Starts of the search: {listed(counts)}.")
     plots = list[Plot]()
     if len(result.history) > 1:
         final = str(run.summary.final)
@@ -42,10 +48,8 @@ def search_section(run: FinishedRun) -> Section:
         caption = "The Pareto set: a lower point fits that segment better."
         plots.append(Plot("pareto", caption, draw))
     if any(len(costs) > 1 for costs in result.starts.values()):
-        caption = (
-            "Where each start of the search ended: those at 0 found the best result."
-        )
-        draw = partial(starts, run.settings.arm.joint_names, result.starts)
+        caption = "Where each start of the search ended. 0 = the best start; further right = worse."
+        draw = partial(starts, names, result.starts)
         plots.append(Plot("starts", caption, draw))
     simulations = sum(effort.simulations for effort in result.refinements)
     answer = f"{simulations:,} simulations of the refinement" if simulations else ""

@@ -25,21 +25,22 @@ from hydroid.words import listed, told_apart, two_digits
 
 _RIVALS = (
     "The simple models of a joint: standing still; speed tables (its mean speed at each "
-    "command); nine numbers (a delay, and for each direction a dead band, an exponent, a top "
-    "speed and a lag)."
+    "command); nine numbers (dead band, exponent, top speed and lag for each direction, "
+    "2 x 4, and one delay)."
 )
 _FITTED = (
     "Rms errors{unit} on the fitted logs. No other log has tested the fit yet. "
     "The last three columns are simple models."
 )
 _TESTED = (
-    "Rms errors{unit} on {count} unseen log{s}, which the fit did not use. After 1, 5 and 10 "
-    "s: of how far the joint has moved in this time. Whole logs: of the angle. In brackets: "
-    "the error of the best simple model. Better, worse: than that model. Cannot be told: the "
-    "difference may be chance."
+    "Rms errors{unit} on {count} unseen log{s}, which the fit did not use: after predicting 1, "
+    "5 and 10 s ahead, and over whole logs. In brackets: the error of the best simple "
+    "model. Better, worse: than that model. Cannot be told: the difference may be chance."
 )
 WHOLE = "whole logs"
 """name of a column"""
+FITTED = "whole fitted logs"
+"""name of the column of errors on the logs that the fit used"""
 GOOD = "good up to"
 """name of the column of tolerances"""
 
@@ -66,11 +67,11 @@ def verdict_table(fits: Verdicts) -> Table:
         unit = ""
         names.append("unit")
     if count:
-        names += [*map(column_of, JUDGED), WHOLE, "fitted", GOOD]
-        optional = (GOOD, "fitted", column_of(JUDGED[1]), WHOLE)
+        names += [*map(column_of, JUDGED), WHOLE, FITTED, GOOD]
+        optional = (GOOD, FITTED, column_of(JUDGED[1]), WHOLE)
         note = _TESTED.format(unit=unit, count=count, s="s" if count > 1 else "")
     else:
-        names += ["fitted", *NAMES]
+        names += [FITTED, *NAMES]
         optional = NAMES[:2]
         note = _FITTED.format(unit=unit)
     rows = list[dict[str, Cell]]()
@@ -92,7 +93,7 @@ def _row(verdict: JointVerdict) -> dict[str, Cell]:
         "joint": verdict.name,
         "verdict": f"{verdict.verdict.sign} {verdict.text}",
         "unit": verdict.shown.unit,
-        "fitted": _shown(verdict.fitted_deg, verdict.shown),
+        FITTED: _shown(verdict.fitted_deg, verdict.shown),
         GOOD: _shown(verdict.tolerance_deg, verdict.shown),
     }
 
@@ -216,7 +217,7 @@ def horizon_section(fits: Verdicts) -> Section | None:
     note = (
         "Rms error of how far the joint moves in this time, over starts every 2 s along the "
         "unseen logs. Each simulation begins 2 s earlier, at the measured angles. Last "
-        "column: of the angle over whole logs."
+        "column: error of the angle over whole logs."
     )
     table = Table.of("Error by prediction time", columns, rows, note)
     if not rows:
@@ -338,16 +339,19 @@ def worst(verdicts: Sequence[JointVerdict]) -> str:
         return ""
     verdict = max(verdicts, key=_size)
     if not np.isfinite(_error(verdict)):
-        return f"Worst: {verdict.name}, whose simulation diverges."
+        return f"Furthest outside its tolerance: {verdict.name}, whose simulation diverges."
     scale = verdict.shown.of_degrees(1.0)
     unit = verdict.shown.unit
     tolerance = two_digits(scale * verdict.tolerance_deg)
     # a joint without simple models has no logs either, and nothing beside it
     simple = min(verdict.baselines_deg.values(), default=0.0)
     error, least = told_apart(scale * _error(verdict), scale * simple)
+    where = "Furthest outside its tolerance"
+    if _size(verdict) <= 1.0:
+        where = "Nearest to its tolerance"
     return (
-        f"Worst: {verdict.name}, with an error of {error} {unit}. Up to {tolerance} {unit} "
-        f"is good (by default 2 % of its travel); the best simple model has {least} {unit}."
+        f"{where}: {verdict.name}, {error} {unit} (allowed {tolerance}, by default 2 % of "
+        f"travel). The best simple model errs by {least} {unit}."
     )
 
 

@@ -156,6 +156,8 @@ def test_its_flow_is_area_times_speed_and_its_pose_is_said_in_mm(
     }
     area = TRUTH["area_A" if sign > 0 else "area_B"] * 1e-6
     word = "raising" if sign > 0 else "lowering"
-    speed = found[f"speed at 100 % command and {bench.pose}, {word}"] * 1e-3
-    flow = found[f"flow at 100 % command and {bench.pose}, {word}"]
+    name = settings.arm.joint_names[1]
+    moves = f"when {word}: 100 % command, {name} at {bench.pose}"
+    speed = found[f"speed {moves}"] * 1e-3
+    flow = found[f"flow {moves}"]
     assert flow == pytest.approx(6e4 * area * speed, rel=1e-9)

@@ -68,10 +68,18 @@ def test_speeds_have_a_tab_for_each_joint_with_what_was_measured():
     section = speed_section(SETTINGS, SUMMARY, PROBLEM.logs)
     assert section is not None
     assert [tab.button for tab in section.tabs] == ["shoulder", "elbow"]
-    assert section.answer == "fastest: shoulder 24 deg/s and elbow 24 deg/s"
+    logged = PROBLEM.logs[0].command.min(axis=0)
+    assert section.answer == (
+        f"fastest: shoulder 24 deg/s (beyond the logs' {logged[1]:+.0f} %) "
+        f"and elbow 24 deg/s (beyond the logs' {logged[2]:+.0f} %)"
+    )
     chart = section.tabs[0].make()
     labels = {mark.label for panel in chart.panels for mark in panel.marks}
-    assert labels >= {"measured", "model, positive command", "model, negative command"}
+    assert labels >= {
+        "measured",
+        "model, side A: positive commands",
+        "model, side B: negative commands",
+    }
     drawn(chart)
     assert (
         speed_section(SETTINGS, SUMMARY.changed({"curves": {}}), PROBLEM.logs) is None
@@ -98,6 +106,8 @@ def test_step_and_frequency_response_stand_where_a_fit_states_them():
     curves = {f"shoulder_{kind}_positive": curve for kind, curve in kinds.items()}
     section = step_section(SETTINGS, SUMMARY.changed({"curves": curves}))
     assert section is not None
+    # from 3 to 3 / √2, between 0.5 and 1 Hz
+    assert section.answer == "bandwidth (-3 dB): shoulder 0.9 Hz"
     (tab,) = section.tabs
     chart = tab.make()
     assert [(panel.log_x, panel.log_y) for panel in chart.panels] == [

@@ -247,7 +247,7 @@ def test_the_verdict_shows_each_time_beside_the_best_simple_model_and_digits_tha
         "5 s": "2.91 (2.88) cannot be told",
         "10 s": "diverged (5)",
         "whole logs": "3.0 (2.0)",  # two logs tell nothing
-        "fitted": "1",
+        "whole fitted logs": "1",
         "good up to": "1",
     }
     assert lead({"a": [one]}).startswith(
@@ -299,14 +299,17 @@ def test_the_worst_joint_is_that_which_errs_most_for_its_tolerance():
     )
     said = worst([swing, boom])
     assert said.startswith(
-        "Worst: boom, with an error of 2.00 deg. Up to 1 deg is good "
+        "Furthest outside its tolerance: boom, 2.00 deg (allowed 1, "
     )
-    assert said.endswith("the best simple model has 2.04 deg.")
+    assert said.endswith("The best simple model errs by 2.04 deg.")
     assert not worst([boom])
     diverged = boom.changed({"unseen_deg": None, "fitted_deg": 0.1})
-    assert worst([swing, diverged]) == "Worst: boom, whose simulation diverges."
+    assert (
+        worst([swing, diverged])
+        == "Furthest outside its tolerance: boom, whose simulation diverges."
+    )
     assert worst([swing, diverged.changed({"unseen_logs": 0})]).startswith(
-        "Worst: swing"
+        "Nearest to its tolerance: swing"
     )
 
 

@@ -194,8 +194,9 @@ def _side_and_word(settings: FitSettings, name: str, summary: FitSummary) -> str
     knows."""
     side = quantity_and_side(settings, name)[1]
     word = ""
-    if side:
-        joint = settings.arm.joint_names[first_joint(settings, name) - 1]
+    joints = settings.parameters[name].joints or ()
+    if side and len(joints) == 1:
+        joint = settings.arm.joint_names[joints[0] - 1]
         word = direction_word(summary, joint, SIDES[side])
     return f"{side} ({word})" if word else side
 

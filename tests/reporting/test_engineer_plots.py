@@ -26,7 +26,7 @@ from hydroid.reporting.correlation_report import (
     strongest,
 )
 from hydroid.reporting.figure import figure, saved, style
-from hydroid.reporting.parameters_report import prior_chart, short_table
+from hydroid.reporting.parameters_report import direction_word, prior_chart, short_table
 from hydroid.reporting.residual_report import residual_section
 from hydroid.reporting.search_report import search_section, starts
 
@@ -104,7 +104,10 @@ def test_step_and_frequency_response_stand_where_a_fit_states_them():
     turned = step.changed({"along": "frequency [Hz]"})
     kinds = {"step": step, "amplitude": turned, "phase": turned}
     curves = {f"shoulder_{kind}_positive": curve for kind, curve in kinds.items()}
-    section = step_section(SETTINGS, SUMMARY.changed({"curves": curves}))
+    summary = SUMMARY.changed({"curves": curves})
+    assert direction_word(summary, "shoulder", "positive") == "raising"
+    assert direction_word(summary, "shoulder", "negative") == ""
+    section = step_section(SETTINGS, summary)
     assert section is not None
     # from 3 to 3 / √2, between 0.5 and 1 Hz
     assert section.answer == "bandwidth (-3 dB): shoulder 0.9 Hz"

@@ -316,11 +316,17 @@ def resample(recording: Recording, settings: LogSettings, joints: int) -> Log:
             commands[joint] = commands.get(joint, 0.0) - values
         else:
             commands[joint] = commands.get(joint, 0.0) + values
+    # a scale and an offset in a few digits do not give 0 at rest
+    shifted = {
+        signal.joint - 1
+        for signal in recording.signals
+        if signal.kind == "command" and signal.offset
+    }
     command = np.zeros((len(grid), joints))
     at = grid - settings.delay_s
     for joint, values in commands.items():
-        # a scale and an offset in a few digits do not give 0 at rest
-        values = np.where(np.abs(values) < NO_COMMAND, 0.0, values)
+        if joint in shifted:
+            values = np.where(np.abs(values) < NO_COMMAND, 0.0, values)
         # amplifiers and converters overshoot
         values = values.clip(-100, 100)
         command[:, joint] = _resampled(time, values, at, period)

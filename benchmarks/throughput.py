@@ -10,7 +10,7 @@ time; and the excavator's derivatives in both models of stage 2.
 
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 
 import mujoco
@@ -88,7 +88,7 @@ def bare_rollout(problem: Problem) -> Callable[[], object]:
     return roll
 
 
-def in_turn(calls: dict[str, Callable[[], object]]) -> dict[str, np.ndarray]:
+def in_turn(calls: Mapping[str, Callable[[], object]]) -> dict[str, np.ndarray]:
     """Seconds of each call in every round, shape (REPEATS,)."""
     rounds = dict[str, list[float]]()
     for _ in range(1 + REPEATS):  # the first one compiles and warms up

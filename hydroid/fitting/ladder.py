@@ -247,6 +247,8 @@ class Ladder:
         gained -= likelihood.log_posterior(self.kept.theta)
         if gained > LEAST_GAIN:
             self.kept = self._measured(problem, end, self._step)
+        # what is shown last is what is kept
+        self._watch.refining(self._step, end.evaluations, self.kept.rms)
 
     def known(self, theta: Array) -> Uncertainty:
         """Return how well the logs determine theta, (P,): the estimate that is kept, or

@@ -78,7 +78,7 @@ def guess_columns(
     arm = Joints(joints, links, slides, rods, ranges)
     columns = signal_columns(table, (*joints, *links))
     time = _time_column(table, columns)
-    step = np.nanmedian(np.diff(time.values))
+    step = usual_step(time.values)
     unit = time.unit or likely_time_unit(step) or "s"
     step *= UNITS[unit].factor
     reasons = [f"{time.name}: time in {unit}, every {step:.3g} s"]
@@ -106,6 +106,14 @@ def guess_columns(
         "joints": entries,
     }
     return ColumnGuess(log, tuple(reasons), unused)
+
+
+def usual_step(times: Array) -> float:
+    """Return the median of the differences of times, (T,), that are numbers; 0 where
+    there is none."""
+    steps = np.diff(times)
+    known = steps[np.isfinite(steps)]
+    return float(np.median(known)) if known.size else 0.0
 
 
 def nearest_period(step: float) -> float:

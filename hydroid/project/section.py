@@ -3,12 +3,10 @@ joint by joint."""
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from hydroid.errors import LogError, SettingsError
 from hydroid.files import Plain
 from hydroid.log import ColumnGuess, Table, guess_columns
-from hydroid.log.guess import nearest_period
+from hydroid.log.guess import nearest_period, usual_step
 from hydroid.log.rods import Rod, rods_of
 from hydroid.log.table import Signal
 from hydroid.project.columns import holds_numbers
@@ -115,7 +113,7 @@ def _sample_time(table: Table, given: LogSettings) -> float:
     """Return the usual time between samples of a log [s]."""
     time = Signal(given.time.column, "time", gain=UNITS[given.time.unit].factor)
     (times,) = table.read([time]).values.T
-    return nearest_period(float(np.nanmedian(np.diff(times))))
+    return nearest_period(usual_step(times))
 
 
 def _entry(columns: ColumnMap) -> Plain:

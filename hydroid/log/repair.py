@@ -304,7 +304,6 @@ def resample(recording: Recording, settings: LogSettings, joints: int) -> Log:
     pressure: Array | None = None
     if any(signal.kind == "pressure" for signal in recording.signals):
         pressure = np.full((len(grid), joints, 2), np.nan)
-    commands = dict[int, Array]()
     columns = recording.values.T[1:]
     for signal, values in zip(recording.signals[1:], columns, strict=True):
         joint = signal.joint - 1
@@ -312,23 +311,9 @@ def resample(recording: Recording, settings: LogSettings, joints: int) -> Log:
             angle[:, joint] = np.interp(grid, time, values)
         elif pressure is not None and signal.kind == "pressure":
             pressure[:, joint, signal.part] = np.interp(grid, time, values)
-        elif signal.part:
-            commands[joint] = commands.get(joint, 0.0) - values
-        else:
-            commands[joint] = commands.get(joint, 0.0) + values
-    # a scale and an offset in a few digits do not give 0 at rest
-    shifted = {
-        signal.joint - 1
-        for signal in recording.signals
-        if signal.kind == "command" and signal.offset
-    }
     command = np.zeros((len(grid), joints))
     at = grid - settings.delay_s
-    for joint, values in commands.items():
-        if joint in shifted:
-            values = np.where(np.abs(values) < NO_COMMAND, 0.0, values)
-        # amplifiers and converters overshoot
-        values = values.clip(-100, 100)
+    for joint, values in _commands(recording).items():
         command[:, joint] = _resampled(time, values, at, period)
     rows = np.rint(time / period).astype(np.int64)
     rows = np.minimum(rows, last)
@@ -343,6 +328,28 @@ def resample(recording: Recording, settings: LogSettings, joints: int) -> Log:
         pressure=pressure,
         recorded=None if recorded.all() else recorded,
     )
+
+
+def _commands(recording: Recording) -> dict[int, Array]:
+    """Return the command of each joint (0-based) in every sample [%], (R,)."""
+    commands = dict[int, Array]()
+    shifted = set[int]()
+    columns = recording.values.T
+    for signal, values in zip(recording.signals, columns, strict=True):
+        if signal.kind != "command":
+            continue
+        joint = signal.joint - 1
+        sign = -1.0 if signal.part else 1.0
+        commands[joint] = commands.get(joint, 0.0) + sign * values
+        if signal.offset:
+            shifted.add(joint)
+    for joint, values in commands.items():
+        # a scale and an offset in a few digits do not give 0 at rest
+        if joint in shifted:
+            values = np.where(np.abs(values) < NO_COMMAND, 0.0, values)
+        # amplifiers and converters overshoot
+        commands[joint] = values.clip(-100, 100)
+    return commands
 
 
 def _resampled(time: Array, command: Array, at: Array, period: float) -> Array:

@@ -4,7 +4,8 @@ it than the last one.
 A rung is kept where it foretells parts of the logs that it has not seen better than the
 one below, by more than the uncertainty of that (`left_out.is_better`). Which rung that
 is shows long before least squares has converged, so that ends early on the way
-(`FIRM`). What is kept at the end is refined to the tolerance of the settings.
+(`FIRM`). What is kept at the end is refined to the tolerance of the settings,
+and, by least squares alone, once more from elsewhere (`Ladder._end_anew`).
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence

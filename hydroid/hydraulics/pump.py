@@ -18,10 +18,9 @@ is taken. Where valves have an open centre, oil runs past them back to the tank,
 
     past = g Q_max (1 − s) √(P/p_S),
 
-s the largest share that one is open, and g `pump_bypass`. The pump
-comes up after a demand: φ is `pump_idle` at rest,
-and from `pump_delay` after the first command on it rises to 1 with the time constant
-`pump_rise`. Every section of the valve has a load check valve: oil never runs back to
+s the largest share that one is open, and g `pump_bypass`. The pump comes up after a
+demand: φ is `pump_idle` at rest, and from `pump_delay` after the first command on it
+rises to 1 with the time constant `pump_rise`. Every section of the valve has a load check valve: oil never runs back to
 the pump. A joint whose own supply pressure is lower than the line's has a reducing
 valve. Joints without an actuator take nothing. One that follows a log takes what its
 actuator's chamber swallows at the logged speed, however low P falls.
@@ -58,9 +57,8 @@ from hydroid.hydraulics.valve import rod_speed
 ITERATIONS = 30  # for a quasi-static line's pressure at most; three to five suffice
 # part of the pump's flow, or of its pressure, that may be left when they end
 SETTLED = 1e-9
-LEAST_FALL = (
-    1e-3  # part of the droop below which the slope of a pump's curve counts no more
-)
+# part of the droop below which a pump's curve is taken for no steeper
+LEAST_FALL = 1e-3
 
 
 @compilable
@@ -75,7 +73,7 @@ def delivery(pressure: float, share: float, c) -> Any:
         return full * max(below_relief, 0.0) / c.pump_droop, full / c.pump_droop
     part = max(below_relief, 0.0) / c.pump_droop
     flow = full * part ** (1.0 / c.pump_exponent)
-    # no flow has a steeper slope than any number
+    # at no flow the curve has an infinite slope
     part = max(part, LEAST_FALL)
     slope = full * part ** (1.0 / c.pump_exponent - 1.0)
     return flow, slope / (c.pump_exponent * c.pump_droop)

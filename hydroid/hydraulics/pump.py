@@ -20,10 +20,11 @@ is taken. Where valves have an open centre, oil runs past them back to the tank,
 
 s the largest share that one is open, and g `pump_bypass`. The pump comes up after a
 demand: φ is `pump_idle` at rest, and from `pump_delay` after the first command on it
-rises to 1 with the time constant `pump_rise`. Every section of the valve has a load check valve: oil never runs back to
-the pump. A joint whose own supply pressure is lower than the line's has a reducing
-valve. Joints without an actuator take nothing. One that follows a log takes what its
-actuator's chamber swallows at the logged speed, however low P falls.
+rises to 1 with the time constant `pump_rise`. Every section of the valve has a load
+check valve: oil never runs back to the pump. A joint whose own supply pressure is lower
+than the line's has a reducing valve. Joints without an actuator take nothing. One that
+follows a log takes what its actuator's chamber swallows at the logged speed, however
+low P falls.
 
 A sub-step is implicit in P, as it is in the chamber pressures and velocities. With the
 chambers eliminated, P changes by

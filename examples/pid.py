@@ -77,9 +77,9 @@ def main(source: str) -> None:
     late = max(float(joint_lags(model)[joint]), model.period)
     ended = {gain / late: follow(machine, model, path, gain / late) for gain in GAINS}
     gain = min(ended, key=lambda one: ended[one][0])
-    unit, factor = (
-        ("mm", 1e3) if arm.joints[joint].slides else ("deg", float(np.degrees(1.0)))
-    )
+    shown = arm.joints[joint].shown
+    unit = shown.unit
+    factor = shown.factor
     wanted = factor * path.angle(SECONDS)
     print(
         f"{name} after {SECONDS:.0f} s: {factor * ended[gain][1]:.2f} {unit} of {wanted:.2f}"

@@ -130,6 +130,11 @@ class CurveEstimate(Settings):
     value: tuple[float, ...]
     interval: tuple[Interval, ...]
     """95 % interval at each point by itself"""
+    step: float | None = None
+    """command [%] whose step it answers; null: it answers none"""
+    moves: str = ""
+    """what that command does with the joint's weight, raising or lowering; empty where
+    it does neither"""
 
 
 def _finding(value: Any) -> Any:

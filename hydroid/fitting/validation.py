@@ -125,16 +125,16 @@ class Prediction:
             raise KeyError(
                 f"no joint {joint!r} is predicted; there {_are(self._named)}"
             )
-        _, unit, factor = display(slides=number in self.slides)
+        shown = display(slides=number in self.slides)
         column = self.joints.index(number)
         band = self.bands.get(number)
         return JointPrediction(
             name=self._named[column],
-            unit=unit,
+            unit=shown.unit,
             time=self.log.time,
-            measured=factor * self.log.angle[:, number - 1],
-            response=factor * self.response[:, column],
-            half=None if band is None else factor * band.half,
+            measured=shown.factor * self.log.angle[:, number - 1],
+            response=shown.factor * self.response[:, column],
+            half=None if band is None else shown.factor * band.half,
         )
 
     def __iter__(self) -> Iterator[str]:

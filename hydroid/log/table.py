@@ -18,6 +18,7 @@ from hydroid.errors import LogError
 from hydroid.findings import Level
 from hydroid.log.log import LogFinding, log_finding
 from hydroid.log.rods import Rod
+from hydroid.units import TURNING, Display, display
 
 _DAY = 86_400 * 10**9
 """[ns]"""
@@ -62,6 +63,12 @@ class Signal:
     owner: str = ""
     rest: float = 0.0
     rod: Rod | None = None
+
+    @property
+    def shown(self) -> Display:
+        """How messages write the angle, or the position of a joint that slides, that it
+        holds."""
+        return display(slides=self.unit not in ("", TURNING.unit))
 
     def __str__(self) -> str:
         return f"{self.kind} of joint {self.owner}" if self.joint else self.kind

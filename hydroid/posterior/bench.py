@@ -40,9 +40,15 @@ class Direction(NamedTuple):
     word: str
 
     @property
+    def moves(self) -> str:
+        """What a command in it does with the joint's weight, raising or lowering; empty
+        where it does neither."""
+        return "" if self.word == self.ending else self.word
+
+    @property
     def when(self) -> str:
         """Says in a sentence when the joint moves in it."""
-        if self.word == self.ending:  # nothing is raised
+        if not self.moves:
             return f"with {self.word} commands"
         return f"when {self.word}"
 
@@ -210,17 +216,14 @@ def make_bench(settings: FitSettings, logs: Sequence[Log], joint: int) -> Bench:
     angles = np.concatenate([log.posed[:, joint - 1] for log in shown])
     middle = (angles.min() + angles.max()) / 2
     # in whole degrees or millimetres, as words say it
-    if arm.joints[joint - 1].slides:
-        middle = np.round(1e3 * middle) / 1e3
-    else:
-        middle = np.radians(np.round(np.degrees(middle)))
+    middle = arm.joints[joint - 1].shown.rounded(middle)
     command = np.zeros((2, len(pose)))
     still = np.tile(pose, (2, 1))
     rest = Log("a test movement", np.array([0.0, period]), command, still, period)
     alone = settings.changed({"simulation.other_joints": "locked"})
     scenario = make_scenario(load_model(arm), rest, [joint - 1], alone)
     only = (only_command(logs, joint, 1.0), only_command(logs, joint, -1.0))
-    return Bench(settings, joint, float(middle), period, scenario, only)
+    return Bench(settings, joint, middle, period, scenario, only)
 
 
 def actuator(bench: Bench, candidates: Candidates) -> tuple[Records, Array, Array]:

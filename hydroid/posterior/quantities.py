@@ -130,6 +130,8 @@ def _curve(
         joint=joint,
         unit=last.unit,
         along=last.along,
+        step=last.step,
+        moves=last.moves,
         at=tuple(_rounded(columns[i].at) for i in order),
         value=tuple(_rounded(estimated.value[rows[i]]) for i in order),
         interval=tuple(_rounded_ends(estimated.interval[rows[i]]) for i in order),

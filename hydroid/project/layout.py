@@ -4,8 +4,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
 
-import numpy as np
-
 from hydroid.arrays import Array, record
 from hydroid.errors import LogError
 from hydroid.files import Plain
@@ -242,8 +240,8 @@ def _skeleton(table: Table, arm: Arm, guess: ColumnGuess, missing: str) -> Layou
     for number, joint in enumerate(arm.joints, 1):
         entry = dict(guess.log["joints"].get(number, {"command": None, "angle": None}))
         entry["command"] = entry["command"] or {"column": "COMMAND", "scale": 1}
-        unit = "m" if joint.slides else "deg"
-        entry["angle"] = entry["angle"] or {"column": "ANGLE", "unit": unit}
+        placeholder = {"column": "ANGLE", "unit": joint.shown.setting}
+        entry["angle"] = entry["angle"] or placeholder
         entries[number] = entry
     placeholders = {
         "time": {"column": "TIME", "unit": "s"},
@@ -305,16 +303,12 @@ def _beyond_range(angle: Array, joint: Joint) -> Iterator[str]:
     margin = angle_margin(lowest, highest)
     if low >= lowest - margin and high <= highest + margin:
         return
-    if joint.slides:
-        what = "positions"
-        run = f"run from {low:.4g} to {high:.4g} m"
-    else:
-        what = "angles"
-        run = f"run from {np.degrees(low):.4g} to {np.degrees(high):.4g} deg"
+    shown = joint.shown
+    ends = f"{shown.in_setting(low):.4g} to {shown.in_setting(high):.4g}"
     allowed = f"{joint.range[0]:.6g} to {joint.range[1]:.6g}"
     yield (
-        f"{joint.name}: {what} in the log {run}, but the arm allows {allowed}: give them an offset "
-        "or a scale of -1, or change the range in arm.xml"
+        f"{joint.name}: {shown.word}s in the log run from {ends} {shown.setting}, but the arm "
+        f"allows {allowed}: give them an offset or a scale of -1, or change the range in arm.xml"
     )
 
 

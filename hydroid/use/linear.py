@@ -195,7 +195,7 @@ def _output_names(plant: Plant, joints: Sequence[int]) -> tuple[str, ...]:
     speeds = list[str]()
     for joint in joints:
         name = plant.names[joint]
-        unit = "m" if plant.identified.settings.arm.joints[joint].slides else "rad"
+        unit = plant.identified.settings.arm.joints[joint].shown.si
         angles.append(f"{name} angle [{unit}]")
         speeds.append(f"{name} speed [{unit}/s]")
     return (*angles, *speeds)

@@ -25,11 +25,16 @@ from hydroid.errors import SettingsError
 from hydroid.hydraulics.kernel import Plugin, source_key
 from hydroid.mjcf import quiet_mujoco
 from hydroid.plant.plant import PHYSICS, Plant
+from hydroid.rungs import Rung
 from hydroid.simulation.quasi_static import roll_quasi_static, share_pump
 from hydroid.simulation.rollout import Course, Handles, Trace, bind, roll, write_sample
+from hydroid.simulation.rolls import ROLLS
 
-# both rungs' files are in the key of numba's cache
+# the files of all rollouts below are in the key of numba's cache
 SOURCE = source_key(write_sample, share_pump)
+QUASI_STATIC: dict[Callable[..., None], bool] = {roll: False, roll_quasi_static: True}
+"""which branch of `_roll_some` is a rollout's: numba's cache takes no function that is
+handed over"""
 
 
 def _typed_pointer(typing: Any, address: Any) -> Any:
@@ -83,7 +88,7 @@ def _roll_some(
     shared: Handles,
     plugin: Plugin,
     plants: Population,
-    at_once: bool,
+    quasi_static: bool,
     source: int = SOURCE,
 ) -> None:
     """Roll some plants out, from rows[0] to before rows[1]; `shared` has what is alike
@@ -126,12 +131,23 @@ def _roll_some(
         )
         course = Course(plants.commands[i], plants.torque[i], nothing, no_openings)
         trace = Trace(plants.angle[i], no_states)
-        if at_once:
+        if quasi_static:
             roll_quasi_static(handles, actuators, plants.state[i], course, trace)
         else:
             roll(handles, actuators, plants.state[i], course, trace)
         finite = np.isfinite(handles.angle).all()
         plants.failed[i] = handles.warnings.any() or not finite
+
+
+def _is_quasi_static(rung: Rung) -> bool:
+    """Return the branch of `_roll_some` that rolls the plants of a rung.
+
+    Raises SettingsError: it has none.
+    """
+    branch = QUASI_STATIC.get(ROLLS[rung])
+    if branch is None:
+        raise SettingsError(f"cannot step the model {rung.name}", "a batch of plants")
+    return branch
 
 
 def copy_records(source: Structs, target: Structs) -> None:
@@ -369,7 +385,7 @@ class PlantBatch:
                 parts.arm.handles,
                 parts.plugin,
                 self._population,
-                first.rung.at_once,
+                _is_quasi_static(first.rung),
             )
             self._calls.append(call)
 

@@ -6,8 +6,8 @@ from typing import NamedTuple
 from hydroid.arrays import record
 from hydroid.log.clues import direction, joint_of, number_in
 from hydroid.log.columns import Column
-from hydroid.log.mapping import LENGTHS
 from hydroid.log.rods import Rod
+from hydroid.settings.log import LENGTHS
 from hydroid.words import listed
 
 USELESS = "left out, lengths of cylinders whose pivots are not known"

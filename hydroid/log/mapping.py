@@ -13,14 +13,12 @@ from hydroid.log.log import LogFinding, log_finding
 from hydroid.log.rods import Rod, rods_of
 from hydroid.log.table import Signal, Table
 from hydroid.settings.arm import Arm
-from hydroid.settings.log import ColumnMap, Kind, LogSettings
+from hydroid.settings.log import LENGTHS, ColumnMap, Kind, LogSettings
 from hydroid.units import UNITS
 from hydroid.words import listed
 
 SHOWN = {"command": "%", "angle": "deg", "length": "mm", "pressure": "bar"}
 """units in which messages state what is measured"""
-LENGTHS = ("m", "cm", "mm")
-"""units of positions, and of the lengths of cylinders"""
 ALIKE = 0.75
 """least likeness of two names of which one may be the other misspelt, from 0 to 1"""
 

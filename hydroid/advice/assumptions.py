@@ -57,25 +57,25 @@ class _Motion:
 
     def command(self, joint: int, earlier: int) -> Array:
         """Return a joint's commands some windows earlier, shape (n,)."""
-        late = list[Array]()
+        delayed = list[Array]()
         for commands in self.commands:
             padded = np.pad(commands[:, joint], (earlier, 0), "edge")
-            late.append(padded[: len(commands)])
-        return np.concatenate(late)
+            delayed.append(padded[: len(commands)])
+        return np.concatenate(delayed)
 
     def follows(self, joint: int, other: int) -> tuple[float, int]:
         """Return how a joint's speed correlates with a joint's command, and after how
         many windows it does most."""
         speed = self.speed[:, joint] - self.speed[:, joint].mean()
         correlations = list[tuple[float, int]]()
-        for late in range(round(LATEST / self.period) + 1):
-            command = self.command(other, late)
+        for lag in range(round(LATEST / self.period) + 1):
+            command = self.command(other, lag)
             command -= command.mean()
             size = np.linalg.norm(command) * np.linalg.norm(speed)
             # of equal ones the earliest
-            correlations.append((abs(command @ speed) / max(size, TINY), -late))
-        best, late = max(correlations)
-        return best, -late
+            correlations.append((abs(command @ speed) / max(size, TINY), -lag))
+        best, negative_lag = max(correlations)
+        return best, -negative_lag
 
 
 def doubts(settings: FitSettings, logs: Sequence[Log]) -> dict[int, float]:

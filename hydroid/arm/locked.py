@@ -218,16 +218,16 @@ def repeat(model: mujoco.MjModel, copies: int) -> mujoco.MjModel:
             name = f"{body.name} {copy}"
             bodies.append(_add(above, name, body.pos, body.quat, joint, copy))
     with quiet_mujoco():
-        many = spec.compile()
+        repeated = spec.compile()
     # as they are in the model, to the last bit
-    many.body_pos[1:] = np.tile(model.body_pos[1:], (copies, 1))
-    many.body_quat[1:] = np.tile(model.body_quat[1:], (copies, 1))
-    _take_over(many, model, [*range(model.njnt)] * copies)
-    many.stat.meaninertia = model.stat.meaninertia
-    many.opt.disableflags = model.opt.disableflags & ~int(
-        mujoco.mjtDisableBit.mjDSBL_ISLAND
-    )
-    return many
+    repeated.body_pos[1:] = np.tile(model.body_pos[1:], (copies, 1))
+    repeated.body_quat[1:] = np.tile(model.body_quat[1:], (copies, 1))
+    _take_over(repeated, model, [*range(model.njnt)] * copies)
+    repeated.stat.meaninertia = model.stat.meaninertia
+    # each copy is an island of constraints of its own, and is solved apart
+    islands = int(mujoco.mjtDisableBit.mjDSBL_ISLAND)
+    repeated.opt.disableflags = model.opt.disableflags & ~islands
+    return repeated
 
 
 def _add(

@@ -111,11 +111,11 @@ def follow(
     angles = np.empty(len(target))
     for k in range(len(target)):
         angles[k] = angle
-        late = k - whole
-        later = late - 1
-        wanted = (1 - part) * target[late] if late >= 0 else 0.0
-        wanted += part * target[later] if later >= 0 else 0.0
-        way = side[max(late, 0)]
+        now = k - whole
+        before = now - 1
+        wanted = (1 - part) * target[now] if now >= 0 else 0.0
+        wanted += part * target[before] if before >= 0 else 0.0
+        way = side[max(now, 0)]
         # the integral of a speed that approaches the wanted one over this sample
         angle += wanted + (speed - wanted) * lag[way] * (1 - left[way])
         speed = wanted + (speed - wanted) * left[way]
@@ -177,14 +177,14 @@ def _mean_speeds(logs: Sequence[Log], still: Baseline, delay: float) -> Baseline
     for log in logs:
         command = log.command[:, still.joint - 1]
         angle = log.angle[:, still.joint - 1]
-        late = round(delay / log.period)
-        speed = np.diff(angle[late:]) / log.period
+        lag = round(delay / log.period)
+        speed = np.diff(angle[lag:]) / log.period
         command = command[: len(speed)]
         # at an end of its range no command moves it
         margin = 0.01 * np.ptp(angle)
         low, high = still.limits
         free = (angle > low + margin) & (angle < high - margin)
-        counts = free[late:-1] & (command != 0)
+        counts = free[lag:-1] & (command != 0)
         pairs.append(np.stack([command, speed])[:, counts])
     command, speed = np.hstack(pairs)
     bins = np.floor(command / (200 / BINS))

@@ -118,12 +118,12 @@ def search(problem: Problem, watch: Watcher, checkpoints: Checkpoints) -> Search
 
     Raises RunError: the search does not repeat what it did before the checkpoint.
     """
-    late = False
+    time_is_up = False
 
     def refining(step: Step, simulated: int, rms: float) -> bool:
-        nonlocal late
-        late = watch.refining(step, simulated, rms) or late
-        return late
+        nonlocal time_is_up
+        time_is_up = watch.refining(step, simulated, rms) or time_is_up
+        return time_is_up
 
     memo = Memo(problem, checkpoints.get("search"))
     algorithm: Search
@@ -143,7 +143,7 @@ def search(problem: Problem, watch: Watcher, checkpoints: Checkpoints) -> Search
     evaluations = 0
     with saving(checkpoints, "search") as keep:
         while population is None or (
-            len(history) <= algorithm.generations and not late
+            len(history) <= algorithm.generations and not time_is_up
         ):
             repeats = bool(memo.stored)
             chromosomes = algorithm.ask(population, rng)
@@ -164,8 +164,9 @@ def search(problem: Problem, watch: Watcher, checkpoints: Checkpoints) -> Search
             ]
             history = np.vstack([history, row])
             if not repeats:
-                if not late:  # else a start may not have been refined to its end
+                # else a start may not have been refined to its end
+                if not time_is_up:
                     keep(state)
-                late = watch.generation(history[-1]) or late
+                time_is_up = watch.generation(history[-1]) or time_is_up
     theta = algorithm.theta(population.chromosomes)
     return Searched(theta, population, algorithm.single, history, memo, algorithm.ends)

@@ -151,17 +151,19 @@ def _isotonic(
 def _pairs(log: Log, joint: int, reach: tuple[float, float], delay: float) -> Array:
     """Return commands [%], the speeds that follow them [rad/s], and their weights,
     shape (3, n)."""
-    command, angle = log.command[:, joint - 1], log.angle[:, joint - 1]
+    command = log.command[:, joint - 1]
+    angle = log.angle[:, joint - 1]
     half = max(round(0.5 * WINDOW / log.period), 1)
-    late, before = round(delay / log.period), round(SETTLING / log.period)
-    first = max(half, late + before)
+    lag = round(delay / log.period)
+    settling = round(SETTLING / log.period)
+    first = max(half, lag + settling)
     at = np.arange(first, len(angle) - half)
     if len(at) == 0:
         return np.empty((3, 0))
     speed = (angle[at + half] - angle[at - half]) / (2 * half * log.period)
-    asked = command[at - late]
-    behind = np.stack([command[at - late - shift] for shift in range(before + 1)])
-    changed = np.ptp(behind, axis=0) / STEADY
+    asked = command[at - lag]
+    recent = [command[at - lag - shift] for shift in range(settling + 1)]
+    changed = np.ptp(np.stack(recent), axis=0) / STEADY
     weight = 1.0 / (1.0 + changed * changed)
     there = inside(angle, reach)[at]
     return np.stack([asked, speed, weight])[:, there]

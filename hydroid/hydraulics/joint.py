@@ -56,8 +56,8 @@ def command(c, z, w, commands, now: int) -> None:
     """
     w.a.before = z.a.asked
     w.b.before = z.b.asked
-    w.a.after = commands[now - c.a.late]
-    w.b.after = -commands[now - c.b.late]
+    w.a.after = commands[now - c.a.delay_steps]
+    w.b.after = -commands[now - c.b.delay_steps]
     z.a.asked = w.a.after
     z.b.asked = w.b.after
 
@@ -139,14 +139,14 @@ def net_opening(c, z, w, substep: int, step: float) -> float:
     if z.displacement != displacement:
         z.displacement = displacement
         if displacement > 0.0:
-            z.open = c.a.lagging * open_share(c.a, displacement)
+            z.unlagged = c.a.lagging * open_share(c.a, displacement)
         else:
-            z.open = -c.b.lagging * open_share(c.b, -displacement)
+            z.unlagged = -c.b.lagging * open_share(c.b, -displacement)
     # a spool passes its neutral when it does, however large the openings of its two
     # sides are; a speed that lags, as of a mass, passes 0 by the speeds of both
-    left = (z.opening - z.open) * (1.0 - c.opening_keep)
-    z.opening -= left
-    mean = z.open + left * c.opening_steps
+    left = (z.lagged - z.unlagged) * (1.0 - c.opening_keep)
+    z.lagged -= left
+    mean = z.unlagged + left * c.opening_steps
     side = c.a if mean > 0.0 else c.b
     return side.opening * (mean / side.lagging)
 

@@ -71,10 +71,10 @@ def _kind_by_unit(in_name: Collection[str], unit: Unit) -> str:
 
 
 def _kind_by_words(name: str) -> str:
-    """Return the kind that the last telling word of a name says."""
+    """Return the kind that a name says, by the last of its words that says one."""
     for word in reversed(words(name)):
-        for kind, telling in CLUES["kinds"].items():
-            if word in telling:
+        for kind, vocabulary in CLUES["kinds"].items():
+            if word in vocabulary:
                 return kind
     # "boom_up" is what a valve is told
     sign, _ = direction(name)

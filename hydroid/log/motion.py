@@ -20,7 +20,7 @@ END = 0.02
 """part of a joint's travel that counts as its end"""
 MOVING = 0.2
 """part of a joint's speed above which it moves"""
-LATE = 0.25
+USUAL_LAG = 0.25
 """how much later than its command a joint moves, by valve and oil [s]"""
 LONGEST_LAG = 0.8
 """that is looked for [s]"""
@@ -75,10 +75,10 @@ class JointMotion:
     def directed(self) -> tuple[float, float]:
         """Its way under strong commands [deg], and the share of this against them; 0 if
         it is too short."""
-        late = round(LATE / self.log.period)
+        lag = round(USUAL_LAG / self.log.period)
         smooth_command, _, speed = self._slow
-        command = smooth_command[: len(smooth_command) - late]
-        steps = np.rad2deg(speed[late:]) * self.log.period
+        command = smooth_command[: len(smooth_command) - lag]
+        steps = np.rad2deg(speed[lag:]) * self.log.period
         strong = np.abs(command) > 0.3 * np.abs(self._logged).max()
         path = np.abs(steps[strong]).sum()
         if path < LEAST_PATH:
@@ -138,10 +138,10 @@ class JointMotion:
         Every 5 % more must explain a thousandth of the samples, else few of them
         decide.
         """
-        late = round(self.likely_lag / self.log.period)
+        lag = round(self.likely_lag / self.log.period)
         _, _, speed = self._quick
-        moves = np.abs(speed[late:]) > 0.1 * self.speed
-        size = np.abs(self._logged[: len(self._logged) - late])
+        moves = np.abs(speed[lag:]) > 0.1 * self.speed
+        size = np.abs(self._logged[: len(self._logged) - lag])
         costs = list[float]()
         for step in range(20):
             wrong = np.mean(moves == (size < 5 * step))

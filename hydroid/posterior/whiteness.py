@@ -165,7 +165,9 @@ def cross_correlation(logs: list[Array], causes: list[Array], lags: int) -> Arra
         change = cause - cause.mean()
         squares += log @ log, change @ change
         for lag in range(lags + 1):
-            late = len(log) - lag
-            products[lags + lag] += log[lag:] @ change[:late]
-            products[lags - lag] += log[:late] @ change[lag:] if lag else 0.0
+            shared = len(log) - lag
+            products[lags + lag] += log[lag:] @ change[:shared]
+            # without a lag both would be the same product, which counts once
+            if lag:
+                products[lags - lag] += log[:shared] @ change[lag:]
     return products / max(np.sqrt(squares.prod()), np.finfo(float).tiny)

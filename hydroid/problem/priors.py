@@ -98,8 +98,9 @@ class _Heavy:
         square = (distances * distances).sum(axis=1, keepdims=True)
         # log(1 + x)/x is 1 there to the last digit
         far = np.maximum(square / FREEDOM, 1e-12)
-        many = distances.shape[1]
-        return distances * np.sqrt((FREEDOM + many) / FREEDOM * np.log1p(far) / far)
+        count = distances.shape[1]
+        shrinking = np.log1p(far) / far
+        return distances * np.sqrt((FREEDOM + count) / FREEDOM * shrinking)
 
     def weight(self, theta: Array) -> float:
         """Factor on distances at one theta, (1, P), by which a normal prior has the
@@ -141,9 +142,9 @@ class Priors:
             self._several.append(further)
             if isinstance(further, _Combination):
                 self._combinations.append(further)
-            many = further.distances(self.searched.start[None]).shape[1]
-            names += [name] * many
-            firm += [isinstance(further, _Combination)] * many
+            count = further.distances(self.searched.start[None]).shape[1]
+            names += [name] * count
+            firm += [isinstance(further, _Combination)] * count
         self.names = tuple(names)
         self.firm: Mask = np.array(firm, dtype=bool)
         if self._combinations:

@@ -81,10 +81,10 @@ class Problem:
         segments: list[Ints] = []
         for channel in self.channels:
             # a pressure is one objective, however long
-            many = 1
+            count = 1
             if channel.quantity == "angle":
-                many = settings.objective.segments
-            within = segment_bounds(len(channel.measured), many)
+                count = settings.objective.segments
+            within = segment_bounds(len(channel.measured), count)
             segments.append(channel.rows.start + within)
         self.bounds: Ints = np.concatenate(segments)
 

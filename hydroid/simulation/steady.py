@@ -148,11 +148,11 @@ def oil_at(speed: float, supply: float, c, w, takes) -> Any:
     """Pressures of chambers A and B [Pa] at a rod's speed [m/s], and flow from the pump
     [m³/s].
 
-    `w` has the valve's net opening `travel` [m²]. The chambers take in oil as pistons
+    `w` has the valve's net opening `open_area` [m²]. The chambers take in oil as pistons
     of the areas that `takes` has [m²] do.
     """
-    a = max(w.travel, 0.0)
-    b = max(-w.travel, 0.0)
+    a = max(w.open_area, 0.0)
+    b = max(-w.open_area, 0.0)
     return_a = c.leakage + b * c.a.return_
     return_b = c.leakage + a * c.b.return_
     flow_a = takes[0] * speed
@@ -230,7 +230,7 @@ def fed_speed(c, w, takes) -> Any:
     high = c.relief
     pressure = c.relief
     # what is drawn rises with the line's pressure, and what is given falls
-    centre = left_open(1.0, c, w.travel)
+    centre = left_open(1.0, c, w.open_area)
     for _ in range(HALVINGS):
         _, drawn = balanced_speed(min(pressure, c.supply_pressure), c, w, takes)
         drawn += past_valves(pressure, centre, c)[0]
@@ -254,7 +254,7 @@ def areas_on_the_way(c, w, angle: float, load, command: float) -> Any:
     (3,).
     """
     areas = (c.a.area, c.b.area)
-    w.travel = steady_opening(command, c)
+    w.open_area = steady_opening(command, c)
     weigh(c, w, angle - NEAR, load[0])
     speed, supply = fed_speed(c, w, areas)
     before_a, before_b, _ = oil_at(speed, supply, c, w, areas)
@@ -287,7 +287,7 @@ def _quasi_static_speed(coefficients, driven, pad) -> float:
         shared = line_pressure(coefficients, driven, pad.joints, line, 1.0)
         supply = min(supply, shared)
     speed = rod_speed(c, w, supply)[0]
-    return speed if w.travel > 0.0 else -speed
+    return speed if w.open_area > 0.0 else -speed
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -303,8 +303,8 @@ def _steady(
     for i in range(coefficients.size):
         c = coefficients[i]
         for k in range(commands.size):
-            w.travel = steady_opening(commands[k], c)
-            shut = w.travel == 0.0 and c.leakage == 0.0
+            w.open_area = steady_opening(commands[k], c)
+            shut = w.open_area == 0.0 and c.leakage == 0.0
             takes = (c.a.area, c.b.area)
             if not (quasi or shut):
                 takes = areas_on_the_way(c, w, angle, load[i], commands[k])

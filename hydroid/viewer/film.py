@@ -184,7 +184,7 @@ def _mp4(pictures: Iterable[Picture]) -> bytes:
 
 FRAME = 1 / 60
 """time between two pictures of the viewer [s]"""
-LATE = 0.1
+LONGEST_WAIT = 0.1
 """a machine too slow by this shows slow motion instead of jumps [s]"""
 
 
@@ -198,8 +198,8 @@ def play(playback: Playback, viewer: Any) -> None:
     begun = clock()
     while viewer.is_running():
         frame = clock()
-        late = frame - begun - playback.time - LATE
-        begun += max(0.0, late) if playback.time < playback.duration else 0.0
+        behind = frame - begun - playback.time - LONGEST_WAIT
+        begun += max(0.0, behind) if playback.time < playback.duration else 0.0
         playback.advance(frame - begun)
         viewer.user_scn.ngeom = 0
         add_ghost(playback, viewer.user_scn, viewer.cam)

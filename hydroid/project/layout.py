@@ -74,9 +74,7 @@ def find_layout(
     order: Sequence[str] = (),
     *,
     given: LogSettings | None = None,
-    others: Sequence[Path] = (),
-    unseen: Path | None = None,
-    in_range: bool = True,
+    others: Others | None = None,
 ) -> Layout:
     """Guess the columns of a log, turn commands that act against the angle,
     and see how fast joints are.
@@ -89,8 +87,6 @@ def find_layout(
         given: what a person says of the columns, which are not guessed then.
         others: further logs of the same columns; a joint that one of them drives can be
             fitted. One that cannot be read by the columns of the first is left out.
-        unseen: a log to validate on, of which no more is asked.
-        in_range: False: the arm's ranges are guesses, which logs may leave.
 
     Raises:
         SettingsError: no joint has one of the names.
@@ -102,15 +98,15 @@ def find_layout(
         return Layout(
             {"period_s": 0.01, "joints": {}}, every, (), (), {}, followed=False
         )
-    more = Others(others, unseen, in_range)
+    others = others or Others()
     if given is not None:
         guess = _given(table, arm, given)
-        return _seen(table, arm, guess, more, GIVEN)
+        return _seen(table, arm, guess, others, GIVEN)
     guess = guessed_section(table, arm, order)
     missing = missing_column(guess.log, targets=_has_targets(table))
     if missing:
         return _skeleton(table, arm, guess, missing)
-    return _seen(table, arm, guess, more, GUESSED)
+    return _seen(table, arm, guess, others, GUESSED)
 
 
 def _seen(

@@ -16,12 +16,14 @@ SAID = ("row left out", "cut end", "lost", "gap", "half a command", "unasked", "
 
 
 class Others(NamedTuple):
-    """Logs beside the first: those that are fitted, and one that is validated on."""
+    """Logs beside the first: those that are fitted, and one that is validated on, of
+    which no more is asked."""
 
-    fitted: Sequence[Path]
-    unseen: Path | None
-    in_range: bool
-    """whether they must be within the arm's ranges, if the first one is"""
+    fitted: Sequence[Path] = ()
+    unseen: Path | None = None
+    in_range: bool = True
+    """whether they must be within the arm's ranges, if the first one is; not where
+    these ranges are guesses"""
 
 
 def read_first(

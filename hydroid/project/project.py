@@ -18,6 +18,7 @@ from hydroid.log import Table, open_table
 from hydroid.log.mapping import angle_margin
 from hydroid.project.boxes import boxes_urdf, moves_as
 from hydroid.project.layout import Layout, find_layout
+from hydroid.project.logs import Others
 from hydroid.project.texts import JointSize, arm_text, fit_text, joint_sizes
 from hydroid.reporting.figure import arm_picture
 from hydroid.settings.arm import Arm, load_arm
@@ -111,14 +112,8 @@ def _layout(
     in_range: bool,
 ) -> Layout:
     """Return what logs hold, the first of which is the table."""
-    return find_layout(
-        table,
-        arm,
-        joints,
-        others=_fitted(logs)[1:],
-        unseen=_unseen(logs),
-        in_range=in_range,
-    )
+    others = Others(_fitted(logs)[1:], _unseen(logs), in_range)
+    return find_layout(table, arm, joints, others=others)
 
 
 def _wider(arm: Arm, layout: Layout) -> dict[str, tuple[float, float]]:
@@ -193,13 +188,8 @@ def go_on(
     replaces_config = config.resolve() == (folder / FIT).resolve()
     _refuse_replacing(folder, (FIT, STEPS, PICTURE), force=force or replaces_config)
     table = open_table(logs[0], settings.log)
-    layout = find_layout(
-        table,
-        arm,
-        given=settings.log,
-        others=_fitted(logs)[1:],
-        unseen=_unseen(logs),
-    )
+    others = Others(_fitted(logs)[1:], _unseen(logs))
+    layout = find_layout(table, arm, given=settings.log, others=others)
     steps = _steps(folder, logs, layout)
     reference = _seen_from(folder, Path(arm.where))
     text = fit_text(

@@ -69,9 +69,8 @@ class Baseline:
         else:
             dead, exponent, speed = self.numbers[:3, side]
             beyond = (np.abs(command) - dead) / (100.0 - dead)
-            share = np.power(
-                beyond, exponent, out=np.zeros_like(beyond), where=beyond > 0
-            )
+            share = np.zeros_like(beyond)
+            np.power(beyond, exponent, out=share, where=beyond > 0)
             target = speed * share
         return follow(
             target * log.period,
@@ -84,9 +83,11 @@ class Baseline:
 
     def errors(self, logs: Sequence[Log]) -> Array:
         """Return measured minus predicted angles of all logs [rad]."""
-        return np.concatenate(
-            [log.angle[:, self.joint - 1] - self.predict(log) for log in logs]
-        )
+        errors = list[Array]()
+        for log in logs:
+            measured = log.angle[:, self.joint - 1]
+            errors.append(measured - self.predict(log))
+        return np.concatenate(errors)
 
 
 @njit(cache=True)
@@ -151,9 +152,8 @@ def _fit_numbers(logs: Sequence[Log], table: Baseline) -> Baseline:
     end."""
 
     def made(x: Array) -> Baseline:
-        return replace(
-            table, table=None, delay=float(x[8]), numbers=x[:8].reshape(4, 2)
-        )
+        numbers = x[:8].reshape(4, 2)
+        return replace(table, table=None, delay=float(x[8]), numbers=numbers)
 
     def fit(start: Array, evaluations: int) -> OptimizeResult:
         return least_squares(

@@ -61,11 +61,13 @@ class SpeedCurve:
         """Return the side of positive (1) or negative (-1) commands, both command and
         speed above 0."""
         own = sign * self.command >= LEAST_COMMAND
-        order = np.argsort(sign * self.command[own], kind="stable")
+        command = sign * self.command[own]
+        speed = np.maximum(sign * self.speed[own], 0.0)
+        order = np.argsort(command, kind="stable")
         return SpeedCurve(
             self.delay,
-            (sign * self.command[own])[order],
-            np.maximum(sign * self.speed[own], 0.0)[order],
+            command[order],
+            speed[order],
             self.weight[own][order],
             sign * self.direction,
         )
@@ -94,18 +96,21 @@ def measured_speeds(logs: Sequence[Log], joint: int) -> SpeedCurve | None:
     if not own:
         return None
     angles = np.concatenate([log.angle[:, joint - 1] for log in own])
-    reach = float(angles.min()), float(angles.max())
+    reach = (float(angles.min()), float(angles.max()))
     period = min(log.period for log in own)
     delays = np.arange(0.0, LONGEST_DELAY, period).tolist()
     # which delay is right is seen where commands change, and how fast it moves where
     # they do not
-    tried = [
-        (_isotonic(own, joint, reach, delay, steady=False), delay) for delay in delays
-    ]
-    shown = [(result[0], delay) for result, delay in tried if result is not None]
-    if not shown:
+    left = list[tuple[float, float]]()
+    for delay in delays:
+        result = _isotonic(own, joint, reach, delay, steady=False)
+        if result is not None:
+            left.append((result[0], delay))
+    if not left:
         return None
-    result = _isotonic(own, joint, reach, min(shown)[1], steady=True)
+    # of delays that leave the same the shortest
+    _, likely = min(left)
+    result = _isotonic(own, joint, reach, likely, steady=True)
     return result[1] if result else None
 
 
@@ -124,15 +129,15 @@ def _isotonic(
     """
     pairs = [_pairs(log, joint, reach, delay) for log in logs]
     command, speed, weight = np.hstack(pairs)
-    if (
-        len(command) < LEAST_SAMPLES
-        or not np.ptp(command) > LEAST_COMMAND
-        or not speed.any()
-    ):
+    if len(command) < LEAST_SAMPLES:
+        return None
+    commands_differ = np.ptp(command) > LEAST_COMMAND
+    if not commands_differ or not speed.any():
         return None
     if not steady:
         weight = np.ones(len(command))
-    direction = 1.0 if np.average(command * speed, weights=weight) >= 0.0 else -1.0
+    together = np.average(command * speed, weights=weight)
+    direction = 1.0 if together >= 0.0 else -1.0
     # commands that are alike have one speed: sorted by chance, they would seem to rise
     # with each other
     number = np.unique(np.round(command / ALIKE), return_inverse=True)[1]
@@ -143,9 +148,11 @@ def _isotonic(
     # a drift at rest, such as a sensor's, is no speed of the valve: the curve has one
     # sign at each side
     fitted = np.where(asked > 0.0, np.maximum(fitted, 0.0), np.minimum(fitted, 0.0))
-    left = np.average((direction * speed - fitted[number]) ** 2, weights=weight)
+    error = direction * speed - fitted[number]
+    left = np.average(error**2, weights=weight)
+    whole = np.average(speed**2, weights=weight)
     curve = SpeedCurve(delay, asked, fitted, total, direction)
-    return float(left / np.average(speed**2, weights=weight)), curve
+    return float(left / whole), curve
 
 
 def _pairs(log: Log, joint: int, reach: tuple[float, float], delay: float) -> Array:
@@ -160,7 +167,8 @@ def _pairs(log: Log, joint: int, reach: tuple[float, float], delay: float) -> Ar
     at = np.arange(first, len(angle) - half)
     if len(at) == 0:
         return np.empty((3, 0))
-    speed = (angle[at + half] - angle[at - half]) / (2 * half * log.period)
+    way = angle[at + half] - angle[at - half]
+    speed = way / (2 * half * log.period)
     asked = command[at - lag]
     recent = [command[at - lag - shift] for shift in range(settling + 1)]
     changed = np.ptp(np.stack(recent), axis=0) / STEADY
@@ -171,5 +179,6 @@ def _pairs(log: Log, joint: int, reach: tuple[float, float], delay: float) -> Ar
 
 def inside(angle: Array, reach: tuple[float, float]) -> Mask:
     """Which samples are not near the ends of a joint's travel in all logs, (T,)."""
-    margin = END * (reach[1] - reach[0])
-    return (angle > reach[0] + margin) & (angle < reach[1] - margin)
+    low, high = reach
+    margin = END * (high - low)
+    return (angle > low + margin) & (angle < high - margin)

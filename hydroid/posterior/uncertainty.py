@@ -101,7 +101,10 @@ def flag_of(relative_sd: float, share: float = 1.0) -> Flag:
     The logs alone leave a variance of the posterior's divided by their share. NaN
     counts as infinite.
     """
-    alone = relative_sd / math.sqrt(share) if share > 0 else math.inf
+    alone = math.inf
+    if share > 0:
+        alone = relative_sd / math.sqrt(share)
+    # NaN is not below it either
     if not alone <= UNIDENTIFIABLE_ABOVE:
         return Flag.UNIDENTIFIABLE
     return Flag.WEAK if alone > WEAK_ABOVE else Flag.IDENTIFIABLE

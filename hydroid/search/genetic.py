@@ -71,7 +71,8 @@ def tournament(objectives: Array, count: int, rng: Generator) -> Ints:
     contestants = np.concatenate(drawn)[: 2 * count]
     first = contestants[0::2]
     second = contestants[1::2]
-    as_good = (rank[first] == rank[second]) & (room[first] >= room[second])
+    same_front = rank[first] == rank[second]
+    as_good = same_front & (room[first] >= room[second])
     first_wins = (rank[first] < rank[second]) | as_good
     return np.where(first_wins, first, second)
 
@@ -129,7 +130,9 @@ class SimpleGa:
         """Return the elite of the present population, then all offspring."""
         if population is None:
             return offspring
-        best = np.argsort(population.objectives[:, 0], kind="stable")[: self.elite]
+        # of equals the one that has been there longer
+        order = np.argsort(population.objectives[:, 0], kind="stable")
+        best = order[: self.elite]
         return population.take(best).join(offspring)
 
 

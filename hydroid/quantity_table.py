@@ -53,7 +53,9 @@ class Quantity(NamedTuple):
     def factor(self) -> float:
         """Factor that turns a value in `unit` into SI; a command stays in %,
         and a plain number has 1."""
-        return UNITS[self.unit.lower()].factor if self.unit else 1.0
+        if self.unit:
+            return UNITS[self.unit.lower()].factor
+        return 1.0
 
     @property
     def positive(self) -> bool:
@@ -63,7 +65,9 @@ class Quantity(NamedTuple):
     @property
     def lowest(self) -> float:
         """The least value that a fit may try; 0 but for changes of a lever."""
-        return self.limits[0] if self.limits else 0.0
+        if self.limits:
+            return self.limits[0]
+        return 0.0
 
     @property
     def of_the_pump(self) -> bool:

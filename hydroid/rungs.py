@@ -117,7 +117,9 @@ stands for stays as it is: a rung that is to come first has a climb of its own.
 
 def rungs_of(stage: Stage, climb: str) -> tuple[Rung, ...]:
     """Return the rungs that a fit climbs, the first one first."""
-    return (GAIN,) if stage == "mech" else CLIMBS[climb]
+    if stage == "mech":
+        return (GAIN,)
+    return CLIMBS[climb]
 
 
 def stage_has(stage: Stage, quantity: str) -> bool:

@@ -47,7 +47,9 @@ class Display(NamedTuple):
     def of_degrees(self, value: float) -> float:
         """Return, in the unit, what files keep in degrees; of a joint that slides they
         keep 1 m as if it were 1 rad."""
-        return value if self is TURNING else self.factor * math.radians(value)
+        if self is TURNING:
+            return value
+        return self.factor * math.radians(value)
 
     def rounded(self, value: float) -> float:
         """Return an angle [rad], or a position [m], that is whole in the unit."""
@@ -57,11 +59,15 @@ class Display(NamedTuple):
 
     def in_setting(self, value: float) -> float:
         """Return an angle [rad], or a position [m], in the unit of settings."""
-        return math.degrees(value) if self is TURNING else value
+        if self is TURNING:
+            return math.degrees(value)
+        return value
 
     def way(self, degrees: float) -> str:
         """Write how far the joint moves, in the unit of settings."""
-        value = degrees if self is TURNING else math.radians(degrees)
+        value = degrees
+        if self is not TURNING:
+            value = math.radians(degrees)
         return f"{value:.3g} {self.setting}"
 
 

@@ -379,4 +379,6 @@ def moved_by(random: Sequence[Trial], posterior: Posterior, counted: Mask) -> Ma
     moved = counted & (np.min(deviations, axis=0) < MOVED * posterior.deviations)
     if moved.any():
         return moved
-    return counted if counted.any() else np.ones_like(counted)
+    if counted.any():
+        return counted
+    return np.ones_like(counted)

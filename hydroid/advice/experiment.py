@@ -39,7 +39,9 @@ class Experiment:
         """Return commands without motion: every angle stays in the start pose."""
         period = settings.log.period_s
         slew = settings.design.slew_pct_s
-        largest_step = np.inf if slew is None else slew * period
+        largest_step = np.inf
+        if slew is not None:
+            largest_step = slew * period
         samples = experiment_samples(settings)
         command = np.zeros((samples, len(self.pose)))
         for joint, signal in self.inputs.items():

@@ -140,7 +140,7 @@ def improvement(after: LeftOut, before: LeftOut) -> dict[str, tuple[float, float
         without_one = np.sqrt((sums[:, None] - squares) / max(spans - 1, 1))
         falls = without_one[0] - without_one[1]
         sd = np.sqrt((len(falls) - 1) * np.var(falls))
-        name = settings.arm.joint_names[joint - 1]
+        name = settings.arm.name_of(joint)
         improvements[name] = (
             float(np.degrees(rms_before - rms_after)),
             float(np.degrees(sd)),
@@ -265,7 +265,9 @@ def proposed(candidate: Candidate, value: float) -> dict[str, Plain]:
     term = candidate.term
     low, high = term.span
     held = value if math.isinf(term.value) else term.value
-    least = min(value / 5.0, held) if low else low
+    least = low
+    if low:
+        least = min(value / 5.0, held)
     most = max(5.0 * value, held)
     # two digits are enough for a reader
     least, most = (float(f"{end:.2g}") for end in (max(least, low), min(most, high)))
@@ -340,5 +342,7 @@ def action_findings(content: Content, settings: FitSettings) -> Iterator[Finding
             "after": after,
             "sd": 100 * STATED_SD.get(kind, 0.0),
         }
-        link = settings.parameters[subject].link if kind == "weigh" else None
+        link = None
+        if kind == "weigh":
+            link = settings.parameters[subject].link
         yield Finding(kind, "note", (link or named(settings, subject),), numbers)

@@ -345,7 +345,9 @@ def _four_bar(joint: Any, pins: Sequence[Pin]) -> Plain | None:
         return None
     between_pivots = float(np.angle((eye - ground) * np.conj(foot - ground)))
     # the rod's pin turns with the rocker
-    sense = 1.0 if math.sin(between_pivots) * per_joint_angle > 0 else -1.0
+    sense = -1.0
+    if math.sin(between_pivots) * per_joint_angle > 0:
+        sense = 1.0
     theta0 = math.degrees(math.remainder(between_pivots - rocker_angle, math.tau))
     # the sign of theta0 says which way the rod moves
     if theta0 * sense < 0:

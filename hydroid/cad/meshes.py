@@ -85,7 +85,9 @@ def convert_meshes(
             continue
         shapes = [geom for geom in spec.geoms if geom.meshname == mesh.name]
         mesh.scale = mesh.scale * units.get(mesh.name, 1.0)
-        source = read.get(mesh.file) if shapes else None
+        source = None
+        if shapes:
+            source = read.get(mesh.file)
         shown = source and _shown_stl(source, mesh.scale, files[mesh.file].name, notes)
         if not shown:
             lost.update(geom.parent.name for geom in shapes)

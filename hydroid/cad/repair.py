@@ -354,7 +354,9 @@ def _stated_fault(body: mujoco.MjsBody, urdf: bool) -> str:
         )
         return "no mass" if urdf or unsaid else ""
     has_mass = body.mass > MASSLESS and np.isfinite(body.mass)
-    fault = _tensor_fault(_stated_tensor(body)) if has_mass else "no mass"
+    fault = "no mass"
+    if has_mass:
+        fault = _tensor_fault(_stated_tensor(body))
     if fault:
         if not has_mass:
             body.mass = 0.0

@@ -141,7 +141,9 @@ class FitProgress(Progress):
 
         arm = self._settings.arm
         joints = (step.joint,) if step.joint else self._settings.outputs
-        about = arm.joint_names[joints[0] - 1] if len(joints) == 1 else "all joints"
+        about = "all joints"
+        if len(joints) == 1:
+            about = arm.joint_names[joints[0] - 1]
         all_slide = {*joints} <= {*arm.slides}
         error = display(slides=all_slide).way(math.degrees(rms))
         text = f"rms error {error}, {simulated} simulations"

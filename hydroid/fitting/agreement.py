@@ -96,9 +96,9 @@ def compare_logs(
 
 
 def _moves(log: Log, joint: int) -> bool:
-    way = np.rad2deg(np.ptp(log.angle[:, joint - 1]))
+    way = np.rad2deg(np.ptp(log.angle_of(joint)))
     # NaN, which is not larger than anything: not measured
-    return bool(log.driven[joint - 1]) and way > LEAST_WAY
+    return log.drives(joint) and bool(way > LEAST_WAY)
 
 
 def _thinned(log: Log) -> Log:
@@ -144,7 +144,7 @@ class _Course:
     def errors(self, predicted: Array) -> Array:
         """Return errors of angles [rad], shape (T,), less the mean of their window,
         where they count."""
-        angle = self.log.angle[:, self.joint - 1]
+        angle = self.log.angle_of(self.joint)
         error = (angle - predicted)[self.used]
         # what drifts from window to window says nothing of how the joint follows
         mean = np.bincount(self.window, error) / self.count
@@ -361,7 +361,7 @@ def _predict(model: Baseline, log: Log, x: Array) -> Array:
 def _course(log: Log, joint: int, limits: tuple[float, float]) -> _Course:
     """Return a joint's motion in a log in windows, which also end where it reaches an
     end."""
-    angle = log.angle[:, joint - 1]
+    angle = log.angle_of(joint)
     margin = 0.01 * np.ptp(angle)
     low = max(limits[0], angle.min())
     high = min(limits[1], angle.max())

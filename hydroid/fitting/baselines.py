@@ -61,7 +61,7 @@ class Baseline:
     def predict(self, log: Log) -> Array:
         """Return the angle from the log's start pose under its commands alone [rad],
         shape (T,)."""
-        command = log.command[:, self.joint - 1]
+        command = log.command_of(self.joint)
         side = (command < 0).astype(int)
         if self.table is not None:
             commands, speeds = self.table.T
@@ -85,7 +85,7 @@ class Baseline:
         """Return measured minus predicted angles of all logs [rad]."""
         errors = list[Array]()
         for log in logs:
-            measured = log.angle[:, self.joint - 1]
+            measured = log.angle_of(self.joint)
             errors.append(measured - self.predict(log))
         return np.concatenate(errors)
 
@@ -134,9 +134,9 @@ def fit_baselines(
     `limits` is its range [rad]. They are by name, the simplest first. A joint that is
     never driven has only that.
     """
-    measured = [log for log in logs if log.has_angle[joint - 1]]
+    measured = [log for log in logs if log.measures(joint)]
     still = Baseline(joint, np.asarray(limits, float))
-    if not any(log.driven[joint - 1] for log in measured):
+    if not any(log.drives(joint) for log in measured):
         return {NAMES[0]: still}
     # the table has no delay of its own to be fitted: the best of all that are tried is
     # taken
@@ -175,8 +175,8 @@ def _mean_speeds(logs: Sequence[Log], still: Baseline, delay: float) -> Baseline
     for zero command."""
     pairs = list[Array]()
     for log in logs:
-        command = log.command[:, still.joint - 1]
-        angle = log.angle[:, still.joint - 1]
+        command = log.command_of(still.joint)
+        angle = log.angle_of(still.joint)
         lag = round(delay / log.period)
         speed = np.diff(angle[lag:]) / log.period
         command = command[: len(speed)]

@@ -153,7 +153,9 @@ def search(problem: Problem, watch: Watcher, checkpoints: Checkpoints) -> Search
             population = algorithm.tell(population, Population(chromosomes, objectives))
             overall = memo.evaluate(algorithm.theta(population.chromosomes))[:, -1]
             finite = overall[np.isfinite(overall)]
-            best_before = history[-1, 4] if len(history) else np.inf
+            best_before = np.inf
+            if len(history):
+                best_before = history[-1, 4]
             row = [
                 len(history) + 1,
                 evaluations + memo.elsewhere,

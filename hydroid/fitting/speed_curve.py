@@ -92,10 +92,10 @@ def measured_speeds(logs: Sequence[Log], joint: int) -> SpeedCurve | None:
 
     None where there are none.
     """
-    own = [log for log in logs if log.driven[joint - 1] and log.has_angle[joint - 1]]
+    own = [log for log in logs if log.drives(joint) and log.measures(joint)]
     if not own:
         return None
-    angles = np.concatenate([log.angle[:, joint - 1] for log in own])
+    angles = np.concatenate([log.angle_of(joint) for log in own])
     reach = (float(angles.min()), float(angles.max()))
     period = min(log.period for log in own)
     delays = np.arange(0.0, LONGEST_DELAY, period).tolist()
@@ -158,8 +158,8 @@ def _isotonic(
 def _pairs(log: Log, joint: int, reach: tuple[float, float], delay: float) -> Array:
     """Return commands [%], the speeds that follow them [rad/s], and their weights,
     shape (3, n)."""
-    command = log.command[:, joint - 1]
-    angle = log.angle[:, joint - 1]
+    command = log.command_of(joint)
+    angle = log.angle_of(joint)
     half = max(round(0.5 * WINDOW / log.period), 1)
     lag = round(delay / log.period)
     settling = round(SETTLING / log.period)

@@ -261,7 +261,7 @@ def _lasting_findings(
     for joint in problem.settings.outputs:
         lasts_s = errors[f"q{joint}"].lasts_s
         if lasts_s > 0:
-            name = problem.settings.arm.joint_names[joint - 1]
+            name = problem.settings.arm.name_of(joint)
             findings.append(Finding("error lasts", "note", (name,), {"time": lasts_s}))
     return findings
 

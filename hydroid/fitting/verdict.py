@@ -89,7 +89,7 @@ def judge(
     verdicts = list[JointVerdict]()
     for joint in settings.outputs:
         models = baselines.get(joint) or {NAMES[0]: Baseline(joint, ANYWHERE)}
-        fitted_there = [p for p in fitted if p.log.driven[joint - 1]]
+        fitted_there = [p for p in fitted if p.log.drives(joint)]
         verdicts.append(
             _judged(settings, models, fitted_there, _tests(unseen, joint), joint)
         )
@@ -102,7 +102,7 @@ def _tests(unseen: Sequence[Prediction], joint: int) -> list[Prediction]:
     for prediction in unseen:
         # None: nobody knows whether the fit has seen it, so it counts as a test
         may_test = prediction.unseen is not False and not prediction.apart
-        if may_test and prediction.log.driven[joint - 1]:
+        if may_test and prediction.log.drives(joint):
             tests.append(prediction)
     return tests
 
@@ -138,14 +138,16 @@ def _judged(
     verdict, beside = _verdict(fitted_errors, unseen_errors, outcomes, tolerance)
     banded = [p for p in unseen if joint in p.bands]
     # one log does not say how logs differ, so its band is no expectation
-    expected = _expected(banded, joint) if len(fitted) > 1 else None
+    expected = None
+    if len(fitted) > 1:
+        expected = _expected(banded, joint)
     horizons = dict[str, tuple[float | None, ...]]()
     for name, rows in ahead.items():
         horizons[name] = _rms_ahead(np.concatenate(rows))
     return JointVerdict(
         joint=joint,
-        name=settings.arm.joint_names[joint - 1],
-        slides=settings.arm.joints[joint - 1].slides,
+        name=settings.arm.name_of(joint),
+        slides=settings.arm.joint(joint).slides,
         verdict=verdict,
         beside=beside,
         fitted_deg=finite(fitted_errors.fit),
@@ -174,7 +176,7 @@ def _tolerance(
         stated = stated.get(joint)
     if stated:
         return stated
-    travels = [np.ptp(p.log.angle[:, joint - 1]) for p in unseen or fitted]
+    travels = [np.ptp(p.log.angle_of(joint)) for p in unseen or fitted]
     share = SHARE * max(travels, default=0.0)
     return max(float(np.degrees(share)), LEAST_TOLERANCE)
 

@@ -139,7 +139,9 @@ def _only_joint(in_name: set[str], words_of_joints: Sequence[set[str]]) -> int |
     for number, joint_words in enumerate(words_of_joints, 1):
         if in_name & joint_words:
             joints.append(number)
-    return joints[0] if len(joints) == 1 else None
+    if len(joints) == 1:
+        return joints[0]
+    return None
 
 
 def number_in(name: str) -> int | None:
@@ -149,7 +151,9 @@ def number_in(name: str) -> int | None:
         return None
     last = numbers[-1].lstrip("0") or "0"
     # a longer one is no joint's, and Python refuses to convert texts of thousands
-    return int(last) if len(last) <= LONGEST_NUMBER else None
+    if len(last) <= LONGEST_NUMBER:
+        return int(last)
+    return None
 
 
 def direction(name: str) -> tuple[int, frozenset[str]]:

@@ -173,7 +173,7 @@ class JointMotion:
         it off there too; for much longer than its sensor gives the same reading
         elsewhere.
         """
-        angle = self.log.angle[:, self.joint - 1]
+        angle = self.log.angle_of(self.joint)
         command = self._logged
         period = self.log.period
         steps = np.abs(np.diff(angle))
@@ -249,7 +249,7 @@ class JointMotion:
     @property
     def _logged(self) -> Array:
         """Its command as logged [%]."""
-        return self.log.command[:, self.joint - 1]
+        return self.log.command_of(self.joint)
 
     @cached_property
     def _following(self) -> Array:
@@ -278,8 +278,8 @@ def _smoothed(log: Log, joint: int, seconds: float) -> tuple[Array, ...]:
     bell /= bell.sum()
     # a filter by the bell's derivative gives that of the smooth angle
     slope = -samples / width**2 * bell / log.period
-    command = np.pad(log.command[:, joint - 1], reach, "symmetric")
-    angle = np.pad(log.angle[:, joint - 1], reach, "symmetric")
+    command = np.pad(log.command_of(joint), reach, "symmetric")
+    angle = np.pad(log.angle_of(joint), reach, "symmetric")
     return (
         np.convolve(command, bell, "valid").astype(np.float64),
         np.convolve(angle, bell, "valid").astype(np.float64),

@@ -98,7 +98,7 @@ def _constant(
     for (kind, joint), signal in columns.items():
         if kind == "angle":
             values = log.angle
-            shall_change = joint in outputs or log.driven[joint - 1]
+            shall_change = joint in outputs or log.drives(joint)
         elif kind == "command":
             values = log.command
             # that nothing is driven is said already
@@ -148,7 +148,7 @@ def _range(
         remedy = common.remedy(command.gain, command.offset)
         yield joint.warning("range", command, **remedy)
         return
-    likely = likely_range(motion.log.command[:, motion.joint - 1])
+    likely = likely_range(motion.log.command_of(motion.joint))
     if likely is None:
         return
     remedy = likely.remedy(command.gain, command.offset)
@@ -180,7 +180,7 @@ def _not_told(joint: _Joint) -> Iterator[LogFinding]:
     upwards, downwards = motion.unasked
     unasked = max(upwards, downwards)
     if unasked > max(LEAST_PATH, UNASKED * motion.travel):
-        command = motion.log.command[:, motion.joint - 1]
+        command = motion.log.command_of(motion.joint)
         one_way = (command >= 0).all() or (command <= 0).all()
         kind = "half a command" if one_way else "unasked"
         path = "positive" if upwards > downwards else "negative"
@@ -211,9 +211,9 @@ def motion_findings(logs: Sequence[Log], arm: Arm) -> Iterator[LogFinding]:
     Where no log passes the angle, it is an end of the joint's travel.
     """
     for joint, name in enumerate(arm.joint_names, 1):
-        motions = [motion_of(log, joint) for log in logs if log.has_angle[joint - 1]]
+        motions = [motion_of(log, joint) for log in logs if log.measures(joint)]
         ends = np.array([motion.reach for motion in motions])
-        shown = arm.joints[joint - 1].shown
+        shown = arm.joint(joint).shown
         for motion in motions:
             yield from _stands(motion, name, ends, shown)
     for log in logs:

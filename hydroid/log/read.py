@@ -129,7 +129,9 @@ def check_parts(
             )
         del recording  # a long one is large
         for part in parts:
-            backward = reading.arm.backward if reading.arm else ()
+            backward = ()
+            if reading.arm:
+                backward = reading.arm.backward
             outputs = reading.outputs or ()
             findings += check_motion(part, signals, outputs, backward, settings.delay_s)
     except LogError as error:

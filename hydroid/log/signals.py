@@ -90,7 +90,9 @@ class CommandSignal(NamedTuple):
     def slack(self) -> float:
         """By how much numbers may be off, in a range around 0 half as much."""
         slack = SLACK * self.half
-        return slack / 2 if self.low < 0 else slack
+        if self.low < 0:
+            return slack / 2
+        return slack
 
     @property
     def range(self) -> CommandRange:

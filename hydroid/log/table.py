@@ -175,7 +175,9 @@ class Recording:
     ) -> LogFinding:
         """Make a finding at the first of `rows`, about a signal or other subjects; it
         counts the others."""
-        row = self._place(rows[0]) if len(rows) else ""
+        row = ""
+        if len(rows):
+            row = self._place(rows[0])
         more = ""
         if len(rows) > 1:
             more = f" (and {len(rows) - 1} more, to {self._place(rows[-1])})"
@@ -202,7 +204,9 @@ def number(cell: str) -> float | None:
     """Return what float() reads, but for the digit groups of Python's literals (1_000);
     None: no number."""
     try:
-        return float(cell) if "_" not in cell else None
+        if "_" not in cell:
+            return float(cell)
+        return None
     except ValueError:
         return None
 
@@ -348,6 +352,8 @@ def format_library(package: str, extra: str, path: Path, kind: str) -> Generator
     except LogError:
         raise
     except Exception as error:
-        reason = "" if isinstance(error, BLIND) else " ".join(str(error).split())
+        reason = ""
+        if not isinstance(error, BLIND):
+            reason = " ".join(str(error).split())
         what = f"cannot be read as {kind} ({reason[:200] or 'damaged'})"
         raise LogError(what, path, "save it again") from None

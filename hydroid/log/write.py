@@ -72,11 +72,11 @@ def _refuse_incomplete(path: Path, log: Log, signals: Sequence[Signal]) -> None:
     """Refuse a command without a column, and a column without an angle."""
     mapped = {(signal.kind, signal.joint) for signal in signals}
     for joint in range(1, 1 + log.joints):
-        if log.driven[joint - 1] and ("command", joint) not in mapped:
+        if log.drives(joint) and ("command", joint) not in mapped:
             what = f"joint {joint} is driven but no column holds its command"
             hint = f"map a column in log.joints.{joint}.command"
             raise LogError(what, path, hint)
-        if not log.has_angle[joint - 1] and ("angle", joint) in mapped:
+        if not log.measures(joint) and ("angle", joint) in mapped:
             hint = f"set log.joints.{joint}.angle: null"
             raise LogError(f"joint {joint} has no angle to write", path, hint)
 

@@ -108,7 +108,7 @@ def prediction_bands(
     for column, joint in enumerate(outputs):
         sensor, drift = error_variances(errors, column, response[:, column])
         spread = Spread(variances[:, column], sensor, drift)
-        error = log.angle[:, joint - 1] - response[:, column]
+        error = log.angle_of(joint) - response[:, column]
         unseen = np.radians(left_out.get(f"q{joint}", ()))
         bands[joint] = _band(posterior, spread, error, unseen)
     return bands

@@ -139,7 +139,9 @@ def _before_the_end(bench: Bench, angles: Array) -> int:
     joint's range.
     """
     lower, upper = [*bench.settings.arm.ranges.values()][bench.joint - 1]
-    margin = MARGIN * (upper - lower) if np.isfinite(upper - lower) else 0.0
+    margin = 0.0
+    if np.isfinite(upper - lower):
+        margin = MARGIN * (upper - lower)
     beyond = np.flatnonzero((angles < lower + margin) | (angles > upper - margin))
     if not len(beyond):
         return len(angles)

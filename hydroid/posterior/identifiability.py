@@ -89,7 +89,9 @@ def _deviance_unit(uncertainty: Uncertainty, i: int) -> float:
     variance = uncertainty.posterior.deviations**2
     units = linear.spread(variance / np.sum(linear.changes**2, axis=1))
     # one held at a bound has no variance: the others' largest
-    return units[i] if linear.box.varied[i] else np.nanmax(units)
+    if linear.box.varied[i]:
+        return units[i]
+    return np.nanmax(units)
 
 
 @record

@@ -93,7 +93,7 @@ def _joint_quantities(
     positive = np.array([column.positive for column in columns])
     estimated = uncertainty.posterior.propagate(values, positive, concerned)
 
-    joint_name = problem.settings.arm.joint_names[joint - 1]
+    joint_name = problem.settings.arm.name_of(joint)
     scalars = dict[str, QuantityEstimate]()
     points = defaultdict[str, list[int]](list)
     for i in np.flatnonzero(np.isfinite(estimated.value)).tolist():

@@ -74,7 +74,7 @@ def residual_tests(
         courses = _courses(errors, i)
         rows = [innovations[course.rows] for course in courses]
         used = [row[course.used] for course, row in zip(courses, rows, strict=True)]
-        commands = [log.command[:, signal.joint - 1] for log in logs]
+        commands = [log.command_of(signal.joint) for log in logs]
         period = _between(courses)
         lags = _lags(SHOWN, period, used)
         # every sample has a command, whether it counts or not

@@ -25,7 +25,9 @@ def column_lines(table: Table) -> tuple[str, ...]:
     names = [name for name in dict.fromkeys(table.names) if name]
     lines = list[str]()
     for name in names[:MOST]:
-        shown = name if name.isprintable() else ascii(name)[1:-1]
+        shown = name
+        if not name.isprintable():
+            shown = ascii(name)[1:-1]
         lines.append(f"{shown}: {_described(table, name)}")
     if len(names) > MOST:
         lines.append(f"and {len(names) - MOST} more columns")

@@ -161,7 +161,7 @@ def _driven(
     joints: Sequence[int], logs: Sequence[Log], names: Sequence[str], reasons: list[str]
 ) -> list[int]:
     """Return the joints that any log drives; of the others say so."""
-    driven = [joint for joint in joints if any(log.driven[joint - 1] for log in logs)]
+    driven = [joint for joint in joints if any(log.drives(joint) for log in logs)]
     idle = [names[joint - 1] for joint in joints if joint not in driven]
     if idle:
         reasons.append(f"{listed(idle)}: no command in the logs, so not compared")
@@ -182,7 +182,7 @@ def _turn_commands(
     wrong = list[int]()
     for joint, motion in motions.items():
         is_wrong = motion.contradicts(backward=joint in arm.backward)
-        reasons += _remarks(motion, arm.joints[joint - 1], is_wrong)
+        reasons += _remarks(motion, arm.joint(joint), is_wrong)
         if is_wrong:
             entries[joint]["command"] = turned(entries[joint]["command"])
             wrong.append(joint)
@@ -263,7 +263,7 @@ def _refuse_rest(
     them."""
     travels = dict[int, float]()
     for joint in driven:
-        moved = [motion_of(log, joint).travel for log in logs if log.driven[joint - 1]]
+        moved = [motion_of(log, joint).travel for log in logs if log.drives(joint)]
         if moved:
             travels[joint] = max(moved)
     if any(travel > MOVED for travel in travels.values()):
@@ -279,14 +279,14 @@ def _refuse_rest(
 
 
 def _remarks(motion: JointMotion, joint: Joint, wrong: bool) -> Iterator[str]:
-    angle = motion.log.angle[:, motion.joint - 1]
+    angle = motion.log.angle_of(motion.joint)
     if not joint.continuous:
         yield from _beyond_range(angle, joint)
     if wrong:
         _, against = motion.directed
         share = f"on {max(against, 1 - against):.0%} of its way"
         yield f"{joint.name} moves against its command ({share}): the command's sign is reversed"
-    if motion.log.driven[motion.joint - 1] and motion.dead_band > 10:
+    if motion.log.drives(motion.joint) and motion.dead_band > 10:
         below = f"below about {motion.dead_band:g} % of command"
         yield f"{joint.name} hardly moves {below}: a dead band, or little opening"
 

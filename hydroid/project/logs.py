@@ -45,7 +45,9 @@ def read_first(
         log, _ = check_log(path, settings, _no_limits(arm), repaired)
     reasons += _said(findings)
     # of one that cannot be read, what its joints do is not known
-    return [] if log is None else [log]
+    if log is None:
+        return []
+    return [log]
 
 
 def read_others(
@@ -85,7 +87,7 @@ def reach_of(
     """Return the ends of what joints (numbers, from 1) do in logs [rad, m]."""
     reach = dict[int, tuple[float, float]]()
     for joint in joints:
-        angles = np.concatenate([log.angle[:, joint - 1] for log in logs])
+        angles = np.concatenate([log.angle_of(joint) for log in logs])
         reach[joint] = float(np.nanmin(angles)), float(np.nanmax(angles))
     return reach
 

@@ -69,7 +69,9 @@ def write_project(
     what is given)."""
     _refuse_replacing(folder, FILES, force=options.pop("force", False))
     lengths = options.pop("lengths", ())
-    table = open_table(logs[0]) if logs else None
+    table = None
+    if logs:
+        table = open_table(logs[0])
     has_own_file = robot is not None and robot.suffix.lower() in (".yaml", ".yml")
     imported = None
     if robot is not None and not has_own_file:
@@ -121,7 +123,7 @@ def _wider(arm: Arm, layout: Layout) -> dict[str, tuple[float, float]]:
     logs reach, and a little more."""
     wider = dict[str, tuple[float, float]]()
     for number, (low, high) in layout.reach.items():
-        joint = arm.joints[number - 1]
+        joint = arm.joint(number)
         least, most = joint.limits
         margin = angle_margin(least, most)
         if low < least - margin or high > most + margin:
@@ -220,7 +222,9 @@ def _fitted(logs: Sequence[Path]) -> Sequence[Path]:
 
 def _unseen(logs: Sequence[Path]) -> Path | None:
     """Return the log that is kept to validate on; None: there is one log only."""
-    return logs[-1] if len(logs) > 1 else None
+    if len(logs) > 1:
+        return logs[-1]
+    return None
 
 
 def _steps(folder: Path, logs: Sequence[Path], layout: Layout) -> tuple[str, ...]:

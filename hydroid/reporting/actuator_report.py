@@ -56,15 +56,15 @@ def speed_section(
     fastest = list[str]()
     opens = False
     for joint in settings.outputs:
-        name = settings.arm.joint_names[joint - 1]
+        name = settings.arm.name_of(joint)
         speed = summary.curves.get(f"{name}_speed")
         if speed is None:
             continue
         opening = summary.curves.get(f"{name}_opening")
         opens = opens or opening is not None
         cloud = _measured_cloud(logs, joint, _dead_times(name, summary))
-        cloud[1] *= settings.arm.joints[joint - 1].shown.factor
-        commands = np.concatenate([log.command[:, joint - 1] for log in logs])
+        cloud[1] *= settings.arm.joint(joint).shown.factor
+        commands = np.concatenate([log.command_of(joint) for log in logs])
         sides = _sides(name, summary)
         draw = partial(_speed_chart, name, (speed, opening), sides, commands, cloud)
         caption = f"{name}: {speed.label}"
@@ -109,7 +109,7 @@ def _measured_cloud(logs: Sequence[Log], joint: int, dead_times: list[float]) ->
     delay = float(np.mean(dead_times)) if dead_times else 0.0
     pairs = [np.empty((2, 0))]
     for log in logs:
-        if log.has_angle[joint - 1]:
+        if log.measures(joint):
             pairs.append(np.array(measured_speeds(log, joint, delay)))
     return np.hstack(pairs)
 
@@ -123,7 +123,7 @@ def step_section(settings: FitSettings, summary: FitSummary) -> Section | None:
     slowest = list[str]()
     narrowest = list[str]()
     for joint in settings.outputs:
-        name = settings.arm.joint_names[joint - 1]
+        name = settings.arm.name_of(joint)
         if not any(f"{name}_step_{towards}" in summary.curves for towards in TOWARDS):
             continue
         draw = partial(_response_chart, name, summary.curves)
@@ -168,8 +168,8 @@ def measured_speeds(log: Log, joint: int, delay: float) -> tuple[Array, Array]:
     The command is that of `delay` [s] before. Stretches of OVER do not overlap; those
     without a command, and those near an end of the travel, are left out.
     """
-    command = log.command[:, joint - 1]
-    angle = log.angle[:, joint - 1]
+    command = log.command_of(joint)
+    angle = log.angle_of(joint)
     half = max(round(0.5 * OVER / log.period), 1)
     steps = round(delay / log.period)
     low = np.min(angle)

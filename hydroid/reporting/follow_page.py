@@ -45,7 +45,7 @@ def follow_page(name: str, followed: Followed, arm: Arm) -> Page:
         sections.append(motion)
     tabs = list[Plot]()
     for joint in followed.joints:
-        joint_name = arm.joint_names[joint - 1]
+        joint_name = arm.name_of(joint)
         draw = partial(_chart, followed, joint, arm)
         tab = Plot(f"joint_{joint}", joint_name, draw, zoom=True, button=joint_name)
         tabs.append(tab)
@@ -59,12 +59,14 @@ def tracking_table(followed: Followed, arm: Arm) -> Table:
     """Return the predicted errors of the joints."""
     rows = list[tuple[Cell, ...]]()
     for joint in followed.joints:
-        shown = arm.joints[joint - 1].shown
+        shown = arm.joint(joint).shown
         error, wide = followed.rms(joint)
-        banded = shown.factor * wide if np.isfinite(wide) else None
-        command = followed.log.command[:, joint - 1]
+        banded = None
+        if np.isfinite(wide):
+            banded = shown.factor * wide
+        command = followed.log.command_of(joint)
         full = 100.0 * float(np.mean(np.abs(command) >= 100.0))
-        name = arm.joint_names[joint - 1]
+        name = arm.name_of(joint)
         rows.append((name, shown.unit, shown.factor * error, banded, full))
     header = ("joint", "unit", "error", "with its band", "full command [% of time]")
     return Table("Predicted tracking error", header, tuple(rows), _NOTE)
@@ -94,9 +96,9 @@ def _lead(followed: Followed, arm: Arm) -> str:
         return followed.rms(joint)[0]
 
     worst = max(followed.joints, key=relative)
-    shown = arm.joints[worst - 1].shown
+    shown = arm.joint(worst).shown
     error = number(shown.factor * followed.rms(worst)[0])
-    name = arm.joint_names[worst - 1]
+    name = arm.name_of(worst)
     text = f"The model follows the path to {error} {shown.unit} rms at most ({name})."
     if followed.missed:
         names = dict.fromkeys(arm.joint_names[span.joint] for span in followed.missed)

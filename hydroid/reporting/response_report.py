@@ -231,8 +231,8 @@ def _joint_tab(
     that compares it.
     """
     predictions = [prediction for prediction in group if joint in prediction.joints]
-    name = arm.joint_names[joint - 1]
-    shown = arm.joints[joint - 1].shown
+    name = arm.name_of(joint)
+    shown = arm.joint(joint).shown
     title = f"{name} in {log}"
     error = rms_deg([predictions[0].error(joint)])
     draw = partial(draw_response, title, joint, predictions, bins, shown)
@@ -318,7 +318,7 @@ def _response_marks(
     """Draw the response, the residual and, where there is one, the 95 % band of a joint
     that travelled so far, as it is shown."""
     time = prediction.log.time
-    measured = shown.factor * prediction.log.angle[:, joint - 1]
+    measured = shown.factor * prediction.log.angle_of(joint)
     residual = shown.factor * finite(prediction.error(joint))
     name = short_name(prediction.fit)
     size = rms(residual)
@@ -395,9 +395,9 @@ def draw_joints(title: str, arm: Arm, group: Sequence[Prediction], bins: int) ->
     for joint, color in zip(_compared(group), cycle(COMMAND_COLORS), strict=False):
         prediction = next(p for p in group if joint in p.joints)
         time = prediction.log.time
-        name = arm.joint_names[joint - 1]
-        shown = arm.joints[joint - 1].shown
-        measured = shown.factor * prediction.log.angle[:, joint - 1]
+        name = arm.name_of(joint)
+        shown = arm.joint(joint).shown
+        measured = shown.factor * prediction.log.angle_of(joint)
         simulated = measured - shown.factor * finite(prediction.error(joint))
         far = FAR * max(np.ptp(measured), 1.0)
         simulated[np.abs(simulated - measured) > far] = np.nan
@@ -408,7 +408,7 @@ def draw_joints(title: str, arm: Arm, group: Sequence[Prediction], bins: int) ->
         heading = title if not panels else ""
         label = f"{short_name(name)} [{shown.unit}]"
         panels.append(Panel("", label, marks, heading, 150))
-        command = prediction.log.command[:, joint - 1]
+        command = prediction.log.command_of(joint)
         commands.append(Mark("step", time, command, color=color, label=name))
         oil = prediction.oil
         if oil is None:

@@ -43,7 +43,9 @@ def pack(tree: object, *, compressed: bool = True) -> bytes:
             return {"array": name}
         if is_dataclass(value):
             return {field.name: getattr(value, field.name) for field in fields(value)}
-        return dict(value) if isinstance(value, Mapping) else value.item()
+        if isinstance(value, Mapping):
+            return dict(value)
+        return value.item()
 
     text = json.dumps(tree, default=plain)
     content = np.frombuffer(text.encode(), dtype=np.uint8)
@@ -70,7 +72,9 @@ def unpack(file: Path) -> Any:
         arrays = _arrays(data)
 
         def filled(value: Plain) -> Any:
-            return arrays[value["array"]] if value.keys() == {"array"} else value
+            if value.keys() == {"array"}:
+                return arrays[value["array"]]
+            return value
 
         return json.loads(arrays["content"].tobytes(), object_hook=filled)
     except (

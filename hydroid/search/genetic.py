@@ -149,6 +149,8 @@ class Nsga2(SimpleGa):
 
     def tell(self, population: Population | None, offspring: Population) -> Population:
         """Return the best of parents and children together, in crowded order."""
-        everyone = offspring if population is None else population.join(offspring)
+        everyone = offspring
+        if population is not None:
+            everyone = population.join(offspring)
         order = crowded_order(everyone.objectives)
         return everyone.take(order[: self.settings.population])

@@ -207,7 +207,9 @@ def _moved(
     the Jacobian is to be taken."""
     cost = costs(row[None])[0]
     gained_little = now.cost - cost < settings.gain_tolerance * now.cost
-    slow = now.slow + 1 if gained_little else 0
+    slow = 0
+    if gained_little:
+        slow = now.slow + 1
     ending = Ending.UNDER_WAY
     if cost <= EXACT * now.cost_before:
         ending = Ending.EXACT

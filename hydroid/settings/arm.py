@@ -33,7 +33,9 @@ SLIDE = 2  # MuJoCo's number of a joint that slides
 
 def _from_folder(path: Path, info: ValidationInfo) -> Path:
     folder = (info.context or {}).get("folder")
-    return path if folder is None else (folder / path).resolve()
+    if folder is None:
+        return path
+    return (folder / path).resolve()
 
 
 Beside = Annotated[Path, Strict(False), AfterValidator(_from_folder)]
@@ -210,6 +212,14 @@ class Arm(Settings):
     def joint_names(self) -> tuple[str, ...]:
         """Joint names, (J,)."""
         return tuple(joint.name for joint in self.joints)
+
+    def joint(self, number: int) -> Joint:
+        """Return a joint by its number, from 1."""
+        return self.joints[number - 1]
+
+    def name_of(self, joint: int) -> str:
+        """Return the name of a joint by its number, from 1."""
+        return self.joint(joint).name
 
     @property
     def link_names(self) -> tuple[str, ...]:

@@ -67,7 +67,9 @@ def read_document(text: str, source: object, times: int = 1) -> tuple[Any, Lines
     try:
         # every scalar is text
         node = yaml.compose(text, Loader=yaml.BaseLoader)
-        value = None if node is None else reader.value(node, ())
+        value = None
+        if node is not None:
+            value = reader.value(node, ())
     except yaml.YAMLError as error:
         raise _not_yaml(error, source) from None
     except RecursionError:

@@ -65,7 +65,9 @@ def _nonzero(value: float | None) -> float | None:
 
 
 def _one_or_more(given: str | tuple[str, ...]) -> tuple[str, ...]:
-    return (given,) if isinstance(given, str) else given
+    if isinstance(given, str):
+        return (given,)
+    return given
 
 
 Name = Annotated[str, Field(min_length=1)]

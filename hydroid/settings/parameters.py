@@ -46,7 +46,9 @@ def expanded(parameters: Mapping[str, Any], compared: Any, arm: Arm | None) -> P
     """
     result: Plain = {}
     for name, entry in parameters.items():
-        each = entry.get("each") if isinstance(entry, dict) else None
+        each = None
+        if isinstance(entry, dict):
+            each = entry.get("each")
         if not each:
             _add(result, name, entry)
         elif entry.get("quantity") == "mass":
@@ -237,7 +239,9 @@ def nominal_value(
         if actuator is not None:
             table = actuator_values(actuator, hydraulics)
             values |= {table[name] for name in TARGETS[settings.quantity]}
-    return values.pop() if len(values) == 1 else None
+    if len(values) == 1:
+        return values.pop()
+    return None
 
 
 def make_parameter(

@@ -64,7 +64,8 @@ def fast_enough(c, w, wished: float, supply: float, quasi: bool) -> bool:
     sign = 1.0 if wished > 0.0 else -1.0
     if quasi:
         return sign * w.open_area > 0.0 and rod_speed(c, w, supply)[0] >= abs(wished)
-    left = surplus(wished, supply, c, w, (c.a.area, c.b.area))[0]
+    areas = (c.a.area, c.b.area)
+    left = surplus(wished, supply, c, w, areas)[0]
     return sign * left >= joint_friction(c, w.arm)
 
 
@@ -186,7 +187,8 @@ def shared_pressure(plugin: Plugin, rods: Rods, law: Law) -> float:
     if over < pump.pump_flow:
         part = (over / pump.pump_flow) ** pump.pump_exponent
         low = max(low, high - pump.pump_droop * part)
-    under = taken_at(plugin, rods, law, low) - delivery(low, 1.0, pump)[0]
+    given = delivery(low, 1.0, pump)[0]
+    under = taken_at(plugin, rods, law, low) - given
     left = SETTLED * pump.pump_flow
     if under >= -left:
         return low
@@ -199,9 +201,8 @@ def shared_pressure(plugin: Plugin, rods: Rods, law: Law) -> float:
         # where the rule creeps
         if count % 4 == 3:
             pressure = 0.5 * (low + high)
-        excess = (
-            taken_at(plugin, rods, law, pressure) - delivery(pressure, 1.0, pump)[0]
-        )
+        given = delivery(pressure, 1.0, pump)[0]
+        excess = taken_at(plugin, rods, law, pressure) - given
         if abs(excess) <= left:
             return pressure
         if excess > 0.0:

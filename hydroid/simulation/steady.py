@@ -95,7 +95,10 @@ def steady_stroke(asked: float, side, c) -> float:
 def steady_opening(command: float, c) -> float:
     """Net opening [m²] of a valve under a command [%] that is held, below 0 towards
     B."""
-    travel = steady_stroke(command, c.a, c) - steady_stroke(-command, c.b, c)
+    # the spool stands where both plungers push it
+    pushed_a = steady_stroke(command, c.a, c)
+    pushed_b = steady_stroke(-command, c.b, c)
+    travel = pushed_a - pushed_b
     if travel > 0.0:
         return c.a.opening * open_share(c.a, travel)
     return -c.b.opening * open_share(c.b, -travel)
@@ -270,7 +273,9 @@ def areas_on_the_way(c, w, angle: float, load, command: float) -> Any:
     way = 2.0 * NEAR * (arm if abs(arm) > LEAST_LEVER else LEAST_LEVER)
     a = c.a.area + volume_a / c.bulk_modulus * (behind_a - before_a) / way
     b = c.b.area - volume_b / c.bulk_modulus * (behind_b - before_b) / way
-    return max(a, LEAST_AREA * c.a.area), max(b, LEAST_AREA * c.b.area)
+    least_a = LEAST_AREA * c.a.area
+    least_b = LEAST_AREA * c.b.area
+    return max(a, least_a), max(b, least_b)
 
 
 @compilable

@@ -106,14 +106,16 @@ class Followed:
     def error(self, joint: int) -> Array:
         """Return wished minus predicted angle of a joint (number, from 1) [rad], shape
         (T,)."""
-        return self.log.angle[:, joint - 1] - self.angle[:, joint - 1]
+        return self.log.angle_of(joint) - self.angle[:, joint - 1]
 
     def rms(self, joint: int) -> tuple[float, float]:
         """Return the predicted rms error of a joint (number, from 1) [rad], and that
         within its band."""
         error = self.error(joint)
         half = self.half.get(joint)
-        wide = np.inf if half is None else float(np.sqrt(np.mean(error**2 + half**2)))
+        wide = np.inf
+        if half is not None:
+            wide = float(np.sqrt(np.mean(error**2 + half**2)))
         return float(rms(error)), wide
 
 

@@ -97,7 +97,9 @@ class LinearArm:
         plain = dict[str, Any]()
         for key, value in vars(self).items():
             # matrices bear their usual names in the file: A, B, C, D
-            name = key.upper() if len(key) == 1 else key
+            name = key
+            if len(key) == 1:
+                name = key.upper()
             plain[name] = np.asarray(value).tolist()
         return json.dumps(plain, indent=1)
 

@@ -85,7 +85,9 @@ def render_motion(
         raise SettingsError(what, "--span", "write FROM:TO in seconds")
     size, rate = KINDS[kind]
     count = max(1, int(np.ceil((end - begin) * rate - 1e-9)))
-    error = f", rms error {motion.error:.2g}°" if np.isfinite(motion.error) else ""
+    error = ""
+    if np.isfinite(motion.error):
+        error = f", rms error {motion.error:.2g}°"
 
     def frames() -> Iterator[tuple[float, str]]:
         for k in range(count):
@@ -96,7 +98,9 @@ def render_motion(
     pictures = rendered(motion, size, frames())
     if kind == ".mp4":
         return _mp4(pictures)
-    return _gif(pictures) if kind == ".gif" else _png(pictures)
+    if kind == ".gif":
+        return _gif(pictures)
+    return _png(pictures)
 
 
 def look_at(camera: mujoco.MjvCamera, model: mujoco.MjModel, region: Region) -> None:

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator
 from itertools import chain
 from typing import Literal, NamedTuple
 
+from hydroid.arrays import Limits
 from hydroid.files import Plain, read_table
 from hydroid.units import UNITS
 
@@ -39,15 +40,17 @@ class Quantity(NamedTuple):
     default: float | tuple[float, float] | None
     plain: str
     note: str = ""
-    span: tuple[float, float] | None = None
-    limits: tuple[float, float] | None = None
+    span: Limits | None = None
+    limits: Limits | None = None
     of: Literal["", "pump", "cylinder", "stand-in"] = ""
     optional: bool = False
 
     @property
     def meaning(self) -> str:
         """The plain words for the quantity, with the note behind them."""
-        return f"{self.plain}; {self.note}" if self.note else self.plain
+        if self.note:
+            return f"{self.plain}; {self.note}"
+        return self.plain
 
     @property
     def factor(self) -> float:

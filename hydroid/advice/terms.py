@@ -11,7 +11,7 @@ from itertools import product
 
 import numpy as np
 
-from hydroid.arrays import Array, record
+from hydroid.arrays import Array, Limits, record
 from hydroid.files import Plain
 from hydroid.hydraulics.actuator import START_PRESSURE
 from hydroid.posterior.error_model import Likelihood
@@ -42,7 +42,7 @@ class Term:
     value: float
 
     @property
-    def span(self) -> tuple[float, float]:
+    def span(self) -> Limits:
         """Smallest and largest value."""
         bounds = self.entries[self.name].bounds
         assert bounds is not None

@@ -134,7 +134,9 @@ def _replace_mass(body: mujoco.MjsBody, likely: "_Likely") -> str:
     usual = likely.usual
     scale = likely.density / USUAL
     mass = scale * usual.mass
-    was = f"{float(f'{body.mass:.2g}'):g}" if body.mass else "none"
+    was = "none"
+    if body.mass:
+        was = f"{float(f'{body.mass:.2g}'):g}"
     set_inertia(body, mass, usual.centre, scale * usual.tensor)
     return f"{body.name} {was} -> {mass:.3g}"
 

@@ -193,7 +193,9 @@ def main() -> None:
     except Exception as error:
         code = _ending(error)
     if code == STOPPED:
-        rest = "" if kept is None else f"; {kept or 'nothing was written'}"
+        rest = ""
+        if kept is not None:
+            rest = f"; {kept or 'nothing was written'}"
         tell(f"hydroid: stopped{rest}")
     sys.exit(code)
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.special import ndtri, stdtr
 
-from hydroid.arrays import Array, Mask, record
+from hydroid.arrays import Array, Limits, Mask, record
 from hydroid.fitting.baselines import (
     LOWER,
     NAMES,
@@ -78,7 +78,7 @@ class Agreement:
 
 def compare_logs(
     logs: Sequence[Log],
-    ranges: Sequence[tuple[float, float]],
+    ranges: Sequence[Limits],
     progress: Progress = no_progress,
 ) -> list[Agreement]:
     """Compare logs, joint by joint (`ranges` [rad]), of those joints that at least
@@ -151,9 +151,7 @@ class _Course:
         return error - mean[self.window]
 
 
-def _compare(
-    logs: Sequence[Log], joint: int, limits: tuple[float, float]
-) -> Agreement | None:
+def _compare(logs: Sequence[Log], joint: int, limits: Limits) -> Agreement | None:
     courses = [_course(log, joint, limits) for log in logs]
     courses = [course for course in courses if len(course.count) >= LEAST_WINDOWS]
     if len(courses) < LEAST_LOGS:
@@ -358,7 +356,7 @@ def _predict(model: Baseline, log: Log, x: Array) -> Array:
     return np.interp(log.time - delay, log.time, angle)
 
 
-def _course(log: Log, joint: int, limits: tuple[float, float]) -> _Course:
+def _course(log: Log, joint: int, limits: Limits) -> _Course:
     """Return a joint's motion in a log in windows, which also end where it reaches an
     end."""
     angle = log.angle_of(joint)

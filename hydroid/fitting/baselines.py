@@ -21,7 +21,7 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.optimize import OptimizeResult, least_squares
 
-from hydroid.arrays import Array, record
+from hydroid.arrays import Array, Limits, record
 from hydroid.log import Log
 
 NAMES = ("standing still", "speed tables", "nine numbers")
@@ -127,7 +127,7 @@ def follow(
 
 
 def fit_baselines(
-    logs: Sequence[Log], joint: int, limits: tuple[float, float]
+    logs: Sequence[Log], joint: int, limits: Limits
 ) -> dict[str, Baseline]:
     """Fit the baselines of a joint (number, from 1) to the logs that measure it.
 

@@ -149,7 +149,10 @@ def search(problem: Problem, watch: Watcher, checkpoints: Checkpoints) -> Search
             chromosomes = algorithm.ask(population, rng)
             result = memo.evaluate(algorithm.theta(chromosomes))
             evaluations += len(chromosomes)
-            objectives = result[:, -1:] if algorithm.single else result[:, :-1]
+            # overall comes last, behind the segments
+            objectives = result[:, :-1]
+            if algorithm.single:
+                objectives = result[:, -1:]
             population = algorithm.tell(population, Population(chromosomes, objectives))
             overall = memo.evaluate(algorithm.theta(population.chromosomes))[:, -1]
             finite = overall[np.isfinite(overall)]

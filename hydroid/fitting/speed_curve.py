@@ -16,7 +16,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.optimize import isotonic_regression
 
-from hydroid.arrays import Array, Mask, record
+from hydroid.arrays import Array, Limits, Mask, record
 from hydroid.log import Log, one_size
 from hydroid.log.command_sizes import LEAST_COMMAND
 
@@ -111,13 +111,15 @@ def measured_speeds(logs: Sequence[Log], joint: int) -> SpeedCurve | None:
     # of delays that leave the same the shortest
     _, likely = min(left)
     result = _isotonic(own, joint, reach, likely, steady=True)
-    return result[1] if result else None
+    if result:
+        return result[1]
+    return None
 
 
 def _isotonic(
     logs: Sequence[Log],
     joint: int,
-    reach: tuple[float, float],
+    reach: Limits,
     delay: float,
     *,
     steady: bool,
@@ -137,7 +139,9 @@ def _isotonic(
     if not steady:
         weight = np.ones(len(command))
     together = np.average(command * speed, weights=weight)
-    direction = 1.0 if together >= 0.0 else -1.0
+    direction = -1.0
+    if together >= 0.0:
+        direction = 1.0
     # commands that are alike have one speed: sorted by chance, they would seem to rise
     # with each other
     number = np.unique(np.round(command / ALIKE), return_inverse=True)[1]
@@ -155,7 +159,7 @@ def _isotonic(
     return float(left / whole), curve
 
 
-def _pairs(log: Log, joint: int, reach: tuple[float, float], delay: float) -> Array:
+def _pairs(log: Log, joint: int, reach: Limits, delay: float) -> Array:
     """Return commands [%], the speeds that follow them [rad/s], and their weights,
     shape (3, n)."""
     command = log.command_of(joint)
@@ -177,7 +181,7 @@ def _pairs(log: Log, joint: int, reach: tuple[float, float], delay: float) -> Ar
     return np.stack([asked, speed, weight])[:, there]
 
 
-def inside(angle: Array, reach: tuple[float, float]) -> Mask:
+def inside(angle: Array, reach: Limits) -> Mask:
     """Which samples are not near the ends of a joint's travel in all logs, (T,)."""
     low, high = reach
     margin = END * (high - low)

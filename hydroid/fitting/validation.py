@@ -129,14 +129,16 @@ class Prediction:
             )
         shown = display(slides=number in self.slides)
         column = self.joints.index(number)
-        band = self.bands.get(number)
+        half = None
+        if number in self.bands:
+            half = shown.factor * self.bands[number].half
         return JointPrediction(
             name=self._named[column],
             unit=shown.unit,
             time=self.log.time,
             measured=shown.factor * self.log.angle_of(number),
             response=shown.factor * self.response[:, column],
-            half=None if band is None else shown.factor * band.half,
+            half=half,
         )
 
     def __iter__(self) -> Iterator[str]:

@@ -15,7 +15,7 @@ import numpy as np
 
 from hydroid.hydraulics.cylinder import contact_torque, stop_damping
 from hydroid.hydraulics.elementwise import compilable, implicit_weight, kept
-from hydroid.hydraulics.oil import begin_oil, press, take_flow, volume
+from hydroid.hydraulics.oil import begin_oil, press, take_flow, volumes
 from hydroid.hydraulics.records import LINEAR, NONE
 from hydroid.hydraulics.seals import friction_damping
 from hydroid.hydraulics.solenoid import (
@@ -198,8 +198,7 @@ def load(c, z, w, step: float) -> None:
     volume_b = c.dead_volume
     if c.kind == LINEAR:
         travel = w.travel + turn * (w.arm + 0.5 * w.slope * turn)
-        volume_a = volume(travel, c.a.area, c.dead_volume)
-        volume_b = volume(c.stroke - travel, c.b.area, c.dead_volume)
+        volume_a, volume_b = volumes(travel, c)
         rub = stop_damping(travel, arm * w.speed, c.stroke, c.stop_penetration)
     if c.dry_friction > 0.0:
         rub += friction_damping(arm * w.speed, c.dry_friction)

@@ -46,6 +46,15 @@ def volume(travel, area, dead) -> Any:
 
 
 @compilable
+def volumes(travel, c) -> Any:
+    """Volumes of chambers A and B of a cylinder [m³] whose rod stands at `travel`
+    [m]."""
+    volume_a = volume(travel, c.a.area, c.dead_volume)
+    volume_b = volume(c.stroke - travel, c.b.area, c.dead_volume)
+    return volume_a, volume_b
+
+
+@compilable
 def filling(travel, area, dead) -> Any:
     """ln(V/V_0) of a chamber that opens with `travel` [m] at `area` [m²]."""
     return np.log(volume(travel, area, dead) / dead)

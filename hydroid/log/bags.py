@@ -232,7 +232,9 @@ def open_bag(
         set_back = _set_back(path)
     remarks = content.remarks()
     if not content.channels:
-        what = listed(remarks) if remarks else "holds no channel of numbers"
+        what = "holds no channel of numbers"
+        if remarks:
+            what = listed(remarks)
         raise LogError(what, path)
     return BagTable(
         source=str(path),

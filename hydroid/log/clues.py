@@ -30,7 +30,9 @@ def column_unit(name: str, given: str) -> Unit | None:
     """Return the unit that the file gives, or the one in or at the end of the name;
     None: there is none."""
     inside = re.search(r"[\[(<]([^\])>]*)[\])>]\s*$", name)
-    in_brackets = inside[1] if inside else ""
+    in_brackets = ""
+    if inside:
+        in_brackets = inside[1]
     last_word = re.split(r"[_ .]", name)[-1]
     # elsewhere "in" is a direction
     may_be_inch = [given, in_brackets]

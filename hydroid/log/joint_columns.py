@@ -3,7 +3,7 @@
 from collections.abc import Hashable, Mapping, Sequence
 from typing import NamedTuple
 
-from hydroid.arrays import record
+from hydroid.arrays import Limits, record
 from hydroid.log.clues import direction, joint_of, number_in
 from hydroid.log.columns import Column
 from hydroid.log.rods import Rod
@@ -30,7 +30,7 @@ class Joints:
     links: Sequence[str]
     slides: Sequence[int]
     rods: Mapping[int, Rod]
-    ranges: Mapping[int, tuple[float, float]]
+    ranges: Mapping[int, Limits]
 
     def named_in(self, column: str) -> int:
         """Return the joint whose name, or whose link's, a column's name holds; 0:

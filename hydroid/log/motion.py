@@ -5,7 +5,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from hydroid.arrays import Array, record
+from hydroid.arrays import Array, Limits, record
 from hydroid.log.log import Log
 
 QUICK = 0.05
@@ -50,7 +50,7 @@ class JointMotion:
     joint: int
 
     @cached_property
-    def reach(self) -> tuple[float, float]:
+    def reach(self) -> Limits:
         """Its least and largest angle but for the noise [rad]."""
         return self._slow[1].min(), self._slow[1].max()
 

@@ -71,7 +71,9 @@ class Signal:
         return display(slides=self.unit not in ("", TURNING.unit))
 
     def __str__(self) -> str:
-        return f"{self.kind} of joint {self.owner}" if self.joint else self.kind
+        if self.joint:
+            return f"{self.kind} of joint {self.owner}"
+        return self.kind
 
 
 @record

@@ -87,7 +87,9 @@ def _values(signal: Signal, log: Log, command: Array) -> Array:
     joint = signal.joint - 1
     if signal.kind == "command":
         # the second column is for the negative direction
-        sign = -1 if signal.part else 1
+        sign = 1
+        if signal.part:
+            sign = -1
         return (sign * command[:, joint]).clip(min=signal.low)
     if signal.kind == "angle":
         angle = log.angle[:, joint]

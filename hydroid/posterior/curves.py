@@ -142,7 +142,9 @@ def _before_the_end(bench: Bench, angles: Array) -> int:
     margin = 0.0
     if np.isfinite(upper - lower):
         margin = MARGIN * (upper - lower)
-    beyond = np.flatnonzero((angles < lower + margin) | (angles > upper - margin))
+    below = angles < lower + margin
+    above = angles > upper - margin
+    beyond = np.flatnonzero(below | above)
     if not len(beyond):
         return len(angles)
     # two points make a curve

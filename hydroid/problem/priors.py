@@ -275,7 +275,9 @@ def _bends(
 
 def _least(parameter: Parameter) -> float:
     """Return the least value that a parameter can have."""
-    return parameter.lower if parameter.fixed is None else parameter.fixed
+    if parameter.fixed is None:
+        return parameter.lower
+    return parameter.fixed
 
 
 def _combination(prior: PriorSettings, parameters: ParameterSet) -> _Combination | None:

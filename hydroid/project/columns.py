@@ -63,7 +63,9 @@ def _choices(values: Array, unit: str) -> Iterator[str]:
     if likely and likely.name == "%":
         yield "a command in %"
     elif likely:
-        offset = f", offset: {likely.offset:.4g}" if likely.offset else ""
+        offset = ""
+        if likely.offset:
+            offset = f", offset: {likely.offset:.4g}"
         yield f"a command in {likely.name} (scale: {likely.scale:.4g}{offset})"
     most = np.abs(values).max()
     if most <= RADIANS:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hydroid.arrays import Limits
 from hydroid.log import Log, LogFinding, Reading, Table, check_log
 from hydroid.settings.arm import Arm
 from hydroid.settings.log import LogSettings
@@ -81,18 +82,16 @@ def read_others(
     return fitted, unseen, left_out
 
 
-def reach_of(
-    logs: Sequence[Log], joints: Sequence[int]
-) -> dict[int, tuple[float, float]]:
+def reach_of(logs: Sequence[Log], joints: Sequence[int]) -> dict[int, Limits]:
     """Return the ends of what joints (numbers, from 1) do in logs [rad, m]."""
-    reach = dict[int, tuple[float, float]]()
+    reach = dict[int, Limits]()
     for joint in joints:
         angles = np.concatenate([log.angle_of(joint) for log in logs])
         reach[joint] = float(np.nanmin(angles)), float(np.nanmax(angles))
     return reach
 
 
-def _no_limits(arm: Arm) -> Mapping[str, tuple[float, float]]:
+def _no_limits(arm: Arm) -> Mapping[str, Limits]:
     return dict.fromkeys(arm.joint_names, (-np.inf, np.inf))
 
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from hydroid.arrays import record
+from hydroid.arrays import Limits, record
 from hydroid.cad.importer import ImportedArm, import_arm
 from hydroid.cad.meshes import MESHES
 from hydroid.errors import HydroidError, SettingsError
@@ -118,10 +118,10 @@ def _layout(
     return find_layout(table, arm, joints, others=others)
 
 
-def _wider(arm: Arm, layout: Layout) -> dict[str, tuple[float, float]]:
+def _wider(arm: Arm, layout: Layout) -> dict[str, Limits]:
     """Return the ranges [rad, m] of joints whose logs leave what is guessed: what the
     logs reach, and a little more."""
-    wider = dict[str, tuple[float, float]]()
+    wider = dict[str, Limits]()
     for number, (low, high) in layout.reach.items():
         joint = arm.joint(number)
         least, most = joint.limits
@@ -136,7 +136,7 @@ def _arm_of_boxes(
     joints: Sequence[str],
     lengths: Sequence[float],
     options: Plain,
-    wider: Mapping[str, tuple[float, float]],
+    wider: Mapping[str, Limits],
 ) -> ImportedArm:
     """Import an arm of boxes as if a person had drawn it; `wider`: ranges of joints that
     the logs tell [rad, m]."""

@@ -32,9 +32,9 @@ def linear_page(linear: LinearArm, drawn: Sequence[LinearArm], arm: Arm) -> Page
         draw = partial(_chart, linear, drawn, k, arm)
         caption = f"{name}: step response and Bode plot"
         tabs.append(Plot(f"linear_{k + 1}", caption, draw, button=name))
-    band = (
-        f" Bands: 95 % of {len(drawn)} machines that the logs allow." if drawn else ""
-    )
+    band = ""
+    if drawn:
+        band = f" Bands: 95 % of {len(drawn)} machines that the logs allow."
     section = Section("Step response and Bode plot", _TEXT + band, tabs=tuple(tabs))
     table = _about(linear, arm)
     near = Section(table.title, tables={"about": table})

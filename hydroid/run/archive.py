@@ -108,8 +108,10 @@ def _arrays(data: bytes) -> dict[str, np.ndarray]:
             values = np.frombuffer(content, kind, offset=header.tell())
             if values.size != math.prod(shape):
                 raise ValueError("shape")
-            ordered = values.reshape(shape, order="F" if columns_first else "C")
-            arrays[member.filename.removesuffix(".npy")] = ordered.copy(order="K")
+            order = "F" if columns_first else "C"
+            name = member.filename.removesuffix(".npy")
+            # a copy: what stands on the bytes of the file cannot be written to
+            arrays[name] = values.reshape(shape, order=order).copy(order="K")
     return arrays
 
 

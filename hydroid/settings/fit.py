@@ -106,7 +106,9 @@ class FitSettings(Settings):
             if quantity in TARGETS[parameter.quantity] and parameter.per is None:
                 found.append(name)
                 open_joints -= {*(parameter.joints or open_joints)}
-        return () if open_joints else tuple(found)
+        if open_joints:
+            return ()
+        return tuple(found)
 
     @classmethod
     def names_of_joints(cls, values: Plain, folder: Path) -> tuple[str, ...]:

@@ -227,7 +227,9 @@ class LogSettings(Settings):
             raise SettingsError(
                 f"{log_file(log).name} is in the groups {listed(found)}", "log.groups"
             )
-        return found[0] if found else OTHER
+        if found:
+            return found[0]
+        return OTHER
 
     def of_arm(self, side: str) -> "LogSettings":
         """Return the columns of one of two arms: their names begin with its own;

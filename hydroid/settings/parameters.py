@@ -7,6 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 from itertools import count
 from typing import Any
 
+from hydroid.arrays import Limits
 from hydroid.files import Plain
 from hydroid.parameters import Parameter, Prior
 from hydroid.quantity_table import CHOICES, CURVE, MECHANICAL, TARGETS
@@ -316,9 +317,7 @@ def _prior(
     return Prior(nominal, math.log(settings.within or 1.0) / 1.96, log=True)
 
 
-def _default_bounds(
-    settings: ParameterSettings, prior: Prior | None
-) -> tuple[float, float]:
+def _default_bounds(settings: ParameterSettings, prior: Prior | None) -> Limits:
     """Return the bounds of a parameter that states none: four standard deviations of
     its prior."""
     if prior is None:

@@ -264,7 +264,9 @@ class Simulation:
         state = ready.states[row]
         samples = len(scenario.command) // scenario.stepping.steps
         observed = bool(self._pressures.size)
-        kept = 1 + samples if observed else 1
+        kept = 1
+        if observed:
+            kept = 1 + samples
         angle = np.full((1 + samples, start.size), np.nan)
         history = np.zeros((kept, len(state)), JOINT_STATE)
         angle[0] = start

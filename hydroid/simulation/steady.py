@@ -33,7 +33,7 @@ from hydroid.hydraulics.cylinder import rod_way, weigh
 from hydroid.hydraulics.elementwise import compilable
 from hydroid.hydraulics.joint import open_share
 from hydroid.hydraulics.kernel import make_pad, source_key
-from hydroid.hydraulics.oil import volume
+from hydroid.hydraulics.oil import volumes
 from hydroid.hydraulics.pump import (
     centre_left,
     delivery,
@@ -265,10 +265,10 @@ def areas_on_the_way(c, w, angle: float, load, command: float) -> Any:
     speed, supply = fed_speed(c, w, areas)
     behind_a, behind_b, _ = oil_at(speed, supply, c, w, areas)
     travel, arm = rod_way(c, angle)
-    volume_a = volume_b = c.dead_volume
+    volume_a = c.dead_volume
+    volume_b = c.dead_volume
     if c.kind == LINEAR:
-        volume_a = volume(travel, c.a.area, c.dead_volume)
-        volume_b = volume(c.stroke - travel, c.b.area, c.dead_volume)
+        volume_a, volume_b = volumes(travel, c)
     # near a dead centre the rod hardly moves, whatever the joint does
     way = 2.0 * NEAR * (arm if abs(arm) > LEAST_LEVER else LEAST_LEVER)
     a = c.a.area + volume_a / c.bulk_modulus * (behind_a - before_a) / way

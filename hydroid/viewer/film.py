@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from hydroid.arrays import Limits
 from hydroid.errors import RunError, SettingsError
 from hydroid.progress import Progress, no_progress
 from hydroid.reporting.outlines import sight
@@ -72,7 +73,7 @@ def rendered(
 def render_motion(
     motion: Motion,
     kind: str,
-    span: tuple[float, float],
+    span: Limits,
     progress: Progress = no_progress,
 ) -> bytes:
     """Return the content of a film of a motion in a span [s], or of a picture of its

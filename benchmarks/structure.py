@@ -166,7 +166,7 @@ def shape(path: Path) -> Shape:
     comprehensions = [node for node in nodes if isinstance(node, COMPREHENSIONS)]
     conditionals = [node for node in nodes if isinstance(node, ast.IfExp)]
     functions = [node for node in nodes if isinstance(node, Function)]
-    many = [f for f in functions if arguments(f) > MOST_ARGUMENTS]
+    overloaded = [f for f in functions if arguments(f) > MOST_ARGUMENTS]
     return Shape(
         files=1,
         lines=len(text.splitlines()),
@@ -181,7 +181,7 @@ def shape(path: Path) -> Shape:
         conditionals=len(conditionals),
         nested_conditionals=sum(holds(node, ast.IfExp) for node in conditionals),
         paired_assignments=sum(is_paired(node) for node in nodes),
-        functions_of_many_arguments=0 if path.parent == OPTIONS else len(many),
+        functions_of_many_arguments=0 if path.parent == OPTIONS else len(overloaded),
         nodes=[statement_nodes(s) for s in statements(tree)],
         complexities=[complexity(f) for f in functions],
     )

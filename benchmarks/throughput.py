@@ -157,7 +157,7 @@ def together(model: str) -> tuple[float, float, float, float]:
         )
         for steps in (1, HELD)
     )
-    envs = VectorEnv(plant.identified, MACHINES, draws=False, threads=2)
+    envs = VectorEnv(plant.identified, MACHINES, seed=None)
     envs.reset(seed=0)
     for _ in range(100):
         envs.reset()

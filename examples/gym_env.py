@@ -25,7 +25,7 @@ def make_env(source: str) -> VectorEnv:
     try:
         return hydroid.VectorEnv(model, MACHINES, seconds=SECONDS)
     except HydroidError:
-        return hydroid.VectorEnv(model, MACHINES, seconds=SECONDS, draws=False)
+        return hydroid.VectorEnv(model, MACHINES, seconds=SECONDS, seed=None)
 
 
 if __name__ == "__main__":

@@ -158,7 +158,9 @@ def _tell_idle(settings: FitSettings, overrides: Mapping[str, Any]) -> None:
         group, _, quantity = key.partition(".")
         if group != "hydraulics":
             continue
-        setting = [settings.parameters_of(name) for name in TARGETS.get(quantity, ())]
+        targets = TARGETS.get(quantity, ())
+        setting = [settings.parameters_of(name) for name in targets]
+        # of a quantity of both sides both must be set
         if setting and all(setting):
             names = listed(sorted({*chain.from_iterable(setting)}), 3)
             text = "note: %s changes nothing: the estimate has %s"
@@ -250,7 +252,8 @@ def changed_files(folder: Path) -> list[str]:
     except (OSError, ValueError, RecursionError, KeyError, TypeError):
         # whoever needs the description says what is wrong with it
         return []
-    present = own_hashes(folder) | {NAME: file_hash(folder / NAME)}
+    present = own_hashes(folder)
+    present[NAME] = file_hash(folder / NAME)
     return [name for name, stored in written.items() if present.get(name) != stored]
 
 
@@ -274,17 +277,16 @@ def write_settings(folder: Path, settings: FitSettings) -> None:
     from hydroid.mjcf import copy_models
 
     arm = settings.arm
-    models = {MODEL: arm.model} | ({PAIR: arm.pair} if arm.pair else {})
-    copy_models(
-        {Path(name).name: path for name, path in models.items()},
-        folder / Path(MODEL).parent,
-    )
-    paths = {"model": MODEL, "pair": PAIR if arm.pair else None}
-    for name, content in (
-        (ARM, arm.model_dump(mode="json") | paths),
-        (CONFIG, portable(settings)),
-    ):
-        write_atomic(folder / name, yaml_text(content))
+    models = {Path(MODEL).name: arm.model}
+    paths: dict[str, str | None] = {"model": MODEL, "pair": None}
+    if arm.pair:
+        models[Path(PAIR).name] = arm.pair
+        paths["pair"] = PAIR
+    copy_models(models, folder / Path(MODEL).parent)
+    description = arm.model_dump(mode="json") | paths
+    write_atomic(folder / ARM, yaml_text(description))
+    # last: whoever finds it finds what it names
+    write_atomic(folder / CONFIG, yaml_text(portable(settings)))
 
 
 def portable(settings: FitSettings) -> dict[str, Any]:

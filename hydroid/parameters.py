@@ -70,11 +70,11 @@ class Parameter:
     def position(self, value: Array | float) -> Array:
         """Return where values lie on the parameter's scale: 0 at the lower bound,
         1 at the upper one."""
+        value = np.asarray(value)
         if self.log:
-            return np.log(np.asarray(value) / self.lower) / np.log(
-                self.upper / self.lower
-            )
-        return (np.asarray(value) - self.lower) / (self.upper - self.lower)
+            width = np.log(self.upper / self.lower)
+            return np.log(value / self.lower) / width
+        return (value - self.lower) / (self.upper - self.lower)
 
     def at(self, position: Array | float) -> Array:
         """Return the values at positions; the ends are the bounds to the last digit.
@@ -83,6 +83,7 @@ class Parameter:
             inner = self.lower * (self.upper / self.lower) ** np.asarray(position)
         else:
             inner = self.lower + position * (self.upper - self.lower)
+        # a power or a product may miss the upper bound by rounding
         return np.where(np.asarray(position) >= 1.0, self.upper, inner)
 
 
@@ -143,25 +144,24 @@ class ParameterSet:
     def from_unit(self, unit: Array) -> Array:
         """Map points of the unit box, shape (.., free), to theta, shape (.., P)."""
         theta = np.empty((*unit.shape[:-1], len(self.parameters)))
+        # of the free parameters alone
         positions = iter(np.moveaxis(unit, -1, 0))
         for column, parameter in enumerate(self.parameters):
-            fixed = parameter.fixed
-            theta[..., column] = (
-                parameter.at(next(positions)) if fixed is None else fixed
-            )
+            if parameter.fixed is None:
+                theta[..., column] = parameter.at(next(positions))
+            else:
+                theta[..., column] = parameter.fixed
         return theta
 
     def to_unit(self, theta: Array) -> Array:
         """Map theta, shape (.., P), to the unit box, shape (.., free);
         values beyond a bound are clipped."""
-        columns = [
-            parameter.position(values)
-            for parameter, values in zip(
-                self.parameters, np.moveaxis(theta, -1, 0), strict=True
-            )
-            if parameter.fixed is None
-        ]
-        return np.clip(np.stack(columns, axis=-1), 0.0, 1.0)
+        positions = list[Array]()
+        columns = np.moveaxis(theta, -1, 0)
+        for parameter, values in zip(self.parameters, columns, strict=True):
+            if parameter.fixed is None:
+                positions.append(parameter.position(values))
+        return np.clip(np.stack(positions, axis=-1), 0.0, 1.0)
 
     def width(self, theta: Array) -> Array:
         """Return the change of each value per change of its position on its scale, at

@@ -130,12 +130,11 @@ def run_study(
     tasks = make_tasks(cells, study.seeds, logs)
     files = [folder / "runs" / f"{task.key()}.json" for task in tasks]
     results = {file: _read(file) for file in files if file.is_file()}
-    # cells that say the same are one run
-    missing = {
-        file: task
-        for file, task in zip(files, tasks, strict=True)
-        if file not in results
-    }
+    missing = dict[Path, Task]()
+    for file, task in zip(files, tasks, strict=True):
+        # cells that say the same are one run
+        if file not in results:
+            missing[file] = task
     if results and missing:
         total = len(results) + len(missing)
         LOGGER.log(NOTE, "%d of %d runs found, goes on", len(results), total)
@@ -159,6 +158,7 @@ def _perform_all(
         for done, future in enumerate(as_completed(futures), there + 1):
             file = futures.pop(future)
             results[file], lasting = _ended(future, missing[file])
+            # written one by one: whoever ends a study goes on from here
             if lasting:
                 text = json.dumps(results[file], indent=1, allow_nan=False)
                 write_atomic(file, text + "\n")
@@ -196,12 +196,14 @@ def read_cells(
     """
     logs = dict[str, Sequence[Log]]()
     for name, settings in cells.items():
-        alike = [
-            other
-            for other in logs
-            if cells[other].log == settings.log and cells[other].arm == settings.arm
-        ]
-        logs[name] = logs[alike[0]] if alike else read(paths, settings)
+        for other in logs:
+            # the arm says how long its rods are, which logs may hold
+            reads_alike = cells[other].log == settings.log
+            if reads_alike and cells[other].arm == settings.arm:
+                logs[name] = logs[other]
+                break
+        else:
+            logs[name] = read(paths, settings)
     return logs
 
 
@@ -214,16 +216,18 @@ def make_tasks(
     for seed in range(1, seeds + 1):
         for name, settings in cells.items():
             changes = {"search.seed": seed, "simulation.threads": 1}
-            tasks.append(Task(name, seed, settings.changed(changes), tuple(logs[name])))
+            changed = settings.changed(changes)
+            tasks.append(Task(name, seed, changed, tuple(logs[name])))
     return tasks
 
 
 def measures_of(task: Task, result: Result) -> Row:
     """Return the measures of one run (docs/studies.md)."""
-    values = {name: float(value) for name, value in result.get("measures", {}).items()}
-    values |= {
-        f"value {name}": value for name, value in result.get("theta", {}).items()
-    }
+    values = dict[str, float]()
+    for name, value in result.get("measures", {}).items():
+        values[name] = float(value)
+    for name, value in result.get("theta", {}).items():
+        values[f"value {name}"] = value
     return Row(task.cell, task.seed, values, result.get("failed", ""))
 
 
@@ -248,7 +252,9 @@ def processes(count: int = 0) -> Generator[Executor]:
     try:
         yield pool
     except BaseException:
-        for process in list((getattr(pool, "_processes", None) or {}).values()):
+        # a simulation takes no signal before its log's end, and shutdown would wait
+        running = getattr(pool, "_processes", None) or {}
+        for process in list(running.values()):
             process.kill()
         raise
     finally:

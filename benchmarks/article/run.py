@@ -45,7 +45,7 @@ def work(
         while True:
             if time.monotonic() - begun < seconds:
                 todo = [
-                    key for key in telling(plans, runs) if key not in pending.values()
+                    key for key in by_worth(plans, runs) if key not in pending.values()
                 ]
                 for name, cell, seed in todo[: at_once - len(pending)]:
                     pending[executor.submit(perform, plans[name].task(cell, seed))] = (
@@ -79,7 +79,7 @@ def write(results: Path, name: str, runs: Runs) -> None:
     )
 
 
-def telling(plans: Mapping[str, Plan], runs: Mapping[str, Runs]) -> list[Key]:
+def by_worth(plans: Mapping[str, Plan], runs: Mapping[str, Runs]) -> list[Key]:
     """Return what is missing: for the article's undecided claims, the cheapest first;
     for ours; all else."""
     have = {

@@ -324,7 +324,9 @@ def design(
 
     # the number breaks ties: trials themselves cannot be compared
     scored = [(score(trial), number, trial) for number, trial in enumerate(random)]
-    elite = sorted(scored, reverse=True)[:ELITE]
+    elite = sorted(scored, reverse=True)
+    # more of them would spread the changes over experiments that are far behind
+    elite = elite[:ELITE]
     effort = settings.design.effort
     for tried in range(_random_effort(effort) + 1, effort + 1):
         # of two drawn the better: those at the front are changed more often

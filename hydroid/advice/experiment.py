@@ -247,6 +247,7 @@ def repaired(experiment: Experiment, first: Violation) -> Experiment:
             if abs(level) <= 10.0:
                 level = 0.0
             return experiment.with_level(first.joint, last, level)
+    # nothing that the joint did led there: another one moved it
     for joint, signal in experiment.inputs.items():
         experiment = experiment.with_level(joint, slice(None), 0.7 * signal.level)
     return experiment

@@ -98,6 +98,7 @@ def load_of(model: IdentifiedModel, log: Log, problem: Problem, theta: Array) ->
         quantile = known.quantile
     rows = np.vstack([np.column_stack(slopes), prior])
     aim = np.append(-here, np.zeros(len(prior)))
+    # what the log does not determine stays as the fit has it
     inverse = np.linalg.pinv(rows.T @ rows, hermitian=True)
     step = inverse @ (rows.T @ aim)
     mass = max(mass + change * float(step[0]), 0.0)

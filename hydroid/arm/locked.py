@@ -140,6 +140,7 @@ def lock(spec: mujoco.MjSpec, arm: Arm, moving: Mask, pose: Array) -> LockedArm:
     locked = LockedArm(model, joints, columns, pose[columns], parts, held)
     for name, value in locked.inertials(arm.masses[None]).items():
         getattr(model, name)[:] = value[0]
+    # constants of the reference pose, by which MuJoCo scales its tolerances
     with quiet_mujoco():
         mujoco.mj_setConst(model, mujoco.MjData(model))
     return locked

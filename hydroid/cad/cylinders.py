@@ -138,7 +138,8 @@ def _show_pivots(spec: mujoco.MjSpec, made: "_Linkage", data: mujoco.MjData) -> 
         pins.reverse()
     for end, pin, body in zip(ENDS, pins, (carrier, moved), strict=True):
         frame = data.body(body)
-        place = frame.xmat.reshape(3, 3).T @ (pin.at - frame.xpos)
+        axes = frame.xmat.reshape(3, 3)
+        place = axes.T @ (pin.at - frame.xpos)
         spec.body(body).add_site(name=f"{made.joint.name}_pivot_{end}", pos=place)
 
 

@@ -96,7 +96,11 @@ def _widths(
     model: mujoco.MjModel, data: mujoco.MjData, loops: list[int]
 ) -> list[float]:
     """Return how far the ends of loops are apart [m]."""
-    return [float(np.linalg.norm(_gap(model, data, number))) for number in loops]
+    widths = list[float]()
+    for number in loops:
+        gap = _gap(model, data, number)
+        widths.append(float(np.linalg.norm(gap)))
+    return widths
 
 
 def _gap(model: mujoco.MjModel, data: mujoco.MjData, number: int) -> Array:

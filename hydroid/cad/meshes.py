@@ -63,7 +63,9 @@ class _Reach:
     def nearest(self, length: float, of: float) -> float:
         """Return the unit [m] in which a mesh of a length is most like a distance
         [m]."""
-        return min(UNITS, key=lambda unit: abs(np.log(length * unit / of)))
+        # by the ratio of both: a mesh may be ten times too large or too small
+        ratios = {unit: length * unit / of for unit in UNITS}
+        return min(UNITS, key=lambda unit: abs(np.log(ratios[unit])))
 
 
 def convert_meshes(
@@ -244,7 +246,10 @@ def _tell_units(
 
 def _reach(spec: mujoco.MjSpec, notes: Notes) -> _Reach:
     model, data = bare_model(spec, notes.path)
-    link_of = [model.body(int(at)).name if at else "" for at in model.body_weldid]
+    link_of = list[str]()
+    for carrier in model.body_weldid.tolist():
+        # 0 is the world, which is no link
+        link_of.append(model.body(carrier).name if carrier else "")
     distances = dict[str, float]()
     for joint in range(model.njnt):
         above = link_of[int(model.body_parentid[model.jnt_bodyid[joint]])]

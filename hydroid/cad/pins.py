@@ -85,7 +85,9 @@ def pins_of(spec: mujoco.MjSpec, data: mujoco.MjData) -> list[Pin]:
                 continue
         else:
             body = data.body(equality.name1)
-            at = body.xpos + body.xmat.reshape(3, 3) @ np.array(equality.data[:3])
+            frame = body.xmat.reshape(3, 3)
+            # the anchor stands in the first body's frame
+            at = body.xpos + frame @ np.array(equality.data[:3])
         pins.append(Pin(ends_of(spec, equality), at))
     return pins
 
@@ -115,8 +117,12 @@ def hinged_rods(spec: mujoco.MjSpec) -> Iterator[tuple[str, str]]:
             name = frozenset(_other_words(joint.parent.name))
             by_name.setdefault(name, []).append(joint.parent)
     for bodies in by_name.values():
-        if len(bodies) == 2 and bodies[0].parent.name != bodies[1].parent.name:
-            yield bodies[0].name, bodies[1].name
+        if len(bodies) != 2:
+            continue
+        first, second = bodies
+        # on one link they would be a pair of cylinders
+        if first.parent.name != second.parent.name:
+            yield first.name, second.name
 
 
 def _other_words(name: str) -> set[str]:
@@ -141,7 +147,8 @@ def closed_pins(
     cylinder_parts = {*chain.from_iterable(cylinders)}
     for tube, rod in cylinders:
         feet = pins_at(pins, tube, rod)
-        is_loose = len(feet) == 1 and not pins_at([*pins, *closed], rod, tube)
+        heads = pins_at([*pins, *closed], rod, tube)
+        is_loose = len(feet) == 1 and not heads
         # a telescope with a tool is no cylinder
         if not is_loose or not is_part_of_cylinder(spec.body(rod).joints[0]):
             continue
@@ -273,7 +280,8 @@ def _frames(spec: mujoco.MjSpec, data: mujoco.MjData) -> list[_Frame]:
         owner = body.parent
         while not owner.joints and owner.name != "world":
             owner = owner.parent
-        frames.append(_Frame(body.name, owner.name, data.body(body.name).xpos.copy()))
+        place = data.body(body.name).xpos.copy()
+        frames.append(_Frame(body.name, owner.name, place))
     return frames
 
 

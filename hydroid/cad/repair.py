@@ -152,8 +152,9 @@ def _doubt_light(
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     for body, after in pairwise(links):
-        ends = [data.joint(one.joints[0].name).xanchor for one in (body, after)]
-        length = float(np.linalg.norm(ends[1] - ends[0]))
+        here = data.joint(body.joints[0].name).xanchor
+        there = data.joint(after.joints[0].name).xanchor
+        length = float(np.linalg.norm(there - here))
         least = SLIGHT * SLENDER * length**3
         if body.mass == stated[body.name] and body.mass < least:
             notes.add(
@@ -187,7 +188,8 @@ def _likely(
     }
     filled = _filled([body for body in links if body.name not in lost], hull_of)
     places = _joints_and_end(links, data)
-    longest = np.linalg.norm(np.diff(places, axis=0), axis=1).max()
+    ways = np.diff(places, axis=0)
+    longest = np.linalg.norm(ways, axis=1).max()
     likely = list[tuple[mujoco.MjsBody, _Likely]]()
     for body, (here, there) in zip(links, pairwise(places), strict=True):
         if body.name in filled:
@@ -225,8 +227,12 @@ def _joints_and_end(
     The last link goes on as the one before it, half as long.
     """
     places = [data.joint(body.joints[0].name).xanchor for body in links]
-    before = places[-2] if len(links) > 1 else places[-1] - [1.0, 0.0, 0.0]
-    return [*places, 1.5 * places[-1] - 0.5 * before]
+    last = places[-1]
+    # of an arm with one link nobody knows its direction
+    before = last - [1.0, 0.0, 0.0]
+    if len(links) > 1:
+        before = places[-2]
+    return [*places, 1.5 * last - 0.5 * before]
 
 
 def _slender(body: Any, to_next: Array, shortest: float) -> _Likely:
@@ -235,7 +241,9 @@ def _slender(body: Any, to_next: Array, shortest: float) -> _Likely:
     along = body.xmat.reshape(3, 3).T @ to_next
     length = max(float(np.linalg.norm(along)), shortest, 0.1)
     mass = USUAL * SLENDER * length**3
-    rod = Inertial(mass, 0.5 * along, mass * length**2 / 12 * np.eye(3))
+    # that of a thin rod, about every axis
+    inertia = mass * length**2 / 12 * np.eye(3)
+    rod = Inertial(mass, 0.5 * along, inertia)
     return _Likely(rod, SLIGHT, np.inf, USUAL)
 
 

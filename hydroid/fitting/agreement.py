@@ -283,7 +283,7 @@ def _ease(move: Array, ask: Array, place: Array) -> Array:
     weak = 1e-3 * np.sum(ask**2) + TINY
     normal = rows.T @ rows + weak * np.eye(3)
     right = rows.T @ move + weak * np.array([1, 0, 0])
-    return np.linalg.solve(normal, right)
+    return np.linalg.solve(normal, right).astype(float)
 
 
 def _deviations(numbers: _Numbers, k: int) -> Array:

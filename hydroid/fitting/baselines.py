@@ -135,6 +135,7 @@ def fit_baselines(
     never driven has only that.
     """
     measured = [log for log in logs if log.measures(joint)]
+    # the simplest guess: it stays where it starts
     still = Baseline(joint, np.asarray(limits, float))
     if not any(log.drives(joint) for log in measured):
         return {NAMES[0]: still}

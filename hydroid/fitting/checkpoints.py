@@ -54,6 +54,7 @@ def saving(
     try:
         yield keep
     finally:
+        # by an interrupt, too: a resumed run goes on from there
         if pending is not None:
             checkpoints[name] = pending()
 

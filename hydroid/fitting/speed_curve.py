@@ -129,6 +129,7 @@ def _isotonic(
 
     `steady`: whether speeds count less while the command changes.
     """
+    # one curve for all logs: a valve is the same in each
     pairs = [_pairs(log, joint, reach, delay) for log in logs]
     command, speed, weight = np.hstack(pairs)
     if len(command) < LEAST_SAMPLES:
@@ -148,6 +149,8 @@ def _isotonic(
     total: Array = np.bincount(number, weight).astype(float)
     asked = np.bincount(number, weight * command) / total
     mean = np.bincount(number, weight * direction * speed) / total
+    # a valve that opens farther never makes a joint slower: of all such curves the
+    # nearest, without a law of the opening
     fitted = isotonic_regression(mean, weights=total).x
     # a drift at rest, such as a sensor's, is no speed of the valve: the curve has one
     # sign at each side

@@ -53,6 +53,7 @@ def summarise(problem: Problem, fit: Fit) -> FitSummary:
     known = account(fit.problem, fit.uncertainty)
     scalars, curves = fit.quantities
     simulations, diverged = fit.history[-1, 2:4]
+    # those that were not kept, too: a reader sees what a term or a model gained
     estimates = dict[str, NamedEstimate]()
     for estimate in fit.estimates.values():
         estimates[estimate.name] = _named_estimate(problem, estimate)

@@ -129,6 +129,7 @@ class Prediction:
             )
         shown = display(slides=number in self.slides)
         column = self.joints.index(number)
+        # models without a covariance have no bands
         half = None
         if number in self.bands:
             half = shown.factor * self.bands[number].half

@@ -302,7 +302,7 @@ def _verdict(
         return Verdict.MISFIT, None
     if unseen.fit is None:
         return Verdict.UNTESTED, None
-    # of a fit that fits, and diverges elsewhere, that is the news
+    # of a fit that fits, and diverges elsewhere, that is the news, and no comparison
     diverged_alone = fitted.fit is not None and not np.isfinite(unseen.fit)
     if not diverged_alone:
         for name in not_ahead:

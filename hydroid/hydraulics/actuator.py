@@ -52,7 +52,8 @@ def at_rest(plugin: Plugin, angle: Array, torque: Array) -> Structs:
     """
     c: Records = plugin.coefficients.view(np.recarray)
     lever = rod_motion(angle, c)[1]
-    level = np.where(np.isfinite(c.start_pressure), c.start_pressure, START_PRESSURE)
+    stated = np.isfinite(c.start_pressure)
+    level = np.where(stated, c.start_pressure, START_PRESSURE)
     pressure_a, pressure_b = holding_pressures(
         torque / lever, c.a.area, c.b.area, c.supply_pressure, c.tank_pressure, level
     )
@@ -68,6 +69,7 @@ def at_rest(plugin: Plugin, angle: Array, torque: Array) -> Structs:
         plunger = state[side]
         plunger["drive"] = idle_drive
         plunger["stroke"] = resting_stroke(idle_drive, c.gap, c.plunger_stiffness)
+    # the first step has no step before it that says what else acts: it is what is held
     state["hold"] = torque
     state["external"] = -torque
     # what trapped oil does not carry, the joint rests on
@@ -107,5 +109,8 @@ def swallowed(c: Records, angle: Array, velocity: Array) -> Array:
     Elementwise over COEFFICIENTS; 0 of a joint without actuator.
     """
     speed = rod_motion(angle, c)[1] * velocity
-    area = np.where(speed > 0, c.a.draw * c.a.area, -c.b.draw * c.b.area)
+    # the chamber that fills is fed by the pump, the other one empties to the tank
+    filled_a = c.a.draw * c.a.area
+    filled_b = -c.b.draw * c.b.area
+    area = np.where(speed > 0, filled_a, filled_b)
     return np.where(c.kind == NONE, 0.0, area * speed)

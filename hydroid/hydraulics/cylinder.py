@@ -74,10 +74,9 @@ def rod_motion(angle: Array, c) -> list[Array]:
     with np.errstate(all="ignore"):  # joints without a range, a rocker or a triangle
         turned = bent(angle, c)
         rocked = four_bar(angle, c)
-        psi, first, second = (
-            np.where(has_rocker, with_rocker, without)
-            for with_rocker, without in zip(rocked, still, strict=True)
-        )
+        psi = np.where(has_rocker, rocked[0], angle)
+        first = np.where(has_rocker, rocked[1], 1.0)
+        second = np.where(has_rocker, rocked[2], 0.0)
         travel, arm, slope = triangle(
             psi, c.pivot_distance_1, c.pivot_distance_2, c.theta0, c.shortest
         )
@@ -93,7 +92,10 @@ def rod_motion(angle: Array, c) -> list[Array]:
 def rod_way(c, angle: float) -> Any:
     """Travel of one joint's rod [m] and its moment arm [m/rad] at an angle [rad]; of a
     rotary actuator as `bent`."""
-    way, arm, _ = rod(angle, c) if c.kind == LINEAR else bent(angle, c)
+    if c.kind == LINEAR:
+        way, arm, _ = rod(angle, c)
+    else:
+        way, arm, _ = bent(angle, c)
     return way, arm
 
 

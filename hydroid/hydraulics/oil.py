@@ -149,6 +149,7 @@ def store_oil(c, z, w, speed: float, angle: float, supply: float) -> None:
         pressure_a = max(supply, (tank * b + w.push - w.thrust) / a)
     elif w.open_area < 0.0:
         pressure_b = max(supply, (tank * a - w.push - w.thrust) / b)
+    # what `actuator.pressures` takes off again
     out = rod_way(c, angle)[0]
     fill_a = out * a / c.dead_volume
     fill_b = -out * b / c.dead_volume

@@ -161,6 +161,7 @@ def draw_from_line(line, c, w) -> None:
     back_b = w.b.filled * w.b.give * w.b.rise
     a = c.a.draw
     b = c.b.draw
+    # at the pressure and the speed at which the sub-step begins
     line.drawn += (
         a * w.a.pumped
         - a * back_a * w.a.inflow
@@ -170,6 +171,7 @@ def draw_from_line(line, c, w) -> None:
     line.softness += a * w.a.give * (1.0 - back_a) + b * w.b.give * (1.0 - back_b)
     w.thrust = back_a * w.a.lever + back_b * w.b.lever
     w.sweep = a * back_a * w.a.lever + b * back_b * w.b.lever
+    # f and g enter one symmetric system: their geometric mean keeps it symmetric
     w.pull = np.copysign(np.sqrt(max(w.thrust * w.sweep, 0.0)), w.thrust)
     line.swept += w.sweep * w.speed
 
@@ -238,7 +240,8 @@ def line_pressure(coefficients, driven, work, line, share: float) -> float:
         met = abs(excess) <= SETTLED * share * pump.pump_flow
         if met or high - low <= SETTLED * pump.relief:
             break
-        after = pressure - excess / slope  # infinite where nothing flows
+        # infinite where nothing flows
+        after = pressure - excess / slope
         if not low < after < high:
             # beyond the relief pressure Newton's step ends there, elsewhere it halves
             after = high if after > high == pump.relief else 0.5 * (low + high)

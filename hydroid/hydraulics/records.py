@@ -184,6 +184,7 @@ def nominal_joints(arm: Arm, settings: HydraulicSettings) -> Structs:
     table = np.zeros(len(arm.joints), JOINT)
     for row, joint in zip(table, arm.joints, strict=True):
         actuator = joint.actuator
+        # of the joint's range: middle, half and the retracted rod follow from them
         ends = np.array(joint.limits)
         for name, value in actuator_values(actuator, settings).items():
             if name == "mass":

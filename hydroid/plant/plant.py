@@ -111,7 +111,8 @@ class Plant:
         self._candidate = Bindings(settings).candidates(identified.theta[None])
         if settings.stage == "hyd":
             _refuse_without_force(self._candidate, identified.source)
-        self._locked_pose = np.empty(0)  # none yet
+        # none yet: the first reset locks whatever does not move
+        self._locked_pose = np.empty(0)
         compile_rollout()
         self.reset()
 

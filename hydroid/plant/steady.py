@@ -128,14 +128,18 @@ class SteadyArm:
         """Return where joints at an end of their range should move beyond it, (S,
         J)."""
         low, high = self.ranges.T
-        return ((speed < 0.0) & (pose <= low)) | ((speed > 0.0) & (pose >= high))
+        downwards = (speed < 0.0) & (pose <= low)
+        upwards = (speed > 0.0) & (pose >= high)
+        return downwards | upwards
 
     def limits(
         self, speed: Array, reached: Array, command: Array, pose: Array
     ) -> list[dict[int, Limit]]:
         """Return why joints (0-based) do not have their wished speeds, for each of S
         poses."""
-        away = np.abs(reached - speed) > np.maximum(CLOSE * np.abs(speed), LEAST_SPEED)
+        # what the search for a command leaves is no limit
+        close = np.maximum(CLOSE * np.abs(speed), LEAST_SPEED)
+        away = np.abs(reached - speed) > close
         driven = self.columns[self.plugin.order[self.plugin.idle :]]
         away &= np.isin(np.arange(len(self.ranges)), driven)
         stopped = self.stopped(speed, pose)

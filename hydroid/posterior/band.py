@@ -64,6 +64,7 @@ def fitted_bands(
     for number, channel in enumerate(problem.channels):
         if channel.quantity != "angle":
             continue
+        # residuals are weighted; bands are in the angle's own unit
         sd = posterior.sd(slopes[:, channel.rows]) / channel.weight
         simulated = responses[channel.log][:, channel.column]
         sensor, drift = error_variances(uncertainty.errors, number, simulated)

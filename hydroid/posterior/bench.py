@@ -174,6 +174,7 @@ class Movement:
         slack where the first log starts.
         """
         settings = self.bench.settings
+        # a speed is the joint's, and not what a sensor makes of it
         to_scale = candidates.joints.copy()
         to_scale["sensor_scale"] = 1.0
         steps = self.samples * settings.stepping.steps
@@ -222,6 +223,7 @@ def make_bench(settings: FitSettings, logs: Sequence[Log], joint: int) -> Bench:
     command = np.zeros((2, len(pose)))
     still = np.tile(pose, (2, 1))
     rest = Log("a test movement", np.array([0.0, period]), command, still, period)
+    # a quantity of a joint is to be its own, whatever the others do
     alone = settings.changed({"simulation.other_joints": "locked"})
     scenario = make_scenario(load_model(arm), rest, [joint - 1], alone)
     only = (only_command(logs, joint, 1.0), only_command(logs, joint, -1.0))

@@ -130,6 +130,7 @@ def _left_out(problem: Problem, uncertainty: Uncertainty, logs: Ints) -> _LeftOu
     inverses = scaled @ axes.transpose(0, 2, 1)
     row = linear.innovations.copy()
     steps = np.empty((len(logs), len(linear.slopes)))
+    # the effects are orthonormal over all logs: what one log has of them is its share
     for g, (of_log, u) in enumerate(zip(samples, effects, strict=True)):
         steps[g] = inverses[g] @ u @ row[of_log]
         row[of_log] += steps[g] @ u

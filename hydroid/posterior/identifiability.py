@@ -71,6 +71,7 @@ def profile(problem: Problem, uncertainty: Uncertainty, name: str) -> Profile:
         reach = np.inf
     low, below = _one_side(held, parameters.lower[i], reach)
     high, above = _one_side(held, parameters.upper[i], reach)
+    # the deviance is measured from the estimate, where it is 0
     points = [(float(uncertainty.theta[i]), 0.0), *below, *above]
     lowest = min(deviance for _, deviance in points)
     # without a crossing within the bounds that side has no limit

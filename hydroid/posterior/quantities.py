@@ -123,6 +123,7 @@ def _curve(
 ) -> CurveEstimate:
     """Return the curve of a joint whose points, at least one, are `rows` of what is
     estimated."""
+    # points come direction by direction; a curve goes on from one to the other
     order = sorted(range(len(rows)), key=lambda i: columns[i].at or 0.0)
     last = columns[-1]
     return CurveEstimate(

@@ -78,6 +78,7 @@ class Bindings:
         """Spread theta, shape (n, P), over joints and links, in SI, as they are in a
         log of this name."""
         group = self._group_of(log)
+        # what no parameter sets keeps its nominal value
         joints: Records = np.tile(self._nominal, (len(theta), 1)).view(np.recarray)
         mass = np.tile(self._arm.masses, (len(theta), 1))
         for binding in self._bindings:

@@ -81,6 +81,7 @@ def make_channels(logs: Sequence[Log], settings: FitSettings) -> tuple[Channel, 
     channels = list[Channel]()
     end = 0
     for i, log in enumerate(logs):
+        # all signals of a log have its samples: gaps have parted it before
         samples = len(log.time)
         for signal in (*_angles(log, settings), *_pressures(log, settings)):
             rows = slice(end, end + samples)
@@ -155,6 +156,7 @@ def overall_objective(
     value = norm(error, settings.norm)
     if not settings.relative:
         return value
+    # (19): relative to the measured output, which a joint that stands does not have
     scale = norm(measured[None, :], settings.norm)[0]
     if scale == 0:
         raise SettingsError(

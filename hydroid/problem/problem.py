@@ -147,8 +147,10 @@ class Problem:
     def objectives(self, theta: Array) -> Array:
         """Evaluate theta, shape (n, P), in this process."""
         size = max(1, CHUNK // len(self.measured))
-        chunks = [theta[at : at + size] for at in range(0, len(theta), size)]
-        parts = [self.norms(self.errors(self.responses(chunk))) for chunk in chunks]
+        parts = list[Array]()
+        for first in range(0, len(theta), size):
+            responses = self.responses(theta[first : first + size])
+            parts.append(self.norms(self.errors(responses)))
         return np.vstack(parts)
 
     def norms(self, errors: Array) -> Array:

@@ -236,12 +236,16 @@ def _both_sides(curve: CurveEstimate, sides: Mapping[str, str]) -> list[Mark]:
     marks = list[Mark]()
     rows = _rows(curve)
     for sign, towards in (1.0, "positive"), (-1.0, "negative"):
-        x, y, low, high = rows[:, sign * rows[0] > 0]
-        color = TOWARDS[towards]
-        label = f"model, {sides[towards]}"
-        marks.append(Mark("band", x, low, high, color=color, label=label, alpha=0.25))
-        marks.append(Mark("line", x, y, color=color, label=label))
+        of_side = rows[:, sign * rows[0] > 0]
+        marks += _banded(of_side, TOWARDS[towards], f"model, {sides[towards]}")
     return marks
+
+
+def _banded(rows: Array, color: Color, label: str) -> tuple[Mark, Mark]:
+    """Draw the interval of a curve and the curve, from rows as `_rows` gives them."""
+    x, value, low, high = rows
+    band = Mark("band", x, low, high, color=color, label=label, alpha=0.25)
+    return band, Mark("line", x, value, color=color, label=label)
 
 
 def _response_chart(name: str, curves: Mapping[str, CurveEstimate]) -> Chart:
@@ -272,11 +276,8 @@ def _response_panel(y: str, curves: Mapping[str, CurveEstimate]) -> Panel:
     along = ""
     unit = ""
     for towards, curve in curves.items():
-        x, value, low, high = _rows(curve)
         label = _answered(curve, towards)
-        color = TOWARDS[towards]
-        marks.append(Mark("band", x, low, high, color=color, label=label, alpha=0.25))
-        marks.append(Mark("line", x, value, color=color, label=label))
+        marks += _banded(_rows(curve), TOWARDS[towards], label)
         along = curve.along
         unit = curve.unit
     return Panel(along, f"{y} [{unit}]", tuple(marks), height=200)

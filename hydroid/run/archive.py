@@ -53,6 +53,7 @@ def pack(tree: object, *, compressed: bool = True) -> bytes:
     save = np.savez_compressed if compressed else np.savez
     save(buffer, content=content, **arrays)  # pyright: ignore[reportArgumentType]
     packed = buffer.getvalue()
+    # a disk may damage a file silently: then it is refused, and not half read
     return packed + hashlib.sha256(packed).digest()
 
 

@@ -81,6 +81,7 @@ def difference(run: Mapping[str, Any], other: Mapping[str, Any], but: str = "") 
         return (
             f"has other logs, or others' contents: {names}, not {', '.join(other_logs)}"
         )
+    # dotted keys, as `--set` takes them, so that the message can be acted on
     settings = _flat(run.get("settings"))
     other_settings = _flat(other.get("settings"))
     for key in sorted(settings.keys() | other_settings.keys()):
@@ -205,7 +206,7 @@ class RunFolder:
             )
             return self.checkpoints()
         self.refuse_changes()
-        # its own copy, to the last bit
+        # resumed with its own config.yaml: the model is its own copy, to the last bit
         if (self.path / MODEL).samefile(settings.arm.model):
             wanted["origin"] = self.identity().get("origin")
         other = difference(self.identity(), wanted)

@@ -60,9 +60,9 @@ def _lock(file: FileIO, folder: Path) -> None:
     except OSError as error:
         if error.errno in (errno.EWOULDBLOCK, errno.EACCES):
             file.seek(0)
-            holder = (
-                file.read(200).decode(errors="replace").strip() or "another process"
-            )
+            written = file.read(200).decode(errors="replace").strip()
+            # empty for the moment in which the other process writes who it is
+            holder = written or "another process"
             hint = "wait for it to end, or choose another --out"
             raise RunError(f"is in use by {holder}", folder, hint) from None
         words = "%s: no lock on this file system (%s); let no two runs use it"
@@ -93,6 +93,7 @@ class _File(logging.FileHandler):
     """A log that falls silent where it cannot be written: no run ends for it."""
 
     def format(self, record: logging.LogRecord) -> str:
+        # one line each, so that a program can read it
         return " ".join(super().format(record).splitlines())
 
     def handleError(self, record: logging.LogRecord) -> None:

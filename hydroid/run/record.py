@@ -262,6 +262,7 @@ def _validations(folder: Path) -> dict[str, Prediction]:
     once."""
     unseen = dict[str, Prediction]()
     contents = set[bytes]()
+    # in an order that does not depend on the file system
     for file in sorted(folder.glob(f"{VALIDATIONS}/*/{RESULT}")):
         try:
             prediction = _read(file, Prediction, "validate again")

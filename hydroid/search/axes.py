@@ -204,7 +204,7 @@ def _slopes(
         difference = np.linalg.norm(first - parabola, axis=1)
         in_common = np.linalg.norm(parabola, axis=1)
         curved = difference > in_common
-    # where one of two steps fails, the other one tells the slope
+    # where one of two steps fails (a simulation diverges), the other tells the slope
     line = np.where(np.isfinite(first), first, second)
     slopes = np.where(np.isfinite(parabola), parabola, line)
     return slopes, curved

@@ -121,6 +121,7 @@ def _advance(now: State, residuals: Function, settings: RefinementSettings) -> S
         corrected = _corrected(now, model, first, residuals)
         if corrected is not None:
             steps.append(corrected)
+    # inside the box, so that a step may be shorter than it was solved for
     points = np.array([model.reach(s) for s in steps])
     moved = np.linalg.norm(points[0] - now.point)
     if moved <= SHORTEST * np.linalg.norm(now.point):

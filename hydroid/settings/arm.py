@@ -182,12 +182,16 @@ class Arm(Settings):
         a load at the tip; L in all.
         """
         model = self._model
-        bodies = [model.body(b) for b in range(1, model.nbody) if model.body_weldid[b]]
+        # what is welded to the world does not move: its mass changes nothing
+        moving = [b for b in range(1, model.nbody) if model.body_weldid[b]]
+        bodies = [model.body(b) for b in moving]
         links = [body for body in bodies if body.name and body.mass[0]]
         # the sort is stable: those of the joints come first, in their order
         links.sort(key=lambda body: not body.jntnum[0])
         masses = {body.name: float(body.mass[0]) for body in links}
-        return masses | ({TIP_LOAD: self.load} if self.load else {})
+        if self.load:
+            masses[TIP_LOAD] = self.load
+        return masses
 
     @cached_property
     def poses(self) -> dict[str, tuple[float, ...]]:

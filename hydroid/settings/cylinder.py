@@ -78,12 +78,17 @@ def make_cylinder(
         sides = _along_joint(settings, data, joint)
     elif sides is None:
         sides, pivots = _pinned(settings.pivots, data, joint)
-    sides = sides.changed({"a": max(sides.a, sides.b), "b": min(sides.a, sides.b)})
+    # the law is the same for both orders; b = 0 marks a joint that slides
+    longer = max(sides.a, sides.b)
+    shorter = min(sides.a, sides.b)
+    sides = sides.changed({"a": longer, "b": shorter})
     cylinder = LinearActuator(settings, sides, 0.0, pivots)
     _refuse_dead_centre(cylinder, limits)
-    needed = 1e3 * float(np.ptp(cylinder.length(np.array(limits))))
+    lengths = cylinder.length(np.array(limits))
+    needed = 1e3 * float(np.ptp(lengths))
     stroke = settings.stroke or round(needed, 3)
-    if stroke < 0.98 * needed:  # catalogues round: the cylinder then stops first
+    # catalogues round: the cylinder then stops first
+    if stroke < 0.98 * needed:
         raise ValueError(
             f"a stroke of {stroke:g} mm is too short for the range, which needs {needed:.1f} mm"
         )
@@ -102,7 +107,8 @@ def _along_joint(settings: Cylinder, data: Any, joint: str) -> Triangle:
         rod = np.subtract(pivots.child, pivots.parent)
         is_forward = rod @ data.joint(joint).xaxis > 0
     # with b = 0 and a = 1 the length is the sine of theta0 times the way
-    return Triangle.model_construct(a=1.0, b=0.0, theta0=90.0 if is_forward else -90.0)
+    theta0 = 90.0 if is_forward else -90.0
+    return Triangle.model_construct(a=1.0, b=0.0, theta0=theta0)
 
 
 def _refuse_dead_centre(cylinder: LinearActuator, limits: Limits) -> None:
@@ -135,7 +141,8 @@ def _pinned(
     ends = _pivot_ends(given, data, joint)
     child = data.model.joint(joint).bodyid[0]
     parent = data.model.body_parentid[child]
-    in_bodies = _in_body(data, parent, ends[0]), _in_body(data, child, ends[1])
+    in_parent = _in_body(data, parent, ends[0])
+    in_child = _in_body(data, child, ends[1])
     axis = data.joint(joint).xaxis
     ends = ends - data.joint(joint).xanchor
     heights = ends @ axis
@@ -154,9 +161,11 @@ def _pinned(
             f"its pivots lie {skew:.4g} m apart along the joint's axis and {length:.4g} m across it; "
             "a cylinder must lie across the axis"
         )
-    angle = math.degrees(math.atan2(np.cross(near, far) @ axis, near @ far))
+    sine = np.cross(near, far) @ axis
+    angle = math.degrees(math.atan2(sine, near @ far))
     theta0 = round(angle, DIGITS)
-    return Triangle(a=round(a, DIGITS), b=round(b, DIGITS), theta0=theta0), in_bodies
+    sides = Triangle(a=round(a, DIGITS), b=round(b, DIGITS), theta0=theta0)
+    return sides, (in_parent, in_child)
 
 
 def _pivot_ends(given: Pivots | None, data: Any, joint: str) -> Array:
@@ -176,5 +185,6 @@ def _pivot_ends(given: Pivots | None, data: Any, joint: str) -> Array:
 def _in_body(data: Any, body: int, point: Array) -> Vector:
     """Return a point of the world [m], (3,), in the frame of a body, rounded as files
     state it."""
-    turned = data.xmat[body].reshape(3, 3).T @ (point - data.xpos[body])
+    frame = data.xmat[body].reshape(3, 3)
+    turned = frame.T @ (point - data.xpos[body])
     return tuple(turned.round(DIGITS).tolist())

@@ -100,6 +100,7 @@ class FitSettings(Settings):
         """Return the parameters that set a quantity of every joint with an actuator;
         none if what the settings say counts for some joint."""
         joints = self.arm.joints
+        # joints for which nothing has been found to set it
         open_joints = {n for n, joint in enumerate(joints, 1) if joint.actuator}
         found = list[str]()
         for name, parameter in self.parameters.items():
@@ -235,6 +236,7 @@ class FitSettings(Settings):
             return self
         model, *terms = name.split("+")
         settings = self
+        # a joint refinement frees what the search had fixed
         if model == "joint":
             settings = self._all_free()
         if self.terms() != tuple(terms):
@@ -310,11 +312,11 @@ class FitSettings(Settings):
         Joints that are not compared then follow their logged motion.
         """
         free = self.acting_on(joint)
-        held = {
-            name: parameter.changed({"fixed": values[name]})
-            for name, parameter in self.parameters.items()
-            if name not in free
-        }
+        held = dict[str, ParameterSettings]()
+        for name, parameter in self.parameters.items():
+            # masses and the pump, too: one joint does not tell them
+            if name not in free:
+                held[name] = parameter.changed({"fixed": values[name]})
         changes = {"outputs": (joint,), "simulation.other_joints": "measured"}
         return self.with_parameters(held).changed(changes)
 

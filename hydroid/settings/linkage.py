@@ -59,21 +59,24 @@ def four_bar(angle, bars) -> Any:
     phase [rad] and `branch`, 1 or -1: the rocker's pin lies to the left or to the right
     of the line from its pivot to the child's pin. NaN where the coupler cannot reach.
     """
-    along, across = (
-        bars.child * np.cos(angle + bars.phase),
-        bars.child * np.sin(angle + bars.phase),
-    )
+    along = bars.child * np.cos(angle + bars.phase)
+    across = bars.child * np.sin(angle + bars.phase)
+    # the law of cosines in the triangle of rocker, coupler and the line between their
+    # outer pins
     square = (along - bars.ground) ** 2 + across**2
-    reach = (bars.rocker**2 + square - bars.coupler**2) / (
-        2.0 * bars.rocker * np.sqrt(square)
-    )
-    psi = np.arctan2(across, along - bars.ground) + bars.branch * np.arccos(reach)
+    sides = bars.rocker**2 + square - bars.coupler**2
+    reach = sides / (2.0 * bars.rocker * np.sqrt(square))
+    towards = np.arctan2(across, along - bars.ground)
+    psi = towards + bars.branch * np.arccos(reach)
     # with the coupler (x, y), x² + y² = coupler²: its derivatives for q give those of ψ
-    cosine, sine = bars.rocker * np.cos(psi), bars.rocker * np.sin(psi)
-    x, y = bars.ground + cosine - along, sine - across
+    cosine = bars.rocker * np.cos(psi)
+    sine = bars.rocker * np.sin(psi)
+    x = bars.ground + cosine - along
+    y = sine - across
     lever = y * cosine - x * sine
     first = (y * along - x * across) / lever
-    dx, dy = across - first * sine, first * cosine - along
+    dx = across - first * sine
+    dy = first * cosine - along
     bent = (
         dx * dx
         + dy * dy

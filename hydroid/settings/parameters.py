@@ -75,7 +75,10 @@ def _add_links(result: Plain, name: str, entry: Plain, arm: Arm | None) -> None:
         )
     links: Any = entry["each"]
     if links is True:
-        links = arm.link_names if arm else None
+        links = None
+        # without an arm that can be read its own fault is said
+        if arm:
+            links = arm.link_names
     if not _are_all(links, str):
         # refused as any other wrong value
         result[name] = entry
@@ -84,7 +87,8 @@ def _add_links(result: Plain, name: str, entry: Plain, arm: Arm | None) -> None:
     taken = set[str]()
     for link in links:
         own_name = _name_at(name, link, taken)
-        result[own_name] = shared | {"link": link} | result.get(own_name, {})
+        stated = result.get(own_name, {})
+        result[own_name] = shared | {"link": link} | stated
 
 
 def _add_joints(
@@ -95,7 +99,9 @@ def _add_joints(
         what = "joints that share it or each: joints that have their own, not both"
         raise ValueError(f"parameters.{name}: give {what}")
     all_compared = entry["each"] is True
-    joints: Any = compared if all_compared else entry["each"]
+    joints: Any = entry["each"]
+    if all_compared:
+        joints = compared
     if not _are_all(joints, int | str):
         # refused as any other wrong value
         result[name] = entry
@@ -108,13 +114,17 @@ def _add_joints(
     if len(joints) == 1:
         # joints that are driven but not compared need a mechanical parameter, too
         everywhere = all_compared and entry.get("quantity") in MECHANICAL
-        result[name] = shared if everywhere else shared | {"joints": joints}
+        if not everywhere:
+            shared["joints"] = joints
+        result[name] = shared
         return
     labels = dict(enumerate(names, 1))
     taken = set[str]()
     for joint in joints:
         own_name = _name_at(name, labels.get(joint, joint), taken)
-        result[own_name] = shared | {"joints": [joint]} | result.get(own_name, {})
+        # an entry of that name changes what `each` says of this joint alone
+        stated = result.get(own_name, {})
+        result[own_name] = shared | {"joints": [joint]} | stated
 
 
 def _are_all(values: Any, kind: Any) -> bool:
@@ -267,6 +277,7 @@ def make_parameter(
     start = nominal
     if settings.start is not None:
         start = settings.start
+    # a nominal value may lie outside bounds that the user states
     if start is not None:
         start = min(max(start, lower), upper)
     has_log_prior = prior is not None and prior.log

@@ -173,6 +173,7 @@ class Scenario:
         self.settings = settings
         self.stepping = stepping
         self.machine = arm
+        # a compared joint that nothing drives still holds its load by its oil
         active = log.driven.copy()
         active[outputs] = True
         self.roles = roles(active, settings.other_joints)
@@ -181,6 +182,7 @@ class Scenario:
         self.arm.model.opt.timestep = log.period / stepping.steps
         self.arm.model.qpos_spring[:] = self.arm.pose
         self.outputs = np.searchsorted(self.arm.columns, outputs)
+        # the last command acts only after the last sample
         self.command = np.repeat(log.command[:-1, moving], stepping.steps, axis=0)
         self.pressure = log.start_pressure[moving]
         self.period = log.period

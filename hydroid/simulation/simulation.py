@@ -118,8 +118,9 @@ class Simulation:
             flow=np.full((n, samples, wanted, 2), np.nan),
             line=np.full((n, samples if wanted else 0), np.nan),
         )
-        # those that differ in effects of other groups of logs are simulated once
+        # those that differ only in effects of other groups of logs are simulated once
         first, alike = distinct(candidates.joints, candidates.mass)
+        # a coil that no numbers give a force is infeasible, and costs no simulation
         exists = has_force_curve(candidates.joints[:, self.joints])
         rows = np.intersect1d(np.flatnonzero(exists), first)
         threads = min(scenario.settings.threads or os.cpu_count() or 1, rows.size)

@@ -166,6 +166,7 @@ def on_their_level(posterior: Posterior, changes: Array, problem: Problem) -> Ar
         return start[rows] + part[:, None] * way
 
     # the same changes without the directions that the logs leave wide open
+    # where the Gaussian ends far outside what the logs allow, it is along these
     variances, axes = np.linalg.eigh(posterior.covariance)
     narrow = axes[:, np.sqrt(variances) < WIDE_OPEN]
     projected = changes @ narrow @ narrow.T

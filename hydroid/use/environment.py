@@ -285,9 +285,8 @@ class VectorEnv(GymnasiumVectorEnv[Floats, Floats, Any]):
     Args:
         source: a run folder, or the result of a fit.
         num_envs: n; the first is the fit's estimate, and the others are draws.
-        draws: whether they are; else all are the estimate.
-        seed, seconds, decision_s, errors: as of `Env`.
-        threads: that step them; None: one per core.
+        seed: of the draws; None: all are the estimate.
+        seconds, decision_s, errors: as of `Env`.
     """
 
     metadata = {"autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
@@ -297,19 +296,17 @@ class VectorEnv(GymnasiumVectorEnv[Floats, Floats, Any]):
         source: Any,
         num_envs: int,
         *,
-        draws: bool = True,
-        seed: int = 0,
+        seed: int | None = 0,
         seconds: float = 5.0,
         decision_s: float = DECISION,
         errors: bool = True,
-        threads: int | None = None,
     ) -> None:
         model = _opened(source)
         thetas = np.tile(model.theta, (num_envs, 1))
-        if draws and num_envs > 1:
+        if seed is not None and num_envs > 1:
             thetas[1:] = draw(model, num_envs - 1, seed).theta
         self._machines = _Machines(
-            model, thetas, errors=errors, decision=decision_s, threads=threads
+            model, thetas, errors=errors, decision=decision_s, threads=None
         )
         self._seconds = seconds
         self.num_envs = num_envs

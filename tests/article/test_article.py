@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from page import DOCS, page
-from run import telling, with_what_needs_no_search
+from run import by_worth, with_what_needs_no_search
 from studies import BLIND, CENTRE, RECORDS, Plan, load_studies, read_runs
 
 STUDIES = load_studies()
@@ -55,7 +55,7 @@ def test_what_is_committed_is_not_run_again_and_the_cheapest_claim_comes_first()
     results = DOCS / "reproduction"
     plans = {name: Plan(name, study) for name, study in STUDIES.items()}
     runs = {name: read_runs(results / f"{name}_runs.csv") for name in plans}
-    todo = telling(plans, runs)
+    todo = by_worth(plans, runs)
     have = {(n, run["cell"], run["seed"]) for n, made in runs.items() for run in made}
     wanted = {
         (n, c, s)
@@ -65,7 +65,7 @@ def test_what_is_committed_is_not_run_again_and_the_cheapest_claim_comes_first()
     }
     assert len(todo) == len(set(todo))
     assert set(todo) == wanted - have
-    fresh = telling(plans, {name: [] for name in runs})
+    fresh = by_worth(plans, {name: [] for name in runs})
     assert set(fresh) == wanted
     assert {seed for _, _, seed in fresh[:12]} <= set(range(1, 7))
 

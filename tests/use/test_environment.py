@@ -64,7 +64,7 @@ def test_episodes_end_in_time_and_repeat_themselves(model):
 
 
 def test_a_vector_of_machines_is_one_call(model):
-    several = VectorEnv(model, 5, draws=False, seconds=0.5, threads=1, errors=False)
+    several = VectorEnv(model, 5, seed=None, seconds=0.5, errors=False)
     first, _ = several.reset(seed=3)
     assert first.shape == (5, 6)
     assert several.observation_space.contains(first)
@@ -102,7 +102,7 @@ def test_a_machine_that_diverges_ends_its_episode(model):
 
 @pytest.mark.parametrize("action", [[[np.nan, 0.0]], [[0.5]], [0.5, 0.5]])
 def test_an_action_that_is_none_is_refused(model, action):
-    one = VectorEnv(model, 1, draws=False)
+    one = VectorEnv(model, 1, seed=None)
     one.reset(seed=0)
     with pytest.raises(ValueError, match="2 finite numbers per machine"):
         one.step(np.array(action, np.float32))

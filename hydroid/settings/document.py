@@ -67,7 +67,9 @@ def read_document(text: str, source: object, times: int = 1) -> tuple[Any, Lines
     reader = _Reader(source, times * MOST_VALUES)
     try:
         node = _composed(text)
-        value = None if node is None else reader.value(node, ())
+        value = None
+        if node is not None:
+            value = reader.value(node, ())
     except yaml.YAMLError as error:
         raise _not_yaml(error, source) from None
     except RecursionError:
@@ -91,9 +93,9 @@ def _composed(text: str) -> yaml.Node | None:
 def _not_yaml(error: yaml.YAMLError, source: object) -> SettingsError:
     """Return what the YAML reader stumbled over, in plain words, and where."""
     mark = getattr(error, "problem_mark", None)
-    where = (
-        f"{source}, line {mark.line + 1}, column {mark.column + 1}" if mark else source
-    )
+    where = source
+    if mark:
+        where = f"{source}, line {mark.line + 1}, column {mark.column + 1}"
     problem = getattr(error, "problem", None) or getattr(error, "reason", None)
     plain = next(
         (words for part, words in _PLAIN.items() if part in str(problem)), problem
@@ -168,7 +170,9 @@ class _Reader:
             )
         # a plain scalar is neither quoted nor a block of text
         is_plain = not node.style
-        return _plain_value(text) if is_plain else text
+        if is_plain:
+            return _plain_value(text)
+        return text
 
 
 def _plain_value(text: str) -> Any:

@@ -44,9 +44,6 @@ LESS = 0.1
 """part by which the errors of one joint must fall for its model to be refined again"""
 ANEW = 3
 """number of the start from which the kept estimate is refined again"""
-PROMISING = 2.0
-"""gain of the log-likelihood that a term must promise to be tried on a joint: less than
-what it must bring, since a linear model may promise too little"""
 FIRM = 1e-3  # gain below which least squares ends where another rung may follow
 
 
@@ -160,13 +157,7 @@ class Ladder:
             tolerance = max(FIRM, refinement.gain_tolerance)
             on_the_way = refinement.changed({"gain_tolerance": tolerance})
         lone = self._lone_terms(settings)
-        first = settings.rung
-        self._climb_model(whole, first, lone, on_the_way)
-        before = self._step.terms
-        self._add_lone_terms(whole, lone, on_the_way)
-        if self._step.terms != before:
-            # errors of a valve may have hidden a pump
-            self._add_terms(whole, first, lone, on_the_way)
+        self._climb_first(whole, lone, on_the_way)
         for rung in further:
             self._climb_model(whole, rung, lone, on_the_way)
         if self._step.model in {rung.name for rung in further}:
@@ -179,6 +170,28 @@ class Ladder:
             joint = self._step.changed(model="joint")
             self._rung(whole, joint, refinement, if_better=False)
 
+    def _climb_first(
+        self, whole: Problem, lone: Mapping[str, int], settings: RefinementSettings
+    ) -> None:
+        """Refine on the first rung, and then with terms besides.
+
+        Those of single joints come first: with the wrong curve of a valve, a pump that
+        is not there explains something. They are tried again where others were added,
+        and so are the others where that helped.
+        """
+        rung = whole.settings.rung
+        # the first one is refined in any case
+        self._rung(whole, Step("refined"), settings, if_better=False)
+        self._add_lone_terms(whole, lone, settings)
+        of_joints = self._step.terms
+        self._add_terms(whole, rung, lone, settings)
+        shared = self._step.terms
+        if shared == of_joints:
+            return
+        self._add_lone_terms(whole, lone, settings)
+        if self._step.terms != shared:
+            self._add_terms(whole, rung, lone, settings)
+
     def _climb_model(
         self,
         whole: Problem,
@@ -186,15 +199,12 @@ class Ladder:
         lone: Collection[str],
         settings: RefinementSettings,
     ) -> None:
-        """Refine on a rung, and then with each of its terms besides; those of `lone`
-        are another method's."""
+        """Refine on a further rung, if it is better, and then with each of its terms
+        besides; those of `lone` are another method's."""
         possible = whole.settings.terms(rung)
         terms = tuple(term for term in possible if term in self._step.terms)
-        if_better = rung is not whole.settings.rung
-        # the first one is refined in any case, and its estimate is called so
-        model = rung.name if if_better else "refined"
-        self._rung(whole, Step(model, terms), settings, if_better=if_better)
-        if self._step.model == model:
+        self._rung(whole, Step(rung.name, terms), settings, if_better=True)
+        if self._step.model == rung.name:
             self._add_terms(whole, rung, lone, settings)
 
     def _add_terms(
@@ -395,6 +405,8 @@ class Ladder:
         theta = self.kept.theta
         step = self._step
         for term, joint in lone.items():
+            if term in step.terms:
+                continue
             tried = step.changed(terms=(*step.terms, term), joint=joint)
             own = whole.varied(whole.settings.of_estimate(tried.estimate))
             if not self._promises(own, problem, theta, joint):
@@ -429,7 +441,7 @@ class Ladder:
         started = problem.parameters.started(values)
         new = np.array([name not in values for name in problem.settings.parameters])
         likelihood = make_likelihood(alone(problem, joint, started))
-        return promised(likelihood, started, new) > PROMISING
+        return promised(likelihood.of_independent_errors, started, new) > LESS
 
     def _alone(
         self,

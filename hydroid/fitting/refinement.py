@@ -141,23 +141,22 @@ def refine_from_afar(
 
 
 def promised(likelihood: Likelihood, theta: Array, new: Mask) -> float:
-    """Return by how much the linear model at theta, (P,), promises to raise the
-    log-likelihood by `new` parameters, (P,), besides what the others promise.
+    """Return the part of the squared errors that `new` parameters, (P,), promise to
+    explain by the linear model at theta, (P,), of what the others leave.
 
-    The errors are taken to be as large as they are then. It is inf where it cannot be
-    told.
+    It is 1 where that cannot be told.
     """
     parameters = likelihood.problem.parameters
     begun = _begun(likelihood, parameters.to_unit(theta))
     columns = derivatives(_rows(likelihood, begun), begun.point, begun.residual)
     if begun.ended or not np.isfinite(columns).all():
-        return np.inf
+        return 1.0
     others = columns * ~new[parameters.free, None]
     left = list[float]()
     for slopes in (others, columns):
         model = LinearModel(replace(begun, jacobian=slopes.T))
         left.append(begun.cost - model.gain(model.step(UNDAMPED)))
-    return begun.cost * float(np.log(left[0] / left[1])) if left[1] > 0.0 else np.inf
+    return 1.0 - left[1] / left[0]
 
 
 def _tolerant(

@@ -139,7 +139,7 @@ def test_parameters_promise_a_gain_only_off_their_optimum(problem):
     half = np.arange(len(optimum)) % 2 == 0
     assert promised(likelihood, optimum, everything) < 0.01
     off = optimum * np.where(half, 0.9, 1.1)
-    assert promised(likelihood, off, everything) > 2.0
+    assert promised(likelihood, off, everything) > 0.5
     assert promised(likelihood, off, half) >= 0.0
     assert promised(likelihood, off, half) <= promised(likelihood, off, everything)
     assert promised(likelihood, off, ~everything) == 0.0

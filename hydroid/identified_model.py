@@ -188,6 +188,7 @@ def read_identified(
     # began with
     if config is None and summary is not None:
         settings = settings.of_estimate(summary.final)
+    # parameters that the estimate has no value of
     missing = list[str]()
     stated = dict[str, ParameterSettings]()
     for name, parameter in settings.parameters.items():

@@ -66,7 +66,9 @@ class _Motion:
     def follows(self, joint: int, other: int) -> tuple[float, int]:
         """Return how a joint's speed correlates with a joint's command, and after how
         many windows it does most."""
-        speed = self.speed[:, joint] - self.speed[:, joint].mean()
+        # about their means: where both drift, neither follows the other
+        own = self.speed[:, joint]
+        speed = own - own.mean()
         correlations = list[tuple[float, int]]()
         for lag in range(round(LATEST / self.period) + 1):
             command = self.command(other, lag)

@@ -186,6 +186,7 @@ def _tested(term: Term, uncertainty: Uncertainty, fit: Explained) -> Candidate |
     """
     low, high = term.span
     is_limit = math.isinf(term.value)
+    # of a limit that is off: from where it hardly acts to where it binds most
     if is_limit:
         values = np.geomspace(high, low, 16)
         parts = np.zeros(16)

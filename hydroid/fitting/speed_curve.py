@@ -98,6 +98,7 @@ def measured_speeds(logs: Sequence[Log], joint: int) -> SpeedCurve | None:
     angles = np.concatenate([log.angle_of(joint) for log in own])
     reach = (float(angles.min()), float(angles.max()))
     period = min(log.period for log in own)
+    # a finer delay than a sample makes no difference to the pairs
     delays = np.arange(0.0, LONGEST_DELAY, period).tolist()
     # which delay is right is seen where commands change, and how fast it moves where
     # they do not

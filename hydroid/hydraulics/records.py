@@ -261,9 +261,10 @@ def coefficients(joints: Records, period: float = 0.01, substeps: int = 1) -> Re
         steps = side.delay / period
         side["delay_steps"] = np.floor(steps)
         side["fresh"] = (steps - side.delay_steps) * substeps
-        side["lagging"] = (
-            np.maximum(side.opening, 1e-3 * both) / both
-        ) ** p.lag_of_speed
+        # a side that never opens has a share, too: something must be left to divide by
+        least = 1e-3 * both
+        share = np.maximum(side.opening, least) / both
+        side["lagging"] = share**p.lag_of_speed
         side["pilot_steps"] = side.pilot_lag * substeps / period
         side["pilot_keep"] = kept(side["pilot_steps"])
         side["plunger_weight"] = plunger_weight(

@@ -53,7 +53,8 @@ class DaskWorkers:
         """
         result = np.full((len(theta), columns), np.nan)
         try:
-            # a task and no data: what a dead worker held is computed again
+            # a task and no data: what a dead worker held is computed again;
+            # once for all chunks, since a problem with its logs is large
             if target not in self._sent:
                 self._sent[target] = self.client.submit(
                     bytes, pickle.dumps(target), pure=False

@@ -59,7 +59,9 @@ class Weighing:
     def __init__(
         self, spec: mujoco.MjSpec, arm: Arm, candidate: Candidates, slack: Array
     ) -> None:
-        whole = lock(spec, arm, np.ones(len(slack), dtype=bool), slack)
+        # no joint is locked: the pose is another at every call
+        every_joint = np.ones(len(slack), dtype=bool)
+        whole = lock(spec, arm, every_joint, slack)
         whole.model.qpos_spring[:] = slack
         self._values = model_values(whole, candidate)
         self._arm = SteppedArm(whole.model)

@@ -196,6 +196,7 @@ class Movement:
         """Return when speeds, shape (n, samples), first reach a level, shape (n,) [s];
         NaN where never."""
         over = speeds >= level[:, None]
+        # of several the first: a joint that rings passes a level again
         first = over.argmax(axis=1)
         # the joint rests at the start; a speed is that between two samples
         from_rest = np.pad(speeds, ((0, 0), (1, 0)))
@@ -206,7 +207,8 @@ class Movement:
         between = times[first + 1] - times[first]
         with np.errstate(all="ignore"):
             time = times[first] + between * (level - before) / (after - before)
-        return np.where(over.any(axis=1), self.bench.period * time, np.nan)
+        reached = over.any(axis=1)
+        return np.where(reached, self.bench.period * time, np.nan)
 
 
 def make_bench(settings: FitSettings, logs: Sequence[Log], joint: int) -> Bench:

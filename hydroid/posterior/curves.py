@@ -76,7 +76,8 @@ def step_curves(
     bench = step.bench
     angles = step.angles(estimate)
     samples = _before_the_end(bench, angles[0, 1:])
-    start = min(_start(step, step.speeds_of(angles)[:, :samples]), samples)
+    speeds_before_the_end = step.speeds_of(angles)[:, :samples]
+    start = min(_start(step, speeds_before_the_end), samples)
     unit = f"{bench.unit[1]}/s"
     size = f"{abs(step.command):g} % command, {direction.word}"
     begun = np.linspace(0, start - 1, START_POINTS)
@@ -127,10 +128,15 @@ def frequency_response(
     # from next to 0, where it is 0
     dense = np.geomspace(frequencies[0] / 100.0, frequencies[-1], DENSE)
     every = np.unique(np.concatenate([dense, frequencies]))
-    response = impulse @ np.exp(-2j * np.pi * np.outer(time, every))
+    # the Fourier transform, at these frequencies alone
+    swings = np.exp(-2j * np.pi * np.outer(time, every))
+    response = impulse @ swings
     wanted = np.searchsorted(every, frequencies)
-    phase = np.degrees(np.unwrap(np.angle(response), axis=1))
-    amplitude = np.abs(response[:, wanted]) / np.sinc(period * frequencies) ** 2
+    turned = np.unwrap(np.angle(response), axis=1)
+    phase = np.degrees(turned)
+    # once for the mean between two samples, once for their difference
+    damped = np.sinc(period * frequencies) ** 2
+    amplitude = np.abs(response[:, wanted]) / damped
     return amplitude, phase[:, wanted]
 
 

@@ -90,6 +90,7 @@ class Bindings:
             if binding.group is None:
                 table[:, binding.targets] = value
             elif binding.group == group:
+                # on top of what is set for all logs, but never beyond what can be
                 changed = table[:, binding.targets] + value
                 least = quantity.lowest * quantity.factor
                 table[:, binding.targets] = np.maximum(changed, least)

@@ -312,6 +312,7 @@ def read_runs(names: Sequence[str], out: str | Path | None) -> tuple[FinishedRun
     if out is not None and RunFolder(Path(out)).exists:
         raise RunError("is a run itself", out, "name another folder")
     runs = list[FinishedRun]()
+    # one that cannot be read does not keep the others from being merged
     for path in _matching(names):
         try:
             runs.append(_finished_run(path))

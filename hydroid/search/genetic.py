@@ -149,6 +149,7 @@ class Nsga2(SimpleGa):
 
     def tell(self, population: Population | None, offspring: Population) -> Population:
         """Return the best of parents and children together, in crowded order."""
+        # parents and children compete: a good candidate is never lost
         everyone = offspring
         if population is not None:
             everyone = population.join(offspring)

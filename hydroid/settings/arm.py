@@ -198,6 +198,7 @@ class Arm(Settings):
         """Angle of each joint by the pose's name [rad]: the model's keyframes, and
         `home`."""
         model = self._model
+        # a keyframe of that name takes its place
         poses = {"home": tuple(model.qpos0.tolist())}
         for k in range(model.nkey):
             poses[model.key(k).name] = tuple(model.key_qpos[k].tolist())

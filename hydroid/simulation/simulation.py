@@ -203,6 +203,7 @@ class Simulation:
         most = TOGETHER // len(self.scenario.arm.columns)
         # groups of equal size, so that all threads have something to do to the end
         needed = math.ceil(n / most)
+        # fewer groups than threads would leave some without any
         groups = max(threads, needed)
         return math.ceil(n / groups)
 
@@ -289,7 +290,9 @@ class Simulation:
         scenario = self.scenario
         pushed = self._chain.pushed
         servo = scenario.prescribed
-        torque = gain * scenario.command[:, None, pushed] + balance[:, pushed]
+        # equation (1): what holds the start pose acts throughout
+        by_gain = gain * scenario.command[:, None, pushed]
+        torque = by_gain + balance[:, pushed]
         served = np.searchsorted(pushed, servo.columns)
         if served.size:
             # without inertia a joint is put where the log has it

@@ -182,6 +182,7 @@ def balanced_speed(supply: float, c, w, takes) -> Any:
     """Speed [m/s] of the rod at which no force is left, and flow from the pump [m³/s],
     at a supply [Pa]."""
     left, drawn = surplus(0.0, supply, c, w, takes)
+    # a joint at rest is held by its dry friction, whatever the direction
     held = joint_friction(c, w.arm)
     if abs(left) <= held:
         return 0.0, drawn

@@ -296,9 +296,8 @@ def _store(folder: "RunFolder", result: FitResult) -> Path:
     folder.write_estimate(result.model, result.problem.logs[0])
     write_record(folder.path, result.record)
     keep_earlier(folder.path, result.earlier)
-    folder.status("running", finished=date.today().isoformat())
+    seconds = dict(result.fit.seconds)
+    folder.status("running", finished=date.today().isoformat(), seconds=seconds)
     page = write_report(folder.path)
-    folder.status(
-        "done", seconds={**result.fit.seconds, "report": time.monotonic() - began}
-    )
+    folder.status("done", seconds=seconds | {"report": time.monotonic() - began})
     return page

@@ -196,13 +196,23 @@ def fit_findings(fit: Fit) -> list[Finding]:
         for e in fit.estimates.values()
         if not e.usable
     ]
-    # half of a 95 % interval as large as the value, or without end
-    lost = dict.fromkeys(
-        q.label for q in fit.quantities[0].values() if not q.within <= 1.0
-    )
-    if lost:
-        findings.append(Finding("quantities open", "note", tuple(lost)))
+    if lost := _open_quantities(fit):
+        details = {joint: "; ".join(labels) for joint, labels in lost.items()}
+        findings.append(
+            Finding("quantities open", "note", tuple(lost), details=details)
+        )
     return findings
+
+
+def _open_quantities(fit: Fit) -> dict[str, list[str]]:
+    """Return what half of a 95 % interval is as large as, or that has no limit: labels
+    of quantities, by the names of their joints."""
+    names = fit.problem.settings.arm.joint_names
+    lost = dict[str, list[str]]()
+    for quantity in fit.quantities[0].values():
+        if not quantity.within <= 1.0:
+            lost.setdefault(names[quantity.joint - 1], []).append(quantity.label)
+    return lost
 
 
 def _ending_findings(fit: Fit) -> Iterator[Finding]:

@@ -24,6 +24,7 @@ from hydroid.reporting.knowledge_report import (
     unknown_section,
     warnings,
 )
+from hydroid.reporting.oil_report import oil_section
 from hydroid.reporting.page import Page, Section, short_name
 from hydroid.reporting.parameters_report import (
     in_words,
@@ -44,7 +45,7 @@ from hydroid.reporting.verdict_table import (
 )
 from hydroid.run.record import FinishedRun, load_record
 from hydroid.settings.arm import Arm
-from hydroid.words import listed
+from hydroid.words import listed, time_words
 
 MOST_LOGS = 6
 """logs that the foot of a page names"""
@@ -147,6 +148,7 @@ def _fit_sections(
         error_section(settings, summary, run.verdict),
         unknown_section(settings, summary),
         residual_section(settings, summary, fitted),
+        oil_section(settings.arm, shown),
         speed_section(settings, summary, [prediction.log for prediction in fitted]),
         step_section(settings, summary),
         every_quantity_section(settings, summary),
@@ -189,7 +191,7 @@ def _search_data(run: FinishedRun) -> dict[str, str]:
 
 
 def _made_from(run: FinishedRun) -> tuple[str, ...]:
-    """Return the logs, settings, seed and date of a fit, for the foot of its page."""
+    """Return the logs, settings, seed, time and date of a fit, for the foot of its page."""
     logs = [prediction.log.source for prediction in run.result.fitted]
     settings = f"settings: config.yaml in {run.folder}, model {run.summary.final}"
     if run.settings.stage == "hyd":
@@ -200,6 +202,8 @@ def _made_from(run: FinishedRun) -> tuple[str, ...]:
     sampled = f"{counted} at {1.0 / run.settings.log.period_s:.3g} Hz"
     fitted_to = f"Fitted to {_log_list(logs)}: {sampled}"
     made_from = [fitted_to, settings, f"seed {run.seed}"]
+    if run.seconds:
+        made_from.append(f"took {time_words(sum(run.seconds.values()))}")
     if date := run.identity.get("finished"):
         made_from.append(str(date))
     return tuple(made_from)

@@ -35,7 +35,8 @@ _FITTED = (
 _TESTED = (
     "Rms errors{unit} on {count} unseen log{s}, which the fit did not use: after predicting 1, "
     "5 and 10 s ahead, and over whole logs. In brackets: the error of the best simple "
-    "model. Better, worse: than that model. Cannot be told: the difference may be chance."
+    "model. Better, worse: than that model. Cannot be told: these logs cannot tell which of "
+    "the two errs less, as the difference may be chance; more logs can."
 )
 WHOLE = "whole logs"
 """name of a column"""

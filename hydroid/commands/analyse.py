@@ -104,7 +104,7 @@ def analyse(
     from hydroid.posterior import identifiability
     from hydroid.posterior.uncertainty import uncertainty
     from hydroid.reporting.analysis import analysis_page
-    from hydroid.reporting.parameters_report import in_words, parameter_table
+    from hydroid.reporting.parameters_report import parameter_table, sentence
 
     wanted = names(profile)
     profiles: dict[str, Profile] = {}
@@ -131,7 +131,7 @@ def analyse(
         )
     page = analysis_page(problem.settings, stated, profiles)
     page = replace(page, files={**page.files, "parameters": table})
-    said = [f"- {in_words(finding, problem.settings)}" for finding in findings]
+    said = [f"- {sentence(finding, problem.settings)}" for finding in findings]
     lines = [table, *said, *written(page, out)]
     return Result(lines, content, Analysis(of_estimate, identified, profiles), page)
 

@@ -16,6 +16,8 @@ NEAR = 5.0
 """how far the command of a measured speed may be from the table's [%]"""
 LEAST_MEASURED = 5
 """measured speeds that a median is taken of"""
+LEAST_PART = 1e-3
+"""of the top speed, below which a measured speed is shown as 0"""
 PHASE_AT = 1.0
 """frequency at which the phase is stated [Hz]"""
 
@@ -33,6 +35,7 @@ def speed_table(
         header.append(f"valve [{opening.unit}]")
         openings = dict(zip(opening.at, opening.value, strict=True))
     rows = list[tuple[Cell, ...]]()
+    least = LEAST_PART * max(map(abs, speed.value))
     points = zip(speed.at, speed.value, speed.interval, strict=True)
     for command, value, (low, high) in points:
         if command % EVERY:
@@ -41,7 +44,7 @@ def speed_table(
         stands = low == high == 0.0
         row: list[Cell] = [f"{command:+.0f}", "0" if stands else three_digits(value)]
         row.append(None if stands else interval_words(low, high))
-        row.append(_median(command, measured))
+        row.append(_median(command, measured, least))
         if opening is not None:
             area = openings.get(command)
             row.append(None if area is None else three_digits(area))
@@ -49,12 +52,14 @@ def speed_table(
     return Table(name, tuple(header), tuple(rows))
 
 
-def _median(command: float, measured: Array) -> str | None:
-    """Return the median speed near a command; nothing of too few."""
+def _median(command: float, measured: Array, least: float) -> str | None:
+    """Return the median speed near a command, 0 below the least one; nothing of too
+    few."""
     speeds = measured[1, np.abs(measured[0] - command) <= NEAR]
     if len(speeds) < LEAST_MEASURED:
         return None
-    return three_digits(float(np.median(speeds)))
+    median = float(np.median(speeds))
+    return three_digits(median) if abs(median) >= least else "0"
 
 
 RESPONSE_HEADER = (

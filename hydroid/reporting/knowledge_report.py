@@ -8,7 +8,7 @@ from hydroid.estimate import FitSummary, QuantityEstimate
 from hydroid.findings import Finding
 from hydroid.joint_verdict import JointVerdict
 from hydroid.reporting.page import Cell, Section, Table
-from hydroid.reporting.parameters_report import in_words
+from hydroid.reporting.parameters_report import sentence
 from hydroid.settings.fit import FitSettings
 from hydroid.words import interval_words, listed, three_digits, two_digits
 
@@ -36,8 +36,8 @@ def unknown_section(settings: FitSettings, summary: FitSummary) -> Section:
 
     Those after the first six stand with the parameters.
     """
-    named = [in_words(finding, settings) for finding in _others(summary)[:MOST_UNKNOWN]]
-    points = tuple(map(str, named))
+    shown = _others(summary)[:MOST_UNKNOWN]
+    points = tuple(sentence(finding, settings) for finding in shown)
     none = "" if points else "The logs determine every free parameter."
     return Section("What is not known", none, points)
 

@@ -245,6 +245,18 @@ def in_words(finding: Finding, settings: FitSettings) -> Finding:
     return replace(finding, subjects=tuple(subjects), details=details)
 
 
+def sentence(finding: Finding, settings: FitSettings) -> str:
+    """Return what `in_words` makes of a finding, with a capital letter where a
+    parameter's words begin it."""
+    worded = in_words(finding, settings)
+    text = str(worded)
+    first = worded.subjects[0] if worded.subjects else ""
+    # names of joints and logs are their users'
+    if first and first not in finding.subjects and text.startswith(first):
+        return text[0].upper() + text[1:]
+    return text
+
+
 def _with_detail(name: str, details: dict[str, str]) -> str:
     """Return a symbol with its detail, which is taken from the details."""
     return f"{name}: {details.pop(name)}" if name in details else name

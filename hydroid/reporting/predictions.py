@@ -27,10 +27,10 @@ from hydroid.reporting.knowledge_report import (
 from hydroid.reporting.oil_report import oil_section
 from hydroid.reporting.page import Page, Section, short_name
 from hydroid.reporting.parameters_report import (
-    in_words,
     parameter_section,
     parameter_table,
     prior_section,
+    sentence,
 )
 from hydroid.reporting.residual_report import residual_section
 from hydroid.reporting.response_report import error_table, response_section
@@ -171,7 +171,7 @@ def _fit_warnings(run: FinishedRun) -> tuple[str, ...]:
     warned += map(str, standing_out(unseen, run.verdict, run.folder))
     warned += outside(run.verdict)
     for finding in warnings(run.summary):
-        warned.append(str(in_words(finding, run.settings)))
+        warned.append(sentence(finding, run.settings))
     return tuple(warned)
 
 

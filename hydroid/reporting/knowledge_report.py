@@ -73,7 +73,7 @@ def quantity_section(settings: FitSettings, summary: FitSummary) -> Section | No
             cards[f"known_{name}"] = Table(name, header, tuple(rows))
     text = (
         "The best known quantities of each joint, with 95 % intervals. Intervals are right "
-        "only if the model is right. All quantities stand further down."
+        "only if the model is right. All quantities are listed further down."
     )
     return Section("What is known", text, cards=cards) if cards else None
 
@@ -97,8 +97,8 @@ def every_quantity_section(
     header = ("joint", "quantity", "value", "unit", "from", "to")
     note = "from, to: 95 % interval; empty: no limit."
     text = (
-        "What follows from the parameters of each joint. What is itself a parameter, such as "
-        "the dead band of a pilot stage, stands with the parameters."
+        "What follows from the parameters of each joint. Quantities that are parameters "
+        "themselves, such as the dead band of a pilot stage, are in the table of parameters."
     )
     tables = {"quantities": Table("", header, tuple(rows), note)}
     answer = f"{len(rows)}, with intervals"
@@ -152,8 +152,8 @@ def error_section(
         "influences than the commands add up."
     )
     note = (
-        "Standard deviations; after 10 s: at the mean speed of the logs. An error that "
-        "persists comes from the model, not the sensor; empty: none persists."
+        "Standard deviations. After 10 s: of a joint that moves at the mean speed of the logs. "
+        "An error that persists comes from the model, not from the sensor. Empty: none persists."
     )
     columns = {name: name for name in rows[0]}
     if not any(row[INSIDE] for row in rows):

@@ -312,8 +312,8 @@ def prior_chart(settings: FitSettings, summary: FitSummary) -> Chart:
         x = "lower bound: 0; upper bound: 1"
         quantities = [settings.parameters[name].quantity for name in positions]
         curves = any(quantity.startswith("curve_") for quantity in quantities)
-        shared = " (the parts of a curve share one)" if curves else ""
-        title = f"Without a prior of their own{shared}: between their bounds"
+        shared = " (of the parts of a curve: they share a prior)" if curves else ""
+        title = f"Without a prior, between their bounds{shared}"
         panels.append(_bars(title, x, positions))
     return Chart(tuple(panels))
 

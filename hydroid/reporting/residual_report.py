@@ -20,10 +20,10 @@ from hydroid.settings.fit import FitSettings
 from hydroid.words import listed, two_digits
 
 _TEXT = (
-    "Tested is the part of each sample that the samples before it do not predict (the "
-    "innovations). If the model is right, it is correlated neither with itself nor with the "
+    "The test takes the innovations: the part of each sample that earlier samples do not "
+    "predict. If the model is right, they are correlated neither with themselves nor with the "
     "command, and 95 % of the correlations lie in the grey band. With many samples the band "
-    f"is narrow: a correlation of {FAINT:g} or less matters to nobody."
+    f"is narrow: a correlation of {FAINT:g} or less does not matter."
 )
 _HEADER = (
     "joint",

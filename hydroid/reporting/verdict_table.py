@@ -38,6 +38,7 @@ _TESTED = (
     "model. Better, worse: than that model. Cannot be told: these logs cannot tell which of "
     "the two errs less, as the difference may be chance; more logs can."
 )
+_NO_WORD = f" Whole logs: without a word, as it takes {LEAST_BLOCKS} to compare."
 WHOLE = "whole logs"
 """name of a column"""
 FITTED = "whole fitted logs"
@@ -71,6 +72,8 @@ def verdict_table(fits: Verdicts) -> Table:
         names += [*map(column_of, JUDGED), WHOLE, FITTED, GOOD]
         optional = (GOOD, FITTED, column_of(JUDGED[1]), WHOLE)
         note = _TESTED.format(unit=unit, count=count, s="s" if count > 1 else "")
+        if count < LEAST_BLOCKS:
+            note += _NO_WORD
     else:
         names += [FITTED, *NAMES]
         optional = NAMES[:2]

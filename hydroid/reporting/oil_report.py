@@ -50,7 +50,7 @@ def oil_section(arm: Arm, predictions: Sequence[Prediction]) -> Section | None:
         of_joint = [p for p in usable if joint in p.joints]
         row = _joint_row(joint, of_joint)
         if row:
-            rows.append((arm.joint_names[joint - 1], *row))
+            rows.append((arm.name_of(joint), *row))
     if not rows:
         return None
     tables = {"oil": Table("", _HEADER, tuple(rows))}

@@ -49,6 +49,8 @@ from hydroid.words import listed, time_words
 
 MOST_LOGS = 6
 """logs that the foot of a page names"""
+FILES = "beside this page: values in estimate.yaml, tables (CSV) in tables/, the arm (MJCF) in model/"
+"""what a run folder holds for other programs, for the foot of its page"""
 SOFTWARE = ("hydroid", "mujoco", "numpy", "python")
 """whose versions stand at the foot of a page"""
 
@@ -191,7 +193,7 @@ def _search_data(run: FinishedRun) -> dict[str, str]:
 
 
 def _made_from(run: FinishedRun) -> tuple[str, ...]:
-    """Return the logs, settings, seed, time and date of a fit, for the foot of its page."""
+    """Return the logs, settings, seed, time, date and files of a fit, for the foot of its page."""
     logs = [prediction.log.source for prediction in run.result.fitted]
     settings = f"settings: config.yaml in {run.folder}, model {run.summary.final}"
     if run.settings.stage == "hyd":
@@ -206,4 +208,5 @@ def _made_from(run: FinishedRun) -> tuple[str, ...]:
         made_from.append(f"took {time_words(sum(run.seconds.values()))}")
     if date := run.identity.get("finished"):
         made_from.append(str(date))
+    made_from.append(FILES)
     return tuple(made_from)

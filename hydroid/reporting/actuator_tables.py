@@ -116,5 +116,5 @@ def _quantity(quantity: QuantityEstimate | None) -> str | None:
     if quantity is None:
         return None
     between = interval_words(*quantity.interval)
-    value = two_digits(quantity.value)
+    value = three_digits(quantity.value)
     return f"{value} ({between})" if between else value

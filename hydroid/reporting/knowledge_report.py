@@ -15,7 +15,7 @@ from hydroid.words import interval_words, listed, three_digits, two_digits
 BEST_WITHIN = 0.3
 """half of a 95 % interval, relative to the value, up to which a property counts as
 known"""
-MOST_KNOWN = 5
+MOST_KNOWN = 4
 """quantities of a joint that a page shows"""
 MOST_UNKNOWN = 6
 MOST_WARNINGS = 3

@@ -1,7 +1,7 @@
 """Least squares of other programs on hydroid's problems: how many starts reach the
 optimum, simulations, time.
 
-    python benchmarks/others.py [--problems 27 9 10] [--starts 3] [--most 4000] [--write]
+    python benchmarks/others.py [--problems 27 9 10] [--starts 3] [--most 4000] [--minutes 5] [--write]
 
 27  gain, damping and spring of each joint and six masses, from a simulated log of 30 s
     in which all joints move, with noise. mujoco.sysid fits it too, with its own
@@ -12,17 +12,24 @@ optimum, simulations, time.
 All begin at the same random points between the bounds, which are a factor of 10 on
 either side, or those of the settings. Apart from mujoco.sysid all see one function, the
 output errors over parameters scaled to the unit box, and take derivatives by
-differences. A run ends where its program ends it, or after so many simulations. A start
-has reached the optimum if its rms error is within 1 % of the lowest that any program
-found. What is not installed is left out: pip install pypesto. With --write the rows go
-to docs/figures.yaml, and `python docs/figures.py --pages` puts them on their page.
+differences. A run ends where its program ends it, or after so many simulations or CPU
+minutes. A start has reached the optimum if its rms error is within 1 % of the lowest
+that any program found. What is not installed is left out: pip install pypesto.
+
+Every run is a line of build/others/PROBLEM-MOST-MINUTES.jsonl as soon as it has ended. A
+run that stands there is not done again, so that an interrupted benchmark goes on. With
+--write the rows of all starts so far go to docs/figures.yaml after every start, and
+`python docs/figures.py --pages` puts them on their page.
 """
 
 import copy
 import io
+import json
 from collections.abc import Callable
-from contextlib import redirect_stdout
+from contextlib import redirect_stdout, suppress
+from dataclasses import asdict, dataclass
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -51,6 +58,7 @@ QUANTITIES = {"K": "gain", "D": "damping", "S": "stiffness"}
 FACTOR = 10.0
 """of the bounds beside the truth, both ways"""
 FIGURES = ROOT / "docs" / "figures.yaml"
+STORE = ROOT / "build" / "others"
 NOISE_DEG = 0.1
 SECONDS = 30.0
 REACHED = 0.01
@@ -59,30 +67,48 @@ FAILED = 1e3
 
 
 class UsedUp(Exception):
-    """A program has had all its simulations."""
+    """A program has had all its simulations, or all its time."""
 
 
-class Residuals:
-    """Output errors of points of the unit box, and what became of them.
+class Allowance:
+    """What one run of a program may use.
 
     Attributes:
         simulations: so far.
-        lowest: rms error [rad] of the best of them.
+        clock: runs since it was made.
     """
 
-    def __init__(self, problem: Problem, most: int) -> None:
-        self._problem = problem
+    def __init__(self, most: int, minutes: float) -> None:
         self._most = most
+        self._minutes = minutes
         self.simulations = 0
+        self.clock = Clock()
+
+    def use(self, simulations: int) -> None:
+        """Count simulations to come. Raises UsedUp if all have been had."""
+        minutes = self.clock.seconds[1] / 60
+        if self.simulations >= self._most or minutes >= self._minutes:
+            raise UsedUp
+        self.simulations += simulations
+
+
+class Residuals:
+    """Output errors of points of the unit box, and the least of them.
+
+    Attributes:
+        lowest: rms error [rad] of the best point so far.
+    """
+
+    def __init__(self, problem: Problem, allowance: Allowance) -> None:
+        self._problem = problem
+        self._allowance = allowance
         self.lowest = np.inf
 
     def __call__(self, points: Array) -> Array:
         """Return the residuals of points, shape (n, p): (n, R)."""
-        if self.simulations >= self._most:
-            raise UsedUp
+        self._allowance.use(len(points))
         theta = self._problem.parameters.from_unit(np.clip(points, 0.0, 1.0))
         rows = self._problem.output_errors(theta)
-        self.simulations += len(points)
         rows = np.where(np.isfinite(rows), rows, FAILED)
         self.lowest = min(self.lowest, float(rms(rows, axis=1).min()))
         return rows
@@ -129,11 +155,13 @@ def by_pypesto(residuals: Residuals, point: Array) -> None:
     pypesto.optimize.minimize(asked, n_starts=1, options=options, progress_bar=False)
 
 
+PYPESTO = "pyPESTO, its default"
+SYSID = "mujoco.sysid"
 PROGRAMS: dict[str, Callable[[Residuals, Array], None]] = {
     "hydroid, least squares alone": by_hydroid,
     "scipy, `trf`": by_scipy,
     "mujoco.minimize": by_mujoco,
-    "pyPESTO, its default": by_pypesto,
+    PYPESTO: by_pypesto,
 }
 
 
@@ -183,14 +211,16 @@ class Sysid:
     as its examples do, would cost more time.
     """
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, allowance: Allowance) -> None:
         from mujoco import sysid
 
         (log,) = problem.logs
         arm = problem.settings.arm
         self._problem = problem
+        self._allowance = allowance
+        self._lowest = np.inf
+        self._best: Array | None = None
         self._pose = log.angle[0]
-        self.simulations = 0
         spec = load_model(arm)
         for geom in list(spec.geoms):
             spec.delete(geom)
@@ -222,7 +252,7 @@ class Sysid:
 
     def fit(self, start: Array) -> float:
         """Return the rms error [rad] of what `mujoco.sysid.optimize` finds from a
-        point of the unit box, shape (p,)."""
+        point of the unit box, shape (p,): of its best candidate where it is ended."""
         from mujoco import sysid
 
         known = self._problem.parameters
@@ -231,21 +261,38 @@ class Sysid:
         ends = zip(known.names, theta, known.lower, known.upper, strict=True)
         for name, value, low, high in ends:
             parameters.add(sysid.Parameter(name, value, low, high))
-        found, _ = sysid.optimize(parameters, self._residuals, verbose=False)
-        rows = self._problem.output_errors(found.as_vector()[None])
-        return float(rms(rows))
+        try:
+            result, _ = sysid.optimize(parameters, self._residuals, verbose=False)
+            best = result.as_vector()
+        except UsedUp:
+            best = theta if self._best is None else self._best
+        return float(rms(self._problem.output_errors(best[None])))
 
     def _residuals(self, x: Array, parameters: Any) -> Any:
         """Return sysid's residuals and those of the prior; x has shape (P,) or (P,
         n)."""
-        self.simulations += 1 if x.ndim == 1 else x.shape[1]
+        columns = np.atleast_2d(x.T).T
+        self._allowance.use(columns.shape[1])
         rows, predicted, measured = self._residual(x, parameters)
-        scores = self._weight * self._problem.priors.scores(np.atleast_2d(x.T)).T
+        scores = self._weight * self._problem.priors.scores(columns.T).T
+        self._keep_best(columns, [*rows, scores])
         return (
             [*rows, scores[:, 0] if x.ndim == 1 else scores],
             predicted,
             measured,
         )
+
+    def _keep_best(self, columns: Array, rows: list[Array]) -> None:
+        """Remember the candidate with the lowest sum of squares; rows end with one
+        column per candidate, or are those of the only one."""
+        count = columns.shape[1]
+        sums = np.zeros(count)
+        for one in rows:
+            sums += np.sum(one.reshape(-1, count) ** 2, axis=0)
+        place = int(np.argmin(sums))
+        if sums[place] < self._lowest:
+            self._lowest = float(sums[place])
+            self._best = columns[:, place].copy()
 
     def _build(self, parameters: Any, _: mujoco.MjSpec) -> mujoco.MjModel:
         model = copy.copy(self._model)
@@ -272,70 +319,96 @@ class Sysid:
         return model
 
 
-Ran = tuple[str, float, int, float]
-"""of one start: the program, its rms error [rad], simulations, CPU time [s]"""
+@dataclass(frozen=True)
+class Run:
+    """What became of one start.
+
+    Attributes:
+        program: its name.
+        start: its number, from 0.
+        error: rms [rad] of the best candidate.
+        simulations: that the program took.
+        seconds: CPU time.
+    """
+
+    program: str
+    start: int
+    error: float
+    simulations: int
+    seconds: float
 
 
-def run(name: str, problem: Problem, point: Array, most: int) -> Ran:
-    """Let a program run from a point."""
-    residuals = Residuals(problem, most)
-    clock = Clock()
-    try:
-        with redirect_stdout(io.StringIO()):
-            PROGRAMS[name](residuals, point)
-    except UsedUp:
-        pass
-    return name, residuals.lowest, residuals.simulations, clock.seconds[1]
+def run(
+    name: str, problem: Problem, start: int, point: Array, allowance: Allowance
+) -> Run:
+    """Let a program run from a point of the unit box, shape (p,)."""
+    with redirect_stdout(io.StringIO()):
+        if name == SYSID:
+            error = Sysid(problem, allowance).fit(point)
+        else:
+            residuals = Residuals(problem, allowance)
+            with suppress(UsedUp):
+                PROGRAMS[name](residuals, point)
+            error = residuals.lowest
+    return Run(name, start, error, allowance.simulations, allowance.clock.seconds[1])
 
 
-def run_sysid(problem: Problem, point: Array) -> Ran:
-    """Let mujoco.sysid run from a point."""
-    sysid = Sysid(problem)
-    clock = Clock()
-    with redirect_stdout(io.StringIO()):  # it prints every iteration
-        error = sysid.fit(point)
-    return "mujoco.sysid", error, sysid.simulations, clock.seconds[1]
+def programs(count: int) -> list[str]:
+    """Return the programs that are installed and can solve a problem."""
+    names = [name for name in PROGRAMS if name != PYPESTO or find_spec("pypesto")]
+    if count == len(MANY) and find_spec("absl"):
+        names.append(SYSID)
+    return names
 
 
-def programs() -> list[str]:
-    """Return the programs that are installed."""
-    left_out = [] if find_spec("pypesto") else ["pyPESTO, its default"]
-    return [name for name in PROGRAMS if name not in left_out]
+def stored(file: Path) -> list[Run]:
+    """Return the runs that a file has, one a line."""
+    if not file.exists():
+        return []
+    lines = file.read_text(encoding="utf-8").splitlines()
+    return [Run(**json.loads(line)) for line in lines]
 
 
 def main() -> None:
-    given = options(__doc__, problems=[*PROBLEMS], starts=3, most=4000, write=False)
+    given = options(
+        __doc__, problems=[*PROBLEMS], starts=3, most=4000, minutes=5.0, write=False
+    )
     table("parameters | program | reached the optimum | simulations | CPU time, median")
     for count in given.problems:
         problem = PROBLEMS[count]()
         rng = np.random.default_rng(count)
         points = rng.random((given.starts, int(problem.parameters.free.sum())))
-        ran = list[Ran]()
-        for point in points:
-            for name in programs():
-                ran.append(run(name, problem, point, given.most))
-            if count == len(MANY) and find_spec("absl"):
-                ran.append(run_sysid(problem, point))
-        rows = shown(ran)
-        for name, cells in rows.items():
+        file = STORE / f"{count}-{given.most}-{given.minutes:g}.jsonl"
+        file.parent.mkdir(parents=True, exist_ok=True)
+        runs = [one for one in stored(file) if one.start < given.starts]
+        done = {(one.program, one.start) for one in runs}
+        for start, point in enumerate(points):
+            for name in programs(count):
+                if (name, start) in done:
+                    continue
+                allowance = Allowance(given.most, given.minutes)
+                runs.append(run(name, problem, start, point, allowance))
+                with file.open("a", encoding="utf-8") as opened:
+                    opened.write(json.dumps(asdict(runs[-1])) + "\n")
+            if given.write:
+                write(count, shown(runs))
+        for name, cells in shown(runs).items():
             row(count, name, *cells)
-        if given.write:
-            write(count, rows)
 
 
-def shown(ran: list[Ran]) -> dict[str, list[str]]:
+def shown(runs: list[Run]) -> dict[str, list[str]]:
     """Return what the table says of each program: how many starts reached the optimum,
     simulations, CPU time."""
-    best = min(error for _, error, _, _ in ran)
+    best = min(one.error for one in runs)
     rows = dict[str, list[str]]()
-    for name in dict.fromkeys(one[0] for one in ran):
-        own = [one for one in ran if one[0] == name]
-        reached = sum(error <= (1 + REACHED) * best for _, error, _, _ in own)
-        took = [simulations for _, _, simulations, _ in own]
+    for name in dict.fromkeys(one.program for one in runs):
+        of_program = [one for one in runs if one.program == name]
+        reached = sum(one.error <= (1 + REACHED) * best for one in of_program)
+        simulations = [one.simulations for one in of_program]
         rows[name] = [
-            f"{reached} of {len(own)}",
-            f"{min(took):,} to {max(took):,}",
-            f"{np.median([seconds for *_, seconds in own]):.0f} s",
+            f"{reached} of {len(of_program)}",
+            f"{min(simulations):,} to {max(simulations):,}",
+            f"{np.median([one.seconds for one in of_program]):.0f} s",
         ]
     return rows
 

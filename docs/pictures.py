@@ -38,22 +38,22 @@ SHOTS = {
     "report_step": (
         "hyd/report.html",
         "Step and frequency response",
-        (1000, 860),
+        (1000, 0),
         "light",
     ),
     "report_residuals": (
         "hyd/report.html",
         "Are the residuals white?",
-        (1000, 705),
+        (1000, 0),
         "dark",
     ),
 }
 """page, title of the section or a selector (without: the page's beginning), width and
-height [px], look"""
-TOP = """(document.querySelector("%s".startsWith(".") ? "%s" : "none")
+height [px] (0: to the end of the section), look"""
+PLACE = """(() => { const place = (document.querySelector("%s".startsWith(".") ? "%s" : "none")
   ?? [...document.querySelectorAll("section, details")].find(
-    (one) => one.querySelector("h2")?.textContent === "%s")
-).getBoundingClientRect().top + scrollY"""
+    (one) => one.querySelector("h2")?.textContent === "%s")).getBoundingClientRect();
+  return [place.top + scrollY, place.height]; })()"""
 FOLD = 'document.querySelectorAll("details").forEach((one) => { one.open = false; })'
 
 
@@ -95,11 +95,12 @@ async def shots(demo: Path) -> None:
         tab = await connected(profile)
         for name, (page, title, (width, height), look) in SHOTS.items():
             await tab.load(demo / page, width, look)
-            top = await tab.value(
-                TOP % (title, title, title) if title else f"{FOLD}, 0"
-            )
+            if title:
+                top, whole = await tab.value(PLACE % (title, title, title))
+            else:
+                top, whole = await tab.value(f"{FOLD}, [0, 0]")
             file = HERE / f"{name}.png"
-            file.write_bytes(await tab.shot(0, float(top), width, height))
+            file.write_bytes(await tab.shot(0, top, width, height or whole))
             Image.open(file).convert("RGB").quantize(
                 128, dither=Image.Dither.NONE
             ).save(file, optimize=True)

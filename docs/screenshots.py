@@ -2,6 +2,7 @@
 
     python docs/screenshots.py                      # build/screenshots/KIND-WIDTH-LOOK.png, KIND-paper.pdf
     python docs/screenshots.py --only fit-hyd validate
+    python docs/screenshots.py --pages runs/excavator/fit/report.html    # of pages that are there
     python docs/screenshots.py --axe axe.min.js     # also asks axe-core, a checker of accessibility
 
 The reports come from small fits of the virtual rig's logs, made once in
@@ -54,9 +55,13 @@ def main() -> None:
     parser.add_argument(
         "--only", nargs="+", choices=KINDS, default=list(KINDS), metavar="KIND"
     )
+    parser.add_argument("--pages", nargs="+", type=Path, default=[], metavar="PAGE")
     parser.add_argument("--axe", type=Path, help="axe.min.js")
     asked = parser.parse_args()
-    pages = {kind: page(kind, asked.out.resolve() / "runs") for kind in asked.only}
+    pages = {"-".join(one.parts[-3:-1]): one.resolve() for one in asked.pages}
+    if not pages:
+        pages = {kind: page(kind, asked.out.resolve() / "runs") for kind in asked.only}
+    asked.out.mkdir(parents=True, exist_ok=True)
     asyncio.run(
         shoot(pages, asked.out.resolve(), asked.axe.read_text() if asked.axe else "")
     )

@@ -92,6 +92,16 @@ def interval_words(low: float | None, high: float | None) -> str:
     return f"{first} to {last}"
 
 
+def time_words(seconds: float) -> str:
+    """Write how long something took, with the unit that suits: "40 s", "14 min", "2.3
+    h"."""
+    if seconds < 100:
+        return f"{seconds:.0f} s"
+    if seconds < 6000:
+        return f"{seconds / 60:.0f} min"
+    return f"{seconds / 3600:.1f} h"
+
+
 def _decimals(size: float) -> int:
     """Return how many decimals show two digits of a number; 0 of one from 10 on, and of
     0."""

@@ -88,6 +88,7 @@ def analyse(
         logs (LOG): Logs of commands and joint angles [default: those of the run].
         fit (RUN|YAML): An estimate, as a run folder or a YAML file [default: the start
             values of the parameters].
+        config (YAML): Settings, where --fit is not the folder of a run: a run has its own.
         profile (K,D): Parameters to profile. Each point of a profile costs a
             refinement, so this is slow.
 
@@ -104,7 +105,7 @@ def analyse(
     from hydroid.posterior import identifiability
     from hydroid.posterior.uncertainty import uncertainty
     from hydroid.reporting.analysis import analysis_page
-    from hydroid.reporting.parameters_report import in_words, parameter_table
+    from hydroid.reporting.parameters_report import parameter_table, sentence
 
     wanted = names(profile)
     profiles: dict[str, Profile] = {}
@@ -131,7 +132,7 @@ def analyse(
         )
     page = analysis_page(problem.settings, stated, profiles)
     page = replace(page, files={**page.files, "parameters": table})
-    said = [f"- {in_words(finding, problem.settings)}" for finding in findings]
+    said = [f"- {sentence(finding, problem.settings)}" for finding in findings]
     lines = [table, *said, *written(page, out)]
     return Result(lines, content, Analysis(of_estimate, identified, profiles), page)
 

@@ -143,7 +143,18 @@ def click_command(command: str) -> "TyperCommand":
     }
     alone = typer.Typer(**PLAIN)
     alone.command(command, help=text, epilog=example)(run)
-    return typer.main.get_command(alone)  # pyright: ignore[reportReturnType]  # a group only of several commands
+    # a group only of several commands
+    made: Any = typer.main.get_command(alone)
+    for parameter in made.params:
+        if parameter.param_type_name == "argument":
+            # its name says what it is; typer would add the type of Python
+            parameter.display_type_rich = _no_type
+    return made
+
+
+def _no_type(ctx: Any) -> str:
+    """Return what stands behind the name of an argument: nothing."""
+    return ""
 
 
 ABOUT = "Estimate the physical parameters of a hydraulic arm from logs of commands and joint angles."

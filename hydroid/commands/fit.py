@@ -250,7 +250,7 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
     from hydroid.fitting.validation import fitted
     from hydroid.fitting.verdict import baselines_of, behind, judge
     from hydroid.reporting.knowledge_report import warnings
-    from hydroid.reporting.parameters_report import in_words, parameter_table
+    from hydroid.reporting.parameters_report import parameter_table, sentence
     from hydroid.reporting.verdict_table import next_lines, next_step, verdict_lines
     from hydroid.run.record import fit_record
 
@@ -269,11 +269,11 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
     summary = summary.changed({"verdict": verdict, "findings": tuple(findings)})
     source = "the fit" if folder is None else str(folder / NAME)
     lines: list[Table | str] = verdict_lines({fit.final: verdict})
-    lines += [str(in_words(finding, settings)) for finding in warnings(summary)]
+    lines += [sentence(finding, settings) for finding in warnings(summary)]
     if folder is not None:
         step = next_step(summary, verdict, str(folder), predictions)
         lines += [*next_lines(step), str(folder / "report.html")]
-    said = [str(in_words(finding, settings)) for finding in summary.findings]
+    said = [sentence(finding, settings) for finding in summary.findings]
     return FitResult(
         lines=lines,
         content=summary.plain() | {"out": folder and str(folder)},
@@ -296,9 +296,8 @@ def _store(folder: "RunFolder", result: FitResult) -> Path:
     folder.write_estimate(result.model, result.problem.logs[0])
     write_record(folder.path, result.record)
     keep_earlier(folder.path, result.earlier)
-    folder.status("running", finished=date.today().isoformat())
+    seconds = dict(result.fit.seconds)
+    folder.status("running", finished=date.today().isoformat(), seconds=seconds)
     page = write_report(folder.path)
-    folder.status(
-        "done", seconds={**result.fit.seconds, "report": time.monotonic() - began}
-    )
+    folder.status("done", seconds=seconds | {"report": time.monotonic() - began})
     return page

@@ -42,11 +42,10 @@ SHARED = f"""
     log (LOG): A log. Formats: {FORMATS}.
     fit (RUN|YAML): A fit: the folder of a run or of Plant.save (Python), an
         estimate.yaml, or a YAML file with values of the parameters.
-    out (DIR): Folder for the tables [default: runs/COMMAND; in Python
+    out (DIR): Folder of the results [default: runs/COMMAND; in Python
         nothing is written].
     config (YAML): Settings: the fit.yaml that `hydroid init` wrote for your machine.
-        For the shipped arm: the name of a shipped config. Not needed with the folder of
-        a run.
+        For the shipped arm: the name of a shipped config.
     set (KEY=VALUE): Replace a setting, such as search.ga.generations=80.
     repair: Fill gaps in the logs up to log.repair_s (0.1 s), and list what was filled. The files
         themselves stay as they are.
@@ -285,7 +284,7 @@ def _limits(value: str, value_type: Any) -> Plain:
         return {"metavar": value or None}
     lowest, highest = limits.groups()
     return {
-        "metavar": None,
+        "metavar": "N" if value_type is int else "NUMBER",
         "min": value_type(lowest),
         "max": None if highest is None else value_type(highest),
     }

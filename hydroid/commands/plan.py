@@ -69,6 +69,7 @@ def suggest(
 
     Args:
         logs (LOG): Logs of commands and joint angles [default: those of the run].
+        config (YAML): Settings, where --fit is not the folder of a run: a run has its own.
 
     Raises:
         LogError: a log cannot be used.
@@ -141,22 +142,23 @@ def design(
     SAFETY: Keep a hand on the emergency stop during the first run. The limits
     (design.speed_deg_s, design.margin_deg, design.clearance_m) are checked only in
     simulation with the present estimate; the real arm may exceed them. Collisions are
-    checked with the shapes of the model, which knows no hoses and nothing that stands
+    checked with the shapes of the model, which has no hoses, and nothing that stands
     around the machine.
 
-    Writes commands.csv (the experiment) and predicted.csv (the simulated motion, no
-    measurement). The settings define the compared joints, the free parameters and the
-    limits.
+    Writes commands.csv (the experiment) and predicted.csv (the motion that is expected). The
+    settings define the limits, the free parameters, and the joints whose angles are
+    compared (outputs).
 
     Example: hydroid design LOG.csv --fit runs/mech --duration 30
 
         commands = hydroid.design("a.csv", fit="runs/a", duration=30).result.log
 
     Args:
-        logs (LOG): Logs that you already have; the experiment measures what they leave
-            open.
+        logs (LOG): Logs that you already have. The experiment is designed to add to them.
+        config (YAML): Settings, where --fit is not the folder of a run: a run has its own.
         duration (S): Length of the experiment [s].
-        joints (2,3): Joints to drive, by number or name [default: the compared joints].
+        joints (2,3): Joints to drive, by number or name [default: those of
+            outputs].
 
     Raises:
         SettingsError: limits that no experiment keeps.

@@ -119,7 +119,8 @@ def fit_hyd(
 
     Args:
         out (DIR): Run folder [default: runs/fit-hyd; in Python nothing is written].
-        mech (RUN|YAML): Stage 1: its run folder, or a YAML file of its values.
+        mech (RUN|YAML): Stage 1: its run folder, or a YAML file of its values [default:
+            the masses of the arm's file, or free ones with priors].
 
     Raises:
         HydroidError: an input or a folder that cannot be used.
@@ -344,10 +345,10 @@ def adapt(
 
     Use it after a change of the machine: a slower engine, a colder day, another tool.
     For a load of known mass, set the payload of the logs instead: --set
-    'payloads={LOADED.csv: 250}'. A load at the tip that nobody has weighed is found
-    like the other parameters; its name is tip_load. hydroid leaves parts of the logs
-    out, and keeps a parameter free only if the error falls there. The result is a run
-    that every command takes.
+    'payloads={LOADED.csv: 250}'. For a load that nobody has
+    weighed, free tip_load. hydroid predicts parts of the logs that it leaves out, and
+    keeps a parameter free only if their error falls. The result is a run that every
+    command takes.
 
     Example: hydroid adapt LOADED.csv --fit runs/hyd --free P_flow
 
@@ -357,8 +358,8 @@ def adapt(
     Args:
         logs (LOG): The new logs.
         free (NAME,NAME): Parameters to free [default: hydroid tries masses, pump,
-            effects of the groups of logs, and tip_load in turn; it goes on as long as
-            the error falls on every part left out].
+            effects of the groups of logs, and tip_load in turn, and keeps those that
+            lower the error on every part left out].
         out (DIR): Run folder [default: runs/adapt; in Python nothing is written].
         set (KEY=VALUE): Replace a setting of the fit, such as
             refinement.iterations=100.

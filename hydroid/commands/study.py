@@ -43,6 +43,7 @@ def study(
 
     Args:
         file (STUDY.yaml): The study's file (docs/studies.md).
+        out (DIR): Folder of the tables and of the file of each run.
         processes (0 to 1024): Number of processes. 0 means one per core.
 
     Raises:

@@ -53,8 +53,7 @@ def validate(
     compares its error with those of simple models.
 
     Each fit reads the logs with its own settings. The page shows every response with
-    its errors (article, table 9). From then on, the report of the fit's own run shows
-    these logs too.
+    its errors. From then on, the report of the fit's own run shows these logs too.
 
     Example: hydroid validate OTHER.csv --fit runs/mech --fit runs/hyd
 

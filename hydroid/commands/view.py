@@ -68,6 +68,7 @@ def simulate(
         log = hydroid.simulate("commands.csv", fit="runs/a", out="predicted.csv").log
 
     Args:
+        config (YAML): Settings, where --fit is not the folder of a run: a run has its own.
         commands (COMMANDS.csv): A log of commands. Its angles before the first command
             give the start pose.
         out (LOG.csv): The log to write [default: runs/simulated.csv; in Python nothing

@@ -192,13 +192,24 @@ def fit_findings(fit: Fit) -> list[Finding]:
     for estimate in fit.estimates.values():
         if not estimate.usable:
             findings.append(Finding("diverged", "warning", (estimate.name,)))
-    scalars, _ = fit.quantities
-    # half of a 95 % interval as large as the value, or without end
-    lost = [quantity.label for quantity in scalars.values() if not quantity.within <= 1]
-    if lost:
-        labels = tuple(dict.fromkeys(lost))
-        findings.append(Finding("quantities open", "note", labels))
+    if lost := _open_quantities(fit):
+        details = {joint: "; ".join(labels) for joint, labels in lost.items()}
+        findings.append(
+            Finding("quantities open", "note", tuple(lost), details=details)
+        )
     return findings
+
+
+def _open_quantities(fit: Fit) -> dict[str, list[str]]:
+    """Return the labels of quantities, by the names of their joints, half of whose 95 %
+    interval is as large as the value, or has no end."""
+    arm = fit.problem.settings.arm
+    lost = dict[str, list[str]]()
+    scalars, _ = fit.quantities
+    for quantity in scalars.values():
+        if not quantity.within <= 1.0:
+            lost.setdefault(arm.name_of(quantity.joint), []).append(quantity.label)
+    return lost
 
 
 def _ending_findings(fit: Fit) -> Iterator[Finding]:

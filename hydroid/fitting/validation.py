@@ -77,6 +77,20 @@ class JointPrediction:
         """The rms of the error; NaN if the simulation diverged."""
         return float(rms(self.error))
 
+    def __repr__(self) -> str:
+        size = np.abs(self.error)
+        said = f"{self.name}: the simulation diverged"
+        if np.isfinite(size).all():
+            place = int(np.argmax(size))
+            said = (
+                f"{self.name}: rms error {three_digits(self.rms)} {self.unit}, largest "
+                f"{three_digits(float(size[place]))} {self.unit} at {self.time[place]:.1f} s"
+            )
+        arrays = "time, measured, response, error"
+        if self.half is not None:
+            arrays += ", half (of the 95 % band)"
+        return f"{said}\narrays of {len(self.time)} samples: {arrays}"
+
 
 @record
 class Prediction:

@@ -203,7 +203,7 @@ def _lacks_columns(
             about += f", did you mean {misspelt[signal.name]!r}?"
         descriptions.append(f"{signal.name!r} ({about})")
     spare = [*filter(None, unused.values())] or ["none"]
-    what = f"lacks {listed(descriptions, 2)}; unused: {listed(spare, 3)}"
+    what = f"lacks {listed(descriptions, 2)}; columns without a use: {listed(spare, 3)}"
     settings = listed([*dict.fromkeys(f"log.{signal.kind}" for signal in lacking)])
     hint = (
         f"in the config, set {settings} to the right column, or to null if the log has "

@@ -11,8 +11,14 @@ import numpy as np
 from hydroid.arrays import Array
 from hydroid.estimate import CurveEstimate, FitSummary
 from hydroid.log import Log
+from hydroid.reporting.actuator_tables import (
+    RESPONSE_HEADER,
+    bandwidth,
+    response_rows,
+    speed_table,
+)
 from hydroid.reporting.chart import Chart, Color, Mark, Panel
-from hydroid.reporting.page import Plot, Section
+from hydroid.reporting.page import Cell, Plot, Section, Table
 from hydroid.reporting.parameters_report import SIDES, direction_word
 from hydroid.settings.fit import FitSettings
 from hydroid.words import listed, two_digits
@@ -43,6 +49,10 @@ _STEP = (
     "after a step, above 0 in the direction of the command, and the frequency response "
     "computed from it. Bands: 95 % intervals."
 )
+_TABLE = (
+    " Tables: measured is the median of the measured speeds within 5 % of the command."
+)
+_RESPONSES = "In brackets: 95 % intervals. Phase: of the speed behind the command."
 
 
 def speed_section(
@@ -54,6 +64,7 @@ def speed_section(
     """
     tabs = list[Plot]()
     fastest = list[str]()
+    cards = dict[str, Table]()
     opens = False
     for joint in settings.outputs:
         name = settings.arm.name_of(joint)
@@ -70,6 +81,7 @@ def speed_section(
         caption = f"{name}: {speed.label}"
         tabs.append(Plot(f"speed_{len(tabs) + 1}", caption, draw, button=name))
         fastest.append(f"{name} {_fastest(speed, commands)}")
+        cards[f"speed_{name}"] = speed_table(name, speed, opening, cloud)
     if not tabs:
         return None
     title = "Speed against command"
@@ -77,8 +89,11 @@ def speed_section(
     if opens:
         title = "Speed and valve against command"
         text = _SPEED
+    text += _TABLE
     answer = f"fastest: {listed(fastest)}"
-    return Section(title, text, tabs=tuple(tabs), folded=True, answer=answer)
+    return Section(
+        title, text, tabs=tuple(tabs), cards=cards, folded=True, answer=answer
+    )
 
 
 def _fastest(speed: CurveEstimate, commands: Array) -> str:
@@ -122,6 +137,7 @@ def step_section(settings: FitSettings, summary: FitSummary) -> Section | None:
     tabs = list[Plot]()
     slowest = list[str]()
     narrowest = list[str]()
+    rows = list[tuple[Cell, ...]]()
     for joint in settings.outputs:
         name = settings.arm.name_of(joint)
         if not any(f"{name}_step_{towards}" in summary.curves for towards in TOWARDS):
@@ -133,6 +149,9 @@ def step_section(settings: FitSettings, summary: FitSummary) -> Section | None:
             slowest.append(f"{name} {two_digits(max(dead_times))} s")
         if widths := _bandwidths(name, summary.curves):
             narrowest.append(f"{name} {two_digits(min(widths))} Hz")
+        for towards in TOWARDS:
+            if f"{name}_step_{towards}" in summary.curves:
+                rows.append(response_rows(name, towards, summary))
     if not tabs:
         return None
     answers = list[str]()
@@ -141,24 +160,22 @@ def step_section(settings: FitSettings, summary: FitSummary) -> Section | None:
     if narrowest:
         answers.append(f"bandwidth (-3 dB): {listed(narrowest)}")
     title = "Step and frequency response"
+    tables = {"responses": Table("", RESPONSE_HEADER, tuple(rows), _RESPONSES)}
     return Section(
-        title, _STEP, tabs=tuple(tabs), folded=True, answer="; ".join(answers)
+        title,
+        _STEP,
+        tabs=tuple(tabs),
+        tables=tables,
+        folded=True,
+        answer="; ".join(answers),
     )
 
 
 def _bandwidths(name: str, curves: Mapping[str, CurveEstimate]) -> list[float]:
-    """Return the frequencies [Hz] at which the speed first falls by 3 dB from that at
-    the lowest one, in both directions; none of a curve that does not fall so far."""
-    widths = list[float]()
-    for curve in _towards(name, "amplitude", curves).values():
-        gain = np.log(np.array(curve.value) / curve.value[0] * np.sqrt(2.0))
-        below = np.flatnonzero(gain < 0.0)
-        if not len(below):
-            continue
-        ends = slice(below[0] - 1, below[0] + 1)
-        at = np.log(curve.at[ends])
-        widths.append(float(np.exp(np.interp(0.0, -gain[ends], at))))
-    return widths
+    """Return the bandwidths of a joint in both directions [Hz], as far as they lie
+    within the curves."""
+    both = map(bandwidth, _towards(name, "amplitude", curves).values())
+    return [width for width in both if width is not None]
 
 
 def measured_speeds(log: Log, joint: int, delay: float) -> tuple[Array, Array]:

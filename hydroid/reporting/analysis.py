@@ -13,10 +13,10 @@ from hydroid.reporting.correlation_report import correlation_section, correlatio
 from hydroid.reporting.knowledge_report import unknown_section, warnings
 from hydroid.reporting.page import Page, Plot, Section
 from hydroid.reporting.parameters_report import (
-    in_words,
     known_of_free,
     parameter_section,
     prior_section,
+    sentence,
 )
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.naming import named
@@ -39,7 +39,7 @@ def analysis_page(
         parameter_section(settings, summary),
     ]
     lead = f"Logs and priors together: {known_of_free(summary)}."
-    warned = [str(in_words(finding, settings)) for finding in warnings(summary)]
+    warned = [sentence(finding, settings) for finding in warnings(summary)]
     matrix = correlation_table(summary)
     files = {} if matrix is None else {"correlations": matrix}
     return Page(

@@ -8,14 +8,14 @@ from hydroid.estimate import FitSummary, QuantityEstimate
 from hydroid.findings import Finding
 from hydroid.joint_verdict import JointVerdict
 from hydroid.reporting.page import Cell, Section, Table
-from hydroid.reporting.parameters_report import in_words
+from hydroid.reporting.parameters_report import sentence
 from hydroid.settings.fit import FitSettings
 from hydroid.words import interval_words, listed, three_digits, two_digits
 
 BEST_WITHIN = 0.3
 """half of a 95 % interval, relative to the value, up to which a property counts as
 known"""
-MOST_KNOWN = 5
+MOST_KNOWN = 4
 """quantities of a joint that a page shows"""
 MOST_UNKNOWN = 6
 MOST_WARNINGS = 3
@@ -36,8 +36,8 @@ def unknown_section(settings: FitSettings, summary: FitSummary) -> Section:
 
     Those after the first six stand with the parameters.
     """
-    named = [in_words(finding, settings) for finding in _others(summary)[:MOST_UNKNOWN]]
-    points = tuple(map(str, named))
+    shown = _others(summary)[:MOST_UNKNOWN]
+    points = tuple(sentence(finding, settings) for finding in shown)
     none = "" if points else "The logs determine every free parameter."
     return Section("What is not known", none, points)
 
@@ -73,7 +73,7 @@ def quantity_section(settings: FitSettings, summary: FitSummary) -> Section | No
             cards[f"known_{name}"] = Table(name, header, tuple(rows))
     text = (
         "The best known quantities of each joint, with 95 % intervals. Intervals are right "
-        "only if the model is right. All quantities stand further down."
+        "only if the model is right. All quantities are listed further down."
     )
     return Section("What is known", text, cards=cards) if cards else None
 
@@ -97,8 +97,8 @@ def every_quantity_section(
     header = ("joint", "quantity", "value", "unit", "from", "to")
     note = "from, to: 95 % interval; empty: no limit."
     text = (
-        "What follows from the parameters of each joint. What is itself a parameter, such as "
-        "the dead band of a pilot stage, stands with the parameters."
+        "What follows from the parameters of each joint. Quantities that are parameters "
+        "themselves, such as the dead band of a pilot stage, are in the table of parameters."
     )
     tables = {"quantities": Table("", header, tuple(rows), note)}
     answer = f"{len(rows)}, with intervals"
@@ -152,8 +152,8 @@ def error_section(
         "influences than the commands add up."
     )
     note = (
-        "Standard deviations; after 10 s: at the mean speed of the logs. An error that "
-        "persists comes from the model, not the sensor; empty: none persists."
+        "Standard deviations. After 10 s: of a joint that moves at the mean speed of the logs. "
+        "An error that persists comes from the model, not from the sensor. Empty: none persists."
     )
     columns = {name: name for name in rows[0]}
     if not any(row[INSIDE] for row in rows):

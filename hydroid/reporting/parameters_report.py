@@ -244,6 +244,18 @@ def in_words(finding: Finding, settings: FitSettings) -> Finding:
     return replace(finding, subjects=tuple(subjects), details=details)
 
 
+def sentence(finding: Finding, settings: FitSettings) -> str:
+    """Return what `in_words` makes of a finding, with a capital letter where a
+    parameter's words begin it."""
+    worded = in_words(finding, settings)
+    text = str(worded)
+    first = worded.subjects[0] if worded.subjects else ""
+    # names of joints and logs are their users'
+    if first and first not in finding.subjects and text.startswith(first):
+        return text[0].upper() + text[1:]
+    return text
+
+
 def _with_detail(name: str, details: dict[str, str]) -> str:
     """Return a symbol with its detail, which is taken from the details."""
     return f"{name}: {details.pop(name)}" if name in details else name
@@ -299,8 +311,8 @@ def prior_chart(settings: FitSettings, summary: FitSummary) -> Chart:
         x = "lower bound: 0; upper bound: 1"
         quantities = [settings.parameters[name].quantity for name in positions]
         curves = any(quantity.startswith("curve_") for quantity in quantities)
-        shared = " (the parts of a curve share one)" if curves else ""
-        title = f"Without a prior of their own{shared}: between their bounds"
+        shared = " (of the parts of a curve: they share a prior)" if curves else ""
+        title = f"Without a prior, between their bounds{shared}"
         panels.append(_bars(title, x, positions))
     return Chart(tuple(panels))
 

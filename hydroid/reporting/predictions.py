@@ -24,12 +24,13 @@ from hydroid.reporting.knowledge_report import (
     unknown_section,
     warnings,
 )
+from hydroid.reporting.oil_report import oil_section
 from hydroid.reporting.page import Page, Section, short_name
 from hydroid.reporting.parameters_report import (
-    in_words,
     parameter_section,
     parameter_table,
     prior_section,
+    sentence,
 )
 from hydroid.reporting.residual_report import residual_section
 from hydroid.reporting.response_report import error_table, response_section
@@ -44,10 +45,12 @@ from hydroid.reporting.verdict_table import (
 )
 from hydroid.run.record import FinishedRun, load_record
 from hydroid.settings.arm import Arm
-from hydroid.words import listed
+from hydroid.words import listed, time_words
 
 MOST_LOGS = 6
 """logs that the foot of a page names"""
+FILES = "beside this page: values in estimate.yaml, tables (CSV) in tables/, the arm (MJCF) in model/"
+"""what a run folder holds for other programs, for the foot of its page"""
 SOFTWARE = ("hydroid", "mujoco", "numpy", "python")
 """whose versions stand at the foot of a page"""
 
@@ -147,6 +150,7 @@ def _fit_sections(
         error_section(settings, summary, run.verdict),
         unknown_section(settings, summary),
         residual_section(settings, summary, fitted),
+        oil_section(settings.arm, shown),
         speed_section(settings, summary, [prediction.log for prediction in fitted]),
         step_section(settings, summary),
         every_quantity_section(settings, summary),
@@ -169,7 +173,7 @@ def _fit_warnings(run: FinishedRun) -> tuple[str, ...]:
     warned += map(str, standing_out(unseen, run.verdict, run.folder))
     warned += outside(run.verdict)
     for finding in warnings(run.summary):
-        warned.append(str(in_words(finding, run.settings)))
+        warned.append(sentence(finding, run.settings))
     return tuple(warned)
 
 
@@ -189,7 +193,7 @@ def _search_data(run: FinishedRun) -> dict[str, str]:
 
 
 def _made_from(run: FinishedRun) -> tuple[str, ...]:
-    """Return the logs, settings, seed and date of a fit, for the foot of its page."""
+    """Return the logs, settings, seed, time, date and files of a fit, for the foot of its page."""
     logs = [prediction.log.source for prediction in run.result.fitted]
     settings = f"settings: config.yaml in {run.folder}, model {run.summary.final}"
     if run.settings.stage == "hyd":
@@ -200,6 +204,9 @@ def _made_from(run: FinishedRun) -> tuple[str, ...]:
     sampled = f"{counted} at {1.0 / run.settings.log.period_s:.3g} Hz"
     fitted_to = f"Fitted to {_log_list(logs)}: {sampled}"
     made_from = [fitted_to, settings, f"seed {run.seed}"]
+    if run.seconds:
+        made_from.append(f"took {time_words(sum(run.seconds.values()))}")
     if date := run.identity.get("finished"):
         made_from.append(str(date))
+    made_from.append(FILES)
     return tuple(made_from)

@@ -20,10 +20,10 @@ from hydroid.settings.fit import FitSettings
 from hydroid.words import listed, two_digits
 
 _TEXT = (
-    "Tested is the part of each sample that the samples before it do not predict (the "
-    "innovations). If the model is right, it is correlated neither with itself nor with the "
+    "The test takes the innovations: the part of each sample that earlier samples do not "
+    "predict. If the model is right, they are correlated neither with themselves nor with the "
     "command, and 95 % of the correlations lie in the grey band. With many samples the band "
-    f"is narrow: a correlation of {FAINT:g} or less matters to nobody."
+    f"is narrow: a correlation of {FAINT:g} or less does not matter."
 )
 _HEADER = (
     "joint",
@@ -48,7 +48,8 @@ def residual_section(
     tests = _tests(settings, summary, usable)
     tabs = list[Plot]()
     rows = list[tuple[Cell, ...]]()
-    coloured = list[str]()
+    by_itself = list[str]()
+    by_command = list[str]()
     for joint, test in tests.items():
         name = settings.arm.name_of(joint)
         draw = partial(_correlations, name, test)
@@ -58,13 +59,18 @@ def residual_section(
         with_command = float(np.abs(test.with_command).max())
         shares = [100 * part for part in test.outside]
         rows.append((name, *map(two_digits, (in_time, with_command, *shares))))
-        largest = max(in_time, with_command)
-        if largest > FAINT:
-            coloured.append(f"{name} {two_digits(largest)}")
+        if in_time > FAINT:
+            by_itself.append(f"{name} {two_digits(in_time)}")
+        if with_command > FAINT:
+            by_command.append(f"{name} {two_digits(with_command)}")
+    answers = list[str]()
+    if by_itself:
+        answers.append(f"largest autocorrelation: {listed(by_itself)}")
+    if by_command:
+        answers.append(f"with the command: {listed(by_command)}")
     answer = f"yes: no correlation is above {FAINT:g}"
-    if coloured:
-        no = "no, in no joint" if len(coloured) == len(tests) else "no"
-        answer = f"{no}; largest correlation: {listed(coloured)}"
+    if answers:
+        answer = f"no; {'; '.join(answers)}"
     title = "Are the residuals white?"
     table = Table("", _HEADER, tuple(rows))
     tables = {"residuals": table}

@@ -299,17 +299,28 @@ def draw_response(
         middle.append(residual)
         # a band stands behind every line
         middle[:0] = band
+    title += _largest(predictions[0], joint, shown)
     panels = [
-        Panel("", f"{shown.word} [{shown.unit}]", tuple(upper), title, 200),
-        Panel("", f"residual [{shown.unit}]", tuple(middle), height=130),
+        Panel("", f"{shown.word} [{shown.unit}]", tuple(upper), title, 180),
+        Panel("", f"residual [{shown.unit}]", tuple(middle), height=110),
     ]
     if pressures := _pressures(predictions[0], joint):
-        panels.append(Panel("", "pressure [bar]", pressures, height=120))
+        panels.append(Panel("", "pressure [bar]", pressures, height=105))
     if flows := _flows(predictions[0], joint):
-        panels.append(Panel("", "flow in [L/min]", flows, height=110))
+        panels.append(Panel("", "flow in [L/min]", flows, height=100))
     command = Mark("step", log.time, log.command[:, column], color="grey")
     panels.append(command_panel(command))
     return Chart(tuple(panels), linked=True, bins=bins)
+
+
+def _largest(prediction: Prediction, joint: int, shown: Display) -> str:
+    """Say how large the largest error is, and when; nothing of what diverged."""
+    error = np.abs(shown.factor * prediction.error(joint))
+    if not np.isfinite(error).all():
+        return ""
+    place = int(np.argmax(error))
+    size = significant(float(error[place]), 2)
+    return f": largest error {size} {shown.unit}, at {prediction.log.time[place]:.1f} s"
 
 
 def _response_marks(

@@ -11,7 +11,7 @@ from hydroid.reporting.chart import SERIES, Chart, Mark, Panel, finite
 from hydroid.reporting.page import Plot, Section
 from hydroid.run.record import Effort, FinishedRun
 from hydroid.settings.problem import ObjectiveSettings
-from hydroid.words import listed, two_digits
+from hydroid.words import listed, time_words, two_digits
 
 _NORMS = {1: "mean absolute error", 2: "rms error", "inf": "largest error"}
 """names of the objective's norms"""
@@ -51,15 +51,27 @@ def search_section(run: FinishedRun) -> Section:
         caption = "Where each start of the search ended. 0 = the best start; further right = worse."
         draw = partial(starts, names, result.starts)
         plots.append(Plot("starts", caption, draw))
-    simulations = sum(effort.simulations for effort in result.refinements)
-    answer = f"{simulations:,} simulations of the refinement" if simulations else ""
+    if run.seconds:
+        steps = [f"{step} {time_words(took)}" for step, took in run.seconds.items()]
+        points.append(f"Time: {listed(steps)}.")
     return Section(
         "How the search went",
         points=tuple(points),
         plots=tuple(plots),
         folded=True,
-        answer=answer,
+        answer=_answer(run),
     )
+
+
+def _answer(run: FinishedRun) -> str:
+    """Say what the fit took in all."""
+    answers = list[str]()
+    if run.seconds:
+        answers.append(f"it took {time_words(sum(run.seconds.values()))}")
+    simulations = sum(effort.simulations for effort in run.result.refinements)
+    if simulations:
+        answers.append(f"{simulations:,} simulations of the refinement")
+    return "; ".join(answers)
 
 
 def _refined(run: FinishedRun, effort: Effort) -> str:

@@ -35,8 +35,10 @@ _FITTED = (
 _TESTED = (
     "Rms errors{unit} on {count} unseen log{s}, which the fit did not use: after predicting 1, "
     "5 and 10 s ahead, and over whole logs. In brackets: the error of the best simple "
-    "model. Better, worse: than that model. Cannot be told: the difference may be chance."
+    "model. Better, worse: than that model. Cannot be told: these logs cannot tell which of "
+    "the two errs less, as the difference may be chance; more logs can."
 )
+_NO_WORD = f" Whole logs: without a word, as it takes {LEAST_BLOCKS} to compare."
 WHOLE = "whole logs"
 """name of a column"""
 FITTED = "whole fitted logs"
@@ -70,6 +72,8 @@ def verdict_table(fits: Verdicts) -> Table:
         names += [*map(column_of, JUDGED), WHOLE, FITTED, GOOD]
         optional = (GOOD, FITTED, column_of(JUDGED[1]), WHOLE)
         note = _TESTED.format(unit=unit, count=count, s="s" if count > 1 else "")
+        if count < LEAST_BLOCKS:
+            note += _NO_WORD
     else:
         names += [FITTED, *NAMES]
         optional = NAMES[:2]

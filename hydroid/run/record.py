@@ -43,6 +43,8 @@ RESULT = "result.npz"
 """name of the file of arrays"""
 EARLIER = "earlier.npz"
 """name of the file of the logs of earlier fits"""
+STEPS = ("search", "refinement", "uncertainty")
+"""of a fit, whose times a run stores"""
 VALIDATIONS = "validations"
 """name of the folder of unseen logs"""
 LONGEST_NAME = 60
@@ -108,6 +110,13 @@ class FinishedRun:
     def seed(self) -> int:
         """Seed of the search."""
         return self.settings.search.seed
+
+    @property
+    def seconds(self) -> dict[str, float]:
+        """What the fit took [s], by its steps; of a resumed one since it went on. Empty
+        of a run that does not say so."""
+        taken = self.identity.get("seconds", {})
+        return {step: float(taken[step]) for step in STEPS if step in taken}
 
     @property
     def rms_deg(self) -> float:

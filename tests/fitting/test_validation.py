@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from report_fits import make_fit, make_prediction, make_problem
 
-from hydroid.fitting.validation import Prediction, fitted
+from hydroid.fitting.validation import JointPrediction, Prediction, fitted
 
 PROBLEM = make_problem(("dir/a.csv",), outputs=(2, 3))
 (FITTED,) = fitted(make_fit(PROBLEM))
@@ -62,3 +62,20 @@ def test_a_prediction_prints_itself_in_three_lines():
 def test_one_that_diverged_prints_itself_too():
     lost = Prediction("hyd", PROBLEM.logs[0], (2,), np.full((120, 1), np.nan), {}, None)
     assert "rms error: 2 – deg" in repr(lost)
+
+
+def test_a_joint_prints_itself_in_two_lines():
+    time = np.arange(3) * 0.5
+    measured = np.array([0.0, 1.0, 2.0])
+    one = JointPrediction(
+        "boom", "deg", time, measured, measured - np.array([0.0, 3.0, 0.0]), None
+    )
+    assert repr(one).splitlines() == [
+        "boom: rms error 1.73 deg, largest 3 deg at 0.5 s",
+        "arrays of 3 samples: time, measured, response, error",
+    ]
+    lost = JointPrediction("boom", "mm", time, measured, np.full(3, np.nan), measured)
+    assert repr(lost).splitlines() == [
+        "boom: the simulation diverged",
+        "arrays of 3 samples: time, measured, response, error, half (of the 95 % band)",
+    ]

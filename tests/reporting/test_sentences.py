@@ -9,7 +9,7 @@ from hydroid.advice.growth import Candidate
 from hydroid.advice.suggestions import action_findings, freeing_command, proposed
 from hydroid.advice.terms import Term
 from hydroid.findings import Finding
-from hydroid.reporting.parameters_report import in_words
+from hydroid.reporting.parameters_report import in_words, sentence
 from hydroid.settings.load import parse_override
 
 
@@ -71,3 +71,13 @@ def test_parameters_of_the_same_words_are_named_together():
     )
     other = Finding("log stands out", "warning", ("a.csv",), {"run": "R"})
     assert in_words(other, settings).subjects == ("a.csv",)
+
+
+def test_a_sentence_begins_with_a_capital_letter_but_not_a_name():
+    settings = make_problem().settings
+    words = sentence(Finding("at limit", "note", ("D",)), settings)
+    assert words == (
+        "Damping of the joint (D) is at the upper bound, the largest possible value."
+    )
+    of_a_log = Finding("log stands out", "note", ("a.csv",), {"run": "r"})
+    assert sentence(of_a_log, settings).startswith("a.csv has an error")

@@ -1,0 +1,120 @@
+"""What the curves of the actuators say at the places that an engineer asks for, as
+tables: every tenth per cent of command, 1 Hz."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hydroid.arrays import Array
+from hydroid.estimate import CurveEstimate, FitSummary, QuantityEstimate
+from hydroid.reporting.page import Cell, Table
+from hydroid.words import interval_words, three_digits, two_digits
+
+EVERY = 10.0
+"""commands of the table of speeds [%]"""
+NEAR = 5.0
+"""how far the command of a measured speed may be from the table's [%]"""
+LEAST_MEASURED = 5
+"""measured speeds that a median is taken of"""
+LEAST_PART = 1e-3
+"""of the top speed, below which a measured speed is shown as 0"""
+PHASE_AT = 1.0
+"""frequency at which the phase is stated [Hz]"""
+
+
+def speed_table(
+    name: str, speed: CurveEstimate, opening: CurveEstimate | None, measured: Array
+) -> Table:
+    """Return speed and valve opening of a joint against its command, beside the median
+    of measured speeds; `measured` are commands [%] and speeds in the curve's unit,
+    shape (2, n)."""
+    unit = speed.unit
+    header = ["command [%]", f"speed [{unit}]", "95 %", "measured"]
+    openings = dict[float, float]()
+    if opening is not None:
+        header.append(f"valve [{opening.unit}]")
+        openings = dict(zip(opening.at, opening.value, strict=True))
+    rows = list[tuple[Cell, ...]]()
+    least = LEAST_PART * max(map(abs, speed.value))
+    points = zip(speed.at, speed.value, speed.interval, strict=True)
+    for command, value, (low, high) in points:
+        if command % EVERY:
+            continue
+        # a valve that stays shut has no interval, and its speed no sign
+        stands = low == high == 0.0
+        row: list[Cell] = [f"{command:+.0f}", "0" if stands else three_digits(value)]
+        row.append(None if stands else interval_words(low, high))
+        row.append(_median(command, measured, least))
+        if opening is not None:
+            area = openings.get(command)
+            row.append(None if area is None else three_digits(area))
+        rows.append(tuple(row))
+    return Table(name, tuple(header), tuple(rows))
+
+
+def _median(command: float, measured: Array, least: float) -> str | None:
+    """Return the median speed near a command, 0 below the least one; nothing of too
+    few."""
+    speeds = measured[1, np.abs(measured[0] - command) <= NEAR]
+    if len(speeds) < LEAST_MEASURED:
+        return None
+    median = float(np.median(speeds))
+    return three_digits(median) if abs(median) >= least else "0"
+
+
+RESPONSE_HEADER = (
+    "joint",
+    "step to",
+    "dead time [s]",
+    "time constant [s]",
+    "bandwidth (-3 dB) [Hz]",
+    f"phase at {PHASE_AT:g} Hz [deg]",
+)
+
+
+def response_rows(name: str, towards: str, summary: FitSummary) -> tuple[Cell, ...]:
+    """Return a row of the table of responses: of a joint in one direction."""
+    curves = summary.curves
+    step = curves.get(f"{name}_step_{towards}")
+    amplitude = curves.get(f"{name}_amplitude_{towards}")
+    phase = curves.get(f"{name}_phase_{towards}")
+    # the command and the direction
+    label = step.label.partition(" to ")[2] if step else towards
+    width = bandwidth(amplitude) if amplitude else None
+    return (
+        name,
+        label,
+        _quantity(summary.quantities.get(f"{name}_dead_time_{towards}")),
+        _quantity(summary.quantities.get(f"{name}_time_constant_{towards}")),
+        None if width is None else two_digits(width),
+        None if phase is None else _at(phase, PHASE_AT),
+    )
+
+
+def bandwidth(amplitude: CurveEstimate) -> float | None:
+    """Return the frequency [Hz] at which the speed first falls by 3 dB from that at the
+    lowest one; None of a curve that does not fall so far."""
+    gain = np.log(np.array(amplitude.value) / amplitude.value[0] * np.sqrt(2.0))
+    below = np.flatnonzero(gain < 0.0)
+    if not len(below):
+        return None
+    ends = slice(below[0] - 1, below[0] + 1)
+    at = np.log(amplitude.at[ends])
+    return float(np.exp(np.interp(0.0, -gain[ends], at)))
+
+
+def _at(curve: CurveEstimate, place: float) -> str | None:
+    """Return a curve's value between its points; nothing beyond them."""
+    places: Sequence[float] = curve.at
+    if not places[0] <= place <= places[-1]:
+        return None
+    return f"{float(np.interp(np.log(place), np.log(places), curve.value)):.0f}"
+
+
+def _quantity(quantity: QuantityEstimate | None) -> str | None:
+    """Write a quantity with its interval."""
+    if quantity is None:
+        return None
+    between = interval_words(*quantity.interval)
+    value = three_digits(quantity.value)
+    return f"{value} ({between})" if between else value

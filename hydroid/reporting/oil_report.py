@@ -1,0 +1,118 @@
+"""How far pressures and flows went in the simulated logs, and whether the pump
+suffices."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hydroid.arrays import Array
+from hydroid.fitting.validation import Prediction
+from hydroid.prediction import OilTrace
+from hydroid.reporting.page import Cell, Section, Table, log_names
+from hydroid.reporting.response_report import BAR, LITRES_PER_MINUTE
+from hydroid.settings.arm import Arm
+from hydroid.words import listed, three_digits
+
+_TEXT = (
+    "The largest values in all logs of this page, as the model simulates them. Choose a joint "
+    "in a log above to see them over time."
+)
+_HEADER = (
+    "joint",
+    "pressure in A up to [bar]",
+    "pressure in B up to [bar]",
+    "flow in up to [L/min]",
+    "flow: in log",
+    "flow: at [s]",
+)
+_PUMP_HEADER = ("", "highest [bar]", "lowest [bar]", "lowest: in log", "lowest: at [s]")
+
+
+@dataclass(frozen=True)
+class _Peak:
+    """The largest value of several traces: in which log, and when [s]."""
+
+    value: float
+    log: str
+    time: float
+
+
+def oil_section(arm: Arm, predictions: Sequence[Prediction]) -> Section | None:
+    """Return the section of the largest pressures and flows.
+
+    None: the model has no hydraulics, or every simulation diverged.
+    """
+    usable = [p for p in predictions if p.oil and np.isfinite(p.response).all()]
+    joints = dict.fromkeys(joint for p in usable for joint in p.joints)
+    rows = list[tuple[Cell, ...]]()
+    for joint in joints:
+        of_joint = [p for p in usable if joint in p.joints]
+        row = _joint_row(joint, of_joint)
+        if row:
+            rows.append((arm.name_of(joint), *row))
+    if not rows:
+        return None
+    tables = {"oil": Table("", _HEADER, tuple(rows))}
+    answer = f"flow in up to: {listed([f'{row[0]} {row[3]} L/min' for row in rows])}"
+    if pump := _pump_row(usable):
+        tables["pump"] = Table("", _PUMP_HEADER, (pump,))
+        _, high, low, log, time = pump
+        answer = f"the pump's line falls from {high} to {low} bar ({log}, {time} s)"
+    return Section(
+        "Pressures and flows", _TEXT, tables=tables, folded=True, answer=answer
+    )
+
+
+def _joint_row(joint: int, predictions: Sequence[Prediction]) -> tuple[Cell, ...]:
+    """Return the largest pressures in both chambers of a joint and the largest flow into
+    one; nothing of a joint that no log drives."""
+
+    def pressure(side: int) -> Callable[[Prediction, OilTrace], Array]:
+        return lambda one, oil: BAR * oil.pressure[:, one.joints.index(joint), side]
+
+    def flow(one: Prediction, oil: OilTrace) -> Array:
+        return LITRES_PER_MINUTE * oil.flow[:, one.joints.index(joint)].max(axis=1)
+
+    in_a = _peak(predictions, pressure(0))
+    in_b = _peak(predictions, pressure(1))
+    inflow = _peak(predictions, flow)
+    if in_a is None or in_b is None or inflow is None:
+        return ()
+    values = [three_digits(one.value) for one in (in_a, in_b, inflow)]
+    return (*values, inflow.log, f"{inflow.time:.1f}")
+
+
+def _pump_row(predictions: Sequence[Prediction]) -> tuple[Cell, ...]:
+    """Return the highest and the lowest pressure of the pump's line; nothing without a
+    pump."""
+
+    def line(_: Prediction, oil: OilTrace) -> Array:
+        return np.full(1, np.nan) if oil.line is None else BAR * oil.line
+
+    high = _peak(predictions, line)
+    low = _peak(predictions, lambda one, oil: -line(one, oil))
+    if high is None or low is None:
+        return ()
+    ends = three_digits(high.value), three_digits(-low.value)
+    return ("pump's line", *ends, low.log, f"{low.time:.1f}")
+
+
+def _peak(
+    predictions: Sequence[Prediction], trace: Callable[[Prediction, OilTrace], Array]
+) -> _Peak | None:
+    """Return the largest value of the traces of predictions; None where all are NaN."""
+    names = log_names(prediction.log.source for prediction in predictions)
+    largest: _Peak | None = None
+    for prediction in predictions:
+        if prediction.oil is None:
+            continue
+        values = trace(prediction, prediction.oil)
+        if not np.isfinite(values).any():
+            continue
+        place = int(np.nanargmax(values))
+        value = float(values[place])
+        if largest is None or value > largest.value:
+            time = float(prediction.log.time[place])
+            largest = _Peak(value, names[prediction.log.source], time)
+    return largest

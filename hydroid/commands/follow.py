@@ -207,14 +207,15 @@ def _without_absent_joints(
 
 def _errors(followed: "Followed", joint: int, arm: "Arm") -> dict[str, object]:
     """Return the predicted errors of a joint (number, from 1), with and without its
-    band."""
+    band: in deg, or in mm of a joint that slides, which the keys say."""
     import math
 
+    _, unit, factor = arm.joints[joint - 1].shown
     error, wide = followed.rms(joint)
-    banded = math.degrees(wide) if math.isfinite(wide) else None
+    banded = factor * wide if math.isfinite(wide) else None
     return {
         "joint": joint,
         "name": arm.joint_names[joint - 1],
-        "rms_deg": math.degrees(error),
-        "rms_with_band_deg": banded,
+        f"rms_{unit}": factor * error,
+        f"rms_with_band_{unit}": banded,
     }

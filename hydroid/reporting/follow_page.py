@@ -28,7 +28,7 @@ _MOTION = (
 )
 _NOTE = (
     "error: rms between wished and predicted angle. with its band: 95 % of the machines that the logs allow "
-    "stay within this rms error, without any feedback."
+    "stay within this rms error, without any feedback. saturated: part of the time at full command."
 )
 
 
@@ -66,7 +66,7 @@ def tracking_table(followed: Followed, arm: Arm) -> Table:
         full = 100.0 * float(np.mean(np.abs(command) >= 100.0))
         name = arm.joint_names[joint - 1]
         rows.append((name, unit, factor * error, banded, full))
-    header = ("joint", "unit", "error", "with its band", "full command [% of time]")
+    header = ("joint", "unit", "error", "with its band", "saturated [%]")
     return Table("Predicted tracking error", header, tuple(rows), _NOTE)
 
 

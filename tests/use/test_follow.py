@@ -80,6 +80,22 @@ def test_commands_come_before_the_motion_by_delay_and_lags():
     np.testing.assert_array_equal(first.log.angle[-len(early.time) :], early.angle)
 
 
+@pytest.mark.parametrize("kind", ["quasi-static", "dynamic"])
+def test_a_joint_gets_no_command_before_its_motion_asks_for_one(kind):
+    """What is learnt comes through a filter that looks ahead: nothing of it may come
+    before the lags do."""
+    one = model(kind, opening_lag=0.2, pump_flow=5.0)
+    lags = joint_lags(Plant(one))
+    found = follow(one, path(one, rest=2.0))
+    for joint in JOINTS.values():
+        command = found.log.command[:, joint]
+        moves = np.flatnonzero(np.diff(found.log.angle[:, joint]))[0]
+        first = np.flatnonzero(command)[0]
+        assert (moves - first) * found.log.period <= lags[joint] + found.log.period
+        # the path begins upwards
+        assert command[first : moves + 50].min() > -0.1 * command.max()
+
+
 def test_lifting_takes_more_command_than_lowering():
     one = model()
     found = follow(one, path(one, joints={"shoulder": 1}))

@@ -95,8 +95,8 @@ def speeds_alone(plant: Plant, column: int, angles: Array, commands: Array) -> A
 def parameter_files(draws: Draws) -> dict[str, str]:
     """Return draws, ranges and errors as CSV, by file name, with a text that says what
     to take."""
-    settings = draws.model.settings
-    units = [settings.parameters[name].unit for name in draws.names]
+    parameters = draws.model.settings.parameter_set().parameters
+    units = [parameter.unit for parameter in parameters]
     low, high = np.quantile(draws.theta, [0.025, 0.975], axis=0)
     numbers = (draws.model.theta.tolist(), low.tolist(), high.tolist())
     ranges = zip(draws.names, units, *numbers, strict=True)

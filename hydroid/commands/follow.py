@@ -23,6 +23,7 @@ from hydroid.words import plain
 if TYPE_CHECKING:
     from hydroid.arrays import Array
     from hydroid.identified_model import IdentifiedModel
+    from hydroid.reporting.page import Table
     from hydroid.settings.arm import Arm
     from hydroid.settings.fit import FitSettings
     from hydroid.use.follow import Followed
@@ -91,12 +92,9 @@ def follow(
     followed = find_commands(model, path, payload=payload)
     arm = model.settings.arm
     name = "commands" if out is None else Path(out).stem
-    page = follow_page(name, followed, arm)
-    lines = [
-        tracking_table(followed, arm),
-        *missed_lines(followed, arm),
-        *_path_lines(followed, tip),
-    ]
+    said = [*missed_lines(followed, arm), *_path_lines(followed, tip)]
+    page = follow_page(name, followed, arm, said)
+    lines: list[Table | str] = [tracking_table(followed, arm), *said]
     if out is not None:
         write_log(Path(out), followed.recording, model.settings.log, arm=arm)
         lines += [str(out), *written(page, Path(out).parent)]

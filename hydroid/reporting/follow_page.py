@@ -32,11 +32,13 @@ _NOTE = (
 )
 
 
-def follow_page(name: str, followed: Followed, arm: Arm) -> Page:
-    """Return the page; its file has the `name`, its table is `tracking`."""
+def follow_page(
+    name: str, followed: Followed, arm: Arm, said: Sequence[str] = ()
+) -> Page:
+    """Return the page; its file has the `name`, its table is `tracking`, and beside it
+    stands what is `said` of the path."""
     table = tracking_table(followed, arm)
-    missed = tuple(missed_lines(followed, arm))
-    sections = [Section(table.title, "", missed, {"tracking": table})]
+    sections = [Section(table.title, "", tuple(said), {"tracking": table})]
     columns = [joint - 1 for joint in followed.joints]
     angle = followed.angle[:, columns]
     moving = Prediction(name, followed.log, followed.joints, angle, {}, None)

@@ -116,10 +116,13 @@ def _path_lines(followed: "Followed", tip: "TipKinematics | None") -> list[str]:
     """Return what is said of the tip's path, and of when the path begins."""
     lines = list[str]()
     if tip is not None:
+        from hydroid.use.tip_path import spelt
+
         away = _away(tip, followed)
+        start = spelt(tip.place(followed.log.angle[0]))
         lines.append(
-            f"The tip is {tip.tip.what}. By the model it stays within {away:.3g} mm of "
-            "the path."
+            f"The tip is {tip.tip.what}. It starts at {start}. By the model it stays "
+            f"within {away:.3g} mm of the path."
         )
     if followed.lead_s:
         lines.append(

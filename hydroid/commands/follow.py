@@ -211,12 +211,12 @@ def _errors(followed: "Followed", joint: int, arm: "Arm") -> dict[str, object]:
     band: in deg, or in mm of a joint that slides, which the keys say."""
     import math
 
-    _, unit, factor = arm.joints[joint - 1].shown
+    shown = arm.joint(joint).shown
     error, wide = followed.rms(joint)
-    banded = factor * wide if math.isfinite(wide) else None
+    banded = shown.factor * wide if math.isfinite(wide) else None
     return {
         "joint": joint,
-        "name": arm.joint_names[joint - 1],
-        f"rms_{unit}": factor * error,
-        f"rms_with_band_{unit}": banded,
+        "name": arm.name_of(joint),
+        f"rms_{shown.unit}": shown.factor * error,
+        f"rms_with_band_{shown.unit}": banded,
     }

@@ -53,11 +53,8 @@ def speed_tables(plant: Plant) -> dict[str, str]:
     files = dict[str, str]()
     arm = plant.identified.settings.arm
     for column in [joint - 1 for joint in plant.joints]:
-        unit = "deg"
-        factor = float(np.degrees(1.0))
-        if arm.joints[column].slides:
-            unit = "mm"
-            factor = 1e3
+        unit = arm.joints[column].shown.unit
+        factor = arm.joints[column].shown.factor
         low, high = joint_range(plant, column)
         header = ["command_pct"]
         columns = [COMMANDS]
@@ -118,7 +115,8 @@ def _error_rows(draws: Draws) -> list[tuple[str | float, ...]]:
         sensor, with_time, with_way, lasting, seconds = numbers.tolist()
         if seconds == 0.0:
             continue
-        _, unit, factor = joint.shown
+        unit = joint.shown.unit
+        factor = joint.shown.factor
         # variances grow with time and way, and the way is in the unit too
         own = factor * math.sqrt(sensor), factor * math.sqrt(with_time)
         grown = math.sqrt(factor * with_way)

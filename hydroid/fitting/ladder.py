@@ -5,7 +5,7 @@ A rung is kept where it foretells parts of the logs that it has not seen better 
 one below, by more than the uncertainty of that (`left_out.is_better`). Which rung that
 is shows long before least squares has converged, so that ends early on the way
 (`FIRM`). What is kept at the end is refined to the tolerance of the settings,
-and, by least squares alone, once more from elsewhere (`Ladder._end_anew`).
+after least squares has also tried it from elsewhere (`Ladder._begin_anew`).
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -25,7 +25,7 @@ from hydroid.fitting.left_out import (
     predict_blocks,
 )
 from hydroid.fitting.multistart import alone, by_speeds, has_curve, lone_joints
-from hydroid.fitting.refinement import Refinement, refine, refine_from_afar
+from hydroid.fitting.refinement import Refinement, promised, refine, refine_from_afar
 from hydroid.fitting.step import Step, step_of
 from hydroid.posterior.error_model import Likelihood, likelihood_at, make_likelihood
 from hydroid.posterior.linear import estimate_box
@@ -100,17 +100,16 @@ class Watcher(Protocol):
 
 
 class _Beginning(NamedTuple):
-    """Where a model begins: theta, shape (P,); whether that may be far from an optimum;
-    whether each joint alone led there."""
+    """Where a model begins: theta, shape (P,); whether that may be far from an
+    optimum."""
 
     theta: Array
     far: bool
-    alone: bool
 
 
 class _Alone(NamedTuple):
     """Where a joint alone leads: theta with another term, shape (P + N,), if that is
-    better; else, without it, (P,). Neither: there was nothing to refine."""
+    better; else, without it, (P,). Neither: there was no time."""
 
     theta: Array | None = None
     without: Array | None = None
@@ -140,9 +139,8 @@ class Ladder:
         self._watch = watch
         self._checkpoints = checkpoints
         self._late = False
+        self._each_searched = False
         self._step = step_of(self.kept.name)
-        # whether output errors led near the kept estimate, before its innovations
-        self._from_afar = False
 
     def climb(self, whole: Problem) -> None:
         """Refine the estimate with each model and term that the settings of a fit's
@@ -151,31 +149,48 @@ class Ladder:
         refinement = settings.refinement
         assert refinement is not None
         further = settings.rungs[1:]
-        climbs = bool(further or settings.terms())
         on_the_way = refinement
-        if climbs:
+        by_starts = settings.search.algorithm == "multistart"
+        self._each_searched = by_starts and bool(lone_joints(self.problem))
+        anew = bool(further or settings.terms() or by_starts)
+        if anew:
             tolerance = max(FIRM, refinement.gain_tolerance)
             on_the_way = refinement.changed({"gain_tolerance": tolerance})
         lone = self._lone_terms(settings)
-        first = settings.rung
-        self._climb_model(whole, first, lone, on_the_way)
-        before = self._step.terms
-        self._add_lone_terms(whole, lone, on_the_way)
-        if self._step.terms != before:
-            # errors of a valve may have hidden a pump
-            self._add_terms(whole, first, lone, on_the_way)
+        self._climb_first(whole, lone, on_the_way)
         for rung in further:
             self._climb_model(whole, rung, lone, on_the_way)
         if self._step.model in {rung.name for rung in further}:
             for term in self._step.terms:
                 self._try_without(whole, term, on_the_way)
-        if climbs:
+        if anew:
+            self._begin_anew(on_the_way)
             self._end(refinement)
-        if settings.search.algorithm == "multistart":
-            self._end_anew(refinement)
         if settings.joint_refinement:
             joint = self._step.changed(model="joint")
             self._rung(whole, joint, refinement, if_better=False)
+
+    def _climb_first(
+        self, whole: Problem, lone: Mapping[str, int], settings: RefinementSettings
+    ) -> None:
+        """Refine on the first rung, and then with terms besides.
+
+        Those of single joints come first: with the wrong curve of a valve, a pump that
+        is not there explains something. They are tried again where others were added,
+        and so are the others where that helped.
+        """
+        rung = whole.settings.rung
+        # the first one is refined in any case
+        self._rung(whole, Step("refined"), settings, if_better=False)
+        self._add_lone_terms(whole, lone, settings)
+        of_joints = self._step.terms
+        self._add_terms(whole, rung, lone, settings)
+        shared = self._step.terms
+        if shared == of_joints:
+            return
+        self._add_lone_terms(whole, lone, settings)
+        if self._step.terms != shared:
+            self._add_terms(whole, rung, lone, settings)
 
     def _climb_model(
         self,
@@ -184,15 +199,12 @@ class Ladder:
         lone: Collection[str],
         settings: RefinementSettings,
     ) -> None:
-        """Refine on a rung, and then with each of its terms besides; those of `lone`
-        are another method's."""
+        """Refine on a further rung, if it is better, and then with each of its terms
+        besides; those of `lone` are another method's."""
         possible = whole.settings.terms(rung)
         terms = tuple(term for term in possible if term in self._step.terms)
-        if_better = rung is not whole.settings.rung
-        # the first one is refined in any case, and its estimate is called so
-        model = rung.name if if_better else "refined"
-        self._rung(whole, Step(model, terms), settings, if_better=if_better)
-        if self._step.model == model:
+        self._rung(whole, Step(rung.name, terms), settings, if_better=True)
+        if self._step.model == rung.name:
             self._add_terms(whole, rung, lone, settings)
 
     def _add_terms(
@@ -210,17 +222,13 @@ class Ladder:
 
     def _end(self, settings: RefinementSettings) -> None:
         """Refine the estimate that is kept to the tolerance of the settings."""
-        kept = self.kept
-        # a term that was added to an estimate began with the drift that its lack had
-        # left
-        how = refine if self._from_afar else refine_from_afar
         likelihood = make_likelihood(self.problem)
-        last = self._refined(likelihood, kept.theta, settings, self._step, how)
+        last = self._refined(likelihood, self.kept.theta, settings, self._step)
         self.kept = self._measured(self.problem, last, self._step)
 
-    def _end_anew(self, settings: RefinementSettings) -> None:
+    def _begin_anew(self, settings: RefinementSettings) -> None:
         """Refine the kept estimate once more, from where output errors lead if they
-        were independent; keep that end where it is likelier, by the errors as they are.
+        were independent; keep that where it is likelier, by the errors as they are.
 
         Errors that last tell little, and then the priors hold the parameters. That is
         right where the model errs, but not where errors last because parameters are
@@ -230,17 +238,8 @@ class Ladder:
             return
         problem = self.problem
         likelihood = make_likelihood(problem)
-        step = self._step.changed(start=ANEW)
-        rough = settings.changed({"gain_tolerance": max(settings.gain_tolerance, FIRM)})
-        far = self._refined(
-            likelihood.of_independent_errors,
-            self.kept.theta,
-            rough,
-            step.changed(phase="from afar"),
-        )
-        end = self._refined(
-            likelihood, problem.parameters.from_unit(far.point), settings, step
-        )
+        step = self._step.changed(start=ANEW, phase="on the way")
+        end = self._refined_anew(likelihood, self.kept.theta, settings, step)
         if self._late:
             return
         theta = problem.parameters.from_unit(end.point)
@@ -248,8 +247,6 @@ class Ladder:
         gained -= likelihood.log_posterior(self.kept.theta)
         if gained > LEAST_GAIN:
             self.kept = self._measured(problem, end, self._step)
-        # what is shown last is what is kept
-        self._watch.refining(self._step, end.evaluations, self.kept.rms)
 
     def known(self, theta: Array) -> Uncertainty:
         """Return how well the logs determine theta, (P,): the estimate that is kept, or
@@ -289,8 +286,7 @@ class Ladder:
         begin = self._beginning(own, begun, settings, step)
         if begin is None:
             return
-        # what a search ended at may be far from an optimum, too
-        how = refine_from_afar if begin.far or not if_better else refine
+        how = refine_from_afar if begin.far else refine
         on_the_way = step.changed(phase="on the way")
         likelihood = make_likelihood(own)
         result = self._refined(likelihood, begin.theta, settings, on_the_way, how)
@@ -304,8 +300,7 @@ class Ladder:
             self.estimates[step.estimate] = new
             if not is_clear(*gained):
                 return
-        from_afar = how is refine_from_afar or (self._from_afar and begin.alone)
-        self._keep(own, new, step, from_afar=from_afar)
+        self._keep(own, new, step)
 
     def _beginning(
         self,
@@ -322,9 +317,13 @@ class Ladder:
         """
         last = self.problem
         start = self.kept
-        far = bool(_new_curves(problem, last))
-        renewed = list[int]()
+        far = False
         if theta is None:
+            # what a search ended at may be far from an optimum, if joints together were
+            # not fitted alone before
+            searched = start.name not in self.refinements
+            far = searched and not self._each_searched
+            far |= bool(_new_curves(problem, last))
             theta = _begun(problem, last, start.theta)
             renewed = _renewed(problem, last, theta)
             theta = self._each_alone(problem, renewed, theta, settings, step)
@@ -335,7 +334,7 @@ class Ladder:
             theta = self._nearer(make_likelihood(problem), theta, settings, step)
             if problem.rms(problem.output_errors(theta[None]))[0] > start.rms:
                 return None
-        return _Beginning(theta, far, bool(renewed))
+        return _Beginning(theta, far)
 
     def _each_alone(
         self,
@@ -373,11 +372,10 @@ class Ladder:
         have the drift of the last model's errors.
         """
         few = settings.changed({"iterations": FIRST})
-        output_errors = replace(likelihood, memory=np.inf)
         parameters = likelihood.problem.parameters
         ends = [
             self._refined(
-                output_errors,
+                likelihood.of_output_errors,
                 begun,
                 few,
                 step.changed(phase="at first", start=number),
@@ -407,8 +405,12 @@ class Ladder:
         theta = self.kept.theta
         step = self._step
         for term, joint in lone.items():
+            if term in step.terms:
+                continue
             tried = step.changed(terms=(*step.terms, term), joint=joint)
             own = whole.varied(whole.settings.of_estimate(tried.estimate))
+            if not self._promises(own, problem, theta, joint):
+                continue
             alone_with = self._alone(problem, own, theta, tried, settings)
             if alone_with.theta is not None:
                 problem = own
@@ -424,6 +426,23 @@ class Ladder:
             self._rung(whole, again, settings, if_better=False, begun=theta)
             self._step = step
 
+    def _promises(
+        self, problem: Problem, last: Problem, theta: Array, joint: int
+    ) -> bool:
+        """Whether another term may gain anything for a joint alone, from the theta of
+        the last problem, (P,).
+
+        That takes one Jacobian, and most joints of most machines lack no term.
+        """
+        before = alone(last, joint, theta)
+        if self._late or before.leaves_noise(theta):
+            return False
+        values = last.parameters.mapping(theta)
+        started = problem.parameters.started(values)
+        new = np.array([name not in values for name in problem.settings.parameters])
+        likelihood = make_likelihood(alone(problem, joint, started))
+        return promised(likelihood.of_independent_errors, started, new) > LESS
+
     def _alone(
         self,
         last: Problem,
@@ -435,21 +454,16 @@ class Ladder:
         """Refine a joint alone without the last term of a step, and with it, from the
         theta of the last problem, (P,)."""
         before = alone(last, step.joint, theta)
-        if self._late or before.leaves_noise(theta):
-            return _Alone()
         begun = _begun(problem, last, theta)
         after = alone(problem, step.joint, begun)
-        # both from afar: else what helped the one would count for the term
-        without = self._refined(
+        # both anew: else what helped the one would count for the term
+        without = self._refined_anew(
             make_likelihood(before),
             theta,
             settings,
             step.changed(terms=step.terms[:-1]),
-            refine_from_afar,
         )
-        with_it = self._refined(
-            make_likelihood(after), begun, settings, step, refine_from_afar
-        )
+        with_it = self._refined_anew(make_likelihood(after), begun, settings, step)
         if self._late:
             return _Alone()
         gained = is_better(
@@ -495,18 +509,10 @@ class Ladder:
         errors = self.problem.output_errors(self.kept.theta[None])
         return not any(lasting(shown, shown.innovations(errors)[0]).values())
 
-    def _keep(
-        self,
-        problem: Problem,
-        estimate: Estimate,
-        step: Step,
-        *,
-        from_afar: bool = False,
-    ) -> None:
+    def _keep(self, problem: Problem, estimate: Estimate, step: Step) -> None:
         self.problem = problem
         self.kept = estimate
         self._step = step
-        self._from_afar = from_afar
 
     def _left_out_of(self, problem: Problem, end: Refinement) -> LeftOut:
         return predict_blocks(make_likelihood(problem), end)
@@ -524,6 +530,24 @@ class Ladder:
         )
         self._late |= result.ending is Ending.TIME
         return result
+
+    def _refined_anew(
+        self,
+        likelihood: Likelihood,
+        theta: Array,
+        settings: RefinementSettings,
+        step: Step,
+    ) -> Refinement:
+        """Refine from where output errors lead from theta, (P,), if they were
+        independent."""
+        far = self._refined(
+            likelihood.of_independent_errors,
+            theta,
+            settings,
+            step.changed(phase="from afar"),
+        )
+        begun = likelihood.problem.parameters.from_unit(far.point)
+        return self._refined(likelihood, begun, settings, step)
 
     def _measured(self, problem: Problem, end: Refinement, step: Step) -> Estimate:
         """Measure an end of least squares, and list it; one of the model that is kept

@@ -25,12 +25,12 @@ from numpy.random import Generator
 
 from hydroid.fitting.baselines import NAMES, fit_baselines
 from hydroid.fitting.checkpoints import Checkpoints, Memo
-from hydroid.fitting.refinement import Refining, refine_from_afar
+from hydroid.fitting.refinement import Refining, refine
 from hydroid.fitting.step import Step
 from hydroid.fitting.valve_start import fitted_valve
 from hydroid.parameters import Array
 from hydroid.posterior.bench import make_bench
-from hydroid.posterior.error_model import likelihood_at, make_likelihood
+from hydroid.posterior.error_model import Likelihood, likelihood_at, make_likelihood
 from hydroid.problem.problem import Problem
 from hydroid.quantity_table import CURVE
 from hydroid.search.chromosomes import Genes
@@ -137,8 +137,10 @@ class Multistart:
                 tried.append(
                     self._grown(problem, by_speeds(problem, joint, theta), step)
                 )
-            result = min(tried, key=COST)
             self.ends[joint] += map(COST, tried)
+            # the other one seldom ends elsewhere
+            _, near = min(tried, key=COST)
+            result = self._fitted(make_likelihood(problem), near, step)
             best = self._best[joint] = min(
                 self._best.get(joint, result), result, key=COST
             )
@@ -147,27 +149,34 @@ class Multistart:
         return theta
 
     def _grown(self, problem: Problem, theta: Array, step: Step) -> tuple[float, Array]:
-        """Fit theta, (P,), to growing parts of the records, at last all of them.
+        """Fit theta, (P,), to growing parts of the records, at last all of them, by
+        output errors.
 
         Returned are its negative log-likelihood, and it.
         """
         cost = np.inf
         for number, part in enumerate(self._parts(problem), 1):
-            before = self._memo.simulated
-            result = refine_from_afar(
-                make_likelihood(part),
-                theta,
-                self.settings,
-                lambda what, n, rms, before=before: self._progress(
-                    what, before + n, rms
-                ),
-                self._checkpoints,
-                step.changed(horizon=number),
-            )
-            cost = result.negative_log
-            theta = part.parameters.from_unit(result.point)
-            self._memo.elsewhere += result.evaluations
+            likelihood = make_likelihood(part).of_output_errors
+            cost, theta = self._fitted(likelihood, theta, step.changed(horizon=number))
         return cost, theta
+
+    def _fitted(
+        self, likelihood: Likelihood, theta: Array, step: Step
+    ) -> tuple[float, Array]:
+        """Fit theta, (P,); return its negative log-likelihood, and it."""
+        before = self._memo.simulated
+        result = refine(
+            likelihood,
+            theta,
+            self.settings,
+            lambda what, n, rms: self._progress(what, before + n, rms),
+            self._checkpoints,
+            step,
+        )
+        self._memo.elsewhere += result.evaluations
+        return result.negative_log, likelihood.problem.parameters.from_unit(
+            result.point
+        )
 
     def _parts(self, problem: Problem) -> list[Problem]:
         """The problem's first seconds, more and more of them, and at last all of it.

@@ -6,13 +6,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from hydroid.arrays import Array, Mask
 from hydroid.fitting.checkpoints import Checkpoints, saving
 from hydroid.fitting.step import Step
-from hydroid.parameters import Array
 from hydroid.posterior.error_model import Likelihood
 from hydroid.progress import LOGGER
-from hydroid.search.descent import Descent, Ending, no_jacobian, start
-from hydroid.search.least_squares import step
+from hydroid.search.descent import (
+    Descent,
+    Ending,
+    LinearModel,
+    derivatives,
+    no_jacobian,
+    start,
+)
+from hydroid.search.least_squares import UNDAMPED, step
 from hydroid.settings.search import RefinementSettings
 
 SETTLED = 1.0
@@ -22,6 +29,12 @@ are: so they settle"""
 ROUGH = 1e-3
 """gain below which a least squares of output errors ends that is to lead near an
 optimum"""
+
+ENOUGH = 0.05
+"""gain of the log-likelihood below which least squares ends that only leads on: what
+weighs its errors makes its cost one"""
+LARGEST = 0.5
+"""tolerance [1] at most: with fewer errors left than ENOUGH"""
 
 Refining = Callable[[Step, int, float], bool | None]
 """takes a step of the fit, its number of simulations, and its rms error [rad] so far;
@@ -81,12 +94,12 @@ def refine(
                 break
             if not len(now.jacobian):
                 keep(now.arrays)  # a resumed refinement estimates the errors here, too
-                now = _with_new_numbers(likelihood, now)
+                now = _with_new_numbers(likelihood, now, nearby=True)
                 rows = _rows(likelihood, now)
-            now = step(now, rows, settings)
+            now = step(now, rows, _tolerant(settings, now, what))
             moved = True
             if now.ending.converged:  # unless its errors are others by now
-                now = _with_new_numbers(likelihood, now)
+                now = _with_new_numbers(likelihood, now, nearby=False)
                 rows = _rows(likelihood, now)
         now = replace(now, negative_log=_at(likelihood, now).negative_log(now.residual))
         if now.ended and what.on_its_way:
@@ -117,14 +130,44 @@ def refine_from_afar(
     if np.isinf(likelihood.memory):
         return refine(likelihood, theta, settings, progress, checkpoints, what)
     rough = settings.changed({"gain_tolerance": max(settings.gain_tolerance, ROUGH)})
-    output_errors = replace(likelihood, memory=np.inf)
     afar = what.changed(phase="from afar")
+    output_errors = likelihood.of_output_errors
     first = refine(output_errors, theta, rough, progress, checkpoints, afar)
     if first.ending is Ending.TIME:
         return first
     near = likelihood.problem.parameters.from_unit(first.point)
     result = refine(likelihood, near, settings, progress, checkpoints, what)
     return replace(result, evaluations=result.evaluations + first.evaluations)
+
+
+def promised(likelihood: Likelihood, theta: Array, new: Mask) -> float:
+    """Return the part of the squared errors that `new` parameters, (P,), promise to
+    explain by the linear model at theta, (P,), of what the others leave.
+
+    It is 1 where that cannot be told.
+    """
+    parameters = likelihood.problem.parameters
+    begun = _begun(likelihood, parameters.to_unit(theta))
+    columns = derivatives(_rows(likelihood, begun), begun.point, begun.residual)
+    if begun.ended or not np.isfinite(columns).all():
+        return 1.0
+    others = columns * ~new[parameters.free, None]
+    left = list[float]()
+    for slopes in (others, columns):
+        model = LinearModel(replace(begun, jacobian=slopes.T))
+        left.append(begun.cost - model.gain(model.step(UNDAMPED)))
+    return 1.0 - left[1] / left[0]
+
+
+def _tolerant(
+    settings: RefinementSettings, now: Refinement, what: Step
+) -> RefinementSettings:
+    """Return the settings of the next iteration: a step that only leads on need not be
+    exact."""
+    if what.is_last or now.cost <= 0.0:
+        return settings
+    tolerance = min(max(settings.gain_tolerance, ENOUGH / now.cost), LARGEST)
+    return settings.changed({"gain_tolerance": tolerance})
 
 
 def _begun(likelihood: Likelihood, unit: Array) -> Refinement:
@@ -139,7 +182,9 @@ def _begun(likelihood: Likelihood, unit: Array) -> Refinement:
     return Refinement(**vars(begun), numbers=likelihood.shown.numbers)
 
 
-def _with_new_numbers(likelihood: Likelihood, now: Refinement) -> Refinement:
+def _with_new_numbers(
+    likelihood: Likelihood, now: Refinement, *, nearby: bool
+) -> Refinement:
     """Return the refinement with the error model of its point, if that is clearly more
     likely.
 
@@ -148,7 +193,7 @@ def _with_new_numbers(likelihood: Likelihood, now: Refinement) -> Refinement:
     problem = likelihood.problem
     errors = problem.output_errors(problem.parameters.from_unit(now.point[None]))
     before = _at(likelihood, now)
-    after = before.estimated(errors[0])
+    after = before.estimated(errors[0], nearby=nearby)
     now = replace(now, evaluations=now.evaluations + 1)
     if (
         after.shown.log_likelihood(errors[0]) - before.shown.log_likelihood(errors[0])

@@ -61,6 +61,11 @@ class Step:
         counts."""
         return self.model == "start" or self.phase in ("from afar", "at first")
 
+    @property
+    def is_last(self) -> bool:
+        """Whether nothing refines its end any further: an estimate of all joints."""
+        return not (self.phase or self.joint or self.model == "start")
+
     def changed(self, **changes: object) -> "Step":
         """Return the step with other attributes."""
         return replace(self, **changes)  # pyright: ignore[reportArgumentType]

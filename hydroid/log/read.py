@@ -17,6 +17,7 @@ from hydroid.log.mapping import Ranges, map_signals, match_columns, measured_sig
 from hydroid.log.motion_checks import check_motion
 from hydroid.log.repair import between_gaps, resample, without_bad_rows
 from hydroid.log.table import Recording, Table
+from hydroid.log.work import with_work, without_work
 from hydroid.progress import Progress, no_progress
 from hydroid.settings.arm import Arm
 from hydroid.settings.log import LogSettings
@@ -163,10 +164,12 @@ def _read(
     if reading.outputs is None:
         signals = measured_signals(table, signals)
     signals = match_columns(table, signals, needed, findings)
+    signals = with_work(table, signals, settings.work)
     recording = table.read(signals)
     del table  # with the columns that are not used
     for remark in recording.table.remarks:
         findings.append(log_finding("note", "layout", str(path), what=remark))
+    recording = without_work(recording, settings.work, findings)
     recording = as_angles(without_lost_signals(recording), findings)
     recording = without_bad_rows(recording, settings, findings, repair=reading.repair)
     findings += check_recording(recording, settings)

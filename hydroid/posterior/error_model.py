@@ -225,14 +225,18 @@ class ErrorModel:
         """Return the log-likelihood of weighted output errors, (R,)."""
         return float(self.log_density(self.innovations(errors[None])[0]).sum())
 
-    def estimated(self, errors: Array) -> "ErrorModel":
+    def estimated(self, errors: Array, *, nearby: bool = False) -> "ErrorModel":
         """Return the error model whose numbers make weighted output errors, (R,), most
-        likely."""
+        likely.
+
+        nearby: the search for them starts at the present ones only, which is faster.
+        """
         numbers = self.numbers.copy()
         for i, signal in enumerate(self.signals):
             pairs = [(c, errors[c.rows] / c.weight) for c in self.courses_of(i)]
             least = LEAST_NOISE[signal.quantity] ** 2
-            numbers[i] = _most_likely(pairs, least, float(self.given[i]))
+            start = numbers[i] if nearby else None
+            numbers[i] = _most_likely(pairs, least, float(self.given[i]), start)
         return replace(self, numbers=numbers)
 
     def independent(self, errors: Array) -> "ErrorModel":
@@ -394,10 +398,15 @@ class Likelihood:
         return self.shown.weighing(self.memory, alike=alike)
 
     @property
+    def of_output_errors(self) -> "Likelihood":
+        """The likelihood that takes none of an output error for drift."""
+        return replace(self, memory=np.inf)
+
+    @property
     def of_independent_errors(self) -> "Likelihood":
         """The likelihood if output errors were independent: then the logs outweigh the
         priors."""
-        return replace(self, memory=np.inf, independent=True)
+        return replace(self.of_output_errors, independent=True)
 
     def log_posterior(self, theta: Array) -> float:
         """Return the logarithm of the posterior density of theta, (P,), but for a
@@ -443,12 +452,12 @@ class Likelihood:
             )
         return total
 
-    def estimated(self, errors: Array) -> "Likelihood":
+    def estimated(self, errors: Array, *, nearby: bool = False) -> "Likelihood":
         """Return the likelihood for what weighted output errors, (R,), show of their
-        model."""
-        shown = self.shown
-        new = shown.independent(errors) if self.independent else shown.estimated(errors)
-        return replace(self, shown=new)
+        model, `nearby` as `ErrorModel.estimated` does."""
+        if self.independent:
+            return replace(self, shown=self.shown.independent(errors))
+        return replace(self, shown=self.shown.estimated(errors, nearby=nearby))
 
 
 def make_likelihood(problem: Problem) -> Likelihood:
@@ -510,7 +519,10 @@ def _model(course: Course, numbers: Array) -> tuple[Array, Array]:
 
 
 def _most_likely(
-    pairs: Sequence[tuple[Course, Array]], least: float, given: float
+    pairs: Sequence[tuple[Course, Array]],
+    least: float,
+    given: float,
+    start: Array | None = None,
 ) -> Array:
     """Return the most likely NUMBERS of one signal's errors, each of shape (T,), with
     their courses.
@@ -537,10 +549,11 @@ def _most_likely(
     steady = np.array([0.5, 0.1 / seconds, 0.1 / way, 0.1, 0.0]) * square
     drifting = np.array([1e-3, 10 / seconds, 10 / way, 1e-2, 0.0]) * square
     steady[4] = drifting[4] = 0.3
+    starts = (steady, drifting) if start is None else (start,)
     options = {"maxiter": 60, "ftol": 1e-6}  # of a log-likelihood in the thousands
     ended = list[OptimizeResult]()
-    for start in (steady, drifting):
-        begin = np.clip(np.log(np.maximum(start, 1e-300)), *bounds.T)
+    for begun in starts:
+        begin = np.clip(np.log(np.maximum(begun, 1e-300)), *bounds.T)
         ended.append(
             minimize(cost, begin, method="L-BFGS-B", bounds=bounds, options=options)
         )

@@ -18,7 +18,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, Valida
 
 from hydroid.errors import SettingsError
 from hydroid.files import Plain
-from hydroid.settings.load import ByJoint, Settings
+from hydroid.settings.load import ByJoint, NotNegative, Settings
 from hydroid.units import UNITS
 from hydroid.words import listed
 
@@ -100,6 +100,37 @@ class Columns(Settings):
     """factor on the cells; default: 1"""
     offset: Number | None = None
     """is added to the scaled cells, in `unit`; default: 0"""
+
+
+Span = tuple[NotNegative, NotNegative]
+
+
+def _increasing(spans: tuple[Span, ...]) -> tuple[Span, ...]:
+    for begin, end in spans:
+        if not begin < end:
+            raise ValueError(
+                f"a stretch ends after it begins, not [{begin:g}, {end:g}]"
+            )
+    return spans
+
+
+class Work(Settings):
+    """Where an arm works against the world."""
+
+    column: Name | None = None
+    """name in the header of a column that is not 0 while it works; a log without it is
+    used whole"""
+    spans: dict[Name, Annotated[tuple[Span, ...], AfterValidator(_increasing)]] = {}
+    """stretches of a log [s], from its first row on, by a pattern of file names, or of
+    the ends of paths: {dig_*.csv: [[12, 15.5], [40, 52]]}"""
+
+    def spans_of(self, log: str | Path) -> tuple[Span, ...]:
+        """Return the stretches [s] of a log by its file."""
+        found = list[Span]()
+        for pattern, spans in self.spans.items():
+            if ends_with(log, pattern):
+                found += spans
+        return tuple(found)
 
 
 class ColumnMap(NamedTuple):
@@ -188,6 +219,9 @@ class LogSettings(Settings):
     choice: a pattern of file names, or of the ends of paths, or several, as in {monday:
     mon_*.csv} or {monday: monday/*.csv}. Parameters may have an effect in each (`per:
     group`)"""
+    work: Work = Work()
+    """stretches in which a joint works against the world, as a bucket that digs: no
+    model of free motion holds there. They are left out, and the log is split there"""
     repair_s: Annotated[float, Field(ge=0, le=10)] = 0.1
     """longest gap that --repair fills [s]"""
 

@@ -5,7 +5,7 @@ import pytest
 from made_logs import TRUTH, noisy, stepped
 
 from hydroid import load_settings
-from hydroid.fitting.refinement import refine
+from hydroid.fitting.refinement import promised, refine
 from hydroid.fitting.step import Step
 from hydroid.posterior.error_model import make_likelihood
 from hydroid.problem.problem import Problem
@@ -128,3 +128,18 @@ def test_another_refinement_has_a_checkpoint_of_its_own(problem, tmp_path):
             ONE,
         ),
     )
+
+
+def test_parameters_promise_a_gain_only_off_their_optimum(problem):
+    likelihood = make_likelihood(problem)
+    settings = RefinementSettings(iterations=60)
+    end = refine(likelihood, begin(problem), settings, lambda *_: None, {}, ONE)
+    optimum = problem.parameters.from_unit(end.point)
+    everything = np.ones(len(optimum), dtype=bool)
+    half = np.arange(len(optimum)) % 2 == 0
+    assert promised(likelihood, optimum, everything) < 0.01
+    off = optimum * np.where(half, 0.9, 1.1)
+    assert promised(likelihood, off, everything) > 0.5
+    assert promised(likelihood, off, half) >= 0.0
+    assert promised(likelihood, off, half) <= promised(likelihood, off, everything)
+    assert promised(likelihood, off, ~everything) == 0.0

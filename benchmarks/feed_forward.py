@@ -25,6 +25,7 @@ has one joint, and no path of a tip.
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -119,7 +120,7 @@ class Case:
         """Of the logs [s]."""
         return self.model.settings.log.period_s
 
-    @property
+    @cached_property
     def top(self) -> Array:
         """Speed of each joint that the logs show in both directions [rad/s], (J,)."""
         tables = [one.table for one in self.simple["speed tables"]]
@@ -127,12 +128,19 @@ class Case:
             [min(np.max(t[:, 1]), -np.min(t[:, 1])) for t in tables if t is not None]
         )
 
-    @property
+    @cached_property
     def late(self) -> Array:
         """Delay and lag of each joint, by nine numbers [s], (J,)."""
         return np.array(
             [one.delay + one.numbers[3].mean() for one in self.simple["nine numbers"]]
         )
+
+    @cached_property
+    def valves(self) -> Array:
+        """Dead band [%], exponent and full speed [rad/s] of both directions of each
+        joint, by nine numbers, (3, J, 2)."""
+        numbers = [one.numbers[:3] for one in self.simple["nine numbers"]]
+        return np.array(numbers).swapaxes(0, 1)
 
 
 class StrangerRun:
@@ -256,8 +264,8 @@ def path(case: Case, kind: str) -> Log:
 
 
 def inverse(one: Baseline, speed: Array) -> Array:
-    """Commands [%] at which a simple model has speeds [rad/s]; full ones where it has
-    not."""
+    """Commands [%] at which a simple model of a joint has speeds [rad/s], (T,); full
+    ones where it has not."""
     if one.table is not None:
         commands, speeds = one.table.T
         rising = np.sign(speeds[-1] - speeds[0])
@@ -265,12 +273,18 @@ def inverse(one: Baseline, speed: Array) -> Array:
         return np.interp(
             rising * speed, order + 1e-12 * np.arange(len(order)), commands
         ) * (speed != 0)
-    dead, exponent, full = one.numbers[:3]
-    side = np.where(speed / full[0] > 0, 0, 1)
-    part = np.clip(np.abs(speed / full[side]), 0.0, 1.0) ** (1.0 / exponent[side])
-    return np.where(
-        speed == 0, 0.0, (1.0 - 2.0 * side) * (dead[side] + (100.0 - dead[side]) * part)
-    )
+    return valve_commands(np.array(one.numbers[:3])[:, None], speed[:, None])[:, 0]
+
+
+def valve_commands(valves: Array, speed: Array) -> Array:
+    """Commands [%] of J joints at speeds [rad/s], both (..., J); `valves` as those of a
+    case."""
+    full = valves[2, :, 0]
+    side = np.where(speed / full > 0, 0, 1)
+    dead, exponent, full = valves[:, np.arange(valves.shape[1]), side]
+    part = np.clip(np.abs(speed / full), 0.0, 1.0) ** (1.0 / exponent)
+    command = (1.0 - 2.0 * side) * (dead + (100.0 - dead) * part)
+    return np.where(speed == 0, 0.0, command)
 
 
 def ahead(wished: Log, late: Array) -> Array:
@@ -321,13 +335,10 @@ def play(
 def correction(case: Case, forward: Array, more: Array) -> Array:
     """What is added to commands [%] for more speed [rad/s] beside that which they
     already ask for."""
-    asked = np.where(np.abs(forward + more) < QUIET * case.top, 0.0, forward + more)
-    before = np.where(np.abs(forward) < QUIET * case.top, 0.0, forward)
-    models = case.simple["nine numbers"]
-    pairs = zip(models, asked, before, strict=True)
-    return np.array(
-        [float(inverse(m, np.array(a)) - inverse(m, np.array(b))) for m, a, b in pairs]
-    )
+    wished = np.array([forward + more, forward])
+    wished[np.abs(wished) < QUIET * case.top] = 0.0
+    asked, before = valve_commands(case.valves, wished)
+    return asked - before
 
 
 def tuned(case: Case) -> Pid:

@@ -150,7 +150,12 @@ def together(model: str) -> tuple[float, float, float, float]:
     batch, held = (
         PlantBatch(
             [
-                Plant(plant.identified, joints=[2], period=steps * plant.period)
+                Plant(
+                    plant.identified,
+                    joints=[2],
+                    period=steps * plant.period,
+                    shapes=False,
+                )
                 for _ in range(MACHINES)
             ],
             threads=2,

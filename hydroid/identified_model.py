@@ -78,11 +78,11 @@ class IdentifiedModel:
         """Return the fit's own account, or the values alone."""
         if self.summary is not None:
             return self.summary
+        parameters = self.settings.parameter_set()
+        values = parameters.mapping(self.theta)
         estimate = {
-            name: ParameterEstimate(
-                value=value, unit=self.settings.parameters[name].unit
-            )
-            for name, value in self.values.items()
+            one.name: ParameterEstimate(value=values[one.name], unit=one.unit)
+            for one in parameters.parameters
         }
         return FitSummary(stage=self.settings.stage, estimate=estimate)
 

@@ -24,13 +24,20 @@ _FIELDS = (
 """of a model, whose last bits depend on how its bodies were fused"""
 
 
-def dressed_model(spec: mujoco.MjSpec, locked: LockedArm) -> mujoco.MjModel:
+def dressed_model(
+    spec: mujoco.MjSpec, locked: LockedArm, *, shapes: bool = True
+) -> mujoco.MjModel:
     """Return the locked arm's model with shapes, cameras and one idle motor per joint.
 
     It steps as `locked.model` does, bit for bit: motors are switched off, and their
-    controls are free to hold commands in %.
+    controls are free to hold commands in %. Without `shapes` it does so faster, as
+    MuJoCo places each of them at every step, but nothing of it can be drawn.
     """
     source = locked_spec(spec, locked, locked.model, np.zeros((2, len(locked.joints))))
+    if not shapes:
+        drawn = [*source.tendons, *source.geoms, *source.sites]
+        for part in [*drawn, *source.meshes, *source.hfields]:
+            source.delete(part)
     with quiet_mujoco():
         model = source.compile()
     for name in _FIELDS:

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 MACHINES = 40  # drawn for the bands of a linear model's page
 KINDS = ("parameters", "table", "urdf", "mjcf", "linear", "fmu")
+SUFFIXES = (".csv", ".urdf", ".xml", ".json", ".fmu")
+"""of what is written"""
 
 
 @command
@@ -81,6 +83,8 @@ def export(
         hint = "name it: --robot robot.urdf"
         raise SettingsError("needs your robot's file", "--to urdf", hint)
     folder = Path("export" if out is None else out)
+    if out is not None:
+        _refuse_file(folder, robot)
     model = open_model(fit, overrides=set)
     if to == "parameters":
         from hydroid.use.tables import parameter_files
@@ -103,6 +107,18 @@ def export(
     if to == "linear":
         return _with_page(result, plant, at, out)
     return result
+
+
+def _refuse_file(folder: Path, robot: "Source | None") -> None:
+    """Refuse a folder that has the name of a file, or in which the user's own robot
+    would be overwritten."""
+    if folder.suffix in SUFFIXES and not folder.is_dir():
+        hint = f"name the folder: --out {folder.parent / 'export'}"
+        raise SettingsError("is a file's name, and files go to a folder", folder, hint)
+    own = Path(robot or "")
+    if robot is not None and (folder / own.name).resolve() == own.resolve():
+        hint = "name another folder"
+        raise SettingsError("would overwrite your robot's file", folder, hint)
 
 
 def _files(

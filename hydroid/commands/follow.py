@@ -23,6 +23,7 @@ from hydroid.words import plain
 if TYPE_CHECKING:
     from hydroid.arrays import Array
     from hydroid.identified_model import IdentifiedModel
+    from hydroid.reporting.page import Table
     from hydroid.settings.arm import Arm
     from hydroid.settings.fit import FitSettings
     from hydroid.use.follow import Followed
@@ -91,12 +92,9 @@ def follow(
     followed = find_commands(model, path, payload=payload)
     arm = model.settings.arm
     name = "commands" if out is None else Path(out).stem
-    page = follow_page(name, followed, arm)
-    lines = [
-        tracking_table(followed, arm),
-        *missed_lines(followed, arm),
-        *_path_lines(followed, tip),
-    ]
+    said = [*missed_lines(followed, arm), *_path_lines(followed, tip)]
+    page = follow_page(name, followed, arm, said)
+    lines: list[Table | str] = [tracking_table(followed, arm), *said]
     if out is not None:
         write_log(Path(out), followed.recording, model.settings.log, arm=arm)
         lines += [str(out), *written(page, Path(out).parent)]
@@ -118,10 +116,13 @@ def _path_lines(followed: "Followed", tip: "TipKinematics | None") -> list[str]:
     """Return what is said of the tip's path, and of when the path begins."""
     lines = list[str]()
     if tip is not None:
+        from hydroid.use.tip_path import spelt
+
         away = _away(tip, followed)
+        start = spelt(tip.place(followed.log.angle[0]))
         lines.append(
-            f"The tip is {tip.tip.what}. By the model it stays within {away:.3g} mm of "
-            "the path."
+            f"The tip is {tip.tip.what}. It starts at {start}. By the model it stays "
+            f"within {away:.3g} mm of the path."
         )
     if followed.lead_s:
         lines.append(
@@ -207,14 +208,15 @@ def _without_absent_joints(
 
 def _errors(followed: "Followed", joint: int, arm: "Arm") -> dict[str, object]:
     """Return the predicted errors of a joint (number, from 1), with and without its
-    band."""
+    band: in deg, or in mm of a joint that slides, which the keys say."""
     import math
 
+    shown = arm.joint(joint).shown
     error, wide = followed.rms(joint)
-    banded = math.degrees(wide) if math.isfinite(wide) else None
+    banded = shown.factor * wide if math.isfinite(wide) else None
     return {
         "joint": joint,
         "name": arm.name_of(joint),
-        "rms_deg": math.degrees(error),
-        "rms_with_band_deg": banded,
+        f"rms_{shown.unit}": shown.factor * error,
+        f"rms_with_band_{shown.unit}": banded,
     }

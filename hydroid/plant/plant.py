@@ -72,6 +72,8 @@ class Plant:
         period: how long one command is held [s], a multiple of MuJoCo's step; by
             default the logs' period.
         payload: mass at the tip [kg].
+        shapes: whether `model` has them. Without them nothing can be drawn, and many
+            plants are stepped faster, to the same bits.
 
     Attributes:
         joints: those that take commands.
@@ -92,10 +94,12 @@ class Plant:
         joints: Sequence[int | str] | None = None,
         period: float | None = None,
         payload: float = 0.0,
+        shapes: bool = True,
     ) -> None:
         settings = identified.settings
         arm = settings.arm
         self.identified = identified
+        self._shapes = shapes
         wanted = joints or identified.summarise().joints or settings.outputs
         self.joints = _joint_numbers(wanted, arm.joint_names)
         self._named = [arm.name_of(joint) for joint in self.joints]
@@ -467,7 +471,7 @@ class Plant:
         settings = self.identified.settings
         locked = lock(self._spec, settings.arm, self._roles.moving, pose)
         locked.model.opt.timestep = self.timestep
-        model = dressed_model(self._spec, locked)
+        model = dressed_model(self._spec, locked, shapes=self._shapes)
         self._locked = locked
         self._locked_pose = pose
         self._columns = locked.columns

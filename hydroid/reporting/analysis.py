@@ -57,8 +57,9 @@ def profile_section(
 ) -> Section | None:
     """Return the section of profiles as curves, a tab for each; None without any."""
     tabs = list[Plot]()
+    units = {one.name: one.unit for one in settings.parameter_set().parameters}
     for name, profile in profiles.items():
-        unit = settings.parameters[name].unit
+        unit = units[name]
         label = f"{name} [{unit}]" if unit else name
         draw = partial(profile_chart, label, profile)
         caption = named(settings, name)

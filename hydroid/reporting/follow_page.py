@@ -28,15 +28,17 @@ _MOTION = (
 )
 _NOTE = (
     "error: rms between wished and predicted angle. with its band: 95 % of the machines that the logs allow "
-    "stay within this rms error, without any feedback."
+    "stay within this rms error, without any feedback. saturated: part of the time at full command."
 )
 
 
-def follow_page(name: str, followed: Followed, arm: Arm) -> Page:
-    """Return the page; its file has the `name`, its table is `tracking`."""
+def follow_page(
+    name: str, followed: Followed, arm: Arm, said: Sequence[str] = ()
+) -> Page:
+    """Return the page; its file has the `name`, its table is `tracking`, and beside it
+    stands what is `said` of the path."""
     table = tracking_table(followed, arm)
-    missed = tuple(missed_lines(followed, arm))
-    sections = [Section(table.title, "", missed, {"tracking": table})]
+    sections = [Section(table.title, "", tuple(said), {"tracking": table})]
     columns = [joint - 1 for joint in followed.joints]
     angle = followed.angle[:, columns]
     moving = Prediction(name, followed.log, followed.joints, angle, {}, None)
@@ -68,7 +70,7 @@ def tracking_table(followed: Followed, arm: Arm) -> Table:
         full = 100.0 * float(np.mean(np.abs(command) >= 100.0))
         name = arm.name_of(joint)
         rows.append((name, shown.unit, shown.factor * error, banded, full))
-    header = ("joint", "unit", "error", "with its band", "full command [% of time]")
+    header = ("joint", "unit", "error", "with its band", "saturated [%]")
     return Table("Predicted tracking error", header, tuple(rows), _NOTE)
 
 

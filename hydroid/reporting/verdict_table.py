@@ -385,7 +385,7 @@ def next_step(
 def _step_after_tests(verdicts: Sequence[JointVerdict], run: str) -> Finding:
     """Return what to do once unseen logs have tested all joints of a run."""
     if all(verdict.verdict is Verdict.PREDICTS for verdict in verdicts):
-        return _step("use the machine", [], f"simulate COMMANDS.csv --fit {run}")
+        return _step("use the machine", [], f"follow TRAJECTORY.csv --fit {run}")
     if worse := _named(verdicts, _worse_than_expected):
         return _step("machine changed", worse, f"adapt UNSEEN.csv --fit {run}")
     if untold := _too_short(verdicts):

@@ -77,10 +77,13 @@ class _Machines:
         self.joints = Plant(model).joints
         sample = settings.log.period_s
         self.period = max(round(decision / sample), 1) * sample
+        # one machine alone may be drawn
+        drawn = len(thetas) == 1
         plants = list[Plant]()
         for theta in thetas:
             machine = replace(model, theta=theta, summary=None)
-            plants.append(Plant(machine, joints=self.joints, period=self.period))
+            plant = Plant(machine, joints=self.joints, period=self.period, shapes=drawn)
+            plants.append(plant)
         self.batch = PlantBatch(plants, threads=threads)
         self._columns = np.array(self.joints) - 1
         low, high = np.clip([arm.lower, arm.upper], -ENDLESS, ENDLESS)[:, self._columns]

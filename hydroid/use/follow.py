@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
-from hydroid.arrays import Array, Index, record, rms
+from hydroid.arrays import Array, Index, Mask, record, rms
 from hydroid.errors import LogError, SettingsError
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
@@ -260,6 +260,7 @@ class _Tracker:
         self._speed = _rates(angle, path.period)
         self._load = self._steady.weighing.loads(self._pose)
         self._driven: Index = np.array(plant.joints) - 1
+        self._waiting = self._rests_before_motion()
 
     def missed(self) -> list[Missed]:
         """Return the spans in which the wished speeds cannot be had as settled ones."""
@@ -324,6 +325,7 @@ class _Tracker:
         without = 0
         while turns < MOST_TURNS and without < TURNS_WITHOUT:
             wish = wish + self._learnable(self._path.angle - angle)
+            wish[self._waiting] = 0.0
             command = self._commands(wish)
             angle = self._simulate(command)
             size = self._size(angle)
@@ -333,6 +335,27 @@ class _Tracker:
                 best = (command, angle)
                 least = size
         return *best, turns
+
+    def _rests_before_motion(self) -> Mask:
+        """Return where joints stand and nothing is left to be learnt but what comes,
+        (T, J).
+
+        That is the rest before the first motion, and the second half of any other one.
+        A filter without phase would otherwise begin commands earlier than the lags ask
+        for, even against the motion. Joints that sag are not among them.
+        """
+        still = np.abs(self._speed) <= self._quiet()
+        _, sag = self._steady.commands(np.zeros_like(self._pose[:1]), self._pose[:1])
+        waiting = np.zeros_like(still)
+        for joint in self._driven.tolist():
+            if np.abs(sag[0, joint]) > LEAST_SPEED:
+                continue
+            for rest in _runs(np.flatnonzero(still[:, joint])):
+                if rest[-1] + 1 == len(still):
+                    continue
+                begin = 0 if rest[0] == 0 else len(rest) // 2
+                waiting[rest[begin:], joint] = True
+        return waiting
 
     def _size(self, angle: Array) -> float:
         """Rms error of the driven joints [rad]."""

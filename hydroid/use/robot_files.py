@@ -18,6 +18,7 @@ import numpy as np
 from hydroid.arrays import Array
 from hydroid.errors import ModelError
 from hydroid.files import csv_text, fill_template, write_atomic
+from hydroid.log.mapping import map_signals
 from hydroid.mjcf import mjcf_text
 from hydroid.plant import Plant
 from hydroid.robot_xml import read_robot
@@ -168,12 +169,33 @@ def write_moving(plant: Plant, folder: Path) -> list[Path]:
         "moving.xml": mjcf_text(spec),
         "speeds.csv": csv_text(speeds),
         "lags.csv": csv_text([("joint", "lag_s"), *zip(names, lags, strict=True)]),
+        "columns.csv": csv_text(_columns(plant)),
         "drive.py": fill_template("use/drive.py.j2"),
         "MOVING.txt": fill_template("use/moving.txt.j2", joints=", ".join(names)),
     }
     for name, text in content.items():
         write_atomic(model / name, text)
     return [model / "moving.xml", model / "drive.py", model / "MOVING.txt"]
+
+
+def _columns(plant: Plant) -> list[Sequence[str]]:
+    """Return what the columns of the logs hold: the factor and the offset with which
+    their cells become s, % and rad or m."""
+    settings = plant.identified.settings
+    arm = settings.arm
+    ranges = dict.fromkeys(arm.joint_names, (-np.inf, np.inf))
+    rows: list[Sequence[str]] = [("kind", "joint", "column", "gain", "offset")]
+    for signal in map_signals(settings.log, ranges, arm):
+        is_of_arm = signal.joint in (0, *plant.joints) and signal.kind != "pressure"
+        # the length of a cylinder is no line of the angle
+        if not is_of_arm or signal.rod is not None:
+            continue
+        # the second column is for the negative direction
+        sign = -1.0 if signal.part else 1.0
+        numbers = sign * signal.gain, sign * signal.offset
+        row = (signal.kind, signal.owner, signal.name, *map("{:.17g}".format, numbers))
+        rows.append(row)
+    return rows
 
 
 def speed_grids(plant: Plant) -> dict[str, Array]:

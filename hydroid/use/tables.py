@@ -1,14 +1,14 @@
 """Tables for other programs: settled speeds for a PLC, draws of the parameters, and
 their ranges."""
 
-from operator import attrgetter
+import math
 
 import numpy as np
 
 from hydroid.arrays import Array
 from hydroid.files import csv_text
 from hydroid.plant import Plant
-from hydroid.use.draws import Draws
+from hydroid.use.draws import Draws, error_numbers
 
 COMMANDS = np.concatenate([np.arange(-100.0, 0.0, 5.0), np.arange(0.0, 101.0, 5.0)])
 """of a table of speeds [%]"""
@@ -16,20 +16,27 @@ PARTS = (0.1, 0.3, 0.5, 0.7, 0.9)
 """of a joint's range, at which a table has its speeds"""
 ENDLESS = np.pi
 """end of the range of a joint that turns without end [rad]"""
-ERROR_COLUMNS = (
-    "sensor_deg",
-    "drift_per_s",
-    "drift_per_way",
-    "lasting_deg",
+ERRORS_HEADER = (
+    "joint",
+    "unit",
+    "sensor",
+    "drift_per_root_s",
+    "drift_per_root_way",
+    "lasting",
     "lasting_s",
 )
-"""of the table of errors: attributes of an `AngleError`"""
+"""of the table of errors: standard deviations in the unit, after 1 s and after a way of
+1 unit of those that grow"""
 
 RANGES_NOTE = """\
 draws.csv   machines that the logs do not rule out, one per row: all parameters together
 ranges.csv  the estimate of each parameter, and the range of its draws (95 %)
-errors.csv  what the machine does besides: noise of the sensors, and drift of the angles from the model's
-            with time (rate) and with the way travelled (way)
+errors.csv  what the machine does besides, as standard deviations in the unit of the row:
+            sensor              the sensor's noise, of each sample
+            drift_per_root_s    a random walk of the angle away from the model's: so far after 1 s, twice that
+                                after 4 s
+            drift_per_root_way  a random walk with the way travelled: so far after a way of 1 unit
+            lasting, lasting_s  an error that lasts for a moment, and its time constant
 
 Randomise by the rows of draws.csv. Ranges taken one by one are too wide: parameters that trade with each
 other, such as an opening and a pressure, would be drawn apart. By the logs, such machines lie {apart}
@@ -85,17 +92,34 @@ def speeds_alone(plant: Plant, column: int, angles: Array, commands: Array) -> A
 def parameter_files(draws: Draws) -> dict[str, str]:
     """Return draws, ranges and errors as CSV, by file name, with a text that says what
     to take."""
-    settings = draws.model.settings
-    units = [settings.parameters[name].unit for name in draws.names]
+    parameters = draws.model.settings.parameter_set().parameters
+    units = [parameter.unit for parameter in parameters]
     low, high = np.quantile(draws.theta, [0.025, 0.975], axis=0)
     numbers = (draws.model.theta.tolist(), low.tolist(), high.tolist())
     ranges = zip(draws.names, units, *numbers, strict=True)
     header = ("parameter", "unit", "estimate", "lower", "upper")
-    of_errors = attrgetter(*ERROR_COLUMNS)
-    errors = [(angle, *of_errors(error)) for angle, error in draws.errors.items()]
     return {
         "draws.csv": csv_text([draws.names, *draws.theta.tolist()]),
         "ranges.csv": csv_text([header, *ranges]),
-        "errors.csv": csv_text([("angle", *ERROR_COLUMNS), *errors]),
+        "errors.csv": csv_text([ERRORS_HEADER, *_error_rows(draws)]),
         "README.txt": RANGES_NOTE.format(apart=f"{draws.apart:.3g}"),
     }
+
+
+def _error_rows(draws: Draws) -> list[tuple[str | float, ...]]:
+    """Return the error of each joint that the fit compared, as `ERRORS_HEADER` has
+    it."""
+    arm = draws.model.settings.arm
+    rows = list[tuple[str | float, ...]]()
+    for joint, numbers in zip(arm.joints, error_numbers(draws.model), strict=True):
+        sensor, with_time, with_way, lasting, seconds = numbers.tolist()
+        if seconds == 0.0:
+            continue
+        unit = joint.shown.unit
+        factor = joint.shown.factor
+        # variances grow with time and way, and the way is in the unit too
+        own = factor * math.sqrt(sensor), factor * math.sqrt(with_time)
+        grown = math.sqrt(factor * with_way)
+        lasted = factor * math.sqrt(lasting), seconds
+        rows.append((joint.name, unit, *own, grown, *lasted))
+    return rows

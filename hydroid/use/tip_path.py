@@ -137,8 +137,12 @@ class TipKinematics:
 def holds_tip(table: Table) -> bool:
     """Whether a file holds positions of the tip, in `COLUMNS` or `FROM_START`.
 
-    Raises LogError: it holds some of these columns only.
+    Raises LogError: it holds some of these columns only, or has them without a unit.
     """
+    bare = [name.removesuffix("_m") for name in FROM_START]
+    if {*bare} <= {*table.names}:
+        hint = f"a path of the tip takes {', '.join(FROM_START)}, in m"
+        raise LogError(f"column {bare[0]} has no unit", table.source, hint)
     for columns in (COLUMNS, FROM_START):
         missing = [name for name in columns if name not in table.names]
         if not missing:
@@ -216,6 +220,12 @@ def _rows(
     return recording.time, values[:, 1:]
 
 
+def spelt(point: Array) -> str:
+    """Return a point [m], (3,), as messages have it."""
+    x, y, z = point.tolist()
+    return f"x {x:.3f}, y {y:.3f}, z {z:.3f} m"
+
+
 def _unreached(
     source: str, time: Array, points: Array, off: Array, first: Array
 ) -> LogError:
@@ -224,13 +234,8 @@ def _unreached(
     worst = int(np.argmax(off))
     missed = int(np.sum(off > UNREACHED))
     what = (
-        f"the tip cannot reach {_spelt(points[worst])} at {time[worst]:.4g} s: "
+        f"the tip cannot reach {spelt(points[worst])} at {time[worst]:.4g} s: "
         f"it stays {off[worst]:.3g} m off, the most of {missed} such samples"
     )
-    hint = f"only joints with commands move; the tip starts at {_spelt(first)}"
+    hint = f"only joints with commands move; the tip starts at {spelt(first)}"
     return LogError(what, source, hint)
-
-
-def _spelt(point: Array) -> str:
-    x, y, z = point.tolist()
-    return f"x {x:.3f}, y {y:.3f}, z {z:.3f} m"

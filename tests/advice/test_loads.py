@@ -5,11 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from two_joints import TRUTH, drive, two_joints
+from made_logs import noisy
+from two_joints import FIT, TRUTH, drive, two_joints
 
 import hydroid
 from hydroid.advice.adaptation import steps
-from hydroid.advice.loads import asked_loads
+from hydroid.advice.loads import Load, asked_loads
 from hydroid.identified_model import identified
 from hydroid.log import Log
 from hydroid.progress import no_progress
@@ -33,6 +34,29 @@ def test_a_load_at_the_tip_is_found_where_all_else_is_known(tmp_path):
     assert load.log == "drive_3.csv"
     assert load.mass == pytest.approx(MASS, rel=1e-3)
     assert load.low < load.mass < load.high
+
+
+def test_pressures_that_a_fit_compares_narrow_the_load(tmp_path):
+    columns = {"column": ["pA{joint}", "pB{joint}"], "unit": "MPa"}
+    found = list[Load]()
+    for name, weight in (("angles", 0.0), ("pressures", 0.1)):
+        (tmp_path / name).mkdir()
+        settings = two_joints(
+            tmp_path / name,
+            log=FIT["log"] | {"pressure": columns},
+            objective=FIT["objective"] | {"pressure_weight": weight},
+        )
+        # angles that say little
+        log = noisy(loaded(settings, 3), 3.0, exact_start=False)
+        if log.pressure is not None:
+            noise = np.random.default_rng(1).normal(0.0, 2e4, log.pressure.shape)
+            log = replace(log, pressure=log.pressure + noise)
+        found += asked_loads(identified(settings, TRUTH, "a fit"), [log])
+    by_angles, by_pressures = found
+    for load in found:
+        assert load.mass == pytest.approx(MASS, rel=0.05)
+    width = by_pressures.high - by_pressures.low
+    assert width < 0.5 * (by_angles.high - by_angles.low)
 
 
 def test_what_settings_state_is_not_asked_for_again(tmp_path):

@@ -67,6 +67,16 @@ def test_a_batch_steps_to_the_bits_of_its_plants(kind, threads):
 
 
 @pytest.mark.parametrize("kind", KINDS)
+def test_without_shapes_a_plant_steps_to_the_same_bits(kind):
+    shaped = plant(kind)
+    bare = Plant(shaped.identified, joints=JOINTS, shapes=False)
+    assert shaped.model.ngeom > bare.model.ngeom == bare.model.nsite == 0
+    np.testing.assert_array_equal(bare.reset("rig"), shaped.reset("rig"))
+    for given in commands(20)[:, 0]:
+        np.testing.assert_array_equal(bare.step(given), shaped.step(given))
+
+
+@pytest.mark.parametrize("kind", KINDS)
 def test_a_restored_plant_steps_to_the_same_bits(kind):
     first, other = plant(kind), plant(kind)
     first.reset("rig")

@@ -265,7 +265,7 @@ def test_the_verdict_shows_each_time_beside_the_best_simple_model_and_digits_tha
             "fit-hyd a.csv --config 'a b'/config.yaml --out 'a b' --resume",
         ),
         ({}, ("predicts", "not tested"), "validate OTHER.csv --fit 'a b'"),
-        ({}, ("predicts", "predicts"), "simulate COMMANDS.csv --fit 'a b'"),
+        ({}, ("predicts", "predicts"), "follow TRAJECTORY.csv --fit 'a b'"),
         ({}, ("predicts", "does not fit"), "suggest --fit 'a b'"),
         ({}, ("predicts", "cannot be told"), "validate OTHER.csv --fit 'a b'"),
         ({}, ("does not fit", "cannot be told"), "suggest --fit 'a b'"),

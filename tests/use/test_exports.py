@@ -10,13 +10,14 @@ from xml.etree import ElementTree
 import mujoco
 import numpy as np
 import pytest
-from made_logs import step_log
+from made_logs import at_rest, step_log
 from made_models import VALUES, made_model
 
 import hydroid
 from hydroid import load_settings
 from hydroid.errors import HydroidError
 from hydroid.identified_model import IdentifiedModel
+from hydroid.log import write_log
 from hydroid.plant import Plant, load_plant
 
 URDF = Path(__file__).parents[2] / "examples" / "urdf"
@@ -75,8 +76,15 @@ def test_draws_of_a_fit_are_written_with_ranges_and_errors(tmp_path):
     parameters = settings.parameter_set()
     assert (drawn.theta >= parameters.lower).all()
     assert (drawn.theta <= parameters.upper).all()
-    assert {row["parameter"] for row in rows(tmp_path / "ranges.csv")} == {*drawn.names}
-    assert rows(tmp_path / "errors.csv")[0]["angle"] == "q2"
+    ranges = {row["parameter"]: row["unit"] for row in rows(tmp_path / "ranges.csv")}
+    # as the fit has them: a joint that slides, or a rotary actuator, has others
+    assert ranges == {n: one.unit for n, one in fitted.summary.estimate.items()}
+    (row,) = rows(tmp_path / "errors.csv")
+    assert (row["joint"], row["unit"]) == ("shoulder", "deg")
+    error = drawn.errors["q2"]
+    assert float(row["sensor"]) == pytest.approx(error.sensor_deg)
+    assert float(row["drift_per_root_s"]) ** 2 == pytest.approx(error.drift_per_s)
+    assert float(row["drift_per_root_way"]) ** 2 == pytest.approx(error.drift_per_way)
     assert "too wide" in (tmp_path / "README.txt").read_text()
     assert drawn.apart > 1.0
     for plant in drawn.plants():
@@ -212,6 +220,18 @@ def test_plain_mujoco_moves_the_mjcf_as_the_plant_moves(model, tmp_path):
     )
     found = [float(row["shoulder"]) for row in csv.DictReader(done.stdout.splitlines())]
     plant = Plant(model)
+    # a log of the same commands, which begins where the plant does, gives the same
+    driven = np.zeros((len(time), len(plant.names)))
+    driven[:, 1] = command
+    log = at_rest(plant.angle, driven, source="log")
+    write_log(tmp_path / "log.csv", log, model.settings.log)
+    drive[-1] = str(tmp_path / "log.csv")
+    again = subprocess.run(drive, capture_output=True, text=True, check=True)
+    assert again.stdout == done.stdout
+    (tmp_path / "log.csv").write_text("time_s,q2_deg\n0,0\n")
+    refused = subprocess.run(drive, capture_output=True, text=True, check=False)
+    assert refused.returncode == 1
+    assert "no column u2_pct, u3_pct: the file needs" in refused.stderr
     expected = [plant.angle[1], *(plant.step({"shoulder": one})[1] for one in command)]
     travel = np.ptp(expected)
     assert travel > 0.05
@@ -279,3 +299,19 @@ def test_what_cannot_be_exported_is_one_line(
     with pytest.raises(HydroidError, match=says):
         hydroid.export(model, out=tmp_path / "out", **options)
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("out", "says"),
+    [
+        (".", "would overwrite your robot's file"),
+        ("new.urdf", "is a file's name, and files go to a folder; name the folder"),
+    ],
+)
+def test_an_export_is_no_users_file(model, out, says, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("robot.urdf").write_text("mine")
+    with pytest.raises(HydroidError, match=says):
+        hydroid.export(model, to="urdf", robot="robot.urdf", out=out)
+    assert Path("robot.urdf").read_text() == "mine"
+    assert [*map(str, Path().iterdir())] == ["robot.urdf"]

@@ -80,6 +80,22 @@ def test_commands_come_before_the_motion_by_delay_and_lags():
     np.testing.assert_array_equal(first.log.angle[-len(early.time) :], early.angle)
 
 
+@pytest.mark.parametrize("kind", ["quasi-static", "dynamic"])
+def test_a_joint_gets_no_command_before_its_motion_asks_for_one(kind):
+    """What is learnt comes through a filter that looks ahead: nothing of it may come
+    before the lags do."""
+    one = model(kind, opening_lag=0.2, pump_flow=5.0)
+    lags = joint_lags(Plant(one))
+    found = follow(one, path(one, rest=2.0))
+    for joint in JOINTS.values():
+        command = found.log.command[:, joint]
+        moves = np.flatnonzero(np.diff(found.log.angle[:, joint]))[0]
+        first = np.flatnonzero(command)[0]
+        assert (moves - first) * found.log.period <= lags[joint] + found.log.period
+        # the path begins upwards
+        assert command[first : moves + 50].min() > -0.1 * command.max()
+
+
 def test_lifting_takes_more_command_than_lowering():
     one = model()
     found = follow(one, path(one, joints={"shoulder": 1}))
@@ -167,6 +183,30 @@ def test_a_joint_without_a_column_rests_and_a_misspelt_one_is_named(tmp_path: Pa
     assert not np.delete(moved, 1).any()
     with pytest.raises(HydroidError, match="unused: elbwo"):
         hydroid.follow(tmp_path / "elbwo.csv", fit=one)
+
+
+CRANE = """<robot name="crane"><link name="base"/>
+<link name="boom"><inertial><origin xyz="1 0 0"/><mass value="200"/>
+  <inertia ixx="9" iyy="80" izz="80" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<link name="rod"><inertial><origin xyz="1 0 0"/><mass value="60"/>
+  <inertia ixx="2" iyy="20" izz="20" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="lift" type="revolute"><parent link="base"/><child link="boom"/>
+  <axis xyz="0 -1 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+<joint name="telescope" type="prismatic"><parent link="boom"/><child link="rod"/>
+  <axis xyz="1 0 0"/><limit lower="0" upper="1.5" effort="1" velocity="1"/></joint>
+</robot>"""
+
+
+def test_errors_of_a_joint_that_slides_are_in_mm(tmp_path: Path):
+    (tmp_path / "crane.urdf").write_text(CRANE)
+    hydroid.init(tmp_path / "mine", arm=tmp_path / "crane.urdf")
+    one = hydroid.load_plant(tmp_path / "mine" / "fit.yaml").identified
+    found = hydroid.follow(path(one, joints={"telescope": 1}), fit=one)
+    turning, sliding = found.plain()["joints"]
+    assert {"rms_deg", "rms_with_band_deg"} < turning.keys()
+    assert {"rms_mm", "rms_with_band_mm"} < sliding.keys()
+    assert sliding["rms_mm"] == pytest.approx(1e3 * found.result.rms(2)[0])
+    assert sliding["rms_mm"] > 0.0
 
 
 @pytest.mark.parametrize(

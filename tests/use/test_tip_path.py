@@ -91,9 +91,10 @@ def test_an_arm_without_a_site_is_led_by_the_end_of_its_last_link(tmp_path: Path
     assert followed.content["tip"] == "the end of jaw_left"
     (line_,) = [one for one in followed.lines if str(one).startswith("The tip is ")]
     away = followed.content["tip_away_mm"]
+    place = tip.place(start)
     assert line_ == (
-        "The tip is the end of jaw_left. By the model it stays within "
-        f"{away:.3g} mm of the path."
+        f"The tip is the end of jaw_left. It starts at x {place[0]:.3f}, y {place[1]:.3f}, "
+        f"z {place[2]:.3f} m. By the model it stays within {away:.3g} mm of the path."
     )
     along = followed.result
     wish = np.array([tip.place(pose) for pose in along.log.angle])
@@ -159,6 +160,7 @@ def without_number(place):
         (beyond, "time_s,x_m,y_m,height", "column z_m is missing"),
         (beyond, "time_s,dx_m,dy_m,height", "column dz_m is missing"),
         (beyond, "seconds,x_m,y_m,z_m", "column time_s is missing"),
+        (beyond, "time_s,dx,dy,dz", "column dx has no unit; .* takes dx_m, dy_m"),
     ],
 )
 def test_a_path_that_cannot_be_followed_is_refused_in_one_line(

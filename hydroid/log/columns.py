@@ -7,6 +7,7 @@ import numpy as np
 
 from hydroid.arrays import Array
 from hydroid.errors import LogError
+from hydroid.files import Plain
 from hydroid.log.clues import CLUES, RAW, column_unit, joint_of, kind_of, words
 from hydroid.log.mapping import LENGTHS
 from hydroid.log.signals import CommandRange, likely_range
@@ -14,6 +15,7 @@ from hydroid.log.table import Signal, Table
 from hydroid.units import UNITS, Unit, likely_time_unit, unit_of
 
 ANGLES = ("rad", "deg")
+NO_SETTINGS: Plain = {}
 EXCEL_DAYS = 30_000
 """days from 1900 that a spreadsheet's dates are, at least"""
 KEPT_IN = {"length": "mm", "angle": "deg"}
@@ -55,6 +57,18 @@ class Column(NamedTuple):
 
     def _has_word(self, of: Sequence[str]) -> bool:
         return not {*words(self.name)}.isdisjoint(of)
+
+
+class Entry(NamedTuple):
+    """The settings of a column, and what it is taken for.
+
+    `mirrored`: of an angle whose sensor has no known scale, the settings if it counts
+    the other way; empty of all others.
+    """
+
+    settings: Plain
+    meaning: str
+    mirrored: Plain = NO_SETTINGS
 
 
 def signal_columns(table: Table, names: Sequence[str]) -> list[Column]:

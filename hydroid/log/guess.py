@@ -17,12 +17,13 @@ from hydroid.arrays import Array
 from hydroid.errors import LogError
 from hydroid.files import Plain
 from hydroid.log.clues import column_unit, kind_of
-from hydroid.log.columns import Column, rises, signal_columns
+from hydroid.log.columns import Column, Entry, rises, signal_columns
 from hydroid.log.joint_columns import JointColumns, Joints, by_joint
 from hydroid.log.mapping import LENGTHS
 from hydroid.log.rods import Rod
 from hydroid.log.signals import CommandRange, likely_range, resting_range
 from hydroid.log.table import Signal, Table
+from hydroid.log.uncalibrated import over_the_joint, over_the_range
 from hydroid.units import UNITS, likely_time_unit
 from hydroid.words import listed
 
@@ -30,6 +31,7 @@ PERIODS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2)
 """[s], of which a guess takes the nearest"""
 NO_RODS: Mapping[int, Rod] = {}
 NO_RANGES: Mapping[int, tuple[float, float]] = {}
+NO_ANGLES: Mapping[int, Plain] = {}
 LARGEST_ANGLE = np.radians(400.0)
 """of an arm's joint [rad]; larger numbers are lengths or counts"""
 LARGEST_RADIANS = 6.3
@@ -43,19 +45,14 @@ class ColumnGuess(NamedTuple):
     and the unused columns.
 
     A reason stands for each column that it uses, for what is uncertain, and for the
-    others.
+    others. `mirrored`: settings of the angles, by joint, whose sensors have no known
+    scale, for sensors that count the other way.
     """
 
     log: Plain
     reasons: tuple[str, ...]
     unused: tuple[str, ...]
-
-
-class _Entry(NamedTuple):
-    """The settings of a column, and what it is taken for."""
-
-    settings: Plain
-    meaning: str
+    mirrored: Mapping[int, Plain] = NO_ANGLES
 
 
 def guess_columns(
@@ -86,7 +83,8 @@ def guess_columns(
         reasons[0] += ", by its values: no column is called a time"
     commands = by_joint(_of_kind(columns, "command"), arm, reasons)
     angles = by_joint(_of_kind(columns, "angle"), arm, reasons)
-    entries = _joint_entries(table, commands, angles, arm, reasons)
+    mirrored = dict[int, Plain]()
+    entries = _joint_entries(table, commands, angles, arm, reasons, mirrored)
     for column in columns:
         if column.kind == "target":
             reasons.append(
@@ -105,7 +103,7 @@ def guess_columns(
         "period_s": nearest_period(step),
         "joints": entries,
     }
-    return ColumnGuess(log, tuple(reasons), unused)
+    return ColumnGuess(log, tuple(reasons), unused, mirrored)
 
 
 def usual_step(times: Array) -> float:
@@ -152,9 +150,10 @@ def _joint_entries(
     angles: Mapping[int, JointColumns],
     arm: Joints,
     reasons: list[str],
+    mirrored: dict[int, Plain],
 ) -> dict[int, Plain]:
     """Return the settings of the joints' columns, by joint, and add a reason for
-    each."""
+    each, and those of mirrored angles."""
     angle_unit = _usual_angle_unit(angles, arm)
     cells = dict[int, _Cells]()
     for joint, command in commands.items():
@@ -166,12 +165,16 @@ def _joint_entries(
         entry: Plain = {"command": None, "angle": None}
         if joint in commands:
             columns, reason = commands[joint]
-            entry["command"], meaning = _command(columns, cells[joint], usual)
-            reasons.append(f"{meaning} of {name}, {reason}")
+            command = _command(columns, cells[joint], usual)
+            entry["command"] = command.settings
+            reasons.append(f"{command.meaning} of {name}, {reason}")
         if joint in angles:
             (column,), reason = angles[joint]
-            entry["angle"], meaning = _angle(column, joint, angle_unit, arm)
-            reasons.append(f"{meaning} of {name}, {reason}")
+            angle = _angle(column, joint, angle_unit, arm)
+            entry["angle"] = angle.settings
+            reasons.append(f"{angle.meaning} of {name}, {reason}")
+            if angle.mirrored:
+                mirrored[joint] = angle.mirrored
         entries[joint] = entry
     return entries
 
@@ -188,7 +191,7 @@ def _usual_angle_unit(angles: Mapping[int, JointColumns], arm: Joints) -> str:
     return "deg"
 
 
-def _angle(column: Column, joint: int, usual_unit: str, arm: Joints) -> _Entry:
+def _angle(column: Column, joint: int, usual_unit: str, arm: Joints) -> Entry:
     """Return the settings of the column of a joint's angle, and what it is taken
     for."""
     slides = joint in arm.slides
@@ -202,22 +205,11 @@ def _angle(column: Column, joint: int, usual_unit: str, arm: Joints) -> _Entry:
             return length
     is_counts = not column.unit and not _may_be_angles(column, usual_unit)
     if limits and (column.is_raw or is_counts):
-        return _over_the_joint(column, limits, slides=slides)
+        return over_the_joint(column, limits, slides=slides)
     unit = usual_unit
     if column.unit and not column.is_raw:
         unit = column.unit
-    return _Entry(_scaled(column, unit), f"{column.name}: angle in {unit}")
-
-
-def _over_the_joint(
-    column: Column, limits: tuple[float, float], *, slides: bool
-) -> _Entry:
-    """Return the settings of a position in V, mA or counts, over a joint's range [rad,
-    m]."""
-    if slides:
-        return _over_the_range(column, limits, "m", "range")
-    low, high = np.degrees(limits)
-    return _over_the_range(column, (float(low), float(high)), "deg", "range")
+    return Entry(_scaled(column, unit), f"{column.name}: angle in {unit}")
 
 
 def _scaled(column: Column, unit: str) -> Plain:
@@ -228,13 +220,13 @@ def _scaled(column: Column, unit: str) -> Plain:
     return settings
 
 
-def _position(column: Column) -> _Entry:
+def _position(column: Column) -> Entry:
     """Return the settings of the column of a joint that slides."""
     unit = column.unit
     if not unit:
         largest = float(np.nanmax(np.abs(column.values)))
         unit = "mm" if largest > LARGEST_METRES else "m"
-    return _Entry(_scaled(column, unit), f"{column.name}: position in {unit}")
+    return Entry(_scaled(column, unit), f"{column.name}: position in {unit}")
 
 
 def _may_be_angles(column: Column, unit: str) -> bool:
@@ -251,7 +243,7 @@ def _may_be_length(column: Column, angle_unit: str) -> bool:
     return column.is_length or not _may_be_angles(column, angle_unit)
 
 
-def _cylinder_length(column: Column, rod: Rod, angle_unit: str) -> _Entry | None:
+def _cylinder_length(column: Column, rod: Rod, angle_unit: str) -> Entry | None:
     """Return the settings of a column that holds the length of a joint's cylinder;
     None: it does not.
 
@@ -261,7 +253,7 @@ def _cylinder_length(column: Column, rod: Rod, angle_unit: str) -> _Entry | None
     if column.is_raw and column.is_length:
         shortest, longest = rod.ends
         ends = 1e3 * shortest, 1e3 * longest
-        return _over_the_range(column, ends, "mm", "stroke of its cylinder")
+        return over_the_range(column, ends, "mm", "stroke of its cylinder")
     if not _may_be_length(column, angle_unit):
         return None
     reading = rod.reading(column.values, column.unit)
@@ -273,39 +265,11 @@ def _cylinder_length(column: Column, rod: Rod, angle_unit: str) -> _Entry | None
     settings = _scaled(column, unit)
     # without an offset the sensor measures from pin to pin
     if not offset:
-        return _Entry(settings, f"{column.name}: length of the cylinder in {unit}")
+        return Entry(settings, f"{column.name}: length of the cylinder in {unit}")
     settings["offset"] = offset
     with_it_in = f"whose cylinder is {offset:.6g} {unit} long with it in,"
     meaning = f"{column.name}: travel of the rod in {unit}, {with_it_in}"
-    return _Entry(settings, meaning)
-
-
-def _over_the_range(
-    column: Column, ends: tuple[float, float], unit: str, whole: str
-) -> _Entry:
-    """Return the settings of a position in V, mA or counts, which is taken for all that
-    a joint can do.
-
-    `ends` of that are in the unit.
-    """
-    finite = column.values[np.isfinite(column.values)]
-    low = float(finite.min())
-    high = float(finite.max())
-    least, most = ends
-    # a reading that never changes has no span, and tells nothing of its ends
-    span = high - low or 1.0
-    scale = float(f"{(most - least) / span:.6g}")
-    offset = float(f"{least - scale * low:.6g}")
-    signal = column.unit or "counts"
-    what = f"{low:g} to {high:g} {signal}, taken for the whole {whole}, {least:.4g} to {most:.4g} {unit}"
-    hint = "correct scale and offset where the log does not reach both ends,"
-    settings: Plain = {
-        "column": column.name,
-        "unit": unit,
-        "scale": scale,
-        "offset": offset,
-    }
-    return _Entry(settings, f"{column.name}: {what}: {hint}")
+    return Entry(settings, meaning)
 
 
 class _Cells(NamedTuple):
@@ -346,7 +310,7 @@ def _usual_range(commands: Sequence[_Cells]) -> CommandRange | None:
 
 def _command(
     columns: Sequence[Column], cells: _Cells, usual: CommandRange | None
-) -> _Entry:
+) -> Entry:
     """Return the settings of the columns of a command, and what they are taken for.
 
     What rests beside the middle is no command: its own rest is 0 %.
@@ -362,12 +326,12 @@ def _command(
             command_range = range_at_rest.with_overshoot(cells.values)
             settings |= {"scale": command_range.scale, "offset": command_range.offset}
             meaning = f"command in {command_range.name}, at rest at {rest:.6g}"
-            return _Entry(settings, f"{names[0]}: {meaning}")
+            return Entry(settings, f"{names[0]}: {meaning}")
     both = " and ".join(names)
     if likely is None or "%" in (columns[0].unit, likely.name):
-        return _Entry(settings, f"{both}: command in %")
+        return Entry(settings, f"{both}: command in %")
     likely = likely.with_overshoot(cells.values)
     settings["scale"] = likely.scale
     if likely.offset:
         settings["offset"] = likely.offset
-    return _Entry(settings, f"{both}: command in {likely.name}")
+    return Entry(settings, f"{both}: command in {likely.name}")

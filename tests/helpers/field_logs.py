@@ -238,6 +238,15 @@ def _counts(columns: Columns) -> Columns:
     }
 
 
+def _backwards(columns: Columns) -> Columns:
+    counts = _counts(columns)
+    return {n: 4095 - v if "counts" in n else v for n, v in counts.items()}
+
+
+def _other_sign(columns: Columns) -> Columns:
+    return columns | {"stick_angle_deg": -columns["stick_angle_deg"]}
+
+
 def _pots(columns: Columns) -> Columns:
     others = {name: own for name, own in columns.items() if "angle" not in name}
     return others | {
@@ -318,6 +327,7 @@ FIELD_LOGS = (
     FieldLog("a receiver that loses its signal", commands("pwm", _received), lost=0.7),
     FieldLog("cylinder lengths in inches", lengths("cyl_in", 1 / 0.0254)),
     FieldLog("angles in thousandths of a degree", changed(_thousandths)),
+    FieldLog("an angle of the other sign", changed(_other_sign)),
     FieldLog("dates under another name", changed(_logged_at)),
     FieldLog(
         "pulses without their lower half",
@@ -332,6 +342,10 @@ FIELD_LOGS = (
     FieldLog("targets in place of commands", changed(_targets), "targets of positions"),
     FieldLog("encoder counts", changed(_counts), "taken for the whole range"),
     FieldLog("encoders called enc", changed(_encoders), "taken for the whole range"),
+    FieldLog("encoders that count backwards", changed(_backwards), "counts backwards"),
+    FieldLog(
+        "a draw wire that counts backwards", wires("wire_V", 10, 0), "counts backwards"
+    ),
     FieldLog("draw wires in mA", wires("wire_mA", 4, 20), "taken for the whole stroke"),
     FieldLog("draw wires in V", wires("wire_V", 0, 10), "taken for the whole stroke"),
     FieldLog(

@@ -36,6 +36,13 @@ LARGEST_ANGLE = np.radians(400.0)
 """of an arm's joint [rad]; larger numbers are lengths or counts"""
 LARGEST_RADIANS = 6.3
 """of a log's angles without a unit; larger numbers are degrees"""
+SMALL_COMMAND = 5.0
+"""of a log's commands, the smallest is below this [%], if one of 0 is none"""
+NEVER_AT_REST = (
+    "it is never 0, so where it rests is not known: correct scale and offset"
+)
+COUNTS = "counts"
+"""in place of a unit of angles, where columns without one hold what a sensor gives"""
 LARGEST_METRES = 50.0
 """of a position without a unit, for no telescope is longer; larger numbers are mm"""
 
@@ -154,7 +161,7 @@ def _joint_entries(
 ) -> dict[int, Plain]:
     """Return the settings of the joints' columns, by joint, and add a reason for
     each, and those of mirrored angles."""
-    angle_unit = _usual_angle_unit(angles, arm)
+    units = _usual_angle_units(angles, arm)
     cells = dict[int, _Cells]()
     for joint, command in commands.items():
         cells[joint] = _cells(table, command.columns)
@@ -167,33 +174,47 @@ def _joint_entries(
             columns, reason = commands[joint]
             command = _command(columns, cells[joint], usual)
             entry["command"] = command.settings
-            reasons.append(f"{command.meaning} of {name}, {reason}")
+            reasons.append(command.reason(name, reason))
         if joint in angles:
             (column,), reason = angles[joint]
-            angle = _angle(column, joint, angle_unit, arm)
-            entry["angle"] = angle.settings
-            reasons.append(f"{angle.meaning} of {name}, {reason}")
+            angle = _angle(column, joint, units[joint], arm)
+            if angle.settings:
+                entry["angle"] = angle.settings
+            reasons.append(angle.reason(name, reason))
             if angle.mirrored:
                 mirrored[joint] = angle.mirrored
         entries[joint] = entry
     return entries
 
 
-def _usual_angle_unit(angles: Mapping[int, JointColumns], arm: Joints) -> str:
-    """Return the unit of angles whose columns state none."""
+def _usual_angle_units(
+    angles: Mapping[int, JointColumns], arm: Joints
+) -> dict[int, str]:
+    """Return the units of angles whose columns state none, by joint."""
     largest = list[float]()
     for joint, ((column,), _) in angles.items():
         if joint not in arm.slides and not column.unit and not column.is_raw:
             largest.append(np.nanmax(np.abs(column.values)))
     # without any, degrees, in which most loggers write
-    if max(largest, default=np.inf) <= LARGEST_RADIANS:
-        return "rad"
-    return "deg"
+    unit = "rad" if max(largest, default=np.inf) <= LARGEST_RADIANS else "deg"
+    # a sensor's counts may be as small as angles, beside those of others
+    sensors_count = any(
+        column.is_of_a_sensor and _is_counts(column, joint, unit, arm)
+        for joint, ((column,), _) in angles.items()
+    )
+    units = dict[int, str]()
+    for joint, ((column,), _) in angles.items():
+        is_count = sensors_count and column.is_of_a_sensor
+        units[joint] = COUNTS if is_count else unit
+    return units
 
 
 def _angle(column: Column, joint: int, usual_unit: str, arm: Joints) -> Entry:
     """Return the settings of the column of a joint's angle, and what it is taken
-    for."""
+    for.
+
+    `usual_unit`: of columns that state none.
+    """
     slides = joint in arm.slides
     rod = arm.rods.get(joint)
     limits = arm.ranges.get(joint)
@@ -203,13 +224,34 @@ def _angle(column: Column, joint: int, usual_unit: str, arm: Joints) -> Entry:
         length = _cylinder_length(column, rod, usual_unit)
         if length is not None:
             return length
-    is_counts = not column.unit and not _may_be_angles(column, usual_unit)
-    if limits and (column.is_raw or is_counts):
+    if column.is_raw or _are_counts(column, limits, usual_unit):
         return over_the_joint(column, limits, slides=slides)
-    unit = usual_unit
+    unit = usual_unit if usual_unit != COUNTS else "deg"
     if column.unit and not column.is_raw:
         unit = column.unit
-    return Entry(_scaled(column, unit), f"{column.name}: angle in {unit}")
+    hint = "" if column.unit else "its unit is stated nowhere"
+    return Entry(_scaled(column, unit), f"{column.name}: angle in {unit}", hint)
+
+
+def _is_counts(column: Column, joint: int, angle_unit: str, arm: Joints) -> bool:
+    """Return whether the column of a joint's angle holds counts, by its size, and no
+    length of its cylinder."""
+    if joint in arm.slides or column.is_raw:
+        return False
+    rod = arm.rods.get(joint)
+    if rod and not column.turns and _cylinder_length(column, rod, angle_unit):
+        return False
+    return _are_counts(column, arm.ranges.get(joint), angle_unit)
+
+
+def _are_counts(
+    column: Column, limits: tuple[float, float] | None, angle_unit: str
+) -> bool:
+    """Return whether a column without a unit holds counts, by its size; a joint without
+    limits may turn far."""
+    if column.unit or _may_be_angles(column, angle_unit):
+        return False
+    return limits is not None or column.is_of_a_sensor
 
 
 def _scaled(column: Column, unit: str) -> Plain:
@@ -231,6 +273,8 @@ def _position(column: Column) -> Entry:
 
 def _may_be_angles(column: Column, unit: str) -> bool:
     """Return whether all cells, in a unit, are angles that a joint can have."""
+    if unit == COUNTS:
+        return False
     largest = np.nanmax(np.abs(column.values))
     return bool(largest * UNITS[unit].factor <= LARGEST_ANGLE)
 
@@ -240,7 +284,10 @@ def _may_be_length(column: Column, angle_unit: str) -> bool:
     size."""
     if column.is_raw or (column.unit and column.unit not in LENGTHS):
         return False
-    return column.is_length or not _may_be_angles(column, angle_unit)
+    if column.is_length:
+        return True
+    # a potentiometer's counts are in some stroke, too
+    return not (column.is_of_a_sensor or _may_be_angles(column, angle_unit))
 
 
 def _cylinder_length(column: Column, rod: Rod, angle_unit: str) -> Entry | None:
@@ -253,7 +300,7 @@ def _cylinder_length(column: Column, rod: Rod, angle_unit: str) -> Entry | None:
     if column.is_raw and column.is_length:
         shortest, longest = rod.ends
         ends = 1e3 * shortest, 1e3 * longest
-        return over_the_range(column, ends, "mm", "stroke of its cylinder")
+        return over_the_range(column, ends, "mm", "stroke of the cylinder")
     if not _may_be_length(column, angle_unit):
         return None
     reading = rod.reading(column.values, column.unit)
@@ -329,9 +376,20 @@ def _command(
             return Entry(settings, f"{names[0]}: {meaning}")
     both = " and ".join(names)
     if likely is None or "%" in (columns[0].unit, likely.name):
-        return Entry(settings, f"{both}: command in %")
+        in_percent = likely or CommandRange("%", 1.0, 0.0)
+        hint = "" if _rests_at_zero(cells, in_percent) else NEVER_AT_REST
+        return Entry(settings, f"{both}: command in %", hint)
     likely = likely.with_overshoot(cells.values)
     settings["scale"] = likely.scale
     if likely.offset:
         settings["offset"] = likely.offset
-    return Entry(settings, f"{both}: command in {likely.name}")
+    hint = "" if _rests_at_zero(cells, likely) else NEVER_AT_REST
+    return Entry(settings, f"{both}: command in {likely.name}", hint)
+
+
+def _rests_at_zero(cells: _Cells, likely: CommandRange) -> bool:
+    """Return whether a command is ever none, of a range that has 0 in its middle."""
+    if likely.offset or len(cells.values) > 1 or not cells.changes:
+        return True
+    smallest = float(np.nanmin(np.abs(cells.values)))
+    return likely.scale * smallest <= SMALL_COMMAND

@@ -44,7 +44,7 @@ def follow(
 ) -> tuple[float, float]:
     """Return the rms error along a path, and the angle at its end; gain [1/s]."""
     joint = model.joints[0] - 1
-    late = float(joint_lags(model)[joint])
+    lag = float(joint_lags(model)[joint])
     pose = model.angle
     pose[joint] = path.start
     angle = machine.reset(pose)
@@ -54,8 +54,8 @@ def follow(
         integral += error * machine.period
         change = (error - before) / machine.period
         before = error
-        wished = path.speed(machine.time + late) + gain * (
-            error + 0.2 * gain * integral + 0.1 * late * change
+        wished = path.speed(machine.time + lag) + gain * (
+            error + 0.2 * gain * integral + 0.1 * lag * change
         )
         found = model.commands({model.names[joint]: wished}, at=angle)
         angle = machine.step(found.command)
@@ -74,12 +74,12 @@ def main(source: str) -> None:
     pose[joint] = low + START * (high - low)
     top = model.commands({name: 1e3}, at=pose).speed[joint]
     path = Path(pose[joint], low + TARGET * (high - low), FASTEST * top)
-    late = max(float(joint_lags(model)[joint]), model.period)
-    ended = {gain / late: follow(machine, model, path, gain / late) for gain in GAINS}
+    lag = max(float(joint_lags(model)[joint]), model.period)
+    ended = {gain / lag: follow(machine, model, path, gain / lag) for gain in GAINS}
     gain = min(ended, key=lambda one: ended[one][0])
-    unit, factor = (
-        ("mm", 1e3) if arm.joints[joint].slides else ("deg", float(np.degrees(1.0)))
-    )
+    shown = arm.joints[joint].shown
+    unit = shown.unit
+    factor = shown.factor
     wanted = factor * path.angle(SECONDS)
     print(
         f"{name} after {SECONDS:.0f} s: {factor * ended[gain][1]:.2f} {unit} of {wanted:.2f}"

@@ -2,7 +2,7 @@
 shapes and units stand where one is made."""
 
 from dataclasses import dataclass, field
-from typing import Any, TypeVar, dataclass_transform
+from typing import Any, TypeAlias, TypeVar, dataclass_transform
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,8 @@ Ints = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 Index = NDArray[np.intp]
 Structs = NDArray[np.void]  # of a structured type
+Limits: TypeAlias = tuple[float, float]
+"""two ends of what lies between them, the lower one first"""
 
 T = TypeVar("T")
 

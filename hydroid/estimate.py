@@ -130,12 +130,19 @@ class CurveEstimate(Settings):
     value: tuple[float, ...]
     interval: tuple[Interval, ...]
     """95 % interval at each point by itself"""
+    step: float | None = None
+    """command [%] whose step it answers; null: it answers none"""
+    moves: str = ""
+    """what that command does with the joint's weight, raising or lowering; empty where
+    it does neither"""
 
 
 def _finding(value: Any) -> Any:
     """Return a finding from a mapping: files have no dataclasses."""
     try:
-        return Finding(**value) if isinstance(value, dict) else value
+        if isinstance(value, dict):
+            return Finding(**value)
+        return value
     except TypeError:
         raise ValueError("is no finding") from None
 
@@ -248,7 +255,9 @@ def read_estimate(source: Path) -> tuple[Path, Plain, FitSummary | None]:
     Raises:
         RunError: a folder that holds no estimate. SettingsError: a file that is none.
     """
-    file = _estimate_in(source) if os.path.isdir(source) else source
+    file = source
+    if os.path.isdir(source):
+        file = _estimate_in(source)
     content, lines = read_yaml(file, LARGER)
     if "estimate" in content:
         summary = validate(content, FitSummary, str(file), lines)

@@ -65,7 +65,9 @@ class IdentifiedModel:
     def name(self) -> str:
         """Name of the run folder or the file that the estimate came from."""
         file = Path(self.source)
-        return file.resolve().parent.name if file.name == NAME else file.stem
+        if file.name == NAME:
+            return file.resolve().parent.name
+        return file.stem
 
     @property
     def values(self) -> dict[str, float]:

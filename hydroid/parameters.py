@@ -37,9 +37,9 @@ class Prior:
     def value(self, score: float) -> float:
         """Return the value at a score."""
         change = score * self.sd
-        return (
-            float(self.nominal * np.exp(change)) if self.log else self.nominal + change
-        )
+        if self.log:
+            return float(self.nominal * np.exp(change))
+        return self.nominal + change
 
 
 @record
@@ -210,4 +210,6 @@ def _number(value: object) -> float:
     none."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return math.nan
-    return float(value) if abs(value) < 1e100 else math.nan
+    if abs(value) < 1e100:
+        return float(value)
+    return math.nan

@@ -56,7 +56,9 @@ def predict_with_oil(
     pressure[:, places] = response.pressure[0]
     flow = np.full(pressure.shape, np.nan)
     flow[:, places] = response.flow[0]
-    line = response.line[0] if driven else np.empty(0)
+    line = np.empty(0)
+    if driven:
+        line = response.line[0]
     has_pump = np.isfinite(line).any()
     return response.angle[0], OilTrace(pressure, flow, line if has_pump else None)
 

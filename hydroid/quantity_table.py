@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator
 from itertools import chain
 from typing import Literal, NamedTuple
 
+from hydroid.arrays import Limits
 from hydroid.files import Plain, read_table
 from hydroid.units import UNITS
 
@@ -39,21 +40,25 @@ class Quantity(NamedTuple):
     default: float | tuple[float, float] | None
     plain: str
     note: str = ""
-    span: tuple[float, float] | None = None
-    limits: tuple[float, float] | None = None
+    span: Limits | None = None
+    limits: Limits | None = None
     of: Literal["", "pump", "cylinder", "stand-in"] = ""
     optional: bool = False
 
     @property
     def meaning(self) -> str:
         """The plain words for the quantity, with the note behind them."""
-        return f"{self.plain}; {self.note}" if self.note else self.plain
+        if self.note:
+            return f"{self.plain}; {self.note}"
+        return self.plain
 
     @property
     def factor(self) -> float:
         """Factor that turns a value in `unit` into SI; a command stays in %,
         and a plain number has 1."""
-        return UNITS[self.unit.lower()].factor if self.unit else 1.0
+        if self.unit:
+            return UNITS[self.unit.lower()].factor
+        return 1.0
 
     @property
     def positive(self) -> bool:
@@ -63,7 +68,9 @@ class Quantity(NamedTuple):
     @property
     def lowest(self) -> float:
         """The least value that a fit may try; 0 but for changes of a lever."""
-        return self.limits[0] if self.limits else 0.0
+        if self.limits:
+            return self.limits[0]
+        return 0.0
 
     @property
     def of_the_pump(self) -> bool:

@@ -179,7 +179,9 @@ def _check_chains(root: ElementTree.Element, path: Path) -> None:
 
 def _link(end: ElementTree.Element | None) -> str:
     """Return the link that an end of a joint names; empty where there is none."""
-    return "" if end is None else end.get("link", "")
+    if end is None:
+        return ""
+    return end.get("link", "")
 
 
 def _check_copies(root: ElementTree.Element, path: Path) -> None:
@@ -243,9 +245,9 @@ def _limits(element: ElementTree.Element) -> tuple[float | None, float | None]:
 
 def _place(owner: str, element: ElementTree.Element) -> str:
     tag = str(element.tag)
-    return (
-        owner if owner.startswith(f"{tag} ") else f"{owner}, {tag}".removeprefix(", ")
-    )
+    if owner.startswith(f"{tag} "):
+        return owner
+    return f"{owner}, {tag}".removeprefix(", ")
 
 
 def _number(word: str) -> float | None:

@@ -12,7 +12,7 @@ from hydroid.quantity_table import MECHANICAL, QUANTITIES, TARGETS
 
 Stage = Literal["mech", "hyd"]
 Climb = Literal["dynamic", "quasi-static", "ladder"]
-"""the rungs of stage 2 by their names; ladder: all of them, one after the other"""
+"""names of what a fit of stage 2 climbs, as settings say it: keys of CLIMBS"""
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,9 @@ class Rung:
         name: in `simulation.model` and in the names of estimates.
         stage: of the fits that it belongs to.
         at_once: whether speeds follow valve and load at once, without inertia. One step
-            a sample is then enough, and joints that follow a log take its angles.
+            a sample is then enough, joints that follow a log take its angles, and held
+            commands lead to the speeds of `valve.rod_speed`. Valves open as
+            `simulation.openings` says, whatever the arm does.
         lacks: quantities that have no effect, each side by itself.
     """
 
@@ -101,14 +103,26 @@ DYNAMIC = Rung(
 
 RUNGS = {rung.name: rung for rung in (GAIN, QUASI_STATIC, DYNAMIC)}
 
+CLIMBS: dict[str, tuple[Rung, ...]] = {
+    "dynamic": (DYNAMIC,),
+    "quasi-static": (QUASI_STATIC,),
+    "ladder": (QUASI_STATIC, DYNAMIC),
+}
+"""the rungs that a fit of stage 2 climbs, the first one first
+
+Runs store the name, and what they call `refined` is on the first rung. So what a name
+stands for stays as it is: a rung that is to come first has a climb of its own.
+"""
+
 
 def rungs_of(stage: Stage, climb: str) -> tuple[Rung, ...]:
     """Return the rungs that a fit climbs, the first one first."""
-    of_stage = tuple(rung for rung in RUNGS.values() if rung.stage == stage)
-    chosen = tuple(rung for rung in of_stage if rung.name == climb)
-    return chosen or of_stage
+    if stage == "mech":
+        return (GAIN,)
+    return CLIMBS[climb]
 
 
 def stage_has(stage: Stage, quantity: str) -> bool:
     """Return whether a quantity has an effect on some rung of a stage."""
-    return any(rung.has(quantity) for rung in rungs_of(stage, "ladder"))
+    of_stage = [rung for rung in RUNGS.values() if rung.stage == stage]
+    return any(rung.has(quantity) for rung in of_stage)

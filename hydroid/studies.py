@@ -77,7 +77,9 @@ def perform(task: Task) -> Result:
     problem = fitted.problem
     errors = problem.output_errors(best.theta[None])
     angles = np.degrees(problem.angles(errors)[0])
-    unit = 1.0 if task.settings.objective.relative else 180 / math.pi
+    unit = 1.0
+    if not task.settings.objective.relative:
+        unit = 180 / math.pi
     refined = sum(refinement.evaluations for refinement in fitted.refinements.values())
     measures = {
         "objective": unit * best.overall,

@@ -5,6 +5,8 @@ import math
 import re
 from typing import NamedTuple
 
+import numpy as np
+
 from hydroid.files import read_table
 
 
@@ -28,22 +30,49 @@ def _units() -> dict[str, Unit]:
 
 
 class Display(NamedTuple):
-    """How a reader is shown where a joint is: what that is called, and in which
-    unit."""
+    """How it is written where a joint is: every unit of an angle, or of the position of
+    a joint that slides, is decided here."""
 
     word: str
     unit: str
+    """which a reader is shown"""
+    mark: str
+    """the unit behind a number, where there is little room"""
     factor: float
     """what 1 rad, or 1 m of a joint that slides, is in the unit"""
+    si: str
+    setting: str
+    """unit of its range, and of what a log's settings say without another"""
 
     def of_degrees(self, value: float) -> float:
         """Return, in the unit, what files keep in degrees; of a joint that slides they
         keep 1 m as if it were 1 rad."""
-        return value if self is TURNING else self.factor * math.radians(value)
+        if self is TURNING:
+            return value
+        return self.factor * math.radians(value)
+
+    def rounded(self, value: float) -> float:
+        """Return an angle [rad], or a position [m], that is whole in the unit."""
+        if self is TURNING:
+            return float(np.radians(np.round(np.degrees(value))))
+        return float(np.round(self.factor * value) / self.factor)
+
+    def in_setting(self, value: float) -> float:
+        """Return an angle [rad], or a position [m], in the unit of settings."""
+        if self is TURNING:
+            return math.degrees(value)
+        return value
+
+    def way(self, degrees: float) -> str:
+        """Write how far the joint moves, in the unit of settings."""
+        value = degrees
+        if self is not TURNING:
+            value = math.radians(degrees)
+        return f"{value:.3g} {self.setting}"
 
 
-TURNING = Display("angle", "deg", math.degrees(1.0))
-SLIDING = Display("position", "mm", 1e3)
+TURNING = Display("angle", "deg", "°", math.degrees(1.0), "rad", "deg")
+SLIDING = Display("position", "mm", " mm", 1e3, "m", "m")
 
 
 def display(*, slides: bool) -> Display:
@@ -84,8 +113,3 @@ def likely_time_unit(step: float) -> str:
         if 9e-4 < step * UNITS[name].factor < 0.6:
             return name
     return ""
-
-
-def way(degrees: float, *, slides: bool) -> str:
-    """Write how far a joint moves, in m of one that slides."""
-    return f"{math.radians(degrees):.3g} m" if slides else f"{degrees:.3g} deg"

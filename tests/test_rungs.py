@@ -1,5 +1,8 @@
 """A rung says which quantities its model lacks, and how finely it steps."""
 
+from itertools import chain
+from typing import get_args
+
 import numpy as np
 import pytest
 from conftest import candidates
@@ -8,7 +11,16 @@ from made_logs import at_rest
 from hydroid import load_settings
 from hydroid.hydraulics.records import JOINT, nominal_joints
 from hydroid.quantity_table import CHOICES, QUANTITIES
-from hydroid.rungs import DYNAMIC, GAIN, QUASI_STATIC, RUNGS, Rung, rungs_of
+from hydroid.rungs import (
+    CLIMBS,
+    DYNAMIC,
+    GAIN,
+    QUASI_STATIC,
+    RUNGS,
+    Climb,
+    Rung,
+    rungs_of,
+)
 from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.problem import SimulationSettings
 from hydroid.simulation import Simulation
@@ -106,6 +118,11 @@ def test_a_stage_climbs_its_rungs_or_stands_on_one():
         assert rungs_of("hyd", rung.name) == (rung,)
         settings = load_settings("fit-hyd", {"simulation.model": "ladder"}).on(rung)
         assert settings.rung is rung
+
+
+def test_every_climb_has_a_name_in_settings_and_every_rung_a_climb():
+    assert {*CLIMBS} == {*get_args(Climb)}
+    assert {GAIN, *chain(*CLIMBS.values())} == {*RUNGS.values()}
 
 
 def test_every_rung_rolls_and_every_quantity_has_a_rung():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hydroid.quantity_table import QUANTITIES, quantity
-from hydroid.units import UNITS, unit_of
+from hydroid.units import UNITS, display, unit_of
 
 
 @pytest.mark.parametrize(
@@ -42,3 +42,22 @@ def test_a_quantity_in_an_unknown_unit_is_refused():
         ValueError, match=r"quantities\.yaml: reach: units\.yaml has no unit furlong"
     ):
         quantity("reach", row)
+
+
+@pytest.mark.parametrize(
+    ("slides", "degrees", "shown", "way", "whole"),
+    [
+        (False, 57.2957795, 57.2957795, "57.3 deg", 1.0),
+        (True, 57.2957795, 1e3, "1 m", 1),
+    ],
+)
+def test_one_table_says_how_an_angle_and_a_position_are_written(
+    slides: bool, degrees: float, shown: float, way: str, whole: float
+):
+    written = display(slides=slides)
+    assert written.of_degrees(degrees) == pytest.approx(shown)
+    assert written.way(degrees) == way
+    assert written.in_setting(1.0) == pytest.approx(1.0 if slides else 57.2957795)
+    rounded = written.factor * written.rounded(0.7654321)
+    assert rounded == pytest.approx(round(rounded))
+    assert abs(rounded - written.factor * 0.7654321) <= whole / 2

@@ -51,7 +51,9 @@ def adapted(
         value = model.values[name]
         changes: Plain = {"term": None, "fixed": value}
         if name in free:
-            start = first_guess(model) if name == TIP_LOAD else value
+            start = value
+            if name == TIP_LOAD:
+                start = first_guess(model)
             changes |= {"fixed": None, "start": start}
             if parameter.has_prior:
                 changes["nominal"] = value

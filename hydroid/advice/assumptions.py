@@ -57,25 +57,25 @@ class _Motion:
 
     def command(self, joint: int, earlier: int) -> Array:
         """Return a joint's commands some windows earlier, shape (n,)."""
-        late = list[Array]()
+        delayed = list[Array]()
         for commands in self.commands:
             padded = np.pad(commands[:, joint], (earlier, 0), "edge")
-            late.append(padded[: len(commands)])
-        return np.concatenate(late)
+            delayed.append(padded[: len(commands)])
+        return np.concatenate(delayed)
 
     def follows(self, joint: int, other: int) -> tuple[float, int]:
         """Return how a joint's speed correlates with a joint's command, and after how
         many windows it does most."""
         speed = self.speed[:, joint] - self.speed[:, joint].mean()
         correlations = list[tuple[float, int]]()
-        for late in range(round(LATEST / self.period) + 1):
-            command = self.command(other, late)
+        for lag in range(round(LATEST / self.period) + 1):
+            command = self.command(other, lag)
             command -= command.mean()
             size = np.linalg.norm(command) * np.linalg.norm(speed)
             # of equal ones the earliest
-            correlations.append((abs(command @ speed) / max(size, TINY), -late))
-        best, late = max(correlations)
-        return best, -late
+            correlations.append((abs(command @ speed) / max(size, TINY), -lag))
+        best, negative_lag = max(correlations)
+        return best, -negative_lag
 
 
 def doubts(settings: FitSettings, logs: Sequence[Log]) -> dict[int, float]:
@@ -199,8 +199,11 @@ def _motion(settings: FitSettings, logs: Sequence[Log]) -> _Motion:
         speeds.append((end - begin) / (width * log.period))
         angles.append((end + begin) / 2)
         # means over windows, by the differences of a running sum
-        total = np.cumsum(np.pad(log.command, ((1, 0), (0, 0))), axis=0)
-        commands.append((total[width:-1:step] - total[: -width - 1 : step]) / width)
+        from_zero = np.pad(log.command, ((1, 0), (0, 0)))
+        total = np.cumsum(from_zero, axis=0)
+        at_end = total[width:-1:step]
+        at_begin = total[: -width - 1 : step]
+        commands.append((at_end - at_begin) / width)
     driven = np.any([log.driven for log in usable], axis=0)
     measured = np.all([log.has_angle for log in usable], axis=0)
     joints = np.flatnonzero(driven & measured).tolist()
@@ -223,25 +226,31 @@ def _law(settings: FitSettings, motion: _Motion, joint: int) -> Law | None:
     angle = angle[used]
     speeds = motion.speed[used]
     rows = _by_command(commands[used])
-    if len(rows) < 2 * rows.shape[1] or not speeds[:, joint].any():
+    own = speeds[:, joint]
+    windows, unknown = rows.shape
+    if windows < 2 * unknown or not own.any():
         return None
     # the speed by the commands alone; lever arm and pump then change it by a factor
-    speed = rows @ np.linalg.lstsq(rows, speeds[:, joint])[0]
+    by_commands = np.linalg.lstsq(rows, own)[0]
+    speed = rows @ by_commands
     off_centre = angle - angle.mean()
     others = speeds[:, [k for k in motion.joints if k != joint]]
-    factors = np.column_stack(
-        [off_centre, off_centre**2, np.maximum(others, 0), np.minimum(others, 0)]
-    )
+    # the pump gives the others oil whichever way they move, but not the same amount
+    rising = np.maximum(others, 0)
+    falling = np.minimum(others, 0)
+    factors = np.column_stack([off_centre, off_centre**2, rising, falling])
     unknowns = np.hstack([rows, speed[:, None] * factors])
     basis, sizes, _ = np.linalg.svd(unknowns, full_matrices=False)
     basis = basis[:, sizes > 1e-9 * sizes[0]]
-    rest = speeds[:, joint] - basis @ (basis.T @ speeds[:, joint])
+    rest = own - basis @ (basis.T @ own)
 
     def left(load: Array) -> Array:
         """A load slows what lifts it; it cannot do the contrary."""
         effect = -np.abs(speed) * load[used]
+        # what commands, lever and pump explain is not the load's
         effect -= basis @ (basis.T @ effect)
-        factor = max(effect @ rest, 0.0) / max(effect @ effect, TINY)
+        agreeing = max(effect @ rest, 0.0)
+        factor = agreeing / max(effect @ effect, TINY)
         return rest - factor * effect
 
     return left
@@ -253,7 +262,8 @@ def _late_commands(motion: _Motion, joint: int) -> Array:
     taps = [round(tap / motion.period) for tap in TAPS]
     _, delay = motion.follows(joint, joint)
     first = max(delay - taps[-1] // 2, 0)
-    return np.stack([motion.command(joint, first + tap) for tap in taps], axis=1)
+    commands = [motion.command(joint, first + tap) for tap in taps]
+    return np.stack(commands, axis=1)
 
 
 def _by_command(commands: Array) -> Array:
@@ -262,6 +272,9 @@ def _by_command(commands: Array) -> Array:
 
     Knots that few windows are near to are left out.
     """
-    distance = np.abs(commands[:, :, None] - KNOTS) / (KNOTS[1] - KNOTS[0])
+    apart = KNOTS[1] - KNOTS[0]
+    distance = np.abs(commands[:, :, None] - KNOTS) / apart
+    # hats: 1 at a knot, 0 from its neighbours on
     rows = np.maximum(1 - distance, 0).reshape(len(commands), -1)
-    return rows[:, rows.sum(axis=0) > 3]
+    near = rows.sum(axis=0) > 3
+    return rows[:, near]

@@ -63,13 +63,16 @@ def information(
     are those of an error model: the sensor's noise, and a drift.
     """
     noise, drift = np.radians([settings.noise_deg, settings.drift_deg])
+    sensor = noise**2
     # the drift is stated after 10 s, and its variance grows with time
-    rows = [whitened(signal, period, noise**2, drift**2 / 10.0) for signal in signals]
+    rate = drift**2 / 10.0
+    rows = [whitened(signal, period, sensor, rate) for signal in signals]
     p = len(rows[0])
     largest = max(float(np.abs(row).max()) for row in rows)
     # a little information about everything, so that what nothing shows stays finite
     floor = 1e-6 * largest + np.finfo(float).tiny
-    return regular(np.vstack([floor * np.eye(p), *(row.T for row in rows)]))
+    weak = floor * np.eye(p)
+    return regular(np.vstack([weak, *(row.T for row in rows)]))
 
 
 POSES = 50  # that show which distances change
@@ -128,10 +131,11 @@ class ExperimentSimulator:
             self._machine = load_machine(arm, pair=arm.pair is not None)
             # no command can keep bodies apart whose distance no joint changes
             low, high = np.array([joint.limits for joint in arm.joints]).T
-            poses = np.random.default_rng(0).uniform(low, high, (POSES, len(low)))
-            motion = self._machine.joined(
-                dict.fromkeys(self._machine.sides, poses), self._pose
-            )
+            # always the same poses: the design is to depend on its own seed alone
+            rng = np.random.default_rng(0)
+            poses = rng.uniform(low, high, (POSES, len(low)))
+            of_sides = dict.fromkeys(self._machine.sides, poses)
+            motion = self._machine.joined(of_sides, self._pose)
             self._counted = self._machine.checker.changing(motion)
 
     def trial(self, experiment: Experiment) -> Trial | Broken:
@@ -165,7 +169,8 @@ class ExperimentSimulator:
             return None
         # the joint that turned most lately is the cause; those far out count as the
         # others do
-        turned = np.ptp(angle[max(0, near - 20) : near + 1], axis=0)
+        lately = angle[max(0, near - 20) : near + 1]
+        turned = np.ptp(lately, axis=0)
         return Violation(near, int(np.argmax(turned)), False)
 
     def _broken(self, angle: Array, first: Violation | None) -> Broken:
@@ -250,8 +255,9 @@ class Design:
     @property
     def log(self) -> Log:
         """The commands to run, every angle in the start pose."""
-        angle = np.broadcast_to(self.best.experiment.pose, self.best.log.angle.shape)
-        return replace(self.best.log, angle=angle)
+        log = self.best.log
+        angle = np.broadcast_to(self.best.experiment.pose, log.angle.shape)
+        return replace(log, angle=angle)
 
     @property
     def after(self) -> Posterior:
@@ -262,15 +268,15 @@ class Design:
     def random_deviations(self) -> Array:
         """Relative standard deviation of each parameter after a random experiment, the
         median; (p,)."""
-        return np.median(
-            [self.before.add(t.gained).deviations for t in self.random], axis=0
-        )
+        after = [self.before.add(trial.gained).deviations for trial in self.random]
+        return np.median(after, axis=0)
 
 
 def typical(posterior: Posterior, moved: Mask) -> float:
     """Return the geometric mean of the relative standard deviations of some parameters,
     a mask (p,)."""
-    return float(np.exp(np.mean(np.log(posterior.deviations[moved]))))
+    logarithms = np.log(posterior.deviations[moved])
+    return float(np.exp(np.mean(logarithms)))
 
 
 def broken_limits(broken: Sequence[Broken]) -> SettingsError:
@@ -322,11 +328,14 @@ def design(
     effort = settings.design.effort
     for tried in range(_random_effort(effort) + 1, effort + 1):
         # of two drawn the better: those at the front are changed more often
-        place = min(rng.integers(len(elite)), rng.integers(len(elite)))
-        _, _, parent = elite[place]
+        first = rng.integers(len(elite))
+        second = rng.integers(len(elite))
+        _, _, parent = elite[min(first, second)]
         child = simulator.trial(experiments.change(parent.experiment))
-        if isinstance(child, Trial) and score(child) > elite[-1][0]:
-            elite = sorted([*elite[:-1], (score(child), tried, child)], reverse=True)
+        worst_score, _, _ = elite[-1]
+        if isinstance(child, Trial) and score(child) > worst_score:
+            elite[-1] = (score(child), tried, child)
+            elite.sort(reverse=True)
         best_score, _, best = elite[0]
         progress(f"improving: typically {-100 * best_score:.3g} %", tried, effort)
     _, _, best = elite[0]
@@ -379,4 +388,6 @@ def moved_by(random: Sequence[Trial], posterior: Posterior, counted: Mask) -> Ma
     moved = counted & (np.min(deviations, axis=0) < MOVED * posterior.deviations)
     if moved.any():
         return moved
-    return counted if counted.any() else np.ones_like(counted)
+    if counted.any():
+        return counted
+    return np.ones_like(counted)

@@ -39,7 +39,9 @@ class Experiment:
         """Return commands without motion: every angle stays in the start pose."""
         period = settings.log.period_s
         slew = settings.design.slew_pct_s
-        largest_step = np.inf if slew is None else slew * period
+        largest_step = np.inf
+        if slew is not None:
+            largest_step = slew * period
         samples = experiment_samples(settings)
         command = np.zeros((samples, len(self.pose)))
         for joint, signal in self.inputs.items():
@@ -58,7 +60,8 @@ class Experiment:
         signal = self.inputs[joint]
         levels = signal.level.copy()
         levels[place] = np.round(level, 1)
-        return replace(self, inputs={**self.inputs, joint: Input(signal.start, levels)})
+        inputs = {**self.inputs, joint: Input(signal.start, levels)}
+        return replace(self, inputs=inputs)
 
 
 def _slewed(command: Array, largest_step: float) -> Array:
@@ -127,9 +130,8 @@ class RandomExperiments:
         if kind < 0.1:
             return replace(experiment, pose=self._moved(experiment.pose))
         if kind < 0.25 or joint not in experiment.inputs:
-            return replace(
-                experiment, inputs={**experiment.inputs, joint: self._input()}
-            )
+            inputs = {**experiment.inputs, joint: self._input()}
+            return replace(experiment, inputs=inputs)
         level = experiment.inputs[joint].level
         first = self._rng.integers(len(level))
         place = slice(first, first + 1 + self._rng.integers(4))
@@ -137,20 +139,23 @@ class RandomExperiments:
         near = np.clip(level[place] + steps, -self._limit, self._limit)
         # drawn even where it is not taken: the generator's state is part of the result
         far = self._levels(len(near))
-        return experiment.with_level(joint, place, near if kind < 0.5 else far)
+        if kind < 0.5:
+            return experiment.with_level(joint, place, near)
+        return experiment.with_level(joint, place, far)
 
     def _input(self) -> Input:
         starts = [self._rest]
         while True:
-            start = starts[-1] + int(
-                self._rng.integers(self._shortest, self._longest + 1)
-            )
+            lasts = self._rng.integers(self._shortest, self._longest + 1)
+            start = starts[-1] + int(lasts)
             if start >= self._samples - self._shortest:
                 return Input(np.array(starts), self._levels(len(starts)))
             starts.append(start)
 
     def _levels(self, count: int) -> Array:
-        return np.round(self._rng.uniform(-self._limit, self._limit, count), 1)
+        levels = self._rng.uniform(-self._limit, self._limit, count)
+        # a tenth of a per cent is fine enough for whoever plays them
+        return np.round(levels, 1)
 
     def _pose(self) -> Array:
         if self._any_pose and (not len(self._poses) or self._rng.random() < 0.75):
@@ -160,7 +165,8 @@ class RandomExperiments:
     def _moved(self, pose: Array) -> Array:
         if not self._any_pose:
             return self._pose()
-        step = self._rng.normal(0.0, 0.1, len(pose)) * (self._upper - self._lower)
+        share = self._rng.normal(0.0, 0.1, len(pose))
+        step = share * (self._upper - self._lower)
         return np.clip(pose + step, self._lower, self._upper)
 
 
@@ -176,7 +182,8 @@ def _possible_poses(settings: FitSettings) -> Array:
     if names is None or names == "any":
         names = tuple(arm.poses)
     poses = np.array([arm.pose(name) for name in names])
-    moving = [j - 1 for j in {*(limits.joints or ()), *settings.outputs}]
+    numbers = {*(limits.joints or ()), *settings.outputs}
+    moving = [number - 1 for number in numbers]
     margin = np.radians(limits.margin_deg)
     inside = (poses >= arm.lower + margin) & (poses <= arm.upper - margin)
     possible = poses[inside[:, moving].all(axis=1)]
@@ -216,7 +223,8 @@ def beyond(angle: Array, settings: FitSettings) -> tuple[Mask, Mask]:
     limits = settings.design
     arm = settings.arm
     margin, largest_speed = np.radians([limits.margin_deg, limits.speed_deg_s])
-    speed = np.abs(np.diff(angle, axis=0, prepend=angle[:1])) / settings.log.period_s
+    way = np.abs(np.diff(angle, axis=0, prepend=angle[:1]))
+    speed = way / settings.log.period_s
     outside = (angle < arm.lower + margin) | (angle > arm.upper - margin)
     # a joint that stands at the end of its range, and never moves, breaks no limit
     moves = np.ptp(angle, axis=0) > 0
@@ -228,14 +236,17 @@ def repaired(experiment: Experiment, first: Violation) -> Experiment:
     range."""
     signal = experiment.inputs.get(first.joint)
     if signal is not None:
-        earlier = np.flatnonzero((signal.start < first.sample) & (signal.level != 0.0))
+        is_earlier = signal.start < first.sample
+        earlier = np.flatnonzero(is_earlier & (signal.level != 0.0))
         if len(earlier):
             last = earlier[-1]
-            level = (0.7 if first.fast else -0.7) * signal.level[last]
+            # less of what was too fast, and back from an end that came too near
+            factor = 0.7 if first.fast else -0.7
+            level = factor * signal.level[last]
             # below 10 % an earlier level is to blame
-            return experiment.with_level(
-                first.joint, last, level if abs(level) > 10.0 else 0.0
-            )
+            if abs(level) <= 10.0:
+                level = 0.0
+            return experiment.with_level(first.joint, last, level)
     for joint, signal in experiment.inputs.items():
         experiment = experiment.with_level(joint, slice(None), 0.7 * signal.level)
     return experiment

@@ -52,7 +52,9 @@ class Score:
     def chance(self, *, one_sided: bool) -> float:
         """Return the probability of such a statistic where the model lacks nothing."""
         tail = float(normal.sf(self.statistic if one_sided else abs(self.statistic)))
-        return tail if one_sided else 2 * tail
+        if one_sided:
+            return tail
+        return 2 * tail
 
 
 @record
@@ -80,7 +82,8 @@ class Explained:
         deviation = math.sqrt(self.variance(row))
         amount = -float(row @ self.left) / square
         gain = 0.5 * amount**2 * square
-        return Score(amount * square / deviation, amount, square / deviation, gain)
+        strength = square / deviation
+        return Score(amount * square / deviation, amount, strength, gain)
 
 
 def explained(problem: Problem, uncertainty: Uncertainty) -> Explained:
@@ -93,7 +96,9 @@ def explained(problem: Problem, uncertainty: Uncertainty) -> Explained:
 
     def variance(row: Array) -> float:
         samples = problem.measured.size
-        return uncertainty.variance(row[:samples]) + float(np.sum(row[samples:] ** 2))
+        of_logs = uncertainty.variance(row[:samples])
+        # scores of priors have a variance of 1
+        return of_logs + float(np.sum(row[samples:] ** 2))
 
     return Explained(linear.effects, left, variance)
 
@@ -185,15 +190,19 @@ def _tested(term: Term, uncertainty: Uncertainty, fit: Explained) -> Candidate |
         values = np.geomspace(high, low, 16)
         parts = np.zeros(16)
     else:
-        end = high if high - term.value >= term.value - low else low
+        # towards the bound that leaves more room
+        end = low
+        if high - term.value >= term.value - low:
+            end = high
         parts = 4.0 ** np.arange(-5.0, 1.0)
         values = term.value + parts * (end - term.value)
     innovations = term.innovations(
         uncertainty.likelihood, uncertainty.theta, values.tolist()
     )
     effects = innovations - uncertainty.linear.innovations
-    noise = max(float(rms(uncertainty.linear.innovations)), np.finfo(float).tiny)
-    sizes = rms(effects, axis=1) / noise
+    noise = float(rms(uncertainty.linear.innovations))
+    # simulated logs without noise can be fitted exactly
+    sizes = rms(effects, axis=1) / max(noise, np.finfo(float).tiny)
     acting = np.flatnonzero(np.isfinite(sizes) & (sizes > 0))
     if not is_limit:
         small = np.sum(sizes[acting] <= LARGEST_EFFECT)

@@ -92,14 +92,18 @@ def load_of(model: IdentifiedModel, log: Log, problem: Problem, theta: Array) ->
             lambda points: with_load(points, mass), known.box, known.axes(STEP), here
         )
         slopes += [*others]
-        prior = np.column_stack([np.zeros(len(known.root)), known.root])
+        # the fit says nothing of the load, whose column comes first
+        of_load = np.zeros(len(known.root))
+        prior = np.column_stack([of_load, known.root])
         quantile = known.quantile
     rows = np.vstack([np.column_stack(slopes), prior])
     aim = np.append(-here, np.zeros(len(prior)))
     inverse = np.linalg.pinv(rows.T @ rows, hermitian=True)
-    mass = max(mass + change * float((inverse @ (rows.T @ aim))[0]), 0.0)
+    step = inverse @ (rows.T @ aim)
+    mass = max(mass + change * float(step[0]), 0.0)
     half = change * quantile * float(np.sqrt(inverse[0, 0]))
-    return Load(log_file(log.source).name, mass, max(mass - half, 0.0), mass + half)
+    name = log_file(log.source).name
+    return Load(name, mass, max(mass - half, 0.0), mass + half)
 
 
 def load_finding(loads: Sequence[Load]) -> list[Finding]:

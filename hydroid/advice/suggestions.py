@@ -4,6 +4,7 @@ a term."""
 import math
 import shlex
 from collections.abc import Iterator, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -131,20 +132,19 @@ def improvement(after: LeftOut, before: LeftOut) -> dict[str, tuple[float, float
     settings = after.problem.settings
     improvements = dict[str, tuple[float, float]]()
     for joint in settings.outputs:
-        squares = np.array(
-            [squared_changes(left_out, joint) for left_out in (before, after)]
-        )
+        of_both = [squared_changes(left_out, joint) for left_out in (before, after)]
+        squares = np.array(of_both)
         spans = squares.shape[1]
         sums = squares.sum(axis=1)
         rms_before, rms_after = np.sqrt(sums / spans)
-        without_one = np.sqrt((sums[:, None] - squares) / max(spans - 1, 1))
+        # a jackknife: each part is left out of the sums in turn
+        remaining = sums[:, None] - squares
+        without_one = np.sqrt(remaining / max(spans - 1, 1))
         falls = without_one[0] - without_one[1]
         sd = np.sqrt((len(falls) - 1) * np.var(falls))
-        name = settings.arm.joint_names[joint - 1]
-        improvements[name] = (
-            float(np.degrees(rms_before - rms_after)),
-            float(np.degrees(sd)),
-        )
+        fall = float(np.degrees(rms_before - rms_after))
+        name = settings.arm.name_of(joint)
+        improvements[name] = (fall, float(np.degrees(sd)))
     return improvements
 
 
@@ -217,8 +217,15 @@ def _forecasts(
     trials = [simulator.trial(draws.random()) for _ in range(6)]
     gained = [trial.gained for trial in trials if isinstance(trial, Trial)]
     if gained:
-        best = max(gained, key=lambda rows: np.sum(np.log(np.diag(now.add(rows).root))))
+        best = max(gained, key=partial(_log_root, now))
         yield "experiment", f"{settings.design.duration_s:g}", best
+
+
+def _log_root(now: Posterior, rows: Array) -> float:
+    """Return half the logarithm of the determinant of the information with more
+    rows."""
+    root = now.add(rows).root
+    return float(np.sum(np.log(np.diag(root))))
 
 
 def _can_be_stated(settings: FitSettings, parameter: ParameterSettings) -> bool:
@@ -265,10 +272,13 @@ def proposed(candidate: Candidate, value: float) -> dict[str, Plain]:
     term = candidate.term
     low, high = term.span
     held = value if math.isinf(term.value) else term.value
-    least = min(value / 5.0, held) if low else low
+    least = low
+    if low:
+        least = min(value / 5.0, held)
     most = max(5.0 * value, held)
     # two digits are enough for a reader
-    least, most = (float(f"{end:.2g}") for end in (max(least, low), min(most, high)))
+    least = float(f"{max(least, low):.2g}")
+    most = float(f"{min(most, high):.2g}")
     entries = {
         name: parameter.model_dump(mode="json", exclude_defaults=True)
         for name, parameter in term.entries.items()
@@ -340,5 +350,7 @@ def action_findings(content: Content, settings: FitSettings) -> Iterator[Finding
             "after": after,
             "sd": 100 * STATED_SD.get(kind, 0.0),
         }
-        link = settings.parameters[subject].link if kind == "weigh" else None
+        link = None
+        if kind == "weigh":
+            link = settings.parameters[subject].link
         yield Finding(kind, "note", (link or named(settings, subject),), numbers)

@@ -11,7 +11,7 @@ from itertools import product
 
 import numpy as np
 
-from hydroid.arrays import Array, record
+from hydroid.arrays import Array, Limits, record
 from hydroid.files import Plain
 from hydroid.hydraulics.actuator import START_PRESSURE
 from hydroid.posterior.error_model import Likelihood
@@ -42,7 +42,7 @@ class Term:
     value: float
 
     @property
-    def span(self) -> tuple[float, float]:
+    def span(self) -> Limits:
         """Smallest and largest value."""
         bounds = self.entries[self.name].bounds
         assert bounds is not None
@@ -243,7 +243,7 @@ def _new_name(
 
 def _label(settings: FitSettings, joint: int) -> str:
     """Return the name of a joint as names of parameters have it."""
-    return re.sub(r"\W", "_", settings.arm.joint_names[joint - 1])
+    return re.sub(r"\W", "_", settings.arm.name_of(joint))
 
 
 def joints_of(settings: FitSettings, parameter: ParameterSettings) -> tuple[int, ...]:
@@ -257,7 +257,7 @@ def joints_of(settings: FitSettings, parameter: ParameterSettings) -> tuple[int,
 def _nominal_value(settings: FitSettings, quantity: str, joint: int) -> float:
     """Return the value of a quantity that no parameter sets;
     inf of a limit that is switched off."""
-    actuator = settings.arm.joints[joint - 1].actuator
+    actuator = settings.arm.joint(joint).actuator
     value = actuator_values(actuator, settings.hydraulics)[quantity]
     if value is not None:
         return value

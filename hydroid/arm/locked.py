@@ -96,13 +96,15 @@ class LockedArm:
         # Steiner's theorem, from each part's centre to that of its body
         away = part.centre - centre[:, part.body]
         square = np.sum(away * away, axis=-1)[..., None, None]
-        moved = square * np.eye(3) - away[..., :, None] * away[..., None, :]
+        outer = away[..., :, None] * away[..., None, :]
+        moved = square * np.eye(3) - outer
         per_mass = part.inertia + moved
         tensor = np.zeros((*shapes, 3, 3))
         np.add.at(tensor, body_of_part, weight[..., None, None] * per_mass)
         inertia, axes = np.linalg.eigh(tensor)
-        # the axes form a right-handed frame
-        axes[..., 2] *= np.sign(np.linalg.det(axes))[..., None]
+        # the axes form a right-handed frame: no quaternion is a reflection
+        handed = np.sign(np.linalg.det(axes))
+        axes[..., 2] *= handed[..., None]
         scalar_last = Rotation.from_matrix(axes.reshape(-1, 3, 3)).as_quat()
         quaternion = np.roll(scalar_last, 1, axis=-1).reshape(*shapes, 4)
         return {
@@ -131,7 +133,8 @@ def lock(spec: mujoco.MjSpec, arm: Arm, moving: Mask, pose: Array) -> LockedArm:
     held = dict[str, tuple[Array, Array]]()
     for name in names[fixed]:
         body = int(full.joint(name).bodyid[0])
-        held[full.body(body).name] = _place(data, body, int(full.body_parentid[body]))
+        above = int(full.body_parentid[body])
+        held[full.body(body).name] = _place(data, body, above)
     joints = tuple(names[columns].tolist())
     model, parts = _fused(full, data, arm, joints)
     locked = LockedArm(model, joints, columns, pose[columns], parts, held)
@@ -146,10 +149,12 @@ def _place(data: mujoco.MjData, body: int, above: int) -> tuple[Array, Array]:
     """Return a body's place in another's frame: [m], (3,), and a quaternion (w, x, y,
     z)."""
     turn = np.empty(4)
+    # the conjugate of a unit quaternion is its inverse
     inverse = data.xquat[above] * [1, -1, -1, -1]
     mujoco.mju_mulQuat(turn, inverse, data.xquat[body])
     frame = data.xmat[above].reshape(3, 3)
-    return frame.T @ (data.xpos[body] - data.xpos[above]), turn
+    away = data.xpos[body] - data.xpos[above]
+    return frame.T @ away, turn
 
 
 def _fused(
@@ -157,10 +162,12 @@ def _fused(
 ) -> tuple[mujoco.MjModel, Any]:
     """Return the chain of bodies that joints move, without what they weigh,
     and every body that is part of them."""
-    column_of = {
-        full.body(name).id: column for column, name in enumerate(arm.link_names)
-    }
-    moved = {int(joint.bodyid[0]): joint for joint in map(full.joint, joints)}
+    column_of = dict[int, int]()
+    for column, name in enumerate(arm.link_names):
+        column_of[full.body(name).id] = column
+    moved = dict[int, Any]()
+    for joint in map(full.joint, joints):
+        moved[int(joint.bodyid[0])] = joint
     spec = mujoco.MjSpec()
     bodies = [spec.worldbody]
     # the body of `full` that each of `bodies` is
@@ -169,7 +176,9 @@ def _fused(
     carriers = list[int]()
     parts = list[tuple[Any, ...]]()
     for number, parent in enumerate(full.body_parentid):
-        carrier = carriers[parent] if number else 0
+        carrier = 0
+        if number:
+            carrier = carriers[parent]
         if number in moved:
             position, turn = _place(data, number, kept[carrier])
             name = full.body(number).name
@@ -179,8 +188,10 @@ def _fused(
         carriers.append(carrier)
         # the world, and what cannot move, weighs nothing in a simulation
         if carrier and full.body_mass[number]:
+            # -1: no link whose mass a parameter may set
             column = column_of.get(number, -1)
-            parts.append((carrier, column, *_part(full, data, number, kept[carrier])))
+            inertial = _part(full, data, number, kept[carrier])
+            parts.append((carrier, column, *inertial))
     with quiet_mujoco():
         model = spec.compile()
     _take_over(model, full, [moved[number].id for number in kept[1:]])
@@ -197,7 +208,8 @@ def _part(
     inverse = data.xmat[carrier].reshape(3, 3).T
     axes = inverse @ data.ximat[body].reshape(3, 3)
     centre = inverse @ (data.xipos[body] - data.xpos[carrier])
-    inertia = (axes * (full.body_inertia[body] / mass)) @ axes.T
+    principal = full.body_inertia[body] / mass
+    inertia = (axes * principal) @ axes.T
     return mass, centre, inertia
 
 
@@ -218,16 +230,16 @@ def repeat(model: mujoco.MjModel, copies: int) -> mujoco.MjModel:
             name = f"{body.name} {copy}"
             bodies.append(_add(above, name, body.pos, body.quat, joint, copy))
     with quiet_mujoco():
-        many = spec.compile()
+        repeated = spec.compile()
     # as they are in the model, to the last bit
-    many.body_pos[1:] = np.tile(model.body_pos[1:], (copies, 1))
-    many.body_quat[1:] = np.tile(model.body_quat[1:], (copies, 1))
-    _take_over(many, model, [*range(model.njnt)] * copies)
-    many.stat.meaninertia = model.stat.meaninertia
-    many.opt.disableflags = model.opt.disableflags & ~int(
-        mujoco.mjtDisableBit.mjDSBL_ISLAND
-    )
-    return many
+    repeated.body_pos[1:] = np.tile(model.body_pos[1:], (copies, 1))
+    repeated.body_quat[1:] = np.tile(model.body_quat[1:], (copies, 1))
+    _take_over(repeated, model, [*range(model.njnt)] * copies)
+    repeated.stat.meaninertia = model.stat.meaninertia
+    # each copy is an island of constraints of its own, and is solved apart
+    islands = int(mujoco.mjtDisableBit.mjDSBL_ISLAND)
+    repeated.opt.disableflags = model.opt.disableflags & ~islands
+    return repeated
 
 
 def _add(

@@ -32,7 +32,9 @@ def load_model(arm: Arm) -> mujoco.MjSpec:
     spec = read_mjcf(arm.model)
     with mujoco_errors(arm.model):
         spec.compile()
-    return add_payload(spec, arm, arm.load, TIP_LOAD) if arm.load else spec
+    if arm.load:
+        return add_payload(spec, arm, arm.load, TIP_LOAD)
+    return spec
 
 
 def add_payload(

@@ -58,7 +58,9 @@ def tip_of(model: mujoco.MjModel, arm: Arm) -> Tip:
 def _last_that_turns(model: mujoco.MjModel) -> int:
     """Return the last joint that turns, 0-based; where all slide, the last."""
     turning = np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE)
-    return int(turning[-1]) if len(turning) else model.njnt - 1
+    if len(turning):
+        return int(turning[-1])
+    return model.njnt - 1
 
 
 def _reach(

@@ -40,7 +40,9 @@ def choose_chain(
         chain, why = _best(spec, tips, columns)
     else:
         link = spec.body(tip)
-        chain = () if link is None else _path(link)
+        chain = ()
+        if link is not None:
+            chain = _path(link)
         why = "as asked"
         if not chain:
             raise ModelError(

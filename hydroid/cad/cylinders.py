@@ -322,7 +322,11 @@ def _four_bar(joint: Any, pins: Sequence[Pin]) -> Plain | None:
     """
     # points in the plane across the joint's axis, as complex numbers from the joint [m]
     axis = joint.xaxis
-    x = np.cross([0.0, 1.0, 0.0] if abs(axis[1]) < 0.9 else [1.0, 0.0, 0.0], axis)
+    # any direction will do that is not nearly the axis'
+    across = [0.0, 1.0, 0.0]
+    if abs(axis[1]) >= 0.9:
+        across = [1.0, 0.0, 0.0]
+    x = np.cross(across, axis)
     x /= np.linalg.norm(x)
     y = np.cross(axis, x)
     offsets = [pin.at - joint.xanchor for pin in pins]
@@ -345,7 +349,9 @@ def _four_bar(joint: Any, pins: Sequence[Pin]) -> Plain | None:
         return None
     between_pivots = float(np.angle((eye - ground) * np.conj(foot - ground)))
     # the rod's pin turns with the rocker
-    sense = 1.0 if math.sin(between_pivots) * per_joint_angle > 0 else -1.0
+    sense = -1.0
+    if math.sin(between_pivots) * per_joint_angle > 0:
+        sense = 1.0
     theta0 = math.degrees(math.remainder(between_pivots - rocker_angle, math.tau))
     # the sign of theta0 says which way the rod moves
     if theta0 * sense < 0:

@@ -50,7 +50,7 @@ class _Reach:
         """The longest of them [m], 0 where there is none."""
         return max(self.own.values(), default=0.0)
 
-    def telling(self, links: Collection[str]) -> dict[str, float]:
+    def clear(self, links: Collection[str]) -> dict[str, float]:
         """Return the distances, by link, that are long enough to tell the unit of a
         link's meshes."""
         least = SPEAKS * self.longest
@@ -85,7 +85,9 @@ def convert_meshes(
             continue
         shapes = [geom for geom in spec.geoms if geom.meshname == mesh.name]
         mesh.scale = mesh.scale * units.get(mesh.name, 1.0)
-        source = read.get(mesh.file) if shapes else None
+        source = None
+        if shapes:
+            source = read.get(mesh.file)
         shown = source and _shown_stl(source, mesh.scale, files[mesh.file].name, notes)
         if not shown:
             lost.update(geom.parent.name for geom in shapes)
@@ -149,13 +151,13 @@ def _units(
     for mesh, body in body_of.items():
         link = reach.link[body]
         longest[link] = max(longest.get(link, 0.0), lengths[mesh])
-    telling = reach.telling(longest)
-    common = _common_unit(reach, telling, longest)
+    clear = reach.clear(longest)
+    common = _common_unit(reach, clear, longest)
     units = dict[str, float]()
     for mesh, body in body_of.items():
         link = reach.link[body]
-        distance = telling.get(link, reach.longest)
-        least = distance * _least_part(link, telling)
+        distance = clear.get(link, reach.longest)
+        least = distance * _least_part(link, clear)
         units[mesh] = _own_unit(
             reach, common, lengths[mesh], longest[link], (least, distance)
         )
@@ -201,21 +203,21 @@ def _own_unit(
 
 
 def _common_unit(
-    reach: "_Reach", telling: Mapping[str, float], longest: Mapping[str, float]
+    reach: "_Reach", clear: Mapping[str, float], longest: Mapping[str, float]
 ) -> float:
     """Return the unit in which most links are as long as the distances between joints
     tell [m]."""
-    if telling:
+    if clear:
         votes = [
-            reach.nearest(longest[link], distance) for link, distance in telling.items()
+            reach.nearest(longest[link], distance) for link, distance in clear.items()
         ]
         return max(UNITS, key=votes.count)
     return 1e-3 if max(longest.values()) > LONGEST else 1.0
 
 
-def _least_part(link: str, telling: Mapping[str, float]) -> float:
+def _least_part(link: str, clear: Mapping[str, float]) -> float:
     """Return the part of a distance between joints that a link is at least long."""
-    if link in telling:
+    if link in clear:
         return TOO_SHORT
     return 0.0 if link else BRACKET
 

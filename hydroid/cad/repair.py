@@ -134,7 +134,9 @@ def _replace_mass(body: mujoco.MjsBody, likely: "_Likely") -> str:
     usual = likely.usual
     scale = likely.density / USUAL
     mass = scale * usual.mass
-    was = f"{float(f'{body.mass:.2g}'):g}" if body.mass else "none"
+    was = "none"
+    if body.mass:
+        was = f"{float(f'{body.mass:.2g}'):g}"
     set_inertia(body, mass, usual.centre, scale * usual.tensor)
     return f"{body.name} {was} -> {mass:.3g}"
 
@@ -354,7 +356,9 @@ def _stated_fault(body: mujoco.MjsBody, urdf: bool) -> str:
         )
         return "no mass" if urdf or unsaid else ""
     has_mass = body.mass > MASSLESS and np.isfinite(body.mass)
-    fault = _tensor_fault(_stated_tensor(body)) if has_mass else "no mass"
+    fault = "no mass"
+    if has_mass:
+        fault = _tensor_fault(_stated_tensor(body))
     if fault:
         if not has_mass:
             body.mass = 0.0

@@ -88,7 +88,9 @@ def read_source(
     is_usd = path.suffix.lower() in USD
     root = ElementTree.Element("usd") if is_usd else read_robot(path)
     is_xacro = any("xacro" in str(part.tag).lower() for part in root.iter())
-    kind = "xacro" if is_xacro else str(root.tag)
+    kind = "xacro"
+    if not is_xacro:
+        kind = str(root.tag)
     if kind in REFUSED:
         what, hint = REFUSED[kind]
         raise ModelError(what, path, hint.format(name=path.name))
@@ -147,7 +149,9 @@ def _plain_path(given: str) -> Path:
     scheme, colon, rest = given.partition(":")
     # C: is a disk, and no scheme
     is_uri = colon and len(scheme) > 1
-    text = unquote(rest.removeprefix("//")) if is_uri else given
+    text = given
+    if is_uri:
+        text = unquote(rest.removeprefix("//"))
     return Path(text.replace("\\", "/"))
 
 
@@ -201,7 +205,9 @@ def _leave_first(root: ElementTree.Element, notes: Notes) -> None:
 def _child(element: ElementTree.Element, tag: str) -> ElementTree.Element:
     """Return the child of an element with a tag; a new one where there is none."""
     child = element.find(tag)
-    return ElementTree.SubElement(element, tag) if child is None else child
+    if child is None:
+        return ElementTree.SubElement(element, tag)
+    return child
 
 
 def _prepare_mjcf(root: ElementTree.Element) -> None:
@@ -232,4 +238,6 @@ def sort_shapes(spec: mujoco.MjSpec) -> None:
 def word(name: str) -> str:
     """Return a plain word from any name."""
     plain = re.sub(r"\W", "_", name, flags=re.ASCII) or "arm"
-    return f"_{plain}" if plain[0].isdigit() else plain
+    if plain[0].isdigit():
+        return f"_{plain}"
+    return plain

@@ -36,7 +36,7 @@ def odd_logs(
             "warning",
             KINDS[number],
             source,
-            settings.arm.joint_names[agreement.joint - 1],
+            settings.arm.name_of(agreement.joint),
             value=agreement.numbers[row, number],
             by=2 * agreement.sd[row, number],
             about=_conditions(by_source[source], settings),

@@ -93,7 +93,9 @@ class LazyGroup(TyperGroup):
 
     def get_command(self, ctx: Any, cmd_name: str) -> "TyperCommand | None":
         """Return a command by its name."""
-        return click_command(cmd_name) if cmd_name in COMMANDS else None
+        if cmd_name in COMMANDS:
+            return click_command(cmd_name)
+        return None
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write one section for each group."""
@@ -182,14 +184,18 @@ def main() -> None:
         code = _run()
     except KeyboardInterrupt as stop:
         code = STOPPED
-        kept = str(stop) if isinstance(stop, Stopped) else None
+        kept = None
+        if isinstance(stop, Stopped):
+            kept = str(stop)
     except BrokenPipeError:
         # the reader has left; Python would complain at exit
         sys.stderr.close()
     except Exception as error:
         code = _ending(error)
     if code == STOPPED:
-        rest = "" if kept is None else f"; {kept or 'nothing was written'}"
+        rest = ""
+        if kept is not None:
+            rest = f"; {kept or 'nothing was written'}"
         tell(f"hydroid: stopped{rest}")
     sys.exit(code)
 

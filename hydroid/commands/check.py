@@ -40,7 +40,6 @@ from hydroid.log import (
 )
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.log import LogSettings
-from hydroid.units import way
 from hydroid.words import listed
 
 if TYPE_CHECKING:
@@ -208,14 +207,14 @@ def _is_usable(log_check: LogCheck) -> bool:
 
 def _sizes(checks: Sequence[LogCheck], settings: FitSettings) -> Iterator[str]:
     """Yield a line on each log: how long it is, and what moves in it."""
-    slides = {settings.arm.joint_names[joint - 1] for joint in settings.arm.slides}
+    shown = {joint.name: joint.shown for joint in settings.arm.joints}
     for log_check in checks:
         log = log_check.log
         if log is None:
             continue
         ways = list[str]()
         for name, travel in log_check.moved_deg.items():
-            ways.append(f"{name} by {way(travel, slides=name in slides)}")
+            ways.append(f"{name} by {shown[name].way(travel)}")
         size = f"{len(log.time)} samples, {log.duration:.2f} s"
         moved = ", ".join(ways) or "nothing"
         yield f"{log.source}: {size}; driven and moved: {moved}"

@@ -142,7 +142,9 @@ def program() -> str:
     is_other = Path(typed).stem == "hydroid" and which("hydroid") != os.path.abspath(
         typed
     )
-    return shlex.quote(typed) if is_other else "hydroid"
+    if is_other:
+        return shlex.quote(typed)
+    return "hydroid"
 
 
 def show_error(error: Any) -> None:
@@ -160,9 +162,9 @@ def show_error(error: Any) -> None:
         where = OPTIONS[key]
         what = what.removeprefix(f"{key}: ")
     if "--json" in sys.argv[1:]:
-        kind = (
-            "usage" if is_usage else type(error).__name__.removesuffix("Error").lower()
-        )
+        kind = "usage"
+        if not is_usage:
+            kind = type(error).__name__.removesuffix("Error").lower()
         parts = {"kind": kind, "what": what, "where": where, "hint": error.hint}
         with suppress(OSError):
             _print_json({"error": parts})

@@ -100,7 +100,9 @@ def export(
             files += map(str, write_moving(plant, folder))
         return Result(files, {"files": files}, files)
     result = _written(_files(plant, to, robot, at), folder, write=out is not None)
-    return _with_page(result, plant, at, out) if to == "linear" else result
+    if to == "linear":
+        return _with_page(result, plant, at, out)
+    return result
 
 
 def _files(

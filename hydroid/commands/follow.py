@@ -214,7 +214,7 @@ def _errors(followed: "Followed", joint: int, arm: "Arm") -> dict[str, object]:
     banded = math.degrees(wide) if math.isfinite(wide) else None
     return {
         "joint": joint,
-        "name": arm.joint_names[joint - 1],
+        "name": arm.name_of(joint),
         "rms_deg": math.degrees(error),
         "rms_with_band_deg": banded,
     }

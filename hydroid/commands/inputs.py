@@ -163,7 +163,9 @@ def open_model(
             raise SettingsError(
                 "stage 1 (mech) does not model the actuators", model.source, hint
             )
-        which = ", ".join(model.nominal) if fit else "all parameters: no fit is given"
+        which = "all parameters: no fit is given"
+        if fit:
+            which = ", ".join(model.nominal)
         LOGGER.log(NOTE, "note: nominal values for %s", which)
     return model
 
@@ -270,7 +272,9 @@ def _on_command_line(
 def _flags(name: str) -> list[str]:
     """Return how an option is spelt."""
     flag = f"--{name.replace('_', '-')}"
-    return [flag, "-o"] if name == "out" else [flag]
+    if name == "out":
+        return [flag, "-o"]
+    return [flag]
 
 
 def _limits(value: str, value_type: Any) -> Plain:

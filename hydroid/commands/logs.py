@@ -192,7 +192,9 @@ def read_arms(
 
     if arm is None:
         return {ALONE: read(columns)}
-    moving = SIDES if arm == "both" else (arm,)
+    moving = SIDES
+    if arm != "both":
+        moving = (arm,)
     if _names_sides(log, settings, SIDES):
         return {side: read(columns.of_arm(side)) for side in moving}
     return dict.fromkeys(moving, read(columns))

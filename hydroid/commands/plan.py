@@ -84,7 +84,9 @@ def suggest(
     from hydroid.run.record import load_record, run_of
 
     folder = Path(model.source).parent
-    run = str(folder) if is_file(folder / CONFIG) else "RUN"
+    run = "RUN"
+    if is_file(folder / CONFIG):
+        run = str(folder)
     with Progress() as progress:
         content, findings = advice(
             problem, uncertainty(problem, model.theta), run, progress

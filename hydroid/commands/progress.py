@@ -137,13 +137,15 @@ class FitProgress(Progress):
         A rung is the search, or a model or term of the ladder; what is kept is refined
         as the last one. Returns whether time is up.
         """
-        from hydroid.units import way
+        from hydroid.units import display
 
         arm = self._settings.arm
         joints = (step.joint,) if step.joint else self._settings.outputs
-        about = arm.joint_names[joints[0] - 1] if len(joints) == 1 else "all joints"
+        about = "all joints"
+        if len(joints) == 1:
+            about = arm.joint_names[joints[0] - 1]
         all_slide = {*joints} <= {*arm.slides}
-        error = way(math.degrees(rms), slides=all_slide)
+        error = display(slides=all_slide).way(math.degrees(rms))
         text = f"rms error {error}, {simulated} simulations"
         self(f"{self._rung(step)}, {about}", simulated, None, text)
         return time.monotonic() > self._end

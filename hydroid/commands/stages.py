@@ -395,7 +395,9 @@ def adapt(
     title = "Parameters freed one after another"
     table = left_out_table(title, {"parameter": "freed"}, named, settings.arm)
     # where a load at the tip was tried too, a mass that was freed says more than it
-    of_loads = load_findings(settings) if free else ()
+    of_loads = ()
+    if free:
+        of_loads = load_findings(settings)
     if TIP_LOAD in chosen:
         of_loads = load_finding(asked_loads(model, read))
     findings = [*result.content["findings"], *map(asdict, of_loads)]

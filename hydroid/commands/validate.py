@@ -204,7 +204,9 @@ def _test(
     seen = seen_logs(source)
     predictions = list["Prediction"]()
     for log in logs:
-        unseen = _unseen(log, seen) if seen else None
+        unseen = None
+        if seen:
+            unseen = _unseen(log, seen)
         load = model.settings.payload_of(log.source)
         if unseen and load:
             # another day's log may have the name of one that was fitted

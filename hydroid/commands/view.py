@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hydroid.arrays import record
+from hydroid.arrays import Limits, record
 from hydroid.commands.console import Result
 from hydroid.commands.inputs import (
     ConfigSource,
@@ -196,7 +196,7 @@ def _write_film(
     model: "IdentifiedModel",
     logs: "dict[str, Log]",
     out: Path,
-    span: tuple[float, float],
+    span: Limits,
 ) -> None:
     """Write a film or a picture of simulated logs, by its ending, of a span [s]."""
     from hydroid.viewer.film import KINDS, render_motion
@@ -261,7 +261,7 @@ def _collisions(logs: "dict[str, Log]", settings: "FitSettings") -> "Result[Clea
     return Result([line], content, result)
 
 
-def _span(text: str) -> tuple[float, float]:
+def _span(text: str) -> Limits:
     """Return the ends of a span [s] such as 10:20, 10: or :20."""
     begin, _, end = text.partition(":")
     try:

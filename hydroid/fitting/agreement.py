@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.special import ndtri, stdtr
 
-from hydroid.arrays import Array, Mask, record
+from hydroid.arrays import Array, Limits, Mask, record
 from hydroid.fitting.baselines import (
     LOWER,
     NAMES,
@@ -78,7 +78,7 @@ class Agreement:
 
 def compare_logs(
     logs: Sequence[Log],
-    ranges: Sequence[tuple[float, float]],
+    ranges: Sequence[Limits],
     progress: Progress = no_progress,
 ) -> list[Agreement]:
     """Compare logs, joint by joint (`ranges` [rad]), of those joints that at least
@@ -96,9 +96,9 @@ def compare_logs(
 
 
 def _moves(log: Log, joint: int) -> bool:
-    angle = log.angle[:, joint - 1]
-    # NaN: not measured
-    return bool(log.driven[joint - 1]) and np.rad2deg(np.ptp(angle)) > LEAST_WAY
+    way = np.rad2deg(np.ptp(log.angle_of(joint)))
+    # NaN, which is not larger than anything: not measured
+    return log.drives(joint) and bool(way > LEAST_WAY)
 
 
 def _thinned(log: Log) -> Log:
@@ -107,7 +107,8 @@ def _thinned(log: Log) -> Log:
     if step < 2:
         return log
     rows = len(log.time) // step
-    command = log.command[: rows * step].reshape(rows, step, -1).mean(axis=1)
+    grouped = log.command[: rows * step].reshape(rows, step, -1)
+    command = grouped.mean(axis=1)
     keep = slice(0, rows * step, step)
     return replace(
         log,
@@ -143,20 +144,22 @@ class _Course:
     def errors(self, predicted: Array) -> Array:
         """Return errors of angles [rad], shape (T,), less the mean of their window,
         where they count."""
-        error = (self.log.angle[:, self.joint - 1] - predicted)[self.used]
-        return error - (np.bincount(self.window, error) / self.count)[self.window]
+        angle = self.log.angle_of(self.joint)
+        error = (angle - predicted)[self.used]
+        # what drifts from window to window says nothing of how the joint follows
+        mean = np.bincount(self.window, error) / self.count
+        return error - mean[self.window]
 
 
-def _compare(
-    logs: Sequence[Log], joint: int, limits: tuple[float, float]
-) -> Agreement | None:
+def _compare(logs: Sequence[Log], joint: int, limits: Limits) -> Agreement | None:
     courses = [_course(log, joint, limits) for log in logs]
     courses = [course for course in courses if len(course.count) >= LEAST_WINDOWS]
     if len(courses) < LEAST_LOGS:
         return None
-    model = fit_baselines([course.log for course in courses], joint, limits)[NAMES[-1]]
+    baselines = fit_baselines([course.log for course in courses], joint, limits)
     # what stands at an end of its range is left out, so the model need not stop there
-    model = replace(model, limits=np.array([-np.inf, np.inf]))
+    endless = np.array([-np.inf, np.inf])
+    model = replace(baselines[NAMES[-1]], limits=endless)
     courses = _stretched(courses, model)
     common = _refit(model, courses)
     rests, costs = _without_each(common, courses)
@@ -171,8 +174,8 @@ def _compare(
         sd = np.sqrt(clean.variances)
         sd[seeming] = _deviations(clean, seeming)
         return Agreement(joint, sources, clean.values, sd, (seeming, odd))
-    sd = np.array([_deviations(own, k) for k in range(len(courses))])
-    return Agreement(joint, sources, own.values, sd, None)
+    deviations = [_deviations(own, k) for k in range(len(courses))]
+    return Agreement(joint, sources, own.values, np.array(deviations), None)
 
 
 def _without_each(
@@ -187,7 +190,8 @@ def _without_each(
         rest = _refit(model, others)
         rests.append(rest)
         for other in others:
-            costs[k] += np.sum(other.errors(rest.predict(other.log)) ** 2)
+            errors = other.errors(rest.predict(other.log))
+            costs[k] += np.sum(errors**2)
     return rests, costs
 
 
@@ -203,15 +207,17 @@ class _Numbers:
 
 def _numbers(models: Sequence[Baseline], courses: Sequence[_Course]) -> _Numbers:
     """Return the numbers of logs, each against a model."""
-    shape = len(courses), len(SAME)
-    found = _Numbers(np.empty(shape), np.empty(shape), np.empty(shape))
+    shape = (len(courses), len(SAME))
+    values = np.empty(shape)
+    variances = np.empty(shape)
+    costs = np.empty(shape)
     for k, (model, course) in enumerate(zip(models, courses, strict=True)):
         for number in range(len(SAME)):
             value, variance, cost = _alone(model, course, number)
-            found.values[k, number] = value
-            found.variances[k, number] = variance
-            found.costs[k, number] = cost
-    return found
+            values[k, number] = value
+            variances[k, number] = variance
+            costs[k, number] = cost
+    return _Numbers(values, variances, costs)
 
 
 def _stretched(courses: Sequence[_Course], model: Baseline) -> list[_Course]:
@@ -223,37 +229,61 @@ def _stretched(courses: Sequence[_Course], model: Baseline) -> list[_Course]:
     """
     joint = model.joint - 1
     angles = [course.log.angle[:, joint] for course in courses]
-    least, most = min(map(np.min, angles)), max(map(np.max, angles))
-    moved, asked, places = list[Array](), list[Array](), list[Array]()
-    for course, angle in zip(courses, angles, strict=True):
-        rows = max(round(STRIDE / course.log.period), 1)
-        inside = course.used[rows:] & course.used[:-rows]
-        predicted = model.predict(course.log)
-        moved.append((angle[rows:] - angle[:-rows])[inside])
-        asked.append((predicted[rows:] - predicted[:-rows])[inside])
-        places.append((0.5 * (angle[rows:] + angle[:-rows]))[inside])
-    move, ask = np.concatenate(moved), np.concatenate(asked)
-    at = (np.concatenate(places) - least) / (most - least)
-    # the moves asked for, times 1, the place and its square; 1 as if by a few seconds
-    # more of data
-    rows = ask[:, None] * at[:, None] ** np.arange(3)
-    weak = 1e-3 * np.sum(ask**2) + TINY
-    shape = np.linalg.solve(
-        rows.T @ rows + weak * np.eye(3), rows.T @ move + weak * np.array([1, 0, 0])
-    )
+    least = min(map(np.min, angles))
+    travel = max(map(np.max, angles)) - least
+    move, ask, places = _moves_asked(courses, angles, model)
+    shape = _ease(move, ask, (places - least) / travel)
     grid = np.linspace(0.0, 1.0, 201)
     ease = np.polyval(shape[::-1], grid)
-    if ease.mean() <= 0:  # it moves against its commands, or without them
+    # it moves against its commands, or without them
+    if ease.mean() <= 0:
         return list(courses)
     ease = ease.clip(LEAST_EASE * ease.mean())
-    steps = 0.5 * (1 / ease[1:] + 1 / ease[:-1]) * np.diff(grid) * (most - least)
+    # the trapezoidal rule for the integral of 1 / ease
+    slowness = 0.5 * (1 / ease[1:] + 1 / ease[:-1])
+    steps = slowness * np.diff(grid) * travel
     measure = np.concatenate([[0.0], np.cumsum(steps)])
     stretched = list[_Course]()
     for course, angle in zip(courses, angles, strict=True):
         changed = course.log.angle.copy()
-        changed[:, joint] = np.interp((angle - least) / (most - least), grid, measure)
-        stretched.append(replace(course, log=replace(course.log, angle=changed)))
+        place = (angle - least) / travel
+        changed[:, joint] = np.interp(place, grid, measure)
+        log = replace(course.log, angle=changed)
+        stretched.append(replace(course, log=log))
     return stretched
+
+
+def _moves_asked(
+    courses: Sequence[_Course], angles: Sequence[Array], model: Baseline
+) -> tuple[Array, Array, Array]:
+    """Return how far a joint moved within STRIDE, how far a model of it does, and at
+    which angle [rad], (n,) each, in all logs."""
+    moved = list[Array]()
+    asked = list[Array]()
+    places = list[Array]()
+    for course, angle in zip(courses, angles, strict=True):
+        rows = max(round(STRIDE / course.log.period), 1)
+        inside = course.used[rows:] & course.used[:-rows]
+        predicted = model.predict(course.log)
+        move = angle[rows:] - angle[:-rows]
+        ask = predicted[rows:] - predicted[:-rows]
+        middle = 0.5 * (angle[rows:] + angle[:-rows])
+        moved.append(move[inside])
+        asked.append(ask[inside])
+        places.append(middle[inside])
+    return np.concatenate(moved), np.concatenate(asked), np.concatenate(places)
+
+
+def _ease(move: Array, ask: Array, place: Array) -> Array:
+    """Return by which factor a joint moves farther than asked, as a parabola of its
+    place in its travel, from 0 to 1: three coefficients, the constant first."""
+    # the moves asked for, times 1, the place and its square
+    rows = ask[:, None] * place[:, None] ** np.arange(3)
+    # a factor of 1, as if by a few seconds more of data
+    weak = 1e-3 * np.sum(ask**2) + TINY
+    normal = rows.T @ rows + weak * np.eye(3)
+    right = rows.T @ move + weak * np.array([1, 0, 0])
+    return np.linalg.solve(normal, right)
 
 
 def _deviations(numbers: _Numbers, k: int) -> Array:
@@ -262,9 +292,10 @@ def _deviations(numbers: _Numbers, k: int) -> Array:
     They hold its own scatter, the others' spread, and that of a fit to the others.
     """
     rest = np.arange(len(numbers.values)) != k
-    own = numbers.variances[rest]
-    spread = _spread(numbers.values[rest], own)
-    return np.sqrt(numbers.variances[k] + spread + own.mean(axis=0) / rest.sum())
+    scatter = numbers.variances[rest]
+    spread = _spread(numbers.values[rest], scatter)
+    of_the_fit = scatter.mean(axis=0) / rest.sum()
+    return np.sqrt(numbers.variances[k] + spread + of_the_fit)
 
 
 def _refit(model: Baseline, courses: Sequence[_Course]) -> Baseline:
@@ -280,11 +311,14 @@ def _refit(model: Baseline, courses: Sequence[_Course]) -> Baseline:
         )
 
     start = np.array([*model.numbers.ravel(), model.delay])
-    inside = np.clip(start, np.array(LOWER) + 1e-6, np.array(UPPER) - 1e-6)
-    bounds = LOWER, UPPER
-    return made(
-        least_squares(errors, inside, bounds=bounds, x_scale=SCALE, max_nfev=15).x
+    # scipy takes no start on a bound
+    lowest = np.array(LOWER) + 1e-6
+    highest = np.array(UPPER) - 1e-6
+    inside = np.clip(start, lowest, highest)
+    fitted = least_squares(
+        errors, inside, bounds=(LOWER, UPPER), x_scale=SCALE, max_nfev=15
     )
+    return made(fitted.x)
 
 
 def _alone(rest: Baseline, course: _Course, number: int) -> tuple[float, float, float]:
@@ -296,7 +330,7 @@ def _alone(rest: Baseline, course: _Course, number: int) -> tuple[float, float, 
         x[number] = value[0]
         return course.errors(_predict(rest, course.log, x))
 
-    bounds = LEAST_NUMBERS[number], MOST_NUMBERS[number]
+    bounds = (LEAST_NUMBERS[number], MOST_NUMBERS[number])
     scale = STEPS[number]
     fitted = least_squares(
         errors, SAME[number], bounds=bounds, x_scale=scale, diff_step=1e-3
@@ -306,7 +340,8 @@ def _alone(rest: Baseline, course: _Course, number: int) -> tuple[float, float, 
     (slope,) = fitted.jac.T
     scores = np.bincount(course.window, slope * fitted.fun)
     few = len(course.count) / (len(course.count) - 1)
-    variance = few * np.sum(scores**2) / max(np.sum(slope**2), 1e-30) ** 2
+    information = max(np.sum(slope**2), 1e-30)
+    variance = few * np.sum(scores**2) / information**2
     return fitted.x[0], max(variance, 1e-12), 2 * fitted.cost
 
 
@@ -321,26 +356,32 @@ def _predict(model: Baseline, log: Log, x: Array) -> Array:
     return np.interp(log.time - delay, log.time, angle)
 
 
-def _course(log: Log, joint: int, limits: tuple[float, float]) -> _Course:
+def _course(log: Log, joint: int, limits: Limits) -> _Course:
     """Return a joint's motion in a log in windows, which also end where it reaches an
     end."""
-    angle = log.angle[:, joint - 1]
+    angle = log.angle_of(joint)
     margin = 0.01 * np.ptp(angle)
-    low, high = max(limits[0], angle.min()), min(limits[1], angle.max())
+    low = max(limits[0], angle.min())
+    high = min(limits[1], angle.max())
     used = (angle > low + margin) & (angle < high - margin)
     turns = np.cumsum(np.diff(used, prepend=used[:1]))
     pieces = np.stack([turns, log.time // WINDOW], axis=1)[used]
-    _, window = np.unique(pieces, axis=0, return_inverse=True)
-    return _Course(log, joint, used, window.ravel(), np.bincount(window.ravel()))
+    _, piece = np.unique(pieces, axis=0, return_inverse=True)
+    # numpy 2.0 returns a column
+    window = piece.ravel()
+    return _Course(log, joint, used, window, np.bincount(window))
 
 
 def _spread(values: Array, variances: Array) -> Array:
     """Return the variance between logs, by DerSimonian and Laird, shape (3,)."""
     weight = 1 / variances
-    mean = (weight * values).sum(axis=0) / weight.sum(axis=0)
+    total = weight.sum(axis=0)
+    mean = (weight * values).sum(axis=0) / total
     scatter = (weight * (values - mean) ** 2).sum(axis=0)
-    scale = weight.sum(axis=0) - (weight**2).sum(axis=0) / weight.sum(axis=0)
-    return ((scatter - (len(values) - 1)) / scale.clip(TINY)).clip(0.0)
+    # what the variances alone make the values scatter
+    expected = len(values) - 1
+    scale = total - (weight**2).sum(axis=0) / total
+    return ((scatter - expected) / scale.clip(TINY)).clip(0.0)
 
 
 def _odd(numbers: _Numbers, k: int, windows: int) -> int | None:
@@ -349,5 +390,8 @@ def _odd(numbers: _Numbers, k: int, windows: int) -> int | None:
     away = np.abs(numbers.values[k] - SAME)
     # of few windows, standard deviations are rough: as many of a normal distribution
     chance = stdtr(windows - 1, -away / _deviations(numbers, k))
-    far = (away > LEAST) & (-ndtri(chance.clip(1e-300)) > FAR)
-    return int(np.where(far, numbers.costs[k], np.inf).argmin()) if far.any() else None
+    deviations = -ndtri(chance.clip(1e-300))
+    far = (away > LEAST) & (deviations > FAR)
+    if not far.any():
+        return None
+    return int(np.where(far, numbers.costs[k], np.inf).argmin())

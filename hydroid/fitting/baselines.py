@@ -21,7 +21,7 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.optimize import OptimizeResult, least_squares
 
-from hydroid.arrays import Array, record
+from hydroid.arrays import Array, Limits, record
 from hydroid.log import Log
 
 NAMES = ("standing still", "speed tables", "nine numbers")
@@ -61,7 +61,7 @@ class Baseline:
     def predict(self, log: Log) -> Array:
         """Return the angle from the log's start pose under its commands alone [rad],
         shape (T,)."""
-        command = log.command[:, self.joint - 1]
+        command = log.command_of(self.joint)
         side = (command < 0).astype(int)
         if self.table is not None:
             commands, speeds = self.table.T
@@ -69,9 +69,8 @@ class Baseline:
         else:
             dead, exponent, speed = self.numbers[:3, side]
             beyond = (np.abs(command) - dead) / (100.0 - dead)
-            share = np.power(
-                beyond, exponent, out=np.zeros_like(beyond), where=beyond > 0
-            )
+            share = np.zeros_like(beyond)
+            np.power(beyond, exponent, out=share, where=beyond > 0)
             target = speed * share
         return follow(
             target * log.period,
@@ -84,9 +83,11 @@ class Baseline:
 
     def errors(self, logs: Sequence[Log]) -> Array:
         """Return measured minus predicted angles of all logs [rad]."""
-        return np.concatenate(
-            [log.angle[:, self.joint - 1] - self.predict(log) for log in logs]
-        )
+        errors = list[Array]()
+        for log in logs:
+            measured = log.angle_of(self.joint)
+            errors.append(measured - self.predict(log))
+        return np.concatenate(errors)
 
 
 @njit(cache=True)
@@ -111,11 +112,11 @@ def follow(
     angles = np.empty(len(target))
     for k in range(len(target)):
         angles[k] = angle
-        late = k - whole
-        later = late - 1
-        wanted = (1 - part) * target[late] if late >= 0 else 0.0
-        wanted += part * target[later] if later >= 0 else 0.0
-        way = side[max(late, 0)]
+        now = k - whole
+        before = now - 1
+        wanted = (1 - part) * target[now] if now >= 0 else 0.0
+        wanted += part * target[before] if before >= 0 else 0.0
+        way = side[max(now, 0)]
         # the integral of a speed that approaches the wanted one over this sample
         angle += wanted + (speed - wanted) * lag[way] * (1 - left[way])
         speed = wanted + (speed - wanted) * left[way]
@@ -126,16 +127,16 @@ def follow(
 
 
 def fit_baselines(
-    logs: Sequence[Log], joint: int, limits: tuple[float, float]
+    logs: Sequence[Log], joint: int, limits: Limits
 ) -> dict[str, Baseline]:
     """Fit the baselines of a joint (number, from 1) to the logs that measure it.
 
     `limits` is its range [rad]. They are by name, the simplest first. A joint that is
     never driven has only that.
     """
-    measured = [log for log in logs if log.has_angle[joint - 1]]
+    measured = [log for log in logs if log.measures(joint)]
     still = Baseline(joint, np.asarray(limits, float))
-    if not any(log.driven[joint - 1] for log in measured):
+    if not any(log.drives(joint) for log in measured):
         return {NAMES[0]: still}
     # the table has no delay of its own to be fitted: the best of all that are tried is
     # taken
@@ -151,9 +152,8 @@ def _fit_numbers(logs: Sequence[Log], table: Baseline) -> Baseline:
     end."""
 
     def made(x: Array) -> Baseline:
-        return replace(
-            table, table=None, delay=float(x[8]), numbers=x[:8].reshape(4, 2)
-        )
+        numbers = x[:8].reshape(4, 2)
+        return replace(table, table=None, delay=float(x[8]), numbers=numbers)
 
     def fit(start: Array, evaluations: int) -> OptimizeResult:
         return least_squares(
@@ -175,16 +175,16 @@ def _mean_speeds(logs: Sequence[Log], still: Baseline, delay: float) -> Baseline
     for zero command."""
     pairs = list[Array]()
     for log in logs:
-        command = log.command[:, still.joint - 1]
-        angle = log.angle[:, still.joint - 1]
-        late = round(delay / log.period)
-        speed = np.diff(angle[late:]) / log.period
+        command = log.command_of(still.joint)
+        angle = log.angle_of(still.joint)
+        lag = round(delay / log.period)
+        speed = np.diff(angle[lag:]) / log.period
         command = command[: len(speed)]
         # at an end of its range no command moves it
         margin = 0.01 * np.ptp(angle)
         low, high = still.limits
         free = (angle > low + margin) & (angle < high - margin)
-        counts = free[late:-1] & (command != 0)
+        counts = free[lag:-1] & (command != 0)
         pairs.append(np.stack([command, speed])[:, counts])
     command, speed = np.hstack(pairs)
     bins = np.floor(command / (200 / BINS))

@@ -47,7 +47,8 @@ def saving(
         begun = time.monotonic()
         if begun - saved > wait:
             checkpoints[name] = state()
-            saved, pending = time.monotonic(), None
+            pending = None
+            saved = time.monotonic()
             wait = max(SAVE_EVERY, (saved - begun) / SHARE)
 
     try:
@@ -78,8 +79,10 @@ class Memo:
         self.elsewhere = 0
         self._values: dict[bytes, Array] = {}
         """objectives of each candidate, overall last, shape (S + 1,)"""
-        pairs = zip(stored["theta"], stored["values"], strict=True) if stored else ()
-        self.stored = {theta.tobytes(): values.copy() for theta, values in pairs}
+        self.stored: dict[bytes, Array] = {}
+        if stored:
+            for theta, values in zip(stored["theta"], stored["values"], strict=True):
+                self.stored[theta.tobytes()] = values.copy()
 
     @property
     def simulated(self) -> int:
@@ -90,20 +93,28 @@ class Memo:
     @property
     def best(self) -> Array:
         """The candidate with the lowest overall objective, shape (P,)."""
-        return np.frombuffer(min(self._values, key=lambda key: self._values[key][-1]))
+        best = min(self._values, key=lambda key: self._values[key][-1])
+        # its key is the candidate, byte by byte
+        return np.frombuffer(best)
 
     def evaluate(self, theta: Array) -> Array:
         """Evaluate theta as `Problem.evaluate` does, simulating what is new in it.
         Raises RunError: a resumed search does not repeat itself.
         """
-        new = {row.tobytes(): row for row in theta}
-        new = {key: row for key, row in new.items() if key not in self._values}
+        new = dict[bytes, Array]()
+        for row in theta:
+            key = row.tobytes()
+            if key not in self._values:
+                new[key] = row
         values = {key: self.stored.pop(key) for key in new if key in self.stored}
         unknown = [row for key, row in new.items() if key not in values]
         if unknown:
             values |= self._simulated(unknown)
-        self.infeasible += sum(not np.isfinite(row[-1]) for row in values.values())
-        self._values.update((key, values[key]) for key in new)
+        for key in new:
+            # the order in which they were asked for is that of the checkpoint
+            self._values[key] = values[key]
+            if not np.isfinite(values[key][-1]):
+                self.infeasible += 1
         return np.array([self._values[row.tobytes()] for row in theta])
 
     def _simulated(self, unknown: Sequence[Array]) -> dict[bytes, Array]:

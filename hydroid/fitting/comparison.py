@@ -55,14 +55,17 @@ def compare(ours: Sequence[Array], theirs: Sequence[Array]) -> Comparison:
     if blocks == 0:
         return Comparison(outcome=Outcome.UNTOLD)
     to_deg2 = np.degrees(1.0) ** 2
-    differences = [to_deg2 * (a**2 - b**2) for a, b in zip(ours, theirs, strict=True)]
+    differences = list[Array]()
+    for our, their in zip(ours, theirs, strict=True):
+        differences.append(to_deg2 * (our**2 - their**2))
     count = sum(map(len, differences))
     mean = sum(float(block.sum()) for block in differences) / count
     if blocks < 2:
         return Comparison(outcome=Outcome.UNTOLD, difference_deg2=mean, blocks=blocks)
     # the variance of a ratio of sums over blocks: of differences, to samples
     sums = np.array([np.sum(block - mean) for block in differences])
-    sd = float(np.sqrt(blocks / (blocks - 1) * np.sum(sums**2)) / count)
+    variance = blocks / (blocks - 1) * np.sum(sums**2)
+    sd = float(np.sqrt(variance) / count)
     quantile = float(student.ppf(ONE_SIDED, blocks - 1))
     outcome = Outcome.UNTOLD
     if blocks >= LEAST_BLOCKS and abs(mean) > quantile * sd:

@@ -74,7 +74,10 @@ def fit(
     Raises:
         RunError: every simulated candidate diverged.
     """
-    watch, checkpoints = watch or Silent(), {} if checkpoints is None else checkpoints
+    watch = watch or Silent()
+    # an empty one is still to be written to
+    if checkpoints is None:
+        checkpoints = {}
     times, settings = [time.perf_counter()], problem.settings
     first = problem.varied(settings.of_estimate("best"))
     searched = search(first, watch, checkpoints)

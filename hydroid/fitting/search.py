@@ -118,12 +118,12 @@ def search(problem: Problem, watch: Watcher, checkpoints: Checkpoints) -> Search
 
     Raises RunError: the search does not repeat what it did before the checkpoint.
     """
-    late = False
+    time_is_up = False
 
     def refining(step: Step, simulated: int, rms: float) -> bool:
-        nonlocal late
-        late = watch.refining(step, simulated, rms) or late
-        return late
+        nonlocal time_is_up
+        time_is_up = watch.refining(step, simulated, rms) or time_is_up
+        return time_is_up
 
     memo = Memo(problem, checkpoints.get("search"))
     algorithm: Search
@@ -143,17 +143,22 @@ def search(problem: Problem, watch: Watcher, checkpoints: Checkpoints) -> Search
     evaluations = 0
     with saving(checkpoints, "search") as keep:
         while population is None or (
-            len(history) <= algorithm.generations and not late
+            len(history) <= algorithm.generations and not time_is_up
         ):
             repeats = bool(memo.stored)
             chromosomes = algorithm.ask(population, rng)
             result = memo.evaluate(algorithm.theta(chromosomes))
             evaluations += len(chromosomes)
-            objectives = result[:, -1:] if algorithm.single else result[:, :-1]
+            # overall comes last, behind the segments
+            objectives = result[:, :-1]
+            if algorithm.single:
+                objectives = result[:, -1:]
             population = algorithm.tell(population, Population(chromosomes, objectives))
             overall = memo.evaluate(algorithm.theta(population.chromosomes))[:, -1]
             finite = overall[np.isfinite(overall)]
-            best_before = history[-1, 4] if len(history) else np.inf
+            best_before = np.inf
+            if len(history):
+                best_before = history[-1, 4]
             row = [
                 len(history) + 1,
                 evaluations + memo.elsewhere,
@@ -164,8 +169,9 @@ def search(problem: Problem, watch: Watcher, checkpoints: Checkpoints) -> Search
             ]
             history = np.vstack([history, row])
             if not repeats:
-                if not late:  # else a start may not have been refined to its end
+                # else a start may not have been refined to its end
+                if not time_is_up:
                     keep(state)
-                late = watch.generation(history[-1]) or late
+                time_is_up = watch.generation(history[-1]) or time_is_up
     theta = algorithm.theta(population.chromosomes)
     return Searched(theta, population, algorithm.single, history, memo, algorithm.ends)

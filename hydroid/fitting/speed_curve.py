@@ -16,7 +16,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.optimize import isotonic_regression
 
-from hydroid.arrays import Array, Mask, record
+from hydroid.arrays import Array, Limits, Mask, record
 from hydroid.log import Log, one_size
 from hydroid.log.command_sizes import LEAST_COMMAND
 
@@ -61,11 +61,13 @@ class SpeedCurve:
         """Return the side of positive (1) or negative (-1) commands, both command and
         speed above 0."""
         own = sign * self.command >= LEAST_COMMAND
-        order = np.argsort(sign * self.command[own], kind="stable")
+        command = sign * self.command[own]
+        speed = np.maximum(sign * self.speed[own], 0.0)
+        order = np.argsort(command, kind="stable")
         return SpeedCurve(
             self.delay,
-            (sign * self.command[own])[order],
-            np.maximum(sign * self.speed[own], 0.0)[order],
+            command[order],
+            speed[order],
             self.weight[own][order],
             sign * self.direction,
         )
@@ -90,29 +92,34 @@ def measured_speeds(logs: Sequence[Log], joint: int) -> SpeedCurve | None:
 
     None where there are none.
     """
-    own = [log for log in logs if log.driven[joint - 1] and log.has_angle[joint - 1]]
+    own = [log for log in logs if log.drives(joint) and log.measures(joint)]
     if not own:
         return None
-    angles = np.concatenate([log.angle[:, joint - 1] for log in own])
-    reach = float(angles.min()), float(angles.max())
+    angles = np.concatenate([log.angle_of(joint) for log in own])
+    reach = (float(angles.min()), float(angles.max()))
     period = min(log.period for log in own)
     delays = np.arange(0.0, LONGEST_DELAY, period).tolist()
     # which delay is right is seen where commands change, and how fast it moves where
     # they do not
-    tried = [
-        (_isotonic(own, joint, reach, delay, steady=False), delay) for delay in delays
-    ]
-    shown = [(result[0], delay) for result, delay in tried if result is not None]
-    if not shown:
+    left = list[tuple[float, float]]()
+    for delay in delays:
+        result = _isotonic(own, joint, reach, delay, steady=False)
+        if result is not None:
+            left.append((result[0], delay))
+    if not left:
         return None
-    result = _isotonic(own, joint, reach, min(shown)[1], steady=True)
-    return result[1] if result else None
+    # of delays that leave the same the shortest
+    _, likely = min(left)
+    result = _isotonic(own, joint, reach, likely, steady=True)
+    if result:
+        return result[1]
+    return None
 
 
 def _isotonic(
     logs: Sequence[Log],
     joint: int,
-    reach: tuple[float, float],
+    reach: Limits,
     delay: float,
     *,
     steady: bool,
@@ -124,15 +131,17 @@ def _isotonic(
     """
     pairs = [_pairs(log, joint, reach, delay) for log in logs]
     command, speed, weight = np.hstack(pairs)
-    if (
-        len(command) < LEAST_SAMPLES
-        or not np.ptp(command) > LEAST_COMMAND
-        or not speed.any()
-    ):
+    if len(command) < LEAST_SAMPLES:
+        return None
+    commands_differ = np.ptp(command) > LEAST_COMMAND
+    if not commands_differ or not speed.any():
         return None
     if not steady:
         weight = np.ones(len(command))
-    direction = 1.0 if np.average(command * speed, weights=weight) >= 0.0 else -1.0
+    together = np.average(command * speed, weights=weight)
+    direction = -1.0
+    if together >= 0.0:
+        direction = 1.0
     # commands that are alike have one speed: sorted by chance, they would seem to rise
     # with each other
     number = np.unique(np.round(command / ALIKE), return_inverse=True)[1]
@@ -143,31 +152,37 @@ def _isotonic(
     # a drift at rest, such as a sensor's, is no speed of the valve: the curve has one
     # sign at each side
     fitted = np.where(asked > 0.0, np.maximum(fitted, 0.0), np.minimum(fitted, 0.0))
-    left = np.average((direction * speed - fitted[number]) ** 2, weights=weight)
+    error = direction * speed - fitted[number]
+    left = np.average(error**2, weights=weight)
+    whole = np.average(speed**2, weights=weight)
     curve = SpeedCurve(delay, asked, fitted, total, direction)
-    return float(left / np.average(speed**2, weights=weight)), curve
+    return float(left / whole), curve
 
 
-def _pairs(log: Log, joint: int, reach: tuple[float, float], delay: float) -> Array:
+def _pairs(log: Log, joint: int, reach: Limits, delay: float) -> Array:
     """Return commands [%], the speeds that follow them [rad/s], and their weights,
     shape (3, n)."""
-    command, angle = log.command[:, joint - 1], log.angle[:, joint - 1]
+    command = log.command_of(joint)
+    angle = log.angle_of(joint)
     half = max(round(0.5 * WINDOW / log.period), 1)
-    late, before = round(delay / log.period), round(SETTLING / log.period)
-    first = max(half, late + before)
+    lag = round(delay / log.period)
+    settling = round(SETTLING / log.period)
+    first = max(half, lag + settling)
     at = np.arange(first, len(angle) - half)
     if len(at) == 0:
         return np.empty((3, 0))
-    speed = (angle[at + half] - angle[at - half]) / (2 * half * log.period)
-    asked = command[at - late]
-    behind = np.stack([command[at - late - shift] for shift in range(before + 1)])
-    changed = np.ptp(behind, axis=0) / STEADY
+    way = angle[at + half] - angle[at - half]
+    speed = way / (2 * half * log.period)
+    asked = command[at - lag]
+    recent = [command[at - lag - shift] for shift in range(settling + 1)]
+    changed = np.ptp(np.stack(recent), axis=0) / STEADY
     weight = 1.0 / (1.0 + changed * changed)
     there = inside(angle, reach)[at]
     return np.stack([asked, speed, weight])[:, there]
 
 
-def inside(angle: Array, reach: tuple[float, float]) -> Mask:
+def inside(angle: Array, reach: Limits) -> Mask:
     """Which samples are not near the ends of a joint's travel in all logs, (T,)."""
-    margin = END * (reach[1] - reach[0])
-    return (angle > reach[0] + margin) & (angle < reach[1] - margin)
+    low, high = reach
+    margin = END * (high - low)
+    return (angle > low + margin) & (angle < high - margin)

@@ -41,11 +41,18 @@ class Step:
     @property
     def name(self) -> str:
         """Its own name: no two least squares of a fit have the same."""
-        words = [self.estimate, *([str(self.start)] if self.start else [])]
-        words += [f"joint {self.joint}"] if self.joint else []
-        words += ["numbers"] if self.numbers else []
-        words += [f"part {self.horizon}"] if self.horizon else []
-        words += [self.phase] if self.phase else []
+        # checkpoints of stored runs are found by these words, in this order
+        words = [self.estimate]
+        if self.start:
+            words.append(str(self.start))
+        if self.joint:
+            words.append(f"joint {self.joint}")
+        if self.numbers:
+            words.append("numbers")
+        if self.horizon:
+            words.append(f"part {self.horizon}")
+        if self.phase:
+            words.append(self.phase)
         return " ".join(words)
 
     @property

@@ -53,6 +53,9 @@ def summarise(problem: Problem, fit: Fit) -> FitSummary:
     known = account(fit.problem, fit.uncertainty)
     scalars, curves = fit.quantities
     simulations, diverged = fit.history[-1, 2:4]
+    estimates = dict[str, NamedEstimate]()
+    for estimate in fit.estimates.values():
+        estimates[estimate.name] = _named_estimate(problem, estimate)
     converged = None
     ending = None
     if fit.refinement is not None:
@@ -69,10 +72,7 @@ def summarise(problem: Problem, fit: Fit) -> FitSummary:
             "simulations": int(simulations),
             "diverged": int(diverged),
             "findings": (*fit_findings(fit), *known.findings),
-            "estimates": {
-                one.name: _named_estimate(problem, one)
-                for one in fit.estimates.values()
-            },
+            "estimates": estimates,
             "quantities": scalars,
             "curves": curves,
         }
@@ -82,18 +82,16 @@ def summarise(problem: Problem, fit: Fit) -> FitSummary:
 def _named_estimate(problem: Problem, estimate: Estimate) -> NamedEstimate:
     """Return an estimate as it is stored: by names, and in degrees."""
     settings = problem.settings
-    objective = (
-        estimate.overall
-        if settings.objective.relative
-        else np.degrees(estimate.overall)
-    )
+    objective = estimate.overall
+    if not settings.objective.relative:
+        objective = np.degrees(objective)
     gained = None
     if estimate.gained is not None:
         gained = finite_ends(np.array(estimate.gained))
+    # one of another model or with another term has other parameters
+    parameters = settings.of_estimate(estimate.name).parameter_set()
     return NamedEstimate(
-        values=settings.of_estimate(estimate.name)
-        .parameter_set()
-        .mapping(estimate.theta),
+        values=parameters.mapping(estimate.theta),
         rms_deg=finite(np.degrees(estimate.rms)),
         objective=finite(objective),
         gained=gained,
@@ -113,23 +111,20 @@ def account(problem: Problem, known: Uncertainty) -> FitSummary:
     if logs.differing:
         findings.append(Finding("logs disagree", "warning", logs.differing))
     findings += _lasting_findings(problem, errors)
-    several = [
-        one for one in identifiability(problem, known).combinations if len(one) > 1
-    ]
+    combinations = identifiability(problem, known).combinations
+    several = [names for names in combinations if len(names) > 1]
     # the table of directions has all
-    findings += [
-        Finding("combination", "note", tuple(one))
-        for one in several[:MOST_COMBINATIONS]
-    ]
+    for names in several[:MOST_COMBINATIONS]:
+        findings.append(Finding("combination", "note", tuple(names)))
+    # warnings come first
+    findings.sort(key=lambda finding: finding.level == "note")
     return FitSummary(
         stage=problem.settings.stage,
         estimate=estimate,
-        findings=tuple(sorted(findings, key=lambda finding: finding.level == "note")),
+        findings=tuple(findings),
         covariance=known.posterior.stored(parameters),
         errors=errors,
-        left_out_deg={
-            angle: tuple(left_out) for angle, left_out in logs.left_out.items()
-        },
+        left_out_deg={angle: tuple(rms) for angle, rms in logs.left_out.items()},
     )
 
 
@@ -159,17 +154,20 @@ def angle_errors(known: Uncertainty) -> dict[str, AngleError]:
     lasts = lasting(errors, known.innovations)
     result = dict[str, AngleError]()
     for i, signal in enumerate(errors.signals):
-        if signal.quantity == "angle":
-            sensor, rate, way, lasting_square, time = errors.numbers[i].tolist()
-            result[f"q{signal.joint}"] = AngleError(
-                sensor_deg=np.degrees(np.sqrt(sensor)),
-                drift_per_s=np.degrees(np.degrees(rate)),
-                drift_per_way=np.degrees(way),
-                lasting_deg=np.degrees(np.sqrt(lasting_square)),
-                lasting_s=time,
-                after_10_s_deg=np.degrees(_deviation_ahead(errors, i, 10.0)),
-                lasts_s=lasts[signal.joint],
-            )
+        if signal.quantity != "angle":
+            continue
+        sensor, rate, way, lasting_square, time = errors.numbers[i].tolist()
+        result[f"q{signal.joint}"] = AngleError(
+            sensor_deg=np.degrees(np.sqrt(sensor)),
+            # a variance, hence the factor twice
+            drift_per_s=np.degrees(np.degrees(rate)),
+            # a variance per way: one factor is left
+            drift_per_way=np.degrees(way),
+            lasting_deg=np.degrees(np.sqrt(lasting_square)),
+            lasting_s=time,
+            after_10_s_deg=np.degrees(_deviation_ahead(errors, i, 10.0)),
+            lasts_s=lasts[signal.joint],
+        )
     return result
 
 
@@ -177,31 +175,28 @@ def _deviation_ahead(errors: ErrorModel, i: int, seconds: float) -> float:
     """Standard deviation of a signal so many seconds ahead, at its mean speed in the
     logs [rad]."""
     sensor, rate, way, lasting_square, _ = errors.numbers[i]
-    courses = [
-        course
-        for course, own in zip(errors.courses, errors.of, strict=True)
-        if own == i
-    ]
-    speed = sum(course.way.sum() for course in courses) / sum(
-        c.period * len(c.way) for c in courses
-    )
-    return np.sqrt(sensor + lasting_square + (rate + way * speed) * seconds)
+    path = 0.0
+    duration = 0.0
+    for course, own in zip(errors.courses, errors.of, strict=True):
+        if own == i:
+            path += course.way.sum()
+            duration += course.period * len(course.way)
+    drift = rate + way * (path / duration)
+    return np.sqrt(sensor + lasting_square + drift * seconds)
 
 
 def fit_findings(fit: Fit) -> list[Finding]:
     """Return what is to be said about a fit's way to its estimate."""
     findings = [*_ending_findings(fit), *_optima_findings(fit), *_prior_findings(fit)]
-    findings += [
-        Finding("diverged", "warning", (e.name,))
-        for e in fit.estimates.values()
-        if not e.usable
-    ]
+    for estimate in fit.estimates.values():
+        if not estimate.usable:
+            findings.append(Finding("diverged", "warning", (estimate.name,)))
+    scalars, _ = fit.quantities
     # half of a 95 % interval as large as the value, or without end
-    lost = dict.fromkeys(
-        q.label for q in fit.quantities[0].values() if not q.within <= 1.0
-    )
+    lost = [quantity.label for quantity in scalars.values() if not quantity.within <= 1]
     if lost:
-        findings.append(Finding("quantities open", "note", tuple(lost)))
+        labels = tuple(dict.fromkeys(lost))
+        findings.append(Finding("quantities open", "note", labels))
     return findings
 
 
@@ -213,11 +208,10 @@ def _ending_findings(fit: Fit) -> Iterator[Finding]:
     ending = fit.refinement.ending
     if ending.converged:
         return
-    kind = (
-        "not converged"
-        if fit.problem.settings.seeded
-        else "not converged from its start"
-    )
+    kind = "not converged"
+    # another seed would lead it nowhere else
+    if not fit.problem.settings.seeded:
+        kind = "not converged from its start"
     if ending is Ending.TIME:
         kind = "time up"
     yield Finding(kind, "warning", (fit.final,), {"ending": ending.value})
@@ -225,16 +219,15 @@ def _ending_findings(fit: Fit) -> Iterator[Finding]:
 
 def _optima_findings(fit: Fit) -> Iterator[Finding]:
     """Yield the joints whose starts ended at different optima."""
-    apart = [
-        joint
-        for joint, ends in fit.ends.items()
-        if max(ends) > SAME_OPTIMUM + min(ends)
-    ]
-    if apart:
-        names = [
-            fit.problem.settings.arm.joint_names[joint - 1] for joint in apart if joint
-        ]
-        yield Finding("several optima", "note", tuple(names or ["all joints"]))
+    joint_names = fit.problem.settings.arm.joint_names
+    names = list[str]()
+    for joint, ends in fit.ends.items():
+        if max(ends) <= SAME_OPTIMUM + min(ends):
+            continue
+        # joint 0 stands for all of them together
+        names.append(joint_names[joint - 1] if joint else "all joints")
+    if names:
+        yield Finding("several optima", "note", tuple(names))
 
 
 def _prior_findings(fit: Fit) -> Iterator[Finding]:
@@ -242,9 +235,9 @@ def _prior_findings(fit: Fit) -> Iterator[Finding]:
     first."""
     priors = fit.problem.priors
     vague = set[str]()
-    for name, status in zip(
-        fit.problem.parameters.names, fit.uncertainty.status, strict=True
-    ):
+    parameters = fit.problem.parameters.names
+    for name, status in zip(parameters, fit.uncertainty.status, strict=True):
+        # the logs say too little of it to contradict its prior
         if status.source is Source.PRIOR or status.flag is Flag.UNIDENTIFIABLE:
             vague.add(name)
     # heavy tails foresee any distance
@@ -254,7 +247,8 @@ def _prior_findings(fit: Fit) -> Iterator[Finding]:
     for prior in sorted(scores, key=lambda name: -abs(scores[name])):
         score = scores[prior]
         if abs(score) > STRAINED_ABOVE and prior not in vague:
-            far[prior] = f"{abs(score):.1f} {'above' if score > 0 else 'below'}"
+            side = "above" if score > 0 else "below"
+            far[prior] = f"{abs(score):.1f} {side}"
     if far:
         yield Finding("strained prior", "warning", tuple(far), details=far)
 
@@ -263,17 +257,13 @@ def _lasting_findings(
     problem: Problem, errors: Mapping[str, AngleError]
 ) -> list[Finding]:
     """Return the joints whose innovations are not white."""
-    names = problem.settings.arm.joint_names
-    return [
-        Finding(
-            "error lasts",
-            "note",
-            (names[joint - 1],),
-            {"time": errors[f"q{joint}"].lasts_s},
-        )
-        for joint in problem.settings.outputs
-        if errors[f"q{joint}"].lasts_s > 0
-    ]
+    findings = list[Finding]()
+    for joint in problem.settings.outputs:
+        lasts_s = errors[f"q{joint}"].lasts_s
+        if lasts_s > 0:
+            name = problem.settings.arm.name_of(joint)
+            findings.append(Finding("error lasts", "note", (name,), {"time": lasts_s}))
+    return findings
 
 
 def _parameter_findings(
@@ -319,9 +309,8 @@ def _at_bound(problem: Problem, parameter: Parameter, side: str) -> str:
     nobody can widen."""
     if side == "lower":
         return "at zero" if parameter.lower == 0 else "at bound"
-    limits = CHOICES[problem.settings.parameters[parameter.name].quantity].limits
-    return (
-        "at limit"
-        if limits is not None and parameter.upper >= limits[1]
-        else "at bound"
-    )
+    quantity = problem.settings.parameters[parameter.name].quantity
+    limits = CHOICES[quantity].limits
+    if limits is not None and parameter.upper >= limits[1]:
+        return "at limit"
+    return "at bound"

@@ -120,21 +120,25 @@ class Prediction:
         Raises KeyError: the model compares no such joint.
         """
         named = dict(zip(self._named, self.joints, strict=True))
-        number = named.get(joint, joint) if isinstance(joint, str) else joint
+        number = joint
+        if isinstance(joint, str):
+            number = named.get(joint, joint)
         if number not in self.joints:
             raise KeyError(
                 f"no joint {joint!r} is predicted; there {_are(self._named)}"
             )
-        _, unit, factor = display(slides=number in self.slides)
+        shown = display(slides=number in self.slides)
         column = self.joints.index(number)
-        band = self.bands.get(number)
+        half = None
+        if number in self.bands:
+            half = shown.factor * self.bands[number].half
         return JointPrediction(
             name=self._named[column],
-            unit=unit,
+            unit=shown.unit,
             time=self.log.time,
-            measured=factor * self.log.angle[:, number - 1],
-            response=factor * self.response[:, column],
-            half=None if band is None else factor * band.half,
+            measured=shown.factor * self.log.angle_of(number),
+            response=shown.factor * self.response[:, column],
+            half=half,
         )
 
     def __iter__(self) -> Iterator[str]:
@@ -180,13 +184,12 @@ class Prediction:
     def indices(self) -> dict[int, ErrorIndices]:
         """By joint."""
         return {
-            j: error_indices(self.log.angle[:, j - 1], self.error(j))
-            for j in self.joints
+            j: error_indices(self.log.angle_of(j), self.error(j)) for j in self.joints
         }
 
     def error(self, joint: int) -> Array:
         """Return measured minus simulated angle of a joint [rad], shape (T,)."""
-        return self.log.angle[:, joint - 1] - self.response[:, self.joints.index(joint)]
+        return self.log.angle_of(joint) - self.response[:, self.joints.index(joint)]
 
     def plain(self, names: Sequence[str]) -> list[Plain]:
         """Return one mapping per joint, as JSON has them (docs/json.md).
@@ -215,7 +218,9 @@ class Prediction:
 
 
 def _are(names: Sequence[str]) -> str:
-    return f"is {names[0]}" if len(names) == 1 else f"are {listed(names)}"
+    if len(names) == 1:
+        return f"is {names[0]}"
+    return f"are {listed(names)}"
 
 
 def error_indices(measured: Array, error: Array) -> ErrorIndices:
@@ -223,7 +228,9 @@ def error_indices(measured: Array, error: Array) -> ErrorIndices:
     (T,)."""
     size, spread, part = rms(error), np.std(measured), np.abs(error)
     # else it moves by rounding only
-    fit = 100 * (1 - size / spread) if spread > 1e-9 else np.nan
+    fit = np.nan
+    if spread > 1e-9:
+        fit = 100 * (1 - size / spread)
     return ErrorIndices(part.mean(), size, part.max(), fit)
 
 
@@ -246,7 +253,7 @@ def predicted(model: IdentifiedModel, log: Log, unseen: bool | None) -> Predicti
         return part.angle[:, [j - 1 for j in joints]] - predict(model, part, joints)
 
     arm = model.settings.arm
-    named = tuple(arm.joint_names[joint - 1] for joint in joints)
+    named = tuple(arm.name_of(joint) for joint in joints)
     found = Prediction(
         model.name,
         log,
@@ -258,7 +265,9 @@ def predicted(model: IdentifiedModel, log: Log, unseen: bool | None) -> Predicti
         slides=tuple(arm.slides),
         oil=oil,
     )
-    return found if unseen is False else replace(found, ahead=errors_ahead(log, errors))
+    if unseen is False:
+        return found
+    return replace(found, ahead=errors_ahead(log, errors))
 
 
 def errors_ahead(log: Log, errors: Callable[[Log], Array]) -> Array:
@@ -297,7 +306,7 @@ def fitted(fit: Fit) -> tuple[Prediction, ...]:
             angles,
             of_log,
             False,
-            names=tuple(settings.arm.joint_names[joint - 1] for joint in joints),
+            names=tuple(settings.arm.name_of(joint) for joint in joints),
             slides=tuple(settings.arm.slides),
             oil=predict_with_oil(model, log, joints)[1],
         )

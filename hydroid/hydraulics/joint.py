@@ -15,7 +15,7 @@ import numpy as np
 
 from hydroid.hydraulics.cylinder import contact_torque, stop_damping
 from hydroid.hydraulics.elementwise import compilable, implicit_weight, kept
-from hydroid.hydraulics.oil import begin_oil, press, take_flow, volume
+from hydroid.hydraulics.oil import begin_oil, press, take_flow, volumes
 from hydroid.hydraulics.records import LINEAR, NONE
 from hydroid.hydraulics.seals import friction_damping
 from hydroid.hydraulics.solenoid import (
@@ -56,8 +56,8 @@ def command(c, z, w, commands, now: int) -> None:
     """
     w.a.before = z.a.asked
     w.b.before = z.b.asked
-    w.a.after = commands[now - c.a.late]
-    w.b.after = -commands[now - c.b.late]
+    w.a.after = commands[now - c.a.delay_steps]
+    w.b.after = -commands[now - c.b.delay_steps]
     z.a.asked = w.a.after
     z.b.asked = w.b.after
 
@@ -139,14 +139,14 @@ def net_opening(c, z, w, substep: int, step: float) -> float:
     if z.displacement != displacement:
         z.displacement = displacement
         if displacement > 0.0:
-            z.open = c.a.lagging * open_share(c.a, displacement)
+            z.unlagged = c.a.lagging * open_share(c.a, displacement)
         else:
-            z.open = -c.b.lagging * open_share(c.b, -displacement)
+            z.unlagged = -c.b.lagging * open_share(c.b, -displacement)
     # a spool passes its neutral when it does, however large the openings of its two
     # sides are; a speed that lags, as of a mass, passes 0 by the speeds of both
-    left = (z.opening - z.open) * (1.0 - c.opening_keep)
-    z.opening -= left
-    mean = z.open + left * c.opening_steps
+    left = (z.lagged - z.unlagged) * (1.0 - c.opening_keep)
+    z.lagged -= left
+    mean = z.unlagged + left * c.opening_steps
     side = c.a if mean > 0.0 else c.b
     return side.opening * (mean / side.lagging)
 
@@ -198,8 +198,7 @@ def load(c, z, w, step: float) -> None:
     volume_b = c.dead_volume
     if c.kind == LINEAR:
         travel = w.travel + turn * (w.arm + 0.5 * w.slope * turn)
-        volume_a = volume(travel, c.a.area, c.dead_volume)
-        volume_b = volume(c.stroke - travel, c.b.area, c.dead_volume)
+        volume_a, volume_b = volumes(travel, c)
         rub = stop_damping(travel, arm * w.speed, c.stroke, c.stop_penetration)
     if c.dry_friction > 0.0:
         rub += friction_damping(arm * w.speed, c.dry_friction)

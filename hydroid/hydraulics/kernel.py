@@ -131,7 +131,9 @@ class Plugin(NamedTuple):
     @property
     def past(self) -> int:
         """Number of steps that the longest delay reaches back."""
-        return max(self.coefficients[side]["late"].max(initial=0) for side in "ab")
+        return max(
+            self.coefficients[side]["delay_steps"].max(initial=0) for side in "ab"
+        )
 
     def candidate(self, row: int) -> "Plugin":
         """Return the actuators of one of n candidates."""

@@ -46,6 +46,15 @@ def volume(travel, area, dead) -> Any:
 
 
 @compilable
+def volumes(travel, c) -> Any:
+    """Volumes of chambers A and B of a cylinder [m³] whose rod stands at `travel`
+    [m]."""
+    volume_a = volume(travel, c.a.area, c.dead_volume)
+    volume_b = volume(c.stroke - travel, c.b.area, c.dead_volume)
+    return volume_a, volume_b
+
+
+@compilable
 def filling(travel, area, dead) -> Any:
     """ln(V/V_0) of a chamber that opens with `travel` [m] at `area` [m²]."""
     return np.log(volume(travel, area, dead) / dead)
@@ -124,21 +133,21 @@ def store_oil(c, z, w, speed: float, angle: float, supply: float) -> None:
     a = c.a.area
     b = c.b.area
     tank = c.tank_pressure
-    edge = c.conductance * abs(w.travel)
+    edge = c.conductance * abs(w.open_area)
     pressure_a = max(tank, (tank * b + w.push) / a)
     pressure_b = max(tank, (tank * a - w.push) / b)
     if speed != 0.0:
         # the tank edge gives the pressure behind the piston, forces the one before it
         against = w.thrust + w.drag * speed
-        if w.travel > 0.0:
+        if w.open_area > 0.0:
             pressure_b = tank + (speed * b / (edge * c.b.return_)) ** 2
             pressure_a = (pressure_b * b + against + w.push) / a
         else:
             pressure_a = tank + (speed * a / (edge * c.a.return_)) ** 2
             pressure_b = (pressure_a * a + against - w.push) / b
-    elif w.travel > 0.0:
+    elif w.open_area > 0.0:
         pressure_a = max(supply, (tank * b + w.push - w.thrust) / a)
-    elif w.travel < 0.0:
+    elif w.open_area < 0.0:
         pressure_b = max(supply, (tank * a - w.push - w.thrust) / b)
     out = rod_way(c, angle)[0]
     fill_a = out * a / c.dead_volume
@@ -148,7 +157,7 @@ def store_oil(c, z, w, speed: float, angle: float, supply: float) -> None:
         fill_b = filling(c.stroke - out, b, c.dead_volume)
     z.a.oil = max(pressure_a, 0.0) + c.bulk_modulus * fill_a
     z.b.oil = max(pressure_b, 0.0) + c.bulk_modulus * fill_b
-    sign = 1.0 if w.travel > 0.0 else -1.0
+    sign = 1.0 if w.open_area > 0.0 else -1.0
     z.a.flow = sign * a * speed
     z.b.flow = -sign * b * speed
 

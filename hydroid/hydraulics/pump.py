@@ -92,12 +92,12 @@ def left_open(centre: float, c, opening: float) -> float:
 
 @compilable
 def centre_left(coefficients, driven, work) -> float:
-    """Part of the open centre of all valves that the openings `travel` of the driven
+    """Part of the open centre of all valves that the openings `open_area` of the driven
     joints leave."""
     centre = 1.0
     for a in range(driven.size):
         j = driven[a]
-        centre = left_open(centre, coefficients[j], work[j].travel)
+        centre = left_open(centre, coefficients[j], work[j].open_area)
     return centre
 
 

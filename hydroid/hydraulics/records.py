@@ -62,7 +62,7 @@ _SIDE_FIELDS = {
 SIDE = np.dtype(
     [
         *((field, np.float64) for field in _SIDE_FIELDS.values()),
-        ("late", np.int64),  # whole steps of the delay,
+        ("delay_steps", np.int64),  # whole steps of the delay,
         ("fresh", np.float64),  # and sub-steps of the rest
         # part of the pilot stage's error that a sub-step leaves,
         ("pilot_keep", np.float64),
@@ -118,9 +118,10 @@ JOINT_STATE = np.dtype(
             # on ringing oil: velocity [rad/s], and how it changes without what passes
             # the oil at once [rad/s²]
             "turning surge "
-            "opening "  # of the valve: what lags of it, 1 or less; below 0 towards B
-            # of the spool [m], NaN before the first; the share without a lag
-            "displacement open "
+            # how far the valve is open, of what `lag_of_speed` lets lag, from -1 (B) to
+            # 1 (A): with the lag of its opening, and without
+            "lagged unlagged "
+            "displacement "  # of the spool [m], NaN before the first
             # of the look-ahead: turn [rad], velocity v*, torque, h κ
             "way predicted torque armature "
             # contact with what the joint rests on at the start: stiffness, below 0 if
@@ -154,6 +155,8 @@ SCRATCH = np.dtype(
         *_fields(
             # of the whole step: running sums over its sub-steps, and where the joint is
             "inertia way speed torque resistance oil_stiffness travel arm slope "
+            # net opening of the valve [m²], below 0 towards B
+            "open_area "
             # of a sub-step: damping, oil stiffness times step, weight of the new state,
             # torque at rest, f and g of `pump`, and the mean of both
             "drag stiffness weight push thrust sweep pull"
@@ -255,8 +258,8 @@ def coefficients(joints: Records, period: float = 0.01, substeps: int = 1) -> Re
         for name, field in _SIDE_FIELDS.items():
             side[field] = joints[f"{name}_{end}"]
         steps = side.delay / period
-        side["late"] = np.floor(steps)
-        side["fresh"] = (steps - side.late) * substeps
+        side["delay_steps"] = np.floor(steps)
+        side["fresh"] = (steps - side.delay_steps) * substeps
         side["lagging"] = (
             np.maximum(side.opening, 1e-3 * both) / both
         ) ** p.lag_of_speed

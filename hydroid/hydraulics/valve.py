@@ -174,14 +174,14 @@ def rod_speed(c, w, supply: float) -> Any:
     """Speed at which a quasi-static joint's chamber fills [m/s], its flow from the pump
     [m³/s], and how that rises with P [Pa].
 
-    The scratch space w has the net opening `travel` [m²], above 0 towards A, the load
+    The scratch space w has the net opening `open_area` [m²], above 0 towards A, the load
     `push` of gravity and springs, dry friction `thrust` [N], damping `drag` [N·s/m]; of
     a rotary actuator torques. P is `supply`.
     """
-    if w.travel == 0.0:
+    if w.open_area == 0.0:
         return 0.0, 0.0, 0.0
-    side, other, sign = (c.a, c.b, 1.0) if w.travel > 0.0 else (c.b, c.a, -1.0)
-    area = abs(w.travel)
+    side, other, sign = (c.a, c.b, 1.0) if w.open_area > 0.0 else (c.b, c.a, -1.0)
+    area = abs(w.open_area)
     load = sign * w.push + w.thrust
     drag = w.drag
     # what the drops over both edges take from the force of the oil, over v²

@@ -36,7 +36,7 @@ from hydroid.progress import Progress, no_progress
 from hydroid.settings.log import LogSettings
 from hydroid.words import listed
 
-LATE = 0.1
+DISORDER = 0.1
 """how late a message may be recorded [s]: networks reorder messages; a longer step back
 is the clock's"""
 HOLE = 0.1
@@ -77,8 +77,8 @@ class Channel:
         order = np.argsort(times, kind="stable")
         again = np.append(False, np.diff(times[order]) == 0)
         differs = again & np.append(False, np.diff(values[order]) != 0)
-        late = np.flatnonzero(times < latest - round(1e9 * LATE))
-        wrong = [*late, *order[differs]]
+        stepped_back = np.flatnonzero(times < latest - round(1e9 * DISORDER))
+        wrong = [*stepped_back, *order[differs]]
         if wrong:
             first = min(wrong)
             time = (times[first] - times.min()) / 1e9
@@ -232,7 +232,9 @@ def open_bag(
         set_back = _set_back(path)
     remarks = content.remarks()
     if not content.channels:
-        what = listed(remarks) if remarks else "holds no channel of numbers"
+        what = "holds no channel of numbers"
+        if remarks:
+            what = listed(remarks)
         raise LogError(what, path)
     return BagTable(
         source=str(path),
@@ -317,7 +319,7 @@ def _step_back(
     rows = database.execute(query, (topic,))
     times = np.fromiter((time for (time,) in rows), np.int64)
     latest = np.maximum.accumulate(times)
-    back = np.flatnonzero(times < latest - round(1e9 * LATE))
+    back = np.flatnonzero(times < latest - round(1e9 * DISORDER))
     if not len(back):
         return None
     first = int(back[0])

@@ -70,7 +70,9 @@ def _time(recording: Recording, settings: LogSettings) -> Iterator[LogFinding]:
             "error", "time order", falls, signal, time=after, before=before
         )
         return
-    duration = np.ptp(times) if len(times) else 0.0
+    duration = 0.0
+    if len(times):
+        duration = np.ptp(times)
     period = sample_period(time)
     # held commands would not explain the motion between samples that are farther apart
     slowest = 10 * settings.period_s

@@ -30,7 +30,9 @@ def column_unit(name: str, given: str) -> Unit | None:
     """Return the unit that the file gives, or the one in or at the end of the name;
     None: there is none."""
     inside = re.search(r"[\[(<]([^\])>]*)[\])>]\s*$", name)
-    in_brackets = inside[1] if inside else ""
+    in_brackets = ""
+    if inside:
+        in_brackets = inside[1]
     last_word = re.split(r"[_ .]", name)[-1]
     # elsewhere "in" is a direction
     may_be_inch = [given, in_brackets]
@@ -71,10 +73,10 @@ def _kind_by_unit(in_name: Collection[str], unit: Unit) -> str:
 
 
 def _kind_by_words(name: str) -> str:
-    """Return the kind that the last telling word of a name says."""
+    """Return the kind that a name says, by the last of its words that says one."""
     for word in reversed(words(name)):
-        for kind, telling in CLUES["kinds"].items():
-            if word in telling:
+        for kind, vocabulary in CLUES["kinds"].items():
+            if word in vocabulary:
                 return kind
     # "boom_up" is what a valve is told
     sign, _ = direction(name)
@@ -139,7 +141,9 @@ def _only_joint(in_name: set[str], words_of_joints: Sequence[set[str]]) -> int |
     for number, joint_words in enumerate(words_of_joints, 1):
         if in_name & joint_words:
             joints.append(number)
-    return joints[0] if len(joints) == 1 else None
+    if len(joints) == 1:
+        return joints[0]
+    return None
 
 
 def number_in(name: str) -> int | None:
@@ -149,7 +153,9 @@ def number_in(name: str) -> int | None:
         return None
     last = numbers[-1].lstrip("0") or "0"
     # a longer one is no joint's, and Python refuses to convert texts of thousands
-    return int(last) if len(last) <= LONGEST_NUMBER else None
+    if len(last) <= LONGEST_NUMBER:
+        return int(last)
+    return None
 
 
 def direction(name: str) -> tuple[int, frozenset[str]]:

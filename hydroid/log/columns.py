@@ -8,20 +8,12 @@ import numpy as np
 from hydroid.arrays import Array
 from hydroid.errors import LogError
 from hydroid.files import Plain
-from hydroid.log.clues import (
-    CLUES,
-    RAW,
-    column_unit,
-    joint_of,
-    kind_of,
-    words,
-)
-from hydroid.log.mapping import LENGTHS
+from hydroid.log.clues import CLUES, RAW, column_unit, joint_of, kind_of, words
 from hydroid.log.signals import CommandRange, likely_range
 from hydroid.log.table import Signal, Table
+from hydroid.settings.log import ANGLES, LENGTHS
 from hydroid.units import UNITS, Unit, likely_time_unit, unit_of
 
-ANGLES = ("rad", "deg")
 NO_SETTINGS: Plain = {}
 EXCEL_DAYS = 30_000
 """days from 1900 that a spreadsheet's dates are, at least"""

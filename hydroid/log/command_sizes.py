@@ -34,7 +34,7 @@ def only_command(logs: Sequence[Log], joint: int, sign: float) -> float | None:
 
     None where they have several sizes, or there are none.
     """
-    commands = np.concatenate([log.command[:, joint - 1] for log in logs])
+    commands = np.concatenate([log.command_of(joint) for log in logs])
     # those of the other direction become negative, and are left out
     sizes = sign * commands
     sizes = np.sort(sizes[sizes >= LEAST_COMMAND])

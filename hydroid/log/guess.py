@@ -19,11 +19,11 @@ from hydroid.files import Plain
 from hydroid.log.clues import column_unit, kind_of
 from hydroid.log.columns import Column, Entry, rises, signal_columns
 from hydroid.log.joint_columns import JointColumns, Joints, by_joint
-from hydroid.log.mapping import LENGTHS
 from hydroid.log.rods import Rod
 from hydroid.log.signals import CommandRange, likely_range, resting_range
 from hydroid.log.table import Signal, Table
 from hydroid.log.uncalibrated import over_the_joint, over_the_range
+from hydroid.settings.log import LENGTHS
 from hydroid.units import UNITS, likely_time_unit
 from hydroid.words import listed
 

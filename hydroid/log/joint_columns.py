@@ -3,11 +3,11 @@
 from collections.abc import Hashable, Mapping, Sequence
 from typing import NamedTuple
 
-from hydroid.arrays import record
+from hydroid.arrays import Limits, record
 from hydroid.log.clues import direction, joint_of, number_in
 from hydroid.log.columns import Column
-from hydroid.log.mapping import LENGTHS
 from hydroid.log.rods import Rod
+from hydroid.settings.log import LENGTHS
 from hydroid.words import listed
 
 USELESS = "left out, lengths of cylinders whose pivots are not known"
@@ -30,7 +30,7 @@ class Joints:
     links: Sequence[str]
     slides: Sequence[int]
     rods: Mapping[int, Rod]
-    ranges: Mapping[int, tuple[float, float]]
+    ranges: Mapping[int, Limits]
 
     def named_in(self, column: str) -> int:
         """Return the joint whose name, or whose link's, a column's name holds; 0:

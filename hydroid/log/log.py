@@ -68,6 +68,22 @@ class Log:
         """Joints whose angle the log holds, shape (J,)."""
         return ~np.isnan(self.angle[0])
 
+    def angle_of(self, joint: int) -> Array:
+        """Return the angle of a joint (number, from 1) [rad], shape (T,)."""
+        return self.angle[:, joint - 1]
+
+    def command_of(self, joint: int) -> Array:
+        """Return the command of a joint (number, from 1) [%], shape (T,)."""
+        return self.command[:, joint - 1]
+
+    def drives(self, joint: int) -> bool:
+        """Return whether a joint (number, from 1) is ever commanded."""
+        return bool(self.driven[joint - 1])
+
+    def measures(self, joint: int) -> bool:
+        """Return whether the log holds the angle of a joint (number, from 1)."""
+        return bool(self.has_angle[joint - 1])
+
     @property
     def posed(self) -> Array:
         """Angles of all joints [rad], shape (T, J): of those that are not measured that

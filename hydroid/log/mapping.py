@@ -8,23 +8,22 @@ from typing import get_args
 
 import numpy as np
 
+from hydroid.arrays import Limits
 from hydroid.errors import LogError
 from hydroid.log.log import LogFinding, log_finding
 from hydroid.log.rods import Rod, rods_of
 from hydroid.log.table import Signal, Table
 from hydroid.settings.arm import Arm
-from hydroid.settings.log import ColumnMap, Kind, LogSettings
+from hydroid.settings.log import LENGTHS, ColumnMap, Kind, LogSettings
 from hydroid.units import UNITS
 from hydroid.words import listed
 
 SHOWN = {"command": "%", "angle": "deg", "length": "mm", "pressure": "bar"}
 """units in which messages state what is measured"""
-LENGTHS = ("m", "cm", "mm")
-"""units of positions, and of the lengths of cylinders"""
 ALIKE = 0.75
 """least likeness of two names of which one may be the other misspelt, from 0 to 1"""
 
-Ranges = Mapping[str, tuple[float, float]]
+Ranges = Mapping[str, Limits]
 """of all joints [rad, m], by their names"""
 
 
@@ -80,9 +79,7 @@ def angle_margin(low: float, high: float) -> float:
     return max(np.deg2rad(1.0), 0.02 * (high - low))
 
 
-def _limits(
-    kind: Kind, columns: ColumnMap, low: float, high: float
-) -> tuple[float, float]:
+def _limits(kind: Kind, columns: ColumnMap, low: float, high: float) -> Limits:
     """Return the least and the largest value of a signal of a joint with a range."""
     if kind == "angle":
         margin = angle_margin(low, high)
@@ -217,4 +214,6 @@ def _lacks_columns(
 
 def _header_of(table: Table) -> str:
     """Return the place of the names in a file."""
-    return f"{table.source}, line {table.header}" if table.header else table.source
+    if table.header:
+        return f"{table.source}, line {table.header}"
+    return table.source

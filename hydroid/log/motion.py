@@ -5,7 +5,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from hydroid.arrays import Array, record
+from hydroid.arrays import Array, Limits, record
 from hydroid.log.log import Log
 
 QUICK = 0.05
@@ -20,7 +20,7 @@ END = 0.02
 """part of a joint's travel that counts as its end"""
 MOVING = 0.2
 """part of a joint's speed above which it moves"""
-LATE = 0.25
+USUAL_LAG = 0.25
 """how much later than its command a joint moves, by valve and oil [s]"""
 LONGEST_LAG = 0.8
 """that is looked for [s]"""
@@ -50,7 +50,7 @@ class JointMotion:
     joint: int
 
     @cached_property
-    def reach(self) -> tuple[float, float]:
+    def reach(self) -> Limits:
         """Its least and largest angle but for the noise [rad]."""
         return self._slow[1].min(), self._slow[1].max()
 
@@ -75,10 +75,10 @@ class JointMotion:
     def directed(self) -> tuple[float, float]:
         """Its way under strong commands [deg], and the share of this against them; 0 if
         it is too short."""
-        late = round(LATE / self.log.period)
+        lag = round(USUAL_LAG / self.log.period)
         smooth_command, _, speed = self._slow
-        command = smooth_command[: len(smooth_command) - late]
-        steps = np.rad2deg(speed[late:]) * self.log.period
+        command = smooth_command[: len(smooth_command) - lag]
+        steps = np.rad2deg(speed[lag:]) * self.log.period
         strong = np.abs(command) > 0.3 * np.abs(self._logged).max()
         path = np.abs(steps[strong]).sum()
         if path < LEAST_PATH:
@@ -138,10 +138,10 @@ class JointMotion:
         Every 5 % more must explain a thousandth of the samples, else few of them
         decide.
         """
-        late = round(self.likely_lag / self.log.period)
+        lag = round(self.likely_lag / self.log.period)
         _, _, speed = self._quick
-        moves = np.abs(speed[late:]) > 0.1 * self.speed
-        size = np.abs(self._logged[: len(self._logged) - late])
+        moves = np.abs(speed[lag:]) > 0.1 * self.speed
+        size = np.abs(self._logged[: len(self._logged) - lag])
         costs = list[float]()
         for step in range(20):
             wrong = np.mean(moves == (size < 5 * step))
@@ -173,7 +173,7 @@ class JointMotion:
         it off there too; for much longer than its sensor gives the same reading
         elsewhere.
         """
-        angle = self.log.angle[:, self.joint - 1]
+        angle = self.log.angle_of(self.joint)
         command = self._logged
         period = self.log.period
         steps = np.abs(np.diff(angle))
@@ -249,7 +249,7 @@ class JointMotion:
     @property
     def _logged(self) -> Array:
         """Its command as logged [%]."""
-        return self.log.command[:, self.joint - 1]
+        return self.log.command_of(self.joint)
 
     @cached_property
     def _following(self) -> Array:
@@ -278,8 +278,8 @@ def _smoothed(log: Log, joint: int, seconds: float) -> tuple[Array, ...]:
     bell /= bell.sum()
     # a filter by the bell's derivative gives that of the smooth angle
     slope = -samples / width**2 * bell / log.period
-    command = np.pad(log.command[:, joint - 1], reach, "symmetric")
-    angle = np.pad(log.angle[:, joint - 1], reach, "symmetric")
+    command = np.pad(log.command_of(joint), reach, "symmetric")
+    angle = np.pad(log.angle_of(joint), reach, "symmetric")
     return (
         np.convolve(command, bell, "valid").astype(np.float64),
         np.convolve(angle, bell, "valid").astype(np.float64),

@@ -11,7 +11,7 @@ from hydroid.log.motion import END, LEAST_PATH, JointMotion, driven_joints, moti
 from hydroid.log.signals import CommandRange, likely_range
 from hydroid.log.table import Signal
 from hydroid.settings.arm import Arm
-from hydroid.units import way
+from hydroid.units import Display
 
 SMALL = ("±1", "±10 V")
 """ranges of commands whose numbers are possible commands in %, too"""
@@ -45,10 +45,6 @@ class _Joint:
     motion: JointMotion
     command: Signal
     angle: Signal
-
-    @property
-    def slides(self) -> bool:
-        return self.angle.unit != "deg"
 
     def warning(self, kind: str, signal: Signal, **numbers: Any) -> LogFinding:
         return _warning(self.motion.log, kind, signal, **numbers)
@@ -102,7 +98,7 @@ def _constant(
     for (kind, joint), signal in columns.items():
         if kind == "angle":
             values = log.angle
-            shall_change = joint in outputs or log.driven[joint - 1]
+            shall_change = joint in outputs or log.drives(joint)
         elif kind == "command":
             values = log.command
             # that nothing is driven is said already
@@ -152,7 +148,7 @@ def _range(
         remedy = common.remedy(command.gain, command.offset)
         yield joint.warning("range", command, **remedy)
         return
-    likely = likely_range(motion.log.command[:, motion.joint - 1])
+    likely = likely_range(motion.log.command_of(motion.joint))
     if likely is None:
         return
     remedy = likely.remedy(command.gain, command.offset)
@@ -170,7 +166,7 @@ def _direction(joint: _Joint, *, backward: bool) -> Iterator[LogFinding]:
     path, against = joint.motion.directed
     kind = "straight" if backward else "turned"
     numbers = {
-        "path": way(path, slides=joint.slides),
+        "path": joint.angle.shown.way(path),
         "part": 1 - against if backward else against,
         "scale": f"{-joint.command.gain:g}",
     }
@@ -184,11 +180,11 @@ def _not_told(joint: _Joint) -> Iterator[LogFinding]:
     upwards, downwards = motion.unasked
     unasked = max(upwards, downwards)
     if unasked > max(LEAST_PATH, UNASKED * motion.travel):
-        command = motion.log.command[:, motion.joint - 1]
+        command = motion.log.command_of(motion.joint)
         one_way = (command >= 0).all() or (command <= 0).all()
         kind = "half a command" if one_way else "unasked"
         path = "positive" if upwards > downwards else "negative"
-        by = way(unasked, slides=joint.slides)
+        by = joint.angle.shown.way(unasked)
         yield joint.warning(kind, joint.command, by=by, path=path)
     if motion.is_target:
         yield joint.warning("target", joint.command)
@@ -204,7 +200,7 @@ def _still(joint: _Joint) -> Iterator[LogFinding]:
             when = f"from {begin:.4g} s on"
         yield joint.warning("frozen", joint.angle, when=when)
     if motion.push > MUCH_PUSH and 0 < motion.travel < HARDLY_MOVES:
-        most = way(motion.travel, slides=joint.slides)
+        most = joint.angle.shown.way(motion.travel)
         yield joint.warning("no motion", joint.angle, most=most)
 
 
@@ -215,10 +211,11 @@ def motion_findings(logs: Sequence[Log], arm: Arm) -> Iterator[LogFinding]:
     Where no log passes the angle, it is an end of the joint's travel.
     """
     for joint, name in enumerate(arm.joint_names, 1):
-        motions = [motion_of(log, joint) for log in logs if log.has_angle[joint - 1]]
+        motions = [motion_of(log, joint) for log in logs if log.measures(joint)]
         ends = np.array([motion.reach for motion in motions])
+        shown = arm.joint(joint).shown
         for motion in motions:
-            yield from _stands(motion, name, ends, slides=joint in arm.slides)
+            yield from _stands(motion, name, ends, shown)
     for log in logs:
         rest = log.first_command * log.period
         if log.driven.any() and rest < LEAST_REST:
@@ -227,7 +224,7 @@ def motion_findings(logs: Sequence[Log], arm: Arm) -> Iterator[LogFinding]:
 
 
 def _stands(
-    motion: JointMotion, name: str, ends: Array, *, slides: bool
+    motion: JointMotion, name: str, ends: Array, shown: Display
 ) -> Iterator[LogFinding]:
     """Yield where a joint stands in a log although it is driven up or down.
 
@@ -242,6 +239,6 @@ def _stands(
         angle, command = np.median(held, axis=1)
         left = (sign * ends).max() - sign * angle
         kind = "stall" if left > END * np.ptp(ends) else "at a stop"
-        at = way(np.rad2deg(angle), slides=slides)
+        at = shown.way(np.rad2deg(angle))
         numbers = {"angle": at, "command": command, "seconds": seconds}
         yield log_finding("note", kind, motion.log.source, name, side, **numbers)

@@ -39,16 +39,16 @@ def overlap(log: Log, known: Sequence[Log]) -> float:
     Only angles are compared: of joints that move in the log and that a known one
     measures too. A log in which nothing moves is known whole or not at all.
     """
-    telling = 0
-    found = 0
+    moving = 0
+    held = 0
     for stretch in _stretches(log):
         moves = _moves(stretch)
         if moves.any():
-            telling += 1
-            found += any(_holds(other, stretch, moves) for other in known)
-    if not telling:
+            moving += 1
+            held += any(_holds(other, stretch, moves) for other in known)
+    if not moving:
         return float(any(_has_same_angles(log, other) for other in known))
-    return found / telling
+    return held / moving
 
 
 def _has_same_angles(log: Log, other: Log) -> bool:

@@ -58,7 +58,9 @@ def open_table(
     try:
         is_ros_2_bag = (path / "metadata.yaml").is_file()
         # such a bag is a folder, which has no bytes
-        data = b"" if is_ros_2_bag else _first_bytes(path)
+        data = b""
+        if not is_ros_2_bag:
+            data = _first_bytes(path)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise LogError(f"cannot be read ({reason})", path) from None
@@ -129,7 +131,9 @@ def check_parts(
             )
         del recording  # a long one is large
         for part in parts:
-            backward = reading.arm.backward if reading.arm else ()
+            backward = ()
+            if reading.arm:
+                backward = reading.arm.backward
             outputs = reading.outputs or ()
             findings += check_motion(part, signals, outputs, backward, settings.delay_s)
     except LogError as error:

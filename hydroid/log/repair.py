@@ -344,7 +344,9 @@ def _commands(recording: Recording) -> dict[int, Array]:
         if signal.kind != "command":
             continue
         joint = signal.joint - 1
-        sign = -1.0 if signal.part else 1.0
+        sign = 1.0
+        if signal.part:
+            sign = -1.0
         commands[joint] = commands.get(joint, 0.0) + sign * values
         if signal.offset:
             shifted.add(joint)

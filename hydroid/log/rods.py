@@ -5,7 +5,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from hydroid.arrays import Array, record
+from hydroid.arrays import Array, Limits, record
 from hydroid.settings.arm import Arm
 from hydroid.settings.cylinder import LinearActuator
 from hydroid.units import UNITS
@@ -23,10 +23,10 @@ class Rod:
     """A cylinder that turns a joint from a lower to an upper angle [rad], `limits`."""
 
     cylinder: LinearActuator
-    limits: tuple[float, float]
+    limits: Limits
 
     @property
-    def ends(self) -> tuple[float, float]:
+    def ends(self) -> Limits:
         """Its length from pin to pin with the rod in and out [m]."""
         lengths = self.cylinder.length(np.array(self.limits))
         return float(lengths.min()), float(lengths.max())

@@ -14,7 +14,6 @@ from hydroid.arrays import Array, Index
 from hydroid.log.log import LogFinding
 from hydroid.log.repair import GAP, sample_period
 from hydroid.log.table import Recording
-from hydroid.units import way
 
 LEAST_LEAP = np.radians(1.0)
 """of an angle within one sample [rad]; positions [m] take the same number, about 17
@@ -41,12 +40,11 @@ def check_sensors(recording: Recording) -> Iterator[LogFinding]:
     for signal, values in zip(recording.signals, recording.values.T, strict=True):
         if signal.kind != "angle":
             continue
-        slides = signal.unit not in ("", "deg")
         rows = leaps(time, values)
         if len(rows):
             first = rows[0]
             size = abs(values[first] - values[first - 1])
-            by = way(np.rad2deg(size), slides=slides)
+            by = signal.shown.way(np.rad2deg(size))
             yield recording.finding(
                 "warning", "leap", rows, signal, signal.owner, by=by
             )
@@ -55,7 +53,7 @@ def check_sensors(recording: Recording) -> Iterator[LogFinding]:
             continue
         travel = np.nanmax(values) - np.nanmin(values)
         if travel > FEW_STEPS * step:
-            by = way(np.rad2deg(step), slides=slides)
+            by = signal.shown.way(np.rad2deg(step))
             yield recording.finding("note", "coarse", (), signal, signal.owner, by=by)
 
 

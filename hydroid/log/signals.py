@@ -90,7 +90,9 @@ class CommandSignal(NamedTuple):
     def slack(self) -> float:
         """By how much numbers may be off, in a range around 0 half as much."""
         slack = SLACK * self.half
-        return slack / 2 if self.low < 0 else slack
+        if self.low < 0:
+            return slack / 2
+        return slack
 
     @property
     def range(self) -> CommandRange:
@@ -227,7 +229,9 @@ def _fits(signal: CommandSignal, low: float, high: float, unit: str) -> bool:
     if signal.unit and signal.unit != unit:
         return False
     unit_of_signal = unit_of(signal.name.split()[-1])
-    stated = unit_of(unit) if unit else None
+    stated = None
+    if unit:
+        stated = unit_of(unit)
     if unit_of_signal is None or stated is None:
         return True
     return unit_of_signal.quantity == stated.quantity

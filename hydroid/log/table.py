@@ -18,6 +18,7 @@ from hydroid.errors import LogError
 from hydroid.findings import Level
 from hydroid.log.log import LogFinding, log_finding
 from hydroid.log.rods import Rod
+from hydroid.units import TURNING, Display, display
 
 _DAY = 86_400 * 10**9
 """[ns]"""
@@ -63,8 +64,16 @@ class Signal:
     rest: float = 0.0
     rod: Rod | None = None
 
+    @property
+    def shown(self) -> Display:
+        """How messages write the angle, or the position of a joint that slides, that it
+        holds."""
+        return display(slides=self.unit not in ("", TURNING.unit))
+
     def __str__(self) -> str:
-        return f"{self.kind} of joint {self.owner}" if self.joint else self.kind
+        if self.joint:
+            return f"{self.kind} of joint {self.owner}"
+        return self.kind
 
 
 @record
@@ -168,7 +177,9 @@ class Recording:
     ) -> LogFinding:
         """Make a finding at the first of `rows`, about a signal or other subjects; it
         counts the others."""
-        row = self._place(rows[0]) if len(rows) else ""
+        row = ""
+        if len(rows):
+            row = self._place(rows[0])
         more = ""
         if len(rows) > 1:
             more = f" (and {len(rows) - 1} more, to {self._place(rows[-1])})"
@@ -199,7 +210,9 @@ def number(cell: str) -> float | None:
     """Return what float() reads, but for the digit groups of Python's literals (1_000),
     and 1 and 0 of what is true or false; None: no number."""
     try:
-        return float(cell) if "_" not in cell else None
+        if "_" not in cell:
+            return float(cell)
+        return None
     except ValueError:
         return TRUTHS.get(cell.strip().lower())
 
@@ -345,6 +358,8 @@ def format_library(package: str, extra: str, path: Path, kind: str) -> Generator
     except LogError:
         raise
     except Exception as error:
-        reason = "" if isinstance(error, BLIND) else " ".join(str(error).split())
+        reason = ""
+        if not isinstance(error, BLIND):
+            reason = " ".join(str(error).split())
         what = f"cannot be read as {kind} ({reason[:200] or 'damaged'})"
         raise LogError(what, path, "save it again") from None

@@ -72,11 +72,11 @@ def _refuse_incomplete(path: Path, log: Log, signals: Sequence[Signal]) -> None:
     """Refuse a command without a column, and a column without an angle."""
     mapped = {(signal.kind, signal.joint) for signal in signals}
     for joint in range(1, 1 + log.joints):
-        if log.driven[joint - 1] and ("command", joint) not in mapped:
+        if log.drives(joint) and ("command", joint) not in mapped:
             what = f"joint {joint} is driven but no column holds its command"
             hint = f"map a column in log.joints.{joint}.command"
             raise LogError(what, path, hint)
-        if not log.has_angle[joint - 1] and ("angle", joint) in mapped:
+        if not log.measures(joint) and ("angle", joint) in mapped:
             hint = f"set log.joints.{joint}.angle: null"
             raise LogError(f"joint {joint} has no angle to write", path, hint)
 
@@ -87,7 +87,9 @@ def _values(signal: Signal, log: Log, command: Array) -> Array:
     joint = signal.joint - 1
     if signal.kind == "command":
         # the second column is for the negative direction
-        sign = -1 if signal.part else 1
+        sign = 1
+        if signal.part:
+            sign = -1
         return (sign * command[:, joint]).clip(min=signal.low)
     if signal.kind == "angle":
         angle = log.angle[:, joint]

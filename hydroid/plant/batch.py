@@ -22,14 +22,20 @@ from numpy.typing import ArrayLike
 
 from hydroid.arrays import Array, Ints, Mask, Structs
 from hydroid.errors import SettingsError
+from hydroid.hydraulics.elementwise import compilable
 from hydroid.hydraulics.kernel import Plugin, source_key
 from hydroid.mjcf import quiet_mujoco
 from hydroid.plant.plant import PHYSICS, Plant
+from hydroid.rungs import Rung
 from hydroid.simulation.quasi_static import roll_quasi_static, share_pump
 from hydroid.simulation.rollout import Course, Handles, Trace, bind, roll, write_sample
+from hydroid.simulation.rolls import ROLLS
 
-# both rungs' files are in the key of numba's cache
+# the files of all rollouts below are in the key of numba's cache
 SOURCE = source_key(write_sample, share_pump)
+QUASI_STATIC: dict[Callable[..., None], bool] = {roll: False, roll_quasi_static: True}
+"""which branch of `_roll_some` is a rollout's: numba's cache takes no function that is
+handed over"""
 
 
 def _typed_pointer(typing: Any, address: Any) -> Any:
@@ -45,6 +51,12 @@ def _typed_pointer(typing: Any, address: Any) -> Any:
 
 _pointer: Any = intrinsic(_typed_pointer)
 """lets compiled code take an address for that of an array"""
+
+
+@compilable
+def _floats(address: int, count: int) -> Array:
+    """Return the array of so many numbers that stands at an address."""
+    return carray(_pointer(address), (count,), np.float64)
 
 
 class Population(NamedTuple):
@@ -83,7 +95,7 @@ def _roll_some(
     shared: Handles,
     plugin: Plugin,
     plants: Population,
-    at_once: bool,
+    quasi_static: bool,
     source: int = SOURCE,
 ) -> None:
     """Roll some plants out, from rows[0] to before rows[1]; `shared` has what is alike
@@ -102,18 +114,18 @@ def _roll_some(
         handles = Handles(
             model=at[0],
             data=at[1],
-            angle=carray(_pointer(at[2]), (joints,), np.float64),
-            velocity=carray(_pointer(at[3]), (joints,), np.float64),
-            mass=carray(_pointer(at[4]), (entries,), np.float64),
-            applied=carray(_pointer(at[5]), (joints,), np.float64),
-            armature=carray(_pointer(at[6]), (joints,), np.float64),
+            angle=_floats(at[2], joints),
+            velocity=_floats(at[3], joints),
+            mass=_floats(at[4], entries),
+            applied=_floats(at[5], joints),
+            armature=_floats(at[6], joints),
             warnings=carray(_pointer(at[9]), (numbers,), np.int32)[::2],
             columns=shared.columns,
             bare_armature=shared.bare_armature,
             pushed=shared.pushed,
             steps=shared.steps,
-            gravity=carray(_pointer(at[7]), (joints,), np.float64),
-            slack=carray(_pointer(at[8]), (joints,), np.float64),
+            gravity=_floats(at[7], joints),
+            slack=_floats(at[8], joints),
             limits=shared.limits,
         )
         actuators = Plugin(
@@ -126,12 +138,23 @@ def _roll_some(
         )
         course = Course(plants.commands[i], plants.torque[i], nothing, no_openings)
         trace = Trace(plants.angle[i], no_states)
-        if at_once:
+        if quasi_static:
             roll_quasi_static(handles, actuators, plants.state[i], course, trace)
         else:
             roll(handles, actuators, plants.state[i], course, trace)
         finite = np.isfinite(handles.angle).all()
         plants.failed[i] = handles.warnings.any() or not finite
+
+
+def _is_quasi_static(rung: Rung) -> bool:
+    """Return the branch of `_roll_some` that rolls the plants of a rung.
+
+    Raises SettingsError: it has none.
+    """
+    branch = QUASI_STATIC.get(ROLLS[rung])
+    if branch is None:
+        raise SettingsError(f"cannot step the model {rung.name}", "a batch of plants")
+    return branch
 
 
 def copy_records(source: Structs, target: Structs) -> None:
@@ -240,7 +263,9 @@ class PlantBatch:
         Returns:
             The joint angles of all plants [rad], shape (n, J).
         """
-        chosen = np.arange(len(self)) if rows is None else np.asarray(rows, int)
+        chosen = np.arange(len(self))
+        if rows is not None:
+            chosen = np.asarray(rows, int)
         poses: Any = pose
         if pose is None or isinstance(pose, str) or np.ndim(pose) == 1:
             poses = [pose] * len(chosen)
@@ -325,6 +350,7 @@ class PlantBatch:
         if self._pushed.size:
             torque = self._gain * moving + self._balance
             self._population.torque[:] = torque[:, None, self._pushed]
+        # what MuJoCo warns of is seen in `failed`
         with quiet_mujoco():
             # this thread takes a share too: to wake one costs as much as ten plants
             own, *others = self._calls
@@ -369,7 +395,7 @@ class PlantBatch:
                 parts.arm.handles,
                 parts.plugin,
                 self._population,
-                first.rung.at_once,
+                _is_quasi_static(first.rung),
             )
             self._calls.append(call)
 

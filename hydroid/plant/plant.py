@@ -98,7 +98,7 @@ class Plant:
         self.identified = identified
         wanted = joints or identified.summarise().joints or settings.outputs
         self.joints = _joint_numbers(wanted, arm.joint_names)
-        self._named = [arm.joint_names[joint - 1] for joint in self.joints]
+        self._named = [arm.name_of(joint) for joint in self.joints]
         self._active = np.isin(np.arange(1, 1 + len(arm.joint_names)), self.joints)
         others = settings.simulation.other_joints
         self._roles = roles(self._active, others, logged=False)

@@ -103,16 +103,14 @@ def prediction_bands(
     problem = Problem(model.settings, [log])
     errors = stored_error_model(problem, stored)
     variances = _angle_variances(problem, posterior, response.shape)
+    left_out = model.summary.left_out_deg
     bands: dict[int, Band] = {}
     for column, joint in enumerate(outputs):
         sensor, drift = error_variances(errors, column, response[:, column])
-        unseen = np.radians(model.summary.left_out_deg.get(f"q{joint}", ()))
-        bands[joint] = _band(
-            posterior,
-            Spread(variances[:, column], sensor, drift),
-            log.angle[:, joint - 1] - response[:, column],
-            unseen,
-        )
+        spread = Spread(variances[:, column], sensor, drift)
+        error = log.angle_of(joint) - response[:, column]
+        unseen = np.radians(left_out.get(f"q{joint}", ()))
+        bands[joint] = _band(posterior, spread, error, unseen)
     return bands
 
 

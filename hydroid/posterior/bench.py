@@ -40,9 +40,15 @@ class Direction(NamedTuple):
     word: str
 
     @property
+    def moves(self) -> str:
+        """What a command in it does with the joint's weight, raising or lowering; empty
+        where it does neither."""
+        return "" if self.word == self.ending else self.word
+
+    @property
     def when(self) -> str:
         """Says in a sentence when the joint moves in it."""
-        if self.word == self.ending:  # nothing is raised
+        if not self.moves:
             return f"with {self.word} commands"
         return f"when {self.word}"
 
@@ -72,13 +78,13 @@ class Bench:
     @property
     def unit(self) -> tuple[float, str]:
         """What 1 rad, or 1 m of a joint that slides, is in the unit of quantities."""
-        shown = self.settings.arm.joints[self.joint - 1].shown
+        shown = self.settings.arm.joint(self.joint).shown
         return shown.factor, shown.unit
 
     @property
     def slides(self) -> bool:
         """Whether the joint slides: its angle is then a way [m], its torque a force."""
-        return self.settings.arm.joints[self.joint - 1].slides
+        return self.settings.arm.joint(self.joint).slides
 
     @property
     def pose(self) -> str:
@@ -89,7 +95,7 @@ class Bench:
     @property
     def sense(self) -> float:
         """Direction in which a positive command turns the joint, 1 or -1."""
-        actuator = self.settings.arm.joints[self.joint - 1].actuator
+        actuator = self.settings.arm.joint(self.joint).actuator
         if not isinstance(actuator, LinearActuator):
             return 1.0
         return np.sign(actuator.moment_arm(self.angle))
@@ -157,7 +163,9 @@ class Movement:
     @property
     def sign(self) -> float:
         """Direction in which the command turns the joint."""
-        return -self.bench.sense if self.command < 0 else self.bench.sense
+        if self.command < 0:
+            return -self.bench.sense
+        return self.bench.sense
 
     def angles(self, candidates: Candidates) -> Array:
         """Return the angles of n candidates from rest, shape (n, 1 + samples) [rad].
@@ -206,21 +214,18 @@ def make_bench(settings: FitSettings, logs: Sequence[Log], joint: int) -> Bench:
     arm = settings.arm
     pose = logs[0].start
     period = logs[0].period
-    shown = [log for log in logs if log.has_angle[joint - 1]] or logs
+    shown = [log for log in logs if log.measures(joint)] or logs
     angles = np.concatenate([log.posed[:, joint - 1] for log in shown])
     middle = (angles.min() + angles.max()) / 2
     # in whole degrees or millimetres, as words say it
-    if arm.joints[joint - 1].slides:
-        middle = np.round(1e3 * middle) / 1e3
-    else:
-        middle = np.radians(np.round(np.degrees(middle)))
+    middle = arm.joint(joint).shown.rounded(middle)
     command = np.zeros((2, len(pose)))
     still = np.tile(pose, (2, 1))
     rest = Log("a test movement", np.array([0.0, period]), command, still, period)
     alone = settings.changed({"simulation.other_joints": "locked"})
     scenario = make_scenario(load_model(arm), rest, [joint - 1], alone)
     only = (only_command(logs, joint, 1.0), only_command(logs, joint, -1.0))
-    return Bench(settings, joint, float(middle), period, scenario, only)
+    return Bench(settings, joint, middle, period, scenario, only)
 
 
 def actuator(bench: Bench, candidates: Candidates) -> tuple[Records, Array, Array]:

@@ -67,7 +67,8 @@ def by_log(problem: Problem, uncertainty: Uncertainty) -> ByLog:
     logs = np.unique(log_of_channel)
     if len(logs) < 2:
         unknown = np.full(len(uncertainty.theta), np.nan)
-        return ByLog(unknown, np.stack([unknown, unknown], axis=1), unknown, (), {})
+        no_ends = np.stack([unknown, unknown], axis=1)
+        return ByLog(unknown, no_ends, unknown, (), {})
     left_out = _left_out(problem, uncertainty, logs)
     linear = uncertainty.linear
     relative, freedom, ratio = _deviations(uncertainty, left_out, log_of_channel, logs)
@@ -79,7 +80,8 @@ def by_log(problem: Problem, uncertainty: Uncertainty) -> ByLog:
     # in 5 % of the fits with a right model any parameter is said to differ
     stated = np.isfinite(relative)
     level = 0.05 / max(stated.sum(), 1)
-    differing = stated & (chi2.sf(freedom * ratio, freedom) < level)
+    chance = chi2.sf(freedom * ratio, freedom)
+    differing = stated & (chance < level)
     return ByLog(
         relative=relative,
         interval=ends(problem.parameters, linear.box, half),
@@ -114,15 +116,18 @@ class _LeftOut:
 def _left_out(problem: Problem, uncertainty: Uncertainty, logs: Ints) -> _LeftOut:
     """Leave out each of the logs, given by their indices, (G,)."""
     linear = uncertainty.linear
+    log_of_channel = [channel.log for channel in problem.channels]
     lengths = [len(channel.measured) for channel in problem.channels]
-    log_of_sample = np.repeat([channel.log for channel in problem.channels], lengths)
+    log_of_sample = np.repeat(log_of_channel, lengths)
     samples = [np.flatnonzero(log_of_sample == log) for log in logs]
     effects = [linear.effects[:, of_log] for of_log in samples]
     shares = np.array([u @ u.T for u in effects])
     share, axes = np.linalg.eigh(shares)
     alone = share > 0.99
+    # along what only this log determines nothing is left without it: no step
     gain = np.where(alone, 0.0, 1 / (1 - np.minimum(share, 0.99)))
-    inverses = (axes * gain[:, None]) @ axes.transpose(0, 2, 1)
+    scaled = axes * gain[:, None]
+    inverses = scaled @ axes.transpose(0, 2, 1)
     row = linear.innovations.copy()
     steps = np.empty((len(logs), len(linear.slopes)))
     for g, (of_log, u) in enumerate(zip(samples, effects, strict=True)):
@@ -153,12 +158,11 @@ def _deviations(
     over that of the pooled noise, (P,) each."""
     linear = uncertainty.linear
     changes = linear.changes
-    scatters = np.array(
-        [uncertainty.scatters[log_of_channel == log].sum(axis=0) for log in logs]
-    )
-    expected = _expected(
-        changes @ left_out.inverses, left_out.shares, scatters, linear.prior_scatter
-    )
+    by_channel = uncertainty.scatters
+    of_logs = [by_channel[log_of_channel == log].sum(axis=0) for log in logs]
+    scatters = np.array(of_logs)
+    steps = changes @ left_out.inverses
+    expected = _expected(steps, left_out.shares, scatters, linear.prior_scatter)
     mean = np.trace(expected, axis1=1, axis2=2)
     square = np.sum(expected**2, axis=(1, 2))
     changed = np.sum((left_out.steps @ changes.T) ** 2, axis=0)
@@ -173,7 +177,9 @@ def _deviations(
     # unknown by log
     of_one_log = np.where(left_out.alone[:, None], left_out.axes, 0.0)
     owed = np.linalg.norm(changes @ of_one_log, axis=2)
-    widened[(owed > 0.1 * np.linalg.norm(changes, axis=1)).any(axis=0)] = np.inf
+    whole = np.linalg.norm(changes, axis=1)
+    owes_much = (owed > 0.1 * whole).any(axis=0)
+    widened[owes_much] = np.inf
     relative = uncertainty.relative * linear.spread(widened)
     relative[~np.isfinite(uncertainty.relative)] = np.nan
     return relative, linear.spread(freedom), linear.spread(ratio)

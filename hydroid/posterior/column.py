@@ -13,7 +13,7 @@ class Column(NamedTuple):
 
     name: plain ASCII. label: the same in words. positive: it cannot be negative, and
     its interval is multiplicative. at: where the point of a curve is, `along` what; the
-    points of a curve share their name.
+    points of a curve share their name. step, moves: as `CurveEstimate` has them.
     """
 
     name: str
@@ -22,6 +22,8 @@ class Column(NamedTuple):
     positive: bool = True
     at: float | None = None
     along: str = "command [%]"
+    step: float | None = None
+    moves: str = ""
 
 
 Measured: TypeAlias = Iterator[tuple[Column, Array]]

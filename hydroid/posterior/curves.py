@@ -79,31 +79,35 @@ def step_curves(
     start = min(_start(step, step.speeds_of(angles)[:, :samples]), samples)
     unit = f"{bench.unit[1]}/s"
     size = f"{abs(step.command):g} % command, {direction.word}"
-    ending = direction.ending
     begun = np.linspace(0, start - 1, START_POINTS)
     rest = np.linspace(start - 1, samples - 1, REST_POINTS)
     points = np.unique(np.concatenate([begun, rest]).round().astype(int))
     highest = max(1.0 / (LEAST_PERIODS * bench.period), 2.0 * LOWEST)
     frequencies = np.geomspace(LOWEST, highest, FREQUENCY_POINTS)
 
+    def point(
+        kind: str, label: str, unit: str, at: float, along: str, positive: bool = False
+    ) -> Column:
+        name = f"{kind}_{direction.ending}"
+        answered = (step.command, direction.moves)
+        return Column(name, label, unit, positive, at, along, *answered)
+
     def curves(speeds: Array) -> Measured:
-        name = f"step_{ending}"
         label = f"speed after a step to {size}"
         for k in points.tolist():
             at = (k + 0.5) * bench.period  # a speed is that between two samples
-            yield Column(name, label, unit, False, at, "time [s]"), speeds[:, k]
+            yield point("step", label, unit, at, "time [s]"), speeds[:, k]
         amplitude, phase = frequency_response(
             speeds[:, :start], frequencies, bench.period
         )
         label = f"speed over command after a step to {size}"
         along = "frequency [Hz]"
-        name = f"amplitude_{ending}"
+        per = f"{unit} per %"
         for i, at in enumerate(frequencies.tolist()):
             gain = amplitude[:, i] / abs(step.command)
-            yield Column(name, label, f"{unit} per %", True, at, along), gain
-        name = f"phase_{ending}"
+            yield point("amplitude", label, per, at, along, positive=True), gain
         for i, at in enumerate(frequencies.tolist()):
-            yield Column(name, label, "deg", False, at, along), phase[:, i]
+            yield point("phase", label, "deg", at, along), phase[:, i]
 
     return curves
 
@@ -135,8 +139,12 @@ def _before_the_end(bench: Bench, angles: Array) -> int:
     joint's range.
     """
     lower, upper = [*bench.settings.arm.ranges.values()][bench.joint - 1]
-    margin = MARGIN * (upper - lower) if np.isfinite(upper - lower) else 0.0
-    beyond = np.flatnonzero((angles < lower + margin) | (angles > upper - margin))
+    margin = 0.0
+    if np.isfinite(upper - lower):
+        margin = MARGIN * (upper - lower)
+    below = angles < lower + margin
+    above = angles > upper - margin
+    beyond = np.flatnonzero(below | above)
     if not len(beyond):
         return len(angles)
     # two points make a curve

@@ -73,11 +73,12 @@ def profile(problem: Problem, uncertainty: Uncertainty, name: str) -> Profile:
     high, above = _one_side(held, parameters.upper[i], reach)
     points = [(float(uncertainty.theta[i]), 0.0), *below, *above]
     lowest = min(deviance for _, deviance in points)
-    return Profile(
-        (-np.inf if low is None else low, np.inf if high is None else high),
-        lowest,
-        np.array(sorted(points)),
-    )
+    # without a crossing within the bounds that side has no limit
+    if low is None:
+        low = -np.inf
+    if high is None:
+        high = np.inf
+    return Profile((low, high), lowest, np.array(sorted(points)))
 
 
 def _deviance_unit(uncertainty: Uncertainty, i: int) -> float:
@@ -89,7 +90,9 @@ def _deviance_unit(uncertainty: Uncertainty, i: int) -> float:
     variance = uncertainty.posterior.deviations**2
     units = linear.spread(variance / np.sum(linear.changes**2, axis=1))
     # one held at a bound has no variance: the others' largest
-    return units[i] if linear.box.varied[i] else np.nanmax(units)
+    if linear.box.varied[i]:
+        return units[i]
+    return np.nanmax(units)
 
 
 @record

@@ -122,12 +122,14 @@ def linearised(
         before = white.deviations
         after = now.white.deviations
         # above 100 % it does not matter how large a standard deviation is
-        change = np.abs(np.log(after / before))[np.minimum(before, after) < 1.0]
+        matters = np.minimum(before, after) < 1.0
+        change = np.abs(np.log(after / before))[matters]
         if (change <= np.log(4.0)).all():
             break
     effects = np.linalg.norm(now.slopes, axis=1)
     # not the rounding that the axes bring
-    now.slopes[diverging | (effects <= NO_EFFECT_BELOW * effects.max())] = 0.0
+    idle = effects <= NO_EFFECT_BELOW * effects.max()
+    now.slopes[diverging | idle] = 0.0
     return now
 
 
@@ -139,9 +141,11 @@ def estimate_box(parameters: ParameterSet, theta: Array) -> Box:
     bounds' width, of an effect of a group its prior's standard deviation. Raises
     SettingsError: a free parameter on a log scale is 0.
     """
-    least = np.where(parameters.log, 0.0, 0.01 * (parameters.upper - parameters.lower))
+    width = parameters.upper - parameters.lower
+    least = np.where(parameters.log, 0.0, 0.01 * width)
     of_groups = [p.least for p in parameters.parameters]
-    scale = np.maximum(np.maximum(np.abs(theta), least), of_groups)
+    scale = np.maximum(np.abs(theta), least)
+    scale = np.maximum(scale, of_groups)
     for name in parameters.named(parameters.free & (scale == 0)):
         raise SettingsError(
             f"parameter {name} is 0",
@@ -153,12 +157,15 @@ def estimate_box(parameters: ParameterSet, theta: Array) -> Box:
 def prior_slopes(priors: Priors, box: Box) -> Array:
     """Derivatives of the M priors' scores, shape (p, M), per relative change of each
     free parameter."""
-    # they are smooth
-    return differentiate(priors.weighed_at(box.at), box, single_axes(box, 1e-4))
+    # they are smooth, and cost no simulation: single coordinates will do
+    axes = single_axes(box, 1e-4)
+    return differentiate(priors.weighed_at(box.at), box, axes)
 
 
 def white_posterior(box: Box, *parts: Array) -> Posterior:
     """Return the posterior of independent measurements, each (p, m): derivatives over
     their noise."""
+    # what nothing measures keeps a large standard deviation, and not an infinite one
     weak = np.eye(box.varied.sum()) / WEAK_PRIOR
-    return Posterior(box, regular(np.vstack([weak, *(part.T for part in parts)])))
+    rows = [weak, *(part.T for part in parts)]
+    return Posterior(box, regular(np.vstack(rows)))

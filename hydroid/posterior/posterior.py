@@ -103,11 +103,11 @@ class Posterior:
         inside = chosen[self.box.varied]
         # with the others first, the last block of the triangle is the root of what is
         # left (Schur complement)
-        triangle = regular(self.root[:, np.argsort(inside, kind="stable")])
+        others_first = np.argsort(inside, kind="stable")
+        triangle = regular(self.root[:, others_first])
         others = np.sum(~inside)
-        return replace(
-            self, box=self.box.restricted(inside), root=triangle[others:, others:]
-        )
+        root = triangle[others:, others:]
+        return replace(self, box=self.box.restricted(inside), root=root)
 
     def propagate(
         self,
@@ -135,7 +135,8 @@ class Posterior:
             axes = marginal.axes(STEP)
             slopes[inside] = differentiate(function, marginal.box, axes, value)
         finite = np.isfinite(slopes).all(axis=0)
-        sd = np.where(finite, self.sd(np.where(finite, slopes, 0.0)), np.nan)
+        deviations = self.sd(np.where(finite, slopes, 0.0))
+        sd = np.where(finite, deviations, np.nan)
         logarithmic = positive & (value > 0)
         lost = sd > UNIDENTIFIABLE_ABOVE * np.linalg.norm(slopes, axis=0)
         half = self.quantile * sd
@@ -165,14 +166,18 @@ def interval(value: Array, half: Array, multiplicative: Mask) -> Array:
     with np.errstate(all="ignore"):
         factor = np.exp(np.where(multiplicative, half / value, 0.0))
     change = np.where(multiplicative, 0.0, half)
-    return np.stack([value / factor - change, value * factor + change], axis=1)
+    low = value / factor - change
+    high = value * factor + change
+    return np.stack([low, high], axis=1)
 
 
 def regular(rows: Array) -> Array:
     """Return the upper triangle G, (p, p), of G' G = rows' rows, from rows of full
     rank, shape (k, p)."""
     triangle = np.asarray(np.linalg.qr(rows, mode="r"), dtype=float)
-    return triangle * np.where(np.diag(triangle) < 0, -1.0, 1.0)[:, None]
+    # the factorisation leaves the rows' signs open
+    signs = np.where(np.diag(triangle) < 0, -1.0, 1.0)
+    return triangle * signs[:, None]
 
 
 def stored_posterior(model: IdentifiedModel) -> Posterior | None:

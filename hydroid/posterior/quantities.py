@@ -14,7 +14,7 @@ from hydroid.estimate import (
     finite,
     finite_ends,
 )
-from hydroid.hydraulics.oil import volume
+from hydroid.hydraulics.oil import volumes
 from hydroid.hydraulics.records import LINEAR
 from hydroid.hydraulics.solenoid import FULL_SCALE, drive, resting_stroke
 from hydroid.posterior.bench import (
@@ -93,7 +93,7 @@ def _joint_quantities(
     positive = np.array([column.positive for column in columns])
     estimated = uncertainty.posterior.propagate(values, positive, concerned)
 
-    joint_name = problem.settings.arm.joint_names[joint - 1]
+    joint_name = problem.settings.arm.name_of(joint)
     scalars = dict[str, QuantityEstimate]()
     points = defaultdict[str, list[int]](list)
     for i in np.flatnonzero(np.isfinite(estimated.value)).tolist():
@@ -130,6 +130,8 @@ def _curve(
         joint=joint,
         unit=last.unit,
         along=last.along,
+        step=last.step,
+        moves=last.moves,
         at=tuple(_rounded(columns[i].at) for i in order),
         value=tuple(_rounded(estimated.value[rows[i]]) for i in order),
         interval=tuple(_rounded_ends(estimated.interval[rows[i]]) for i in order),
@@ -144,10 +146,11 @@ def _rounded(value: float | None) -> float:
 
 def _rounded_ends(interval: Array) -> Interval:
     low, high = finite_ends(interval)
-    return (
-        None if low is None else _rounded(low),
-        None if high is None else _rounded(high),
-    )
+    if low is not None:
+        low = _rounded(low)
+    if high is not None:
+        high = _rounded(high)
+    return low, high
 
 
 def joint_measure(bench: Bench, estimate: Candidates) -> Measure:
@@ -168,7 +171,11 @@ def joint_measure(bench: Bench, estimate: Candidates) -> Measure:
         for test in tests:
             yield from test.measure(candidates, loads)
         yield from further(bench, candidates, inertia)
-        word, unit = ("force", "N") if bench.slides else ("torque", "N·m")
+        word = "torque"
+        unit = "N·m"
+        if bench.slides:
+            word = "force"
+            unit = "N"
         label = f"gravity {word} at {bench.pose}"
         yield Column("gravity_torque_at_pose", label, unit, False), gravity
 
@@ -224,12 +231,12 @@ def oil(bench: Bench, candidates: Candidates, inertia: Array) -> Measured:
         volume_a = c.dead_volume
         volume_b = c.dead_volume
         if c.kind[0] == LINEAR:
-            volume_a = volume(travel, c.a.area, c.dead_volume)
-            volume_b = volume(c.stroke - travel, c.b.area, c.dead_volume)
+            volume_a, volume_b = volumes(travel, c)
         springs = c.a.area**2 / volume_a + c.b.area**2 / volume_b
         stiffness = arm**2 * c.bulk_modulus * springs
         frequency = np.sqrt(stiffness / inertia) / (2.0 * np.pi)
-        damping = c.damping / (2.0 * np.sqrt(stiffness * inertia))
+        critical = 2.0 * np.sqrt(stiffness * inertia)
+        damping = c.damping / critical
         label = "natural frequency of the arm on the oil"
         yield Column("natural_frequency", label, "Hz"), frequency
         label = "damping ratio of the arm on the oil"
@@ -368,7 +375,9 @@ def _rise(planned: Mapping[float, float], told: Sequence[float]) -> float:
     for size in told:
         if size >= 50.0 and planned[size] > ONSET * planned[100.0]:
             return size
-    return told[-1] if told else 100.0
+    if told:
+        return told[-1]
+    return 100.0
 
 
 def valve_opens(

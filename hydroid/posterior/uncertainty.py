@@ -101,7 +101,10 @@ def flag_of(relative_sd: float, share: float = 1.0) -> Flag:
     The logs alone leave a variance of the posterior's divided by their share. NaN
     counts as infinite.
     """
-    alone = relative_sd / math.sqrt(share) if share > 0 else math.inf
+    alone = math.inf
+    if share > 0:
+        alone = relative_sd / math.sqrt(share)
+    # NaN is not below it either
     if not alone <= UNIDENTIFIABLE_ABOVE:
         return Flag.UNIDENTIFIABLE
     return Flag.WEAK if alone > WEAK_ABOVE else Flag.IDENTIFIABLE
@@ -226,10 +229,14 @@ def _status(
     free = whole.box.varied
     # held ones are flagged as if they were free
     held = np.isnan(relative)
-    deviations = np.where(held, whole.spread(whole.white.deviations), relative)
-    prior = whole.spread(white_posterior(whole.box, whole.prior_slopes).deviations)
-    shares = np.where(free, np.clip(1 - (deviations / prior) ** 2, 0.0, 1.0), 1.0)
-    shares[sensitivity == 0] = 0.0  # not the rounding of their factorisation
+    white = whole.spread(whole.white.deviations)
+    deviations = np.where(held, white, relative)
+    before = white_posterior(whole.box, whole.prior_slopes)
+    prior = whole.spread(before.deviations)
+    gained = 1 - (deviations / prior) ** 2
+    shares = np.where(free, np.clip(gained, 0.0, 1.0), 1.0)
+    # not the rounding of their factorisation
+    shares[sensitivity == 0] = 0.0
     # a stated prior limits a parameter to half of what the weak one leaves, or less
     stated = prior < 0.5 * WEAK_PRIOR
     unknown = (deviations > UNIDENTIFIABLE_ABOVE) & ~stated
@@ -249,10 +256,10 @@ def _status(
 def _scatters(likelihood: Likelihood, errors: ErrorModel, rows: Array) -> Array:
     """Covariance of rows, (n, R + ...), times the innovations, by each of C channels'
     errors, (C, n, n)."""
-    parts = [
-        errors.scatter(number, rows[:, channel.rows], likelihood.errors)
-        for number, channel in enumerate(likelihood.problem.channels)
-    ]
+    parts = list[Array]()
+    for number, channel in enumerate(likelihood.problem.channels):
+        of_channel = rows[:, channel.rows]
+        parts.append(errors.scatter(number, of_channel, likelihood.errors))
     return np.array(parts)
 
 
@@ -265,5 +272,7 @@ def ends(parameters: ParameterSet, box: Box, half: Array) -> Array:
     """
     between = interval(box.at, half * box.scale, parameters.log)
     low = between[:, 0]
-    low[(low < 0) & np.isfinite(low) & (parameters.lower >= 0)] = 0.0
+    # an infinite end stays one: it says that there is no limit
+    impossible = (low < 0) & (parameters.lower >= 0)
+    low[impossible & np.isfinite(low)] = 0.0
     return between

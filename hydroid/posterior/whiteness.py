@@ -73,8 +73,10 @@ def residual_tests(
             continue
         courses = _courses(errors, i)
         rows = [innovations[course.rows] for course in courses]
-        used = [row[course.used] for course, row in zip(courses, rows, strict=True)]
-        commands = [log.command[:, signal.joint - 1] for log in logs]
+        used = list[Array]()
+        for course, row in zip(courses, rows, strict=True):
+            used.append(row[course.used])
+        commands = [log.command_of(signal.joint) for log in logs]
         period = _between(courses)
         lags = _lags(SHOWN, period, used)
         # every sample has a command, whether it counts or not
@@ -118,7 +120,9 @@ def _lasting(courses: list[Course], innovations: Array) -> float:
     lags = _lags(LONGEST, period, logs)
     correlation = autocorrelation(logs, lags)
     square = float(np.sum(correlation**2))
-    if chi2.sf(samples * square, lags) > LEVEL or square < CLEAR:
+    chance = chi2.sf(samples * square, lags)
+    # of many samples even a correlation that nobody minds is certain
+    if chance > LEVEL or square < CLEAR:
         return 0.0
     faint = max(FAINT, correlation[0] / np.e)
     below = int(np.flatnonzero(np.append(correlation, 0.0) < faint)[0])
@@ -137,7 +141,10 @@ def _lags(longest: float, period: float, logs: Sequence[Array]) -> int:
 
     Of short logs, up to a quarter of the shortest.
     """
-    return max(min(round(longest / period), min(map(len, logs)) // 4), 1)
+    shortest = min(map(len, logs))
+    # of longer lags too few products are left to mean anything
+    wanted = min(round(longest / period), shortest // 4)
+    return max(wanted, 1)
 
 
 def autocorrelation(logs: list[Array], lags: int) -> Array:
@@ -165,7 +172,9 @@ def cross_correlation(logs: list[Array], causes: list[Array], lags: int) -> Arra
         change = cause - cause.mean()
         squares += log @ log, change @ change
         for lag in range(lags + 1):
-            late = len(log) - lag
-            products[lags + lag] += log[lag:] @ change[:late]
-            products[lags - lag] += log[:late] @ change[lag:] if lag else 0.0
+            shared = len(log) - lag
+            products[lags + lag] += log[lag:] @ change[:shared]
+            # without a lag both would be the same product, which counts once
+            if lag:
+                products[lags - lag] += log[:shared] @ change[lag:]
     return products / max(np.sqrt(squares.prod()), np.finfo(float).tiny)

@@ -81,7 +81,9 @@ class Bindings:
         joints: Records = np.tile(self._nominal, (len(theta), 1)).view(np.recarray)
         mass = np.tile(self._arm.masses, (len(theta), 1))
         for binding in self._bindings:
-            table = mass if binding.quantity == "mass" else joints[binding.quantity]
+            table = mass
+            if binding.quantity != "mass":
+                table = joints[binding.quantity]
             quantity = QUANTITIES[binding.quantity]
             value = theta[:, binding.column, None] * quantity.factor
             if binding.group is None:
@@ -124,8 +126,10 @@ def _targets(arm: Arm, name: str, settings: ParameterSettings) -> list[int]:
                 f"links: {', '.join(arm.link_names)}",
             )
         return [arm.link_names.index(settings.link)]
-    count = len(arm.joint_names)
-    joints = range(1, count + 1) if settings.joints is None else settings.joints
+    count = len(arm.joints)
+    joints = settings.joints
+    if joints is None:
+        return list(range(count))
     if any(joint > count for joint in joints):
         raise SettingsError(f"the arm has joints 1 to {count}", f"{where}.joints")
     return [joint - 1 for joint in joints]

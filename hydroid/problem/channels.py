@@ -112,7 +112,7 @@ class _Signal(NamedTuple):
 def _angles(log: Log, settings: FitSettings) -> Iterator[_Signal]:
     weights = settings.objective.weights
     for column, joint in enumerate(settings.outputs):
-        measured = log.angle[:, joint - 1]
+        measured = log.angle_of(joint)
         yield _Signal(joint, "angle", column, measured, weights.get(joint, 1.0))
 
 
@@ -175,11 +175,13 @@ def segment_objectives(
     first segments of a simulation that diverged later count for nothing. `bounds` are
     [first, end) of each segment in samples, (S, 2).
     """
-    columns = [
-        overall_objective(error[:, a:b], measured[a:b], settings) for a, b in bounds
-    ]
+    columns = list[Array]()
+    for first, end in bounds:
+        inside = error[:, first:end]
+        columns.append(overall_objective(inside, measured[first:end], settings))
     objectives = np.stack(columns, axis=1)
-    objectives[~np.isfinite(objectives).all(axis=1)] = np.inf
+    diverged = ~np.isfinite(objectives).all(axis=1)
+    objectives[diverged] = np.inf
     return objectives
 
 

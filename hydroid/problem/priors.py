@@ -67,7 +67,8 @@ class _Combination:
 
     def distances(self, theta: Array) -> Array:
         """Distance from the value in standard deviations, shape (n, 1)."""
-        return (self.excess(theta) / self.tolerance(theta))[:, None]
+        deviations = self.excess(theta) / self.tolerance(theta)
+        return deviations[:, None]
 
 
 @record
@@ -82,7 +83,9 @@ class _Bends:
         """Logarithms of the ratios of neighbours, the last one to 1, over the scale:
         (n, P) -> (n, m)."""
         logs = np.log(theta[:, self.columns])
-        ahead = np.hstack([logs[:, 1:], np.zeros((len(theta), 1))])
+        # the last part of a curve has the factor 1, whose logarithm is 0
+        last = np.zeros((len(theta), 1))
+        ahead = np.hstack([logs[:, 1:], last])
         return (logs - ahead) / self.sd
 
 
@@ -98,15 +101,17 @@ class _Heavy:
         square = (distances * distances).sum(axis=1, keepdims=True)
         # log(1 + x)/x is 1 there to the last digit
         far = np.maximum(square / FREEDOM, 1e-12)
-        many = distances.shape[1]
-        return distances * np.sqrt((FREEDOM + many) / FREEDOM * np.log1p(far) / far)
+        count = distances.shape[1]
+        shrinking = np.log1p(far) / far
+        return distances * np.sqrt((FREEDOM + count) / FREEDOM * shrinking)
 
     def weight(self, theta: Array) -> float:
         """Factor on distances at one theta, (1, P), by which a normal prior has the
         same slope there."""
         distances = self.inner.distances(theta)[0]
         square = distances @ distances
-        return float(np.sqrt((FREEDOM + len(distances)) / (FREEDOM + square)))
+        weight = (FREEDOM + len(distances)) / (FREEDOM + square)
+        return float(np.sqrt(weight))
 
 
 class Priors:
@@ -126,6 +131,7 @@ class Priors:
         for column, p in enumerate(parameters.parameters):
             if p.prior is not None and p.fixed is None:
                 self._single[column] = p.prior
+                # a search that draws beyond would spend itself on what nobody believes
                 lower = max(p.lower, p.prior.value(-REACH))
                 upper = min(p.upper, p.prior.value(REACH))
                 searched[column] = replace(p, lower=lower, upper=upper)
@@ -141,9 +147,9 @@ class Priors:
             self._several.append(further)
             if isinstance(further, _Combination):
                 self._combinations.append(further)
-            many = further.distances(self.searched.start[None]).shape[1]
-            names += [name] * many
-            firm += [isinstance(further, _Combination)] * many
+            count = further.distances(self.searched.start[None]).shape[1]
+            names += [name] * count
+            firm += [isinstance(further, _Combination)] * count
         self.names = tuple(names)
         self.firm: Mask = np.array(firm, dtype=bool)
         if self._combinations:
@@ -178,9 +184,10 @@ class Priors:
 
     def _single_scores(self, theta: Array) -> list[Array]:
         """Return the scores of the priors of single parameters, (n, 1) each."""
-        return [
-            prior.score(theta[:, [column]]) for column, prior in self._single.items()
-        ]
+        scores = list[Array]()
+        for column, prior in self._single.items():
+            scores.append(prior.score(theta[:, [column]]))
+        return scores
 
     def weighed_at(self, theta: Array) -> Callable[[Array], Array]:
         """Return scores, (n, P) -> (n, M), with priors of heavy tails as they act at
@@ -268,7 +275,9 @@ def _bends(
 
 def _least(parameter: Parameter) -> float:
     """Return the least value that a parameter can have."""
-    return parameter.lower if parameter.fixed is None else parameter.fixed
+    if parameter.fixed is None:
+        return parameter.lower
+    return parameter.fixed
 
 
 def _combination(prior: PriorSettings, parameters: ParameterSet) -> _Combination | None:
@@ -280,7 +289,9 @@ def _combination(prior: PriorSettings, parameters: ParameterSet) -> _Combination
         return None
     width = np.where(free, parameters.upper - parameters.lower, 0.0)
     # shortest in a box whose sides all count for 1
-    step = factors * width**2 / np.sum((factors * width) ** 2)
+    in_box = factors * width
+    step = factors * width**2 / np.sum(in_box**2)
+    # a constraint is exact but for this: something must be left to divide by
     sd = prior.sd or CONSTRAINT_SD * float(np.abs(factors) @ width)
     if prior.ratio is None:
         return _Combination(factors, prior.value or 0.0, sd, None, step)

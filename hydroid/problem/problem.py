@@ -25,7 +25,7 @@ from hydroid.problem.channels import (
 )
 from hydroid.problem.priors import Priors
 from hydroid.settings.fit import FitSettings
-from hydroid.simulation import Response, make_simulation
+from hydroid.simulation import Response, Simulation, make_simulation
 from hydroid.simulation.roles import roles
 
 CHUNK = 2**23  # residuals that are held in memory at a time, 64 MiB
@@ -70,21 +70,20 @@ class Problem:
                 "no parameter is free", "parameters", "fix fewer of them"
             )
         self.priors = Priors(settings.priors, self.parameters)
-        self._simulations = [
-            make_simulation(
-                spec, log, outputs, settings, compared_pressures(log, settings)
-            )
-            for log in logs
-        ]
+        self._simulations: list[Simulation] = []
+        for log in logs:
+            pressures = compared_pressures(log, settings)
+            simulation = make_simulation(spec, log, outputs, settings, pressures)
+            self._simulations.append(simulation)
         self.channels = make_channels(logs, settings)
         self.measured = np.concatenate([c.weight * c.measured for c in self.channels])
         segments: list[Ints] = []
         for channel in self.channels:
             # a pressure is one objective, however long
-            many = 1
+            count = 1
             if channel.quantity == "angle":
-                many = settings.objective.segments
-            within = segment_bounds(len(channel.measured), many)
+                count = settings.objective.segments
+            within = segment_bounds(len(channel.measured), count)
             segments.append(channel.rows.start + within)
         self.bounds: Ints = np.concatenate(segments)
 
@@ -101,14 +100,19 @@ class Problem:
         same place."""
         if settings is self.settings and logs is None:
             return self
-        return Problem(settings, self.logs if logs is None else logs, self._spread)
+        if logs is None:
+            logs = self.logs
+        return Problem(settings, logs, self._spread)
 
     def started(self, log: Log) -> list[int]:
         """Joints whose measured angle only their start is simulated from, numbered from
         1."""
         compared = np.isin(np.arange(log.joints), self.outputs)
-        of_joints = roles(log.driven | compared, self.settings.simulation.other_joints)
-        return (np.flatnonzero(log.has_angle & ~of_joints.following) + 1).tolist()
+        active = log.driven | compared
+        of_joints = roles(active, self.settings.simulation.other_joints)
+        # those that follow the log are where it has them throughout
+        only_start = log.has_angle & ~of_joints.following
+        return (np.flatnonzero(only_start) + 1).tolist()
 
     def theta(self, unit: Array) -> Array:
         """Return candidates, (n, P), from points of the search's unit box, moved to
@@ -120,10 +124,10 @@ class Problem:
         """The point of the search's unit box where it starts, shape (p,); None: not
         stated."""
         searched = self.priors.searched
-        stated = any(
-            p.start is not None and p.fixed is None for p in searched.parameters
-        )
-        return searched.to_unit(searched.start) if stated else None
+        for parameter in searched.parameters:
+            if parameter.start is not None and parameter.fixed is None:
+                return searched.to_unit(searched.start)
+        return None
 
     def evaluate(self, theta: Array) -> Array:
         """Return the objectives of theta, (n, P), by segment and overall last, shape
@@ -134,9 +138,9 @@ class Problem:
         """
         if self._spread is None:
             return self.objectives(theta)
-        values = self._spread(
-            self._on_worker, "objectives", theta, len(self.bounds) + 1
-        )
+        columns = len(self.bounds) + 1
+        values = self._spread(self._on_worker, "objectives", theta, columns)
+        # NaN: candidates that killed their workers
         values[np.isnan(values)] = np.inf
         return values
 
@@ -167,9 +171,8 @@ class Problem:
     def errors(self, responses: Sequence[Response]) -> Array:
         """Return the weighted output errors of n candidates' responses to all logs
         [rad], shape (n, R)."""
-        return np.concatenate(
-            [c.error(responses[c.log]) for c in self.channels], axis=1
-        )
+        errors = [channel.error(responses[channel.log]) for channel in self.channels]
+        return np.concatenate(errors, axis=1)
 
     def leaves_noise(self, theta: Array) -> bool:
         """Whether errors at an estimate, (P,), change between samples as white noise
@@ -177,7 +180,9 @@ class Problem:
         errors = self.output_errors(theta[None])[0]
         for channel in self.channels:
             error = errors[channel.rows]
-            if not np.mean(np.diff(error) ** 2) > WHITE * np.var(error):
+            change = np.mean(np.diff(error) ** 2)
+            # NaN, of a simulation that diverged, is not larger
+            if not change > WHITE * np.var(error):
                 return False
         return True
 
@@ -192,11 +197,11 @@ class Problem:
     def angles(self, errors: Array, joints: Collection[int] = ()) -> Array:
         """Return the output errors, of (n, R), of the angles of joints (from 1), or
         all, unweighted [rad]."""
-        angles = [
-            errors[:, c.rows] / c.weight
-            for c in self.channels
-            if c.quantity == "angle" and (not joints or c.joint in joints)
-        ]
+        angles = list[Array]()
+        for channel in self.channels:
+            is_meant = not joints or channel.joint in joints
+            if channel.quantity == "angle" and is_meant:
+                angles.append(errors[:, channel.rows] / channel.weight)
         return np.concatenate(angles, axis=1)
 
     def rms(self, errors: Array, joints: Collection[int] = ()) -> Array:

@@ -4,6 +4,7 @@ machine without CAD."""
 import math
 from collections.abc import Mapping, Sequence
 
+from hydroid.arrays import Limits
 from hydroid.errors import SettingsError
 from hydroid.log.clues import words
 
@@ -39,13 +40,13 @@ LONGEST = 100.0
 """of a link [m]"""
 
 
-NO_RANGES: Mapping[str, tuple[float, float]] = {}
+NO_RANGES: Mapping[str, Limits] = {}
 
 
 def boxes_urdf(
     joints: Sequence[str],
     lengths: Sequence[float],
-    ranges: Mapping[str, tuple[float, float]] = NO_RANGES,
+    ranges: Mapping[str, Limits] = NO_RANGES,
 ) -> str:
     """Return a URDF of an arm whose links are boxes; a joint of length 0 turns its link
     about the vertical, and one called a telescope slides out of the link before.
@@ -63,7 +64,9 @@ def boxes_urdf(
     parts = ['<link name="base"/>']
     for joint, length in zip(joints, lengths, strict=True):
         upright = length == UPRIGHT
-        size = reach / SLENDER if upright else length
+        size = length
+        if upright:
+            size = reach / SLENDER
         own = f"{joint}_link"
         if is_telescope(joint):
             # drawn in, it ends where the link does that it slides in
@@ -126,9 +129,13 @@ def _check_lengths(joints: Sequence[str], lengths: Sequence[float]) -> None:
 def _link(name: str, size: float, length: float, *, cube: bool) -> str:
     """Return a box along x, or one around the axis of a link that slews, which weighs
     as the arm does."""
-    wide = size if cube else size / SLENDER
+    wide = size
+    if not cube:
+        wide = size / SLENDER
     mass = min(MASS * length**2, DENSEST * size * wide**2)
-    middle = 0.0 if cube else size / 2
+    middle = 0.0
+    if not cube:
+        middle = size / 2
     along, across = mass * wide**2 / 6, mass * (wide**2 + size**2) / 12
     origin = f'<origin xyz="{middle:g} 0 0"/>'
     return (
@@ -138,7 +145,7 @@ def _link(name: str, size: float, length: float, *, cube: bool) -> str:
     )
 
 
-def _usual_range(name: str, length: float) -> tuple[float, float]:
+def _usual_range(name: str, length: float) -> Limits:
     """Return the range of a joint that is called so [rad, m]."""
     if is_telescope(name):
         return 0.0, SLID * length
@@ -150,9 +157,7 @@ def _usual_range(name: str, length: float) -> tuple[float, float]:
     return math.radians(low), math.radians(high)
 
 
-def _joint(
-    name: str, parent: str, at: str, length: float, limits: tuple[float, float]
-) -> str:
+def _joint(name: str, parent: str, at: str, length: float, limits: Limits) -> str:
     kind = "revolute"
     # positive angles lift
     axis = "0 -1 0"

@@ -25,7 +25,9 @@ def column_lines(table: Table) -> tuple[str, ...]:
     names = [name for name in dict.fromkeys(table.names) if name]
     lines = list[str]()
     for name in names[:MOST]:
-        shown = name if name.isprintable() else ascii(name)[1:-1]
+        shown = name
+        if not name.isprintable():
+            shown = ascii(name)[1:-1]
         lines.append(f"{shown}: {_described(table, name)}")
     if len(names) > MOST:
         lines.append(f"and {len(names) - MOST} more columns")
@@ -61,7 +63,9 @@ def _choices(values: Array, unit: str) -> Iterator[str]:
     if likely and likely.name == "%":
         yield "a command in %"
     elif likely:
-        offset = f", offset: {likely.offset:.4g}" if likely.offset else ""
+        offset = ""
+        if likely.offset:
+            offset = f", offset: {likely.offset:.4g}"
         yield f"a command in {likely.name} (scale: {likely.scale:.4g}{offset})"
     most = np.abs(values).max()
     if most <= RADIANS:

@@ -4,8 +4,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
 
-import numpy as np
-
 from hydroid.arrays import Array, record
 from hydroid.errors import LogError
 from hydroid.files import Plain
@@ -77,9 +75,7 @@ def find_layout(
     order: Sequence[str] = (),
     *,
     given: LogSettings | None = None,
-    others: Sequence[Path] = (),
-    unseen: Path | None = None,
-    in_range: bool = True,
+    others: Others | None = None,
 ) -> Layout:
     """Guess the columns of a log, turn commands that act against the angle,
     and see how fast joints are.
@@ -92,8 +88,6 @@ def find_layout(
         given: what a person says of the columns, which are not guessed then.
         others: further logs of the same columns; a joint that one of them drives can be
             fitted. One that cannot be read by the columns of the first is left out.
-        unseen: a log to validate on, of which no more is asked.
-        in_range: False: the arm's ranges are guesses, which logs may leave.
 
     Raises:
         SettingsError: no joint has one of the names.
@@ -105,15 +99,15 @@ def find_layout(
         return Layout(
             {"period_s": 0.01, "joints": {}}, every, (), (), {}, followed=False
         )
-    more = Others(others, unseen, in_range)
+    others = others or Others()
     if given is not None:
         guess = _given(table, arm, given)
-        return _seen(table, arm, guess, more, GIVEN)
+        return _seen(table, arm, guess, others, GIVEN)
     guess = guessed_section(table, arm, order)
     missing = missing_column(guess.log, targets=_has_targets(table))
     if missing:
         return _skeleton(table, arm, guess, missing)
-    return _seen(table, arm, guess, more, GUESSED)
+    return _seen(table, arm, guess, others, GUESSED)
 
 
 def _seen(
@@ -124,7 +118,10 @@ def _seen(
     reasons = [*guess.reasons]
     settings = validate(guess.log, LogSettings, table.source)
     logs = read_first(table, settings, arm, reasons, strict=origin == GIVEN)
-    backwards = mirror_sensors(logs, guess, arm, in_range=others.in_range)
+    backwards: tuple[str, ...] = ()
+    # a person who names columns knows which way they count
+    if origin == GUESSED:
+        backwards = mirror_sensors(logs, guess, arm, in_range=others.in_range)
     if backwards:
         reasons += backwards
         settings = validate(guess.log, LogSettings, table.source)
@@ -174,7 +171,7 @@ def _driven(
     joints: Sequence[int], logs: Sequence[Log], names: Sequence[str], reasons: list[str]
 ) -> list[int]:
     """Return the joints that any log drives; of the others say so."""
-    driven = [joint for joint in joints if any(log.driven[joint - 1] for log in logs)]
+    driven = [joint for joint in joints if any(log.drives(joint) for log in logs)]
     idle = [names[joint - 1] for joint in joints if joint not in driven]
     if idle:
         reasons.append(f"{listed(idle)}: no command in the logs, so not compared")
@@ -195,7 +192,7 @@ def _turn_commands(
     wrong = list[int]()
     for joint, motion in motions.items():
         is_wrong = motion.contradicts(backward=joint in arm.backward)
-        reasons += _remarks(motion, arm.joints[joint - 1], is_wrong)
+        reasons += _remarks(motion, arm.joint(joint), is_wrong)
         if is_wrong:
             entries[joint]["command"] = turned(entries[joint]["command"])
             wrong.append(joint)
@@ -249,8 +246,8 @@ def _skeleton(table: Table, arm: Arm, guess: ColumnGuess, missing: str) -> Layou
     for number, joint in enumerate(arm.joints, 1):
         entry = dict(guess.log["joints"].get(number, {"command": None, "angle": None}))
         entry["command"] = entry["command"] or {"column": "COMMAND", "scale": 1}
-        unit = "m" if joint.slides else "deg"
-        entry["angle"] = entry["angle"] or {"column": "ANGLE", "unit": unit}
+        placeholder = {"column": "ANGLE", "unit": joint.shown.setting}
+        entry["angle"] = entry["angle"] or placeholder
         entries[number] = entry
     placeholders = {
         "time": {"column": "TIME", "unit": "s"},
@@ -276,7 +273,7 @@ def _refuse_rest(
     them."""
     travels = dict[int, float]()
     for joint in driven:
-        moved = [motion_of(log, joint).travel for log in logs if log.driven[joint - 1]]
+        moved = [motion_of(log, joint).travel for log in logs if log.drives(joint)]
         if moved:
             travels[joint] = max(moved)
     if any(travel > MOVED for travel in travels.values()):
@@ -292,14 +289,14 @@ def _refuse_rest(
 
 
 def _remarks(motion: JointMotion, joint: Joint, wrong: bool) -> Iterator[str]:
-    angle = motion.log.angle[:, motion.joint - 1]
+    angle = motion.log.angle_of(motion.joint)
     if not joint.continuous:
         yield from _beyond_range(angle, joint)
     if wrong:
         _, against = motion.directed
         share = f"on {max(against, 1 - against):.0%} of its way"
         yield f"{joint.name} moves against its command ({share}): the command's sign is reversed"
-    if motion.log.driven[motion.joint - 1] and motion.dead_band > 10:
+    if motion.log.drives(motion.joint) and motion.dead_band > 10:
         below = f"below about {motion.dead_band:g} % of command"
         yield f"{joint.name} hardly moves {below}: a dead band, or little opening"
 
@@ -312,16 +309,12 @@ def _beyond_range(angle: Array, joint: Joint) -> Iterator[str]:
     margin = angle_margin(lowest, highest)
     if low >= lowest - margin and high <= highest + margin:
         return
-    if joint.slides:
-        what = "positions"
-        run = f"run from {low:.4g} to {high:.4g} m"
-    else:
-        what = "angles"
-        run = f"run from {np.degrees(low):.4g} to {np.degrees(high):.4g} deg"
+    shown = joint.shown
+    ends = f"{shown.in_setting(low):.4g} to {shown.in_setting(high):.4g}"
     allowed = f"{joint.range[0]:.6g} to {joint.range[1]:.6g}"
     yield (
-        f"{joint.name}: {what} in the log {run}, but the arm allows {allowed}: give them an offset "
-        "or a scale of -1, or change the range in arm.xml"
+        f"{joint.name}: {shown.word}s in the log run from {ends} {shown.setting}, but the arm "
+        f"allows {allowed}: give them an offset or a scale of -1, or change the range in arm.xml"
     )
 
 

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hydroid.arrays import Limits
 from hydroid.log import Log, LogFinding, Reading, Table, check_parts
 from hydroid.settings.arm import Arm
 from hydroid.settings.log import LogSettings
@@ -16,12 +17,14 @@ SAID = ("row left out", "cut end", "lost", "gap", "half a command", "unasked", "
 
 
 class Others(NamedTuple):
-    """Logs beside the first: those that are fitted, and one that is validated on."""
+    """Logs beside the first: those that are fitted, and one that is validated on, of
+    which no more is asked."""
 
-    fitted: Sequence[Path]
-    unseen: Path | None
-    in_range: bool
-    """whether they must be within the arm's ranges, if the first one is"""
+    fitted: Sequence[Path] = ()
+    unseen: Path | None = None
+    in_range: bool = True
+    """whether they must be within the arm's ranges, if the first one is; not where
+    these ranges are guesses"""
 
 
 def read_first(
@@ -81,13 +84,11 @@ def read_others(
     return fitted, unseen, left_out
 
 
-def reach_of(
-    logs: Sequence[Log], joints: Sequence[int]
-) -> dict[int, tuple[float, float]]:
+def reach_of(logs: Sequence[Log], joints: Sequence[int]) -> dict[int, Limits]:
     """Return the ends of what joints (numbers, from 1) do in logs [rad, m]."""
-    reach = dict[int, tuple[float, float]]()
+    reach = dict[int, Limits]()
     for joint in joints:
-        angles = np.concatenate([log.angle[:, joint - 1] for log in logs])
+        angles = np.concatenate([log.angle_of(joint) for log in logs])
         reach[joint] = float(np.nanmin(angles)), float(np.nanmax(angles))
     return reach
 
@@ -96,7 +97,7 @@ def _longest_first(parts: Sequence[Log]) -> list[Log]:
     return sorted(parts, key=lambda part: part.duration, reverse=True)
 
 
-def _no_limits(arm: Arm) -> Mapping[str, tuple[float, float]]:
+def _no_limits(arm: Arm) -> Mapping[str, Limits]:
     return dict.fromkeys(arm.joint_names, (-np.inf, np.inf))
 
 

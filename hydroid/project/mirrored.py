@@ -9,8 +9,9 @@ from collections.abc import Sequence
 from hydroid.arrays import Array
 from hydroid.files import Plain
 from hydroid.log import ColumnGuess, Log, motion_of
-from hydroid.log.mapping import LENGTHS, angle_margin
+from hydroid.log.mapping import angle_margin
 from hydroid.settings.arm import Arm, Joint
+from hydroid.settings.log import LENGTHS
 
 
 def mirror_sensors(
@@ -40,7 +41,7 @@ def mirror_sensors(
                     f"sign, and set scale: {angle['scale']:g} and offset: {angle['offset']:g} at "
                     "the angle"
                 )
-            elif in_range and _range_says_so(log.angle[:, number - 1], angle, joint):
+            elif in_range and _range_says_so(log.angle_of(number), angle, joint):
                 entry["angle"] = of_other_sign(angle)
                 said.append(
                     f"{column} counts backwards: only so is it in the range of {joint.name}"

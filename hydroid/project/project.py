@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from hydroid.arrays import record
+from hydroid.arrays import Limits, record
 from hydroid.cad.importer import ImportedArm, import_arm
 from hydroid.cad.meshes import MESHES
 from hydroid.errors import HydroidError, SettingsError
@@ -18,6 +18,7 @@ from hydroid.log import Table, open_table
 from hydroid.log.mapping import angle_margin
 from hydroid.project.boxes import boxes_urdf, moves_as
 from hydroid.project.layout import Layout, find_layout
+from hydroid.project.logs import Others
 from hydroid.project.texts import JointSize, arm_text, fit_text, joint_sizes
 from hydroid.reporting.figure import arm_picture
 from hydroid.settings.arm import Arm, load_arm
@@ -68,7 +69,9 @@ def write_project(
     what is given)."""
     _refuse_replacing(folder, FILES, force=options.pop("force", False))
     lengths = options.pop("lengths", ())
-    table = open_table(logs[0]) if logs else None
+    table = None
+    if logs:
+        table = open_table(logs[0])
     has_own_file = robot is not None and robot.suffix.lower() in (".yaml", ".yml")
     imported = None
     if robot is not None and not has_own_file:
@@ -111,22 +114,16 @@ def _layout(
     in_range: bool,
 ) -> Layout:
     """Return what logs hold, the first of which is the table."""
-    return find_layout(
-        table,
-        arm,
-        joints,
-        others=_fitted(logs)[1:],
-        unseen=_unseen(logs),
-        in_range=in_range,
-    )
+    others = Others(_fitted(logs)[1:], _unseen(logs), in_range)
+    return find_layout(table, arm, joints, others=others)
 
 
-def _wider(arm: Arm, layout: Layout) -> dict[str, tuple[float, float]]:
+def _wider(arm: Arm, layout: Layout) -> dict[str, Limits]:
     """Return the ranges [rad, m] of joints whose logs leave what is guessed: what the
     logs reach, and a little more."""
-    wider = dict[str, tuple[float, float]]()
+    wider = dict[str, Limits]()
     for number, (low, high) in layout.reach.items():
-        joint = arm.joints[number - 1]
+        joint = arm.joint(number)
         least, most = joint.limits
         margin = angle_margin(least, most)
         if low < least - margin or high > most + margin:
@@ -139,7 +136,7 @@ def _arm_of_boxes(
     joints: Sequence[str],
     lengths: Sequence[float],
     options: Plain,
-    wider: Mapping[str, tuple[float, float]],
+    wider: Mapping[str, Limits],
 ) -> ImportedArm:
     """Import an arm of boxes as if a person had drawn it; `wider`: ranges of joints that
     the logs tell [rad, m]."""
@@ -193,13 +190,8 @@ def go_on(
     replaces_config = config.resolve() == (folder / FIT).resolve()
     _refuse_replacing(folder, (FIT, STEPS, PICTURE), force=force or replaces_config)
     table = open_table(logs[0], settings.log)
-    layout = find_layout(
-        table,
-        arm,
-        given=settings.log,
-        others=_fitted(logs)[1:],
-        unseen=_unseen(logs),
-    )
+    others = Others(_fitted(logs)[1:], _unseen(logs))
+    layout = find_layout(table, arm, given=settings.log, others=others)
     steps = _steps(folder, logs, layout)
     reference = _seen_from(folder, Path(arm.where))
     text = fit_text(
@@ -230,7 +222,9 @@ def _fitted(logs: Sequence[Path]) -> Sequence[Path]:
 
 def _unseen(logs: Sequence[Path]) -> Path | None:
     """Return the log that is kept to validate on; None: there is one log only."""
-    return logs[-1] if len(logs) > 1 else None
+    if len(logs) > 1:
+        return logs[-1]
+    return None
 
 
 def _steps(folder: Path, logs: Sequence[Path], layout: Layout) -> tuple[str, ...]:

@@ -171,8 +171,12 @@ def _sides(
     [rad/s].
     """
     if valve is None:
-        dead = DEAD * min(max(motion.dead_band, 5.0), 40.0) if motion else UNKNOWN_DEAD
-        opening = _opening(joint, usual, usual) if motion else ""
+        dead = UNKNOWN_DEAD
+        if motion:
+            dead = DEAD * min(max(motion.dead_band, 5.0), 40.0)
+        opening = ""
+        if motion:
+            opening = _opening(joint, usual, usual)
         numbers = opening, short(dead), short(EXPONENT)
         return [
             ValveSide("A", *numbers, one_size=False),
@@ -202,7 +206,9 @@ def arm_text(imported: ImportedArm, arm: Arm | None, sizes: Sequence[JointSize])
             actuators[name] = cylinder | unused
     else:
         for joint, size in zip(arm.joints, sizes, strict=True):
-            sliding = {"kind": "linear"} if joint.slides else None
+            sliding = None
+            if joint.slides:
+                sliding = {"kind": "linear"}
             cylinder = imported.cylinders.get(joint.name, sliding)
             actuators[joint.name] = _actuator(cylinder, size)
     return fill_template(
@@ -262,12 +268,14 @@ def fit_text(
     joints = list[Plain]()
     volumes = list[float]()  # of the chambers of stand-ins [cm³]
     for number in layout.outputs:
-        joint = arm.joints[number - 1]
+        joint = arm.joint(number)
         size = sizes[number - 1]
         # a stand-in's size is a guess, but the valves of one machine let like flows
         # through
         stand_in = not isinstance(joint.actuator, LinearActuator)
-        draw = usual_flow / flows[number] if stand_in else 1.0
+        draw = 1.0
+        if stand_in:
+            draw = usual_flow / flows[number]
         drawn += draw * flows[number]
         if stand_in:
             low, high = joint.range

@@ -56,14 +56,15 @@ def speed_section(
     fastest = list[str]()
     opens = False
     for joint in settings.outputs:
-        name = settings.arm.joint_names[joint - 1]
+        name = settings.arm.name_of(joint)
         speed = summary.curves.get(f"{name}_speed")
         if speed is None:
             continue
         opening = summary.curves.get(f"{name}_opening")
         opens = opens or opening is not None
         cloud = _measured_cloud(logs, joint, _dead_times(name, summary))
-        commands = np.concatenate([log.command[:, joint - 1] for log in logs])
+        cloud[1] *= settings.arm.joint(joint).shown.factor
+        commands = np.concatenate([log.command_of(joint) for log in logs])
         sides = _sides(name, summary)
         draw = partial(_speed_chart, name, (speed, opening), sides, commands, cloud)
         caption = f"{name}: {speed.label}"
@@ -105,11 +106,11 @@ def _sides(name: str, summary: FitSummary) -> dict[str, str]:
 def _measured_cloud(logs: Sequence[Log], joint: int, dead_times: list[float]) -> Array:
     """Return commands [%] and measured speeds [rad/s] of a joint in all logs, shape
     (2, n)."""
-    late = float(np.mean(dead_times)) if dead_times else 0.0
+    delay = float(np.mean(dead_times)) if dead_times else 0.0
     pairs = [np.empty((2, 0))]
     for log in logs:
-        if log.has_angle[joint - 1]:
-            pairs.append(np.array(measured_speeds(log, joint, late)))
+        if log.measures(joint):
+            pairs.append(np.array(measured_speeds(log, joint, delay)))
     return np.hstack(pairs)
 
 
@@ -122,7 +123,7 @@ def step_section(settings: FitSettings, summary: FitSummary) -> Section | None:
     slowest = list[str]()
     narrowest = list[str]()
     for joint in settings.outputs:
-        name = settings.arm.joint_names[joint - 1]
+        name = settings.arm.name_of(joint)
         if not any(f"{name}_step_{towards}" in summary.curves for towards in TOWARDS):
             continue
         draw = partial(_response_chart, name, summary.curves)
@@ -160,24 +161,24 @@ def _bandwidths(name: str, curves: Mapping[str, CurveEstimate]) -> list[float]:
     return widths
 
 
-def measured_speeds(log: Log, joint: int, late: float) -> tuple[Array, Array]:
+def measured_speeds(log: Log, joint: int, delay: float) -> tuple[Array, Array]:
     """Return commands [%] and speeds [rad/s] of a joint, from 1, where its command
     stood still, (n,) each.
 
-    The command is that of `late` [s] before. Stretches of OVER do not overlap; those
+    The command is that of `delay` [s] before. Stretches of OVER do not overlap; those
     without a command, and those near an end of the travel, are left out.
     """
-    command = log.command[:, joint - 1]
-    angle = log.angle[:, joint - 1]
+    command = log.command_of(joint)
+    angle = log.angle_of(joint)
     half = max(round(0.5 * OVER / log.period), 1)
-    delay = round(late / log.period)
+    steps = round(delay / log.period)
     low = np.min(angle)
     high = np.max(angle)
     margin = AT_END * (high - low)
     commands = list[float]()
     speeds = list[float]()
-    for middle in range(delay + 3 * half, len(angle) - half, 2 * half):
-        held = command[middle - delay - 3 * half : middle - delay + half]
+    for middle in range(steps + 3 * half, len(angle) - half, 2 * half):
+        held = command[middle - steps - 3 * half : middle - steps + half]
         free = low + margin < angle[middle] < high - margin
         if not free or np.ptp(held) > STILL or not np.any(held):
             continue
@@ -205,18 +206,15 @@ def _speed_chart(
     commands: Array,
     measured: Array,
 ) -> Chart:
-    """Draw speed and opening of a joint over its logged commands, and measured pairs,
-    shape (2, n)."""
+    """Draw speed and opening of a joint over its logged commands, and measured pairs of
+    command and speed, shape (2, n), in the curves' units."""
     speed, opening = curves
     left = np.array([-105.0, commands.max(initial=0.0)])
     right = np.array([commands.min(initial=0.0), 105.0])
     beyond = Mark("spans", left, end=right, color="pale", alpha=0.4)
-    factor = 1e3 if speed.unit.startswith("mm") else np.degrees(1.0)
-    command, turning = measured
     cloud = Mark(
         "points",
-        command,
-        factor * turning,
+        *measured,
         color="ink",
         label="measured",
         width=5,
@@ -248,14 +246,14 @@ def _both_sides(curve: CurveEstimate, sides: Mapping[str, str]) -> list[Mark]:
 
 def _response_chart(name: str, curves: Mapping[str, CurveEstimate]) -> Chart:
     """Draw what the curves say of one joint in both directions."""
-    step = _towards(name, "step", curves)
-    amplitude = _towards(name, "amplitude", curves)
-    phase = _towards(name, "phase", curves)
+    step = _response_panel("speed", _towards(name, "step", curves))
+    amplitude = _response_panel("amplitude", _towards(name, "amplitude", curves))
+    phase = _response_panel("phase", _towards(name, "phase", curves))
     return Chart(
         (
-            _response_panel("speed", f"{name}: step of the command", 250, step),
-            _response_panel("amplitude", "frequency response", 200, amplitude),
-            _response_panel("phase", "", 200, phase),
+            replace(step, title=f"{name}: step of the command", height=250),
+            replace(amplitude, title="frequency response", log_x=True, log_y=True),
+            replace(phase, log_x=True),
         )
     )
 
@@ -268,24 +266,28 @@ def _towards(
     return {towards: curves[key] for towards, key in keys.items() if key in curves}
 
 
-def _response_panel(
-    y: str, title: str, height: int, curves: Mapping[str, CurveEstimate]
-) -> Panel:
+def _response_panel(y: str, curves: Mapping[str, CurveEstimate]) -> Panel:
+    """Draw curves of a kind, by the direction of the command, with their bands."""
     marks = list[Mark]()
     along = ""
     unit = ""
     for towards, curve in curves.items():
         x, value, low, high = _rows(curve)
-        label = curve.label.partition(" to ")[2]  # the command and the direction
+        label = _answered(curve, towards)
         color = TOWARDS[towards]
         marks.append(Mark("band", x, low, high, color=color, label=label, alpha=0.25))
         marks.append(Mark("line", x, value, color=color, label=label))
         along = curve.along
         unit = curve.unit
-    over_frequency = along.startswith("frequency")
-    decades = y == "amplitude"
-    panel = Panel(along, f"{y} [{unit}]", tuple(marks), title, height)
-    return replace(panel, log_x=over_frequency, log_y=decades)
+    return Panel(along, f"{y} [{unit}]", tuple(marks), height=200)
+
+
+def _answered(curve: CurveEstimate, towards: str) -> str:
+    """Write the command that a curve answers, and what it does with the joint."""
+    direction = curve.moves or f"{towards} commands"
+    if curve.step is None:
+        return direction
+    return f"{abs(curve.step):g} % command, {curve.moves or towards}"
 
 
 def _rows(curve: CurveEstimate) -> Array:

@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from hydroid.arrays import Array, record
+from hydroid.arrays import Array, Limits, record
 
 Color = str  # ink, grey, pale or one of SERIES
 SERIES = ("orange", "blue", "green", "pink", "yellow", "sky")
@@ -88,7 +88,7 @@ class Panel:
     marks: tuple[Mark, ...]
     title: str = ""
     height: int = 220
-    y_limits: tuple[float, float] | None = None
+    y_limits: Limits | None = None
     log_x: bool = False
     log_y: bool = False
     rows: tuple[str, ...] = ()

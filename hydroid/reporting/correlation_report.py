@@ -98,7 +98,7 @@ def _maps(
         draw = partial(correlation_map, matrix[np.ix_(shown, shown)], own)
         button = "shared by all"
         if number:
-            button = settings.arm.joint_names[number - 1]
+            button = settings.arm.name_of(number)
         caption = f"Correlations of the estimates: {button}"
         yield Plot(f"correlation_{number}", caption, draw, button=button)
 

@@ -45,7 +45,7 @@ def follow_page(name: str, followed: Followed, arm: Arm) -> Page:
         sections.append(motion)
     tabs = list[Plot]()
     for joint in followed.joints:
-        joint_name = arm.joint_names[joint - 1]
+        joint_name = arm.name_of(joint)
         draw = partial(_chart, followed, joint, arm)
         tab = Plot(f"joint_{joint}", joint_name, draw, zoom=True, button=joint_name)
         tabs.append(tab)
@@ -59,13 +59,15 @@ def tracking_table(followed: Followed, arm: Arm) -> Table:
     """Return the predicted errors of the joints."""
     rows = list[tuple[Cell, ...]]()
     for joint in followed.joints:
-        _, unit, factor = arm.joints[joint - 1].shown
+        shown = arm.joint(joint).shown
         error, wide = followed.rms(joint)
-        banded = factor * wide if np.isfinite(wide) else None
-        command = followed.log.command[:, joint - 1]
+        banded = None
+        if np.isfinite(wide):
+            banded = shown.factor * wide
+        command = followed.log.command_of(joint)
         full = 100.0 * float(np.mean(np.abs(command) >= 100.0))
-        name = arm.joint_names[joint - 1]
-        rows.append((name, unit, factor * error, banded, full))
+        name = arm.name_of(joint)
+        rows.append((name, shown.unit, shown.factor * error, banded, full))
     header = ("joint", "unit", "error", "with its band", "full command [% of time]")
     return Table("Predicted tracking error", header, tuple(rows), _NOTE)
 
@@ -80,12 +82,12 @@ def missed_lines(followed: Followed, arm: Arm) -> list[str]:
 
 def _missed(group: Sequence[Missed], lead: float, arm: Arm) -> str:
     worst = max(group, key=lambda span: abs(span.wished - span.had))
-    _, unit, factor = arm.joints[worst.joint].shown
+    shown = arm.joints[worst.joint].shown
     spans = [f"{span.from_s - lead:.2f} to {span.to_s - lead:.2f}" for span in group]
-    had = two_digits(factor * worst.had)
-    wished = two_digits(factor * worst.wished)
+    had = two_digits(shown.factor * worst.had)
+    wished = two_digits(shown.factor * worst.wished)
     what = f"{arm.joint_names[worst.joint]}: {worst.limit}"
-    speeds = f"at worst {had} {unit}/s where {wished} are wished"
+    speeds = f"at worst {had} {shown.unit}/s where {wished} are wished"
     return f"{what}, {speeds}; {listed(spans, 3)} s into the path"
 
 
@@ -94,10 +96,10 @@ def _lead(followed: Followed, arm: Arm) -> str:
         return followed.rms(joint)[0]
 
     worst = max(followed.joints, key=relative)
-    _, unit, factor = arm.joints[worst - 1].shown
-    error = number(factor * followed.rms(worst)[0])
-    name = arm.joint_names[worst - 1]
-    text = f"The model follows the path to {error} {unit} rms at most ({name})."
+    shown = arm.joint(worst).shown
+    error = number(shown.factor * followed.rms(worst)[0])
+    name = arm.name_of(worst)
+    text = f"The model follows the path to {error} {shown.unit} rms at most ({name})."
     if followed.missed:
         names = dict.fromkeys(arm.joint_names[span.joint] for span in followed.missed)
         text += f" {', '.join(names)} cannot move as fast as the path asks everywhere."
@@ -106,7 +108,9 @@ def _lead(followed: Followed, arm: Arm) -> str:
 
 def _chart(followed: Followed, joint: int, arm: Arm) -> Chart:
     column = joint - 1
-    word, unit, factor = arm.joints[column].shown
+    shown = arm.joints[column].shown
+    unit = shown.unit
+    factor = shown.factor
     time = followed.log.time - followed.lead_s
     wished = factor * followed.log.angle[:, column]
     predicted = factor * followed.angle[:, column]
@@ -126,7 +130,7 @@ def _chart(followed: Followed, joint: int, arm: Arm) -> Chart:
     shaded = _shaded(spans, followed.lead_s)
     command = Mark("step", time, followed.log.command[:, column], color="grey")
     panels = (
-        Panel("", f"{word} [{unit}]", upper, arm.joint_names[column], 280),
+        Panel("", f"{shown.word} [{unit}]", upper, arm.joint_names[column], 280),
         Panel("", f"error [{unit}]", tuple(middle), height=190),
         command_panel(*shaded, command, height=160),
     )

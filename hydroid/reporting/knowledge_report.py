@@ -67,7 +67,7 @@ def quantity_section(settings: FitSettings, summary: FitSummary) -> Section | No
         for quantity in certain[:MOST_KNOWN]:
             value = three_digits(quantity.value)
             rows.append((quantity.label, value, quantity.unit, _within(quantity)))
-        name = settings.arm.joint_names[joint - 1]
+        name = settings.arm.name_of(joint)
         if rows:
             header = ("quantity", "value", "unit", "interval")
             cards[f"known_{name}"] = Table(name, header, tuple(rows))
@@ -87,7 +87,7 @@ def every_quantity_section(
     """
     rows = list[tuple[Cell, ...]]()
     for joint in settings.outputs:
-        name = settings.arm.joint_names[joint - 1]
+        name = settings.arm.name_of(joint)
         for quantity in summary.quantities.values():
             if quantity.joint == joint:
                 value = quantity.value, quantity.unit, *quantity.interval
@@ -129,8 +129,8 @@ def error_section(
         error = summary.errors.get(f"q{joint}")
         if error is None:
             continue
-        name = settings.arm.joint_names[joint - 1]
-        shown = settings.arm.joints[joint - 1].shown
+        name = settings.arm.name_of(joint)
+        shown = settings.arm.joint(joint).shown
         unit = shown.unit
         factor = shown.of_degrees(1.0)
         ahead = factor * error.after_10_s_deg

@@ -32,9 +32,9 @@ def linear_page(linear: LinearArm, drawn: Sequence[LinearArm], arm: Arm) -> Page
         draw = partial(_chart, linear, drawn, k, arm)
         caption = f"{name}: step response and Bode plot"
         tabs.append(Plot(f"linear_{k + 1}", caption, draw, button=name))
-    band = (
-        f" Bands: 95 % of {len(drawn)} machines that the logs allow." if drawn else ""
-    )
+    band = ""
+    if drawn:
+        band = f" Bands: 95 % of {len(drawn)} machines that the logs allow."
     section = Section("Step response and Bode plot", _TEXT + band, tabs=tuple(tabs))
     table = _about(linear, arm)
     near = Section(table.title, tables={"about": table})
@@ -50,22 +50,25 @@ def _about(linear: LinearArm, arm: Arm) -> Table:
     """Return the commands and the motion about which it is linear."""
     rows = list[tuple[str | float, ...]]()
     for k, name in enumerate(linear.joints):
-        _, unit, factor = arm.joints[arm.joint_names.index(name)].shown
-        numbers = linear.command[k], factor * linear.angle[k], factor * linear.speed[k]
-        rows.append((name, unit, *map(float, numbers), float(linear.delay[k])))
+        shown = arm.joints[arm.joint_names.index(name)].shown
+        command = float(linear.command[k])
+        angle = float(shown.factor * linear.angle[k])
+        speed = float(shown.factor * linear.speed[k])
+        delay = float(linear.delay[k])
+        rows.append((name, shown.unit, command, angle, speed, delay))
     header = ("joint", "unit", "command [%]", "angle", "speed [per s]", "delay [s]")
     return Table("About which it is linear", header, tuple(rows))
 
 
 def _chart(linear: LinearArm, drawn: Sequence[LinearArm], k: int, arm: Arm) -> Chart:
     """Draw the answer of the k-th joint's speed to its command."""
-    _, unit, factor = arm.joints[arm.joint_names.index(linear.joints[k])].shown
-    per = f"{unit}/s per %"
+    shown = arm.joints[arm.joint_names.index(linear.joints[k])].shown
+    per = f"{shown.unit}/s per %"
     time = np.linspace(0.0, SECONDS, SAMPLES)
     frequency = np.geomspace(LOWEST, HIGHEST, SAMPLES)
-    steps = factor * np.array([one.step(k, time) for one in (linear, *drawn)])
+    steps = shown.factor * np.array([one.step(k, time) for one in (linear, *drawn)])
     swings = np.array([one.response(k, frequency) for one in (linear, *drawn)])
-    amplitudes = factor * np.abs(swings)
+    amplitudes = shown.factor * np.abs(swings)
     phases = np.degrees(np.unwrap(np.angle(swings)))
     # a positive command may lower the angle: the phase then begins at 180
     phases -= 360.0 * np.round(phases[:, :1] / 360.0)

@@ -221,6 +221,7 @@ def _errors(
     units = dict[str, str]()
     for joint in compared:
         slides = model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE
-        units[names[joint]] = " mm" if slides else "°"
-        errors[names[joint]] = display(slides=slides).factor * error[:, joint]
+        shown = display(slides=slides)
+        units[names[joint]] = shown.mark
+        errors[names[joint]] = shown.factor * error[:, joint]
     return errors, units

@@ -219,8 +219,12 @@ def _aligned_left(cells: Sequence[str], digit: str) -> list[str]:
 def shown(cell: Cell) -> str:
     """Return the text of a cell for a reader."""
     if isinstance(cell, float):
-        return plain(cell) if isinstance(cell, Given) else three_digits(cell)
-    return "" if cell is None else str(cell)
+        if isinstance(cell, Given):
+            return plain(cell)
+        return three_digits(cell)
+    if cell is None:
+        return ""
+    return str(cell)
 
 
 @record
@@ -320,4 +324,6 @@ def short_name(name: str) -> str:
     letters left out.
     """
     text = "".join(c if c.isprintable() else "?" for c in name)
-    return text if len(text) <= 40 else f"{text[:19]}…{text[-20:]}"
+    if len(text) <= 40:
+        return text
+    return f"{text[:19]}…{text[-20:]}"

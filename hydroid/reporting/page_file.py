@@ -88,7 +88,9 @@ def plain(drawn: Any) -> Any:
 
 
 def _five_digits(value: float) -> float | None:
-    return float(f"{value:.5g}") if math.isfinite(value) else None
+    if math.isfinite(value):
+        return float(f"{value:.5g}")
+    return None
 
 
 def html(page: Page) -> str:

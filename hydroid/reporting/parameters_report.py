@@ -205,8 +205,7 @@ def direction_word(summary: FitSummary, joint: str, towards: str) -> str:
     """Return what a command of a sign does with a joint, `raising` or `lowering`;
     nothing where the fit does not say it."""
     step = summary.curves.get(f"{joint}_step_{towards}")
-    word = step.label.rpartition(", ")[2] if step else ""
-    return "" if word == towards else word
+    return step.moves if step else ""
 
 
 def _bounds(settings: FitSettings, parameter: Parameter) -> Row:

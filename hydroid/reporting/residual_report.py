@@ -50,7 +50,7 @@ def residual_section(
     rows = list[tuple[Cell, ...]]()
     coloured = list[str]()
     for joint, test in tests.items():
-        name = settings.arm.joint_names[joint - 1]
+        name = settings.arm.name_of(joint)
         draw = partial(_correlations, name, test)
         caption = f"{name}: correlations"
         tabs.append(Plot(f"residual_{len(tabs) + 1}", caption, draw, button=name))

@@ -27,7 +27,7 @@ from hydroid.reporting.chart import (
 from hydroid.reporting.moving_arm import MOST, moving_arm
 from hydroid.reporting.page import Plot, Section, Table, log_names, short_name
 from hydroid.settings.arm import Arm
-from hydroid.units import Display, display
+from hydroid.units import TURNING, Display
 from hydroid.words import number, significant
 
 MOTIONS = 8
@@ -231,29 +231,27 @@ def _joint_tab(
     that compares it.
     """
     predictions = [prediction for prediction in group if joint in prediction.joints]
-    name = arm.joint_names[joint - 1]
-    slides = arm.joints[joint - 1].slides
+    name = arm.name_of(joint)
+    shown = arm.joint(joint).shown
     title = f"{name} in {log}"
     error = rms_deg([predictions[0].error(joint)])
-    draw = partial(draw_response, title, joint, predictions, bins, slides=slides)
+    draw = partial(draw_response, title, joint, predictions, bins, shown)
     return Plot(
         "",
         title,
         draw,
         zoom=True,
-        button=_size(error, slides=slides),
+        button=_size(error, shown),
         column=name,
         state=_state(error, tolerances.get(joint, np.inf)),
     )
 
 
-def _size(error: float, *, slides: bool) -> str:
-    """Write an error [deg], of a joint that slides in mm."""
+def _size(error: float, shown: Display) -> str:
+    """Write an error [deg] as its joint is shown."""
     if not np.isfinite(error):
         return "diverged"
-    if slides:
-        return f"{significant(1e3 * np.radians(error), 2)} mm"
-    return f"{significant(error, 2)}°"
+    return f"{significant(shown.of_degrees(error), 2)}{shown.mark}"
 
 
 def _state(error: float, tolerance: float) -> str:
@@ -280,15 +278,13 @@ def draw_response(
     joint: int,
     predictions: Sequence[Prediction],
     bins: int,
-    *,
-    slides: bool = False,
+    shown: Display = TURNING,
 ) -> Chart:
     """Draw the measured angle of one joint, every model's response and residual,
     command and pressures.
     """
     log = predictions[0].log
     column = joint - 1
-    shown = display(slides=slides)
     measured = shown.factor * log.angle[:, column]
     upper = [reference(log.time, measured, "measured")]
     middle = [zero_line()]
@@ -322,7 +318,7 @@ def _response_marks(
     """Draw the response, the residual and, where there is one, the 95 % band of a joint
     that travelled so far, as it is shown."""
     time = prediction.log.time
-    measured = shown.factor * prediction.log.angle[:, joint - 1]
+    measured = shown.factor * prediction.log.angle_of(joint)
     residual = shown.factor * finite(prediction.error(joint))
     name = short_name(prediction.fit)
     size = rms(residual)
@@ -399,10 +395,10 @@ def draw_joints(title: str, arm: Arm, group: Sequence[Prediction], bins: int) ->
     for joint, color in zip(_compared(group), cycle(COMMAND_COLORS), strict=False):
         prediction = next(p for p in group if joint in p.joints)
         time = prediction.log.time
-        name = arm.joint_names[joint - 1]
-        _, unit, factor = arm.joints[joint - 1].shown
-        measured = factor * prediction.log.angle[:, joint - 1]
-        simulated = measured - factor * finite(prediction.error(joint))
+        name = arm.name_of(joint)
+        shown = arm.joint(joint).shown
+        measured = shown.factor * prediction.log.angle_of(joint)
+        simulated = measured - shown.factor * finite(prediction.error(joint))
         far = FAR * max(np.ptp(measured), 1.0)
         simulated[np.abs(simulated - measured) > far] = np.nan
         marks = (
@@ -410,8 +406,9 @@ def draw_joints(title: str, arm: Arm, group: Sequence[Prediction], bins: int) ->
             Mark("line", time, simulated, color="orange", label="simulated"),
         )
         heading = title if not panels else ""
-        panels.append(Panel("", f"{short_name(name)} [{unit}]", marks, heading, 150))
-        command = prediction.log.command[:, joint - 1]
+        label = f"{short_name(name)} [{shown.unit}]"
+        panels.append(Panel("", label, marks, heading, 150))
+        command = prediction.log.command_of(joint)
         commands.append(Mark("step", time, command, color=color, label=name))
         oil = prediction.oil
         if oil is None:

@@ -43,7 +43,9 @@ def pack(tree: object, *, compressed: bool = True) -> bytes:
             return {"array": name}
         if is_dataclass(value):
             return {field.name: getattr(value, field.name) for field in fields(value)}
-        return dict(value) if isinstance(value, Mapping) else value.item()
+        if isinstance(value, Mapping):
+            return dict(value)
+        return value.item()
 
     text = json.dumps(tree, default=plain)
     content = np.frombuffer(text.encode(), dtype=np.uint8)
@@ -70,7 +72,9 @@ def unpack(file: Path) -> Any:
         arrays = _arrays(data)
 
         def filled(value: Plain) -> Any:
-            return arrays[value["array"]] if value.keys() == {"array"} else value
+            if value.keys() == {"array"}:
+                return arrays[value["array"]]
+            return value
 
         return json.loads(arrays["content"].tobytes(), object_hook=filled)
     except (
@@ -104,8 +108,10 @@ def _arrays(data: bytes) -> dict[str, np.ndarray]:
             values = np.frombuffer(content, kind, offset=header.tell())
             if values.size != math.prod(shape):
                 raise ValueError("shape")
-            ordered = values.reshape(shape, order="F" if columns_first else "C")
-            arrays[member.filename.removesuffix(".npy")] = ordered.copy(order="K")
+            order = "F" if columns_first else "C"
+            name = member.filename.removesuffix(".npy")
+            # a copy: what stands on the bytes of the file cannot be written to
+            arrays[name] = values.reshape(shape, order=order).copy(order="K")
     return arrays
 
 

@@ -95,9 +95,9 @@ def model_hash(arm: Arm) -> str:
     """Return the hash of the arm's MJCF and of its meshes."""
     spec = load_model(arm)
     folder = Path(spec.modelfiledir) / spec.meshdir
-    return file_hash(
-        arm.model, *(folder / mesh.file for mesh in spec.meshes if mesh.file)
-    )
+    # a mesh may be given by its vertices, without a file
+    meshes = [folder / mesh.file for mesh in spec.meshes if mesh.file]
+    return file_hash(arm.model, *meshes)
 
 
 def log_hash(log: Log, settings: FitSettings) -> str:
@@ -114,15 +114,18 @@ def log_hash(log: Log, settings: FitSettings) -> str:
 
 def samples(log: Log) -> bytes:
     """Return the digest of a log's samples, wherever they are from."""
-    content = hashlib.sha256(repr((log.period, log.rest, log.angle.shape)).encode())
+    shape = repr((log.period, log.rest, log.angle.shape))
+    content = hashlib.sha256(shape.encode())
     for signal in (log.time, log.command, log.angle, log.pressure, log.recorded):
-        content.update(b"" if signal is None else signal.tobytes())
+        if signal is not None:
+            content.update(signal.tobytes())
     return content.digest()
 
 
 def digest(content: Plain) -> str:
     """Return the digest of a mapping, whatever the order of its keys."""
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+    text = json.dumps(content, sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _names(values: Any) -> bool:

@@ -126,12 +126,12 @@ def fit_record(
 ) -> FitRecord:
     """Return the record of a fit, with what it makes of its logs and the baselines of
     these."""
-    efforts = [
-        Effort(
-            name, refinement.iterations, refinement.evaluations, refinement.ending.value
+    efforts = list[Effort]()
+    for name, refinement in fit.refinements.items():
+        ending = refinement.ending.value
+        efforts.append(
+            Effort(name, refinement.iterations, refinement.evaluations, ending)
         )
-        for name, refinement in fit.refinements.items()
-    ]
     return FitRecord(
         fitted=fitted,
         history=fit.history,

@@ -52,17 +52,21 @@ class Box:
     @property
     def room(self) -> Array:
         """Relative changes to the lower and to the upper bound, shape (2, p)."""
-        away = np.stack([self.at - self.lower, self.upper - self.at])[:, self.varied]
-        return np.maximum(away, 0.0) / self.scale[self.varied]
+        to_lower = self.at - self.lower
+        to_upper = self.upper - self.at
+        # rounding may put a point a little beyond a bound
+        away = np.maximum([to_lower, to_upper], 0.0)
+        return away[:, self.varied] / self.scale[self.varied]
 
     def points(self, changes: Array) -> Array:
         """Return points, (n, P), at relative changes, (n, p);
         rounding does not lead out of the bounds."""
         moved = np.tile(self.at, (len(changes), 1))
         moved[:, self.varied] += changes * self.scale[self.varied]
-        return np.clip(
-            moved, np.minimum(self.lower, self.at), np.maximum(self.upper, self.at)
-        )
+        # a point that stands beyond a bound may stay there
+        lowest = np.minimum(self.lower, self.at)
+        highest = np.maximum(self.upper, self.at)
+        return np.clip(moved, lowest, highest)
 
 
 @record
@@ -105,8 +109,12 @@ def differentiate(
     `former` derivatives, (p, R), are kept along axes that fail; without them, axes that
     are not single coordinates must not: a coordinate's row is NaN.
     """
-    centre = function(at.at[None])[0] if value is None else value
-    expected = None if former is None else axes.directions @ former
+    centre = value
+    if centre is None:
+        centre = function(at.at[None])[0]
+    expected = None
+    if former is not None:
+        expected = axes.directions @ former
     slopes, curved = _slopes(function, at, axes, centre)
     if axes.steps.shape[1] == 2:
         if expected is not None:
@@ -120,20 +128,26 @@ def differentiate(
     failed = ~np.isfinite(slopes).all(axis=1)
     if expected is not None:
         slopes[failed] = expected[failed]
-    if np.array_equal(axes.directions, np.eye(len(slopes))):
+    # along single coordinates the slopes are the derivatives, to the bit
+    single = np.eye(len(slopes))
+    if np.array_equal(axes.directions, single):
         return slopes
     return np.linalg.solve(axes.directions, slopes).astype(float)
 
 
 def _far_below(slopes: Array, others: Array) -> Mask:
     """Return where slopes, (p, R), are shorter than CURVED times others, (p,)."""
-    return np.linalg.norm(slopes, axis=1) < CURVED * np.linalg.norm(others, axis=1)
+    length = np.linalg.norm(slopes, axis=1)
+    other_length = np.linalg.norm(others, axis=1)
+    return length < CURVED * other_length
 
 
 def single_axes(at: Box, step: float) -> Axes:
     """Return a relative step along each varied coordinate."""
     room = at.room
-    return _fitted(np.eye(room.shape[1]), np.full(room.shape[1], step), room)
+    coordinates = room.shape[1]
+    wanted = np.full(coordinates, step)
+    return _fitted(np.eye(coordinates), wanted, room)
 
 
 def covariance_axes(at: Box, root: Array, step: float) -> Axes:

@@ -46,13 +46,16 @@ class GrayCoding:
         """Return points of the unit box, shape (n, parameters)."""
         gray = chromosomes.reshape(-1, self.parameters, BITS)
         bits = np.bitwise_xor.accumulate(gray, axis=-1)
-        return bits @ 2.0 ** np.arange(BITS - 1, -1, -1) / STEPS
+        # the first bit counts most
+        powers = 2.0 ** np.arange(BITS - 1, -1, -1)
+        return bits @ powers / STEPS
 
     def encode(self, points: Array) -> Genes:
         """Chromosomes of the nearest points of the grid."""
         value = _nearest(points)
         gray = value ^ (value >> 1)
-        bits = gray[..., None] >> np.arange(BITS - 1, -1, -1) & 1
+        places = np.arange(BITS - 1, -1, -1)
+        bits = gray[..., None] >> places & 1
         return bits.astype(np.uint8).reshape(len(points), -1)
 
     def altered(self, chromosomes: Genes, rng: Generator) -> Genes:
@@ -92,7 +95,8 @@ Coding = GrayCoding | IntegerCoding
 
 
 def _nearest(points: Array) -> Ints:
-    return np.rint(np.clip(points, 0, 1) * STEPS).astype(np.int64)
+    inside = np.clip(points, 0, 1)
+    return np.rint(inside * STEPS).astype(np.int64)
 
 
 CUTS = 2  # of the pointwise crossover (ours; the article gives none)
@@ -114,10 +118,12 @@ def roulette(objectives: Array, count: int, rng: Generator) -> Ints:
     if feasible.any():
         fitness[feasible] = objective[feasible].max() - objective[feasible]
     if not fitness.any():
-        fitness[feasible if feasible.any() else ...] = 1.0
+        equals = feasible if feasible.any() else ...
+        fitness[equals] = 1.0
     # Divided by the largest first: the sum of huge fitnesses must not overflow.
-    chance = fitness / fitness.max()
-    return rng.choice(len(objective), size=count, p=chance / chance.sum())
+    relative = fitness / fitness.max()
+    chance = relative / relative.sum()
+    return rng.choice(len(objective), size=count, p=chance)
 
 
 def pointwise_swaps(pairs: int, length: int, points: int, rng: Generator) -> Mask:

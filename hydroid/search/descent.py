@@ -142,7 +142,9 @@ class LinearModel:
     def reduced(self, row: Array) -> tuple[Array, Array]:
         """Triangle R and vector b such that |row + J s|² is |b + R s|² and a constant."""
         p = len(self._moving)
-        both = triangle(np.column_stack([self.at.jacobian[:, self._moving], row]))
+        jacobian = self.at.jacobian[:, self._moving]
+        # factorised together: Q is then never formed
+        both = triangle(np.column_stack([jacobian, row]))
         return both[:p, :p], both[:p, p]
 
     def step(self, damping: float, row: Array | None = None) -> Array:
@@ -161,7 +163,9 @@ class LinearModel:
         damped = np.sqrt(damping) * np.eye(len(unit))
         matrix = np.vstack([triangle / self.scale, damped])
         target = np.append(-right / size, np.zeros(len(unit)))
-        limits = (-point * unit, (1 - point) * unit)
+        lower = -point * unit
+        upper = (1 - point) * unit
+        limits = (lower, upper)
         # changes of the active set: far more than it takes
         most = 20 * len(unit) + 20
         solved = lsq_linear(
@@ -172,12 +176,15 @@ class LinearModel:
     def gain(self, s: Array) -> float:
         """Part of the cost that the linear model promises to save by a step."""
         after = self._right + self._triangle @ s
-        return 0.5 * float(self._right @ self._right - after @ after)
+        cost = self._right @ self._right
+        return 0.5 * float(cost - after @ after)
 
     def reach(self, s: Array) -> Array:
         """Return the point of the box that a step leads to, shape (p,)."""
         point = self.at.point.copy()
-        point[self._moving] = np.clip(point[self._moving] + s, 0.0, 1.0)
+        reached = point[self._moving] + s
+        # rounding leads out of the box
+        point[self._moving] = np.clip(reached, 0.0, 1.0)
         return point
 
 
@@ -189,7 +196,8 @@ def triangle(rows: Array) -> Array:
     """
     blocks = np.array_split(rows, max(len(rows) // BLOCK, 1))
     if len(blocks) > 1:
-        rows = np.vstack([np.linalg.qr(block, mode="r") for block in blocks])
+        triangles = [np.linalg.qr(block, mode="r") for block in blocks]
+        rows = np.vstack(triangles)
     return np.asarray(np.linalg.qr(rows, mode="r"))
 
 
@@ -223,7 +231,8 @@ def derivatives(residuals: Function, point: Array, row: Array) -> Array:
     if len(suspect):
         # a derivative does not depend on the step; rounding noise divided by a wider
         # step becomes smaller
-        wider = np.linalg.norm(quotients(suspect, WIDER * WIDTH), axis=1)
+        again = quotients(suspect, WIDER * WIDTH)
+        wider = np.linalg.norm(again, axis=1)
         noise = wider < 0.1 * length[suspect]
         columns[suspect[noise]] = 0.0
     return columns

@@ -71,7 +71,8 @@ def tournament(objectives: Array, count: int, rng: Generator) -> Ints:
     contestants = np.concatenate(drawn)[: 2 * count]
     first = contestants[0::2]
     second = contestants[1::2]
-    as_good = (rank[first] == rank[second]) & (room[first] >= room[second])
+    same_front = rank[first] == rank[second]
+    as_good = same_front & (room[first] >= room[second])
     first_wins = (rank[first] < rank[second]) | as_good
     return np.where(first_wins, first, second)
 
@@ -129,7 +130,9 @@ class SimpleGa:
         """Return the elite of the present population, then all offspring."""
         if population is None:
             return offspring
-        best = np.argsort(population.objectives[:, 0], kind="stable")[: self.elite]
+        # of equals the one that has been there longer
+        order = np.argsort(population.objectives[:, 0], kind="stable")
+        best = order[: self.elite]
         return population.take(best).join(offspring)
 
 
@@ -146,6 +149,8 @@ class Nsga2(SimpleGa):
 
     def tell(self, population: Population | None, offspring: Population) -> Population:
         """Return the best of parents and children together, in crowded order."""
-        everyone = offspring if population is None else population.join(offspring)
+        everyone = offspring
+        if population is not None:
+            everyone = population.join(offspring)
         order = crowded_order(everyone.objectives)
         return everyone.take(order[: self.settings.population])

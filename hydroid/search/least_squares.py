@@ -101,12 +101,15 @@ def _differentiate(
     columns = derivatives(residuals, now.point, now.residual)
     if not np.isfinite(columns).all():
         return replace(now, ending=Ending.JACOBIAN_FAILED)
-    after = replace(
-        now, jacobian=columns.T, fresh=True, cycle=(now.cost, now.evaluations)
-    )
+    # against these a later, updated Jacobian is measured
+    cycle = (now.cost, now.evaluations)
+    after = replace(now, jacobian=columns.T, fresh=True, cycle=cycle)
     model = LinearModel(after)
-    promises = model.gain(model.step(UNDAMPED)) > settings.gain_tolerance * now.cost
-    return after if promises else replace(after, ending=Ending.GAIN)
+    # no damped step promises more than the undamped one
+    most = model.gain(model.step(UNDAMPED))
+    if most > settings.gain_tolerance * now.cost:
+        return after
+    return replace(after, ending=Ending.GAIN)
 
 
 def _advance(now: State, residuals: Function, settings: RefinementSettings) -> State:
@@ -129,7 +132,9 @@ def _advance(now: State, residuals: Function, settings: RefinementSettings) -> S
     if not cost[best] < now.cost:
         return _without_gain(now, model, settings)
     promised = model.gain(first)
-    ratio = (now.cost - cost[best]) / promised if promised > 0 else 0.0
+    ratio = 0.0
+    if promised > 0:
+        ratio = (now.cost - cost[best]) / promised
     after = _moved(now, points[best], rows[best], ratio, settings)
     if after.ended or not _keeps_jacobian(now, after, ratio):
         return after
@@ -146,7 +151,8 @@ def _corrected(
     origin = model.reach(np.zeros_like(first))
     probe = model.reach(PROBE * first)
     slope = (residuals(probe[None])[0] - now.residual) / PROBE
-    curvature = 2 / PROBE * (slope - now.jacobian @ ((probe - origin) / PROBE))
+    linear = now.jacobian @ ((probe - origin) / PROBE)
+    curvature = 2 / PROBE * (slope - linear)
     if not np.isfinite(curvature).all():
         return None
     corrected = model.step(now.damping, now.residual + 0.5 * curvature)
@@ -161,7 +167,9 @@ def _without_gain(
     """Take a new Jacobian, or a shorter step, after a step that does not help."""
     if not now.fresh:
         return replace(now, jacobian=no_jacobian(now.point))
-    after = replace(now, damping=now.damping * 2 * now.growth, growth=2 * now.growth)
+    # each failure in a row raises the damping more than the last one did
+    damping = now.damping * 2 * now.growth
+    after = replace(now, damping=damping, growth=2 * now.growth)
     promised = model.gain(model.step(after.damping))
     if promised >= settings.gain_tolerance * now.cost:
         return after
@@ -177,7 +185,8 @@ def _keeps_jacobian(now: Descent, after: Descent, ratio: float) -> bool:
     if now.fresh:
         return bool(ratio > TRUSTED)
     cost, evaluations = now.cycle
-    mean = np.log(cost / after.cost) / (now.evaluations + 1 - evaluations)
+    simulated = now.evaluations + 1 - evaluations
+    mean = np.log(cost / after.cost) / simulated
     return bool(np.log(now.cost / after.cost) >= mean)
 
 
@@ -186,7 +195,8 @@ def _updated(now: Descent, after: Descent) -> Array:
     scale, that explains the step."""
     move = after.point - now.point
     scaled = np.sum(now.jacobian**2, axis=0) * move
-    unexplained = after.residual - now.residual - now.jacobian @ move
+    expected = now.jacobian @ move
+    unexplained = after.residual - now.residual - expected
     return now.jacobian + np.outer(unexplained / (scaled @ move), scaled)
 
 
@@ -197,7 +207,9 @@ def _moved(
     the Jacobian is to be taken."""
     cost = costs(row[None])[0]
     gained_little = now.cost - cost < settings.gain_tolerance * now.cost
-    slow = now.slow + 1 if gained_little else 0
+    slow = 0
+    if gained_little:
+        slow = now.slow + 1
     ending = Ending.UNDER_WAY
     if cost <= EXACT * now.cost_before:
         ending = Ending.EXACT

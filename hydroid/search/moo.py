@@ -83,7 +83,9 @@ class PymooSearch:
         if population is None:
             self._set_up(int(rng.integers(2**31)))
         self._asked = self._algorithm.ask()
-        points = np.clip(self._asked.get("X").astype(float), 0.0, 1.0)
+        asked = self._asked.get("X").astype(float)
+        # a swarm's particles fly out of the box
+        points = np.clip(asked, 0.0, 1.0)
         if population is None and self._start is not None:
             points[0] = self._start
         self._asked.set("X", points)
@@ -98,11 +100,9 @@ class PymooSearch:
             individual.evaluated.update({"F", "G", "H"})
         self._algorithm.tell(infills=self._asked)
         # of a swarm the particles only pass the best points, which are in its archive
-        kept = (
-            self._algorithm.pop
-            if self._algorithm.archive is None
-            else self._algorithm.archive
-        )
+        kept = self._algorithm.archive
+        if kept is None:
+            kept = self._algorithm.pop
         objectives = kept.get("F").astype(float)
         infeasible = (objectives >= INFEASIBLE).any(axis=1)
         objectives[infeasible] = np.inf
@@ -153,7 +153,10 @@ def _directions(objectives: int, count: int) -> Array:
     from scipy.stats import qmc
 
     axes = np.eye(objectives)[:count]
-    uniform = qmc.Halton(objectives, scramble=False).random(count - len(axes) + 1)[1:]
+    sequence = qmc.Halton(objectives, scramble=False)
+    # the first point of the sequence is 0, which has no logarithm
+    uniform = sequence.random(count - len(axes) + 1)[1:]
+    # exponential numbers over their sum are uniform on the simplex
     exponential = -np.log(uniform)
     inner = exponential / exponential.sum(axis=1, keepdims=True)
     return np.vstack([axes, inner])

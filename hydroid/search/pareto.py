@@ -71,7 +71,9 @@ def crowding(objectives: Array, rank: Ints) -> Array:
         gaps = np.full(front.shape, np.inf)
         # An objective in which all are equal has no ends and no gaps.
         gaps[:, span == 0] = 0.0
-        gaps[1:-1] = (sorted_[2:] - sorted_[:-2]) / np.where(span == 0, 1.0, span)
+        between_neighbours = sorted_[2:] - sorted_[:-2]
+        gaps[1:-1] = between_neighbours / np.where(span == 0, 1.0, span)
+        # back to the order of the candidates
         np.put_along_axis(front, order, gaps, axis=0)
         crowd[candidates] = front
     return crowd.sum(axis=1)
@@ -106,7 +108,8 @@ def utopia(points: Array, objectives: Array) -> Array:
     nearest = usable.min(axis=0)
     span = np.ptp(usable, axis=0)
     relative = (values - nearest) / np.where(span > 0, span, 1.0)
-    return points[(relative**2).sum(axis=1).argmin()]
+    distance = (relative**2).sum(axis=1)
+    return points[distance.argmin()]
 
 
 def _ranked(objectives: Array) -> Array:

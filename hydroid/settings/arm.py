@@ -13,7 +13,7 @@ from typing import Annotated, Any, TypeAlias
 import numpy as np
 from pydantic import AfterValidator, Field, Strict, ValidationInfo
 
-from hydroid.arrays import Array, record
+from hydroid.arrays import Array, Limits, record
 from hydroid.errors import ModelError, SettingsError
 from hydroid.files import find_config
 from hydroid.quantity_table import CHOICES
@@ -33,7 +33,9 @@ SLIDE = 2  # MuJoCo's number of a joint that slides
 
 def _from_folder(path: Path, info: ValidationInfo) -> Path:
     folder = (info.context or {}).get("folder")
-    return path if folder is None else (folder / path).resolve()
+    if folder is None:
+        return path
+    return (folder / path).resolve()
 
 
 Beside = Annotated[Path, Strict(False), AfterValidator(_from_folder)]
@@ -50,13 +52,13 @@ class Joint:
     """
 
     name: str
-    range: tuple[float, float]
+    range: Limits
     continuous: bool
     actuator: Actuator | None
     slides: bool = False
 
     @property
-    def limits(self) -> tuple[float, float]:
+    def limits(self) -> Limits:
         """The range in the units of a simulation [rad], or [m]."""
         if self.slides:
             return self.range
@@ -211,6 +213,14 @@ class Arm(Settings):
         """Joint names, (J,)."""
         return tuple(joint.name for joint in self.joints)
 
+    def joint(self, number: int) -> Joint:
+        """Return a joint by its number, from 1."""
+        return self.joints[number - 1]
+
+    def name_of(self, joint: int) -> str:
+        """Return the name of a joint by its number, from 1."""
+        return self.joint(joint).name
+
     @property
     def link_names(self) -> tuple[str, ...]:
         """Names of the links, (L,)."""
@@ -222,7 +232,7 @@ class Arm(Settings):
         return np.array([*self.mass_of.values()])
 
     @property
-    def ranges(self) -> dict[str, tuple[float, float]]:
+    def ranges(self) -> dict[str, Limits]:
         """Lower and upper stop of each joint by its name [rad], or [m] of a slide;
         infinite where none is."""
         free = (-math.inf, math.inf)
@@ -273,7 +283,7 @@ def load_arm(name: str | Path, beside: Path | None = None) -> Arm:
     return load(find_config(name, beside, kind="arm"), Arm)
 
 
-def _range(joint: Any, continuous: bool, slides: bool) -> tuple[float, float]:
+def _range(joint: Any, continuous: bool, slides: bool) -> Limits:
     """Return the range of a model's joint [deg], or [m]; without limits once round,
     for sliders and tests."""
     if continuous:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from hydroid.arrays import Array, record
+from hydroid.arrays import Array, Limits, record
 from hydroid.settings.linkage import (
     DIGITS,
     Cylinder,
@@ -60,7 +60,7 @@ class LinearActuator:
 
 def make_cylinder(
     settings: Cylinder,
-    limits: tuple[float, float],
+    limits: Limits,
     data: Any = None,
     joint: str = "",
     *,
@@ -105,7 +105,7 @@ def _along_joint(settings: Cylinder, data: Any, joint: str) -> Triangle:
     return Triangle.model_construct(a=1.0, b=0.0, theta0=90.0 if is_forward else -90.0)
 
 
-def _refuse_dead_centre(cylinder: LinearActuator, limits: tuple[float, float]) -> None:
+def _refuse_dead_centre(cylinder: LinearActuator, limits: Limits) -> None:
     """Raise ValueError where a cylinder or its linkage does not reach all of a range,
     or has a dead centre in it."""
     bars = cylinder.settings.four_bar

@@ -67,7 +67,9 @@ def read_document(text: str, source: object, times: int = 1) -> tuple[Any, Lines
     try:
         # every scalar is text
         node = yaml.compose(text, Loader=yaml.BaseLoader)
-        value = None if node is None else reader.value(node, ())
+        value = None
+        if node is not None:
+            value = reader.value(node, ())
     except yaml.YAMLError as error:
         raise _not_yaml(error, source) from None
     except RecursionError:
@@ -78,9 +80,9 @@ def read_document(text: str, source: object, times: int = 1) -> tuple[Any, Lines
 def _not_yaml(error: yaml.YAMLError, source: object) -> SettingsError:
     """Return what the YAML reader stumbled over, in plain words, and where."""
     mark = getattr(error, "problem_mark", None)
-    where = (
-        f"{source}, line {mark.line + 1}, column {mark.column + 1}" if mark else source
-    )
+    where = source
+    if mark:
+        where = f"{source}, line {mark.line + 1}, column {mark.column + 1}"
     problem = getattr(error, "problem", None) or getattr(error, "reason", None)
     plain = next(
         (words for part, words in _PLAIN.items() if part in str(problem)), problem
@@ -155,7 +157,9 @@ class _Reader:
             )
         # a plain scalar is neither quoted nor a block of text
         is_plain = node.style is None
-        return _plain_value(text) if is_plain else text
+        if is_plain:
+            return _plain_value(text)
+        return text
 
 
 def _plain_value(text: str) -> Any:

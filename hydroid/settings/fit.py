@@ -92,7 +92,9 @@ class FitSettings(Settings):
     def payload_of(self, log: str) -> float:
         """Return the mass that the gripper holds in a log [kg]."""
         name = self.payload_name(log)
-        return 0.0 if name is None else self.payloads[name]
+        if name is None:
+            return 0.0
+        return self.payloads[name]
 
     def parameters_of(self, quantity: str) -> tuple[str, ...]:
         """Return the parameters that set a quantity of every joint with an actuator;
@@ -104,7 +106,9 @@ class FitSettings(Settings):
             if quantity in TARGETS[parameter.quantity] and parameter.per is None:
                 found.append(name)
                 open_joints -= {*(parameter.joints or open_joints)}
-        return () if open_joints else tuple(found)
+        if open_joints:
+            return ()
+        return tuple(found)
 
     @classmethod
     def names_of_joints(cls, values: Plain, folder: Path) -> tuple[str, ...]:
@@ -230,7 +234,9 @@ class FitSettings(Settings):
         if name is None:
             return self
         model, *terms = name.split("+")
-        settings = self._all_free() if model == "joint" else self
+        settings = self
+        if model == "joint":
+            settings = self._all_free()
         if self.terms() != tuple(terms):
             settings = settings._with_terms(terms)
         if model in RUNGS:

@@ -105,7 +105,9 @@ class FourBar(Settings):
     @property
     def branch(self) -> float:
         """1 for left, -1 for right."""
-        return 1.0 if self.side == "left" else -1.0
+        if self.side == "left":
+            return 1.0
+        return -1.0
 
     @property
     def phase(self) -> float:

@@ -12,13 +12,14 @@ log:
 import re
 from fnmatch import fnmatch
 from pathlib import Path
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple, get_args
 
 from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, ValidationInfo
 
 from hydroid.errors import SettingsError
 from hydroid.files import Plain
 from hydroid.settings.load import ByJoint, Settings
+from hydroid.units import UNITS
 from hydroid.words import listed
 
 _PART = re.compile(r"\[\d+\]$")
@@ -42,6 +43,19 @@ JOINT = "{joint}"
 OTHER = "other"
 """the group of logs that are in no group of `groups`"""
 Kind = Literal["command", "angle", "pressure"]
+Unit = Literal["%", "deg", "rad", "m", "cm", "mm", "bar", "Pa", "MPa"]
+"""units of columns; the first one of what is measured is the default"""
+
+
+def _units_of(quantity: str) -> tuple[str, ...]:
+    return tuple(
+        unit for unit in get_args(Unit) if UNITS[unit.lower()].quantity == quantity
+    )
+
+
+ANGLES = _units_of("angle")
+LENGTHS = _units_of("length")
+"""units of positions, and of the lengths of cylinders"""
 
 
 def _nonzero(value: float | None) -> float | None:
@@ -51,7 +65,9 @@ def _nonzero(value: float | None) -> float | None:
 
 
 def _one_or_more(given: str | tuple[str, ...]) -> tuple[str, ...]:
-    return (given,) if isinstance(given, str) else given
+    if isinstance(given, str):
+        return (given,)
+    return given
 
 
 Name = Annotated[str, Field(min_length=1)]
@@ -76,7 +92,7 @@ class Columns(Settings):
     positive and the negative direction of a command, whose values lie in [0, 100] % and
     are subtracted; chamber A, which pushes to positive angles, and chamber B of a
     pressure. Default: u{joint}_pct, q{joint}_deg, [pA{joint}_bar, pB{joint}_bar]"""
-    unit: Literal["%", "deg", "rad", "m", "cm", "mm", "bar", "Pa", "MPa"] | None = None
+    unit: Unit | None = None
     """unit of the scaled cells: of the angle of a joint that slides m, cm or mm, which
     of a joint that turns are the length of its cylinder from pin to pin; default: %,
     deg, bar"""
@@ -97,9 +113,9 @@ class ColumnMap(NamedTuple):
 
 
 KINDS = {
-    "command": ((f"u{JOINT}_pct",), (1, 2), ("%",)),
-    "angle": ((f"q{JOINT}_deg",), (1,), ("deg", "rad", "m", "cm", "mm")),
-    "pressure": ((f"pA{JOINT}_bar", f"pB{JOINT}_bar"), (2,), ("bar", "Pa", "MPa")),
+    "command": ((f"u{JOINT}_pct",), (1, 2), _units_of("command")),
+    "angle": ((f"q{JOINT}_deg",), (1,), (*ANGLES, *LENGTHS)),
+    "pressure": ((f"pA{JOINT}_bar", f"pB{JOINT}_bar"), (2,), _units_of("pressure")),
 }
 """default columns of a quantity, how many may hold it, and their units, the default
 first"""
@@ -211,7 +227,9 @@ class LogSettings(Settings):
             raise SettingsError(
                 f"{log_file(log).name} is in the groups {listed(found)}", "log.groups"
             )
-        return found[0] if found else OTHER
+        if found:
+            return found[0]
+        return OTHER
 
     def of_arm(self, side: str) -> "LogSettings":
         """Return the columns of one of two arms: their names begin with its own;

@@ -21,7 +21,9 @@ def belongs_to(settings: FitSettings, name: str) -> str:
         return parameter.link
     every = settings.arm.joint_names
     joints = ", ".join(every[number - 1] for number in parameter.joints or ())
-    return f"{joints} ({parameter.per})" if parameter.per else joints
+    if parameter.per:
+        return f"{joints} ({parameter.per})"
+    return joints
 
 
 def named(settings: FitSettings, name: str, detail: str = "") -> str:

@@ -7,6 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 from itertools import count
 from typing import Any
 
+from hydroid.arrays import Limits
 from hydroid.files import Plain
 from hydroid.parameters import Parameter, Prior
 from hydroid.quantity_table import CHOICES, CURVE, MECHANICAL, TARGETS
@@ -46,7 +47,9 @@ def expanded(parameters: Mapping[str, Any], compared: Any, arm: Arm | None) -> P
     """
     result: Plain = {}
     for name, entry in parameters.items():
-        each = entry.get("each") if isinstance(entry, dict) else None
+        each = None
+        if isinstance(entry, dict):
+            each = entry.get("each")
         if not each:
             _add(result, name, entry)
         elif entry.get("quantity") == "mass":
@@ -237,7 +240,9 @@ def nominal_value(
         if actuator is not None:
             table = actuator_values(actuator, hydraulics)
             values |= {table[name] for name in TARGETS[settings.quantity]}
-    return values.pop() if len(values) == 1 else None
+    if len(values) == 1:
+        return values.pop()
+    return None
 
 
 def make_parameter(
@@ -312,9 +317,7 @@ def _prior(
     return Prior(nominal, math.log(settings.within or 1.0) / 1.96, log=True)
 
 
-def _default_bounds(
-    settings: ParameterSettings, prior: Prior | None
-) -> tuple[float, float]:
+def _default_bounds(settings: ParameterSettings, prior: Prior | None) -> Limits:
     """Return the bounds of a parameter that states none: four standard deviations of
     its prior."""
     if prior is None:

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
+from hydroid.arrays import Limits
 from hydroid.quantity_table import CHOICES, MECHANICAL
 from hydroid.rungs import Climb
 from hydroid.settings.load import ByJoint, Joints, NotNegative, Positive, Settings
@@ -38,7 +39,7 @@ class ParameterSettings(Settings):
     boom's. Of a mass: links; true: all"""
     link: str | None = None
     """link whose mass the parameter is"""
-    bounds: tuple[float, float] | None = None
+    bounds: Limits | None = None
     """lower and upper bound, in the unit of the quantity; null:
     four standard deviations of the prior"""
     nominal: float | None = None

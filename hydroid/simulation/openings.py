@@ -71,7 +71,8 @@ def _valve_keys(coefficients: Structs) -> list[list[ValveKey]]:
     alike["b"][BEHIND_PORT] = 0.0
     keys: list[list[ValveKey]] = []
     for candidate in alike:
-        keys.append([(j, valve.tobytes()) for j, valve in enumerate(candidate)])
+        valves = [valve.tobytes() for valve in candidate]
+        keys.append([*enumerate(valves)])
     return keys
 
 
@@ -96,7 +97,9 @@ def valve_openings(
         i = owners[key]
         j = key[0]
         valve = plugin._replace(coefficients=plugin.coefficients[i, j : j + 1])
-        _open(valve, states[i, j : j + 1].copy(), commands[:, j], openings[key])
+        # the rollout begins from the same state
+        rest = states[i, j : j + 1].copy()
+        _open(valve, rest, commands[:, j], openings[key])
 
     driven = set(plugin.order[plugin.idle :].tolist())
     wanted = [key for key in openings if key[0] in driven]

@@ -76,7 +76,7 @@ def turn(c, z, w, supply: float, limits, period: float) -> Any:
     """Turn a joint over a step of the period [s], within its `limits` [rad], (2,); the
     speed of its rod [m/s] and the angle after it [rad]."""
     speed = rod_speed(c, w, supply)[0]
-    velocity = (speed if w.travel > 0.0 else -speed) / w.arm
+    velocity = (speed if w.open_area > 0.0 else -speed) / w.arm
     way = period * velocity
     if c.oil_frequency != np.inf:
         way += overshoot(c, z, velocity)
@@ -129,9 +129,9 @@ def roll_quasi_static(
             # velocity tells
             arm.angle[column] = z.angle + 0.5 * period * z.velocity
             if opening.size:
-                w.travel = opening[k, j]
+                w.open_area = opening[k, j]
             else:
-                w.travel = mean_opening(c, z, w, commands[:, j], now, plugin)
+                w.open_area = mean_opening(c, z, w, commands[:, j], now, plugin)
             demanded |= commands[now, j] != 0.0
         _kinematics(arm.model, arm.data)
         _com_pos(arm.model, arm.data)

@@ -37,8 +37,10 @@ def roles(active: Mask, others: OtherJoints, *, logged: bool = True) -> Roles:
     Without a `logged` motion to follow, others are locked that would follow one.
     """
     nobody = np.zeros_like(active)
-    return Roles(
-        active=active,
-        passive=~active if others == "passive" else nobody,
-        following=~active if others == "measured" and logged else nobody,
-    )
+    passive = nobody
+    if others == "passive":
+        passive = ~active
+    following = nobody
+    if others == "measured" and logged:
+        following = ~active
+    return Roles(active=active, passive=passive, following=following)

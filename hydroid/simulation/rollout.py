@@ -42,7 +42,8 @@ NO_ACTUATORS = Plugin(
 """of an arm whose joints are all pushed"""
 
 # libmujoco.so.*, libmujoco.*.dylib or mujoco.dll: the one that the bindings have loaded
-_library = ctypes.CDLL(str(next(Path(mujoco.__file__).parent.glob("*mujoco.*"))))
+_file = next(Path(mujoco.__file__).parent.glob("*mujoco.*"))
+_library = ctypes.CDLL(str(_file))
 
 
 def mujoco_function(name: str, *arguments: Any) -> Any:
@@ -137,6 +138,7 @@ class SteppedArm:
         self._inertia = model.stat.meaninertia
         m = self.model
         d = self.data
+        endless = [-np.inf, np.inf]
         # addresses of the bindings: compiled code calls MuJoCo without them
         self._handles = Handles(
             model=m._address,  # pyright: ignore[reportPrivateUsage]
@@ -153,7 +155,7 @@ class SteppedArm:
             steps=steps,
             gravity=d.qfrc_bias,
             slack=m.qpos_spring,
-            limits=np.where(m.jnt_limited[:, None], m.jnt_range, [-np.inf, np.inf]),
+            limits=np.where(m.jnt_limited[:, None], m.jnt_range, endless),
         )
 
     def start(
@@ -166,12 +168,14 @@ class SteppedArm:
         it. Returned is what holds it there, tau0 = g(q0) of equation (1), and springs
         that are not slack there [N·m], shape (V,).
         """
-        model, data = self.model, self.data
+        model = self.model
+        data = self.data
         for name, value in values.items():
             field = getattr(model, name)
             # its row stands before those of all copies
             world = len(field) % self.copies
-            field[world:] = value[rows, world:].reshape(field[world:].shape)
+            of_copies = field[world:]
+            of_copies[:] = value[rows, world:].reshape(of_copies.shape)
         model.dof_armature[:] = self._armature  # a rollout steps with another
         mujoco.mj_setConst(model, data)
         # constraints are solved as well whoever stands beside

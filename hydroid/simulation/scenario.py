@@ -91,8 +91,10 @@ def smooth(angle: Array, cutoff: float) -> Array:
     if cutoff >= 0.5 or len(angle) < 16 or not angle.size:
         return angle
     low_pass = butter(2, 2 * cutoff, output="sos")
+    # scipy asks for padding that is shorter than the signal
+    padding = min(len(angle) - 1, 100)
     # forwards and backwards, so that no phase is lost
-    return sosfiltfilt(low_pass, angle, axis=0, padlen=min(len(angle) - 1, 100))
+    return sosfiltfilt(low_pass, angle, axis=0, padlen=padding)
 
 
 @record
@@ -116,10 +118,10 @@ class Candidates:
 def distinct(*tables: Any) -> tuple[Index, Index]:
     """Return which of n rows differ in any table, m of them, and which of these each
     row is, shape (n,)."""
-    rows = [
-        b"".join(part.tobytes() for part in parts)
-        for parts in zip(*tables, strict=True)
-    ]
+    rows = list[bytes]()
+    for parts in zip(*tables, strict=True):
+        # bytes, so that rows are alike only if they are to the bit
+        rows.append(b"".join(part.tobytes() for part in parts))
     _, first, alike = np.unique(rows, return_index=True, return_inverse=True)
     return first, alike
 
@@ -264,7 +266,8 @@ class Chain:
                     hint="stage 2 needs its cylinder (two pivots, areas) or rotary actuator: "
                     "add actuator: to the joint",
                 )
-        self._range = np.array([arm.lower, arm.upper])[:, self.joints]
+        ranges = np.array([arm.lower, arm.upper])
+        self._range = ranges[:, self.joints]
         model = locked.model
         # of M[i, j] in MuJoCo's sparse mass matrix
         entries = np.zeros((model.nv, model.nv), np.intp)
@@ -298,7 +301,8 @@ class Chain:
         their own.
         """
         joints: Records = candidates.joints[:, self.joints]  # pyright: ignore[reportAssignmentType]
-        to_stop = np.min(abs(self._range - pose[self.columns]), axis=0)
+        away = abs(self._range - pose[self.columns])
+        to_stop = np.min(away, axis=0)
         # nothing is trapped at a stop that the joint does not touch
         joints.trapped_pressure[:, to_stop > STOP_REACH] = np.inf
         if pressure is not None:

@@ -48,11 +48,11 @@ SETTLED = 1e-6
 @compilable
 def settled_rod(c, w, supply: float, quasi: bool) -> Any:
     """Speed of a rod [m/s] and the flow that it takes from the line [m³/s], at the
-    opening `w.travel`."""
+    opening `w.open_area`."""
     if quasi:
         speed, drawn, _ = rod_speed(c, w, supply)
-        return speed if w.travel > 0.0 else -speed, drawn
-    if w.travel == 0.0 and c.leakage == 0.0:
+        return speed if w.open_area > 0.0 else -speed, drawn
+    if w.open_area == 0.0 and c.leakage == 0.0:
         return 0.0, 0.0
     return balanced_speed(supply, c, w, (c.a.area, c.b.area))
 
@@ -60,11 +60,12 @@ def settled_rod(c, w, supply: float, quasi: bool) -> Any:
 @compilable
 def fast_enough(c, w, wished: float, supply: float, quasi: bool) -> bool:
     """Whether a rod moves at least as fast as wished [m/s], in that direction, at the
-    opening `w.travel`."""
+    opening `w.open_area`."""
     sign = 1.0 if wished > 0.0 else -1.0
     if quasi:
-        return sign * w.travel > 0.0 and rod_speed(c, w, supply)[0] >= abs(wished)
-    left = surplus(wished, supply, c, w, (c.a.area, c.b.area))[0]
+        return sign * w.open_area > 0.0 and rod_speed(c, w, supply)[0] >= abs(wished)
+    areas = (c.a.area, c.b.area)
+    left = surplus(wished, supply, c, w, areas)[0]
     return sign * left >= joint_friction(c, w.arm)
 
 
@@ -79,7 +80,7 @@ def least_command(c, w, wished: float, supply: float, quasi: bool) -> float:
     high = FULL_COMMAND
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        w.travel = steady_opening(sign * middle, c)
+        w.open_area = steady_opening(sign * middle, c)
         if fast_enough(c, w, wished, supply, quasi):
             high = middle
         else:
@@ -96,13 +97,13 @@ def nearest_command(
 
     A valve that opens with a jump has a slowest speed.
     """
-    w.travel = steady_opening(command, c)
+    w.open_area = steady_opening(command, c)
     beyond = abs(settled_rod(c, w, supply, quasi)[0] - wished)
     # two of the last halvings: surely on the other side of a jump
     below = command - np.sign(command) * 2.0 * FULL_COMMAND * 0.5**HALVINGS
     if below * command <= 0.0:
         below = 0.0
-    w.travel = steady_opening(below, c)
+    w.open_area = steady_opening(below, c)
     reached = settled_rod(c, w, supply, quasi)[0]
     if abs(reached - wished) >= beyond:
         return command
@@ -149,7 +150,7 @@ def drawn_at(plugin: Plugin, rods: Rods, law: Law, pressure: float) -> float:
         if law.inverse:
             wished = rods.wished[j] * w.arm
             rods.command[j] = least_command(c, w, wished, supply, law.quasi)
-        w.travel = steady_opening(rods.command[j], c)
+        w.open_area = steady_opening(rods.command[j], c)
         rods.speed[j], flow = settled_rod(c, w, supply, law.quasi)
         drawn += flow
     return drawn
@@ -186,7 +187,8 @@ def shared_pressure(plugin: Plugin, rods: Rods, law: Law) -> float:
     if over < pump.pump_flow:
         part = (over / pump.pump_flow) ** pump.pump_exponent
         low = max(low, high - pump.pump_droop * part)
-    under = taken_at(plugin, rods, law, low) - delivery(low, 1.0, pump)[0]
+    given = delivery(low, 1.0, pump)[0]
+    under = taken_at(plugin, rods, law, low) - given
     left = SETTLED * pump.pump_flow
     if under >= -left:
         return low
@@ -199,9 +201,8 @@ def shared_pressure(plugin: Plugin, rods: Rods, law: Law) -> float:
         # where the rule creeps
         if count % 4 == 3:
             pressure = 0.5 * (low + high)
-        excess = (
-            taken_at(plugin, rods, law, pressure) - delivery(pressure, 1.0, pump)[0]
-        )
+        given = delivery(pressure, 1.0, pump)[0]
+        excess = taken_at(plugin, rods, law, pressure) - given
         if abs(excess) <= left:
             return pressure
         if excess > 0.0:
@@ -245,7 +246,7 @@ def _settle(
                 command[k, j] = nearest_command(
                     c, w, wished[j] * w.arm, command[k, j], supply, law.quasi
                 )
-                w.travel = steady_opening(command[k, j], c)
+                w.open_area = steady_opening(command[k, j], c)
                 speed[j] = settled_rod(c, w, supply, law.quasi)[0]
             velocity[k, j] = speed[j] / w.arm + 0.0  # no -0
 

@@ -155,9 +155,11 @@ class Simulation:
             shares = np.array_split(range(rows.size), groups)
             # a deque takes what the pool returns, so that errors are raised here
             deque(pool.map(simulate, shares), maxlen=0)
-            if copies > 1:  # one that diverges stops those beside it
+            # one that diverges stops those beside it, which go again, each alone
+            if copies > 1:
                 free = deque(self._stepped() for _ in range(threads))
-                left = np.flatnonzero(np.isnan(response.angle[rows, -1]).any(axis=1))
+                last = response.angle[rows, -1]
+                left = np.flatnonzero(np.isnan(last).any(axis=1))
                 deque(pool.map(simulate, left[:, None]), maxlen=0)
 
     def _write(
@@ -192,7 +194,8 @@ class Simulation:
         Actuators need an arm of their own; MuJoCo integrates one without any damping
         otherwise.
         """
-        damped = (self.scenario.values(candidates)["dof_damping"] > 0.0).any(axis=1)
+        damping = self.scenario.values(candidates)["dof_damping"]
+        damped = (damping > 0.0).any(axis=1)
         if self.joints.size or not damped.all():
             return 1
         n = len(candidates)
@@ -261,13 +264,18 @@ class Simulation:
         state = ready.states[row]
         samples = len(scenario.command) // scenario.stepping.steps
         observed = bool(self._pressures.size)
-        kept = 1 + samples if observed else 1
+        kept = 1
+        if observed:
+            kept = 1 + samples
         angle = np.full((1 + samples, start.size), np.nan)
         history = np.zeros((kept, len(state)), JOINT_STATE)
         angle[0] = start
         history[0] = state
-        course = Course(ready.commands, torque, ready.taken[row], ready.openings[row])
-        arm.roll(actuators, state, course, Trace(angle[1:], history[1:]))
+        taken = ready.taken[row]
+        course = Course(ready.commands, torque, taken, ready.openings[row])
+        # the start is known: what is rolled out comes after it
+        trace = Trace(angle[1:], history[1:])
+        arm.roll(actuators, state, course, trace)
         oil = None
         if observed:
             oil = _oil(actuators, history, angle[:, self._chain.columns])
@@ -321,7 +329,9 @@ def _oil(actuators: Plugin, history: Structs, angle: Array) -> Oil:
     """Return what the oil of a candidate does in its states, (1 + T, J) of JOINT_STATE,
     at angles [rad], (1 + T, J)."""
     coefficients = actuators.coefficients
-    flow = np.stack([history["a"]["flow"], history["b"]["flow"]], axis=-1)
+    flow_a = history["a"]["flow"]
+    flow_b = history["b"]["flow"]
+    flow = np.stack([flow_a, flow_b], axis=-1)
     # the last in order is driven, and has the pump of all
     last = actuators.order[-1]
     line = history["line"][:, last].copy()
@@ -359,5 +369,7 @@ def reading(angle: Array, sensors: Structs, period: float) -> Array:
     for k in np.flatnonzero(lag):
         left = np.exp(-period / lag[k])
         mean = (1.0 - left) * lag[k] / period
-        turned[:, k] = lfilter([1.0 - mean, mean - left], [1.0, -left], turned[:, k])
+        # exact for an input on straight lines: of this sample, and of the one before
+        inputs = [1.0 - mean, mean - left]
+        turned[:, k] = lfilter(inputs, [1.0, -left], turned[:, k])
     return angle[0] + turned

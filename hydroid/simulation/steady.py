@@ -33,7 +33,7 @@ from hydroid.hydraulics.cylinder import rod_way, weigh
 from hydroid.hydraulics.elementwise import compilable
 from hydroid.hydraulics.joint import open_share
 from hydroid.hydraulics.kernel import make_pad, source_key
-from hydroid.hydraulics.oil import volume
+from hydroid.hydraulics.oil import volumes
 from hydroid.hydraulics.pump import (
     centre_left,
     delivery,
@@ -95,7 +95,10 @@ def steady_stroke(asked: float, side, c) -> float:
 def steady_opening(command: float, c) -> float:
     """Net opening [m²] of a valve under a command [%] that is held, below 0 towards
     B."""
-    travel = steady_stroke(command, c.a, c) - steady_stroke(-command, c.b, c)
+    # the spool stands where both plungers push it
+    pushed_a = steady_stroke(command, c.a, c)
+    pushed_b = steady_stroke(-command, c.b, c)
+    travel = pushed_a - pushed_b
     if travel > 0.0:
         return c.a.opening * open_share(c.a, travel)
     return -c.b.opening * open_share(c.b, -travel)
@@ -148,11 +151,11 @@ def oil_at(speed: float, supply: float, c, w, takes) -> Any:
     """Pressures of chambers A and B [Pa] at a rod's speed [m/s], and flow from the pump
     [m³/s].
 
-    `w` has the valve's net opening `travel` [m²]. The chambers take in oil as pistons
+    `w` has the valve's net opening `open_area` [m²]. The chambers take in oil as pistons
     of the areas that `takes` has [m²] do.
     """
-    a = max(w.travel, 0.0)
-    b = max(-w.travel, 0.0)
+    a = max(w.open_area, 0.0)
+    b = max(-w.open_area, 0.0)
     return_a = c.leakage + b * c.a.return_
     return_b = c.leakage + a * c.b.return_
     flow_a = takes[0] * speed
@@ -230,7 +233,7 @@ def fed_speed(c, w, takes) -> Any:
     high = c.relief
     pressure = c.relief
     # what is drawn rises with the line's pressure, and what is given falls
-    centre = left_open(1.0, c, w.travel)
+    centre = left_open(1.0, c, w.open_area)
     for _ in range(HALVINGS):
         _, drawn = balanced_speed(min(pressure, c.supply_pressure), c, w, takes)
         drawn += past_valves(pressure, centre, c)[0]
@@ -254,7 +257,7 @@ def areas_on_the_way(c, w, angle: float, load, command: float) -> Any:
     (3,).
     """
     areas = (c.a.area, c.b.area)
-    w.travel = steady_opening(command, c)
+    w.open_area = steady_opening(command, c)
     weigh(c, w, angle - NEAR, load[0])
     speed, supply = fed_speed(c, w, areas)
     before_a, before_b, _ = oil_at(speed, supply, c, w, areas)
@@ -262,15 +265,17 @@ def areas_on_the_way(c, w, angle: float, load, command: float) -> Any:
     speed, supply = fed_speed(c, w, areas)
     behind_a, behind_b, _ = oil_at(speed, supply, c, w, areas)
     travel, arm = rod_way(c, angle)
-    volume_a = volume_b = c.dead_volume
+    volume_a = c.dead_volume
+    volume_b = c.dead_volume
     if c.kind == LINEAR:
-        volume_a = volume(travel, c.a.area, c.dead_volume)
-        volume_b = volume(c.stroke - travel, c.b.area, c.dead_volume)
+        volume_a, volume_b = volumes(travel, c)
     # near a dead centre the rod hardly moves, whatever the joint does
     way = 2.0 * NEAR * (arm if abs(arm) > LEAST_LEVER else LEAST_LEVER)
     a = c.a.area + volume_a / c.bulk_modulus * (behind_a - before_a) / way
     b = c.b.area - volume_b / c.bulk_modulus * (behind_b - before_b) / way
-    return max(a, LEAST_AREA * c.a.area), max(b, LEAST_AREA * c.b.area)
+    least_a = LEAST_AREA * c.a.area
+    least_b = LEAST_AREA * c.b.area
+    return max(a, least_a), max(b, least_b)
 
 
 @compilable
@@ -287,7 +292,7 @@ def _quasi_static_speed(coefficients, driven, pad) -> float:
         shared = line_pressure(coefficients, driven, pad.joints, line, 1.0)
         supply = min(supply, shared)
     speed = rod_speed(c, w, supply)[0]
-    return speed if w.travel > 0.0 else -speed
+    return speed if w.open_area > 0.0 else -speed
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -303,8 +308,8 @@ def _steady(
     for i in range(coefficients.size):
         c = coefficients[i]
         for k in range(commands.size):
-            w.travel = steady_opening(commands[k], c)
-            shut = w.travel == 0.0 and c.leakage == 0.0
+            w.open_area = steady_opening(commands[k], c)
+            shut = w.open_area == 0.0 and c.leakage == 0.0
             takes = (c.a.area, c.b.area)
             if not (quasi or shut):
                 takes = areas_on_the_way(c, w, angle, load[i], commands[k])

@@ -100,7 +100,8 @@ class Draws:
         together.
         """
         information = np.sum(self.posterior.root**2, axis=0)
-        return float(np.sqrt(np.mean(information * np.diag(self.posterior.covariance))))
+        variances = np.diag(self.posterior.covariance)
+        return float(np.sqrt(np.mean(information * variances)))
 
 
 def draw(
@@ -138,11 +139,14 @@ def on_their_level(posterior: Posterior, changes: Array, problem: Problem) -> Ar
     box = posterior.box
     likelihood = likelihood_at(problem, box.at)
     widening = posterior.quantile / NORMAL
-    gaussian = 0.5 * np.sum((changes @ posterior.root.T / widening) ** 2, axis=1)
-    least = 0.5 * float(np.sum(likelihood.rows(box.at[None]) ** 2))
+    deviations = changes @ posterior.root.T / widening
+    gaussian = 0.5 * np.sum(deviations**2, axis=1)
+    at_estimate = likelihood.rows(box.at[None])
+    least = 0.5 * float(np.sum(at_estimate**2))
 
     def too_unlikely(candidates: Array, rows: Index) -> Mask:
-        cost = 0.5 * np.sum(likelihood.rows(box.points(candidates)) ** 2, axis=1)
+        residuals = likelihood.rows(box.points(candidates))
+        cost = 0.5 * np.sum(residuals**2, axis=1)
         # a simulation that diverged is as unlikely as can be
         increase = np.nan_to_num(cost - least, nan=np.inf)
         return increase > widening**2 * gaussian[rows]
@@ -151,8 +155,10 @@ def on_their_level(posterior: Posterior, changes: Array, problem: Problem) -> Ar
         """Return how far rows may go from a start towards an end, by halving."""
         way = end[rows] - start[rows]
         part = np.zeros(len(rows))
+        if not len(rows):
+            return way
         step = 0.5
-        for _ in range(HALVINGS if len(rows) else 0):
+        for _ in range(HALVINGS):
             tried = part + step
             far = too_unlikely(start[rows] + tried[:, None] * way, rows)
             part = np.where(far, part, tried)
@@ -162,7 +168,10 @@ def on_their_level(posterior: Posterior, changes: Array, problem: Problem) -> Ar
     # the same changes without the directions that the logs leave wide open
     variances, axes = np.linalg.eigh(posterior.covariance)
     narrow = axes[:, np.sqrt(variances) < WIDE_OPEN]
-    narrowed = np.clip(changes @ narrow @ narrow.T, -box.room[0], box.room[1])
+    projected = changes @ narrow @ narrow.T
+    # a projection of a point in the box may lie outside it
+    below, above = box.room
+    narrowed = np.clip(projected, -below, above)
     every = np.arange(len(changes))
     unlikely = every[too_unlikely(changes, every)]
     still_unlikely = unlikely[too_unlikely(narrowed[unlikely], unlikely)]
@@ -209,7 +218,9 @@ def _move(point: Array, speed: Array, walls: Array, gaps: Array) -> None:
             if reach <= gaps[k]:
                 continue
             phase = np.arctan2(-towards[k], there[k])
-            turn = np.arccos(min(max(-gaps[k] / reach, -1.0), 1.0))
+            # rounding may lead a little beyond what a cosine can be
+            cosine = min(max(-gaps[k] / reach, -1.0), 1.0)
+            turn = np.arccos(cosine)
             time = (turn - phase) % (2.0 * np.pi)
             if TOUCHING < time < first:
                 first = time
@@ -242,7 +253,8 @@ class DriftingAngles:
         self._grown = rate * period
         # a first-order process keeps this part of itself from step to step, and so much
         # is added that its variance stays
-        self._kept = np.exp(-period / np.where(time > 0.0, time, 1.0))
+        lasts = np.where(time > 0.0, time, 1.0)
+        self._kept = np.exp(-period / lasts)
         self._lasting = np.sqrt(lasting * (1.0 - self._kept**2))
         self._drift = np.zeros((n, len(numbers)))
         self._passing = np.zeros((n, len(numbers)))
@@ -256,7 +268,8 @@ class DriftingAngles:
         """Go on for a period in which models moved by a way [rad]; return the errors
         [rad], (n, J) each."""
         drifted, lasted = rng.normal(size=(2, *way.shape))
-        self._drift += np.sqrt(self._grown + self._way * np.abs(way)) * drifted
+        variance = self._grown + self._way * np.abs(way)
+        self._drift += np.sqrt(variance) * drifted
         self._passing = self._kept * self._passing + self._lasting * lasted
         return self._drift + self._passing
 

@@ -106,14 +106,16 @@ class Followed:
     def error(self, joint: int) -> Array:
         """Return wished minus predicted angle of a joint (number, from 1) [rad], shape
         (T,)."""
-        return self.log.angle[:, joint - 1] - self.angle[:, joint - 1]
+        return self.log.angle_of(joint) - self.angle[:, joint - 1]
 
     def rms(self, joint: int) -> tuple[float, float]:
         """Return the predicted rms error of a joint (number, from 1) [rad], and that
         within its band."""
         error = self.error(joint)
         half = self.half.get(joint)
-        wide = np.inf if half is None else float(np.sqrt(np.mean(error**2 + half**2)))
+        wide = np.inf
+        if half is not None:
+            wide = float(np.sqrt(np.mean(error**2 + half**2)))
         return float(rms(error)), wide
 
 
@@ -164,18 +166,18 @@ def joint_lags(plant: Plant) -> Array:
         """Return the mean of both sides of a quantity, by joint."""
         return 0.5 * (actuators[f"{quantity}_a"] + actuators[f"{quantity}_b"])
 
-    late = actuators["opening_lag"] + mean("delay")
-    late = late + mean("pilot_lag")
+    behind = actuators["opening_lag"] + mean("delay")
+    behind = behind + mean("pilot_lag")
     # at half its stroke the solenoid adds as much stiffness as the spring has
-    late = late + 0.5 * mean("plunger_damping") / actuators["plunger_stiffness"]
+    behind = behind + 0.5 * mean("plunger_damping") / actuators["plunger_stiffness"]
     # a slow motion is late behind an oscillator by twice the damping per frequency that
     # acts on the joint
     frequency = 2.0 * np.pi * actuators["oil_frequency"]
     held_back = actuators["oil_damping"] * (1.0 - actuators["oil_damping_share"])
-    late = late + 2.0 * held_back / frequency
+    behind = behind + 2.0 * held_back / frequency
     lags = np.zeros(len(plant.names))
     driven = [joint - 1 for joint in plant.joints]
-    lags[driven] = late[driven]
+    lags[driven] = behind[driven]
     return lags
 
 

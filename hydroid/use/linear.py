@@ -28,7 +28,7 @@ from scipy.signal import StateSpace, lsim
 from hydroid.arrays import Array, Index, record
 from hydroid.errors import SettingsError
 from hydroid.hydraulics.cylinder import rod_way
-from hydroid.hydraulics.oil import volume
+from hydroid.hydraulics.oil import volumes
 from hydroid.hydraulics.records import LINEAR, coefficients
 from hydroid.hydraulics.solenoid import drive, resting_stroke, side_voltage
 from hydroid.plant import Plant
@@ -80,7 +80,9 @@ class LinearArm:
         given = np.zeros((len(time), len(self.joints)))
         given[:, k] = 1.0
         system = StateSpace(self.a, self.b, self.c, self.d)
-        speed = lsim(system, given, time - time[0])[1][:, len(self.joints) + k]
+        _, outputs, _ = lsim(system, given, time - time[0])
+        # angles come first among the outputs
+        speed = outputs[:, len(self.joints) + k]
         return np.interp(time - self.delay[k], time, speed, left=0.0)
 
     def response(self, k: int, frequency: Array) -> Array:
@@ -89,15 +91,20 @@ class LinearArm:
         own = len(self.joints) + k
         swing = 2j * np.pi * frequency
         matrices = swing[:, None, None] * np.eye(len(self.a)) - self.a
-        states = np.linalg.solve(matrices, self.b[:, k, None].astype(complex))[..., 0]
-        return (states @ self.c[own] + self.d[own, k]) * np.exp(-swing * self.delay[k])
+        command = self.b[:, k, None].astype(complex)
+        states = np.linalg.solve(matrices, command)[..., 0]
+        prompt = states @ self.c[own] + self.d[own, k]
+        # a delay turns the phase and leaves the amplitude
+        return prompt * np.exp(-swing * self.delay[k])
 
     def text(self) -> str:
         """Return it as JSON."""
         plain = dict[str, Any]()
         for key, value in vars(self).items():
             # matrices bear their usual names in the file: A, B, C, D
-            name = key.upper() if len(key) == 1 else key
+            name = key
+            if len(key) == 1:
+                name = key.upper()
             plain[name] = np.asarray(value).tolist()
         return json.dumps(plain, indent=1)
 
@@ -141,7 +148,9 @@ def linearise(plant: Plant, command: Array) -> LinearArm:
             first += 2
     rates[first_angle:] = speeds
 
-    outputs = np.vstack([np.eye(total, total + count)[first_angle:], speeds])
+    # angles are states themselves
+    angles = np.eye(total, total + count)[first_angle:]
+    outputs = np.vstack([angles, speeds])
     delays = [_side(plant, joint, command)["delay"] for joint in joints]
     return LinearArm(
         a=rates[:, :total],
@@ -195,7 +204,7 @@ def _output_names(plant: Plant, joints: Sequence[int]) -> tuple[str, ...]:
     speeds = list[str]()
     for joint in joints:
         name = plant.names[joint]
-        unit = "m" if plant.identified.settings.arm.joints[joint].slides else "rad"
+        unit = plant.identified.settings.arm.joints[joint].shown.si
         angles.append(f"{name} angle [{unit}]")
         speeds.append(f"{name} speed [{unit}/s]")
     return (*angles, *speeds)
@@ -273,8 +282,10 @@ def _slopes(plant: Plant, command: Array, columns: Index) -> tuple[Array, Array,
     more = 4 * np.arange(count)
     apart = commands[more, columns] - commands[more + 1, columns]
     speeds = plant.steady().speeds(commands, poses)[:, columns]
-    gain = (speeds[0:-1:4] - speeds[1:-1:4]).T / apart
-    turn = (speeds[2:-1:4] - speeds[3:-1:4]).T / (2.0 * NEAR_ANGLE)
+    by_command = speeds[0:-1:4] - speeds[1:-1:4]
+    by_angle = speeds[2:-1:4] - speeds[3:-1:4]
+    gain = by_command.T / apart
+    turn = by_angle.T / (2.0 * NEAR_ANGLE)
     return gain, turn, speeds[-1]
 
 
@@ -334,7 +345,9 @@ def _plunger_stiffness(
     beyond = max(abs(command) - side["dead_band"], 0.0)
     voltage = side_voltage(beyond, 1.0, side["onset"], side["dead_band"])
     stroke = float(resting_stroke(drive(voltage, c), c.gap, c.plunger_stiffness))
-    return float(c.plunger_stiffness * (1.0 + 2.0 * stroke / (stroke + c.gap)))
+    # the solenoid pulls harder where the gap is shorter: that adds to the spring
+    solenoid = 2.0 * stroke / (stroke + c.gap)
+    return float(c.plunger_stiffness * (1.0 + solenoid))
 
 
 def _coefficients(plant: Plant, joint: int) -> Any:
@@ -357,10 +370,9 @@ def _oil(plant: Plant, joint: int, command: Array) -> _Oil | None:
         stiffness = _oil_stiffness(plant, joint)
         inertia = _inertia(plant, joint)
         yielding = _yielding(plant, joint, command)
-        return _Oil(
-            float(np.sqrt(stiffness / inertia)),
-            0.5 * yielding * float(np.sqrt(stiffness * inertia)),
-        )
+        frequency = float(np.sqrt(stiffness / inertia))
+        damping = 0.5 * yielding * float(np.sqrt(stiffness * inertia))
+        return _Oil(frequency, damping)
     actuator = plant.actuators[joint]
     if np.isinf(actuator["oil_frequency"]):
         return None
@@ -376,8 +388,9 @@ def _oil_stiffness(plant: Plant, joint: int) -> float:
     travel, arm = rod_way(c, float(plant.angle[joint]))
     if c.kind != LINEAR:
         return 2.0 * (arm * c.a.area) ** 2 * c.bulk_modulus / c.dead_volume
-    side_a = c.a.area**2 / volume(travel, c.a.area, c.dead_volume)
-    side_b = c.b.area**2 / volume(c.stroke - travel, c.b.area, c.dead_volume)
+    volume_a, volume_b = volumes(travel, c)
+    side_a = c.a.area**2 / volume_a
+    side_b = c.b.area**2 / volume_b
     return arm**2 * c.bulk_modulus * (side_a + side_b)
 
 

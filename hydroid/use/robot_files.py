@@ -70,7 +70,9 @@ def fitted_urdf(plant: Plant, robot: Path) -> tuple[str, list[str]]:
     # from the end, so that places before it stay
     for block in reversed([*_LINK.finditer(plain)]):
         named = _NAME.search(block[1])
-        factor = factors.get(owners.get(named[2], "")) if named else None
+        factor = None
+        if named:
+            factor = factors.get(owners.get(named[2], ""))
         if factor is not None:
             text = _reweighed(text, plain, block.span(), factor)
     return text, [name for name in names if name not in factors]
@@ -108,7 +110,9 @@ def _owners(root: Element, names: Sequence[str]) -> dict[str, str]:
 def _mass_of(link: Element) -> float:
     """Return the mass that a link states [kg]; 0 where it states none."""
     mass = link.find("inertial/mass")
-    return 0.0 if mass is None else float(mass.get("value", "0"))
+    if mass is None:
+        return 0.0
+    return float(mass.get("value", "0"))
 
 
 def _reweighed(text: str, plain: str, span: tuple[int, int], factor: float) -> str:

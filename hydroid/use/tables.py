@@ -46,11 +46,8 @@ def speed_tables(plant: Plant) -> dict[str, str]:
     files = dict[str, str]()
     arm = plant.identified.settings.arm
     for column in [joint - 1 for joint in plant.joints]:
-        unit = "deg"
-        factor = float(np.degrees(1.0))
-        if arm.joints[column].slides:
-            unit = "mm"
-            factor = 1e3
+        unit = arm.joints[column].shown.unit
+        factor = arm.joints[column].shown.factor
         low, high = joint_range(plant, column)
         header = ["command_pct"]
         columns = [COMMANDS]

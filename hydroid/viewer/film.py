@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from hydroid.arrays import Limits
 from hydroid.errors import RunError, SettingsError
 from hydroid.progress import Progress, no_progress
 from hydroid.reporting.outlines import sight
@@ -72,7 +73,7 @@ def rendered(
 def render_motion(
     motion: Motion,
     kind: str,
-    span: tuple[float, float],
+    span: Limits,
     progress: Progress = no_progress,
 ) -> bytes:
     """Return the content of a film of a motion in a span [s], or of a picture of its
@@ -85,7 +86,9 @@ def render_motion(
         raise SettingsError(what, "--span", "write FROM:TO in seconds")
     size, rate = KINDS[kind]
     count = max(1, int(np.ceil((end - begin) * rate - 1e-9)))
-    error = f", rms error {motion.error:.2g}°" if np.isfinite(motion.error) else ""
+    error = ""
+    if np.isfinite(motion.error):
+        error = f", rms error {motion.error:.2g}°"
 
     def frames() -> Iterator[tuple[float, str]]:
         for k in range(count):
@@ -96,7 +99,9 @@ def render_motion(
     pictures = rendered(motion, size, frames())
     if kind == ".mp4":
         return _mp4(pictures)
-    return _gif(pictures) if kind == ".gif" else _png(pictures)
+    if kind == ".gif":
+        return _gif(pictures)
+    return _png(pictures)
 
 
 def look_at(camera: mujoco.MjvCamera, model: mujoco.MjModel, region: Region) -> None:
@@ -184,7 +189,7 @@ def _mp4(pictures: Iterable[Picture]) -> bytes:
 
 FRAME = 1 / 60
 """time between two pictures of the viewer [s]"""
-LATE = 0.1
+LONGEST_WAIT = 0.1
 """a machine too slow by this shows slow motion instead of jumps [s]"""
 
 
@@ -198,8 +203,8 @@ def play(playback: Playback, viewer: Any) -> None:
     begun = clock()
     while viewer.is_running():
         frame = clock()
-        late = frame - begun - playback.time - LATE
-        begun += max(0.0, late) if playback.time < playback.duration else 0.0
+        behind = frame - begun - playback.time - LONGEST_WAIT
+        begun += max(0.0, behind) if playback.time < playback.duration else 0.0
         playback.advance(frame - begun)
         viewer.user_scn.ngeom = 0
         add_ghost(playback, viewer.user_scn, viewer.cam)

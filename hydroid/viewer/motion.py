@@ -47,7 +47,9 @@ def simulated_motion(model: IdentifiedModel, logs: Mapping[str, Log]) -> Motion:
     simulated = {side: predict_log(model, log).angle for side, log in logs.items()}
     rest = arm.pose(model.settings.start_pose)
     moved = {side: log.posed for side, log in logs.items() if _moves(log.angle).any()}
-    measured = machine.joined(simulated | moved, rest) if moved else None
+    measured = None
+    if moved:
+        measured = machine.joined(simulated | moved, rest)
     time = next(iter(logs.values())).time
     error = _rms_error(logs, simulated)
     return Motion(machine, time, machine.joined(simulated, rest), measured, error)

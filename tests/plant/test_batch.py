@@ -10,11 +10,12 @@ from made_models import made_model
 
 from hydroid.errors import SettingsError
 from hydroid.plant import Plant, PlantBatch
+from hydroid.rungs import RUNGS
 
 VALUES = (
     TRUTH | HYDRAULIC | {"open_A": 0.4, "open_B": 0.4, "delay": 0.03, "friction": 100.0}
 )
-KINDS = ["mech", "dynamic", "quasi-static"]
+KINDS = ["mech", *(rung.name for rung in RUNGS.values() if rung.stage == "hyd")]
 JOINTS = [2, 5]
 
 

@@ -71,6 +71,8 @@ def test_a_step_is_shown_up_to_the_end_of_the_range_and_slow_commands_are_follow
     speeds = step.speeds(estimate)
     curves = step_curves(step, estimate, Direction(1.0, "positive", "raising"))(speeds)
     points = [(column, float(value[0])) for column, value in curves]
+    answered = {(column.step, column.moves) for column, _ in points}
+    assert answered == {(50.0, "raising")}
     times = np.array(
         [column.at for column, _ in points if column.name == "step_positive"]
     )

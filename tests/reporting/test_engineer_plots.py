@@ -96,8 +96,10 @@ def test_step_and_frequency_response_stand_where_a_fit_states_them():
     }
     step = speed.changed(
         {
-            "label": "speed after a step to 50 % command, raising",
+            "label": "any words",
             "along": "time [s]",
+            "step": 50.0,
+            "moves": "raising",
             **points,
         }
     )

@@ -18,7 +18,7 @@ from hydroid.log import Log
 from hydroid.plant import Plant
 from hydroid.reporting.outlines import sight
 from hydroid.viewer import film
-from hydroid.viewer.film import LATE, play, rendered
+from hydroid.viewer.film import LONGEST_WAIT, play, rendered
 from hydroid.viewer.motion import Motion, Replay, Sliders, simulated_motion
 
 SHOULDER = 1
@@ -101,7 +101,7 @@ def test_the_picture_keeps_pace_with_the_clock(slide: Sliders):
 
 def test_a_slow_machine_shows_slow_motion_without_jumps(slide: Sliders):
     viewer = played(slide, 5, cost=0.5)
-    assert np.diff(viewer.times) == pytest.approx(LATE, abs=0.011)
+    assert np.diff(viewer.times) == pytest.approx(LONGEST_WAIT, abs=0.011)
 
 
 def pictures(motion: Motion, *times: float) -> list[Any]:

@@ -23,17 +23,18 @@ def mirror_sensors(
     `in_range`: the arm's ranges are no guesses.
     """
     said = list[str]()
-    for log in logs[:1]:
-        for number, entry in guess.log["joints"].items():
-            joint = arm.joints[number - 1]
-            angle = entry["angle"]
-            if angle is None:
-                continue
-            column = angle["column"]
-            if number in guess.mirrored:
-                motion = motion_of(log, number)
-                if not motion.contradicts(backward=number in arm.backward):
-                    continue
+    if not logs:
+        return ()
+    log = logs[0]
+    for number, entry in guess.log["joints"].items():
+        joint = arm.joints[number - 1]
+        angle = entry["angle"]
+        if angle is None:
+            continue
+        column = angle["column"]
+        if number in guess.mirrored:
+            motion = motion_of(log, number)
+            if motion.contradicts(backward=number in arm.backward):
                 entry["angle"] = guess.mirrored[number]
                 said.append(
                     f"{column} counts backwards, or {joint.name} would move against its command. "
@@ -41,11 +42,11 @@ def mirror_sensors(
                     f"sign, and set scale: {angle['scale']:g} and offset: {angle['offset']:g} at "
                     "the angle"
                 )
-            elif in_range and _range_says_so(log.angle_of(number), angle, joint):
-                entry["angle"] = of_other_sign(angle)
-                said.append(
-                    f"{column} counts backwards: only so is it in the range of {joint.name}"
-                )
+        elif in_range and _range_says_so(log.angle_of(number), angle, joint):
+            entry["angle"] = of_other_sign(angle)
+            said.append(
+                f"{column} counts backwards: only so is it in the range of {joint.name}"
+            )
     return tuple(said)
 
 

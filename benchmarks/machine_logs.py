@@ -6,8 +6,8 @@ without a word.
 
 The logs are written for the purpose (tests/helpers/field_logs.py). Without --follow
 they are read by what `hydroid init` writes. With it, the commands that `init` prints
-are followed: check, a fit of that budget, and validation on a second log; and then for
-twelve arms (tests/helpers/worlds.py), whose fits have three times the budget. A log is
+are followed: check, a fit of that budget of CPU time, and validation on a second log;
+and then for twelve arms (tests/helpers/worlds.py), whose fits have three times as much. A log is
 right if it is read rightly, if the fit errs on the second log by at most a third of
 what standing still does (shown in brackets) [deg], and if its speeds from 60 % of
 command are those that made the log, within 10 % of the largest, in the same direction.
@@ -38,7 +38,10 @@ def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument(
-        "--follow", type=int, metavar="SECONDS", help="budget of a fit of two joints"
+        "--follow",
+        type=int,
+        metavar="SECONDS",
+        help="CPU time of a fit of two joints",
     )
     parser.add_argument(
         "--only", default="", help="a part of the names of logs and arms"

@@ -50,8 +50,8 @@ def init(
         config (YAML): The fit.yaml of an earlier init, whose `log` section you have
             completed. Its columns and its arm stay; all other settings are written
             anew.
-        joints (NAME,NAME): Names of the arm's joints in the order of the log's numbers
-            (u1, u2, ...) [default: the order in the arm's file].
+        joints (NAME,NAME): The arm's joints, by name or number from 1, in the order of
+            the log's numbers (u1, u2, ...) [default: the order in the arm's file].
         lengths (M,M): Lengths [m] of the links that these joints move. They take the
             place of --arm: hydroid makes an arm of boxes. Example: --joints
             swing,boom,arm,bucket --lengths 0,3.7,1.6,0.9. A joint that slews has 0.

@@ -293,5 +293,6 @@ def _limits(value: str, value_type: Any) -> Plain:
 def names(given: str | list[str] | tuple[str, ...] | None) -> list[str]:
     """Return names that stand in a list, or in a text such as `K,D`, in their order."""
     parts = given.split(",") if isinstance(given, str) else given or ()
-    stripped = (part.strip() for part in parts)
+    # Python's callers may give numbers
+    stripped = (str(part).strip() for part in parts)
     return [name for name in stripped if name]

@@ -7,12 +7,14 @@ import numpy as np
 
 from hydroid.arrays import Array
 from hydroid.errors import LogError
+from hydroid.files import Plain
 from hydroid.log.clues import CLUES, RAW, column_unit, joint_of, kind_of, words
 from hydroid.log.signals import CommandRange, likely_range
 from hydroid.log.table import Signal, Table
 from hydroid.settings.log import ANGLES, LENGTHS
 from hydroid.units import UNITS, Unit, likely_time_unit, unit_of
 
+NO_SETTINGS: Plain = {}
 EXCEL_DAYS = 30_000
 """days from 1900 that a spreadsheet's dates are, at least"""
 KEPT_IN = {"length": "mm", "angle": "deg"}
@@ -52,8 +54,32 @@ class Column(NamedTuple):
         """Whether it holds an angle, whatever else its name says."""
         return self.unit in ANGLES or self._has_word(CLUES["turns"])
 
+    @property
+    def is_of_a_sensor(self) -> bool:
+        """Whether its name says what measures it."""
+        return self._has_word(CLUES["sensors"])
+
     def _has_word(self, of: Sequence[str]) -> bool:
         return not {*words(self.name)}.isdisjoint(of)
+
+
+class Entry(NamedTuple):
+    """The settings of a column, what it is taken for, and a hint about what is not
+    known.
+
+    `mirrored`: of an angle whose sensor has no known scale, the settings if it counts
+    the other way; empty of all others.
+    """
+
+    settings: Plain
+    meaning: str
+    hint: str = ""
+    mirrored: Plain = NO_SETTINGS
+
+    def reason(self, joint: str, why: str) -> str:
+        """Return why it is taken for a joint's, with the hint."""
+        sentence = f"{self.meaning} of {joint}, {why}"
+        return f"{sentence}; {self.hint}" if self.hint else sentence
 
 
 def signal_columns(table: Table, names: Sequence[str]) -> list[Column]:

@@ -17,11 +17,12 @@ from hydroid.arrays import Array
 from hydroid.errors import LogError
 from hydroid.files import Plain
 from hydroid.log.clues import column_unit, kind_of
-from hydroid.log.columns import Column, rises, signal_columns
+from hydroid.log.columns import Column, Entry, rises, signal_columns
 from hydroid.log.joint_columns import JointColumns, Joints, by_joint
 from hydroid.log.rods import Rod
 from hydroid.log.signals import CommandRange, likely_range, resting_range
 from hydroid.log.table import Signal, Table
+from hydroid.log.uncalibrated import over_the_joint, over_the_range
 from hydroid.settings.log import LENGTHS
 from hydroid.units import UNITS, likely_time_unit
 from hydroid.words import listed
@@ -30,10 +31,18 @@ PERIODS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2)
 """[s], of which a guess takes the nearest"""
 NO_RODS: Mapping[int, Rod] = {}
 NO_RANGES: Mapping[int, tuple[float, float]] = {}
+NO_ANGLES: Mapping[int, Plain] = {}
 LARGEST_ANGLE = np.radians(400.0)
 """of an arm's joint [rad]; larger numbers are lengths or counts"""
 LARGEST_RADIANS = 6.3
 """of a log's angles without a unit; larger numbers are degrees"""
+SMALL_COMMAND = 5.0
+"""of a log's commands, the smallest is below this [%], if one of 0 is none"""
+NEVER_AT_REST = (
+    "it is never 0, so where it rests is not known: correct scale and offset"
+)
+COUNTS = "counts"
+"""in place of a unit of angles, where columns without one hold what a sensor gives"""
 LARGEST_METRES = 50.0
 """of a position without a unit, for no telescope is longer; larger numbers are mm"""
 
@@ -43,19 +52,14 @@ class ColumnGuess(NamedTuple):
     and the unused columns.
 
     A reason stands for each column that it uses, for what is uncertain, and for the
-    others.
+    others. `mirrored`: settings of the angles, by joint, whose sensors have no known
+    scale, for sensors that count the other way.
     """
 
     log: Plain
     reasons: tuple[str, ...]
     unused: tuple[str, ...]
-
-
-class _Entry(NamedTuple):
-    """The settings of a column, and what it is taken for."""
-
-    settings: Plain
-    meaning: str
+    mirrored: Mapping[int, Plain] = NO_ANGLES
 
 
 def guess_columns(
@@ -86,7 +90,8 @@ def guess_columns(
         reasons[0] += ", by its values: no column is called a time"
     commands = by_joint(_of_kind(columns, "command"), arm, reasons)
     angles = by_joint(_of_kind(columns, "angle"), arm, reasons)
-    entries = _joint_entries(table, commands, angles, arm, reasons)
+    mirrored = dict[int, Plain]()
+    entries = _joint_entries(table, commands, angles, arm, reasons, mirrored)
     for column in columns:
         if column.kind == "target":
             reasons.append(
@@ -105,7 +110,7 @@ def guess_columns(
         "period_s": nearest_period(step),
         "joints": entries,
     }
-    return ColumnGuess(log, tuple(reasons), unused)
+    return ColumnGuess(log, tuple(reasons), unused, mirrored)
 
 
 def usual_step(times: Array) -> float:
@@ -152,10 +157,11 @@ def _joint_entries(
     angles: Mapping[int, JointColumns],
     arm: Joints,
     reasons: list[str],
+    mirrored: dict[int, Plain],
 ) -> dict[int, Plain]:
     """Return the settings of the joints' columns, by joint, and add a reason for
-    each."""
-    angle_unit = _usual_angle_unit(angles, arm)
+    each, and those of mirrored angles."""
+    units = _usual_angle_units(angles, arm)
     cells = dict[int, _Cells]()
     for joint, command in commands.items():
         cells[joint] = _cells(table, command.columns)
@@ -166,31 +172,49 @@ def _joint_entries(
         entry: Plain = {"command": None, "angle": None}
         if joint in commands:
             columns, reason = commands[joint]
-            entry["command"], meaning = _command(columns, cells[joint], usual)
-            reasons.append(f"{meaning} of {name}, {reason}")
+            command = _command(columns, cells[joint], usual)
+            entry["command"] = command.settings
+            reasons.append(command.reason(name, reason))
         if joint in angles:
             (column,), reason = angles[joint]
-            entry["angle"], meaning = _angle(column, joint, angle_unit, arm)
-            reasons.append(f"{meaning} of {name}, {reason}")
+            angle = _angle(column, joint, units[joint], arm)
+            if angle.settings:
+                entry["angle"] = angle.settings
+            reasons.append(angle.reason(name, reason))
+            if angle.mirrored:
+                mirrored[joint] = angle.mirrored
         entries[joint] = entry
     return entries
 
 
-def _usual_angle_unit(angles: Mapping[int, JointColumns], arm: Joints) -> str:
-    """Return the unit of angles whose columns state none."""
+def _usual_angle_units(
+    angles: Mapping[int, JointColumns], arm: Joints
+) -> dict[int, str]:
+    """Return the units of angles whose columns state none, by joint."""
     largest = list[float]()
     for joint, ((column,), _) in angles.items():
         if joint not in arm.slides and not column.unit and not column.is_raw:
             largest.append(np.nanmax(np.abs(column.values)))
     # without any, degrees, in which most loggers write
-    if max(largest, default=np.inf) <= LARGEST_RADIANS:
-        return "rad"
-    return "deg"
+    unit = "rad" if max(largest, default=np.inf) <= LARGEST_RADIANS else "deg"
+    # a sensor's counts may be as small as angles, beside those of others
+    sensors_count = any(
+        column.is_of_a_sensor and _is_counts(column, joint, unit, arm)
+        for joint, ((column,), _) in angles.items()
+    )
+    units = dict[int, str]()
+    for joint, ((column,), _) in angles.items():
+        is_count = sensors_count and column.is_of_a_sensor
+        units[joint] = COUNTS if is_count else unit
+    return units
 
 
-def _angle(column: Column, joint: int, usual_unit: str, arm: Joints) -> _Entry:
+def _angle(column: Column, joint: int, usual_unit: str, arm: Joints) -> Entry:
     """Return the settings of the column of a joint's angle, and what it is taken
-    for."""
+    for.
+
+    `usual_unit`: of columns that state none.
+    """
     slides = joint in arm.slides
     rod = arm.rods.get(joint)
     limits = arm.ranges.get(joint)
@@ -200,24 +224,34 @@ def _angle(column: Column, joint: int, usual_unit: str, arm: Joints) -> _Entry:
         length = _cylinder_length(column, rod, usual_unit)
         if length is not None:
             return length
-    is_counts = not column.unit and not _may_be_angles(column, usual_unit)
-    if limits and (column.is_raw or is_counts):
-        return _over_the_joint(column, limits, slides=slides)
-    unit = usual_unit
+    if column.is_raw or _are_counts(column, limits, usual_unit):
+        return over_the_joint(column, limits, slides=slides)
+    unit = usual_unit if usual_unit != COUNTS else "deg"
     if column.unit and not column.is_raw:
         unit = column.unit
-    return _Entry(_scaled(column, unit), f"{column.name}: angle in {unit}")
+    hint = "" if column.unit else "its unit is stated nowhere"
+    return Entry(_scaled(column, unit), f"{column.name}: angle in {unit}", hint)
 
 
-def _over_the_joint(
-    column: Column, limits: tuple[float, float], *, slides: bool
-) -> _Entry:
-    """Return the settings of a position in V, mA or counts, over a joint's range [rad,
-    m]."""
-    if slides:
-        return _over_the_range(column, limits, "m", "range")
-    low, high = np.degrees(limits)
-    return _over_the_range(column, (float(low), float(high)), "deg", "range")
+def _is_counts(column: Column, joint: int, angle_unit: str, arm: Joints) -> bool:
+    """Return whether the column of a joint's angle holds counts, by its size, and no
+    length of its cylinder."""
+    if joint in arm.slides or column.is_raw:
+        return False
+    rod = arm.rods.get(joint)
+    if rod and not column.turns and _cylinder_length(column, rod, angle_unit):
+        return False
+    return _are_counts(column, arm.ranges.get(joint), angle_unit)
+
+
+def _are_counts(
+    column: Column, limits: tuple[float, float] | None, angle_unit: str
+) -> bool:
+    """Return whether a column without a unit holds counts, by its size; a joint without
+    limits may turn far."""
+    if column.unit or _may_be_angles(column, angle_unit):
+        return False
+    return limits is not None or column.is_of_a_sensor
 
 
 def _scaled(column: Column, unit: str) -> Plain:
@@ -228,17 +262,19 @@ def _scaled(column: Column, unit: str) -> Plain:
     return settings
 
 
-def _position(column: Column) -> _Entry:
+def _position(column: Column) -> Entry:
     """Return the settings of the column of a joint that slides."""
     unit = column.unit
     if not unit:
         largest = float(np.nanmax(np.abs(column.values)))
         unit = "mm" if largest > LARGEST_METRES else "m"
-    return _Entry(_scaled(column, unit), f"{column.name}: position in {unit}")
+    return Entry(_scaled(column, unit), f"{column.name}: position in {unit}")
 
 
 def _may_be_angles(column: Column, unit: str) -> bool:
     """Return whether all cells, in a unit, are angles that a joint can have."""
+    if unit == COUNTS:
+        return False
     largest = np.nanmax(np.abs(column.values))
     return bool(largest * UNITS[unit].factor <= LARGEST_ANGLE)
 
@@ -248,10 +284,13 @@ def _may_be_length(column: Column, angle_unit: str) -> bool:
     size."""
     if column.is_raw or (column.unit and column.unit not in LENGTHS):
         return False
-    return column.is_length or not _may_be_angles(column, angle_unit)
+    if column.is_length:
+        return True
+    # a potentiometer's counts are in some stroke, too
+    return not (column.is_of_a_sensor or _may_be_angles(column, angle_unit))
 
 
-def _cylinder_length(column: Column, rod: Rod, angle_unit: str) -> _Entry | None:
+def _cylinder_length(column: Column, rod: Rod, angle_unit: str) -> Entry | None:
     """Return the settings of a column that holds the length of a joint's cylinder;
     None: it does not.
 
@@ -261,7 +300,7 @@ def _cylinder_length(column: Column, rod: Rod, angle_unit: str) -> _Entry | None
     if column.is_raw and column.is_length:
         shortest, longest = rod.ends
         ends = 1e3 * shortest, 1e3 * longest
-        return _over_the_range(column, ends, "mm", "stroke of its cylinder")
+        return over_the_range(column, ends, "mm", "stroke of the cylinder")
     if not _may_be_length(column, angle_unit):
         return None
     reading = rod.reading(column.values, column.unit)
@@ -273,39 +312,11 @@ def _cylinder_length(column: Column, rod: Rod, angle_unit: str) -> _Entry | None
     settings = _scaled(column, unit)
     # without an offset the sensor measures from pin to pin
     if not offset:
-        return _Entry(settings, f"{column.name}: length of the cylinder in {unit}")
+        return Entry(settings, f"{column.name}: length of the cylinder in {unit}")
     settings["offset"] = offset
     with_it_in = f"whose cylinder is {offset:.6g} {unit} long with it in,"
     meaning = f"{column.name}: travel of the rod in {unit}, {with_it_in}"
-    return _Entry(settings, meaning)
-
-
-def _over_the_range(
-    column: Column, ends: tuple[float, float], unit: str, whole: str
-) -> _Entry:
-    """Return the settings of a position in V, mA or counts, which is taken for all that
-    a joint can do.
-
-    `ends` of that are in the unit.
-    """
-    finite = column.values[np.isfinite(column.values)]
-    low = float(finite.min())
-    high = float(finite.max())
-    least, most = ends
-    # a reading that never changes has no span, and tells nothing of its ends
-    span = high - low or 1.0
-    scale = float(f"{(most - least) / span:.6g}")
-    offset = float(f"{least - scale * low:.6g}")
-    signal = column.unit or "counts"
-    what = f"{low:g} to {high:g} {signal}, taken for the whole {whole}, {least:.4g} to {most:.4g} {unit}"
-    hint = "correct scale and offset where the log does not reach both ends,"
-    settings: Plain = {
-        "column": column.name,
-        "unit": unit,
-        "scale": scale,
-        "offset": offset,
-    }
-    return _Entry(settings, f"{column.name}: {what}: {hint}")
+    return Entry(settings, meaning)
 
 
 class _Cells(NamedTuple):
@@ -346,7 +357,7 @@ def _usual_range(commands: Sequence[_Cells]) -> CommandRange | None:
 
 def _command(
     columns: Sequence[Column], cells: _Cells, usual: CommandRange | None
-) -> _Entry:
+) -> Entry:
     """Return the settings of the columns of a command, and what they are taken for.
 
     What rests beside the middle is no command: its own rest is 0 %.
@@ -362,12 +373,23 @@ def _command(
             command_range = range_at_rest.with_overshoot(cells.values)
             settings |= {"scale": command_range.scale, "offset": command_range.offset}
             meaning = f"command in {command_range.name}, at rest at {rest:.6g}"
-            return _Entry(settings, f"{names[0]}: {meaning}")
+            return Entry(settings, f"{names[0]}: {meaning}")
     both = " and ".join(names)
     if likely is None or "%" in (columns[0].unit, likely.name):
-        return _Entry(settings, f"{both}: command in %")
+        in_percent = likely or CommandRange("%", 1.0, 0.0)
+        hint = "" if _rests_at_zero(cells, in_percent) else NEVER_AT_REST
+        return Entry(settings, f"{both}: command in %", hint)
     likely = likely.with_overshoot(cells.values)
     settings["scale"] = likely.scale
     if likely.offset:
         settings["offset"] = likely.offset
-    return _Entry(settings, f"{both}: command in {likely.name}")
+    hint = "" if _rests_at_zero(cells, likely) else NEVER_AT_REST
+    return Entry(settings, f"{both}: command in {likely.name}", hint)
+
+
+def _rests_at_zero(cells: _Cells, likely: CommandRange) -> bool:
+    """Return whether a command is ever none, of a range that has 0 in its middle."""
+    if likely.offset or len(cells.values) > 1 or not cells.changes:
+        return True
+    smallest = float(np.nanmin(np.abs(cells.values)))
+    return likely.scale * smallest <= SMALL_COMMAND

@@ -18,6 +18,7 @@ import numpy as np
 from hydroid.arrays import Array
 from hydroid.errors import LogError
 from hydroid.log.log import Log, LogFinding
+from hydroid.log.rates import LEAST_EMPTY, join_rates
 from hydroid.log.table import Recording, Signal, number
 from hydroid.settings.log import LogSettings
 
@@ -160,6 +161,7 @@ def without_bad_rows(
         recording = fill(unwrap(recording, findings), settings.repair_s, findings)
     else:
         recording = unwrap(without_cut_end(recording, findings), findings)
+        recording = join_rates(recording, findings)
     empty = np.isnan(recording.values)
     bad = empty.any(axis=1)
     if bad.sum() > max(MOST_LEFT_OUT * len(empty), 1):
@@ -219,8 +221,11 @@ def without_cut_end(recording: Recording, findings: list[LogFinding]) -> Recordi
         return recording
     before, last = np.isnan(recording.values[-2:])
     is_cut = last.all()
-    for signal, empty in zip(recording.signals, last, strict=True):
-        is_cut |= empty and signal.name == table.names[-1]
+    for signal, column in zip(recording.signals, recording.values.T, strict=True):
+        # an empty cell of a slower channel says nothing
+        is_slower = np.isnan(column).mean() > LEAST_EMPTY
+        if signal.name == table.names[-1] and not is_slower:
+            is_cut |= bool(np.isnan(column[-1]))
     # an empty row before the last one is no sign of a logger that was killed
     if not is_cut or before.all():
         return recording

@@ -202,15 +202,19 @@ class Recording:
         return f"{word} {number}"
 
 
+TRUTHS = {"true": 1.0, "false": 0.0}
+"""cells of switched valves, as programs write them"""
+
+
 def number(cell: str) -> float | None:
-    """Return what float() reads, but for the digit groups of Python's literals (1_000);
-    None: no number."""
+    """Return what float() reads, but for the digit groups of Python's literals (1_000),
+    and 1 and 0 of what is true or false; None: no number."""
     try:
         if "_" not in cell:
             return float(cell)
         return None
     except ValueError:
-        return None
+        return TRUTHS.get(cell.strip().lower())
 
 
 def clock(cell: str) -> int | None:

@@ -19,6 +19,7 @@ from hydroid.log.clues import column_unit, kind_of
 from hydroid.log.mapping import angle_margin
 from hydroid.project.columns import column_lines
 from hydroid.project.logs import Others, reach_of, read_first, read_others
+from hydroid.project.mirrored import mirror_sensors, of_other_sign
 from hydroid.project.section import given_section, guessed_section, missing_column
 from hydroid.settings.arm import Arm, Joint
 from hydroid.settings.load import validate
@@ -117,6 +118,15 @@ def _seen(
     reasons = [*guess.reasons]
     settings = validate(guess.log, LogSettings, table.source)
     logs = read_first(table, settings, arm, reasons, strict=origin == GIVEN)
+    backwards: tuple[str, ...] = ()
+    # a person who names columns knows which way they count
+    if origin == GUESSED:
+        backwards = mirror_sensors(logs, guess, arm, in_range=others.in_range)
+    if backwards:
+        reasons += backwards
+        settings = validate(guess.log, LogSettings, table.source)
+        # what it says of the log is the same
+        logs = read_first(table, settings, arm, [], strict=False)
     measured = [joint for joint, entry in entries.items() if entry["angle"]]
     left_out = list[Path]()
     reach = dict[int, tuple[float, float]]()
@@ -314,7 +324,4 @@ def turned(command: Plain) -> Plain:
     # the positive and the negative direction
     if isinstance(columns, list):
         return command | {"column": columns[::-1]}
-    changes = {"scale": -command.get("scale", 1.0)}
-    if command.get("offset"):
-        changes["offset"] = -command["offset"]
-    return command | changes
+    return of_other_sign(command)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hydroid.arrays import Limits
-from hydroid.log import Log, LogFinding, Reading, Table, check_log
+from hydroid.log import Log, LogFinding, Reading, Table, check_parts
 from hydroid.settings.arm import Arm
 from hydroid.settings.log import LogSettings
 
@@ -35,20 +35,22 @@ def read_first(
     *,
     strict: bool,
 ) -> list[Log]:
-    """Read the first log; an error is a reason, or ends the command if `strict`."""
+    """Read the first log, of several parts the longest first; an error is a reason, or
+    ends the command if `strict`.
+
+    Of one that cannot be read, what its joints do is not known.
+    """
     path = Path(table.source)
-    log, findings = check_log(path, settings, _no_limits(arm), Reading(arm=arm))
-    if log is None:
+    limits = _no_limits(arm)
+    parts, findings = check_parts(path, settings, limits, Reading(arm=arm))
+    if not parts:
         if strict:
             raise findings[0].error()
         reasons.append(f"the log cannot be used as it is: {findings[0]}")
         repaired = Reading(arm=arm, repair=True)
-        log, _ = check_log(path, settings, _no_limits(arm), repaired)
+        parts, _ = check_parts(path, settings, limits, repaired)
     reasons += _said(findings)
-    # of one that cannot be read, what its joints do is not known
-    if log is None:
-        return []
-    return [log]
+    return _longest_first(parts)
 
 
 def read_others(
@@ -66,18 +68,18 @@ def read_others(
         return fitted, unseen, left_out
     reading = Reading(arm=arm)
     limits = arm.ranges
-    first, _ = check_log(Path(table.source), settings, limits, reading)
-    if first is None or not others.in_range:
+    first, _ = check_parts(Path(table.source), settings, limits, reading)
+    if not first or not others.in_range:
         limits = _no_limits(arm)
     for path in paths:
-        log, findings = check_log(path, settings, limits, reading)
-        if log is None:
+        parts, findings = check_parts(path, settings, limits, reading)
+        if not parts:
             left_out.append(path)
             reasons.append(f"left out of the commands below: {findings[0]}")
         elif path == others.unseen:
-            unseen.append(log)
+            unseen += parts
         else:
-            fitted.append(log)
+            fitted += _longest_first(parts)
             reasons += _said(findings)
     return fitted, unseen, left_out
 
@@ -89,6 +91,10 @@ def reach_of(logs: Sequence[Log], joints: Sequence[int]) -> dict[int, Limits]:
         angles = np.concatenate([log.angle_of(joint) for log in logs])
         reach[joint] = float(np.nanmin(angles)), float(np.nanmax(angles))
     return reach
+
+
+def _longest_first(parts: Sequence[Log]) -> list[Log]:
+    return sorted(parts, key=lambda part: part.duration, reverse=True)
 
 
 def _no_limits(arm: Arm) -> Mapping[str, Limits]:

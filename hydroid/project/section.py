@@ -1,11 +1,12 @@
 """The `log` section of a fit's settings: guessed from a log, or as a person gave it,
 joint by joint."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from hydroid.errors import LogError, SettingsError
 from hydroid.files import Plain
 from hydroid.log import ColumnGuess, Table, guess_columns
+from hydroid.log.clues import LONGEST_NUMBER
 from hydroid.log.guess import nearest_period, usual_step
 from hydroid.log.rods import Rod, rods_of
 from hydroid.log.table import Signal
@@ -40,9 +41,9 @@ def guessed_section(table: Table, arm: Arm, order: Sequence[str]) -> ColumnGuess
             ranges[number] = joint.limits
     links = [arm.link_names[place] for place in places]
     try:
-        section, reasons, unused = guess_columns(
+        guess = guess_columns(
             table,
-            order or names,
+            [names[place] for place in places],
             links=links,
             slides=slides,
             rods=own_rods,
@@ -52,21 +53,46 @@ def guessed_section(table: Table, arm: Arm, order: Sequence[str]) -> ColumnGuess
         if not holds_numbers(table):
             raise
         return ColumnGuess({"joints": {}}, (), ())
+    section = guess.log
     section["period_s"] = _period(section["period_s"])
-    entries = {
-        places[number - 1] + 1: entry for number, entry in section["joints"].items()
-    }
-    section["joints"] = dict(sorted(entries.items()))
-    return ColumnGuess(section, reasons, unused)
+    section["joints"] = _by_place(section["joints"], places)
+    return guess._replace(mirrored=_by_place(guess.mirrored, places))
+
+
+def _by_place(settings: Mapping[int, Plain], places: Sequence[int]) -> dict[int, Plain]:
+    """Return settings by the joints' numbers in the arm, in place of those in the
+    log."""
+    of_the_arm = dict[int, Plain]()
+    for number, entry in settings.items():
+        of_the_arm[places[number - 1] + 1] = entry
+    return dict(sorted(of_the_arm.items()))
 
 
 def _places(names: Sequence[str], order: Sequence[str]) -> list[int]:
-    """Return the places among the arm's joints of those of an order, or of all."""
-    for name in order:
-        if name not in names:
+    """Return the places among the arm's joints of those of an order, by name or number
+    from 1, or of all."""
+    places = list[int]()
+    for joint in order:
+        place = _place(names, joint)
+        if place is None:
             hint = f"the arm's joints: {', '.join(names)}"
-            raise SettingsError(f"no joint {name!r}", "--joints", hint)
-    return [names.index(name) for name in order or names]
+            raise SettingsError(f"no joint {joint!r}", "--joints", hint)
+        if place in places:
+            raise SettingsError(f"joint {joint!r} occurs twice", "--joints")
+        places.append(place)
+    return places or [*range(len(names))]
+
+
+def _place(names: Sequence[str], joint: str) -> int | None:
+    """Return the place of a joint by its name or its number from 1; None: there is
+    none."""
+    if joint in names:
+        return names.index(joint)
+    if joint.isascii() and joint.isdecimal() and len(joint) <= LONGEST_NUMBER:
+        number = int(joint)
+        if 1 <= number <= len(names):
+            return number - 1
+    return None
 
 
 def _period(period: float) -> float:

@@ -89,11 +89,11 @@ def _number_of(key: Any, info: ValidationInfo) -> Any:
     for its number from 1."""
     if not isinstance(key, str):
         return key
-    if _is_number(key):
-        return int(key)
     names = _joint_names(info)
     if key in names:
         return names.index(key) + 1
+    if _is_number(key) and int(key) > 0:
+        return int(key)
     hint = f"; the arm's joints: {', '.join(names)}" if names else ""
     raise ValueError(f"no joint {key!r}{hint}")
 
@@ -236,6 +236,9 @@ def validate(
         override = _override_of(key, overridden or {})
         if override is not None and overridden:
             name = key[len(override) + 1 :]
+            # the message shows the value, which its place in a list does not
+            if name.isdecimal():
+                name = ""
             where = f"--set {overridden[override]}"
         else:
             names_itself = fault["type"] in ("extra_forbidden", "missing")

@@ -107,7 +107,7 @@ def text(columns: Mapping[str, np.ndarray]) -> str:
     cells = [
         values.tolist()
         if values.dtype.kind in "UO"
-        else [f"{value:.9g}" for value in values]
+        else ["" if np.isnan(value) else f"{value:.9g}" for value in values]
         for values in columns.values()
     ]
     return (
@@ -238,6 +238,54 @@ def _counts(columns: Columns) -> Columns:
     }
 
 
+def _backwards(columns: Columns) -> Columns:
+    counts = _counts(columns)
+    return {n: 4095 - v if "counts" in n else v for n, v in counts.items()}
+
+
+def _other_sign(columns: Columns) -> Columns:
+    return columns | {"stick_angle_deg": -columns["stick_angle_deg"]}
+
+
+def _slower(columns: Columns) -> Columns:
+    """Return angles in every second row, as where channels of several rates are joined."""
+    rows = np.arange(len(columns["time_s"]))
+    return {
+        n: np.where(rows % 2 == 0, v, np.nan) if "angle" in n else v
+        for n, v in columns.items()
+    }
+
+
+def _switched(columns: Columns) -> Columns:
+    switched = {"time_s": columns["time_s"]}
+    for name in JOINTS:
+        command = columns[f"{name}_cmd_pct"]
+        switched[f"{name}_up"] = (command > 0).astype(str)
+        switched[f"{name}_down"] = (command < 0).astype(str)
+    return switched | {n: v for n, v in columns.items() if "angle" in n}
+
+
+def _german(columns: Columns) -> Columns:
+    german = {"boom": "Ausleger", "stick": "Stiel"}
+    renamed = {"Zeit": columns["time_s"]}
+    for name in JOINTS:
+        renamed[f"{german[name]}_Ventil"] = columns[f"{name}_cmd_pct"]
+        renamed[f"{german[name]}_Winkel"] = columns[f"{name}_angle_deg"]
+    return renamed
+
+
+def _turning(columns: Columns) -> Columns:
+    counts = _counts(columns)
+    return {n: (v + 1500) % 4096 if "counts" in n else v for n, v in counts.items()}
+
+
+def _ten_bits(columns: Columns) -> Columns:
+    """Return potentiometers of which one never gives more than an angle could be."""
+    others = {name: own for name, own in columns.items() if "angle" not in name}
+    pots = {f"{n}_pot": np.round(500 + 2 * columns[f"{n}_angle_deg"]) for n in JOINTS}
+    return others | pots
+
+
 def _pots(columns: Columns) -> Columns:
     others = {name: own for name, own in columns.items() if "angle" not in name}
     return others | {
@@ -318,6 +366,14 @@ FIELD_LOGS = (
     FieldLog("a receiver that loses its signal", commands("pwm", _received), lost=0.7),
     FieldLog("cylinder lengths in inches", lengths("cyl_in", 1 / 0.0254)),
     FieldLog("angles in thousandths of a degree", changed(_thousandths)),
+    FieldLog("an angle of the other sign", changed(_other_sign)),
+    FieldLog("channels of several rates", changed(_slower), steps=(50, -50, 45, -45)),
+    FieldLog(
+        "true and false of switched valves", changed(_switched), steps=(100, -100, 100)
+    ),
+    FieldLog("German names", changed(_german)),
+    FieldLog("encoders that begin anew", changed(_turning), "4096 counts a turn"),
+    FieldLog("counts as small as angles", changed(_ten_bits), "to 416 counts, "),
     FieldLog("dates under another name", changed(_logged_at)),
     FieldLog(
         "pulses without their lower half",
@@ -332,6 +388,10 @@ FIELD_LOGS = (
     FieldLog("targets in place of commands", changed(_targets), "targets of positions"),
     FieldLog("encoder counts", changed(_counts), "taken for the whole range"),
     FieldLog("encoders called enc", changed(_encoders), "taken for the whole range"),
+    FieldLog("encoders that count backwards", changed(_backwards), "counts backwards"),
+    FieldLog(
+        "a draw wire that counts backwards", wires("wire_V", 10, 0), "counts backwards"
+    ),
     FieldLog("draw wires in mA", wires("wire_mA", 4, 20), "taken for the whole stroke"),
     FieldLog("draw wires in V", wires("wire_V", 0, 10), "taken for the whole stroke"),
     FieldLog(

@@ -241,3 +241,57 @@ def test_a_sensors_signal_is_taken_for_the_whole_range(
     reached = angle.scale * np.array([cells.min(), cells.max()]) + angle.offset
     np.testing.assert_allclose(reached, np.degrees([-0.5, 1.0]), atol=1e-2)
     assert "taken for the whole range" in str(found.reasons)
+
+
+@pytest.mark.parametrize("counts", [1024, 3600, 4096])
+@pytest.mark.parametrize("way", [1, -1])
+def test_an_encoder_that_begins_anew_tells_its_scale(
+    counts: int, way: int, tmp_path: Path
+) -> None:
+    """Of the joint's own shaft; its zero is not known."""
+    turned = 40 * np.sin(0.4 * T)
+    cells = np.mod(np.round(counts * (0.98 + way * turned / 360)), counts)
+    columns = (T, STEPS, cells)
+    found = guess(tmp_path, ["time_s", "boom_cmd", "boom_counts"], *columns)
+    assert found.log["joints"][2]["angle"]["scale"] == pytest.approx(
+        360 / counts, rel=1e-5
+    )
+    assert found.mirrored[2]["scale"] == -found.log["joints"][2]["angle"]["scale"]
+    assert f"{counts} counts a turn" in str(found.reasons)
+
+
+def test_counts_of_a_joint_without_ends_are_left_out(tmp_path: Path) -> None:
+    columns = (T, STEPS, 2000 + 10 * SWEEP)
+    found = guess(tmp_path, ["time_s", "swing_cmd", "swing_counts"], *columns)
+    assert found.log["joints"][1]["angle"] is None
+    assert "tells no scale" in str(found.reasons)
+
+
+def test_sensors_of_which_one_counts_all_count(tmp_path: Path) -> None:
+    """120 to 160 are possible angles, too."""
+    names = ["time_s", "boom_cmd", "stick_cmd", "boom_pot", "stick_pot", "swing_angle"]
+    columns = (T, STEPS, -STEPS, 600 + SWEEP, 140 + SWEEP, SWEEP)
+    np.savetxt(
+        tmp_path / "log.csv",
+        np.stack(columns, axis=1),
+        delimiter=",",
+        header=",".join(names),
+        comments="",
+    )
+    ranges = dict.fromkeys((1, 2, 3), (-0.5, 1.0))
+    found = guess_columns(open_table(tmp_path / "log.csv"), JOINTS, ranges=ranges)
+    settings = LogSettings.model_validate(found.log)
+    for joint in (2, 3):
+        angle = settings.columns("angle", joint)
+        assert angle is not None
+        assert angle.scale * 40 == pytest.approx(np.degrees(1.5), rel=1e-3)
+    swing = settings.columns("angle", 1)
+    assert swing is not None
+    assert (swing.unit, swing.scale) == ("deg", 1)
+
+
+def test_a_command_that_is_never_0_has_its_rest_elsewhere(tmp_path: Path) -> None:
+    columns = (T, 8 + 1.9 * np.sin(0.4 * T + 1), SWEEP)
+    found = guess(tmp_path, ["time_s", "boom_cmd", "boom_deg"], *columns)
+    (reason,) = [one for one in found.reasons if one.startswith("boom_cmd")]
+    assert "never 0" in reason

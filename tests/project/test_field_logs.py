@@ -4,10 +4,21 @@ what is wrong."""
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
-from field_logs import FIELD_LOGS, Columns, FieldLog, make_truth, outcome, table, text
+from field_logs import (
+    FIELD_LOGS,
+    JOINTS,
+    Columns,
+    FieldLog,
+    make_truth,
+    outcome,
+    table,
+    text,
+)
 
 import hydroid
+from hydroid.log import Log
 from hydroid.settings.arm import Arm, load_arm
 
 
@@ -54,6 +65,38 @@ def test_a_log_that_differs_from_the_first_is_left_out_of_the_commands(
     assert made.commands
     for command in made.commands:
         assert str(logs[place]) not in command
+
+
+@pytest.mark.parametrize("label", ["counts", "wire_V"])
+def test_a_sensor_that_counts_backwards_gives_the_same_angles(
+    label: str, tmp_path: Path
+) -> None:
+    """Of the sensor alone: a command that is wired the other way is another thing."""
+    read = list[Log]()
+    for way in (1, -1):
+        columns = table(make_truth((70, -60, 100)))
+        for name in JOINTS:
+            angle = columns.pop(f"{name}_angle_deg")
+            columns[f"{name}_{label}"] = 5000 + way * 10 * angle
+        folder = tmp_path / f"way {way}"
+        folder.mkdir()
+        log = folder / "log.csv"
+        log.write_text(text(columns))
+        made = hydroid.init(folder / "mine", log=log).result
+        backwards = [one for one in made.columns if "counts backwards" in one]
+        # rods of the template lengthen with the boom's angle, and not with the stick's
+        turned = {
+            1: {"counts": [], "wire_V": ["stick"]},
+            -1: {"counts": JOINTS, "wire_V": ["boom"]},
+        }
+        assert len(backwards) == len(turned[way][label])
+        for line, name in zip(backwards, turned[way][label], strict=True):
+            assert line.startswith(f"{name}_{label} counts backwards")
+        settings = hydroid.load_settings(folder / "mine" / "fit.yaml")
+        (part,) = hydroid.read_logs(log, settings)
+        read.append(part)
+    np.testing.assert_allclose(read[0].angle, read[1].angle, atol=1e-4)
+    np.testing.assert_array_equal(read[0].command, read[1].command)
 
 
 def test_rows_without_a_signal_are_left_out(arm: Arm, tmp_path: Path) -> None:

@@ -504,8 +504,26 @@ def test_a_log_may_count_joints_in_its_own_order(place: Path, tmp_path: Path):
         ("u1_V",),
         ("u2_V",),
     ]
-    with pytest.raises(
-        SettingsError,
-        match=r"--joints: no joint 'bom'; the arm's joints: swing_joint, boom",
-    ):
-        init(tmp_path / "fourth", arm, [tmp_path / "log.csv"], joints=["bom"])
+    init(tmp_path / "third", arm, [tmp_path / "log.csv"], joints=["2", "3", "1"])
+    by_number = hydroid.load_settings(tmp_path / "third" / "fit.yaml")
+    assert by_number.log == settings.log
+
+
+@pytest.mark.parametrize(
+    ("joints", "fault"),
+    [
+        ("bom", "no joint 'bom'; the arm's joints: swing_joint, boom"),
+        ("0", "no joint '0'; the arm's joints: swing_joint, boom"),
+        ("4", "no joint '4'"),
+        ("9" * 5000, "no joint '9"),
+        ("boom_joint,boom_joint", "joint 'boom_joint' occurs twice"),
+        ("boom_joint,2", "joint '2' occurs twice"),
+    ],
+)
+def test_what_is_no_joint_of_the_arm_is_refused(
+    place: Path, tmp_path: Path, joints: str, fault: str
+):
+    arm = place / "mine" / "arm.yaml"
+    with pytest.raises(SettingsError, match=f"--joints: {fault}"):
+        init(tmp_path / "mine", arm, [place / "move_0.csv"], joints=joints.split(","))
+    assert not (tmp_path / "mine").exists()

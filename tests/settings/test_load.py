@@ -311,6 +311,16 @@ def test_a_number_of_thousands_of_digits_is_no_joints(tmp_path: Path, key: str):
         )
 
 
+@pytest.mark.parametrize("joint", ["0", "-1", "bom"])
+def test_a_wrong_joint_of_a_list_is_named_without_its_place(tmp_path: Path, joint: str):
+    """`--joints 1,bom` of a command gives its list so."""
+    says = f"--set design.joints: no joint '{joint}'; the arm's joints: swing"
+    with pytest.raises(SettingsError, match=says):
+        hydroid.load_settings(
+            written(tmp_path, MAPPINGS), {"design.joints": ["1", joint]}
+        )
+
+
 @pytest.mark.parametrize(
     "key", ["tolerance_deg.2", "objective.weights.2", "log.joints.2.command.scale"]
 )

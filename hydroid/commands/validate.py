@@ -52,8 +52,9 @@ def validate(
     """Test fits on logs that they were not fitted to. The verdict on each joint
     compares its error with those of simple models.
 
-    Each fit reads the logs with its own settings. The page shows every response with
-    its errors. From then on, the report of the fit's own run shows these logs too.
+    Each fit reads the logs with its own settings. Writes a page with every response
+    and its errors, and tables. From then on, the report of the fit's own run shows these
+    logs too.
 
     Example: hydroid validate OTHER.csv --fit runs/mech --fit runs/hyd
 

@@ -181,7 +181,7 @@ def test_a_joint_without_a_column_rests_and_a_misspelt_one_is_named(tmp_path: Pa
     moved = np.ptp(found.log.angle, axis=0)
     assert moved[1] == pytest.approx(np.ptp(wished.angle[:, 1]), rel=1e-6)
     assert not np.delete(moved, 1).any()
-    with pytest.raises(HydroidError, match="unused: elbwo"):
+    with pytest.raises(HydroidError, match="columns without a use: elbwo"):
         hydroid.follow(tmp_path / "elbwo.csv", fit=one)
 
 

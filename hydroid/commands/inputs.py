@@ -42,7 +42,7 @@ SHARED = f"""
     log (LOG): A log. Formats: {FORMATS}.
     fit (RUN|YAML): A fit: the folder of a run or of Plant.save (Python), an
         estimate.yaml, or a YAML file with values of the parameters.
-    out (DIR): Folder for the page and the tables [default: runs/COMMAND; in Python
+    out (DIR): Folder for the tables [default: runs/COMMAND; in Python
         nothing is written].
     config (YAML): Settings: the fit.yaml that `hydroid init` wrote for your machine.
         For the shipped arm: the name of a shipped config.

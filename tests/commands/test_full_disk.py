@@ -14,6 +14,7 @@ from command_line import run
 from conftest import SMALL
 from disks import PAGE, disk, used
 from log_files import head
+from taken import without_times
 
 import hydroid
 
@@ -63,9 +64,10 @@ def here(small: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def whole(folder: Path) -> dict[str, bytes]:
-    """Files by name, besides those that tell of a run's course."""
+    """Files by name, besides those that tell of a run's course; pages without the times
+    that it took."""
     return {
-        file.relative_to(folder).as_posix(): file.read_bytes()
+        file.relative_to(folder).as_posix(): without_times(file.read_bytes())
         for file in folder.rglob("*")
         if file.is_file() and file.name not in COURSE
     }

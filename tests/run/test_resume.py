@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 from log_files import head
+from taken import without_times
 
 SHORT = ["--quiet", "--set", "search.ga.population=10", "--algorithm", "ga"]
 STAGE_1 = "{K: 0.2, D: 80, S: 0, M1: 4.6, M2: 5.1, M3: 22.5, M4: 1.6, M5: 4, M6: 4.7}"
@@ -54,14 +55,15 @@ def wait_for(process: "subprocess.Popen[str]", run: Path, pattern: str) -> None:
 
 
 def content(folder: Path) -> dict[str, object]:
-    """Files by name; of run.json what it says besides how long the run took."""
+    """Files by name; of run.json and pages what they say besides how long the run
+    took."""
     found = {
         p.relative_to(folder).as_posix(): p for p in folder.rglob("*") if p.is_file()
     }
     return {
         name: json.loads(p.read_bytes()) | {"seconds": 0}
         if p.name == "run.json"
-        else p.read_bytes()
+        else without_times(p.read_bytes())
         for name, p in found.items()
         if p.name not in OWN
     }

@@ -139,7 +139,6 @@ class Ladder:
         self._watch = watch
         self._checkpoints = checkpoints
         self._late = False
-        self._each_searched = False
         self._step = step_of(self.kept.name)
 
     def climb(self, whole: Problem) -> None:
@@ -151,7 +150,6 @@ class Ladder:
         further = settings.rungs[1:]
         on_the_way = refinement
         by_starts = settings.search.algorithm == "multistart"
-        self._each_searched = by_starts and bool(lone_joints(self.problem))
         anew = bool(further or settings.terms() or by_starts)
         if anew:
             tolerance = max(FIRM, refinement.gain_tolerance)
@@ -319,10 +317,8 @@ class Ladder:
         start = self.kept
         far = False
         if theta is None:
-            # what a search ended at may be far from an optimum, if joints together were
-            # not fitted alone before
-            searched = start.name not in self.refinements
-            far = searched and not self._each_searched
+            # what a search ended at may be far from an optimum
+            far = start.name not in self.refinements
             far |= bool(_new_curves(problem, last))
             theta = _begun(problem, last, start.theta)
             renewed = _renewed(problem, last, theta)

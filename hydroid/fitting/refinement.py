@@ -30,7 +30,7 @@ ROUGH = 1e-3
 """gain below which a least squares of output errors ends that is to lead near an
 optimum"""
 
-ENOUGH = 0.05
+ENOUGH = 0.005
 """gain of the log-likelihood below which least squares ends that only leads on: what
 weighs its errors makes its cost one"""
 LARGEST = 0.5

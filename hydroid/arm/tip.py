@@ -88,5 +88,6 @@ def _corners(model: mujoco.MjModel, geom: int) -> Array:
         return model.mesh_vert[first : first + int(mesh.vertnum[0])].astype(float)
     middle = model.geom_aabb[geom, :3]
     half = model.geom_aabb[geom, 3:]
-    signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
+    ends = [-1, 1]
+    signs = np.array(np.meshgrid(ends, ends, ends)).reshape(3, -1).T
     return middle + signs * half

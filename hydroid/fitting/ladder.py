@@ -593,7 +593,9 @@ def _renewed(problem: Problem, last: Problem, theta: Array) -> list[int]:
     new = {*problem.settings.parameters} - {*last.settings.parameters}
     own = {j: new & problem.settings.acting_on(j) for j in lone_joints(problem)}
     pump_flow = problem.bindings.candidates(theta[None]).joints.pump_flow
-    if np.isfinite(pump_flow).any() or new != set[str]().union(*own.values()):
+    if np.isfinite(pump_flow).any():
+        return []
+    if new != set[str]().union(*own.values()):
         return []
     return [joint for joint, names in own.items() if names]
 

@@ -186,7 +186,8 @@ def gain(after: LeftOut, before: LeftOut) -> tuple[float, float]:
     sums = np.bincount(blocks(problem), change) + before.open - after.open
     if len(sums) < 2:
         return float(np.sum(sums)), np.inf
-    return float(sums.sum()), float(np.sqrt(len(sums) * np.var(sums, ddof=1)))
+    variance = len(sums) * np.var(sums, ddof=1)
+    return float(sums.sum()), float(np.sqrt(variance))
 
 
 def is_better(after: LeftOut, before: LeftOut, among: int = 1) -> bool:

@@ -298,7 +298,8 @@ def errors_ahead(log: Log, errors: Callable[[Log], Array]) -> Array:
     steps = np.array([before + round(seconds / log.period) for seconds in HORIZONS])
     for first in range(0, len(log.time) - int(steps[0]), before):
         error = errors(log.part(first, first + int(steps[-1]) + 1))
-        row, there = np.full((len(steps), *error.shape[1:]), np.nan), steps < len(error)
+        row = np.full((len(steps), *error.shape[1:]), np.nan)
+        there = steps < len(error)
         # NaN: it diverged
         row[there] = np.nan_to_num(error[steps[there]] - error[before], nan=np.inf)
         rows.append(row)

@@ -103,7 +103,8 @@ def valve_start(side: SpeedCurve) -> ValveStart | None:
 
     tried = list[OptimizeResult]()
     for begun, band in product(BEGUN, (dead, 0.5 * dead)):
-        begin = np.array([min(band, 89.0), np.log(begun), *np.zeros(len(KNOTS)), 0.05])
+        level = np.zeros(len(KNOTS))
+        begin = np.array([min(band, 89.0), np.log(begun), *level, 0.05])
         tried.append(
             least_squares(rows, begin, bounds=(LEAST, MOST), x_scale=SCALE, max_nfev=60)
         )
@@ -184,7 +185,8 @@ class _Following:
         """Return the most likely one; it begins at the sides, and at a delay that has
         the lag in it [s]."""
         ends = [_begin(side) for side in self._sides]
-        begin = np.array([*ends[0], *ends[1], max(delay - USUAL_LAG, 0.0), USUAL_LAG])
+        sooner = max(delay - USUAL_LAG, 0.0)
+        begin = np.array([*ends[0], *ends[1], sooner, USUAL_LAG])
         least, most = (
             np.array([*LEAST, *LEAST, 0.0, 0.0]),
             np.array([*MOST, *MOST, 1.0, 0.6]),
@@ -258,7 +260,8 @@ class _Following:
 def _begin(side: ValveStart) -> Array:
     """Return the numbers of a side: dead band, logarithms of exponent, factors and
     relative speed."""
-    return np.array([side.dead_band, np.log(side.exponent), *np.log(side.factors), 0.0])
+    factors = np.log(side.factors)
+    return np.array([side.dead_band, np.log(side.exponent), *factors, 0.0])
 
 
 def _raised(x: Array) -> Array:

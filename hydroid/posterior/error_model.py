@@ -533,7 +533,8 @@ def _most_likely(
     """
     square = max(_mean_square(pairs), least)
     seconds = sum(course.period * len(error) for course, error in pairs) / len(pairs)
-    way = max(sum(float(course.way.sum()) for course, _ in pairs) / len(pairs), 1e-3)
+    ways = [float(course.way.sum()) for course, _ in pairs]
+    way = max(sum(ways) / len(pairs), 1e-3)
     lower = np.array([least, NONE * square, NONE * square, NONE * square, SHORTEST])
     upper = np.array([square * 4, square * 100, square * 1e4, square * 4, LONGEST])
     if np.isfinite(given):

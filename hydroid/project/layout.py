@@ -116,17 +116,12 @@ def _seen(
     """Return the layout of columns, with what the logs show of the joints' motion."""
     entries = guess.log["joints"]
     reasons = [*guess.reasons]
-    settings = validate(guess.log, LogSettings, table.source)
-    logs = read_first(table, settings, arm, reasons, strict=origin == GIVEN)
-    backwards: tuple[str, ...] = ()
-    # a person who names columns knows which way they count
-    if origin == GUESSED:
-        backwards = mirror_sensors(logs, guess, arm, in_range=others.in_range)
-    if backwards:
-        reasons += backwards
+    if origin == GIVEN:
+        # a person who names columns knows which way they count
         settings = validate(guess.log, LogSettings, table.source)
-        # what it says of the log is the same
-        logs = read_first(table, settings, arm, [], strict=False)
+        logs = read_first(table, settings, arm, reasons, strict=True)
+    else:
+        settings, logs = _mirrored(table, arm, guess, others, reasons)
     measured = [joint for joint, entry in entries.items() if entry["angle"]]
     left_out = list[Path]()
     reach = dict[int, tuple[float, float]]()
@@ -155,6 +150,22 @@ def _seen(
         reach=reach,
         origin=origin,
     )
+
+
+def _mirrored(
+    table: Table, arm: Arm, guess: ColumnGuess, others: Others, reasons: list[str]
+) -> tuple[LogSettings, list[Log]]:
+    """Return the settings and logs of guessed columns, those turned round that count
+    backwards."""
+    settings = validate(guess.log, LogSettings, table.source)
+    logs = read_first(table, settings, arm, reasons, strict=False)
+    backwards = mirror_sensors(logs, guess, arm, in_range=others.in_range)
+    if backwards:
+        reasons += backwards
+        settings = validate(guess.log, LogSettings, table.source)
+        # what it says of the log is the same
+        logs = read_first(table, settings, arm, [], strict=False)
+    return settings, logs
 
 
 def _given(table: Table, arm: Arm, given: LogSettings) -> ColumnGuess:

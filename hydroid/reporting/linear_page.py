@@ -66,7 +66,8 @@ def _chart(linear: LinearArm, drawn: Sequence[LinearArm], k: int, arm: Arm) -> C
     per = f"{shown.unit}/s per %"
     time = np.linspace(0.0, SECONDS, SAMPLES)
     frequency = np.geomspace(LOWEST, HIGHEST, SAMPLES)
-    steps = shown.factor * np.array([one.step(k, time) for one in (linear, *drawn)])
+    answers = [one.step(k, time) for one in (linear, *drawn)]
+    steps = shown.factor * np.array(answers)
     swings = np.array([one.response(k, frequency) for one in (linear, *drawn)])
     amplitudes = shown.factor * np.abs(swings)
     phases = np.degrees(np.unwrap(np.angle(swings)))

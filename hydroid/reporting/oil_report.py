@@ -44,13 +44,7 @@ def oil_section(arm: Arm, predictions: Sequence[Prediction]) -> Section | None:
     None: the model has no hydraulics, or every simulation diverged.
     """
     usable = [p for p in predictions if p.oil and np.isfinite(p.response).all()]
-    joints = dict.fromkeys(joint for p in usable for joint in p.joints)
-    rows = list[tuple[Cell, ...]]()
-    for joint in joints:
-        of_joint = [p for p in usable if joint in p.joints]
-        row = _joint_row(joint, of_joint)
-        if row:
-            rows.append((arm.name_of(joint), *row))
+    rows = _joint_rows(arm, usable)
     if not rows:
         return None
     tables = {"oil": Table("", _HEADER, tuple(rows))}
@@ -62,6 +56,18 @@ def oil_section(arm: Arm, predictions: Sequence[Prediction]) -> Section | None:
     return Section(
         "Pressures and flows", _TEXT, tables=tables, folded=True, answer=answer
     )
+
+
+def _joint_rows(arm: Arm, predictions: Sequence[Prediction]) -> list[tuple[Cell, ...]]:
+    """Return a row of each joint that a log drives, its name first."""
+    joints = dict.fromkeys(joint for one in predictions for joint in one.joints)
+    rows = list[tuple[Cell, ...]]()
+    for joint in joints:
+        of_joint = [one for one in predictions if joint in one.joints]
+        row = _joint_row(joint, of_joint)
+        if row:
+            rows.append((arm.name_of(joint), *row))
+    return rows
 
 
 def _joint_row(joint: int, predictions: Sequence[Prediction]) -> tuple[Cell, ...]:

@@ -63,20 +63,26 @@ def residual_section(
             by_itself.append(f"{name} {two_digits(in_time)}")
         if with_command > FAINT:
             by_command.append(f"{name} {two_digits(with_command)}")
+    return Section(
+        "Are the residuals white?",
+        _TEXT,
+        tables={"residuals": Table("", _HEADER, tuple(rows))},
+        tabs=tuple(tabs),
+        folded=True,
+        answer=_answer(by_itself, by_command),
+    )
+
+
+def _answer(by_itself: Sequence[str], by_command: Sequence[str]) -> str:
+    """Say which joints have a correlation above FAINT."""
     answers = list[str]()
     if by_itself:
         answers.append(f"largest autocorrelation: {listed(by_itself)}")
     if by_command:
         answers.append(f"with the command: {listed(by_command)}")
-    answer = f"yes: no correlation is above {FAINT:g}"
     if answers:
-        answer = f"no; {'; '.join(answers)}"
-    title = "Are the residuals white?"
-    table = Table("", _HEADER, tuple(rows))
-    tables = {"residuals": table}
-    return Section(
-        title, _TEXT, tables=tables, tabs=tuple(tabs), folded=True, answer=answer
-    )
+        return f"no; {'; '.join(answers)}"
+    return f"yes: no correlation is above {FAINT:g}"
 
 
 def _tests(

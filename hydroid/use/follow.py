@@ -268,7 +268,8 @@ class _Tracker:
         pose = self._pose
         time = self._path.time
         command, reached = self._steady.commands(speed, pose, self._load)
-        rows = np.flatnonzero(np.any(np.abs(reached - speed) > self._quiet(), axis=1))
+        misses = np.abs(reached - speed) > self._quiet()
+        rows = np.flatnonzero(np.any(misses, axis=1))
         limits = self._steady.limits(
             speed[rows], reached[rows], command[rows], pose[rows]
         )
@@ -345,7 +346,8 @@ class _Tracker:
         for, even against the motion. Joints that sag are not among them.
         """
         still = np.abs(self._speed) <= self._quiet()
-        _, sag = self._steady.commands(np.zeros_like(self._pose[:1]), self._pose[:1])
+        first = self._pose[:1]
+        _, sag = self._steady.commands(np.zeros_like(first), first)
         waiting = np.zeros_like(still)
         for joint in self._driven.tolist():
             if np.abs(sag[0, joint]) > LEAST_SPEED:

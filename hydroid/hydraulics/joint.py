@@ -25,7 +25,7 @@ from hydroid.hydraulics.solenoid import (
     plunger_weight,
     side_voltage,
 )
-from hydroid.hydraulics.valve import curved, slot_share
+from hydroid.hydraulics.valve import curved, power_law, slot_share
 
 STILL = 1e-15
 """speed of a plunger before and after a sub-step, below which rounding alone moves it
@@ -122,7 +122,7 @@ def open_share(side, travel: float) -> float:
     leakage."""
     share = slot_share(travel, side)
     if side.opening_exponent != 1.0:
-        share = share**side.opening_exponent
+        share = power_law(share, side.opening_exponent)
     if side.has_curve:
         share = curved(share, side)
     return share

@@ -55,8 +55,10 @@ import numpy as np
 from hydroid.hydraulics.elementwise import compilable
 from hydroid.hydraulics.valve import rod_speed
 
-ITERATIONS = 30  # for a quasi-static line's pressure at most; three to five suffice
-# part of the pump's flow, or of its pressure, that may be left when they end
+ITERATIONS = 60  # for a quasi-static line's pressure at most; three to five suffice
+FEW = 8
+"""iterations after which every other one is a halving"""
+# part of the pump's flow, or of the way along its curve, that may be left when they end
 SETTLED = 1e-9
 # part of the droop below which a pump's curve is taken for no steeper
 LEAST_FALL = 1e-3
@@ -215,57 +217,93 @@ def close_line(line, c) -> None:
 
 
 @compilable
+def on_curve(way: float, c) -> Any:
+    """Pressure of the line [Pa], and its slope, on a way along the pump's curve.
+
+    Up to a way of 1 that is the part of its flow which the pump gives; from there to 2
+    the pump gives all, and the pressure falls to 0.
+    """
+    knee = c.relief - c.pump_droop
+    if way > 1.0:
+        return knee * (2.0 - way), -knee
+    if c.pump_exponent == 1.0:
+        return c.relief - c.pump_droop * way, -c.pump_droop
+    part = way**c.pump_exponent
+    slope = c.pump_exponent * part / way if way > 0.0 else 0.0
+    return c.relief - c.pump_droop * part, -c.pump_droop * slope
+
+
+@compilable
+def way_to(pressure: float, c) -> float:
+    """The way along the pump's curve at which the line has a pressure [Pa]."""
+    below_relief = c.relief - pressure
+    if below_relief <= 0.0:
+        return 0.0
+    if below_relief > c.pump_droop:
+        return 2.0 - pressure / (c.relief - c.pump_droop)
+    return (below_relief / c.pump_droop) ** (1.0 / c.pump_exponent)
+
+
+@compilable
 def line_pressure(coefficients, driven, work, line, share: float) -> float:
     """Pressure of the line [Pa] at which quasi-static actuators take what the pump
     gives with its φ at `share`.
 
     The actuators are those of the `driven` joints, with (J,) of COEFFICIENTS and of
-    SCRATCH. Newton's method from the last step's, within a bracket: what is taken rises
-    with the pressure, and what is given falls.
+    SCRATCH. Newton's method from the last step's, within a bracket: what is taken falls
+    on the way along the pump's curve, and what is given does not. Over the pressure the
+    curve of a pump that holds it up to a flow would be steep.
     """
     pump = coefficients[driven[driven.size - 1]]
-    low = lowest(pump)
-    high = pump.relief
-    if pump.pump_limit < np.inf:
-        excess, _ = taken_beyond(coefficients, driven, work, line, share, low)
-        if excess >= 0.0:
-            return low  # where the pump gives whatever is taken
-    pressure = min(max(line.pressure, low, 1e-3 * high), high)
-    for _ in range(ITERATIONS):
-        excess, slope = taken_beyond(coefficients, driven, work, line, share, pressure)
+    least = lowest(pump)
+    # without pressure actuators take nothing
+    most = line.taken
+    if least > 0.0:
+        most, _ = taken_from_line(coefficients, driven, work, line, least)
+    if most >= delivery(least, share, pump)[0]:
+        return least
+    full = share * pump.pump_flow
+    low = 0.0
+    high = way_to(least, pump)
+    way = min(way_to(line.pressure, pump), high)
+    pressure = pump.relief
+    for count in range(ITERATIONS):
+        pressure, change = on_curve(way, pump)
+        taken, rise = taken_from_line(coefficients, driven, work, line, pressure)
+        excess = taken - full * min(way, 1.0)
         if excess > 0.0:
-            high = pressure
+            low = way
         else:
-            low = pressure
-        met = abs(excess) <= SETTLED * share * pump.pump_flow
-        if met or high - low <= SETTLED * pump.relief:
+            high = way
+        if abs(excess) <= SETTLED * full or high - low <= SETTLED:
             break
+        slope = rise * change
+        if way < 1.0:
+            slope -= full
         # infinite where nothing flows
-        after = pressure - excess / slope
-        if not low < after < high:
-            # beyond the relief pressure Newton's step ends there, elsewhere it halves
-            after = high if after > high == pump.relief else 0.5 * (low + high)
-        pressure = after
+        after = way - excess / slope
+        creeps = count >= FEW and count % 2 == 0
+        if after < low == 0.0:
+            after = 0.0
+        elif creeps or not low < after < high:
+            after = 0.5 * (low + high)
+        way = after
     return pressure
 
 
 @compilable
-def taken_beyond(
-    coefficients, driven, work, line, share: float, pressure: float
-) -> Any:
-    """Flow that quasi-static actuators take beyond what the pump gives at a line
-    pressure [Pa], and its slope."""
+def taken_from_line(coefficients, driven, work, line, pressure: float) -> Any:
+    """Flow that quasi-static actuators and the open centre take at a line pressure
+    [Pa], and its slope."""
     pump = coefficients[driven[driven.size - 1]]
-    given, slope = delivery(pressure, share, pump)
-    past, rise = past_valves(pressure, line.centre, pump)
-    excess = line.taken + past - given
-    slope += rise
+    past, slope = past_valves(pressure, line.centre, pump)
+    taken = line.taken + past
     for a in range(driven.size):
         j = driven[a]
         c = coefficients[j]
         _, flow, rise = rod_speed(c, work[j], min(pressure, c.supply_pressure))
-        excess += flow
+        taken += flow
         # behind a reducing valve that works, the line's pressure is not felt
         if pressure <= c.supply_pressure:
             slope += rise
-    return excess, slope
+    return taken, slope

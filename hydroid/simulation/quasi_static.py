@@ -85,9 +85,13 @@ def turn(c, z, w, supply: float, limits, period: float) -> Any:
     lower = min(limits[0], z.angle)
     upper = max(limits[1], z.angle)
     after = min(max(free, lower), upper)
-    if after != free:  # a stop ends what rings
-        z.turning = 0.0
-        z.surge = 0.0
+    # a stop ends what rings towards it; what leads away from it goes on
+    if after < free:
+        z.turning = min(z.turning, 0.0)
+        z.surge = min(z.surge, 0.0)
+    elif after > free:
+        z.turning = max(z.turning, 0.0)
+        z.surge = max(z.surge, 0.0)
     z.velocity = (after - z.angle) / period
     return speed, after
 

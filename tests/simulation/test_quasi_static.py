@@ -20,6 +20,7 @@ from hydroid.rungs import QUASI_STATIC, RUNGS
 from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.problem import SimulationSettings
 from hydroid.simulation import Simulation
+from hydroid.simulation.quasi_static import turn
 from hydroid.simulation.scenario import Scenario
 
 SHOULDER, ROLL = 1, 3
@@ -250,17 +251,64 @@ def test_both_models_agree_where_a_load_overruns_a_limited_flow(
     assert joints.area_b[SHOULDER] > 0
 
 
+@pytest.mark.parametrize("exponent", [1.0, 3.0, 50.0])
+@pytest.mark.parametrize("droop", [1e4, 60e5, 150e5])
 @pytest.mark.parametrize("draw", [1.0, 0.6])
-def test_what_the_actuators_take_is_what_the_pump_gives(simulated, draw):
-    _, trace, joints = simulated({SHOULDER: 70, 2: -60}, **PUMP, draw_a=draw)
+def test_what_the_actuators_take_is_what_the_pump_gives(
+    simulated, draw, droop, exponent
+):
+    pump = {"pump_flow": 4e-5, "pump_droop": droop, "pump_exponent": exponent}
+    _, trace, joints = simulated({SHOULDER: 70, 2: -60}, **pump, draw_a=draw)
     taken = np.where(
         trace.flow[..., 0] > 0, draw * trace.flow[..., 0], -trace.flow[..., 1]
     ).sum(axis=1)
-    left = (joints.supply_pressure[SHOULDER] - trace.line[:, 0]) / PUMP["pump_droop"]
-    given = PUMP["pump_flow"] * np.minimum(left, 1.0)
+    left = (joints.supply_pressure[SHOULDER] - trace.line[:, 0]) / droop
+    given = pump["pump_flow"] * np.minimum(left, 1.0) ** (1.0 / exponent)
     moving = trace.line[:, 0] < joints.supply_pressure[SHOULDER]
     assert moving.sum() > 100
     np.testing.assert_allclose(taken[moving], given[moving], rtol=1e-6)
+
+
+SMOOTH = {
+    "a pump that holds its pressure up to a flow": {
+        "pump_flow": 2e-5,
+        "pump_droop": 150e5,
+        "pump_exponent": 10.0,
+    },
+    "valves that open almost at once": {
+        "opening_exponent_a": 0.18,
+        "opening_exponent_b": 0.2,
+        "pilot_lag_a": 0.07,
+        "pilot_lag_b": 0.07,
+        "opening_lag": 0.17,
+    },
+}
+
+
+@pytest.mark.parametrize("values", SMOOTH.values(), ids=SMOOTH.keys())
+def test_a_small_change_of_a_quantity_changes_the_motion_in_proportion(
+    simulated, values
+):
+    """Else finite differences are no derivatives, and least squares finds no step."""
+    rng = np.random.default_rng(5)
+    levels = rng.choice([-70.0, 0.0, 60.0, 90.0], (3, 20))
+    ramps = np.ones(5) / 5
+    commands = {
+        joint: np.convolve(np.repeat(level, 20), ramps)[:401]
+        for joint, level in zip((SHOULDER, 2, ROLL), levels, strict=True)
+    }
+
+    def angle(change):
+        dead = {f"dead_band_{end}": 20.0 * (1.0 + change) for end in "ab"}
+        return simulated(commands, 4.0, plunger_mass=0.008, **dead, **values)[0]
+
+    still = angle(0.0)
+    assert (np.ptp(still, axis=0) > 0.02).all()
+    changes = np.concatenate([k * np.logspace(-9, -6, 4) for k in (1, 2, 3, 5)])
+    slopes = [(angle(change) - still) / change for change in changes]
+    largest = np.abs(slopes[-1]).max()
+    for slope in slopes:
+        np.testing.assert_allclose(slope, slopes[-1], atol=1e-3 * largest)
 
 
 @pytest.mark.parametrize("model", ["quasi-static", "dynamic"])
@@ -341,6 +389,36 @@ def test_a_joint_rings_on_its_oil_as_the_exact_solution_whatever_the_step(ratio,
     _, response = signal.step((system[0], way), T=[0, 0.8])
     # what the joint is further on than at the wanted velocity
     assert ends[0][0] == pytest.approx(wanted * (response[-1] - 0.8), rel=1e-9)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_stop_takes_what_leads_into_it_and_leaves_what_leads_away(side):
+    """Else a joint that just touches its stop would go on as another one that just does
+    not."""
+    cosine, sine = ringing(np.array(1.7), np.array(0.3), 0.02)
+    c = SimpleNamespace(
+        oil_frequency=1.7,
+        oil_damping=0.3,
+        oil_damping_share=0.0,
+        ring_cosine=cosine,
+        ring_sine=sine,
+    )
+    shut = SimpleNamespace(open_area=0.0, arm=1.0)
+    states = []
+    for room in (1e-9, -1e-9):
+        # on the way to the stop, and turning back
+        z = SimpleNamespace(angle=0.0, turning=side * 0.05, surge=-side * 5.0)
+        free = SimpleNamespace(**vars(z))
+        turn(c, free, shut, 1e7, (-np.inf, np.inf), 0.02)
+        way = 0.02 * free.velocity
+        limits = (-1.0, way + room) if side > 0 else (way - room, 1.0)
+        _, after = turn(c, z, shut, 1e7, limits, 0.02)
+        assert after == pytest.approx(way, abs=2e-9)
+        states.append((z.turning, z.surge, free.turning, free.surge))
+    assert (np.array(states)[:, 1] * side < 0.0).all()
+    np.testing.assert_array_equal(states[0][:2], states[0][2:])
+    assert states[1][1] == states[1][3]
+    assert states[1][0] * side <= 0.0
 
 
 def test_the_dynamic_model_rings_as_frequency_and_damping_ratio_say(

@@ -36,6 +36,7 @@ LAWS = [
     },
     STRAIGHT | SLOPING | {"draw_a": 0.5, "return_b": 0.6, "damping": 300.0},
     STRAIGHT | SLOPING | {"pump_exponent": 3.0},
+    STRAIGHT | SLOPING | {"pump_exponent": 50.0},
     STRAIGHT | SLOPING | {"pump_bypass": 0.7},
 ]
 both_models = pytest.mark.parametrize(

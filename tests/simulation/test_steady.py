@@ -61,6 +61,7 @@ def both(spec, arm):
         PUMP | {"draw_a": 0.5, "return_b": 0.6},
         PUMP | {"pump_limit": 15e5},
         PUMP | {"pump_exponent": 4.0},
+        PUMP | {"pump_exponent": 40.0},
         PUMP | {"pump_bypass": 0.7},
         {
             "overlap_a": 0.3e-3,

@@ -27,7 +27,7 @@ from hydroid.arm.model import load_machine, load_model
 from hydroid.arrays import Array, Mask, record
 from hydroid.errors import SettingsError
 from hydroid.log import Log
-from hydroid.posterior.error_model import whitened
+from hydroid.posterior.error_filter import whitened
 from hydroid.posterior.linear import estimate_box, prior_slopes, white_posterior
 from hydroid.posterior.posterior import Posterior, regular
 from hydroid.posterior.uncertainty import uncertainty

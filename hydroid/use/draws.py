@@ -241,7 +241,7 @@ class DriftingAngles:
     sensors with noise.
 
     Args:
-        numbers: of each of J joints' error (`posterior.error_model.NUMBERS`) in rad and
+        numbers: of each of J joints' error (`posterior.error_filter.NUMBERS`) in rad and
             s, shape (J, 5); 0 of those without errors.
         n: machines.
         period: between steps [s].

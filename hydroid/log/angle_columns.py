@@ -8,7 +8,7 @@ import numpy as np
 from hydroid.arrays import Limits
 from hydroid.files import Plain
 from hydroid.log.columns import Column, Entry
-from hydroid.log.joint_columns import JointColumns, Joints
+from hydroid.log.joint_columns import Assignment, Joints
 from hydroid.log.rods import Rod
 from hydroid.log.uncalibrated import over_the_joint, over_the_range
 from hydroid.settings.log import LENGTHS
@@ -24,7 +24,7 @@ COUNTS = "counts"
 """in place of a unit of angles, where columns without one hold what a sensor gives"""
 
 
-def angle_entries(angles: Mapping[int, JointColumns], arm: Joints) -> dict[int, Entry]:
+def angle_entries(angles: Mapping[int, Assignment], arm: Joints) -> dict[int, Entry]:
     """Return the settings of the columns of angles, and what they are taken for, by
     joint."""
     units = _usual_units(angles, arm)
@@ -34,7 +34,7 @@ def angle_entries(angles: Mapping[int, JointColumns], arm: Joints) -> dict[int, 
     return entries
 
 
-def _usual_units(angles: Mapping[int, JointColumns], arm: Joints) -> dict[int, str]:
+def _usual_units(angles: Mapping[int, Assignment], arm: Joints) -> dict[int, str]:
     """Return by joint in which unit its angle is if the column states none: COUNTS, or
     the same for all."""
     largest = list[float]()

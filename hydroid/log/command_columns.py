@@ -9,7 +9,7 @@ import numpy as np
 from hydroid.arrays import Array
 from hydroid.files import Plain
 from hydroid.log.columns import Column, Entry
-from hydroid.log.joint_columns import JointColumns
+from hydroid.log.joint_columns import Assignment
 from hydroid.log.signals import CommandRange, likely_range, resting_range
 from hydroid.log.table import Signal, Table
 
@@ -21,7 +21,7 @@ NEVER_AT_REST = (
 
 
 def command_entries(
-    table: Table, commands: Mapping[int, JointColumns]
+    table: Table, commands: Mapping[int, Assignment]
 ) -> dict[int, Entry]:
     """Return the settings of the columns of commands, and what they are taken for, by
     joint."""

@@ -18,9 +18,9 @@ from hydroid.errors import LogError
 from hydroid.files import Plain
 from hydroid.log.angle_columns import angle_entries
 from hydroid.log.clues import column_unit, kind_of
-from hydroid.log.columns import Column, rises, signal_columns
+from hydroid.log.columns import Column, Entry, rises, signal_columns
 from hydroid.log.command_columns import command_entries
-from hydroid.log.joint_columns import Joints, by_joint
+from hydroid.log.joint_columns import Assignment, Joints, by_joint
 from hydroid.log.rods import Rod
 from hydroid.log.table import Table
 from hydroid.units import UNITS, likely_time_unit
@@ -31,6 +31,8 @@ PERIODS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2)
 NO_RODS: Mapping[int, Rod] = {}
 NO_RANGES: Mapping[int, tuple[float, float]] = {}
 NO_ANGLES: Mapping[int, Plain] = {}
+NOTHING = Entry({}, "")
+"""in place of a column that a joint does not have"""
 
 
 class ColumnGuess(NamedTuple):
@@ -78,22 +80,7 @@ def guess_columns(
     angles = by_joint(_of_kind(columns, "angle"), arm, reasons)
     of_commands = command_entries(table, commands)
     of_angles = angle_entries(angles, arm)
-    entries = dict[int, Plain]()
-    mirrored = dict[int, Plain]()
-    for joint in sorted({*angles, *commands}):
-        name = arm.names[joint - 1]
-        entries[joint] = {"command": None, "angle": None}
-        if joint in commands:
-            command = of_commands[joint]
-            entries[joint]["command"] = command.settings
-            reasons.append(command.reason(name, commands[joint].reason))
-        if joint in angles:
-            angle = of_angles[joint]
-            # nothing tells the scale of some sensors: they are left out
-            entries[joint]["angle"] = angle.settings or None
-            reasons.append(angle.reason(name, angles[joint].reason))
-            if angle.mirrored:
-                mirrored[joint] = angle.mirrored
+    reasons += _joint_reasons(arm, (commands, of_commands), (angles, of_angles))
     for column in columns:
         if column.kind == "target":
             reasons.append(
@@ -110,9 +97,44 @@ def guess_columns(
         "command": None,
         "angle": None,
         "period_s": nearest_period(step),
-        "joints": entries,
+        "joints": _joint_settings(of_commands, of_angles),
     }
+    mirrored = dict[int, Plain]()
+    for joint, angle in of_angles.items():
+        if angle.mirrored:
+            mirrored[joint] = angle.mirrored
     return ColumnGuess(log, tuple(reasons), unused, mirrored)
+
+
+def _joint_reasons(
+    arm: Joints, *kinds: tuple[Mapping[int, Assignment], Mapping[int, Entry]]
+) -> list[str]:
+    """Return why columns of some kinds, here commands and angles, are taken for what
+    they are, joint by joint."""
+    joints = {joint for assigned, _ in kinds for joint in assigned}
+    reasons = list[str]()
+    for joint in sorted(joints):
+        for assigned, entries in kinds:
+            if joint in assigned:
+                why = assigned[joint].reason
+                reasons.append(entries[joint].reason(arm.names[joint - 1], why))
+    return reasons
+
+
+def _joint_settings(
+    commands: Mapping[int, Entry], angles: Mapping[int, Entry]
+) -> dict[int, Plain]:
+    """Return the settings of the joints' columns, by joint; null: it has none, or one
+    of which nothing tells the scale."""
+    settings = dict[int, Plain]()
+    for joint in sorted({*commands, *angles}):
+        command = commands.get(joint, NOTHING)
+        angle = angles.get(joint, NOTHING)
+        settings[joint] = {
+            "command": command.settings or None,
+            "angle": angle.settings or None,
+        }
+    return settings
 
 
 def usual_step(times: Array) -> float:

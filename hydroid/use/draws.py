@@ -232,7 +232,9 @@ def _move(point: Array, speed: Array, walls: Array, gaps: Array) -> None:
         if met < 0:
             return
         wall = walls[met]
-        speed -= 2.0 * np.sum(wall * speed) / np.sum(wall * wall) * wall
+        # it is thrown back: what is towards the wall changes its sign
+        along = np.sum(wall * speed) / np.sum(wall * wall)
+        speed -= 2.0 * along * wall
         left -= first
 
 

@@ -86,10 +86,7 @@ def guess_columns(
             reasons.append(
                 f"{column.name}: a target of a position, no valve's opening; a controller lies between"
             )
-    used = {time.name}
-    for joint_columns in (*commands.values(), *angles.values()):
-        used.update(column.name for column in joint_columns.columns)
-    unused = tuple(name for name in table.names if name and name not in used)
+    unused = _unused(table, time, (*commands.values(), *angles.values()))
     if unused:
         reasons.append(f"not used: {listed(unused)}")
     log: Plain = {
@@ -106,12 +103,24 @@ def guess_columns(
     return ColumnGuess(log, tuple(reasons), unused, mirrored)
 
 
+def _unused(
+    table: Table, time: Column, assigned: Sequence[Assignment]
+) -> tuple[str, ...]:
+    """Return the names of the columns that are neither the time nor a joint's."""
+    used = {time.name}
+    for assignment in assigned:
+        used.update(column.name for column in assignment.columns)
+    return tuple(name for name in table.names if name and name not in used)
+
+
 def _joint_reasons(
     arm: Joints, *kinds: tuple[Mapping[int, Assignment], Mapping[int, Entry]]
 ) -> list[str]:
     """Return why columns of some kinds, here commands and angles, are taken for what
     they are, joint by joint."""
-    joints = {joint for assigned, _ in kinds for joint in assigned}
+    joints = set[int]()
+    for assigned, _ in kinds:
+        joints.update(assigned)
     reasons = list[str]()
     for joint in sorted(joints):
         for assigned, entries in kinds:

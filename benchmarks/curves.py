@@ -26,8 +26,8 @@ from hydroid.posterior.quantities import quantities
 from hydroid.posterior.uncertainty import uncertainty
 from hydroid.problem.problem import Problem
 from hydroid.quantity_table import CURVE
+from hydroid.settings.expansion import CURVE_SD
 from hydroid.settings.fit import FitSettings
-from hydroid.settings.parameters import CURVE_SD
 
 JOINT = 2
 NOISE_DEG = 0.05

@@ -30,15 +30,12 @@ from hydroid.fitting.baselines import (
 from hydroid.fitting.validation import HORIZONS, errors_ahead
 from hydroid.fitting.valve_start import fitted_valve
 from hydroid.log import Log
+from hydroid.posterior.course import Course, at_stops, travelled
+from hydroid.posterior.error_filter import NUMBERS, SHORTEST
 from hydroid.posterior.error_model import (
     LEAST_NOISE,
-    NUMBERS,
-    SHORTEST,
-    Course,
     ErrorModel,
     Signal,
-    at_stops,
-    travelled,
 )
 from hydroid.settings.fit import FitSettings
 

@@ -80,10 +80,12 @@ class IdentifiedModel:
             return self.summary
         parameters = self.settings.parameter_set()
         values = parameters.mapping(self.theta)
-        estimate = {
-            one.name: ParameterEstimate(value=values[one.name], unit=one.unit)
-            for one in parameters.parameters
-        }
+        estimate = dict[str, ParameterEstimate]()
+        for parameter in parameters.parameters:
+            value = values[parameter.name]
+            estimate[parameter.name] = ParameterEstimate(
+                value=value, unit=parameter.unit
+            )
         return FitSummary(stage=self.settings.stage, estimate=estimate)
 
 

@@ -52,9 +52,12 @@ class Parameter:
         fixed: its value if it is not estimated.
         log: whether it is searched, refined and reported by its logarithm; the lower
             bound is then above 0.
-        start: where a search starts; None: no parameter of the set states a start.
+        start: where a search starts; None: nothing states it. If that is so of all
+            parameters of a set, the search draws its starts; else it is the middle of
+            the bounds.
         prior: what is known besides the logs.
-        least: what a relative change of 1 is at least, in the unit.
+        least: smallest size of a relative change of 1, in the unit: an effect is
+            around 0, where nothing is relative to its value.
     """
 
     name: str

@@ -27,7 +27,7 @@ from hydroid.arm.model import load_machine, load_model
 from hydroid.arrays import Array, Mask, record
 from hydroid.errors import SettingsError
 from hydroid.log import Log
-from hydroid.posterior.error_model import whitened
+from hydroid.posterior.error_filter import whitened
 from hydroid.posterior.linear import estimate_box, prior_slopes, white_posterior
 from hydroid.posterior.posterior import Posterior, regular
 from hydroid.posterior.uncertainty import uncertainty
@@ -46,10 +46,21 @@ PRIOR_SD = 1.0
 """relative standard deviation that a forecast assumes of every parameter at most
 (ours): a fit's own prior is so weak that a direction which stays unknown would outweigh
 all that an experiment can do"""
+POSES = 50
+"""random poses that show which distances change"""
+ATTEMPTS = 60
+"""to make an experiment keep the limits"""
+ELITE = 4
+"""experiments that are changed at random, the best so far"""
+MOVED = 0.9
+"""part of its deviation before up to which an experiment must bring a parameter that
+counts"""
+LATELY = 20
+"""samples before bodies meet, over which the joint that turned most is the cause"""
 
 
 def forecast(posterior: Posterior) -> Posterior:
-    """Return what is known if every parameter is known to PRIOR_SD at least."""
+    """Return a posterior in which no relative standard deviation exceeds PRIOR_SD."""
     return posterior.add(np.eye(len(posterior.root)) / PRIOR_SD)
 
 
@@ -75,20 +86,13 @@ def information(
     return regular(np.vstack([weak, *(row.T for row in rows)]))
 
 
-POSES = 50  # that show which distances change
-ATTEMPTS = 60  # to make an experiment keep the limits
-ELITE = 4  # experiments that are changed at random, the best so far
-DIVERGES = "a simulation diverges"
-MOVED = 0.9
-"""part of its deviation before up to which an experiment must bring a parameter that
-counts"""
-
-
 class Trial(NamedTuple):
     """A simulated experiment that keeps the limits.
 
-    experiment: its commands. gained: rows of its information (`information`), shape (p,
-    p). log: its commands with the simulated angles.
+    Attributes:
+        experiment: its commands.
+        gained: rows of its information (`information`), shape (p, p).
+        log: its commands with the simulated angles.
     """
 
     experiment: Experiment
@@ -97,15 +101,20 @@ class Trial(NamedTuple):
 
 
 class Broken(NamedTuple):
-    """Why an experiment cannot be made: what it does, against which setting,
-    in what part of its time."""
+    """Why an experiment cannot be made.
+
+    Attributes:
+        what: it does.
+        setting: that forbids it.
+        share: of its time in which it does so.
+    """
 
     what: str
     setting: str
     share: float
 
 
-DIVERGED = Broken(DIVERGES, "design", 1.0)
+DIVERGED = Broken("a simulation diverges", "design", 1.0)
 
 
 class ExperimentSimulator:
@@ -169,7 +178,7 @@ class ExperimentSimulator:
             return None
         # the joint that turned most lately is the cause; those far out count as the
         # others do
-        lately = angle[max(0, near - 20) : near + 1]
+        lately = angle[max(0, near - LATELY) : near + 1]
         turned = np.ptp(lately, axis=0)
         return Violation(near, int(np.argmax(turned)), False)
 
@@ -203,13 +212,11 @@ class ExperimentSimulator:
         diverge beside them."""
 
         def outputs(theta: Array) -> Array:
-            return self._simulate(experiment, theta)[:, :, self._outputs].reshape(
-                len(theta), -1
-            )
+            angles = self._simulate(experiment, theta)[:, :, self._outputs]
+            return angles.reshape(len(theta), -1)
 
-        slopes = differentiate(
-            outputs, self._box, self._axes, angle[:, self._outputs].ravel()
-        )
+        at_estimate = angle[:, self._outputs].ravel()
+        slopes = differentiate(outputs, self._box, self._axes, at_estimate)
         if not np.isfinite(slopes).all():
             return DIVERGED
         of_angles = slopes.reshape(len(slopes), -1, len(self._outputs))
@@ -229,10 +236,9 @@ class ExperimentSimulator:
         of_joints = roles(log.driven | is_output, others)
         moving = np.flatnonzero(of_joints.simulated)
         simulation = make_simulation(self._spec, log, moving.tolist(), self._settings)
+        candidates = self._bindings.candidates(theta)
         angle = np.tile(log.angle, (len(theta), 1, 1))
-        angle[:, :, moving] = simulation.simulate(
-            self._bindings.candidates(theta)
-        ).angle
+        angle[:, :, moving] = simulation.simulate(candidates).angle
         return angle
 
 
@@ -240,10 +246,14 @@ class ExperimentSimulator:
 class Design:
     """A designed experiment beside the random ones it was chosen from.
 
-    random: those drawn at random that keep the limits. before: the posterior without it.
-    moved: which of the p parameters any of these improves (`MOVED`), but for effects of
-    a group of logs, which belong to another day, (p,); the others must not hide them.
-    names: of the parameters.
+    Attributes:
+        best: the designed one.
+        random: those drawn at random that keep the limits.
+        before: the posterior without it.
+        moved: which of the p parameters any random one improves (`MOVED`), but for
+            effects of a group of logs, which belong to another day, (p,). Only these
+            are scored, so that the others do not hide what an experiment does.
+        names: of the parameters.
     """
 
     best: Trial
@@ -285,9 +295,9 @@ def broken_limits(broken: Sequence[Broken]) -> SettingsError:
     counts = Counter((limit.what, limit.setting) for limit in broken)
     ((what, setting), times) = counts.most_common(1)[0]
     share = np.mean([limit.share for limit in broken if limit.what == what])
+    most_often = f"{what} in {times} of them, there for {100 * share:.0f} % of the time"
     return SettingsError(
-        f"none of {len(broken)} random experiments keeps the limits in simulation: {what} in "
-        f"{times} of them, there for {100 * share:.0f} % of the time",
+        f"none of {len(broken)} random experiments keeps the limits in simulation: {most_often}",
         setting,
         "allow more speed, less margin or clearance, a smaller command, or other poses",
     )

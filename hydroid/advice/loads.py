@@ -73,36 +73,42 @@ def load_of(model: IdentifiedModel, log: Log, problem: Problem, theta: Array) ->
         theta: where all others are the model's, shape (P + 1,).
     """
     likelihood = likelihood_at(problem, theta)
-    mass = float(theta[-1])
+    begun = float(theta[-1])
 
     def with_load(points: Array, load: float) -> Array:
         """Return innovations of the model's parameters, (n, P), with a load."""
         loads = np.full(len(points), load)
         return likelihood.innovations(np.column_stack([points, loads]))
 
-    change = PART * max(mass, first_guess(model))
-    at = theta[None, :-1]
-    heavier = with_load(at, mass + change)[0]
-    here = with_load(at, mass)[0]
-    slopes = [heavier - here]
+    # the load counts in units of this change [kg]
+    change = PART * max(begun, first_guess(model))
+    others = theta[None, :-1]
+    heavier = with_load(others, begun + change)[0]
+    innovations = with_load(others, begun)[0]
+    slopes = [heavier - innovations]
     prior = np.zeros((0, 1))
     quantile = NORMAL
-    if (known := stored_posterior(model)) is not None:
-        others = differentiate(
-            lambda points: with_load(points, mass), known.box, known.axes(STEP), here
-        )
-        slopes += [*others]
+    posterior = stored_posterior(model)
+    if posterior is not None:
+        slopes += [
+            *differentiate(
+                lambda points: with_load(points, begun),
+                posterior.box,
+                posterior.axes(STEP),
+                innovations,
+            )
+        ]
         # the fit says nothing of the load, whose column comes first
-        of_load = np.zeros(len(known.root))
-        prior = np.column_stack([of_load, known.root])
-        quantile = known.quantile
+        of_load = np.zeros(len(posterior.root))
+        prior = np.column_stack([of_load, posterior.root])
+        quantile = posterior.quantile
     rows = np.vstack([np.column_stack(slopes), prior])
-    aim = np.append(-here, np.zeros(len(prior)))
+    wanted = np.append(-innovations, np.zeros(len(prior)))
     # what the log does not determine stays as the fit has it
-    inverse = np.linalg.pinv(rows.T @ rows, hermitian=True)
-    step = inverse @ (rows.T @ aim)
-    mass = max(mass + change * float(step[0]), 0.0)
-    half = change * quantile * float(np.sqrt(inverse[0, 0]))
+    covariance = np.linalg.pinv(rows.T @ rows, hermitian=True)
+    step = covariance @ (rows.T @ wanted)
+    mass = max(begun + change * float(step[0]), 0.0)
+    half = change * quantile * float(np.sqrt(covariance[0, 0]))
     name = log_file(log.source).name
     return Load(name, mass, max(mass - half, 0.0), mass + half)
 
@@ -111,6 +117,6 @@ def load_finding(loads: Sequence[Load]) -> list[Finding]:
     """Return what is said of loads that logs ask for; nothing without any."""
     if not loads:
         return []
-    stated = ", ".join(f"{one.log}: {one.mass:.3g}" for one in loads)
+    stated = ", ".join(f"{load.log}: {load.mass:.3g}" for load in loads)
     numbers = {"stated": f"{{{stated}}}"}
     return [Finding("load asked for", "note", tuple(map(str, loads)), numbers)]

@@ -214,7 +214,9 @@ def _pairs(model: mujoco.MjModel) -> list[list[int]]:
     first, second = np.triu_indices(model.ngeom, 1)
     kinds = model.geom_contype
     masks = model.geom_conaffinity
-    meant = (kinds[first] & masks[second] | kinds[second] & masks[first]) != 0
+    meets_second = kinds[first] & masks[second]
+    meets_first = kinds[second] & masks[first]
+    meant = (meets_second | meets_first) != 0
     # bodies that no joint separates count as one, the weld
     bodies = (model.geom_bodyid[first], model.geom_bodyid[second])
     welds = [model.body_weldid[body] for body in bodies]

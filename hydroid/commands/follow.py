@@ -174,9 +174,11 @@ def _away(tip: "TipKinematics", followed: "Followed") -> float:
     predicts [mm]."""
     import numpy as np
 
-    pairs = zip(followed.log.angle, followed.angle, strict=True)
-    distances = [np.linalg.norm(tip.place(a) - tip.place(b)) for a, b in pairs]
-    return 1e3 * float(max(distances))
+    farthest = 0.0
+    for wanted, predicted in zip(followed.log.angle, followed.angle, strict=True):
+        away = tip.place(predicted) - tip.place(wanted)
+        farthest = max(farthest, float(np.linalg.norm(away)))
+    return 1e3 * farthest
 
 
 def _without_absent_joints(

@@ -113,4 +113,5 @@ def _median(values: Sequence[float]) -> str:
     finite = [value for value in values if np.isfinite(value)]
     if not finite:
         return ""
-    return f"{np.median(finite):.3g} [{min(finite):.3g}, {max(finite):.3g}]"
+    extent = f"[{min(finite):.3g}, {max(finite):.3g}]"
+    return f"{np.median(finite):.3g} {extent}"

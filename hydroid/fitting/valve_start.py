@@ -7,6 +7,10 @@ and a lag, and improves all numbers. What counts of an error e is what it has no
 for a while, r_k = (1 - K) r_{k-1} + e_k - e_{k-1}: an error of the speed stays in the
 angle, and would count for as long as the log lasts. No load slows the joint, and no
 pump.
+
+The numbers of a side, in the vector x of its search: dead band [%], logarithms of the
+exponent, of the factors and of the speed at full command, relative to that in its
+`SpeedCurve`. The vector of a joint has those of both sides, delay and lag [s].
 """
 
 from collections.abc import Sequence
@@ -18,7 +22,7 @@ import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
 from scipy.signal import lfilter
 
-from hydroid.arrays import Array, record
+from hydroid.arrays import Array, Mask, record
 from hydroid.fitting.baselines import Baseline, follow
 from hydroid.fitting.speed_curve import SpeedCurve, inside, measured_speeds
 from hydroid.hydraulics.valve import KNOTS, bent_opening
@@ -28,15 +32,22 @@ STILL = 0.02
 """part of the speed that a direction reaches below which a joint seems to stand: where
 a valve begins to open too late, it has no effect on what the log shows before, and a
 fit sees no reason to let it open earlier"""
-GRID = 40  # commands at which a valve is compared with the speeds
-UNLIKE = 0.5  # scatter of the logarithms of neighbouring factors of a curve
-EXPONENT, EXPONENT_SD = 1.4, 0.4  # usual exponent, and scatter of its logarithm
-BEGUN = 0.6, 1.4, 2.2  # exponents at which the search for a valve begins
+GRID = 40
+"""commands at which a valve is compared with the speeds"""
+SURE = 10.0
+"""samples between two of these commands from which a speed is known there"""
+UNLIKE = 0.5
+"""scatter of the logarithms of neighbouring factors of a curve"""
+EXPONENT = 1.4
+"""usual exponent of an opening"""
+EXPONENT_SD = 0.4
+"""scatter of its logarithm"""
+FIRST_EXPONENTS = (0.6, 1.4, 2.2)
+"""at which the search for a valve begins"""
 LEAST = (0.0, np.log(0.4), *[-5.0] * len(KNOTS), -1.0)
 MOST = (90.0, np.log(3.0), *[5.0] * len(KNOTS), 4.0)
 SCALE = (5.0, 0.3, *[0.5] * len(KNOTS), 0.3)
-"""bounds and scales of a side's numbers: dead band [%], logarithms of exponent, factors
-and relative speed"""
+"""bounds and scales of a side's numbers"""
 FLAT = 3.0
 """command beyond the dead band over which a curve must be flat for the dead band to be
 in doubt [%]"""
@@ -44,25 +55,33 @@ MEMORY = 1.5
 """for how long an error counts [s]"""
 USUAL_LAG = 0.1
 """of a valve and its oil without any delay [s]"""
-# of the search for a valve that a joint follows, with the noise that is left
-ROUNDS, STEPS = 2, 25
-POINTS = 401  # of a table of one direction
-# a joint without stops: its logs may have reached none
+ROUNDS = 2
+"""searches for a valve that a joint follows, each with the noise that the one before
+leaves"""
+STEPS = 25
+"""evaluations of each of them, without those for slopes"""
+POINTS = 401
+"""of a table of one direction"""
 FREE = np.array([-np.inf, np.inf])
-# scatter of a dead band around the command from which a joint seems to move [%]
+"""range of a joint without stops: its logs may have reached none"""
 DEAD_SD = 20.0
-LEAST_ERROR, SPEED_ERROR = 0.01, 0.04
-"""error of a measured speed: a part of what the direction reaches, and one of the speed
-itself"""
+"""scatter of a dead band around the command from which a joint seems to move [%]"""
+LEAST_ERROR = 0.01
+"""error of a measured speed at least, as a part of what the direction reaches"""
+SPEED_ERROR = 0.04
+"""error of a measured speed besides, as a part of it"""
 
 
 @record
 class ValveStart:
-    """Numbers of a direction of a valve.
+    """A valve in one direction.
 
-    dead_band: command below which nothing moves [%]. exponent: of the opening. factors:
-    of its curve, (4,). speed: at full command [rad/s]. one_size: its commands tell no
-    curve: only the speed is measured.
+    Attributes:
+        dead_band: command below which nothing moves [%].
+        exponent: of the opening.
+        factors: of its curve, shape (4,).
+        speed: at full command [rad/s].
+        one_size: its commands tell no curve: only the speed is measured.
     """
 
     dead_band: float
@@ -80,46 +99,54 @@ def valve_start(side: SpeedCurve) -> ValveStart | None:
     """
     if len(side.command) == 0 or not side.top > 0.0:
         return None
-    top = side.top
-    flat = (1.0,) * len(KNOTS)
     dead = _dead_band(side)
     if side.one_size:
-        dead = min(dead, 0.5 * float(side.command[0]))  # nobody knows
-        full = top / max(_share(float(np.median(side.command)), dead), 0.05) ** EXPONENT
-        return ValveStart(dead, EXPONENT, flat, full, one_size=True)
+        return _usual_valve(side, dead)
     at = np.linspace(side.command[0], side.command[-1], GRID)
-    wanted = np.interp(at, side.command, side.speed) / top
-    count = np.histogram(
-        side.command, np.linspace(at[0], at[-1], GRID + 1), weights=side.weight
-    )[0]
+    wanted = np.interp(at, side.command, side.speed) / side.top
+    edges = np.linspace(at[0], at[-1], GRID + 1)
+    count, _ = np.histogram(side.command, edges, weights=side.weight)
     # no sample between two commands: nothing is known there
-    known = np.minimum(count / 10.0, 1.0)
+    known = np.minimum(count / SURE, 1.0)
     weight = np.sqrt(known) / (LEAST_ERROR + SPEED_ERROR * wanted)
 
     def rows(x: Array) -> Array:
-        return np.concatenate(
-            [weight * (_relative_speed(at, x) - wanted), _unusual(x, dead)]
-        )
+        errors = weight * (_relative_speed(at, x) - wanted)
+        return np.concatenate([errors, _unusual(x, dead)])
 
     tried = list[OptimizeResult]()
-    for begun, band in product(BEGUN, (dead, 0.5 * dead)):
-        level = np.zeros(len(KNOTS))
-        begin = np.array([min(band, 89.0), np.log(begun), *level, 0.05])
-        tried.append(
-            least_squares(rows, begin, bounds=(LEAST, MOST), x_scale=SCALE, max_nfev=60)
+    for exponent, band in product(FIRST_EXPONENTS, (dead, 0.5 * dead)):
+        flat = np.zeros(len(KNOTS))
+        begin = np.array([min(band, 89.0), np.log(exponent), *flat, 0.05])
+        result = least_squares(
+            rows, begin, bounds=(LEAST, MOST), x_scale=SCALE, max_nfev=60
         )
-    ended = min(tried, key=lambda one: one.cost)
-    band, exponent, factors, full = _numbers(ended.x)
-    return ValveStart(band, exponent, factors, full * top, one_size=False)
+        tried.append(result)
+    best = min(tried, key=lambda result: result.cost)
+    band, exponent, factors, full = _numbers(best.x)
+    return ValveStart(band, exponent, factors, full * side.top, one_size=False)
+
+
+def _usual_valve(side: SpeedCurve, dead: float) -> ValveStart:
+    """Return a power law with the usual exponent that has the speed of a side at its
+    usual command; `dead` is its dead band [%]."""
+    # nobody knows where the valve opens, but it has opened at the smallest command
+    dead = min(dead, 0.5 * float(side.command[0]))
+    usual = float(np.median(side.command))
+    share = max(_share(usual, dead), 0.05)
+    flat = (1.0,) * len(KNOTS)
+    return ValveStart(dead, EXPONENT, flat, side.top / share**EXPONENT, one_size=True)
 
 
 @record
 class JointStart:
     """Where a fit of a joint's valve begins.
 
-    sides: of positive and of negative commands. delay: of the commands [s]. lag: of the
-    speed behind the valve [s]. direction: 1 where a positive command moves the joint to
-    larger angles, else -1.
+    Attributes:
+        sides: of positive and of negative commands.
+        delay: of the commands [s].
+        lag: of the speed behind the valve [s].
+        direction: 1 where a positive command moves the joint to larger angles, else -1.
     """
 
     sides: tuple[ValveStart, ValveStart]
@@ -139,9 +166,13 @@ class JointStart:
         It is a table of speeds, with a lag.
         """
         at = np.linspace(0.0, 100.0, POINTS)
-        a, b = (side.speed * _relative_speed(at, _begin(side)) for side in self.sides)
-        speeds = self.direction * np.concatenate([-b[:0:-1], a])
-        table = np.stack([np.concatenate([-at[:0:-1], at]), speeds], axis=1)
+        forth, back = (
+            side.speed * _relative_speed(at, _begin(side)) for side in self.sides
+        )
+        # from the largest negative command to the largest positive one
+        commands = np.concatenate([-at[:0:-1], at])
+        speeds = self.direction * np.concatenate([-back[:0:-1], forth])
+        table = np.stack([commands, speeds], axis=1)
         numbers = np.zeros((4, 2))
         numbers[3] = self.lag
         return Baseline(joint, np.asarray(limits, float), self.delay, table, numbers)
@@ -154,55 +185,55 @@ def fitted_valve(logs: Sequence[Log], joint: int) -> JointStart | None:
     None where the logs do not show how it moves in both directions.
     """
     curve = measured_speeds(logs, joint)
-    sides = [valve_start(curve.side(sign)) for sign in (1, -1)] if curve else []
-    shown = [side for side in sides if side is not None]
-    if curve is None or len(shown) < 2:
+    if curve is None:
         return None
-    return _Following(logs, joint, curve.direction, shown).fitted(curve.delay)
+    forth = valve_start(curve.side(1))
+    back = valve_start(curve.side(-1))
+    if forth is None or back is None:
+        return None
+    following = _Following(logs, joint, curve.direction, (forth, back))
+    return following.fitted(curve.delay)
 
 
 class _Following:
-    """A joint that follows the valve of numbers x through its logs: those of both
-    sides, delay, and lag."""
+    """A joint that follows the valve of the numbers x of a joint through its logs."""
 
     def __init__(
         self,
         logs: Sequence[Log],
         joint: int,
         direction: float,
-        sides: Sequence[ValveStart],
+        sides: tuple[ValveStart, ValveStart],
     ) -> None:
+        column = joint - 1
+        self._column = column
+        self._direction = direction
+        self._sides = sides
         self._logs = [
-            log for log in logs if log.driven[joint - 1] and log.has_angle[joint - 1]
+            log for log in logs if log.driven[column] and log.has_angle[column]
         ]
-        self._joint, self._direction, self._sides = joint - 1, direction, sides
-        angles = np.concatenate([log.angle[:, joint - 1] for log in self._logs])
-        reach = float(angles.min()), float(angles.max())
-        self._used = [inside(log.angle[:, joint - 1], reach) for log in self._logs]
+        angles = [log.angle[:, column] for log in self._logs]
+        every = np.concatenate(angles)
+        reach = (float(every.min()), float(every.max()))
+        self._used = [inside(angle, reach) for angle in angles]
         self._noise = 1.0
 
     def fitted(self, delay: float) -> JointStart:
         """Return the most likely one; it begins at the sides, and at a delay that has
         the lag in it [s]."""
-        ends = [_begin(side) for side in self._sides]
+        forth, back = self._sides
         sooner = max(delay - USUAL_LAG, 0.0)
-        begin = np.array([*ends[0], *ends[1], sooner, USUAL_LAG])
-        least, most = (
-            np.array([*LEAST, *LEAST, 0.0, 0.0]),
-            np.array([*MOST, *MOST, 1.0, 0.6]),
-        )
+        begin = np.array([*_begin(forth), *_begin(back), sooner, USUAL_LAG])
+        least = np.array([*LEAST, *LEAST, 0.0, 0.0])
+        most = np.array([*MOST, *MOST, 1.0, 0.6])
         scale = np.array([*SCALE, *SCALE, 0.05, 0.05])
         x = np.clip(begin, least, most)
         for _ in range(ROUNDS):
-            # errors within MEMORY are about one
-            alike = max(MEMORY / self._logs[0].period, 1.0)
-            self._noise = max(
-                float(np.sqrt(alike * np.mean(self._errors(x) ** 2))), 1e-6
-            )
-            raised = np.concatenate([*map(_raised, self._parts(x)), x[-2:]])
-            begun = (
-                [x] if np.array_equal(raised, x) else [x, np.clip(raised, least, most)]
-            )
+            self._noise = self._noise_at(x)
+            begins = [x]
+            raised = np.concatenate([*map(_raised, self._of_sides(x)), x[-2:]])
+            if not np.array_equal(raised, x):
+                begins.append(np.clip(raised, least, most))
             search = partial(
                 least_squares,
                 self._rows,
@@ -210,56 +241,67 @@ class _Following:
                 x_scale=scale,
                 max_nfev=STEPS,
             )
-            x = min(map(search, begun), key=lambda ended: ended.cost).x
-        a, b = (
-            _ended(part, side)
-            for part, side in zip(self._parts(x), self._sides, strict=True)
+            x = min(map(search, begins), key=lambda result: result.cost).x
+        of_forth, of_back = self._of_sides(x)
+        return JointStart(
+            sides=(_ended(of_forth, forth), _ended(of_back, back)),
+            delay=float(x[-2]),
+            lag=float(x[-1]),
+            direction=self._direction,
         )
-        return JointStart((a, b), float(x[-2]), float(x[-1]), self._direction)
 
-    def _parts(self, x: Array) -> tuple[Array, Array]:
+    def _of_sides(self, x: Array) -> tuple[Array, Array]:
         """The numbers of both sides."""
         return x[: len(SCALE)], x[len(SCALE) : -2]
 
+    def _noise_at(self, x: Array) -> float:
+        """Standard deviation of an error that counts by itself [rad]."""
+        # errors within MEMORY are about one
+        alike = max(MEMORY / self._logs[0].period, 1.0)
+        square = alike * np.mean(self._errors(x) ** 2)
+        return max(float(np.sqrt(square)), 1e-6)
+
     def _rows(self, x: Array) -> Array:
-        unusual = [
-            _unusual(part, side.dead_band)
-            for part, side in zip(self._parts(x), self._sides, strict=True)
-        ]
-        return np.concatenate([self._errors(x) / self._noise, *unusual])
+        rows = [self._errors(x) / self._noise]
+        for numbers, side in zip(self._of_sides(x), self._sides, strict=True):
+            rows.append(_unusual(numbers, side.dead_band))
+        return np.concatenate(rows)
 
     def _errors(self, x: Array) -> Array:
         """What has changed of the errors within MEMORY [rad], but near the ends of the
         travel, shape (T,)."""
         errors = list[Array]()
         for log, used in zip(self._logs, self._used, strict=True):
-            command = log.command[:, self._joint]
-            side = (command < 0).astype(int)
-            speed = np.zeros(len(command))
-            for place, (part, sign) in enumerate(
-                zip(self._parts(x), (1.0, -1.0), strict=True)
-            ):
-                own = side == place
-                top = self._sides[place].speed
-                speed[own] = (
-                    sign
-                    * self._direction
-                    * top
-                    * _relative_speed(np.abs(command[own]), part)
-                )
-            late, lag = x[-2] / log.period, np.full(2, x[-1] / log.period)
-            start = float(log.start[self._joint])
-            angle = follow(speed * log.period, side, late, lag, start, FREE)
-            error = log.angle[:, self._joint] - angle
+            command = log.command[:, self._column]
+            is_back = command < 0
+            # in samples
+            delay = x[-2] / log.period
+            lag = np.full(2, x[-1] / log.period)
+            start = float(log.start[self._column])
+            way = self._speeds(x, command, is_back) * log.period
+            angle = follow(way, is_back.astype(int), delay, lag, start, FREE)
+            error = log.angle[:, self._column] - angle
             kept = np.exp(-log.period / MEMORY)
             change = np.where(used, np.diff(error, prepend=error[0]), 0.0)
-            errors.append(np.asarray(lfilter([1.0], [1.0, -kept], change), dtype=float))
+            remembered = lfilter([1.0], [1.0, -kept], change)
+            errors.append(np.asarray(remembered, dtype=float))
         return np.concatenate(errors)
+
+    def _speeds(self, x: Array, command: Array, is_back: Mask) -> Array:
+        """Return the speeds [rad/s] at commands [%], (T,), of which some are of the
+        negative side."""
+        forth, back = self._sides
+        of_forth, of_back = self._of_sides(x)
+        speed = np.zeros(len(command))
+        top = self._direction * forth.speed
+        speed[~is_back] = top * _relative_speed(command[~is_back], of_forth)
+        top = -self._direction * back.speed
+        speed[is_back] = top * _relative_speed(-command[is_back], of_back)
+        return speed
 
 
 def _begin(side: ValveStart) -> Array:
-    """Return the numbers of a side: dead band, logarithms of exponent, factors and
-    relative speed."""
+    """Return the numbers of a side."""
     factors = np.log(side.factors)
     return np.array([side.dead_band, np.log(side.exponent), *factors, 0.0])
 
@@ -275,14 +317,17 @@ def _raised(x: Array) -> Array:
     opens = float(at[np.argmax(opening > STILL * opening[-1])])
     if opens < x[0] + FLAT:
         return x
-    wanted = opening / opening[-1]
-    share = np.maximum(at - opens, 0.0) / (100.0 - opens)
-    heights = np.interp(KNOTS, share[at >= opens], wanted[at >= opens])
-    steps = np.diff([0.0, *heights, 1.0]) / np.diff(
-        [0.0, *np.power(KNOTS, EXPONENT), 1.0]
-    )
-    factors = np.log(np.clip(steps[:-1] / steps[-1], 0.01, 100.0))
-    return np.array([opens, np.log(EXPONENT), *factors, x[-1]])
+    # the same opening as parts of a curve that begins there
+    beyond = at >= opens
+    wanted = opening[beyond] / opening[-1]
+    share = (at[beyond] - opens) / (100.0 - opens)
+    heights = np.interp(KNOTS, share, wanted)
+    rises = np.diff([0.0, *heights, 1.0])
+    usual = np.diff([0.0, *np.power(KNOTS, EXPONENT), 1.0])
+    steepness = rises / usual
+    # the last part of a curve has the factor 1
+    factors = np.clip(steepness[:-1] / steepness[-1], 0.01, 100.0)
+    return np.array([opens, np.log(EXPONENT), *np.log(factors), x[-1]])
 
 
 def _ended(x: Array, before: ValveStart) -> ValveStart:
@@ -298,31 +343,31 @@ def _relative_speed(command: Array, x: Array) -> Array:
     """Speeds at commands [%], (n,), over that which numbers of a side relate to."""
     band, exponent, factors, full = _numbers(x)
     share = np.maximum(command - band, 0.0) / (100.0 - band)
-    return full * bent_opening(
-        share**exponent, factors, tuple(knot**exponent for knot in KNOTS)
-    )
+    knots = tuple(knot**exponent for knot in KNOTS)
+    return full * bent_opening(share**exponent, factors, knots)
 
 
 def _unusual(x: Array, dead: float) -> Array:
     """How far numbers of a side are from usual ones, in standard deviations."""
+    # the last part of a curve has the factor 1, whose logarithm is 0
     bends = np.diff([*x[2:-1], 0.0]) / UNLIKE
-    off = [
+    others = [
         (x[1] - np.log(EXPONENT)) / EXPONENT_SD,
         (x[0] - dead) / DEAD_SD,
         0.1 * x[-1],
     ]
-    return np.concatenate([bends, off])
+    return np.concatenate([bends, others])
 
 
 def _numbers(x: Array) -> tuple[float, float, tuple[float, ...], float]:
     """Dead band [%], exponent, factors of the curve, and speed at full command over the
     largest measured."""
-    values = x.tolist()
+    band, exponent, *factors, speed = x.tolist()
     return (
-        values[0],
-        float(np.exp(values[1])),
-        tuple(np.exp(values[2:-1]).tolist()),
-        float(np.exp(values[-1])),
+        band,
+        float(np.exp(exponent)),
+        tuple(np.exp(factors).tolist()),
+        float(np.exp(speed)),
     )
 
 
@@ -341,4 +386,6 @@ def _dead_band(side: SpeedCurve) -> float:
     first = float(side.command[moves][0])
     still = side.command[~moves]
     last = float(still[-1]) if len(still) else 0.0
-    return max(last, first - 5.0) if first - last > 10.0 else 0.5 * (first + last)
+    if first - last > 10.0:
+        return max(last, first - 5.0)
+    return 0.5 * (first + last)

@@ -90,9 +90,8 @@ def judge(
     for joint in settings.outputs:
         models = baselines.get(joint) or {NAMES[0]: Baseline(joint, ANYWHERE)}
         fitted_there = [p for p in fitted if p.log.drives(joint)]
-        verdicts.append(
-            _judged(settings, models, fitted_there, _tests(unseen, joint), joint)
-        )
+        tests = _tests(unseen, joint)
+        verdicts.append(_judged(settings, models, fitted_there, tests, joint))
     return tuple(verdicts)
 
 
@@ -127,10 +126,11 @@ def _judged(
     tolerance = _tolerance(settings, fitted, unseen, joint)
     fitted_errors = _errors(models, fitted, joint)
     unseen_errors = _errors(models, unseen, joint)
-    ahead = _ahead(models, unseen, joint)
-    compared: dict[str, tuple[Comparison, ...]] = {}
-    if ahead:
-        compared = {name: _compared(ahead[THE_FIT], ahead[name]) for name in models}
+    by_horizon = _by_horizon(models, unseen, joint)
+    compared = dict[str, tuple[Comparison, ...]]()
+    if by_horizon:
+        for name in models:
+            compared[name] = _compared(by_horizon[THE_FIT], by_horizon[name])
     compared_whole = _compared_whole(models, unseen, joint)
     outcomes = dict[str, Outcome]()
     for name, whole in compared_whole.items():
@@ -142,8 +142,8 @@ def _judged(
     if len(fitted) > 1:
         expected = _expected(banded, joint)
     horizons = dict[str, tuple[float | None, ...]]()
-    for name, rows in ahead.items():
-        horizons[name] = _rms_ahead(np.concatenate(rows))
+    for name, errors in by_horizon.items():
+        horizons[name] = _rms_by_horizon(np.concatenate(errors))
     return JointVerdict(
         joint=joint,
         name=settings.arm.name_of(joint),
@@ -213,24 +213,24 @@ def _samples(predictions: Sequence[Prediction]) -> list[int]:
     return [len(p.log.time) for p in predictions]
 
 
-def _ahead(
+def _by_horizon(
     models: Mapping[str, Baseline], unseen: Sequence[Prediction], joint: int
 ) -> dict[str, list[Array]]:
-    """Return errors of predicted changes, (N, HORIZONS) of each log, by model; empty
-    where no log has any.
+    """Return errors of predicted changes, (N, HORIZONS) of each log, by model: of THE_FIT
+    and of each simple one; empty where no log has any.
 
     A log that is shorter than the shortest horizon has no starts.
     """
     with_starts = [p for p in unseen if len(p.ahead)]
     if not with_starts:
         return {}
-    ahead = {THE_FIT: [p.ahead[..., p.joints.index(joint)] for p in with_starts]}
+    by_horizon = {THE_FIT: [p.ahead[..., p.joints.index(joint)] for p in with_starts]}
     for name, model in models.items():
-        ahead[name] = [_ahead_of(model, p.log) for p in with_starts]
-    return ahead
+        by_horizon[name] = [_simple_by_horizon(model, p.log) for p in with_starts]
+    return by_horizon
 
 
-def _ahead_of(model: Baseline, log: Log) -> Array:
+def _simple_by_horizon(model: Baseline, log: Log) -> Array:
     """Return a simple model's errors of predicted changes of a log, shape (N,
     HORIZONS)."""
     return errors_ahead(log, lambda part: model.errors([part]))
@@ -238,7 +238,7 @@ def _ahead_of(model: Baseline, log: Log) -> Array:
 
 def _compared(ours: Sequence[Array], theirs: Sequence[Array]) -> tuple[Comparison, ...]:
     """Compare the fit with a simple model at each of HORIZONS; errors are those of
-    `_ahead`."""
+    `_by_horizon`."""
     comparisons = list[Comparison]()
     for column in range(len(HORIZONS)):
         our_blocks = _blocks(ours, column)
@@ -251,8 +251,8 @@ def _blocks(errors: Sequence[Array], column: int) -> list[Array]:
     """Return the errors of all logs at one of HORIZONS, in blocks that are independent
     enough."""
     blocks = list[Array]()
-    for log in errors:
-        blocks += in_blocks(log[:, column], SETTLING)
+    for of_log in errors:
+        blocks += in_blocks(of_log[:, column], SETTLING)
     return blocks
 
 
@@ -275,13 +275,15 @@ def _outcome(compared: Sequence[Comparison] | None, whole: Comparison) -> Outcom
     without starts by whole logs."""
     if compared is None:
         return whole.outcome
-    outcomes = set[Outcome]()
+    judged = set[Outcome]()
     for seconds, comparison in zip(HORIZONS, compared, strict=True):
         if seconds in JUDGED:
-            outcomes.add(comparison.outcome)
-    for decided in (Outcome.BETTER, Outcome.WORSE):
-        if decided in outcomes:
-            return decided
+            judged.add(comparison.outcome)
+    # better at one time outweighs worse at another
+    if Outcome.BETTER in judged:
+        return Outcome.BETTER
+    if Outcome.WORSE in judged:
+        return Outcome.WORSE
     return Outcome.UNTOLD
 
 
@@ -295,16 +297,19 @@ def _verdict(
     """
     if _is_within(unseen.fit, tolerance):
         return Verdict.PREDICTS, None
-    not_ahead = [
-        name for name, outcome in outcomes.items() if outcome is not Outcome.BETTER
-    ]
-    if _misfits(fitted, tolerance) and (unseen.fit is None or not_ahead):
+    not_ahead = list[str]()
+    for name, outcome in outcomes.items():
+        if outcome is not Outcome.BETTER:
+            not_ahead.append(name)
+    # a fit that is ahead of all simple models on unseen logs is worth more than that
+    ahead_of_all = unseen.fit is not None and not not_ahead
+    if _misfits(fitted, tolerance) and not ahead_of_all:
         return Verdict.MISFIT, None
     if unseen.fit is None:
         return Verdict.UNTESTED, None
-    # of a fit that fits, and diverges elsewhere, that is the news, and no comparison
-    diverged_alone = fitted.fit is not None and not np.isfinite(unseen.fit)
-    if not diverged_alone:
+    # the news of a fit that fits, and diverges elsewhere, is that it diverges
+    diverged_unseen = fitted.fit is not None and not np.isfinite(unseen.fit)
+    if not diverged_unseen:
         for name in not_ahead:
             if outcomes[name] is Outcome.WORSE:
                 return Verdict.NO_BETTER, name
@@ -369,8 +374,8 @@ def standing_out(
         # a simulation that diverged errs most
         errors[np.isnan(errors)] = np.inf
         for i, test in enumerate(tests):
-            others = float(np.median(np.delete(errors, i)))
-            usual = max(others, verdict.tolerance_deg)
+            of_others = float(np.median(np.delete(errors, i)))
+            usual = max(of_others, verdict.tolerance_deg)
             if errors[i] > STANDING_OUT * usual:
                 names.append(test.log.source)
     if not names:
@@ -380,8 +385,8 @@ def standing_out(
 
 
 def behind(settings: FitSettings, verdicts: Sequence[JointVerdict]) -> list[Finding]:
-    """Return that a fit of the hydraulics errs more on its own logs than nine numbers
-    do, which it holds.
+    """Return a finding where a fit of the hydraulics errs more on its own logs than the
+    simple model of nine numbers, which it contains as a special case.
 
     The verdicts are those without unseen logs: their baselines are of the fitted ones.
     """
@@ -406,11 +411,12 @@ def rms_deg(errors: Iterable[Array]) -> float:
     return float(np.degrees(rms(np.concatenate([*errors]))))
 
 
-def _rms_ahead(errors: Array) -> tuple[float | None, ...]:
+def _rms_by_horizon(errors: Array) -> tuple[float | None, ...]:
     """Return the rms of errors of predicted changes [rad], shape (N, HORIZONS),
     over the starts [deg]."""
     there = ~np.isnan(errors)
+    # a horizon without starts divides by 0
     with np.errstate(all="ignore"):
         mean = np.sum(errors**2, axis=0, where=there) / there.sum(axis=0)
-    rms_ahead = np.degrees(np.sqrt(mean))
-    return tuple(map(finite, rms_ahead.tolist()))
+    by_horizon = np.degrees(np.sqrt(mean))
+    return tuple(map(finite, by_horizon.tolist()))

@@ -48,7 +48,7 @@ class Joints:
         return joint in self.rods or not column.is_length
 
 
-class JointColumns(NamedTuple):
+class Assignment(NamedTuple):
     """The column of a joint, or the two for the directions of its command, and what
     says that they are its."""
 
@@ -58,20 +58,20 @@ class JointColumns(NamedTuple):
 
 def by_joint(
     columns: Sequence[Column], joints: Joints, reasons: list[str]
-) -> dict[int, JointColumns]:
+) -> dict[int, Assignment]:
     """Give columns of one kind to the joints; add what is uncertain or left out to the
     reasons.
 
     Where no column says whose it is, they are given to the joints in order.
     """
-    assigned = dict[int, JointColumns]()
+    assigned = dict[int, Assignment]()
     groups = _groups(columns)
     from_zero = any(number_in(column.name) == 0 for column in columns)
     left = list[Sequence[Column]]()
     for group in groups:
         joint, reason = _joint_in(group[0].name, joints, from_zero=from_zero)
         if _may_have(joint, group, joints, assigned):
-            assigned[joint] = JointColumns(group, reason)
+            assigned[joint] = Assignment(group, reason)
         else:
             left.append(group)
     left = _without_lengths(left, joints, assigned, reasons, from_zero=from_zero)
@@ -118,7 +118,7 @@ def _may_have(
     joint: int,
     group: Sequence[Column],
     joints: Joints,
-    assigned: Mapping[int, JointColumns],
+    assigned: Mapping[int, Assignment],
 ) -> bool:
     """Return whether a joint exists, has no columns yet, and moves in the unit of
     these."""
@@ -130,7 +130,7 @@ def _may_have(
 def _given_in_order(
     groups: Sequence[Sequence[Column]],
     joints: Joints,
-    assigned: dict[int, JointColumns],
+    assigned: dict[int, Assignment],
 ) -> list[Sequence[Column]]:
     """Give each group to the first joint that may have it; return the others."""
     left = list[Sequence[Column]]()
@@ -138,7 +138,7 @@ def _given_in_order(
         for joint in range(1, len(joints.names) + 1):
             if _may_have(joint, group, joints, assigned):
                 reason = "by its place in the log: check it"
-                assigned[joint] = JointColumns(group, reason)
+                assigned[joint] = Assignment(group, reason)
                 break
         else:
             left.append(group)
@@ -148,7 +148,7 @@ def _given_in_order(
 def _without_lengths(
     left: Sequence[Sequence[Column]],
     joints: Joints,
-    assigned: Mapping[int, JointColumns],
+    assigned: Mapping[int, Assignment],
     reasons: list[str],
     *,
     from_zero: bool,
@@ -180,7 +180,7 @@ def _without_lengths(
 def _left_out(
     left: Sequence[Sequence[Column]],
     joints: Joints,
-    assigned: Mapping[int, JointColumns],
+    assigned: Mapping[int, Assignment],
 ) -> str:
     """Return the sentence about columns that no joint has."""
     names = list[str]()

@@ -97,7 +97,8 @@ def _within_range(signal: Signal, angle: Array) -> Array | None:
     there = angle[~np.isnan(angle)]
     if not len(there):
         return None
-    turns = np.rint((middle - 0.5 * (there.min() + there.max())) / TURN)
+    middle_now = 0.5 * (there.min() + there.max())
+    turns = np.rint((middle - middle_now) / TURN)
     moved = angle + TURN * turns
     is_inside = np.isnan(moved) | ((signal.low <= moved) & (moved <= signal.high))
     return moved if is_inside.all() else None

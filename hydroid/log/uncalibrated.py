@@ -53,11 +53,14 @@ def _by_turns(column: Column, limits: tuple[float, float] | None) -> Entry | Non
     turns = np.cumsum(np.sign(steps) * (np.abs(steps) > turn / 2))
     joined = finite - turn * np.concatenate([[0], turns])
     scale = 360 / turn
-    low, high = (-180.0, 180.0) if limits is None else np.degrees(limits).tolist()
-    # an encoder on a faster shaft turns more often than its joint
-    if limits is not None and scale * np.ptp(joined) > high - low:
-        return None
-    middle = (joined.min() + joined.max()) / 2, (low + high) / 2
+    middle_of_range = 0.0
+    if limits is not None:
+        low, high = np.degrees(limits).tolist()
+        # an encoder on a faster shaft turns more often than its joint
+        if scale * np.ptp(joined) > high - low:
+            return None
+        middle_of_range = (low + high) / 2
+    middle = ((joined.min() + joined.max()) / 2, middle_of_range)
     return Entry(
         _through(column, "deg", scale, middle),
         f"{column.name}: angle by {turn:g} counts a turn",

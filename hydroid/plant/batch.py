@@ -59,7 +59,7 @@ def _floats(address: int, count: int) -> Array:
     return carray(_pointer(address), (count,), np.float64)
 
 
-class Population(NamedTuple):
+class PlantRows(NamedTuple):
     """What n plants have, each with a row; `addresses` are those in MuJoCo, in the
     order of `_addresses`."""
 
@@ -94,7 +94,7 @@ def _roll_some(
     rows,
     shared: Handles,
     plugin: Plugin,
-    plants: Population,
+    plants: PlantRows,
     quasi_static: bool,
     source: int = SOURCE,
 ) -> None:
@@ -229,7 +229,7 @@ class PlantBatch:
         its reset."""
         angle = self._pose.copy()
         angle[:, self._columns] = self._angle[:, 0]
-        angle[self._population.failed] = np.nan
+        angle[self._plant_rows.failed] = np.nan
         return angle
 
     @property
@@ -237,14 +237,14 @@ class PlantBatch:
         """Angles of the K joints that take commands [rad], shape (n, K), a copy; NaN of
         a plant that diverged."""
         angle = self._angle[:, 0, self._driven]
-        if self._population.failed.any():
-            angle[self._population.failed] = np.nan
+        if self._plant_rows.failed.any():
+            angle[self._plant_rows.failed] = np.nan
         return angle
 
     @property
     def failed(self) -> Mask:
         """Plants that diverged, until their reset, shape (n,), a copy."""
-        return self._population.failed.copy()
+        return self._plant_rows.failed.copy()
 
     @property
     def time(self) -> Array:
@@ -278,7 +278,7 @@ class PlantBatch:
         """Return where the plant of a row stands; to `restore` it costs far less than a
         reset."""
         plant = self.plants[row]
-        population = self._population
+        stacked = self._plant_rows
         physics = np.empty(mujoco.mj_stateSize(plant.model, PHYSICS))
         mujoco.mj_getState(plant.model, plant.data, physics, PHYSICS)
         return RowState(
@@ -286,9 +286,9 @@ class PlantBatch:
             mass=plant.data.M.copy(),
             armature=plant.model.dof_armature.copy(),
             slack=plant.model.qpos_spring.copy(),
-            coefficients=population.coefficients[row].copy(),
-            joints=population.state[row].copy(),
-            commands=population.commands[row].copy(),
+            coefficients=stacked.coefficients[row].copy(),
+            joints=stacked.state[row].copy(),
+            commands=stacked.commands[row].copy(),
             balance=self._balance[row].copy(),
             pose=self._pose[row].copy(),
             angle=self._angle[row].copy(),
@@ -301,16 +301,16 @@ class PlantBatch:
         Its locked joints must stand where they stood then.
         """
         plant = self.plants[row]
-        population = self._population
+        stacked = self._plant_rows
         mujoco.mj_setState(plant.model, plant.data, state.physics, PHYSICS)
         plant.data.M[:] = state.mass
         plant.data.warning.number[:] = 0
         plant.model.dof_armature[:] = state.armature
         plant.model.qpos_spring[:] = state.slack
-        copy_records(state.coefficients, population.coefficients[row])
-        copy_records(state.joints, population.state[row])
-        population.commands[row] = state.commands
-        population.failed[row] = False
+        copy_records(state.coefficients, stacked.coefficients[row])
+        copy_records(state.joints, stacked.state[row])
+        stacked.commands[row] = state.commands
+        stacked.failed[row] = False
         self._balance[row] = state.balance
         self._pose[row] = state.pose
         self._angle[row] = state.angle
@@ -343,13 +343,13 @@ class PlantBatch:
         """
         moving = np.zeros((len(self), len(self._columns)))
         moving[:, self._driven] = command.clip(-100.0, 100.0)
-        commands = self._population.commands
-        steps = self._population.torque.shape[1]
+        commands = self._plant_rows.commands
+        steps = self._plant_rows.torque.shape[1]
         commands[:, :-steps] = commands[:, steps:]
         commands[:, -steps:] = moving[:, None, self._coupled]
         if self._pushed.size:
             torque = self._gain * moving + self._balance
-            self._population.torque[:] = torque[:, None, self._pushed]
+            self._plant_rows.torque[:] = torque[:, None, self._pushed]
         # what MuJoCo warns of is seen in `failed`
         with quiet_mujoco():
             # this thread takes a share too: to wake one costs as much as ten plants
@@ -376,7 +376,7 @@ class PlantBatch:
         self._pose = np.empty((n, len(first.names)))
         self._gain = np.empty((n, len(self._columns)))
         self._balance = np.empty((n, len(self._columns)))
-        self._population = Population(
+        self._plant_rows = PlantRows(
             addresses=np.empty((n, 10), np.int64),
             coefficients=np.zeros((n, joints), parts.plugin.coefficients.dtype),
             state=np.zeros((n, joints), parts.state.dtype),
@@ -394,7 +394,7 @@ class PlantBatch:
                 self._shares[k : k + 2].copy(),
                 parts.arm.handles,
                 parts.plugin,
-                self._population,
+                self._plant_rows,
                 _is_quasi_static(first.rung),
             )
             self._calls.append(call)
@@ -402,13 +402,13 @@ class PlantBatch:
     def _take(self, row: int) -> None:
         """Take over a plant that was reset."""
         plant = self.plants[row]
-        population = self._population
+        stacked = self._plant_rows
         parts = plant.parts
-        population.addresses[row] = _addresses(plant)
-        population.coefficients[row] = parts.plugin.coefficients
-        population.state[row] = parts.state
-        population.commands[row] = 0.0
-        population.failed[row] = False
+        stacked.addresses[row] = _addresses(plant)
+        stacked.coefficients[row] = parts.plugin.coefficients
+        stacked.state[row] = parts.state
+        stacked.commands[row] = 0.0
+        stacked.failed[row] = False
         self._gain[row] = parts.gain
         self._balance[row] = parts.balance
         self._pose[row] = plant.angle

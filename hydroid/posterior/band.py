@@ -18,7 +18,8 @@ from scipy.stats import t as student
 from hydroid.arrays import Array, record, rms
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
-from hydroid.posterior.error_model import ErrorModel, travelled
+from hydroid.posterior.course import travelled
+from hydroid.posterior.error_model import ErrorModel
 from hydroid.posterior.posterior import (
     COVERAGE,
     NORMAL,

@@ -19,7 +19,8 @@ from scipy.stats import chi2
 
 from hydroid.arrays import Array, record
 from hydroid.log import Log
-from hydroid.posterior.error_model import Course, ErrorModel
+from hydroid.posterior.course import Course
+from hydroid.posterior.error_model import ErrorModel
 from hydroid.posterior.posterior import NORMAL
 
 LONGEST = 5.0  # lag up to which innovations are compared [s]

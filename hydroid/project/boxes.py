@@ -136,7 +136,8 @@ def _link(name: str, size: float, length: float, *, cube: bool) -> str:
     middle = 0.0
     if not cube:
         middle = size / 2
-    along, across = mass * wide**2 / 6, mass * (wide**2 + size**2) / 12
+    along = mass * wide**2 / 6
+    across = mass * (wide**2 + size**2) / 12
     origin = f'<origin xyz="{middle:g} 0 0"/>'
     return (
         f'<link name="{name}"><inertial>{origin}<mass value="{mass:g}"/>'

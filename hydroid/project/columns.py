@@ -36,7 +36,9 @@ def column_lines(table: Table) -> tuple[str, ...]:
 
 def holds_numbers(table: Table) -> bool:
     """Return whether two columns or more hold numbers: a time and what was measured."""
-    return sum(_numbers(table, name) is not None for name in {*table.names} - {""}) > 1
+    named = {*table.names} - {""}
+    of_numbers = sum(_numbers(table, name) is not None for name in named)
+    return of_numbers >= 2
 
 
 def _described(table: Table, name: str) -> str:

@@ -57,7 +57,8 @@ def profile_section(
 ) -> Section | None:
     """Return the section of profiles as curves, a tab for each; None without any."""
     tabs = list[Plot]()
-    units = {one.name: one.unit for one in settings.parameter_set().parameters}
+    parameters = settings.parameter_set().parameters
+    units = {parameter.name: parameter.unit for parameter in parameters}
     for name, profile in profiles.items():
         unit = units[name]
         label = f"{name} [{unit}]" if unit else name

@@ -119,8 +119,10 @@ def _draw(axes: Axes, mark: Mark) -> None:
         case "bars":
             axes.barh(y, end - x, left=x, height=0.6, **look)
         case "cells":
-            _draw_cells(axes, x[end > 0], y[end > 0], end[end > 0], "blue")
-            _draw_cells(axes, x[end < 0], y[end < 0], -end[end < 0], "orange")
+            above = end > 0
+            _draw_cells(axes, x[above], y[above], end[above], "blue")
+            below = end < 0
+            _draw_cells(axes, x[below], y[below], -end[below], "orange")
 
 
 def _draw_cells(axes: Axes, x: Array, y: Array, strength: Array, color: str) -> None:

@@ -15,7 +15,8 @@ from hydroid.words import listed, two_digits
 
 SECONDS = 2.0  # of a step response
 SAMPLES = 400  # of a curve
-LOWEST, HIGHEST = 0.05, 20.0  # frequencies [Hz]
+LOWEST = 0.05  # frequency [Hz]
+HIGHEST = 20.0  # frequency [Hz]
 INSIDE = (2.5, 97.5)  # percentiles of the band
 
 _TEXT = (

@@ -170,7 +170,8 @@ def _heading(model: mujoco.MjModel, angles: Array) -> Array:
         is_hinge = model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE
         if not is_hinge or abs(data.xaxis[joint, 2]) < UPRIGHT:
             break
-        turned += np.sign(data.xaxis[joint, 2]) * (angles[:, joint] - angles[0, joint])
+        turn = angles[:, joint] - angles[0, joint]
+        turned += np.sign(data.xaxis[joint, 2]) * turn
         base = data.xanchor[joint]
     centres = data.xipos[1:]
     reach = centres[-1] - base
@@ -193,14 +194,18 @@ def _view(
 
     scale: of the picture [1/m]; 0: so that it is as large as it may be.
     """
-    # y points down
-    axes = np.stack([camera[:2] for camera in cameras]) * np.array([[1.0], [-1.0]])
+    right_and_up = np.stack([camera[:2] for camera in cameras])
+    # in a picture y points down
+    axes = right_and_up * np.array([[1.0], [-1.0]])
     product = "fij,afnj->afni" if len(cameras) > 1 else "gij,afnj->afni"
     in_picture = np.einsum(product, axes, placed)
     low = in_picture.min(axis=(0, 1, 2))
     high = in_picture.max(axis=(0, 1, 2))
-    scale = scale or (_SIZE - 2 * _MARGIN) / float(max(high - low))
-    width, height = (scale * (high - low) + 2 * _MARGIN).round().astype(int).tolist()
+    span = high - low
+    if not scale:
+        scale = (_SIZE - 2 * _MARGIN) / float(max(span))
+    size = scale * span + 2 * _MARGIN
+    width, height = size.round().astype(int).tolist()
     depths = list[float]()
     first = 0
     for outline in outlines:

@@ -25,7 +25,9 @@ class Shape:
 
 def placed(corners: Array, pose: Array) -> Array:
     """Return corners, shape (n, 3), turned and moved, (..., d, 4) -> (..., n, d)."""
-    return corners @ pose[..., :3].swapaxes(-1, -2) + pose[..., None, :, 3]
+    rotation = pose[..., :3].swapaxes(-1, -2)
+    position = pose[..., None, :, 3]
+    return corners @ rotation + position
 
 
 def shapes(model: mujoco.MjModel) -> list[Shape]:

@@ -16,10 +16,11 @@ from hydroid.parameters import ParameterSet
 from hydroid.quantity_table import TARGETS
 from hydroid.rungs import RUNGS, Rung, Stage, Stepping, rungs_of, stage_has
 from hydroid.settings.arm import Arm, load_arm
+from hydroid.settings.expansion import by_group, expanded, with_curves
 from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.load import ByJoint, Joints, Positive, Settings, load, validate
 from hydroid.settings.log import LogSettings, log_file
-from hydroid.settings.parameters import by_group, expanded, make_parameter, with_curves
+from hydroid.settings.parameters import make_parameter
 from hydroid.settings.problem import (
     ObjectiveSettings,
     ParameterSettings,
@@ -279,9 +280,10 @@ class FitSettings(Settings):
     def parameter_set(self) -> ParameterSet:
         """Return the parameters with units, bounds, priors and fixed values,
         in the order of theta."""
+        log_scale = self.scale == "log"
         parameters = [
             make_parameter(
-                name, settings, self.arm, self.hydraulics, log=self.scale == "log"
+                name, settings, self.arm, self.hydraulics, log_scale=log_scale
             )
             for name, settings in self.parameters.items()
         ]

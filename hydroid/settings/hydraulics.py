@@ -18,19 +18,25 @@ from hydroid.settings.load import Positive, Settings
 
 
 def _field(quantity: Quantity) -> Any:
-    optional = quantity.optional or quantity.default is None
-    meaning = (
-        f"{quantity.meaning} [{quantity.unit}]" if quantity.unit else quantity.meaning
-    )
+    """Return the type and the field of a quantity, as `create_model` takes them."""
+    meaning = quantity.meaning
+    if quantity.unit:
+        meaning = f"{meaning} [{quantity.unit}]"
     low, high = quantity.limits or (0.0, math.inf)
-    above, least = (low, None) if quantity.positive else (None, low)
-    field = Field(quantity.default, description=meaning, gt=above, ge=least, le=high)
-    return float | None if optional else float, field
+    field = Field(
+        quantity.default,
+        description=meaning,
+        gt=low if quantity.positive else None,
+        ge=None if quantity.positive else low,
+        le=high,
+    )
+    if quantity.optional or quantity.default is None:
+        return float | None, field
+    return float, field
 
 
-_Quantities: type[Any] = create_model(
-    "_Quantities", __base__=Settings, **{n: _field(q) for n, q in HYDRAULIC.items()}
-)
+_FIELDS = {name: _field(quantity) for name, quantity in HYDRAULIC.items()}
+_Quantities: type[Any] = create_model("_Quantities", __base__=Settings, **_FIELDS)
 
 
 class HydraulicSettings(_Quantities):
@@ -65,19 +71,21 @@ def actuator_values(
     Mechanical quantities are 0: only a fit states them. A joint without an actuator has
     the defaults, which nothing uses: it is never driven in stage 2.
     """
-    values: dict[str, Any] = {
-        name: q.default for name, q in QUANTITIES.items()
-    } | settings.model_dump()
+    values: dict[str, Any] = {}
+    for name, quantity in QUANTITIES.items():
+        values[name] = quantity.default
+    values |= settings.model_dump()
     if isinstance(actuator, LinearActuator):
-        one = actuator.settings
-        sides = actuator.triangle
-        values |= dict.fromkeys(TARGETS["opening"], one.max_opening)
+        cylinder = actuator.settings
+        pivots = actuator.triangle
+        values |= dict.fromkeys(TARGETS["opening"], cylinder.max_opening)
         values |= {
-            "area_a": one.area_a,
-            "area_b": one.area_b,
-            "pivot_angle": abs(sides.theta0),
+            "area_a": cylinder.area_a,
+            "area_b": cylinder.area_b,
+            "pivot_angle": abs(pivots.theta0),
+            "pivot_distance_1": pivots.a,
+            "pivot_distance_2": pivots.b,
         }
-        values |= {"pivot_distance_1": sides.a, "pivot_distance_2": sides.b}
     elif actuator is not None:
         values |= dict.fromkeys(TARGETS["opening"], actuator.max_opening)
         values |= dict.fromkeys(TARGETS["area"], actuator.displacement)

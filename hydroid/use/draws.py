@@ -232,7 +232,9 @@ def _move(point: Array, speed: Array, walls: Array, gaps: Array) -> None:
         if met < 0:
             return
         wall = walls[met]
-        speed -= 2.0 * np.sum(wall * speed) / np.sum(wall * wall) * wall
+        # it is thrown back: what is towards the wall changes its sign
+        along = np.sum(wall * speed) / np.sum(wall * wall)
+        speed -= 2.0 * along * wall
         left -= first
 
 
@@ -241,7 +243,7 @@ class DriftingAngles:
     sensors with noise.
 
     Args:
-        numbers: of each of J joints' error (`posterior.error_model.NUMBERS`) in rad and
+        numbers: of each of J joints' error (`posterior.error_filter.NUMBERS`) in rad and
             s, shape (J, 5); 0 of those without errors.
         n: machines.
         period: between steps [s].

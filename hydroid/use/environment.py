@@ -39,9 +39,11 @@ except ImportError:
 Floats = NDArray[np.float32]
 Options = Mapping[str, Any]
 
-POSES, LEAST_POSES = 256, 4
-"""random poses in which episodes begin, of all machines together, and at least of each:
-to be put into one that is ready takes a hundredth of a reset"""
+POSES = 256
+"""random poses in which episodes begin, of all machines together: to be put into one
+that is ready takes a hundredth of a reset"""
+LEAST_POSES = 4
+"""of these, each machine has as many at least"""
 ENDLESS = np.pi
 """end of the range of a joint that turns without end [rad]"""
 LARGEST = 10.0
@@ -86,7 +88,8 @@ class _Machines:
             plants.append(plant)
         self.batch = PlantBatch(plants, threads=threads)
         self._columns = np.array(self.joints) - 1
-        low, high = np.clip([arm.lower, arm.upper], -ENDLESS, ENDLESS)[:, self._columns]
+        ranges = np.clip([arm.lower, arm.upper], -ENDLESS, ENDLESS)
+        low, high = ranges[:, self._columns]
         self._middle = 0.5 * (low + high)
         self._half = 0.5 * (high - low)
         self._pose = arm.pose(settings.start_pose)
@@ -96,9 +99,11 @@ class _Machines:
         n = len(thetas)
         self._drift = DriftingAngles(numbers, n, self.period)
         self._ready: dict[tuple[int, int], RowState] = {}
-        poses = n, max(POSES // n, LEAST_POSES), len(self.joints)
-        reach = np.random.default_rng(0).uniform(-1.0, 1.0, poses)
-        self._starts = self._middle + (1.0 - 2.0 * MARGIN) * self._half * reach
+        shape = (n, max(POSES // n, LEAST_POSES), len(self.joints))
+        # always the same poses: an episode depends on its own seed alone
+        reach = np.random.default_rng(0).uniform(-1.0, 1.0, shape)
+        inner = (1.0 - 2.0 * MARGIN) * self._half
+        self._starts = self._middle + inner * reach
         self.target = np.tile(self._middle, (n, 1))
         self._angle = self.target.copy()
         self._true = self.target.copy()

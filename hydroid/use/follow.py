@@ -256,7 +256,9 @@ class _Tracker:
         plant.reset(path.angle[0])
         self._steady = plant.steady()
         angle = path.angle
-        self._pose = np.concatenate([0.5 * (angle[1:] + angle[:-1]), angle[-1:]])
+        # that of a command is in the middle of its step; after the last no step follows
+        middle = 0.5 * (angle[1:] + angle[:-1])
+        self._pose = np.concatenate([middle, angle[-1:]])
         self._speed = _rates(angle, path.period)
         self._load = self._steady.weighing.loads(self._pose)
         self._driven: Index = np.array(plant.joints) - 1
@@ -302,8 +304,8 @@ class _Tracker:
         """
         path = self._path
         angle = path.angle.copy()
-        _, had = self._steady.commands(self._speed, self._pose, self._load)
-        limited = np.any(np.abs(had - self._speed) > self._quiet(), axis=1)
+        _, possible = self._steady.commands(self._speed, self._pose, self._load)
+        limited = np.any(np.abs(possible - self._speed) > self._quiet(), axis=1)
         for k in range(len(angle) - 1):
             away = np.zeros(path.joints)
             away[joints] = (path.angle[k] - angle[k])[joints]
@@ -311,7 +313,8 @@ class _Tracker:
                 continue
             wish = self._speed[k] + away / CATCH_UP
             _, reached = self._steady.commands(wish[None], angle[k][None])
-            angle[k + 1, joints] = (angle[k] + path.period * reached[0])[joints]
+            after = angle[k] + path.period * reached[0]
+            angle[k + 1, joints] = after[joints]
         return angle
 
     def learn(self) -> tuple[Array, Array, int]:
@@ -372,18 +375,20 @@ class _Tracker:
         lags."""
         time = self._path.time
         period = self._path.period
-        ahead = np.zeros_like(wish)
+        last = len(time) - 1
+        early = np.zeros_like(wish)
         pose = self._pose.copy()
         load = self._load.copy()
         for joint in self._driven.tolist():
             lag = float(self._lags[joint])
-            ahead[:, joint] = np.interp(time + lag, time, wish[:, joint], right=0.0)
+            early[:, joint] = np.interp(time + lag, time, wish[:, joint], right=0.0)
             # the command acts when the joint is where it will be then
-            row = np.minimum(np.arange(len(time)) + round(lag / period), len(time) - 1)
-            pose[:, joint] = self._pose[row, joint]
-            load[:, joint] = self._load[row, joint]
-        ahead[np.abs(ahead) < self._quiet()] = 0.0
-        return self._steady.commands(ahead, pose, load)[0]
+            acts = np.arange(len(time)) + round(lag / period)
+            acts = np.minimum(acts, last)
+            pose[:, joint] = self._pose[acts, joint]
+            load[:, joint] = self._load[acts, joint]
+        early[np.abs(early) < self._quiet()] = 0.0
+        return self._steady.commands(early, pose, load)[0]
 
     def _simulate(self, command: Array) -> Array:
         angle = np.empty_like(command)

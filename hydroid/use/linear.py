@@ -275,8 +275,11 @@ def _slopes(plant: Plant, command: Array, columns: Index) -> tuple[Array, Array,
     commands = np.tile(command, (4 * count + 1, 1))
     poses = np.tile(plant.angle, (4 * count + 1, 1))
     for k, joint in enumerate(columns.tolist()):
-        commands[[4 * k, 4 * k + 1], joint] += [NEAR_COMMAND, -NEAR_COMMAND]
-        poses[[4 * k + 2, 4 * k + 3], joint] += [NEAR_ANGLE, -NEAR_ANGLE]
+        row = 4 * k
+        commands[row, joint] += NEAR_COMMAND
+        commands[row + 1, joint] -= NEAR_COMMAND
+        poses[row + 2, joint] += NEAR_ANGLE
+        poses[row + 3, joint] -= NEAR_ANGLE
     # at full command the slope is that from below
     commands = commands.clip(-100.0, 100.0)
     more = 4 * np.arange(count)

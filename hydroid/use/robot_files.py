@@ -94,7 +94,8 @@ def _owners(root: Element, names: Sequence[str]) -> dict[str, str]:
     base are of none."""
     parents = dict[str, str]()
     for joint in root.iter("joint"):
-        parent, child = joint.find("parent"), joint.find("child")
+        parent = joint.find("parent")
+        child = joint.find("child")
         if parent is not None and child is not None:
             parents[child.get("link", "")] = parent.get("link", "")
     owners = dict[str, str]()

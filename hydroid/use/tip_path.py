@@ -62,11 +62,13 @@ class TipKinematics:
     def place(self, angle: Array) -> Array:
         """Return where the tip is [m], shape (3,), at angles of all joints [rad], shape
         (J,)."""
-        data, tip = self._data, self.tip
+        data = self._data
+        tip = self.tip
         data.qpos[:] = angle
         mujoco.mj_kinematics(self._model, data)
         mujoco.mj_comPos(self._model, data)
-        return data.xpos[tip.body] + data.xmat[tip.body].reshape(3, 3) @ tip.at
+        turned = data.xmat[tip.body].reshape(3, 3)
+        return data.xpos[tip.body] + turned @ tip.at
 
     def angles(self, points: Array, start: Array) -> tuple[Array, Array]:
         """Return angles [rad], shape (T, J), and how far the tip stays off [m], shape
@@ -173,11 +175,13 @@ def tip_path(table: Table, logs: LogSettings, tip: TipKinematics, start: Array) 
     positions = COLUMNS if absolute else FROM_START
     since, values = _rows(table, logs, positions)
     period = logs.period_s
-    samples = int(np.floor((since[-1] - since[0]) / period + 1e-6)) + 1
+    times = since - since[0]
+    # a whole number of periods may be one less by rounding
+    samples = int(np.floor(times[-1] / period + 1e-6)) + 1
     at = np.arange(samples, dtype=float) * period
     points = np.empty((samples, 3))
     for axis in range(3):
-        points[:, axis] = np.interp(at, since - since[0], values[:, axis])
+        points[:, axis] = np.interp(at, times, values[:, axis])
     if not absolute:
         points += first
     angle, off = tip.angles(points, start)

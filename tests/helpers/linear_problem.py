@@ -10,8 +10,8 @@ from scipy.signal import lfilter
 
 from hydroid.log import Log
 from hydroid.parameters import Parameter, ParameterSet
+from hydroid.posterior.error_filter import SHORTEST
 from hydroid.posterior.error_model import (
-    SHORTEST,
     likelihood_at,
     make_error_model,
     make_likelihood,

@@ -5,13 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from hydroid.arrays import Array
-from hydroid.posterior.error_model import (
-    SHORTEST,
-    Course,
-    ErrorModel,
-    Signal,
-    travelled,
-)
+from hydroid.posterior.course import Course, travelled
+from hydroid.posterior.error_filter import SHORTEST
+from hydroid.posterior.error_model import ErrorModel, Signal
 
 SENSOR, RATE, WAY = 4e-6, 2e-6, 3e-5
 """variance of a sensor [rad²], growth of a drift's with time [rad²/s] and with the way

@@ -12,7 +12,8 @@ from recovery import bands_in, model_of, refined
 import hydroid
 from hydroid.log import Log
 from hydroid.posterior.band import error_variances
-from hydroid.posterior.error_model import SHORTEST, make_error_model
+from hydroid.posterior.error_filter import SHORTEST
+from hydroid.posterior.error_model import make_error_model
 from hydroid.problem.problem import Problem
 from hydroid.settings.search import RefinementSettings
 

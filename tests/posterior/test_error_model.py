@@ -21,15 +21,14 @@ from made_logs import HYDRAULIC, TRUTH, noisy, simulate_log, stepped
 from scipy.stats import multivariate_normal
 
 from hydroid import load_settings
+from hydroid.posterior.course import at_stops
+from hydroid.posterior.error_filter import SHORTEST, whitened
 from hydroid.posterior.error_model import (
     LEAST_NOISE,
     MEMORY,
-    SHORTEST,
-    at_stops,
     likelihood_at,
     make_error_model,
     make_likelihood,
-    whitened,
 )
 from hydroid.problem.problem import Problem
 

@@ -1,0 +1,169 @@
+"""What the column of a joint's angle holds: an angle, a position, the length of a
+cylinder, or counts of a sensor, and in which unit."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from hydroid.arrays import Limits
+from hydroid.files import Plain
+from hydroid.log.columns import Column, Entry
+from hydroid.log.joint_columns import Assignment, Joints
+from hydroid.log.rods import Rod
+from hydroid.log.uncalibrated import over_the_joint, over_the_range
+from hydroid.settings.log import LENGTHS
+from hydroid.units import UNITS
+
+LARGEST_ANGLE = np.radians(400.0)
+"""of an arm's joint [rad]; larger numbers are lengths or counts"""
+LARGEST_RADIANS = 6.3
+"""of a log's angles without a unit; larger numbers are degrees"""
+LARGEST_METRES = 50.0
+"""of a position without a unit, for no telescope is longer; larger numbers are mm"""
+COUNTS = "counts"
+"""in place of a unit of angles, where columns without one hold what a sensor gives"""
+
+
+def angle_entries(angles: Mapping[int, Assignment], arm: Joints) -> dict[int, Entry]:
+    """Return the settings of the columns of angles, and what they are taken for, by
+    joint."""
+    units = _usual_units(angles, arm)
+    entries = dict[int, Entry]()
+    for joint, ((column,), _) in angles.items():
+        entries[joint] = _angle(column, joint, units[joint], arm)
+    return entries
+
+
+def _usual_units(angles: Mapping[int, Assignment], arm: Joints) -> dict[int, str]:
+    """Return by joint in which unit its angle is if the column states none: COUNTS, or
+    the same for all."""
+    largest = list[float]()
+    for joint, ((column,), _) in angles.items():
+        if joint not in arm.slides and not column.unit and not column.is_raw:
+            largest.append(np.nanmax(np.abs(column.values)))
+    # degrees are what most loggers write
+    unit = "deg"
+    if max(largest, default=np.inf) <= LARGEST_RADIANS:
+        unit = "rad"
+    # a sensor's counts may be as small as angles, beside those of others
+    sensors_count = any(
+        column.is_of_a_sensor and _can_only_be_counts(column, joint, unit, arm)
+        for joint, ((column,), _) in angles.items()
+    )
+    units = dict[int, str]()
+    for joint, ((column,), _) in angles.items():
+        is_count = sensors_count and column.is_of_a_sensor
+        units[joint] = COUNTS if is_count else unit
+    return units
+
+
+def _angle(column: Column, joint: int, usual_unit: str, arm: Joints) -> Entry:
+    """Return the settings of the column of a joint's angle, and what it is taken
+    for.
+
+    `usual_unit`: of columns that state none.
+    """
+    slides = joint in arm.slides
+    rod = arm.rods.get(joint)
+    limits = arm.ranges.get(joint)
+    if slides and not column.is_raw:
+        return _position(column)
+    if rod is not None and not column.turns:
+        length = _cylinder_length(column, rod, usual_unit)
+        if length is not None:
+            return length
+    if column.is_raw or _looks_like_counts(column, limits, usual_unit):
+        return over_the_joint(column, limits, slides=slides)
+    unit = column.unit
+    hint = ""
+    if not unit:
+        unit = usual_unit if usual_unit != COUNTS else "deg"
+        hint = "its unit is stated nowhere"
+    return Entry(_scaled(column, unit), f"{column.name}: angle in {unit}", hint)
+
+
+def _can_only_be_counts(
+    column: Column, joint: int, angle_unit: str, arm: Joints
+) -> bool:
+    """Return whether the column of a joint's angle holds counts, by its size, and no
+    length of its cylinder."""
+    if joint in arm.slides or column.is_raw:
+        return False
+    rod = arm.rods.get(joint)
+    if rod and not column.turns and _cylinder_length(column, rod, angle_unit):
+        return False
+    return _looks_like_counts(column, arm.ranges.get(joint), angle_unit)
+
+
+def _looks_like_counts(column: Column, limits: Limits | None, angle_unit: str) -> bool:
+    """Return whether a column without a unit holds counts, by its size; a joint without
+    limits may turn far."""
+    if column.unit or _may_be_angles(column, angle_unit):
+        return False
+    return limits is not None or column.is_of_a_sensor
+
+
+def _scaled(column: Column, unit: str) -> Plain:
+    """Return the settings of a column whose cells, times its scale, are in a unit."""
+    settings: Plain = {"column": column.name, "unit": unit}
+    if column.scale != 1:
+        settings["scale"] = column.scale
+    return settings
+
+
+def _position(column: Column) -> Entry:
+    """Return the settings of the column of a joint that slides."""
+    unit = column.unit
+    if not unit:
+        largest = float(np.nanmax(np.abs(column.values)))
+        unit = "mm" if largest > LARGEST_METRES else "m"
+    return Entry(_scaled(column, unit), f"{column.name}: position in {unit}")
+
+
+def _may_be_angles(column: Column, unit: str) -> bool:
+    """Return whether all cells, in a unit, are angles that a joint can have."""
+    if unit == COUNTS:
+        return False
+    largest = np.nanmax(np.abs(column.values))
+    return bool(largest * UNITS[unit].factor <= LARGEST_ANGLE)
+
+
+def _may_be_length(column: Column, angle_unit: str) -> bool:
+    """Return whether a column may hold lengths of a cylinder, by its unit, name and
+    size."""
+    if column.is_raw or (column.unit and column.unit not in LENGTHS):
+        return False
+    if column.is_length:
+        return True
+    # a potentiometer's counts are in some stroke, too
+    return not (column.is_of_a_sensor or _may_be_angles(column, angle_unit))
+
+
+def _cylinder_length(column: Column, rod: Rod, angle_unit: str) -> Entry | None:
+    """Return the settings of a column that holds the length of a joint's cylinder;
+    None: it does not.
+
+    A column without a unit holds angles if its name does not say otherwise and they are
+    in a joint's reach.
+    """
+    if column.is_raw and column.is_length:
+        shortest, longest = rod.ends
+        ends = (1e3 * shortest, 1e3 * longest)
+        return over_the_range(column, ends, "mm", "stroke of the cylinder")
+    if not _may_be_length(column, angle_unit):
+        return None
+    reading = rod.reading(column.values, column.unit)
+    if reading is None and not column.is_length:
+        return None
+    if reading is None:
+        # lengths that its cylinder cannot have: who reads them says which
+        reading = (column.unit or rod.nearest_unit(column.values), 0.0)
+    unit, offset = reading
+    settings = _scaled(column, unit)
+    # without an offset the sensor measures from pin to pin
+    if not offset:
+        return Entry(settings, f"{column.name}: length of the cylinder in {unit}")
+    settings["offset"] = offset
+    retracted = f"whose cylinder is {offset:.6g} {unit} long with it in,"
+    meaning = f"{column.name}: travel of the rod in {unit}, {retracted}"
+    return Entry(settings, meaning)

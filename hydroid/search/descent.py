@@ -55,7 +55,7 @@ class Descent:
         jacobian: shape (R, p), or (0, p) where it is to be taken.
         fresh: whether the Jacobian is one of finite differences, not an updated one.
         cycle: cost, and number of evaluations, when the Jacobian was taken, shape (2,).
-        damping: λ. growth: factor of λ after the next step that fails.
+        damping: λ.
         slow: steps in a row with gains below the tolerance.
         evaluations: candidates simulated. iterations: steps that helped.
         ending: why it ended, or UNDER_WAY.
@@ -69,7 +69,6 @@ class Descent:
     fresh: bool = False
     cycle: Array | tuple[float, int] = (np.inf, 0)
     damping: float = DAMPING
-    growth: float = 2.0
     slow: int = 0
     evaluations: int = 1
     iterations: int = 0
@@ -96,9 +95,11 @@ class Descent:
 
     @classmethod
     def from_arrays(cls, arrays: dict[str, NDArray[Any]]) -> Self:
-        """Return the descent that `arrays` stored."""
+        """Return the descent that `arrays` stored; what a former version stored
+        besides is left out."""
         values: dict[str, Any] = {}
-        for name, array in arrays.items():
+        for name in (field.name for field in fields(cls)):
+            array = arrays[name]
             values[name] = array if array.ndim else array.item()
         values["ending"] = Ending[values["ending"]]
         return cls(**values)

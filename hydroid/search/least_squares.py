@@ -12,8 +12,12 @@ step s that minimises
 
     |r + J s|² + λ |D s|²
 
-inside the box, D the lengths of J's columns, with Nielsen's rule for the damping λ.
-What differs from a textbook:
+inside the box, D the lengths of J's columns. Where it helps, the damping λ falls by
+Nielsen's rule; where it does not, λ rises by the same factor each time. (Nielsen's
+factor doubles from one failure to the next. A step costs one simulation, a Jacobian
+many: a λ that is passed over may cost the optimum.)
+
+What else differs from a textbook:
 
 - A Jacobian of p simulations is expensive. After a step it is updated from that step
   (C. G. Broyden, 1965) as long as the updated one lowers the logarithm of the cost by
@@ -50,6 +54,8 @@ State = TypeVar("State", bound=Descent)
 
 UNDAMPED = 1e-14
 """λ of the step that tells what a Jacobian promises at most"""
+HARDER = 4.0
+"""factor of λ after a step that does not help"""
 PROBE = 0.1
 """part of a step after which the curvature along it is measured"""
 CURVED = 2.0
@@ -168,9 +174,7 @@ def _without_gain(
     """Take a new Jacobian, or a shorter step, after a step that does not help."""
     if not now.fresh:
         return replace(now, jacobian=no_jacobian(now.point))
-    # each failure in a row raises the damping more than the last one did
-    damping = now.damping * 2 * now.growth
-    after = replace(now, damping=damping, growth=2 * now.growth)
+    after = replace(now, damping=HARDER * now.damping)
     promised = model.gain(model.step(after.damping))
     if promised >= settings.gain_tolerance * now.cost:
         return after
@@ -228,7 +232,6 @@ def _moved(
         jacobian=no_jacobian(point),
         fresh=False,
         damping=max(now.damping * shrinking, UNDAMPED),
-        growth=2.0,
         slow=slow,
         iterations=now.iterations + 1,
         ending=ending,
@@ -239,4 +242,4 @@ def _no_step(now: State) -> State:
     """End where no step is left, or first take anew a Jacobian that was updated."""
     if now.fresh:
         return replace(now, ending=Ending.NO_IMPROVEMENT)
-    return replace(now, jacobian=no_jacobian(now.point), damping=DAMPING, growth=2.0)
+    return replace(now, jacobian=no_jacobian(now.point), damping=DAMPING)

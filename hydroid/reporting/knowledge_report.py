@@ -41,8 +41,10 @@ def unknown_section(settings: FitSettings, summary: FitSummary) -> Section:
     """
     shown = _others(summary)[:MOST_UNKNOWN]
     points = tuple(sentence(finding, settings) for finding in shown)
-    none = "" if points else "The logs determine every free parameter."
-    return Section("What is not known", none, points)
+    text = "The logs determine every free parameter."
+    if points:
+        text = "hydroid suggest lists the logs and measurements that would tell more."
+    return Section("What is not known", text, points)
 
 
 def further_findings(summary: FitSummary) -> tuple[str, ...]:

@@ -98,7 +98,8 @@ def moving_arm(
     moves = np.ptp(measured, axis=0) + np.abs(error).max(axis=0) > 1e-4  # [rad]
     roots = _roots(model, moves)
     parts = sorted(set(roots))
-    count = int(np.clip(RATE * np.ptp(log.time) + 1, 2, most))
+    # the largest error of each joint is one of them
+    count = int(np.clip(RATE * np.ptp(log.time) + 1, 2, most - len(compared)))
     evenly = np.linspace(0, len(log.time) - 1, count)
     largest = np.abs(error).argmax(axis=0)[compared]
     moments = np.unique([*evenly.round().astype(int), *largest])

@@ -142,8 +142,8 @@ def design(
     SAFETY: Keep a hand on the emergency stop during the first run. The limits
     (design.speed_deg_s, design.margin_deg, design.clearance_m) are checked only in
     simulation with the present estimate; the real arm may exceed them. Collisions are
-    checked between the parts of the model only. It knows neither hoses nor what stands
-    around the machine.
+    checked between the parts of the model only. The model knows neither hoses nor what
+    stands around the machine.
 
     Writes commands.csv (the experiment) and predicted.csv (the motion that is expected). The
     settings define the limits, the free parameters, and the joints to measure (outputs).

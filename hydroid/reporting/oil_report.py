@@ -19,8 +19,8 @@ _TEXT = (
     "in a log above to see them over time."
 )
 _NO_PUMP = (
-    " The model has no pump: it supplies the same pressure at any flow, and joints do not slow each "
-    "other down."
+    " The model has no pump: the supply has the same pressure at any flow, and no joint takes "
+    "another's."
 )
 _HEADER = (
     "joint",

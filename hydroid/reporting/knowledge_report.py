@@ -41,10 +41,8 @@ def unknown_section(settings: FitSettings, summary: FitSummary) -> Section:
     """
     shown = _others(summary)[:MOST_UNKNOWN]
     points = tuple(sentence(finding, settings) for finding in shown)
-    text = "The logs determine every free parameter."
-    if points:
-        text = "hydroid suggest lists the logs and measurements that would tell more."
-    return Section("What is not known", text, points)
+    none = "" if points else "The logs determine every free parameter."
+    return Section("What is not known", none, points)
 
 
 def further_findings(summary: FitSummary) -> tuple[str, ...]:

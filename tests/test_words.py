@@ -44,7 +44,7 @@ def test_a_subject_may_be_called_as_a_word_of_the_sentence(name: str):
     )
     assert (
         strained.what == f"{name} (2.9 above) and K are far from their priors "
-        "(in brackets: by how many standard deviations)."
+        "(numbers: standard deviations)."
     )
 
 

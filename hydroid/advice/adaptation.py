@@ -102,8 +102,8 @@ def _refuse_unknown(names: Sequence[str], settings: FitSettings) -> None:
     possible = [name for name, p in settings.parameters.items() if p.can_be_free]
     for name in names:
         if name not in possible:
-            what = f"no parameter {name!r} has bounds or a prior"
-            raise SettingsError(what, "--free", f"one of {', '.join(possible)}")
+            what = f"no parameter {name!r} that could be free"
+            raise SettingsError(what, "--free", f"choose from {', '.join(possible)}")
 
 
 def steps(

@@ -88,7 +88,7 @@ def analyse(
         logs (LOG): Logs of commands and joint angles [default: those of the run].
         fit (RUN|YAML): An estimate, as a run folder or a YAML file [default: the start
             values of the parameters].
-        config (YAML): Settings, where --fit is not the folder of a run: a run has its own.
+        config (YAML): Settings; not needed if --fit is a run folder, which has its own.
         profile (K,D): Parameters to profile. Each point of a profile costs a
             refinement, so this is slow.
 

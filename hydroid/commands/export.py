@@ -66,8 +66,8 @@ def export(
         robot (URDF): With --to urdf: your robot's URDF, whose masses are replaced.
         pose (NAME): The pose where the plant starts, by its name in the arm's file
             [default: the start pose of the settings].
-        at (JOINT=PCT,...): With --to linear: the commands about which the model is
-            linear, such as boom=30,arm=-40; joints that it does not name stand.
+        at (JOINT=PCT,...): With --to linear: the commands [%] near which the model
+            holds, such as boom=30,arm=-40. Joints without a command stand still.
 
     Raises:
         SettingsError: another kind, an option that is missing, or a fit of stage 1,

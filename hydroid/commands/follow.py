@@ -56,8 +56,8 @@ def follow(
     Args:
         trajectory (TRAJECTORY.csv): Joint angles over time, in the columns and units of
             the fit's logs. Or the tip's position over time: columns time_s, x_m, y_m and
-            z_m, or dx_m, dy_m and dz_m from where the tip starts. The tip is the site
-            that the arm's file names as payload, or else the end of the last link.
+            z_m, or dx_m, dy_m and dz_m from where the tip starts. The tip is the
+            `payload` site of the arm's file; without one, the end of the last link.
             Joints without a column, or without commands, stand still. They stand where
             the first log of the fit begins, or in the pose of --set start_pose=NAME.
         out (LOG.csv): The commands and the angles asked for, in the columns and units

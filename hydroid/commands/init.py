@@ -46,12 +46,13 @@ def init(
         arm (robot.urdf): URDF or MJCF of the arm, or an arm's YAML file [default: a
             template of boxes].
         log (LOG): A log; its columns are guessed. Repeat the option for several logs.
-            The next steps keep the last log for the validation.
+            Of several, the commands to run next fit all but the last, and validate on
+            the last.
         config (YAML): The fit.yaml of an earlier init, whose `log` section you have
             completed. Its columns and its arm stay; all other settings are written
             anew.
-        joints (NAME,NAME): The arm's joints, by name or number from 1, in the order of
-            the log's numbers (u1, u2, ...) [default: the order in the arm's file].
+        joints (NAME,NAME): The joints that u1, u2, ... of the log drive, by name or
+            number from 1 [default: the order in the arm's file].
         lengths (M,M): Lengths [m] of the links that these joints move. They take the
             place of --arm: hydroid makes an arm of boxes. Example: --joints
             swing,boom,arm,bucket --lengths 0,3.7,1.6,0.9. A joint that slews has 0.
@@ -59,8 +60,8 @@ def init(
             file are scaled to it.
         force: Replace the files of an earlier project in the folder.
         tip (LINK): Last link of the arm, if the robot has several branches [default:
-            the end of the branch whose joints the log names, or else of the longest
-            branch].
+            the end of the branch that the log's joints are on; if none is, the end of
+            the longest branch].
 
     Raises:
         SettingsError: a file of the project is there already, or no joint has one of

@@ -260,8 +260,8 @@ def run_logs(folder: Path) -> list[Path]:
     logs = [*dict.fromkeys(map(log_file, sources))]
     missing = [str(log) for log in logs if not log.exists()]  # a bag is a folder
     if missing or not logs:
-        what = f"its log {', '.join(missing)} is not there"
-        raise RunError(what, folder, "name the log")
+        what = f"the log of this run, {', '.join(missing)}, does not exist"
+        raise RunError(what, folder, "give the log's new place")
     return logs
 
 

@@ -58,9 +58,9 @@ def suggest(
 
     First it tests every parameter that the fit keeps fixed, switched off or shared,
     such as a delay or dry friction. It frees the most promising ones, and judges them
-    by the error on parts of the logs that are left out. Then it tests whether the logs
-    contradict the sign of an angle. Last it lists actions, from weighing a link to a new experiment,
-    and how much each would reduce the uncertainty.
+    by the error on parts of the logs that are left out. Then it tests whether an
+    angle of the logs has the wrong sign. Last it lists actions, from weighing a link to a
+    new experiment, and how much each would reduce the uncertainty.
 
     Example: hydroid suggest --fit runs/hyd
 
@@ -69,7 +69,7 @@ def suggest(
 
     Args:
         logs (LOG): Logs of commands and joint angles [default: those of the run].
-        config (YAML): Settings, where --fit is not the folder of a run: a run has its own.
+        config (YAML): Settings; not needed if --fit is a run folder, which has its own.
 
     Raises:
         LogError: a log cannot be used.
@@ -142,12 +142,11 @@ def design(
     SAFETY: Keep a hand on the emergency stop during the first run. The limits
     (design.speed_deg_s, design.margin_deg, design.clearance_m) are checked only in
     simulation with the present estimate; the real arm may exceed them. Collisions are
-    checked with the shapes of the model, which has no hoses, and nothing that stands
-    around the machine.
+    checked between the parts of the model only. The model knows neither hoses nor what
+    stands around the machine.
 
     Writes commands.csv (the experiment) and predicted.csv (the motion that is expected). The
-    settings define the limits, the free parameters, and the joints whose angles are
-    compared (outputs).
+    settings define the limits, the free parameters, and the joints to measure (outputs).
 
     Example: hydroid design LOG.csv --fit runs/mech --duration 30
 
@@ -155,7 +154,7 @@ def design(
 
     Args:
         logs (LOG): Logs that you already have. The experiment is designed to add to them.
-        config (YAML): Settings, where --fit is not the folder of a run: a run has its own.
+        config (YAML): Settings; not needed if --fit is a run folder, which has its own.
         duration (S): Length of the experiment [s].
         joints (2,3): Joints to drive, by number or name [default: those of
             outputs].

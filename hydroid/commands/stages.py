@@ -120,7 +120,7 @@ def fit_hyd(
     Args:
         out (DIR): Run folder [default: runs/fit-hyd; in Python nothing is written].
         mech (RUN|YAML): Stage 1: its run folder, or a YAML file of its values [default:
-            the masses of the arm's file, or free ones with priors].
+            the masses of the arm's file, unless the settings free them].
 
     Raises:
         HydroidError: an input or a folder that cannot be used.
@@ -346,9 +346,9 @@ def adapt(
     Use it after a change of the machine: a slower engine, a colder day, another tool.
     For a load of known mass, set the payload of the logs instead: --set
     'payloads={LOADED.csv: 250}'. For a load that nobody has
-    weighed, free tip_load. hydroid predicts parts of the logs that it leaves out, and
-    keeps a parameter free only if their error falls. The result is a run that every
-    command takes.
+    weighed, free tip_load. To judge a parameter, hydroid leaves parts of the logs out of
+    the fit and predicts them. The parameter stays free only if that lowers their error.
+    The result is a run that every command takes.
 
     Example: hydroid adapt LOADED.csv --fit runs/hyd --free P_flow
 
@@ -358,8 +358,8 @@ def adapt(
     Args:
         logs (LOG): The new logs.
         free (NAME,NAME): Parameters to free [default: hydroid tries masses, pump,
-            effects of the groups of logs, and tip_load in turn, and keeps those that
-            lower the error on every part left out].
+            effects of the groups of logs, and tip_load, one after the other, and keeps
+            those that help].
         out (DIR): Run folder [default: runs/adapt; in Python nothing is written].
         set (KEY=VALUE): Replace a setting of the fit, such as
             refinement.iterations=100.

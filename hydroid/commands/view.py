@@ -68,7 +68,7 @@ def simulate(
         log = hydroid.simulate("commands.csv", fit="runs/a", out="predicted.csv").log
 
     Args:
-        config (YAML): Settings, where --fit is not the folder of a run: a run has its own.
+        config (YAML): Settings; not needed if --fit is a run folder, which has its own.
         commands (COMMANDS.csv): A log of commands. Its angles before the first command
             give the start pose.
         out (LOG.csv): The log to write [default: runs/simulated.csv; in Python nothing
@@ -140,8 +140,8 @@ def view(
             --fit.
         out (FILE): Write a film (.mp4, .gif), or a picture (.png) of its first moment,
             instead of opening a window.
-        fit (RUN|YAML): An estimate, as a run folder or a YAML file [default: the arm's
-            file and `hydraulics` in the settings].
+        fit (RUN|YAML): An estimate, as a run folder or a YAML file [default: the values
+            in the arm's file and under `hydraulics` in the settings].
         span (FROM:TO): Part of the log to film [s], such as 10:20 [default: all].
         collisions: Show nothing. Find instead where parts of the arm touch each other,
             the base or the floor at the joint angles of the log. With --arm the carrier
@@ -269,5 +269,5 @@ def _span(text: str) -> Limits:
         return float(begin or 0.0), float(end or "inf")
     except ValueError:
         raise SettingsError(
-            f"{text!r} is no span", "--span", "write FROM:TO in seconds"
+            f"{text!r} is not a span", "--span", "write FROM:TO in seconds"
         ) from None

@@ -293,8 +293,8 @@ def _refuse_rest(
     if travels:
         what = f"{listed([names[joint - 1] for joint in travels])} driven, but nothing moves"
     hint = (
-        "give a log in which it is; or write the project without --log, correct `log` in its "
-        "fit.yaml, and go on with --config"
+        "give a log in which a joint moves; or, if its columns were guessed wrongly, write the "
+        "project without --log, name them in `log` of its fit.yaml, and repeat init with --config"
     )
     raise LogError(f"no joint is driven and moves: {what}", table.source, hint)
 

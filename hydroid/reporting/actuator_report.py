@@ -19,7 +19,7 @@ from hydroid.reporting.actuator_tables import (
 )
 from hydroid.reporting.chart import Chart, Color, Mark, Panel
 from hydroid.reporting.page import Cell, Plot, Section, Table
-from hydroid.reporting.parameters_report import SIDES, direction_word
+from hydroid.reporting.parameters_report import SIDES, direction_word, first_joint
 from hydroid.settings.fit import FitSettings
 from hydroid.words import listed, two_digits
 
@@ -30,6 +30,8 @@ STILL = 20.0
 """by how much a command that stands still may change [%]: a joystick never rests"""
 AT_END = 0.02
 """part of a joint's travel in the logs within which it may stand at a stop"""
+DEAD_BANDS = ("dead_band", "dead_band_a", "dead_band_b")
+"""quantities"""
 TOWARDS: dict[str, Color] = {"positive": "blue", "negative": "orange"}
 """endings of curves, as `posterior.quantities` names directions, and their colours"""
 
@@ -64,6 +66,7 @@ def speed_section(
     """
     tabs = list[Plot]()
     fastest = list[str]()
+    shut = list[str]()
     cards = dict[str, Table]()
     opens = False
     for joint in settings.outputs:
@@ -81,6 +84,8 @@ def speed_section(
         caption = f"{name}: {speed.label}"
         tabs.append(Plot(f"speed_{len(tabs) + 1}", caption, draw, button=name))
         fastest.append(f"{name} {_fastest(speed, commands)}")
+        if band := _dead_band(settings, summary, joint):
+            shut.append(f"{name} {band}")
         cards[f"speed_{name}"] = speed_table(name, speed, opening, cloud)
     if not tabs:
         return None
@@ -91,9 +96,22 @@ def speed_section(
         text = _SPEED
     text += _TABLE
     answer = f"fastest: {listed(fastest)}"
+    if shut:
+        answer = f"dead band: {listed(shut)}; {answer}"
     return Section(
         title, text, tabs=tuple(tabs), cards=cards, folded=True, answer=answer
     )
+
+
+def _dead_band(settings: FitSettings, summary: FitSummary, joint: int) -> str:
+    """Write the dead bands that a joint has for itself, narrower first [%]; nothing
+    without one."""
+    values = set[float]()
+    for name, parameter in settings.parameters.items():
+        if first_joint(settings, name) == joint and parameter.quantity in DEAD_BANDS:
+            values.add(summary.estimate[name].value)
+    words = list(dict.fromkeys(map(two_digits, sorted(values))))
+    return f"{listed(words)} %" if words else ""
 
 
 def _fastest(speed: CurveEstimate, commands: Array) -> str:
@@ -103,7 +121,7 @@ def _fastest(speed: CurveEstimate, commands: Array) -> str:
     at = speed.at[top]
     logged = commands.max(initial=0.0) if at > 0 else commands.min(initial=0.0)
     if abs(at) > abs(logged) + 1.0:
-        said += f" (beyond the logs' {logged:+.0f} %)"
+        said += f" (at {abs(at):.0f} %; the logs reach {abs(logged):.0f} %)"
     return said
 
 

@@ -101,6 +101,9 @@
     Object.assign(axis, { major_label_text_font_size: `${size}px`, major_label_orientation: orientation, major_label_policy: new Bokeh.AllLabels(), major_tick_line_color: null });
   }
 
+  const decades = Array.from({ length: 17 }, (_, i) => i - 8);
+  const logTicks = () => new Bokeh.FixedTicker({ ticks: decades.flatMap((k) => [1, 2, 5].map((m) => Number(`${m}e${k}`))) });
+
   function addPanel(panel, shared, shown, width) {
     const xs = extent(panel, "x", shown), ys = panel.y_limits ?? extent(panel, "y", shown);
     const x_range = shared ?? new Bokeh.Range1d({ start: xs[0], end: xs[1] });
@@ -115,7 +118,11 @@
     if (width < 480) for (const axis of figure.xaxes) axis.ticker.desired_num_ticks = 4;
     for (const [axis, log] of [[figure.xaxes[0], panel.log_x], [figure.yaxes[0], panel.log_y]])
       if (log) {
-        axis.ticker.mantissas = [1, 2, 5]; // else less than two decades have one tick or two
+        // else the largest decade has all ticks, and the others have none
+        axis.ticker = logTicks();
+        const across = axis === figure.xaxes[0] ? 0 : 1;
+        figure.center.filter((one) => one.dimension === across).forEach((grid) => { grid.ticker = axis.ticker; });
+        axis.major_label_policy = new Bokeh.NoOverlap({ min_distance: 4 });
         axis.formatter = new Bokeh.BasicTickFormatter(); // 0.1, not a power of ten
       }
     axisLook(figure);

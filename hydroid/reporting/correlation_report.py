@@ -27,6 +27,8 @@ ROW = 18
 """height of a row [px]"""
 LARGEST = 760
 """height of all rows together, at most [px]"""
+LETTER = 7
+"""length of a letter of the columns' names, which stand upright below the rows [px]"""
 
 _TEXT = (
     "Where two parameters are correlated, one can make up for the other: the logs determine "
@@ -118,7 +120,8 @@ def correlation_map(matrix: Array, names: tuple[str, ...]) -> Chart:
     rows, columns = np.nonzero(np.tril(np.abs(matrix) >= FAINT))
     values = np.clip(matrix[rows, columns], -1.0, 1.0)
     cells = Mark("cells", columns.astype(float), rows.astype(float), values)
-    height = 120 + min(ROW * len(names), LARGEST)
+    below = 30 + LETTER * max(map(len, names))
+    height = below + min(ROW * len(names), LARGEST)
     return Chart((Panel("", "", (cells,), height=height, rows=names, columns=names),))
 
 

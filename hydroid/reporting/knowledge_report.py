@@ -1,6 +1,7 @@
 """What a fit knows of the machine, what it does not know, and how sure a prediction can
 be."""
 
+import re
 from collections.abc import Sequence
 from typing import Any
 
@@ -15,8 +16,10 @@ from hydroid.words import interval_words, listed, three_digits, two_digits
 BEST_WITHIN = 0.3
 """half of a 95 % interval, relative to the value, up to which a property counts as
 known"""
-MOST_KNOWN = 4
+MOST_KNOWN = 5
 """quantities of a joint that a page shows"""
+VARIANT = re.compile(r"_(positive|negative|\d+)(?=_|$)")
+"""direction and command in the name of a quantity: without them it is its kind's"""
 MOST_UNKNOWN = 6
 MOST_WARNINGS = 3
 INSIDE = "unseen samples inside the 95 % bands [%]"
@@ -54,17 +57,24 @@ def _others(summary: FitSummary) -> list[Finding]:
 
 
 def quantity_section(settings: FitSettings, summary: FitSummary) -> Section | None:
-    """Return the section with a card of the best known quantities of each joint.
+    """Return the section with a card of the best known quantity of each kind for each
+    joint.
 
     None without any.
     """
     cards = dict[str, Table]()
     for joint in settings.outputs:
-        of_joint = [q for q in summary.quantities.values() if q.joint == joint]
-        certain = [quantity for quantity in of_joint if quantity.within <= BEST_WITHIN]
-        certain.sort(key=lambda quantity: quantity.within)
+        of_joint = [
+            (VARIANT.sub("", name), quantity)
+            for name, quantity in summary.quantities.items()
+            if quantity.joint == joint and quantity.within <= BEST_WITHIN
+        ]
+        of_joint.sort(key=lambda pair: pair[1].within)
+        best = dict[str, QuantityEstimate]()
+        for kind, quantity in of_joint:
+            best.setdefault(kind, quantity)
         rows = list[tuple[Cell, ...]]()
-        for quantity in certain[:MOST_KNOWN]:
+        for quantity in [*best.values()][:MOST_KNOWN]:
             value = three_digits(quantity.value)
             rows.append((quantity.label, value, quantity.unit, _within(quantity)))
         name = settings.arm.name_of(joint)
@@ -72,7 +82,7 @@ def quantity_section(settings: FitSettings, summary: FitSummary) -> Section | No
             header = ("quantity", "value", "unit", "interval")
             cards[f"known_{name}"] = Table(name, header, tuple(rows))
     text = (
-        "The best known quantities of each joint, with 95 % intervals. Intervals are right "
+        "The best known quantity of each kind, with a 95 % interval. Intervals are right "
         "only if the model is right. All quantities are listed further down."
     )
     return Section("What is known", text, cards=cards) if cards else None

@@ -68,7 +68,7 @@ class MovingArm:
         errors: measured minus simulated angle by the joint's name [°], of one that
             slides [mm], shape (F,).
         units: of the errors, by name.
-        start: number of the moment with the largest error.
+        start: number of the moment at which both arms are farthest apart.
     """
 
     shapes: list[Shape]
@@ -98,9 +98,11 @@ def moving_arm(
     moves = np.ptp(measured, axis=0) + np.abs(error).max(axis=0) > 1e-4  # [rad]
     roots = _roots(model, moves)
     parts = sorted(set(roots))
-    count = int(np.clip(RATE * np.ptp(log.time) + 1, 2, most))
+    # the largest error of each joint is one of them
+    count = int(np.clip(RATE * np.ptp(log.time) + 1, 2, most - len(compared)))
     evenly = np.linspace(0, len(log.time) - 1, count)
-    moments = np.unique(evenly.round().astype(int))
+    largest = np.abs(error).argmax(axis=0)[compared]
+    moments = np.unique([*evenly.round().astype(int), *largest])
     measured_poses = body_poses(model, measured[moments])
     simulated_poses = body_poses(model, simulated[moments])
     outlines = _rigid_parts(model, simulated_poses[0], roots, parts)
@@ -118,8 +120,12 @@ def moving_arm(
 
     by_part = {"measured": _by_part(poses[0]), "simulated": _by_part(poses[1])}
     errors, units = _errors(model, names, compared, error[moments])
-    worst = int(np.abs([*errors.values()]).max(axis=0).argmax())
-    return MovingArm(outlines, log.time[moments], by_part, views, errors, units, worst)
+    # in metres: angles and lengths cannot be compared
+    apart = np.linalg.norm(placed[0] - placed[1], axis=-1).max(axis=1)
+    farthest = int(apart.argmax())
+    return MovingArm(
+        outlines, log.time[moments], by_part, views, errors, units, farthest
+    )
 
 
 def _by_part(poses: Array) -> list[Array]:

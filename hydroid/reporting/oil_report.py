@@ -18,6 +18,10 @@ _TEXT = (
     "The largest values in all logs of this page, as the model simulates them. Choose a joint "
     "in a log above to see them over time."
 )
+_NO_PUMP = (
+    " The model has no pump: the supply has the same pressure at any flow, and no joint takes "
+    "another's."
+)
 _HEADER = (
     "joint",
     "pressure in A up to [bar]",
@@ -48,13 +52,16 @@ def oil_section(arm: Arm, predictions: Sequence[Prediction]) -> Section | None:
     if not rows:
         return None
     tables = {"oil": Table("", _HEADER, tuple(rows))}
-    answer = f"flow in up to: {listed([f'{row[0]} {row[3]} L/min' for row in rows])}"
+    text = _TEXT + _NO_PUMP
+    flows = listed([f"{row[0]} {row[3]} L/min" for row in rows])
+    answer = f"flow in up to: {flows}; no pump"
     if pump := _pump_row(usable):
+        text = _TEXT
         tables["pump"] = Table("", _PUMP_HEADER, (pump,))
         _, high, low, log, time = pump
         answer = f"the pump's line falls from {high} to {low} bar ({log}, {time} s)"
     return Section(
-        "Pressures and flows", _TEXT, tables=tables, folded=True, answer=answer
+        "Pressures and flows", text, tables=tables, folded=True, answer=answer
     )
 
 

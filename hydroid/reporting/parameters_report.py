@@ -302,9 +302,10 @@ def prior_chart(settings: FitSettings, summary: FitSummary) -> Chart:
             scores[name] = _score(estimate, parameter.prior)
     panels = list[Panel]()
     if scores:
-        ends = np.array([-1.96, 1.96])
+        rows = np.arange(float(len(scores)))
+        low = np.full(len(scores), -1.96)
         look: Plain = {"color": "pale", "label": "prior, 95 %", "alpha": 0.6}
-        prior = Mark("spans", ends[:1], end=ends[1:], **look)
+        prior = Mark("bars", low, rows, -low, **look)
         x = "standard deviations from the prior's value"
         panels.append(_bars("Beside their priors", x, scores, prior))
     if positions:

@@ -23,14 +23,15 @@ _TEXT = (
     "The test takes the innovations: the part of each sample that earlier samples do not "
     "predict. If the model is right, they are correlated neither with themselves nor with the "
     "command, and 95 % of the correlations lie in the grey band. With many samples the band "
-    f"is narrow: a correlation of {FAINT:g} or less does not matter."
+    f"is narrow: a correlation of {FAINT:g} or less does not matter. Table: the largest "
+    "correlations, and the share of them outside the band."
 )
 _HEADER = (
     "joint",
-    "autocorrelation: largest value",
-    "correlation with the command: largest value",
-    "autocorrelation: outside the band [%]",
-    "correlation with the command: outside the band [%]",
+    "autocorrelation up to",
+    "with the command up to",
+    "autocorrelation outside [%]",
+    "with the command outside [%]",
 )
 
 

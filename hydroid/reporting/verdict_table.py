@@ -35,10 +35,10 @@ _FITTED = (
 _TESTED = (
     "Rms errors{unit} on {count} unseen log{s}, which the fit did not use: after predicting 1, "
     "5 and 10 s ahead, and over whole logs. In brackets: the error of the best simple "
-    "model. Better, worse: than that model. Cannot be told: these logs cannot tell which of "
-    "the two errs less, as the difference may be chance; more logs can."
+    "model. Better, worse: than that model. Cannot be told: the difference may be chance; "
+    "more logs would show which model errs less."
 )
-_NO_WORD = f" Whole logs: without a word, as it takes {LEAST_BLOCKS} to compare."
+_NO_WORD = f" Whole logs are compared from {LEAST_BLOCKS} logs on."
 WHOLE = "whole logs"
 """name of a column"""
 FITTED = "whole fitted logs"

@@ -133,7 +133,7 @@ class ParameterSettings(Settings):
             raise ValueError("a mass must be above 0 kg")
         if lowest < least:
             limit = f"below {least:g}" if least else "negative"
-            raise ValueError(f"a {self.quantity} cannot be {limit}")
+            raise ValueError(f"{self.quantity} cannot be {limit}")
 
     @property
     def unit(self) -> str:

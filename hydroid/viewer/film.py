@@ -82,8 +82,9 @@ def render_motion(
     begin = max(span[0], 0.0)
     end = min(span[1], motion.time[-1])
     if not begin < end:
-        what = f"{span[0]:g}:{span[1]:g} s holds nothing of a motion of {motion.time[-1]:g} s"
-        raise SettingsError(what, "--span", "write FROM:TO in seconds")
+        what = f"{span[0]:g}:{span[1]:g} s is empty"
+        hint = f"write FROM:TO in seconds; the motion ends at {motion.time[-1]:g} s"
+        raise SettingsError(what, "--span", hint)
     size, rate = KINDS[kind]
     count = max(1, int(np.ceil((end - begin) * rate - 1e-9)))
     error = ""

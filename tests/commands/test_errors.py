@@ -110,7 +110,7 @@ WRONG = [
     ),
     ("view --collisions", "settings", "needs a log"),
     ("view {log} -o a.avi", "settings", "is no film or picture"),
-    ("view {log} -o a.mp4 --span now", "settings", "'now' is no span"),
+    ("view {log} -o a.mp4 --span now", "settings", "'now' is not a span"),
     ("view . -o a.mp4", "log", "cannot be read"),
     ("convert {log} --out {log}", "settings", "would overwrite the log"),
     ("init mine --arm none.urdf", "settings", "no such file"),

@@ -70,8 +70,8 @@ def test_speeds_have_a_tab_for_each_joint_with_what_was_measured():
     assert [tab.button for tab in section.tabs] == ["shoulder", "elbow"]
     logged = PROBLEM.logs[0].command.min(axis=0)
     assert section.answer == (
-        f"fastest: shoulder 24 deg/s (beyond the logs' {logged[1]:+.0f} %) "
-        f"and elbow 24 deg/s (beyond the logs' {logged[2]:+.0f} %)"
+        f"fastest: shoulder 24 deg/s (at 100 %; the logs reach {abs(logged[1]):.0f} %) "
+        f"and elbow 24 deg/s (at 100 %; the logs reach {abs(logged[2]):.0f} %)"
     )
     chart = section.tabs[0].make()
     labels = {mark.label for panel in chart.panels for mark in panel.marks}
@@ -158,10 +158,11 @@ def test_a_prior_and_what_the_logs_made_of_it_are_in_its_standard_deviations():
     chart = prior_chart(settings, SUMMARY.changed({"estimate": estimate}))
     beside = chart.panels[0]
     assert beside.rows == ("K", "D")
-    bars = next(mark for mark in beside.marks if mark.kind == "bars")
+    prior, bars = (mark for mark in beside.marks if mark.kind == "bars")
     points = next(mark for mark in beside.marks if mark.kind == "points")
     # the factor 3 is 1.96 standard deviations
     assert points.x == pytest.approx([1.0, 1.96], rel=1e-2)
+    assert prior.x == pytest.approx([-1.96, -1.96])
     assert bars.x == pytest.approx([0.6, 0.0], abs=1e-6)
     # without an end, as far as is drawn
     assert bars.end == pytest.approx([5.0, 1.96], rel=1e-2)

@@ -111,7 +111,7 @@ def test_all_of_the_arm_stays_in_the_picture(model):
 
 def test_a_long_log_has_few_moments_and_begins_at_the_largest_difference(model):
     arm = moved(model, most=20)
-    assert len(arm.time) == 20
+    assert 18 <= len(arm.time) <= 20
     assert (arm.time[0], arm.time[-1]) == (LOG.time[0], LOG.time[-1])
     assert (
         abs(arm.errors["shoulder"][arm.start]) == np.abs(arm.errors["shoulder"]).max()

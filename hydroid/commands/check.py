@@ -34,6 +34,7 @@ from hydroid.log import (
     driven_joints,
     grouped,
     guess_columns,
+    lacked_by_all,
     motion_findings,
     open_table,
     write_log,
@@ -144,7 +145,11 @@ def _read_files(
         progress("reading log", number, len(logs), path.name)
         parts, findings = check_file(path, settings, repair=repair, progress=progress)
         files.append(_File(path, parts, findings))
-    return files
+    findings_of_all = lacked_by_all([file.findings for file in files])
+    return [
+        replace(file, findings=findings)
+        for file, findings in zip(files, findings_of_all, strict=True)
+    ]
 
 
 def _finding_lines(checks: Sequence[LogCheck]) -> list[str]:

@@ -213,7 +213,7 @@ def _fit(
             NOTE, f"{what}: for your machine give --config, which `hydroid init` writes"
         )
     budget = options.seconds()
-    read = read_logs(options.logs, settings, repair=options.repair)
+    read = read_logs(options.logs, settings, repair=options.repair, fitted=True)
     with (
         open_workers(options.dask) as workers,
         FitProgress(settings, budget) as watcher,

@@ -21,6 +21,7 @@ from hydroid.commands.inputs import (
     load_settings,
     refuse_overwriting,
 )
+from hydroid.commands.joint_units import in_joint_units
 from hydroid.commands.logs import check_file, plain_findings, undriven_findings
 from hydroid.commands.progress import Progress
 from hydroid.files import Plain
@@ -118,6 +119,7 @@ def check(
         "logs": [_plain(log_check, names) for log_check in checks],
         "agreement": plain(agreements, names),
     }
+    content = in_joint_units(content, settings.arm)
     return Result(
         [
             *_finding_lines(checks),

@@ -86,7 +86,7 @@ def test_a_column_of_work_that_no_log_has_is_an_error(tmp_path, column):
         assert len(read_logs(files, settings, fitted=True)) == 3
         return
     assert levels == {"error"}
-    with pytest.raises(LogError, match="no column 'diging'.*no log has it"):
+    with pytest.raises(LogError, match=r"no column 'diging'.*no log has it"):
         read_logs(files, settings, fitted=True)
     # of a validation the fit's logs had it
     assert len(read_logs(files, settings)) == 2

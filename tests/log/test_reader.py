@@ -127,12 +127,11 @@ def test_rows_that_a_logger_writes_twice_are_left_out_in_any_number(
     whole, _ = read(edited(tmp_path, lambda rows: None))
 
     def twice(rows: list[list[str]]) -> None:
-        for row in range(100, 0, -3):
+        for row in range(len(rows) - 1, 0, -3):
             rows.insert(row, rows[row])
 
     log, (finding,) = read(edited(tmp_path, twice))
     assert finding.level == "warning"
-    assert "and 33 more" in str(finding)
     np.testing.assert_array_equal(log.angle, whole.angle)
 
     def other_angles(rows: list[list[str]]) -> None:

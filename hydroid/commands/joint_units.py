@@ -13,7 +13,7 @@ DEGREES = "_deg"
 SQUARED = "_deg2"
 
 
-def in_joint_units(content: Plain, arm: Arm) -> Plain:
+def in_joint_units(content: Mapping[str, Any], arm: Arm) -> Plain:
     """Return JSON content whose numbers about joints that slide are in mm, under keys
     that say so: `rms_mm` in place of `rms_deg`.
 
@@ -21,7 +21,7 @@ def in_joint_units(content: Plain, arm: Arm) -> Plain:
     `name`, and numbers by the joints' names.
     """
     sliding = {joint.name for joint in arm.joints if joint.slides}
-    return _mapping(content, sliding) if sliding else content
+    return _mapping(content, sliding)
 
 
 def _any(value: Any, sliding: Collection[str], *, in_row: bool) -> Any:

@@ -404,7 +404,7 @@ def adapt(
         of_loads = load_finding(asked_loads(model, read))
     findings = [*result.content["findings"], *map(asdict, of_loads)]
     own = in_joint_units({"steps": path, "findings": findings}, settings.arm)
-    content = result.content | own
+    content = {**result.content, **own}
     lines = [table, *map(str, of_loads), *result.lines]
     return replace(result, lines=lines, content=content)
 

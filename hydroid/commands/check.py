@@ -21,6 +21,7 @@ from hydroid.commands.inputs import (
     load_settings,
     refuse_overwriting,
 )
+from hydroid.commands.joint_units import in_joint_units
 from hydroid.commands.logs import check_file, plain_findings, undriven_findings
 from hydroid.commands.progress import Progress
 from hydroid.files import Plain
@@ -34,6 +35,7 @@ from hydroid.log import (
     driven_joints,
     grouped,
     guess_columns,
+    lacked_by_all,
     motion_findings,
     open_table,
     write_log,
@@ -117,6 +119,7 @@ def check(
         "logs": [_plain(log_check, names) for log_check in checks],
         "agreement": plain(agreements, names),
     }
+    content = in_joint_units(content, settings.arm)
     return Result(
         [
             *_finding_lines(checks),
@@ -144,7 +147,11 @@ def _read_files(
         progress("reading log", number, len(logs), path.name)
         parts, findings = check_file(path, settings, repair=repair, progress=progress)
         files.append(_File(path, parts, findings))
-    return files
+    findings_of_all = lacked_by_all([file.findings for file in files])
+    return [
+        replace(file, findings=findings)
+        for file, findings in zip(files, findings_of_all, strict=True)
+    ]
 
 
 def _finding_lines(checks: Sequence[LogCheck]) -> list[str]:

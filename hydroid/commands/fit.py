@@ -175,7 +175,7 @@ def fit(
         RunError: `out` holds another run or cannot be written, or every simulation
             diverged.
     """
-    read = read_logs(logs, settings)
+    read = read_logs(logs, settings, fitted=True)
     _refuse_copies(read)
     files = [*dict.fromkeys(log_file(log.source) for log in read)]
     _refuse_wrong_payloads(settings, files)

@@ -21,6 +21,7 @@ from hydroid.log import (
     Reading,
     check_parts,
     grouped,
+    lacked_by_all,
     log_finding,
     open_table,
 )
@@ -38,6 +39,7 @@ def read_logs(
     *,
     repair: bool = False,
     angles: bool = True,
+    fitted: bool = False,
 ) -> list[Log]:
     """Read logs as the settings map them; warnings and notes go to the `hydroid`
     logger.
@@ -53,12 +55,14 @@ def read_logs(
             its `start_pose`.
         repair: fill holes up to `log.repair_s`.
         angles: whether the compared joints must be measured.
+        fitted: whether a fit is made of them: the column `log.work.column` must be in
+            one of the files then.
 
     Raises:
         LogError: the first fault that keeps a log from being used.
     """
     read = list[Log]()
-    findings = list[LogFinding]()
+    files = list[list[LogFinding]]()
     pose = settings.arm.pose(settings.start_pose)
     with Progress() as progress:
         for source in as_list(logs):
@@ -66,14 +70,21 @@ def read_logs(
                 if source.pose is None and not source.has_angle.all():
                     source = replace(source, pose=pose)
                 read.append(source)
+                files.append([])
                 continue
             parts, of_file = check_file(
                 Path(source), settings, repair=repair, angles=angles, progress=progress
             )
             if not parts:
                 raise of_file[0].error()
-            findings += of_file
+            files.append(of_file)
             read += [replace(part, pose=pose) for part in parts]
+    if fitted:
+        files = lacked_by_all(files)
+    findings = [finding for of_file in files for finding in of_file]
+    for finding in findings:
+        if finding.level == "error":
+            raise finding.error()
     for level, line in grouped(findings):
         importance = logging.WARNING if level == "warning" else NOTE
         LOGGER.log(importance, "%s: %s", level, line)

@@ -16,6 +16,7 @@ from hydroid.commands.inputs import (
     open_model,
     setting_changes,
 )
+from hydroid.commands.joint_units import in_joint_units
 from hydroid.commands.logs import problem_of, read_logs
 from hydroid.commands.progress import Progress
 from hydroid.files import Plain, is_file
@@ -113,6 +114,7 @@ def suggest(
         if "command" in finding.numbers:
             lines.append(f"  {finding.numbers['command']}")
     files = written({"missing_terms": table}, out)
+    content = in_joint_units(content, model.settings.arm)
     return Result([table, *lines, *files], content, findings)
 
 

@@ -20,6 +20,7 @@ from hydroid.commands.inputs import (
     open_values,
     setting_changes,
 )
+from hydroid.commands.joint_units import in_joint_units
 from hydroid.commands.logs import read_logs, refuse_undriven
 from hydroid.commands.progress import FitProgress, Progress
 from hydroid.errors import SettingsError
@@ -213,7 +214,7 @@ def _fit(
             NOTE, f"{what}: for your machine give --config, which `hydroid init` writes"
         )
     budget = options.seconds()
-    read = read_logs(options.logs, settings, repair=options.repair)
+    read = read_logs(options.logs, settings, repair=options.repair, fitted=True)
     with (
         open_workers(options.dask) as workers,
         FitProgress(settings, budget) as watcher,
@@ -402,7 +403,8 @@ def adapt(
     if TIP_LOAD in chosen:
         of_loads = load_finding(asked_loads(model, read))
     findings = [*result.content["findings"], *map(asdict, of_loads)]
-    content = {**result.content, "steps": path, "findings": findings}
+    own = in_joint_units({"steps": path, "findings": findings}, settings.arm)
+    content = {**result.content, **own}
     lines = [table, *map(str, of_loads), *result.lines]
     return replace(result, lines=lines, content=content)
 

@@ -17,6 +17,7 @@ from hydroid.commands.inputs import (
     command,
     open_model,
 )
+from hydroid.commands.joint_units import in_joint_units
 from hydroid.commands.logs import read_logs, seen_logs
 from hydroid.files import Plain
 from hydroid.findings import Finding
@@ -118,6 +119,7 @@ def validate(
     lines += written(page, out)
     content = _content(fits, predictions, arm.joint_names)
     content["findings"] = [asdict(one) for one in loads]
+    content = in_joint_units(content, arm)
     return Result(lines, content, predictions, page, details=[page.tables["errors"]])
 
 

@@ -38,8 +38,7 @@ from hydroid.settings.fit import FitSettings
 from hydroid.settings.search import RefinementSettings
 
 FIRST = 10
-"""iterations after which another model must err less than the last one: each is slow to
-simulate"""
+"""iterations after which another beginning must err less than the last one"""
 LESS = 0.1
 """part by which the errors of one joint must fall for its model to be refined again"""
 ANEW = 3
@@ -492,8 +491,8 @@ class Ladder:
         ends = [self._far_end(own, nothing, settings, step)]
         if _new_curves(problem, last):
             measured = by_speeds(problem, step.joint, nothing)
-            again = step.changed(start=2)
-            ends.append(self._far_end(own, measured, settings, again))
+            few = settings.changed({"iterations": FIRST})
+            ends.append(self._far_end(own, measured, few, step.changed(start=2)))
         return own, min(ends, key=lambda end: end.negative_log)
 
     def _try_without(

@@ -24,4 +24,5 @@ from hydroid.log.read import (
     open_table as open_table,
 )
 from hydroid.log.table import Table as Table
+from hydroid.log.work import lacked_by_all as lacked_by_all
 from hydroid.log.write import write_log as write_log, write_logs as write_logs

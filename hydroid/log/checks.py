@@ -129,7 +129,12 @@ def _values(recording: Recording) -> Iterator[LogFinding]:
             "low": signal.low / factor,
             "high": signal.high / factor,
         }
-        names = {"quantity": signal.kind, "unit": signal.unit, "name": signal.name}
+        names = {
+            "quantity": signal.kind,
+            "unit": signal.unit,
+            "name": signal.name,
+            "setting": signal.setting,
+        }
         yield recording.finding(
             "error", kind, rows, signal, signal.owner, **names, **numbers, **remedy
         )
@@ -141,7 +146,7 @@ def _explained(signal: Signal, values: Array) -> tuple[str, dict[str, str]]:
     if signal.kind == "command":
         likely = likely_range(values)
         if likely and likely.name != "%":
-            remedy = likely.remedy(signal.gain, signal.offset)
+            remedy = likely.remedy(signal.setting, signal.gain, signal.offset)
             return "outside in another range", remedy
     if signal.unit == "deg":
         return _explained_angle(signal, values)
@@ -187,7 +192,8 @@ def _units(recording: Recording) -> Iterator[LogFinding]:
             remedy = f"unit: {unit.name}"
             if signal.kind == "command":
                 remedy = "scale (command [%] = scale · cell + offset)"
-            names = {"quantity": signal.kind, "unit": unit.name, "remedy": remedy}
+            setting = signal.setting or f"log.{signal.kind}"
+            names = {"setting": setting, "unit": unit.name, "remedy": remedy}
             yield recording.finding("warning", "unit", (), signal, signal.name, **names)
 
 

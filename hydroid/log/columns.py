@@ -1,11 +1,12 @@
 """The columns of a table that seem to be times, commands, angles or targets."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
 
-from hydroid.arrays import Array
+from hydroid.arrays import Array, Limits
 from hydroid.errors import LogError
 from hydroid.files import Plain
 from hydroid.log.clues import CLUES, RAW, column_unit, joint_of, kind_of, words
@@ -26,7 +27,8 @@ class Column(NamedTuple):
 
     Its `kind` is time, command, angle or target; the `unit` is empty where the file
     does not state one; `values` are its cells, shape (R,), times `scale`, which is 1
-    but for units that settings do not have.
+    but for units that settings do not have; `further` are those of the same column in
+    other logs.
     """
 
     name: str
@@ -34,6 +36,14 @@ class Column(NamedTuple):
     unit: str
     values: Array
     scale: float = 1.0
+    further: tuple[Array, ...] = ()
+
+    @property
+    def ends(self) -> Limits:
+        """The least and the largest of its values, in all logs."""
+        values = np.concatenate([self.values, *self.further])
+        values = values[np.isfinite(values)]
+        return float(values.min()), float(values.max())
 
     @property
     def is_raw(self) -> bool:
@@ -104,6 +114,19 @@ def signal_columns(table: Table, names: Sequence[str]) -> list[Column]:
     if not any(column.kind == "time" for column in columns):
         columns += _time_by_values(table, kinds)
     return columns
+
+
+def beside(columns: Sequence[Column], tables: Sequence[Table]) -> list[Column]:
+    """Return columns with their values in further tables that have them."""
+    wider = list[Column]()
+    for column in columns:
+        further = list[Array]()
+        for table in tables:
+            with suppress(LogError, KeyError):
+                values = table.read([Signal(column.name, column.kind)]).time
+                further.append(column.scale * values)
+        wider.append(column._replace(further=tuple(further)))
+    return wider
 
 
 def _kinds(units: Mapping[str, Unit | None], names: Sequence[str]) -> dict[str, str]:

@@ -18,7 +18,7 @@ from hydroid.errors import LogError
 from hydroid.files import Plain
 from hydroid.log.angle_columns import angle_entries
 from hydroid.log.clues import column_unit, kind_of
-from hydroid.log.columns import Column, Entry, rises, signal_columns
+from hydroid.log.columns import Column, Entry, beside, rises, signal_columns
 from hydroid.log.command_columns import command_entries
 from hydroid.log.joint_columns import Assignment, Joints, by_joint
 from hydroid.log.rods import Rod
@@ -58,6 +58,7 @@ def guess_columns(
     slides: Sequence[int] = (),
     rods: Mapping[int, Rod] = NO_RODS,
     ranges: Mapping[int, tuple[float, float]] = NO_RANGES,
+    further: Sequence[Table] = (),
 ) -> ColumnGuess:
     """Guess which columns are time, commands and angles, of which joints, in which
     units.
@@ -65,10 +66,11 @@ def guess_columns(
     Columns may have the names of the links that the joints move instead; positions of
     joints (from 1) that slide are in m. Lengths of the cylinders of joints, `rods`,
     stand for their angles. Counts of an encoder or a converter are taken for the
-    `ranges` of the joints [rad].
+    `ranges` of the joints [rad], from the lowest to the highest of this table and of
+    `further` ones.
     """
     arm = Joints(joints, links, slides, rods, ranges)
-    columns = signal_columns(table, (*joints, *links))
+    columns = beside(signal_columns(table, (*joints, *links)), further)
     time = _time_column(table, columns)
     step = usual_step(time.values)
     unit = time.unit or likely_time_unit(step) or "s"

@@ -32,6 +32,7 @@ def as_angles(recording: Recording, findings: list[LogFinding]) -> Recording:
                 "length": 1e3 * column[out[0]],
                 "low": 1e3 * shortest,
                 "high": 1e3 * longest,
+                "setting": signal.setting,
             }
             findings.append(
                 recording.finding(

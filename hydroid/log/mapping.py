@@ -14,7 +14,7 @@ from hydroid.log.log import LogFinding, log_finding
 from hydroid.log.rods import Rod, rods_of
 from hydroid.log.table import Signal, Table
 from hydroid.settings.arm import Arm
-from hydroid.settings.log import LENGTHS, ColumnMap, Kind, LogSettings
+from hydroid.settings.log import LENGTHS, ColumnMap, Columns, Kind, LogSettings
 from hydroid.units import UNITS
 from hydroid.words import listed
 
@@ -67,10 +67,20 @@ def map_signals(
                 unit=shown,
                 owner=owner,
                 rod=rod,
+                setting=_setting(settings, kind, joint, owner),
             )
             for part, name in enumerate(columns.column):
                 signals.append(replace(signal, name=name, part=part))
     return signals
+
+
+def _setting(settings: LogSettings, kind: Kind, joint: int, owner: str) -> str:
+    """Return the key of the settings that name the columns of a joint: its own where it
+    has any, as those of all joints do not replace them."""
+    of_joint = settings.joints.get(joint)
+    if of_joint and getattr(of_joint, kind) != Columns():
+        return f"log.joints.{owner}.{kind}"
+    return f"log.{kind}"
 
 
 def angle_margin(low: float, high: float) -> float:

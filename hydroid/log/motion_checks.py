@@ -7,11 +7,11 @@ import numpy as np
 
 from hydroid.arrays import Array, record
 from hydroid.log.log import Log, LogFinding, log_finding
+from hydroid.log.mapping import angle_margin
 from hydroid.log.motion import END, LEAST_PATH, JointMotion, driven_joints, motion_of
 from hydroid.log.signals import CommandRange, likely_range
 from hydroid.log.table import Signal
-from hydroid.settings.arm import Arm
-from hydroid.units import Display
+from hydroid.settings.arm import Arm, Joint
 
 SMALL = ("±1", "±10 V")
 """ranges of commands whose numbers are possible commands in %, too"""
@@ -52,7 +52,13 @@ class _Joint:
 
 def _warning(log: Log, kind: str, signal: Signal, **numbers: Any) -> LogFinding:
     return log_finding(
-        "warning", kind, log.source, signal.owner, column=signal.name, **numbers
+        "warning",
+        kind,
+        log.source,
+        signal.owner,
+        column=signal.name,
+        setting=signal.setting,
+        **numbers,
     )
 
 
@@ -145,17 +151,19 @@ def _range(
     command = joint.command
     # one range for all is likelier than one for each
     if common:
-        remedy = common.remedy(command.gain, command.offset)
+        remedy = common.remedy(command.setting, command.gain, command.offset)
         yield joint.warning("range", command, **remedy)
         return
     likely = likely_range(motion.log.command_of(motion.joint))
     if likely is None:
         return
-    remedy = likely.remedy(command.gain, command.offset)
     # a command in two columns has no middle
     if likely.offset and command.low < 0:
+        remedy = likely.remedy(command.setting, command.gain, command.offset)
         yield joint.warning("range", command, **remedy)
     elif likely.name in SMALL and usual > FULL and motion.travel > MOVES_WELL:
+        own = f"log.joints.{command.owner}.command"
+        remedy = likely.remedy(own, command.gain, command.offset)
         yield joint.warning("range of one", command, **remedy)
 
 
@@ -210,12 +218,11 @@ def motion_findings(logs: Sequence[Log], arm: Arm) -> Iterator[LogFinding]:
 
     Where no log passes the angle, it is an end of the joint's travel.
     """
-    for joint, name in enumerate(arm.joint_names, 1):
-        motions = [motion_of(log, joint) for log in logs if log.measures(joint)]
+    for number, joint in enumerate(arm.joints, 1):
+        motions = [motion_of(log, number) for log in logs if log.measures(number)]
         ends = np.array([motion.reach for motion in motions])
-        shown = arm.joint(joint).shown
         for motion in motions:
-            yield from _stands(motion, name, ends, shown)
+            yield from _stands(motion, joint, ends)
     for log in logs:
         rest = log.first_command * log.period
         if log.driven.any() and rest < LEAST_REST:
@@ -223,9 +230,7 @@ def motion_findings(logs: Sequence[Log], arm: Arm) -> Iterator[LogFinding]:
             yield log_finding("note", "no rest", log.source, after=after)
 
 
-def _stands(
-    motion: JointMotion, name: str, ends: Array, shown: Display
-) -> Iterator[LogFinding]:
+def _stands(motion: JointMotion, joint: Joint, ends: Array) -> Iterator[LogFinding]:
     """Yield where a joint stands in a log although it is driven up or down.
 
     `ends`: of its travel in all logs [rad].
@@ -238,7 +243,11 @@ def _stands(
             continue
         angle, command = np.median(held, axis=1)
         left = (sign * ends).max() - sign * angle
-        kind = "stall" if left > END * np.ptp(ends) else "at a stop"
-        at = shown.way(np.rad2deg(angle))
+        kind = "stall"
+        if left <= END * np.ptp(ends):
+            end = joint.limits[sign > 0]
+            is_end = abs(angle - end) < angle_margin(*joint.limits)
+            kind = "at the end of its range" if is_end else "at a stop"
+        at = joint.shown.way(np.rad2deg(angle))
         numbers = {"angle": at, "command": command, "seconds": seconds}
-        yield log_finding("note", kind, motion.log.source, name, side, **numbers)
+        yield log_finding("note", kind, motion.log.source, joint.name, side, **numbers)

@@ -164,7 +164,7 @@ def _read(
     if reading.outputs is None:
         signals = measured_signals(table, signals)
     signals = match_columns(table, signals, needed, findings)
-    signals = with_work(table, signals, settings.work)
+    signals = with_work(table, signals, settings.work, findings)
     recording = table.read(signals)
     del table  # with the columns that are not used
     for remark in recording.table.remarks:

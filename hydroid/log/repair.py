@@ -85,7 +85,14 @@ def unwrap(recording: Recording, findings: list[LogFinding]) -> Recording:
         if is_continuous and jumps.any():
             step = np.rad2deg(steps[jumps][0])
             findings.append(
-                recording.finding("error", "jump", after[jumps], signal, step=step)
+                recording.finding(
+                    "error",
+                    "jump",
+                    after[jumps],
+                    signal,
+                    step=step,
+                    setting=signal.setting,
+                )
             )
     return replace(recording, values=values)
 
@@ -195,12 +202,16 @@ def _fault(signal: Signal, recording: Recording, row: int) -> str:
 
 
 def _in_order(recording: Recording, findings: list[LogFinding]) -> Recording:
-    """Leave out rows whose time has been, if they are few."""
+    """Leave out rows whose time has been, if they are few or repeat the row before."""
     time = recording.time
     again = time[1:] <= np.maximum.accumulate(time)[:-1]
-    if not 0 < again.sum() <= max(MOST_AGAIN * len(time), 1):
+    # a logger that writes a sample twice says nothing wrong
+    repeats = (recording.values[1:] == recording.values[:-1]).all(axis=1)
+    if (again & ~repeats).sum() > max(MOST_AGAIN * len(time), 1):
         return recording
     rows = 1 + np.flatnonzero(again)
+    if not len(rows):
+        return recording
     first = rows[0]
     what = (
         f"time does not increase: {time[first]:.6g} s follows {time[first - 1]:.6g} s"

@@ -31,14 +31,14 @@ class CommandRange(NamedTuple):
     scale: float
     offset: float
 
-    def remedy(self, gain: float, offset: float) -> dict[str, str]:
-        """Return its name, and the settings that bring it to percent where those of the
-        log are given."""
+    def remedy(self, setting: str, gain: float, offset: float) -> dict[str, str]:
+        """Return its name, and the settings under a key that bring it to percent where
+        those of the log are given."""
         offset = self.offset + self.scale * offset
-        scale = f"{self.scale * gain:g}"
+        remedy = f"{setting}.scale: {self.scale * gain:g}"
         if offset:
-            scale += f" and log.command.offset: {offset:g}"
-        return {"range": self.name, "scale": scale}
+            remedy += f" and {setting}.offset: {offset:g}"
+        return {"range": self.name, "remedy": remedy}
 
     @property
     def excludes_zero(self) -> bool:

@@ -49,6 +49,7 @@ class Signal:
         owner: the joint's name.
         rest: value of a command before its first message, in a format of messages.
         rod: the cylinder whose length the cells of an angle are.
+        setting: key of the settings that name its column.
     """
 
     name: str
@@ -63,6 +64,7 @@ class Signal:
     owner: str = ""
     rest: float = 0.0
     rod: Rod | None = None
+    setting: str = ""
 
     @property
     def shown(self) -> Display:

@@ -96,19 +96,18 @@ def over_the_range(
     `ends` of that are in the unit; the lowest cell is the first of them, or if the
     sensor counts the other way the last.
     """
-    finite = column.values[np.isfinite(column.values)]
-    low = float(finite.min())
-    high = float(finite.max())
+    low, high = column.ends
     least, most = ends
     signal = column.unit or "counts"
-    reach = f"{low:g} to {high:g} {signal}, {least:.4g} to {most:.4g} {unit}"
     # a reading that never changes has no span, and tells nothing of its ends
     span = high - low or 1.0
     scale = (most - least) / span
+    each = f"{scale:.3g} {unit} per {signal.removesuffix('s')}"
+    reach = f"{low:g} to {high:g} {signal}, {least:.4g} to {most:.4g} {unit} ({each})"
     return Entry(
         _through(column, unit, scale, (low, least)),
         f"{column.name}: {reach}, taken for the whole {whole}",
-        "correct scale and offset where the log does not reach both ends",
+        "correct scale and offset if you know them, or if no log reaches both ends",
         _through(column, unit, -scale, (low, most)),
     )
 

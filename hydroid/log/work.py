@@ -7,19 +7,58 @@ from dataclasses import replace
 import numpy as np
 
 from hydroid.errors import LogError
-from hydroid.log.log import LogFinding
+from hydroid.log.log import LogFinding, by_level, log_finding
 from hydroid.log.table import Recording, Signal, Table
 from hydroid.settings.log import Work
+from hydroid.words import listed
 
 WORK = "work"
 """kind of the signal of a column that says so"""
 
 
-def with_work(table: Table, signals: Sequence[Signal], work: Work) -> list[Signal]:
-    """Return signals with that of the column of work, where the table has it."""
-    if work.column is None or work.column not in table.names:
+NO_WORK = "no work"
+"""kind of the finding that a log lacks this column"""
+
+
+def with_work(
+    table: Table, signals: Sequence[Signal], work: Work, findings: list[LogFinding]
+) -> list[Signal]:
+    """Return signals with that of the column of work; a finding says that the table
+    lacks it, and which columns have no use."""
+    if work.column is None:
         return [*signals]
-    return [*signals, Signal(work.column, WORK)]
+    if work.column in table.names:
+        return [*signals, Signal(work.column, WORK)]
+    used = {signal.name for signal in signals}
+    spare = [name for name in table.names if name and name not in used]
+    findings.append(
+        log_finding(
+            "note",
+            NO_WORK,
+            table.source,
+            work.column,
+            spare=listed(spare or ["none"], 3),
+        )
+    )
+    return [*signals]
+
+
+def lacked_by_all(
+    files: Sequence[Sequence[LogFinding]],
+) -> list[list[LogFinding]]:
+    """Return the findings of files that are read together, by file; if each lacks the
+    column of work, its name is wrong, and that is an error."""
+    lacking = [any(one.kind == NO_WORK for one in findings) for findings in files]
+    if not files or not all(lacking):
+        return [[*findings] for findings in files]
+    return [by_level(map(_as_error, findings)) for findings in files]
+
+
+def _as_error(finding: LogFinding) -> LogFinding:
+    """Return a finding about the column of work as an error, and any other as it is."""
+    if finding.kind != NO_WORK:
+        return finding
+    return replace(finding, kind="no work anywhere", level="error")
 
 
 def without_work(

@@ -29,6 +29,7 @@ from hydroid.simulation.roles import roles
 from hydroid.simulation.rollout import Course, SteppedArm, Trace, compile_rollout
 from hydroid.simulation.scenario import Candidates, Chain, model_values
 
+Pose = str | ArrayLike | Mapping[str, float]
 PHYSICS = mujoco.mjtState.mjSTATE_INTEGRATION.value
 """what MuJoCo needs to go on to the same bits"""
 
@@ -197,12 +198,13 @@ class Plant:
         pressure[~self._active] = np.nan
         return pressure
 
-    def reset(self, pose: str | ArrayLike | None = None) -> Array:
+    def reset(self, pose: Pose | None = None) -> Array:
         """Put the arm at rest, in static balance, its springs slack.
 
         Args:
-            pose: a pose of the arm's file, or joint angles [rad], shape (J,); by
-                default the settings' start pose.
+            pose: a pose of the arm's file, or joint angles [rad], shape (J,), or by
+                the joints' names, others as they stand; by default the settings'
+                start pose.
 
         Returns:
             The joint angles [rad], shape (J,).
@@ -277,15 +279,14 @@ class Plant:
     def speeds(
         self,
         commands: ArrayLike | Mapping[str, float],
-        at: str | ArrayLike | None = None,
+        at: Pose | None = None,
     ) -> Array:
         """Return the speeds that joints settle to under commands that are held, all at
         once.
 
         Args:
             commands: [%], shape (J,), or by the joints' names, others 0.
-            at: a pose of the arm's file, or joint angles [rad], shape (J,); by default
-                where the plant is.
+            at: as `pose` of `reset`; by default where the plant is.
 
         Returns:
             [rad/s], of joints that slide [m/s], shape (J,): of the law itself
@@ -299,7 +300,7 @@ class Plant:
         return self.steady().speeds(given[None], self._posed(at)[None])[0]
 
     def commands(
-        self, speeds: ArrayLike | Mapping[str, float], at: str | ArrayLike | None = None
+        self, speeds: ArrayLike | Mapping[str, float], at: Pose | None = None
     ) -> SteadyCommands:
         """Return the commands under which joints settle to wished speeds, all at once.
 
@@ -451,11 +452,20 @@ class Plant:
             )
         return given
 
-    def _posed(self, pose: str | ArrayLike | None) -> Array:
+    def _posed(self, pose: Pose | None) -> Array:
         """Return the angles of a pose [rad], shape (J,), by its name or its angles;
-        None: of where it is."""
+        None: of where it is. Joints that a mapping does not name stay there, too."""
         if pose is None:
             return self.angle
+        if isinstance(pose, Mapping):
+            where = dict(zip(self.names, self.angle, strict=True))
+            if stray := pose.keys() - where.keys():
+                raise SettingsError(
+                    f"no joint {', '.join(sorted(stray))}",
+                    "pose",
+                    f"the arm has {', '.join(self.names)}",
+                )
+            pose = [*(where | {**pose}).values()]
         if isinstance(pose, str):
             return self.identified.settings.arm.pose(pose)
         angle = np.array(pose, float)

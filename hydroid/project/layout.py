@@ -104,6 +104,9 @@ def find_layout(
         guess = _given(table, arm, given)
         return _seen(table, arm, guess, others, GIVEN)
     guess = guessed_section(table, arm, order)
+    if guess.mirrored:
+        # sensors without a scale: what one log reaches is not all of their range
+        guess = guessed_section(table, arm, order, [*others.tables()])
     missing = missing_column(guess.log, targets=_has_targets(table))
     if missing:
         return _skeleton(table, arm, guess, missing)

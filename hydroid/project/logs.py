@@ -2,13 +2,15 @@
 out."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from hydroid.arrays import Limits
-from hydroid.log import Log, LogFinding, Reading, Table, check_parts
+from hydroid.errors import LogError
+from hydroid.log import Log, LogFinding, Reading, Table, check_parts, open_table
 from hydroid.settings.arm import Arm
 from hydroid.settings.log import LogSettings
 
@@ -25,6 +27,17 @@ class Others(NamedTuple):
     in_range: bool = True
     """whether they must be within the arm's ranges, if the first one is; not where
     these ranges are guesses"""
+
+    def tables(self) -> Iterator[Table]:
+        """Yield the tables of all of them that can be opened."""
+        for path in self.paths:
+            with suppress(LogError):
+                yield open_table(path)
+
+    @property
+    def paths(self) -> list[Path]:
+        """The files of all of them."""
+        return [*self.fitted, *([] if self.unseen is None else [self.unseen])]
 
 
 def read_first(
@@ -61,17 +74,14 @@ def read_others(
     fitted = list[Log]()
     unseen = list[Log]()
     left_out = list[Path]()
-    paths = [*others.fitted]
-    if others.unseen is not None:
-        paths.append(others.unseen)
-    if not paths:
+    if not others.paths:
         return fitted, unseen, left_out
     reading = Reading(arm=arm)
     limits = arm.ranges
     first, _ = check_parts(Path(table.source), settings, limits, reading)
     if not first or not others.in_range:
         limits = _no_limits(arm)
-    for path in paths:
+    for path in others.paths:
         parts, findings = check_parts(path, settings, limits, reading)
         if not parts:
             left_out.append(path)

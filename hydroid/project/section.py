@@ -19,11 +19,13 @@ KINDS: tuple[Kind, ...] = ("command", "angle", "pressure")
 PERIOD = 0.02  # of a simulation of quick logs [s]
 
 
-def guessed_section(table: Table, arm: Arm, order: Sequence[str]) -> ColumnGuess:
+def guessed_section(
+    table: Table, arm: Arm, order: Sequence[str], further: Sequence[Table] = ()
+) -> ColumnGuess:
     """Guess the columns; joints have the numbers of the arm.
 
     `order` are names of the arm's joints in the order of the log's numbers; none: the
-    arm's order.
+    arm's order. `further` tables tell what sensors without a scale reach, too.
     """
     names = arm.joint_names
     places = _places(names, order)
@@ -48,6 +50,7 @@ def guessed_section(table: Table, arm: Arm, order: Sequence[str]) -> ColumnGuess
             slides=slides,
             rods=own_rods,
             ranges=ranges,
+            further=further,
         )
     except LogError:
         if not holds_numbers(table):

@@ -119,7 +119,7 @@ class Work(Settings):
 
     column: Name | None = None
     """name in the header of a column that is not 0 while it works; a log without it is
-    used whole"""
+    used whole, with a note; one of the logs of a fit must have it"""
     spans: dict[Name, Annotated[tuple[Span, ...], AfterValidator(_increasing)]] = {}
     """stretches of a log [s], from its first row on, by a pattern of file names, or of
     the ends of paths: {dig_*.csv: [[12, 15.5], [40, 52]]}"""
@@ -274,9 +274,9 @@ class LogSettings(Settings):
 
     def angles_only(self) -> "LogSettings":
         """Return the columns of a trajectory: whatever commands and pressures it holds
-        are not read."""
+        are not read, and no stretch of it is left out."""
         nothing = {"command": None, "pressure": None}
         joints = {
             joint: own and own.changed(nothing) for joint, own in self.joints.items()
         }
-        return self.changed(nothing | {"joints": joints})
+        return self.changed(nothing | {"joints": joints, "work": Work()})

@@ -7,7 +7,7 @@ import pytest
 from log_files import read
 
 from hydroid.errors import LogError
-from hydroid.log import ColumnGuess, guess_columns, open_table
+from hydroid.log import ColumnGuess, Table, guess_columns, open_table
 from hydroid.log.clues import joint_of, number_in
 from hydroid.settings.log import LogSettings
 
@@ -241,6 +241,25 @@ def test_a_sensors_signal_is_taken_for_the_whole_range(
     reached = angle.scale * np.array([cells.min(), cells.max()]) + angle.offset
     np.testing.assert_allclose(reached, np.degrees([-0.5, 1.0]), atol=1e-2)
     assert "taken for the whole range" in str(found.reasons)
+
+
+def test_a_sensor_without_a_scale_is_spread_over_what_all_logs_reach(
+    tmp_path: Path,
+) -> None:
+    names = "time_s,boom_cmd,boom_counts"
+    tables = list[Table]()
+    for name, cells in (("a", 600 + SWEEP), ("b", 500 + SWEEP), ("c", 700 + SWEEP)):
+        rows = np.stack([T, STEPS, cells], axis=1)
+        np.savetxt(tmp_path / name, rows, delimiter=",", header=names, comments="")
+        tables.append(open_table(tmp_path / name))
+    first, *further = tables
+    found = guess_columns(first, ["boom"], ranges={1: (-0.5, 1.0)}, further=further)
+    angle = LogSettings.model_validate(found.log).columns("angle", 1)
+    assert angle is not None
+    reach = np.array([500 + SWEEP.min(), 700 + SWEEP.max()])
+    reached = angle.scale * reach + angle.offset
+    np.testing.assert_allclose(reached, np.degrees([-0.5, 1.0]), atol=1e-2)
+    assert f"{angle.scale:.3g} deg per count" in str(found.reasons)
 
 
 @pytest.mark.parametrize("counts", [1024, 3600, 4096])

@@ -121,6 +121,29 @@ def test_the_edge_of_what_a_cell_may_hold(
     assert faults(edited(tmp_path, cell(40, column, text))) == []
 
 
+def test_rows_that_a_logger_writes_twice_are_left_out_in_any_number(
+    tmp_path: Path,
+) -> None:
+    whole, _ = read(edited(tmp_path, lambda rows: None))
+
+    def twice(rows: list[list[str]]) -> None:
+        for row in range(len(rows) - 1, 0, -3):
+            rows.insert(row, rows[row])
+
+    log, (finding,) = read(edited(tmp_path, twice))
+    assert finding.level == "warning"
+    np.testing.assert_array_equal(log.angle, whole.angle)
+
+    def other_angles(rows: list[list[str]]) -> None:
+        twice(rows)
+        for row in range(2, len(rows)):
+            rows[row] = [*rows[row][:3], str(row * 1e-3), *rows[row][4:]]
+
+    # a clock that is too coarse is no logger that writes twice
+    (fault,) = faults(edited(tmp_path, other_angles))
+    assert "does not increase" in str(fault)
+
+
 PROSE = """# A machine
 
 It has a boom, and a stick, which we measured.

@@ -3,7 +3,10 @@
 import numpy as np
 import pytest
 
-from hydroid.errors import SettingsError
+import hydroid
+from hydroid.commands.inputs import load_settings
+from hydroid.commands.logs import read_logs
+from hydroid.errors import LogError, SettingsError
 from hydroid.log.read import check_parts
 from hydroid.settings.load import validate
 from hydroid.settings.log import LogSettings
@@ -12,7 +15,7 @@ RANGES = {"boom": (-1.0, 1.0)}
 TIME = np.arange(0.0, 20.0, 0.05)
 
 
-def _written(tmp_path, cells=None):
+def _written(tmp_path, cells=None, name="dig_1.csv"):
     """A log of a joint that moves for 20 s, with a column of work where there are
     cells."""
     columns = {"time_s": 100.0 + TIME, "u1_pct": 50 * np.sin(TIME)}
@@ -20,7 +23,7 @@ def _written(tmp_path, cells=None):
     if cells is not None:
         columns["digging"] = cells
     rows = np.column_stack([np.asarray(one, dtype=str) for one in columns.values()])
-    path = tmp_path / "dig_1.csv"
+    path = tmp_path / name
     path.write_text("\n".join([",".join(columns), *map(",".join, rows.tolist())]))
     return path
 
@@ -53,10 +56,40 @@ def test_work_is_left_out_and_the_log_is_split_there(tmp_path, cells, work):
 
 
 def test_a_log_without_work_is_used_whole(tmp_path):
-    for cells, column in ((None, "digging"), (0.0 * TIME, "digging")):
-        (log,), found = _read(_written(tmp_path, cells), column=column)
-        assert log.duration == pytest.approx(TIME[-1], abs=0.06)
-        assert "work" not in found
+    (log,), found = _read(_written(tmp_path, 0.0 * TIME), column="digging")
+    assert log.duration == pytest.approx(TIME[-1], abs=0.06)
+    assert not {"work", "no work"} & {*found}
+
+
+def test_a_log_without_the_column_is_used_whole_and_says_so(tmp_path):
+    (log,), found = _read(_written(tmp_path, DIGS), column="diging")
+    assert log.duration == pytest.approx(TIME[-1], abs=0.06)
+    assert found["no work"].level == "note"
+    assert "no column 'diging'" in str(found["no work"])
+    assert "without a use: digging" in str(found["no work"])
+
+
+@pytest.mark.parametrize("column", ["digging", "diging"])
+def test_a_column_of_work_that_no_log_has_is_an_error(tmp_path, column):
+    files = [
+        _written(tmp_path, cells, f"{k}.csv") for k, cells in enumerate((DIGS, None))
+    ]
+    settings = load_settings(
+        "fit-hyd", {"outputs": [1], "log.work.column": column, "log.period_s": 0.05}
+    )
+    checks = hydroid.check(files, config=settings).result
+    levels = {
+        one.level for check in checks for one in check.findings if "work" in one.kind
+    }
+    if column == "digging":
+        assert levels == {"note"}
+        assert len(read_logs(files, settings, fitted=True)) == 3
+        return
+    assert levels == {"error"}
+    with pytest.raises(LogError, match=r"no column 'diging'.*no log has it"):
+        read_logs(files, settings, fitted=True)
+    # of a validation the fit's logs had it
+    assert len(read_logs(files, settings)) == 2
 
 
 @pytest.mark.parametrize(

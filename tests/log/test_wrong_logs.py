@@ -387,6 +387,20 @@ def test_a_stop_is_no_other_sign(
     assert kinds & {"at a stop", "stall", "turned", "late"} == {"at a stop"}
 
 
+def test_a_stop_at_the_end_of_the_range_says_nothing_against_the_range(
+    tmp_path: Path,
+) -> None:
+    _, end = np.degrees(SETTINGS.arm.joint(2).limits)
+    table = boom([60, -60, 100, -100], stop=float(end), seconds=8)
+    (found,) = [
+        one
+        for one in findings(tmp_path, table)
+        if one.subjects == ("shoulder", "upper")
+    ]
+    assert found.kind == "at the end of its range"
+    assert "should end there" not in str(found)
+
+
 def test_how_far_each_joint_moves(tmp_path: Path) -> None:
     (log,) = hydroid.check(
         save(Wrong("", "", lambda: [boom([50])]), tmp_path), config=SETTINGS

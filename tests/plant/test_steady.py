@@ -58,6 +58,19 @@ def test_speeds_and_commands_are_inverse_wherever_the_plant_stands(model):
     assert np.array_equal(plant.reset(), start)  # asking moves nothing
 
 
+def test_a_pose_by_names_leaves_the_other_joints_where_they_stand():
+    plant = made()
+    pose = plant.angle
+    pose[plant.names.index("shoulder")] = 0.3
+    by_name = plant.commands({"elbow": 0.05}, at={"shoulder": 0.3})
+    assert np.array_equal(
+        by_name.command, plant.commands({"elbow": 0.05}, at=pose).command
+    )
+    assert np.array_equal(plant.reset({"shoulder": 0.3}), pose)
+    with pytest.raises(SettingsError, match="no joint knee"):
+        plant.reset({"knee": 0.3})
+
+
 def test_a_heavier_load_takes_more_command_to_lift():
     light = made()
     heavy = Plant(light.identified, joints=[2, 3], payload=20.0)

@@ -291,7 +291,7 @@ def convert(
         ranges = arm.ranges
     else:
         joints = [f"joint {number}" for number in range(1, MOST_JOINTS + 1)]
-        guess = guess_columns(open_table(path), joints)
+        guess = guess_columns([open_table(path)], joints)
         layout = LogSettings.model_validate(guess.log)
         last = max(layout.joints, default=1)
         ranges = {str(number): (-np.inf, np.inf) for number in range(1, last + 1)}

@@ -283,12 +283,19 @@ def line_pressure(coefficients, driven, work, line, share: float) -> float:
         # infinite where nothing flows
         after = way - excess / slope
         creeps = count >= FEW and count % 2 == 0
-        if after < low == 0.0:
-            after = 0.0
-        elif creeps or not low < after < high:
-            after = 0.5 * (low + high)
-        way = after
+        way = within(after, low, high, creeps)
     return pressure
+
+
+@compilable
+def within(after: float, low: float, high: float, creeps: bool) -> float:
+    """The way to try next: Newton's, where it lies in the bracket and does not creep;
+    else a halving, or the relief pressure."""
+    if after < low == 0.0:
+        return 0.0
+    if creeps or not low < after < high:
+        return 0.5 * (low + high)
+    return after
 
 
 @compilable

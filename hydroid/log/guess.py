@@ -51,24 +51,23 @@ class ColumnGuess(NamedTuple):
 
 
 def guess_columns(
-    table: Table,
+    tables: Sequence[Table],
     joints: Sequence[str],
     *,
     links: Sequence[str] = (),
     slides: Sequence[int] = (),
     rods: Mapping[int, Rod] = NO_RODS,
     ranges: Mapping[int, tuple[float, float]] = NO_RANGES,
-    further: Sequence[Table] = (),
 ) -> ColumnGuess:
-    """Guess which columns are time, commands and angles, of which joints, in which
-    units.
+    """Guess which columns of the first table are time, commands and angles, of which
+    joints, in which units.
 
     Columns may have the names of the links that the joints move instead; positions of
     joints (from 1) that slide are in m. Lengths of the cylinders of joints, `rods`,
     stand for their angles. Counts of an encoder or a converter are taken for the
-    `ranges` of the joints [rad], from the lowest to the highest of this table and of
-    `further` ones.
+    `ranges` of the joints [rad], from the lowest to the highest of all tables.
     """
+    table, *further = tables
     arm = Joints(joints, links, slides, rods, ranges)
     columns = beside(signal_columns(table, (*joints, *links)), further)
     time = _time_column(table, columns)

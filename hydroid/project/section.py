@@ -44,13 +44,12 @@ def guessed_section(
     links = [arm.link_names[place] for place in places]
     try:
         guess = guess_columns(
-            table,
+            [table, *further],
             [names[place] for place in places],
             links=links,
             slides=slides,
             rods=own_rods,
             ranges=ranges,
-            further=further,
         )
     except LogError:
         if not holds_numbers(table):

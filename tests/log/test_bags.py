@@ -175,7 +175,8 @@ def test_the_range_of_a_command_that_starts_late_is_guessed_from_its_messages(
     }
     table = open_table(two_topics(tmp_path, "ros2", volts))
     (command,) = [
-        entry["command"] for entry in guess_columns(table, NAMES).log["joints"].values()
+        entry["command"]
+        for entry in guess_columns([table], NAMES).log["joints"].values()
     ][:1]
     assert (command["scale"], command["offset"]) == (40.0, -100.0)
 

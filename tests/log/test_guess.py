@@ -28,7 +28,7 @@ def guess(
         header=above + ",".join(names),
         comments="",
     )
-    return guess_columns(open_table(path), JOINTS)
+    return guess_columns([open_table(path)], JOINTS)
 
 
 @pytest.mark.parametrize(
@@ -190,7 +190,7 @@ def test_a_command_that_rests_beside_the_middle_rests_at_zero_and_is_in_the_rang
         header=",".join(names),
         comments="",
     )
-    found = guess_columns(open_table(tmp_path / "log.csv"), list(rests))
+    found = guess_columns([open_table(tmp_path / "log.csv")], list(rests))
     settings = LogSettings.model_validate(found.log)
     for number, (joint, rest) in enumerate(rests.items(), 1):
         command = settings.columns("command", number)
@@ -211,7 +211,7 @@ def test_what_is_called_ms_and_is_no_time_is_measured(tmp_path: Path) -> None:
     columns = np.stack([time, 60 * np.sign(np.sin(time)), 9 + 2 * np.sin(time)], axis=1)
     header = "Time,Boom Cmd,Boom Ms"
     np.savetxt(tmp_path / "log.csv", columns, "%.6g", ",", header=header, comments="")
-    found = guess_columns(open_table(tmp_path / "log.csv"), ["boom"])
+    found = guess_columns([open_table(tmp_path / "log.csv")], ["boom"])
     assert found.log["joints"][1]["angle"]["column"] == "Boom Ms"
     assert found.log["joints"][1]["command"]["column"] == "Boom Cmd"
 
@@ -234,7 +234,7 @@ def test_a_sensors_signal_is_taken_for_the_whole_range(
         comments="",
     )
     found = guess_columns(
-        open_table(tmp_path / "log.csv"), ["boom"], ranges={1: (-0.5, 1.0)}
+        [open_table(tmp_path / "log.csv")], ["boom"], ranges={1: (-0.5, 1.0)}
     )
     angle = LogSettings.model_validate(found.log).columns("angle", 1)
     assert angle is not None
@@ -252,8 +252,7 @@ def test_a_sensor_without_a_scale_is_spread_over_what_all_logs_reach(
         rows = np.stack([T, STEPS, cells], axis=1)
         np.savetxt(tmp_path / name, rows, delimiter=",", header=names, comments="")
         tables.append(open_table(tmp_path / name))
-    first, *further = tables
-    found = guess_columns(first, ["boom"], ranges={1: (-0.5, 1.0)}, further=further)
+    found = guess_columns(tables, ["boom"], ranges={1: (-0.5, 1.0)})
     angle = LogSettings.model_validate(found.log).columns("angle", 1)
     assert angle is not None
     reach = np.array([500 + SWEEP.min(), 700 + SWEEP.max()])
@@ -298,7 +297,7 @@ def test_sensors_of_which_one_counts_all_count(tmp_path: Path) -> None:
         comments="",
     )
     ranges = dict.fromkeys((1, 2, 3), (-0.5, 1.0))
-    found = guess_columns(open_table(tmp_path / "log.csv"), JOINTS, ranges=ranges)
+    found = guess_columns([open_table(tmp_path / "log.csv")], JOINTS, ranges=ranges)
     settings = LogSettings.model_validate(found.log)
     for joint in (2, 3):
         angle = settings.columns("angle", joint)

@@ -63,7 +63,7 @@ def test_lengths_are_guessed_and_read_as_angles(
     column = f"{name}_length_{unit}".rstrip("_")
     factor = {"mm": 1e3, "cm": 1e2, "m": 1.0, "": 1e3}[unit]
     path = table(tmp_path, **{f"{name}_cmd": STEPS, column: factor * length})
-    guess = guess_columns(open_table(path), arm.joint_names, rods=rods_of(arm))
+    guess = guess_columns([open_table(path)], arm.joint_names, rods=rods_of(arm))
     entry = guess.log["joints"][joint]["angle"]
     assert (entry["column"], entry["unit"], "offset" in entry) == (
         column,
@@ -86,7 +86,7 @@ def test_an_angle_that_is_there_is_taken_before_a_length(
         f"{name}_angle_deg": np.rad2deg(angle),
     }
     path = table(tmp_path, **{f"{name}_cmd": STEPS}, **columns)
-    guess = guess_columns(open_table(path), arm.joint_names, rods=rods_of(arm))
+    guess = guess_columns([open_table(path)], arm.joint_names, rods=rods_of(arm))
     assert guess.log["joints"][joint]["angle"]["column"] == f"{name}_angle_deg"
 
 
@@ -130,7 +130,7 @@ def test_lengths_are_no_angles_of_a_joint_whose_pivots_nobody_knows(
     name = arm.joint_names[joint - 1]
     columns = {f"{name}_cmd": STEPS, f"{name}_cyl{unit}": 90 + np.sin(T)}
     path = table(tmp_path, **columns)
-    guess = guess_columns(open_table(path), arm.joint_names, rods=rods_of(arm))
+    guess = guess_columns([open_table(path)], arm.joint_names, rods=rods_of(arm))
     assert guess.log["joints"][joint]["angle"] is None
     what = f"lengths of cylinders whose pivots are not known: {name}_cyl{unit}: give"
     assert [reason for reason in guess.reasons if what in reason]
@@ -143,7 +143,7 @@ def test_lengths_without_a_unit_that_the_pins_do_not_allow_are_no_angles(
     name = arm.joint_names[joint - 1]
     length = 1.5 * rod.ends[1] + 0.01 * np.sin(T)
     path = table(tmp_path, **{f"{name}_cmd": STEPS, f"{name}_cyl": 1e3 * length})
-    guess = guess_columns(open_table(path), arm.joint_names, rods=rods_of(arm))
+    guess = guess_columns([open_table(path)], arm.joint_names, rods=rods_of(arm))
     assert guess.log["joints"][joint]["angle"]["unit"] == "mm"
     log, (fault, *_) = check_log(
         path, LogSettings.model_validate(guess.log), arm.ranges, Reading(arm=arm)

@@ -51,7 +51,7 @@ def test_init_writes_its_scale_and_offset(
         path, table, delimiter=",", header=f"time_s,{name},angle_boom", comments=""
     )
     command = LogSettings.model_validate(
-        guess_columns(open_table(path), ["boom"]).log
+        guess_columns([open_table(path)], ["boom"]).log
     ).columns("command", 1)
     assert command is not None
     np.testing.assert_allclose(
@@ -99,7 +99,7 @@ def test_a_command_that_never_changes_has_the_range_of_the_others(
     table = np.stack([T, PULSES, 0 * T + 1500, angle, angle], axis=1)
     names = "time_s,cmd_boom,cmd_stick,angle_boom,angle_stick"
     np.savetxt(path, table, delimiter=",", header=names, comments="")
-    section = guess_columns(open_table(path), ["boom", "stick"]).log
+    section = guess_columns([open_table(path)], ["boom", "stick"]).log
     command = LogSettings.model_validate(section).columns("command", 2)
     assert command is not None
     assert command.scale * 1500 + command.offset == 0

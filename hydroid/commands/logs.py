@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hydroid.arrays import Array
 from hydroid.commands.inputs import LogSource, LogSources, ModelSource, as_list
 from hydroid.commands.progress import Progress
 from hydroid.errors import LogError, RunError, SettingsError
@@ -67,9 +68,7 @@ def read_logs(
     with Progress() as progress:
         for source in as_list(logs):
             if isinstance(source, Log):
-                if source.pose is None and not source.has_angle.all():
-                    source = replace(source, pose=pose)
-                read.append(source)
+                read.append(_posed(source, pose))
                 files.append([])
                 continue
             parts, of_file = check_file(
@@ -81,14 +80,25 @@ def read_logs(
             read += [replace(part, pose=pose) for part in parts]
     if fitted:
         files = lacked_by_all(files)
-    findings = [finding for of_file in files for finding in of_file]
+    _tell([finding for of_file in files for finding in of_file])
+    return read
+
+
+def _posed(log: Log, pose: Array) -> Log:
+    """Return a log whose joints that it does not measure stand in a pose [rad], (J,)."""
+    if log.pose is None and not log.has_angle.all():
+        return replace(log, pose=pose)
+    return log
+
+
+def _tell(findings: Sequence[LogFinding]) -> None:
+    """Log warnings and notes, or raise the first error."""
     for finding in findings:
         if finding.level == "error":
             raise finding.error()
     for level, line in grouped(findings):
         importance = logging.WARNING if level == "warning" else NOTE
         LOGGER.log(importance, "%s: %s", level, line)
-    return read
 
 
 def read_log(

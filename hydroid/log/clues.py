@@ -3,6 +3,9 @@
 import re
 from collections.abc import Collection, Sequence
 
+import numpy as np
+
+from hydroid.arrays import Ints
 from hydroid.files import read_table
 from hydroid.units import UNITS, Unit, bare, unit_of
 
@@ -100,6 +103,8 @@ def joint_of(name: str, joints: Sequence[str]) -> int | None:
     None: of none.
 
     Words of three letters and more may be cut short: `tele1_cmd` is the telescope's.
+    Of several joints it is the one that shares most words: `left_boom_deg` is no angle
+    of `left_stick`, nor of `right_boom`.
     """
     part = distinctive_part(name)
     if part != name:
@@ -110,12 +115,24 @@ def joint_of(name: str, joints: Sequence[str]) -> int | None:
     alike = [_with_synonyms(joint_words) for joint_words in exact]
     cut = [_cut_short(joint_words) for joint_words in alike]
     in_name = {*words(name)} - GENERIC_WORDS
+    against = [_contradicts(in_name, joint_words) for joint_words in exact]
     # the first way in which the name is one joint's decides
     for words_of_joints in (exact, alike, cut):
-        joint = _only_joint(in_name, words_of_joints)
+        shared = np.array([len(in_name & own) for own in words_of_joints], int)
+        joint = _only_largest(np.where(against, 0, shared))
         if joint is not None:
             return joint
     return None
+
+
+def _contradicts(in_name: Collection[str], joint_words: Collection[str]) -> bool:
+    """Return whether a name tells another side than a joint's name."""
+    for pair in CLUES["opposite"]:
+        told = {*pair}.intersection(in_name)
+        own = {*pair}.intersection(joint_words)
+        if told and own and told.isdisjoint(own):
+            return True
+    return False
 
 
 def _with_synonyms(joint_words: set[str]) -> set[str]:
@@ -134,15 +151,12 @@ def _cut_short(joint_words: Collection[str]) -> set[str]:
     return cut
 
 
-def _only_joint(in_name: set[str], words_of_joints: Sequence[set[str]]) -> int | None:
-    """Return the number of the only joint that has one of the words; None: none or
-    several have."""
-    joints = list[int]()
-    for number, joint_words in enumerate(words_of_joints, 1):
-        if in_name & joint_words:
-            joints.append(number)
-    if len(joints) == 1:
-        return joints[0]
+def _only_largest(shared: Ints) -> int | None:
+    """Return the number of the only joint with the most words shared, (J,); None: none
+    or several have."""
+    most = shared.max(initial=0)
+    if most and np.count_nonzero(shared == most) == 1:
+        return int(shared.argmax()) + 1
     return None
 
 

@@ -4,7 +4,7 @@ from collections.abc import Hashable, Mapping, Sequence
 from typing import NamedTuple
 
 from hydroid.arrays import Limits, record
-from hydroid.log.clues import direction, joint_of, number_in
+from hydroid.log.clues import direction, joint_of, number_in, words
 from hydroid.log.columns import Column
 from hydroid.log.rods import Rod
 from hydroid.settings.log import LENGTHS
@@ -65,7 +65,7 @@ def by_joint(
     Where no column says whose it is, they are given to the joints in order.
     """
     assigned = dict[int, Assignment]()
-    groups = _groups(columns)
+    groups = _groups(columns, joints.names)
     from_zero = any(number_in(column.name) == 0 for column in columns)
     left = list[Sequence[Column]]()
     for group in groups:
@@ -85,14 +85,17 @@ def by_joint(
     return assigned
 
 
-def _groups(columns: Sequence[Column]) -> list[Sequence[Column]]:
+def _groups(columns: Sequence[Column], joints: Sequence[str]) -> list[Sequence[Column]]:
     """Return columns alone, and those for two directions of a command together, the
     positive one first."""
+    in_joints = {word for joint in joints for word in words(joint)}
     groups = dict[Hashable, list[Column]]()
     for column in columns:
         sign, other_words = direction(column.name)
         key: Hashable = column.name
-        if sign and column.kind == "command":
+        # the left boom's command is not one to the left
+        told = {*words(column.name)} - other_words
+        if sign and column.kind == "command" and told.isdisjoint(in_joints):
             key = other_words
         groups.setdefault(key, []).append(column)
     for group in groups.values():

@@ -313,3 +313,17 @@ def test_a_command_that_is_never_0_has_its_rest_elsewhere(tmp_path: Path) -> Non
     found = guess(tmp_path, ["time_s", "boom_cmd", "boom_deg"], *columns)
     (reason,) = [one for one in found.reasons if one.startswith("boom_cmd")]
     assert "never 0" in reason
+
+
+def test_two_arms_keep_their_columns_apart(tmp_path: Path) -> None:
+    names = "time_s,right_boom_cmd,left_boom_cmd,right_boom_deg,left_boom_deg"
+    rows = np.stack([T, STEPS, -STEPS, 10 + SWEEP, SWEEP], axis=1)
+    np.savetxt(tmp_path / "log.csv", rows, delimiter=",", header=names, comments="")
+    tables = [open_table(tmp_path / "log.csv")]
+    for side, other in (("left", "right"), ("right", "left")):
+        found = guess_columns(tables, [f"{side}_boom", f"{side}_stick"])
+        boom = found.log["joints"][1]
+        assert boom["command"]["column"] == f"{side}_boom_cmd"
+        assert boom["angle"]["column"] == f"{side}_boom_deg"
+        assert 2 not in found.log["joints"]
+        assert {f"{other}_boom_cmd", f"{other}_boom_deg"} <= {*found.unused}

@@ -7,7 +7,7 @@ import io
 import os
 import signal
 import threading
-from collections.abc import Generator, Iterable
+from collections.abc import Generator, Iterable, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from secrets import token_hex
@@ -25,28 +25,30 @@ closed"""
 
 
 @contextmanager
-def undisturbed() -> Generator[None]:
-    """Delay Ctrl-C and the signals of a cluster until a file is written.
+def undisturbed() -> Generator[Sequence[int]]:
+    """Delay Ctrl-C and the signals of a cluster until a file is written, or until
+    threads have ended; yield the signals that have come.
 
     A KeyboardInterrupt may come between any two bytecodes, and some libraries turn it
-    into another error.
+    into another error. Where Python begins a thread or waits for one, it may leave a
+    lock locked: then the process never ends.
     """
+    held: list[int] = []
     # signals only interrupt the main thread
     if threading.current_thread() is not threading.main_thread():
-        yield
+        yield held
         return
-    held: list[int] = []
     ours = [
         number
         for number in (signal.SIGINT, *NOTICES)
-        if signal.getsignal(number) is not None
+        if signal.getsignal(number) not in (None, signal.SIG_IGN)
     ]
     before = {
         number: signal.signal(number, lambda number, _: held.append(number))
         for number in ours
     }
     try:
-        yield
+        yield held
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

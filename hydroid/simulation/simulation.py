@@ -23,6 +23,7 @@ from scipy.signal import lfilter
 from hydroid.arm.locked import repeat
 from hydroid.arm.model import add_payload
 from hydroid.arrays import Array, Index, Structs, record
+from hydroid.files import undisturbed
 from hydroid.hydraulics.actuator import pressures
 from hydroid.hydraulics.kernel import Plugin
 from hydroid.hydraulics.records import JOINT_STATE, has_force_curve
@@ -141,13 +142,20 @@ class Simulation:
         self, response: Response, rows: Index, candidates: Candidates, threads: int
     ) -> None:
         """Write what candidates do to their rows of a response."""
-        with quiet_mujoco(), ThreadPoolExecutor(threads) as pool:
+        # a stop is raised once the threads have ended; they begin nothing more meanwhile
+        with (
+            undisturbed() as stops,
+            quiet_mujoco(),
+            ThreadPoolExecutor(threads) as pool,
+        ):
             copies = self._copies(candidates, threads)
             # arms that no thread steps
             free = deque(self._stepped(copies) for _ in range(threads))
             ready = self._ready(candidates, free[0], pool.map)
 
             def simulate(some: Index) -> None:
+                if stops:
+                    return
                 arm = free.pop()
                 self._write(response, rows, some, ready, arm)
                 free.append(arm)
@@ -162,6 +170,9 @@ class Simulation:
                 last = response.angle[rows, -1]
                 left = np.flatnonzero(np.isnan(last).any(axis=1))
                 deque(pool.map(simulate, left[:, None]), maxlen=0)
+        # whoever took the signal goes on
+        if stops:
+            self._fill(response, rows, candidates, threads)
 
     def _write(
         self,

@@ -29,8 +29,9 @@ def start(
     if not (cwd / "log.csv").exists():
         head(cwd / "log.csv", 600)
         (cwd / "mech.yaml").write_text(STAGE_1)
-    # under nohup the tests ignore SIGHUP, and so would the run
+    # what the tests ignore (SIGHUP under nohup, SIGINT in the background) the run would too
     code = "import signal; signal.signal(signal.SIGHUP, signal.SIG_DFL); "
+    code += "signal.signal(signal.SIGINT, signal.default_int_handler); "
     code += "import hydroid.commands.app as a, hydroid.fitting.checkpoints as s; s.SAVE_EVERY = 0; "
     code += "print('imported', flush=True); a.main()"
     words = [command, "log.csv", *map(str, options), "--out", out, "--resume"]
@@ -137,7 +138,7 @@ def test_killed_runs_end_the_same(tmp_path: Path, kind: str):
                 rng.choice((".checkpoint.npz.*.part", ".*.part")),
             )
         process.send_signal(end)
-        _, errors = process.communicate()
+        _, errors = process.communicate(timeout=300)
         if process.returncode == 0:  # it was faster
             assert content(killed / "run") == content(whole / "run")
             shutil.rmtree(killed / "run")

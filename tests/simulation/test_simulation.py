@@ -2,8 +2,11 @@
 common."""
 
 import os
+import signal
 import subprocess
 import sys
+import threading
+import time
 from dataclasses import replace
 
 import mujoco
@@ -234,3 +237,42 @@ def test_compiling_is_announced_only_where_the_cache_is_empty(tmp_path):
     said = [run.stderr for run in runs]
     assert said[0].count("compiling the simulation") == 1
     assert said[1] == ""
+
+
+@pytest.fixture
+def stopping(spec, arm, study_log, monkeypatch):
+    """A simulation that is stopped when its first candidate begins, and the moments at
+    which it began one."""
+    stopped = simulation(spec, arm, study_log, range(7), threads=2)
+    begun = list[float]()
+    write = stopped._write
+
+    def write_and_stop(*given):
+        begun.append(time.monotonic())
+        if len(begun) == 1:
+            os.kill(os.getpid(), signal.SIGINT)
+        write(*given)
+
+    monkeypatch.setattr(stopped, "_write", write_and_stop)
+    before = signal.getsignal(signal.SIGINT)
+    yield stopped, begun
+    signal.signal(signal.SIGINT, before)
+
+
+def test_a_stop_is_raised_when_no_thread_is_left(arm, stopping):
+    """Else Python may leave a lock locked for which a thread waits forever."""
+    stopped, begun = stopping
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    threads = threading.active_count()
+    with pytest.raises(KeyboardInterrupt):
+        stopped.simulate(candidates(arm, 20))
+    assert threading.active_count() == threads
+    assert len(begun) < 20
+
+
+def test_a_stop_that_is_ignored_changes_nothing(spec, arm, study_log, stopping):
+    stopped, _ = stopping
+    signal.signal(signal.SIGINT, lambda *_: None)
+    parameters = candidates(arm, 20)
+    whole = simulation(spec, arm, study_log, range(7)).simulate(parameters)
+    np.testing.assert_array_equal(stopped.simulate(parameters).angle, whole.angle)

@@ -203,7 +203,7 @@ class SteppedArm:
 
         `state` is its actuators', (J,) of JOINT_STATE: steps change it.
         """
-        self._roll(self._handles, plugin, state, course, trace)
+        call_compiled(self._roll, self._handles, plugin, state, course, trace)
 
     @property
     def handles(self) -> Handles:
@@ -222,20 +222,57 @@ def bind(compiled: Any, *arguments: Any) -> Callable[[], object]:
     `source`, is left out.
 
     It takes 3 µs beside the function itself. Without it numba looks at the types at
-    every call, and may take 1 ms for those of structured arrays.
+    every call, and takes 1 ms or more for those of structured arrays.
     """
+    return partial(_entry(compiled, arguments), *arguments, _source(compiled))
+
+
+_entries: dict[Any, Callable[..., object]] = {}
+"""what `call_compiled` calls, by the function and the kinds of its arguments"""
+
+
+def call_compiled(compiled: Any, *arguments: Any) -> None:
+    """Call a compiled function as `bind` does, for arguments that are others each time:
+    numba looks at their types only where their kinds are new."""
+    key = (compiled, *map(_kind, arguments))
+    entry = _entries.get(key)
+    if entry is None:
+        entry = _entry(compiled, arguments)
+        _entries[key] = entry
+    entry(*arguments, _source(compiled))
+
+
+def _entry(compiled: Any, arguments: Sequence[Any]) -> Callable[..., object]:
+    """Return a compiled function for the types of its arguments, `source` left out."""
+    omitted = types.Omitted(_source(compiled).value)
+    return compiled.compile((*map(typeof, arguments), omitted))
+
+
+def _source(compiled: Any) -> OmittedArg:
     (source,) = compiled.py_func.__defaults__
-    kinds = (*map(typeof, arguments), types.Omitted(source))
-    return partial(compiled.compile(kinds), *arguments, OmittedArg(source))
+    return OmittedArg(source)
+
+
+def _kind(argument: Any) -> Any:
+    """Return what the type of an argument depends on for numba, or what tells more
+    apart."""
+    if isinstance(argument, np.ndarray):
+        return argument.dtype, argument.ndim, argument.flags.num
+    if isinstance(argument, tuple):
+        return type(argument), *map(_kind, argument)
+    return type(argument)
 
 
 @compilable
 def write_sample(arm, trace, state, k: int) -> None:
     """Write the sample that step k ends, if it ends one."""
     if (k + 1) % arm.steps == 0:
-        trace.angle[k // arm.steps] = arm.angle
+        sample = k // arm.steps
+        # a loop: numba first looks whether two arrays overlap
+        for i in range(arm.angle.size):
+            trace.angle[sample, i] = arm.angle[i]
         if trace.states.size:
-            trace.states[k // arm.steps] = state
+            trace.states[sample] = state
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

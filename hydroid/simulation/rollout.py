@@ -32,10 +32,12 @@ from hydroid.arrays import Array, Index, Structs
 from hydroid.hydraulics.elementwise import compilable
 from hydroid.hydraulics.kernel import SOURCE, Plugin, look_ahead, make_pad, take_over
 from hydroid.hydraulics.records import COEFFICIENTS, JOINT_STATE
+from hydroid.simulation.gravity import LINK
 
 _log = logging.getLogger(__name__)
 
 NO_JOINTS = np.empty(0, np.intp)
+NO_LINKS = np.empty(0, LINK)
 NO_ACTUATORS = Plugin(
     np.empty(0, COEFFICIENTS), NO_JOINTS, np.empty((0, 0), np.intp), 0, 0.0, 1
 )
@@ -73,8 +75,11 @@ class Handles(NamedTuple):
     bare_armature: Array  # the arm's own, without oil, of these [kg·m²], (J,)
     pushed: Index  # the other joints, (P,)
     steps: int  # in one sample
-    # torques that hold the arm, where a rollout asks for them [N·m], (V,)
-    gravity: Array
+    # the bodies, the world first, (V + 1,) of `gravity.LINK`; empty where a rollout asks
+    # for no gravity
+    links: Structs
+    body_mass: Array  # of these [kg], (V + 1,)
+    body_centre: Array  # of these, in their frames [m], (V + 1, 3)
     slack: Array  # angles at which springs are slack [rad], (V,)
     limits: Array  # of the angles [rad], (V, 2)
 
@@ -116,6 +121,7 @@ class SteppedArm:
         steps: of MuJoCo in one sample.
         rollout: the compiled one, with the arguments of `roll`, which it is by default.
         copies: how often the arm is in the model.
+        links: as of `Handles`.
 
     Attributes:
         model, data: with the values of the candidate that was started last, and its
@@ -129,6 +135,7 @@ class SteppedArm:
         steps: int = 1,
         rollout: Callable[..., None] | None = None,
         copies: int = 1,
+        links: Structs = NO_LINKS,
     ) -> None:
         self._roll = rollout or roll
         self.copies = copies
@@ -153,7 +160,9 @@ class SteppedArm:
             bare_armature=self._armature[columns],
             pushed=np.setdiff1d(np.arange(m.nv), columns),
             steps=steps,
-            gravity=d.qfrc_bias,
+            links=links,
+            body_mass=m.body_mass,
+            body_centre=m.body_ipos,
             slack=m.qpos_spring,
             limits=np.where(m.jnt_limited[:, None], m.jnt_range, endless),
         )

@@ -142,6 +142,11 @@ class Response:
     flow: Array
     line: Array
 
+    def __getitem__(self, rows: slice | Index) -> "Response":
+        return Response(
+            self.angle[rows], self.pressure[rows], self.flow[rows], self.line[rows]
+        )
+
 
 class Scenario:
     """A log made ready for simulation: its commands drive, from the pose in which it

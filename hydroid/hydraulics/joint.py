@@ -103,7 +103,7 @@ def _advance(c, side, z, asked: float, step: float, whole: bool) -> float:
 
 
 @compilable
-def _move_plunger(c, side, z, w, substep: int, step: float) -> float:
+def move_plunger(c, side, z, w, substep: int, step: float) -> float:
     """Advance a side over a sub-step, up to the moment at which its command changes and
     on; mean stroke."""
     # part of the sub-step under the new command
@@ -132,9 +132,15 @@ def open_share(side, travel: float) -> float:
 def net_opening(c, z, w, substep: int, step: float) -> float:
     """Advance both plungers over a sub-step; the mean opening [m²], below 0 towards
     B."""
-    # of the spool [m], equation (6)
-    displacement = _move_plunger(c, c.a, z.a, w.a, substep, step)
-    displacement -= _move_plunger(c, c.b, z.b, w.b, substep, step)
+    a = move_plunger(c, c.a, z.a, w.a, substep, step)
+    b = move_plunger(c, c.b, z.b, w.b, substep, step)
+    return spool_opening(c, z, a - b)
+
+
+@compilable
+def spool_opening(c, z, displacement: float) -> float:
+    """Move the spool to a displacement [m], equation (6), over a sub-step; the mean
+    opening as `net_opening`."""
     # else the spool rests, and its power law is not worked out again
     if z.displacement != displacement:
         z.displacement = displacement

@@ -3,7 +3,8 @@
 What a valve opens follows from its command alone, whatever the arm does. So the
 openings of a population are computed before its arms move, and once for all candidates
 whose valve is the same: of two candidates that differ in one parameter, those are all
-joints but one.
+joints but one. What moves the plunger of a side is computed first, once for all whose
+plunger and coil are the same, whatever the spool opens.
 """
 
 # pyright: reportMissingParameterType=false
@@ -11,14 +12,16 @@ joints but one.
 
 from collections import deque
 from collections.abc import Callable, Iterable
+from functools import partial
 
 import numpy as np
 from numba import njit
 
 from hydroid.arrays import Array, Structs
-from hydroid.hydraulics.joint import mean_opening
+from hydroid.hydraulics.joint import command, move_plunger, spool_opening
 from hydroid.hydraulics.kernel import SOURCE, Plugin
 from hydroid.hydraulics.records import SCRATCH
+from hydroid.hydraulics.valve import KNOTS
 
 BEHIND_VALVE = [
     *(
@@ -46,34 +49,92 @@ BEHIND_PORT = ["area", "draw", "return_"]
 """what a valve's opening does not depend on, of a joint and of its sides; the others
 are taken to matter"""
 
-ValveKey = tuple[int, bytes]
-"""a joint, and what its opening depends on"""
+BEHIND_PLUNGER = ["opening_keep", "opening_steps", "lag_of_speed"]
+BEHIND_SPOOL = [
+    *("opening", "opening_exponent", "overlap", "slot_width", "lagging", "has_curve"),
+    *(f"curve_{k}" for k in range(1, len(KNOTS) + 1)),
+    *(f"knot_{k}" for k in range(1, len(KNOTS) + 1)),
+]
+"""what the strokes of its plungers do not depend on besides, of a joint and of its
+sides"""
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _open(valve: Plugin, rest, commands, opening, source: int = SOURCE) -> None:
-    """Write the mean opening of one joint's valve in each step, (steps,), from its
-    state at rest, (1,)."""
+def _push(
+    valve: Plugin, rest, commands, side_a: bool, strokes, source: int = SOURCE
+) -> None:
+    """Write the mean strokes of the plunger of side A, or B, in each sub-step, (steps,
+    sub-steps), from a joint's state at rest, (1,)."""
     c = valve.coefficients[0]
     z = rest[0]
     w = np.zeros(1, SCRATCH)[0]
-    past = commands.size - opening.size
+    step = valve.period / valve.substeps
+    past = commands.size - strokes.shape[0]
+    for k in range(strokes.shape[0]):
+        command(c, z, w, commands, past + k)
+        for i in range(valve.substeps):
+            if side_a:
+                strokes[k, i] = move_plunger(c, c.a, z.a, w.a, i, step)
+            else:
+                strokes[k, i] = move_plunger(c, c.b, z.b, w.b, i, step)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _open(
+    valve: Plugin, rest, strokes_a, strokes_b, opening, source: int = SOURCE
+) -> None:
+    """Write the mean opening of one joint's valve in each step, (steps,), from the
+    strokes of its plungers, (steps, sub-steps)."""
+    c = valve.coefficients[0]
+    z = rest[0]
     for k in range(opening.size):
-        opening[k] = mean_opening(c, z, w, commands, past + k, valve)
+        net = 0.0
+        for i in range(valve.substeps):
+            net += spool_opening(c, z, strokes_a[k, i] - strokes_b[k, i])
+        opening[k] = net / valve.substeps
 
 
-def _valve_keys(coefficients: Structs) -> list[list[ValveKey]]:
+def _valves(coefficients: Structs) -> Structs:
     """Return what the openings of every candidate's joints depend on, of COEFFICIENTS,
-    (n, J)."""
-    alike = coefficients.copy()
-    alike[BEHIND_VALVE] = 0.0
-    alike["a"][BEHIND_PORT] = 0.0
-    alike["b"][BEHIND_PORT] = 0.0
-    keys: list[list[ValveKey]] = []
-    for candidate in alike:
-        valves = [valve.tobytes() for valve in candidate]
-        keys.append([*enumerate(valves)])
-    return keys
+    (n, J), alone: all else is 0."""
+    valves = coefficients.copy()
+    valves[BEHIND_VALVE] = 0.0
+    for side in "ab":
+        valves[side][BEHIND_PORT] = 0.0
+    return valves
+
+
+def _plungers(valves: Structs, side: str) -> Structs:
+    """Return the same for the strokes of one side's plungers."""
+    plungers = valves.copy()
+    plungers[BEHIND_PLUNGER] = 0.0
+    plungers[side][BEHIND_SPOOL] = 0.0
+    plungers["b" if side == "a" else "a"] = 0.0
+    return plungers
+
+
+def _of_each(
+    depends_on: Structs,
+    driven: set[int],
+    make: Callable[[int, int], Array],
+    run: Callable[..., Iterable[None]],
+) -> list[list[Array | None]]:
+    """Return what `make` gives for every candidate's driven joints, by both numbers:
+    once for those of a joint that are alike in what it depends on, (n, J) of
+    COEFFICIENTS."""
+    keys = [[*enumerate(one.tobytes() for one in row)] for row in depends_on]
+    # the last candidate that has it
+    owners = dict[tuple[int, bytes], int]()
+    for i, row in enumerate(keys):
+        owners |= {key: i for key in row if key[0] in driven}
+    made = dict[tuple[int, bytes], Array]()
+
+    def make_once(key: tuple[int, bytes]) -> None:
+        made[key] = make(owners[key], key[0])
+
+    # the deque takes what the pool returns, so that errors are raised here
+    deque(run(make_once, owners), maxlen=0)
+    return [[made.get(key) for key in row] for row in keys]
 
 
 def valve_openings(
@@ -85,24 +146,34 @@ def valve_openings(
     `states` are those of the start, shape (n, J), and `commands` those of a `Course`.
     `run` is that of a pool. No bit depends on the other candidates.
     """
-    keys = _valve_keys(plugin.coefficients)
-    # the last candidate that has a valve
-    owners: dict[ValveKey, int] = {}
-    for i, row in enumerate(keys):
-        owners |= dict.fromkeys(row, i)
+    driven = set(plugin.order[plugin.idle :].tolist())
     steps = len(commands) - plugin.past
-    openings = {key: np.zeros(steps) for key in owners}
+    valves = _valves(plugin.coefficients)
 
-    def open_valve(key: ValveKey) -> None:
-        i = owners[key]
-        j = key[0]
+    def of_joint(i: int, j: int) -> tuple[Plugin, Structs]:
+        """Return the valve of a candidate's joint, and its state at rest."""
         valve = plugin._replace(coefficients=plugin.coefficients[i, j : j + 1])
         # the rollout begins from the same state
-        rest = states[i, j : j + 1].copy()
-        _open(valve, rest, commands[:, j], openings[key])
+        return valve, states[i, j : j + 1].copy()
 
-    driven = set(plugin.order[plugin.idle :].tolist())
-    wanted = [key for key in openings if key[0] in driven]
-    # the deque takes what the pool returns, so that errors are raised here
-    deque(run(open_valve, wanted), maxlen=0)
-    return [np.column_stack([openings[key] for key in row]) for row in keys]
+    def push(i: int, j: int, side: str) -> Array:
+        strokes = np.empty((steps, plugin.substeps))
+        _push(*of_joint(i, j), commands[:, j], side == "a", strokes)
+        return strokes
+
+    strokes_a, strokes_b = (
+        _of_each(_plungers(valves, side), driven, partial(push, side=side), run)
+        for side in "ab"
+    )
+
+    def open_valve(i: int, j: int) -> Array:
+        opening = np.zeros(steps)
+        _open(*of_joint(i, j), strokes_a[i][j], strokes_b[i][j], opening)
+        return opening
+
+    shut = np.zeros(steps)
+    openings = _of_each(valves, driven, open_valve, run)
+    return [
+        np.column_stack([shut if one is None else one for one in row])
+        for row in openings
+    ]

@@ -77,6 +77,7 @@ def inlined(function: FunctionType, seen: set[FunctionType]) -> Iterator[Path]:
     [
         (rollout.roll, []),
         (quasi_static.roll_quasi_static, [rollout.write_sample, gravity.hold]),
+        (openings._push, []),  # pyright: ignore[reportPrivateUsage]
         (openings._open, []),  # pyright: ignore[reportPrivateUsage]
         (steady._steady, []),  # pyright: ignore[reportPrivateUsage]
         (

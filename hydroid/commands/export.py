@@ -46,8 +46,8 @@ def export(
 ) -> Result[list[str]]:
     """Write a fitted machine for other programs.
 
-    parameters: draws, that is, sets of parameter values that the logs allow; their ranges;
-    and the errors of the model. table: steady speed of each joint against its command,
+    parameters: draws of all parameters that agree with the logs, ranges of the
+    parameters, and errors of the model. table: steady speed of each joint against its command,
     as CSV for a PLC. urdf: your own file with the masses of the fit. mjcf: a model that
     plain MuJoCo steps. linear: A, B, C, D and delays near one pose and
     command, as JSON, and a page with step response and Bode plot. fmu: FMI 2 for

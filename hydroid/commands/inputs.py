@@ -63,7 +63,7 @@ SHARED = f"""
     refinement: After the search, refine its estimate by least squares.
     budget (TIME): Time for search and refinement, such as 90s, 5min or 2h. When it is
         up, hydroid keeps the best model so far. Intervals and report take some more
-        time. To go on, repeat the command with --resume and a larger budget.
+        time. To go on, repeat the command with --resume.
     threads (N): Number of threads (0: one per core, or with --dask one per worker).
 """
 

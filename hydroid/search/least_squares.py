@@ -28,7 +28,7 @@ What else differs from a textbook:
   compensate each other.
 - A response may have an edge: a machine that just leaves its stop, or does not. Steps
   that lead over it do not help, however short, although the linear model promises much.
-  Before least squares ends there, it tries steps that hold one parameter each where it
+  Before least squares ends so, it tries steps that hold one parameter each where it
   is. With the one that leads over the edge held, the others move on.
 - A parameter without effect stays where it is: its column of J is zero, or rounding
   noise (`derivatives`).
@@ -67,6 +67,8 @@ CURVED = 2.0
 """a correction this many times longer than the step itself is not believed"""
 TRUSTED = 0.3
 """part of the promised gain that a step must bring for its Jacobian to be updated"""
+PROMISING = 0.1
+"""part of the cost that is promised beside an edge; near an optimum it is far less"""
 FIRM = (1e-2, 1.0)
 """λ of the steps that hold a parameter"""
 SHORTEST = 1e-14
@@ -196,6 +198,8 @@ def _without_gain(
     promised = model.gain(model.step(after.damping))
     if promised >= settings.gain_tolerance * now.cost:
         return after
+    if model.gain(model.step(UNDAMPED)) < PROMISING * now.cost:
+        return _no_step(now)
     return _beside_an_edge(now, model, residuals, settings)
 
 

@@ -4,6 +4,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
 
+import numpy as np
+
 from hydroid.arrays import Array, record
 from hydroid.errors import LogError
 from hydroid.files import Plain
@@ -14,8 +16,10 @@ from hydroid.log import (
     Log,
     Table,
     motion_of,
+    stands_still,
 )
 from hydroid.log.clues import column_unit, kind_of
+from hydroid.log.command_sizes import LEAST_COMMAND
 from hydroid.log.mapping import angle_margin
 from hydroid.project.columns import column_lines
 from hydroid.project.logs import Others, reach_of, read_first, read_others
@@ -28,6 +32,11 @@ from hydroid.words import listed
 
 GUESSED = "GUESSED from the log: check every line."
 GIVEN = "As you gave them, compared with the log."
+UNDRIVEN = "no command in the logs, so not compared"
+STANDING = (
+    "driven, but the angle never changes, so not compared; check the sensor, or its "
+    "column in fit.yaml"
+)
 REVERSED = (
     "a reversed command suits a valve that is wired the other way. If a sensor counts the other "
     "way instead (compare arm.png), set scale: -1 at its angle and not at its command: gravity "
@@ -140,6 +149,11 @@ def _seen(
         driven = _driven(driven, logs, arm.joint_names, reasons)
     wrong = _turn_commands(entries, motions, arm, reasons)
     reasons += _lacking(entries, arm.joint_names)
+    if origin == GUESSED:
+        for joint in measured:
+            # a guessed valve would swing a joint of which nothing is known
+            if stands_still(logs, joint):
+                entries[joint]["command"] = None
     undriven = [motion for joint, motion in motions.items() if joint not in driven]
     return Layout(
         guess.log,
@@ -184,12 +198,18 @@ def _given(table: Table, arm: Arm, given: LogSettings) -> ColumnGuess:
 def _driven(
     joints: Sequence[int], logs: Sequence[Log], names: Sequence[str], reasons: list[str]
 ) -> list[int]:
-    """Return the joints that any log drives; of the others say so."""
-    driven = [joint for joint in joints if any(log.drives(joint) for log in logs)]
-    idle = [names[joint - 1] for joint in joints if joint not in driven]
-    if idle:
-        reasons.append(f"{listed(idle)}: no command in the logs, so not compared")
-    return driven
+    """Return the joints that any log drives, by more than the noise of a lever, and
+    whose angle changes; of the others say so."""
+    idle = list[int]()
+    for joint in joints:
+        most = max(np.abs(log.command_of(joint)).max() for log in logs)
+        if most < LEAST_COMMAND:
+            idle.append(joint)
+    standing = [k for k in joints if stands_still(logs, k)]
+    for left_out, why in ((idle, UNDRIVEN), (standing, STANDING)):
+        if left_out:
+            reasons.append(f"{listed([names[k - 1] for k in left_out])}: {why}")
+    return [k for k in joints if k not in (*idle, *standing)]
 
 
 def _turn_commands(

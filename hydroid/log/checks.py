@@ -89,7 +89,7 @@ def _time(recording: Recording, settings: LogSettings) -> Iterator[LogFinding]:
             "period": period,
             "slowest": slowest,
         }
-        remedy = _time_remedy(period, signal.gain)
+        remedy = _time_remedy(recording, period, duration)
         yield recording.finding("error", kind, (), signal, remedy=remedy, **numbers)
         return
     # gaps are spoken of where they split the log
@@ -106,13 +106,23 @@ def _time(recording: Recording, settings: LogSettings) -> Iterator[LogFinding]:
         )
 
 
-def _time_remedy(period: float, factor: float) -> str:
-    """Return what to do about a period [s] that is read with a unit of so many
-    seconds."""
-    unit = likely_time_unit(period / factor)
-    if unit and UNITS[unit].factor != factor:
-        return f"if its unit is {unit}, set log.time.unit: {unit}"
-    return "check log.time.unit and log.period_s"
+def _time_remedy(recording: Recording, period: float, duration: float) -> str:
+    """Return what to do about a period and a duration [s] that no log has.
+
+    Another unit may explain them if the log is then long enough; it is the last thing
+    to think of where the file states the unit.
+    """
+    signal = recording.signals[0]
+    unit = likely_time_unit(period / signal.gain)
+    in_unit = UNITS[unit].factor / signal.gain if unit else 1.0
+    if in_unit == 1 or duration * in_unit < SHORTEST:
+        return "take more samples, or check log.time.unit and log.period_s"
+    hint = f"if its unit is {unit}, set log.time.unit: {unit}"
+    given = recording.table.units.get(signal.name, "")
+    stated = column_unit(signal.name, given)
+    if stated is not None and stated.factor == signal.gain:
+        return f"take more samples, or {hint}"
+    return hint
 
 
 def _values(recording: Recording) -> Iterator[LogFinding]:

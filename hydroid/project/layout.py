@@ -21,6 +21,7 @@ from hydroid.log import (
 from hydroid.log.clues import column_unit, kind_of
 from hydroid.log.command_sizes import LEAST_COMMAND
 from hydroid.log.mapping import angle_margin
+from hydroid.progress import Progress, no_progress
 from hydroid.project.columns import column_lines
 from hydroid.project.logs import Others, reach_of, read_first, read_others
 from hydroid.project.mirrored import mirror_sensors, of_other_sign
@@ -85,6 +86,7 @@ def find_layout(
     *,
     given: LogSettings | None = None,
     others: Others | None = None,
+    progress: Progress = no_progress,
 ) -> Layout:
     """Guess the columns of a log, turn commands that act against the angle,
     and see how fast joints are.
@@ -97,6 +99,7 @@ def find_layout(
         given: what a person says of the columns, which are not guessed then.
         others: further logs of the same columns; a joint that one of them drives can be
             fitted. One that cannot be read by the columns of the first is left out.
+        progress: what is read, or fitted, and how much of it.
 
     Raises:
         SettingsError: no joint has one of the names.
@@ -111,19 +114,25 @@ def find_layout(
     others = others or Others()
     if given is not None:
         guess = _given(table, arm, given)
-        return _seen(table, arm, guess, others, GIVEN)
+        return _seen(table, arm, guess, others, GIVEN, progress)
     guess = guessed_section(table, arm, order)
     if guess.mirrored:
         # sensors without a scale: what one log reaches is not all of their range
-        guess = guessed_section(table, arm, order, [*others.tables()])
+        tables = [*others.tables(progress)]
+        guess = guessed_section(table, arm, order, tables)
     missing = missing_column(guess.log, targets=_has_targets(table))
     if missing:
         return _skeleton(table, arm, guess, missing)
-    return _seen(table, arm, guess, others, GUESSED)
+    return _seen(table, arm, guess, others, GUESSED, progress)
 
 
 def _seen(
-    table: Table, arm: Arm, guess: ColumnGuess, others: Others, origin: str
+    table: Table,
+    arm: Arm,
+    guess: ColumnGuess,
+    others: Others,
+    origin: str,
+    progress: Progress,
 ) -> Layout:
     """Return the layout of columns, with what the logs show of the joints' motion."""
     entries = guess.log["joints"]
@@ -131,14 +140,16 @@ def _seen(
     if origin == GIVEN:
         # a person who names columns knows which way they count
         settings = validate(guess.log, LogSettings, table.source)
-        logs = read_first(table, settings, arm, reasons, strict=True)
+        logs = read_first(table, settings, arm, reasons, progress, strict=True)
     else:
-        settings, logs = _mirrored(table, arm, guess, others, reasons)
+        settings, logs = _mirrored(table, arm, guess, others, reasons, progress)
     measured = [joint for joint, entry in entries.items() if entry["angle"]]
     left_out = list[Path]()
     reach = dict[int, tuple[float, float]]()
     if logs:
-        fitted, unseen, left_out = read_others(table, settings, arm, others, reasons)
+        fitted, unseen, left_out = read_others(
+            table, settings, arm, others, reasons, progress
+        )
         logs += fitted
         reach = reach_of([*logs, *unseen], measured)
     driven = [joint for joint in measured if entries[joint]["command"] is not None]
@@ -162,7 +173,7 @@ def _seen(
         guess.unused,
         motions,
         followed=any(motion.travel > FOLLOWED for motion in undriven),
-        valves=_valves(logs, driven, wrong),
+        valves=_valves(logs, driven, wrong, progress),
         left_out=tuple(left_out),
         reach=reach,
         origin=origin,
@@ -170,18 +181,23 @@ def _seen(
 
 
 def _mirrored(
-    table: Table, arm: Arm, guess: ColumnGuess, others: Others, reasons: list[str]
+    table: Table,
+    arm: Arm,
+    guess: ColumnGuess,
+    others: Others,
+    reasons: list[str],
+    progress: Progress,
 ) -> tuple[LogSettings, list[Log]]:
     """Return the settings and logs of guessed columns, those turned round that count
     backwards."""
     settings = validate(guess.log, LogSettings, table.source)
-    logs = read_first(table, settings, arm, reasons, strict=False)
+    logs = read_first(table, settings, arm, reasons, progress, strict=False)
     backwards = mirror_sensors(logs, guess, arm, in_range=others.in_range)
     if backwards:
         reasons += backwards
         settings = validate(guess.log, LogSettings, table.source)
         # what it says of the log is the same
-        logs = read_first(table, settings, arm, [], strict=False)
+        logs = read_first(table, settings, arm, [], progress, strict=False)
     return settings, logs
 
 
@@ -236,7 +252,10 @@ def _turn_commands(
 
 
 def _valves(
-    logs: Sequence[Log], joints: Sequence[int], wrong: Sequence[int]
+    logs: Sequence[Log],
+    joints: Sequence[int],
+    wrong: Sequence[int],
+    progress: Progress,
 ) -> dict[int, JointStart]:
     """Return the valves of joints that follow their logged commands.
 
@@ -244,7 +263,8 @@ def _valves(
     then turned.
     """
     valves = dict[int, JointStart]()
-    for joint in joints:
+    for number, joint in enumerate(joints):
+        progress("finding starts of valves: joint", number, len(joints))
         valve = fitted_valve(logs, joint)
         if valve is not None:
             valves[joint] = valve.turned if joint in wrong else valve

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from hydroid.commands.console import Result
 from hydroid.commands.inputs import Source, as_list, command, names
+from hydroid.commands.progress import Progress
 from hydroid.errors import SettingsError
 from hydroid.files import Plain, is_file
 
@@ -74,26 +75,28 @@ def init(
     kept_config = None if config is None else _existing(config)
     from hydroid.project.project import go_on, write_project
 
-    if kept_config is not None:
-        if any((robot, joints, lengths, tip, total_mass is not None)):
-            hint = "leave --arm, --joints, --lengths, --tip and --total-mass out"
-            raise SettingsError(
-                "names its arm, which stays as it is", kept_config, hint
+    with Progress() as progress:
+        if kept_config is not None:
+            if any((robot, joints, lengths, tip, total_mass is not None)):
+                hint = "leave --arm, --joints, --lengths, --tip and --total-mass out"
+                raise SettingsError(
+                    "names its arm, which stays as it is", kept_config, hint
+                )
+            where = Path(folder) if folder else None
+            project = go_on(where, kept_config, logs, progress, force=force)
+        else:
+            _refuse_two_arms(robot, lengths)
+            project = write_project(
+                _required(folder),
+                robot,
+                logs,
+                names(joints),
+                progress,
+                tip=tip,
+                total_mass=total_mass,
+                force=force,
+                lengths=_numbers(names(lengths)),
             )
-        where = Path(folder) if folder else None
-        project = go_on(where, kept_config, logs, force=force)
-    else:
-        _refuse_two_arms(robot, lengths)
-        project = write_project(
-            _required(folder),
-            robot,
-            logs,
-            names(joints),
-            tip=tip,
-            total_mass=total_mass,
-            force=force,
-            lengths=_numbers(names(lengths)),
-        )
     content: Plain = {"out": str(project.folder), "missing": project.missing or None}
     for key in ("files", "notes", "columns", "unused", "commands"):
         content[key] = [*getattr(project, key)]

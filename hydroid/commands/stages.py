@@ -21,7 +21,7 @@ from hydroid.commands.inputs import (
     setting_changes,
 )
 from hydroid.commands.joint_units import in_joint_units
-from hydroid.commands.logs import read_logs, refuse_undriven
+from hydroid.commands.logs import read_logs, refuse_unfit
 from hydroid.commands.progress import FitProgress, Progress
 from hydroid.errors import SettingsError
 from hydroid.estimate import FitSummary
@@ -377,7 +377,7 @@ def adapt(
         )
         if stray:
             raise SettingsError("is none of the logs", f"payloads.{min(stray)}")
-    refuse_undriven(read, model.settings)
+    refuse_unfit(read, model.settings)
     from hydroid.advice.adaptation import adapted, load_findings, steps
     from hydroid.advice.loads import asked_loads, load_finding
     from hydroid.reporting.verdict_table import left_out_table

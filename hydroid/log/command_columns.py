@@ -10,7 +10,7 @@ from hydroid.arrays import Array
 from hydroid.files import Plain
 from hydroid.log.columns import Column, Entry
 from hydroid.log.joint_columns import Assignment
-from hydroid.log.signals import CommandRange, likely_range, resting_range
+from hydroid.log.signals import CommandRange, likely_range, of_one_scale, resting_range
 from hydroid.log.table import Signal, Table
 
 SMALL_COMMAND = 5.0
@@ -28,6 +28,9 @@ def command_entries(
     cells = dict[int, _Cells]()
     for joint, command in commands.items():
         cells[joint] = _cells(table, command.columns)
+    ranges = of_one_scale([of_joint.likely for of_joint in cells.values()])
+    for joint, likely in zip(cells, ranges, strict=True):
+        cells[joint] = cells[joint]._replace(likely=likely)
     usual = _usual_range([*cells.values()])
     entries = dict[int, Entry]()
     for joint, command in commands.items():

@@ -47,8 +47,8 @@ def init(
         arm (robot.urdf): URDF or MJCF of the arm, or an arm's YAML file [default: a
             template of boxes].
         log (LOG): A log; its columns are guessed. Repeat the option for several logs.
-            Of several, the commands to run next fit all but the last, and validate on
-            the last.
+            The commands to run next then fit all logs but the last, and validate on
+            that one.
         config (YAML): The fit.yaml of an earlier init, whose `log` section you have
             completed. Its columns and its arm stay; all other settings are written
             anew.
@@ -61,8 +61,7 @@ def init(
             file are scaled to it.
         force: Replace the files of an earlier project in the folder.
         tip (LINK): Last link of the arm, if the robot has several branches [default:
-            the end of the branch that the log's joints are on; if none is, the end of
-            the longest branch].
+            the end of the branch with the log's joints, or else of the longest branch].
 
     Raises:
         SettingsError: a file of the project is there already, or no joint has one of

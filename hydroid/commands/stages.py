@@ -65,7 +65,7 @@ def fit_mech(
         print(fitted.summary.values)
 
     Args:
-        out (DIR): Run folder [default: runs/fit-mech; in Python nothing is written].
+        out (DIR): Run folder [default: runs/fit-mech; in Python: none].
 
     Raises:
         HydroidError: an input or a folder that cannot be used.
@@ -119,9 +119,10 @@ def fit_hyd(
         print(fitted.summary.values)
 
     Args:
-        out (DIR): Run folder [default: runs/fit-hyd; in Python nothing is written].
-        mech (RUN|YAML): Stage 1: its run folder, or a YAML file of its values [default:
-            the masses of the arm's file, unless the settings free them].
+        out (DIR): Run folder [default: runs/fit-hyd; in Python: none].
+        mech (RUN|YAML): Stage 1: its run folder, or a YAML file of its values. The
+            masses are fixed at these values [default: the settings free the masses, or
+            the arm's file gives them].
 
     Raises:
         HydroidError: an input or a folder that cannot be used.
@@ -358,10 +359,9 @@ def adapt(
 
     Args:
         logs (LOG): The new logs.
-        free (NAME,NAME): Parameters to free [default: hydroid tries masses, pump,
-            effects of the groups of logs, and tip_load, one after the other, and keeps
-            those that help].
-        out (DIR): Run folder [default: runs/adapt; in Python nothing is written].
+        free (NAME,NAME): Parameters to free [default: those that help, among masses,
+            pump, tip_load and the effects of days or other groups of logs].
+        out (DIR): Run folder [default: runs/adapt; in Python: none].
         set (KEY=VALUE): Replace a setting of the fit, such as
             refinement.iterations=100.
 

@@ -27,12 +27,13 @@ from hydroid.hydraulics.kernel import Plugin, source_key
 from hydroid.mjcf import quiet_mujoco
 from hydroid.plant.plant import PHYSICS, Plant
 from hydroid.rungs import Rung
+from hydroid.simulation.gravity import hold
 from hydroid.simulation.quasi_static import roll_quasi_static, share_pump
 from hydroid.simulation.rollout import Course, Handles, Trace, bind, roll, write_sample
 from hydroid.simulation.rolls import ROLLS
 
 # the files of all rollouts below are in the key of numba's cache
-SOURCE = source_key(write_sample, share_pump)
+SOURCE = source_key(write_sample, share_pump, hold)
 QUASI_STATIC: dict[Callable[..., None], bool] = {roll: False, roll_quasi_static: True}
 """which branch of `_roll_some` is a rollout's: numba's cache takes no function that is
 handed over"""
@@ -63,7 +64,7 @@ class PlantRows(NamedTuple):
     """What n plants have, each with a row; `addresses` are those in MuJoCo, in the
     order of `_addresses`."""
 
-    addresses: Ints  # (n, 10)
+    addresses: Ints  # (n, 11)
     coefficients: Any  # (n, J), of COEFFICIENTS
     state: Any  # (n, J), of JOINT_STATE
     commands: Array  # (n, past + steps, J)
@@ -81,7 +82,8 @@ def _addresses(plant: Plant) -> list[int]:
         data.M,
         data.qfrc_applied,
         model.dof_armature,
-        data.qfrc_bias,
+        model.body_mass,
+        model.body_ipos,
         model.qpos_spring,
         data.warning.number,
     ]
@@ -102,6 +104,7 @@ def _roll_some(
     of all."""
     joints = shared.angle.size
     entries = shared.mass.size
+    bodies = shared.links.size
     # a warning of MuJoCo's has two numbers: every other one is its count
     numbers = 2 * shared.warnings.size - 1
     nothing = np.empty(0)
@@ -119,13 +122,15 @@ def _roll_some(
             mass=_floats(at[4], entries),
             applied=_floats(at[5], joints),
             armature=_floats(at[6], joints),
-            warnings=carray(_pointer(at[9]), (numbers,), np.int32)[::2],
+            warnings=carray(_pointer(at[10]), (numbers,), np.int32)[::2],
             columns=shared.columns,
             bare_armature=shared.bare_armature,
             pushed=shared.pushed,
             steps=shared.steps,
-            gravity=_floats(at[7], joints),
-            slack=_floats(at[8], joints),
+            links=shared.links,
+            body_mass=_floats(at[7], bodies),
+            body_centre=_floats(at[8], 3 * bodies).reshape((bodies, 3)),
+            slack=_floats(at[9], joints),
             limits=shared.limits,
         )
         actuators = Plugin(
@@ -377,7 +382,7 @@ class PlantBatch:
         self._gain = np.empty((n, len(self._columns)))
         self._balance = np.empty((n, len(self._columns)))
         self._plant_rows = PlantRows(
-            addresses=np.empty((n, 10), np.int64),
+            addresses=np.empty((n, 11), np.int64),
             coefficients=np.zeros((n, joints), parts.plugin.coefficients.dtype),
             state=np.zeros((n, joints), parts.state.dtype),
             commands=np.zeros((n, self._past + steps, joints)),

@@ -30,7 +30,7 @@ what a log shows of both, a natural frequency and a damping ratio (`overshoot`).
 from typing import Any
 
 import numpy as np
-from numba import njit, types
+from numba import njit
 
 from hydroid.hydraulics.cylinder import weigh
 from hydroid.hydraulics.elementwise import compilable
@@ -39,13 +39,10 @@ from hydroid.hydraulics.kernel import Plugin, make_pad, source_key
 from hydroid.hydraulics.oil import overshoot, store_oil
 from hydroid.hydraulics.pump import begin_line, centre_left, come_up, line_pressure
 from hydroid.hydraulics.valve import rod_speed
-from hydroid.simulation.rollout import mujoco_function, write_sample
+from hydroid.simulation.gravity import hold, load_links
+from hydroid.simulation.rollout import write_sample
 
-_kinematics = mujoco_function("mj_kinematics", types.intp, types.intp)
-_com_pos = mujoco_function("mj_comPos", types.intp, types.intp)
-_rne = mujoco_function("mj_rne", types.intp, types.intp, types.int32, types.intp)
-
-SOURCE = source_key(write_sample)
+SOURCE = source_key(write_sample, hold)
 
 
 @compilable
@@ -115,6 +112,9 @@ def roll_quasi_static(
     pad = make_pad(plugin.order.size)
     work = pad.joints
     line = pad.line[0]
+    links = arm.links.copy()
+    load_links(links, arm.body_mass, arm.body_centre)
+    held = np.empty(arm.angle.size)
     for k in range(steps):
         now = past + k
         # of states that nobody reads, only the last is stored
@@ -137,16 +137,14 @@ def roll_quasi_static(
             else:
                 w.open_area = mean_opening(c, z, w, commands[:, j], now, plugin)
             demanded |= commands[now, j] != 0.0
-        _kinematics(arm.model, arm.data)
-        _com_pos(arm.model, arm.data)
-        _rne(arm.model, arm.data, 0, arm.gravity.ctypes.data)
+        hold(links, arm.angle, held)
         for a in range(driven.size):
             j = driven[a]
             c = coefficients[j]
             column = arm.columns[j]
             angle = arm.angle[column]
             spring = c.stiffness * (angle - arm.slack[column])
-            weigh(c, work[j], angle, arm.gravity[column] + spring)
+            weigh(c, work[j], angle, held[column] + spring)
         line.taken = taken[k] if taken.size else 0.0
         pressure = np.inf
         if driven.size:

@@ -32,10 +32,12 @@ from hydroid.arrays import Array, Index, Structs
 from hydroid.hydraulics.elementwise import compilable
 from hydroid.hydraulics.kernel import SOURCE, Plugin, look_ahead, make_pad, take_over
 from hydroid.hydraulics.records import COEFFICIENTS, JOINT_STATE
+from hydroid.simulation.gravity import LINK
 
 _log = logging.getLogger(__name__)
 
 NO_JOINTS = np.empty(0, np.intp)
+NO_LINKS = np.empty(0, LINK)
 NO_ACTUATORS = Plugin(
     np.empty(0, COEFFICIENTS), NO_JOINTS, np.empty((0, 0), np.intp), 0, 0.0, 1
 )
@@ -73,8 +75,11 @@ class Handles(NamedTuple):
     bare_armature: Array  # the arm's own, without oil, of these [kg·m²], (J,)
     pushed: Index  # the other joints, (P,)
     steps: int  # in one sample
-    # torques that hold the arm, where a rollout asks for them [N·m], (V,)
-    gravity: Array
+    # the bodies, the world first, (V + 1,) of `gravity.LINK`; empty where a rollout asks
+    # for no gravity
+    links: Structs
+    body_mass: Array  # of these [kg], (V + 1,)
+    body_centre: Array  # of these, in their frames [m], (V + 1, 3)
     slack: Array  # angles at which springs are slack [rad], (V,)
     limits: Array  # of the angles [rad], (V, 2)
 
@@ -116,6 +121,7 @@ class SteppedArm:
         steps: of MuJoCo in one sample.
         rollout: the compiled one, with the arguments of `roll`, which it is by default.
         copies: how often the arm is in the model.
+        links: as of `Handles`.
 
     Attributes:
         model, data: with the values of the candidate that was started last, and its
@@ -129,6 +135,7 @@ class SteppedArm:
         steps: int = 1,
         rollout: Callable[..., None] | None = None,
         copies: int = 1,
+        links: Structs = NO_LINKS,
     ) -> None:
         self._roll = rollout or roll
         self.copies = copies
@@ -153,7 +160,9 @@ class SteppedArm:
             bare_armature=self._armature[columns],
             pushed=np.setdiff1d(np.arange(m.nv), columns),
             steps=steps,
-            gravity=d.qfrc_bias,
+            links=links,
+            body_mass=m.body_mass,
+            body_centre=m.body_ipos,
             slack=m.qpos_spring,
             limits=np.where(m.jnt_limited[:, None], m.jnt_range, endless),
         )
@@ -203,7 +212,7 @@ class SteppedArm:
 
         `state` is its actuators', (J,) of JOINT_STATE: steps change it.
         """
-        self._roll(self._handles, plugin, state, course, trace)
+        call_compiled(self._roll, self._handles, plugin, state, course, trace)
 
     @property
     def handles(self) -> Handles:
@@ -222,20 +231,57 @@ def bind(compiled: Any, *arguments: Any) -> Callable[[], object]:
     `source`, is left out.
 
     It takes 3 µs beside the function itself. Without it numba looks at the types at
-    every call, and may take 1 ms for those of structured arrays.
+    every call, and takes 1 ms or more for those of structured arrays.
     """
+    return partial(_entry(compiled, arguments), *arguments, _source(compiled))
+
+
+_entries: dict[Any, Callable[..., object]] = {}
+"""what `call_compiled` calls, by the function and the kinds of its arguments"""
+
+
+def call_compiled(compiled: Any, *arguments: Any) -> None:
+    """Call a compiled function as `bind` does, for arguments that are others each time:
+    numba looks at their types only where their kinds are new."""
+    key = (compiled, *map(_kind, arguments))
+    entry = _entries.get(key)
+    if entry is None:
+        entry = _entry(compiled, arguments)
+        _entries[key] = entry
+    entry(*arguments, _source(compiled))
+
+
+def _entry(compiled: Any, arguments: Sequence[Any]) -> Callable[..., object]:
+    """Return a compiled function for the types of its arguments, `source` left out."""
+    omitted = types.Omitted(_source(compiled).value)
+    return compiled.compile((*map(typeof, arguments), omitted))
+
+
+def _source(compiled: Any) -> OmittedArg:
     (source,) = compiled.py_func.__defaults__
-    kinds = (*map(typeof, arguments), types.Omitted(source))
-    return partial(compiled.compile(kinds), *arguments, OmittedArg(source))
+    return OmittedArg(source)
+
+
+def _kind(argument: Any) -> Any:
+    """Return what the type of an argument depends on for numba, or what tells more
+    apart."""
+    if isinstance(argument, np.ndarray):
+        return argument.dtype, argument.ndim, argument.flags.num
+    if isinstance(argument, tuple):
+        return type(argument), *map(_kind, argument)
+    return type(argument)
 
 
 @compilable
 def write_sample(arm, trace, state, k: int) -> None:
     """Write the sample that step k ends, if it ends one."""
     if (k + 1) % arm.steps == 0:
-        trace.angle[k // arm.steps] = arm.angle
+        sample = k // arm.steps
+        # a loop: numba first looks whether two arrays overlap
+        for i in range(arm.angle.size):
+            trace.angle[sample, i] = arm.angle[i]
         if trace.states.size:
-            trace.states[k // arm.steps] = state
+            trace.states[sample] = state
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

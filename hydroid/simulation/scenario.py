@@ -19,8 +19,9 @@ from hydroid.log import Log
 from hydroid.rungs import GAIN, Stepping
 from hydroid.settings.arm import Arm
 from hydroid.settings.problem import SimulationSettings
+from hydroid.simulation.gravity import make_links
 from hydroid.simulation.roles import Roles, roles
-from hydroid.simulation.rollout import SteppedArm
+from hydroid.simulation.rollout import NO_LINKS, SteppedArm
 from hydroid.simulation.rolls import ROLLS
 
 ARMATURE = 1e6
@@ -140,6 +141,11 @@ class Response:
     pressure: Array
     flow: Array
     line: Array
+
+    def __getitem__(self, rows: slice | Index) -> "Response":
+        return Response(
+            self.angle[rows], self.pressure[rows], self.flow[rows], self.line[rows]
+        )
 
 
 class Scenario:
@@ -280,12 +286,15 @@ class Chain:
         entries[columns, rows] = np.arange(model.nC)
         self._entries = entries[np.ix_(self.columns, self.columns)]
         self._period = model.opt.timestep
+        self._links = NO_LINKS
+        if stepping.rung.at_once:
+            self._links = make_links(model)
 
     def stepped(self, model: mujoco.MjModel, steps: int, copies: int = 1) -> SteppedArm:
         """Return the arm of a model, or several copies of it, to be rolled out as its
         rung is, with a sample after so many steps."""
         roll = ROLLS[self._stepping.rung]
-        return SteppedArm(model, self.columns, steps, roll, copies)
+        return SteppedArm(model, self.columns, steps, roll, copies, self._links)
 
     def start(
         self,

@@ -129,13 +129,7 @@ class Simulation:
             return response
         self._fill(response, rows, candidates[rows], threads)
         if len(first) < n:
-            every = first[alike]
-            return Response(
-                response.angle[every],
-                response.pressure[every],
-                response.flow[every],
-                response.line[every],
-            )
+            return response[first[alike]]
         return response
 
     def _fill(
@@ -206,9 +200,10 @@ class Simulation:
         Actuators need an arm of their own; MuJoCo integrates one without any damping
         otherwise.
         """
+        if self.joints.size:
+            return 1
         damping = self.scenario.values(candidates)["dof_damping"]
-        damped = (damping > 0.0).any(axis=1)
-        if self.joints.size or not damped.all():
+        if not (damping > 0.0).any(axis=1).all():
             return 1
         n = len(candidates)
         most = TOGETHER // len(self.scenario.arm.columns)

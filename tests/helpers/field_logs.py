@@ -403,7 +403,7 @@ FIELD_LOGS = (
     FieldLog(
         "a draw wire that is too short",
         wires("wire_mm", 0, 400, clip=0.6),
-        "stands to the last digit",
+        "is frozen",
     ),
     FieldLog("an encoder that slips", changed(_jump), "jumps by"),
     FieldLog(

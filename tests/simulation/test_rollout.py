@@ -13,7 +13,14 @@ import pytest
 from hydroid.hydraulics import kernel
 from hydroid.plant import batch
 from hydroid.settings import linkage
-from hydroid.simulation import openings, quasi_static, rollout, settled, steady
+from hydroid.simulation import (
+    gravity,
+    openings,
+    quasi_static,
+    rollout,
+    settled,
+    steady,
+)
 from hydroid.simulation.rollout import SteppedArm
 
 ARM = "<mujoco><worldbody><body><joint/><geom size='1'/></body></worldbody></mujoco>"
@@ -69,10 +76,13 @@ def inlined(function: FunctionType, seen: set[FunctionType]) -> Iterator[Path]:
     ("compiled", "more"),
     [
         (rollout.roll, []),
-        (quasi_static.roll_quasi_static, [rollout.write_sample]),
+        (quasi_static.roll_quasi_static, [rollout.write_sample, gravity.hold]),
         (openings._open, []),  # pyright: ignore[reportPrivateUsage]
         (steady._steady, []),  # pyright: ignore[reportPrivateUsage]
-        (batch._roll_some, [rollout.write_sample, quasi_static.share_pump]),  # pyright: ignore[reportPrivateUsage]
+        (
+            batch._roll_some,  # pyright: ignore[reportPrivateUsage]
+            [rollout.write_sample, quasi_static.share_pump, gravity.hold],
+        ),
         (settled._settle, [steady.balanced_speed]),  # pyright: ignore[reportPrivateUsage]
     ],
 )

@@ -281,12 +281,15 @@ def _rests_in_the_middle(
 def _comes_near_zero(
     signal: CommandSignal, values: Array, rests: tuple[float, float]
 ) -> bool:
-    """Return whether cells, (R,), of a signal around 0 are ever near it: counts must
-    be."""
+    """Return whether cells of a signal around 0 are ever near it: counts must be."""
+    return signal.low < 0 and (signal.half <= 100 or comes_near_zero(values))
+
+
+def comes_near_zero(values: Array) -> bool:
+    """Return whether any of the cells of a command, (R,) without NaN, is near 0."""
     low = values.min()
     high = values.max()
-    is_near = low <= NEAR_ZERO * high and high >= NEAR_ZERO * low
-    return signal.low < 0 and bool(signal.half <= 100 or is_near)
+    return bool(low <= NEAR_ZERO * high and high >= NEAR_ZERO * low)
 
 
 def _rests_beside(

@@ -350,7 +350,8 @@ def _remarks(motion: JointMotion, joint: Joint, wrong: bool) -> Iterator[str]:
         _, against = motion.directed
         share = f"on {max(against, 1 - against):.0%} of its way"
         yield f"{joint.name} moves against its command ({share}): the command's sign is reversed"
-    if motion.log.drives(motion.joint) and motion.dead_band > 10:
+    moves = np.ptp(angle) > 0 and motion.log.drives(motion.joint)
+    if moves and motion.dead_band > 10:
         below = f"below about {motion.dead_band:g} % of command"
         yield f"{joint.name} hardly moves {below}: a dead band, or little opening"
 

@@ -481,7 +481,7 @@ def followed(
     words = ["followed", "--log", "log.csv"]
     found = follow(folder, words, "other.csv", budget, known)
     speeds = _speeds(make_truth(log.steps, arm), arm)
-    found = judged(found, speeds)
+    found = judged(found, speeds, max(map(abs, log.steps)))
     return Outcome(found.verdict, found.line)
 
 

@@ -174,3 +174,20 @@ def test_counts_around_0_of_one_log_have_one_scale(tmp_path: Path) -> None:
     hints = [one.hint for one in findings if one.level == "error"]
     assert len(hints) == 2
     assert all("in ±2047" in hint for hint in hints)
+
+
+def test_a_command_that_is_never_near_0_tells_no_range(tmp_path: Path) -> None:
+    """Of one that tells it the others have theirs, and rest where they begin."""
+    path = tmp_path / "log.csv"
+    joints = ["swing", "boom", "stick"]
+    names = ["time_s", *(f"cmd_{n}" for n in joints), *(f"angle_{n}" for n in joints)]
+    duty = [7.47 + 0.025 * STEPS, 6.9 + 0.005 * STEPS, 0 * STEPS + 7.6]
+    columns = [T, *duty, *(20 * np.sin(k * T) for k in (0.2, 0.3, 0.4))]
+    header = ",".join(names)
+    np.savetxt(path, np.stack(columns, 1), delimiter=",", header=header, comments="")
+    settings = LogSettings.model_validate(guess_columns([open_table(path)], joints).log)
+    for joint, cell in enumerate((7.47, 6.9, 7.6), 1):
+        command = settings.columns("command", joint)
+        assert command is not None
+        assert command.scale == pytest.approx(40, rel=0.05)
+        assert command.scale * cell + command.offset == pytest.approx(0, abs=0.01)
